@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/cl/context.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cstdlib>
+#include <functional>
+
+#include "skeletex/cl/kernel_source.h"
+#include "skeletex/model/error.h"
+
+namespace skeletex {
+namespace {
+
+/// The OpenCL codes that a user can meet, in words.
+std::string describe(cl_int code) {
+  switch (code) {
+    case CL_DEVICE_NOT_FOUND: return "no device found";
+    case CL_DEVICE_NOT_AVAILABLE: return "the device is not available";
+    case CL_COMPILER_NOT_AVAILABLE: return "the driver has no compiler";
+    case CL_MEM_OBJECT_ALLOCATION_FAILURE: return "the device's memory is exhausted";
+    case CL_OUT_OF_RESOURCES: return "the device ran out of resources";
+    case CL_OUT_OF_HOST_MEMORY: return "the host's memory is exhausted";
+    case CL_BUILD_PROGRAM_FAILURE: return "the program does not compile";
+    case CL_INVALID_BUFFER_SIZE: return "the buffer is larger than the device allows";
+    case CL_INVALID_KERNEL_NAME: return "the program has no such kernel";
+    case CL_INVALID_ARG_INDEX: return "the kernel has no such argument";
+    case CL_INVALID_ARG_SIZE: return "the argument has another size";
+    case CL_INVALID_KERNEL_ARGS: return "an argument is not set";
+    case CL_INVALID_WORK_GROUP_SIZE: return "the work-group does not fit the device";
+    case CL_INVALID_VALUE: return "a value is out of range";
+    default: return fmt::format("OpenCL error {}", code);
+  }
+}
+
+void check(cl_int code, std::string_view what) {
+  if (code != CL_SUCCESS) throw DeviceError(fmt::format("{}: {}", what, describe(code)));
+}
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+std::string text_of(const ::cl::Device& device, cl_device_info what) {
+  std::string text;
+  device.getInfo(what, &text);
+  while (!text.empty() && (text.back() == '\0' || text.back() == ' ')) text.pop_back();
+  return text;
+}
+
+std::vector<std::pair<ClDeviceInfo, ::cl::Device>> enumerate() {
+  std::vector<std::pair<ClDeviceInfo, ::cl::Device>> found;
+  std::vector<::cl::Platform> platforms;
+  if (::cl::Platform::get(&platforms) != CL_SUCCESS) return found;
+  for (const ::cl::Platform& platform : platforms) {
+    std::vector<::cl::Device> devices;
+    if (platform.getDevices(CL_DEVICE_TYPE_ALL, &devices) != CL_SUCCESS) continue;
+    for (const ::cl::Device& device : devices) {
+      ClDeviceInfo info;
+      info.index = static_cast<int>(found.size());
+      platform.getInfo(CL_PLATFORM_NAME, &info.platform);
+      while (!info.platform.empty() && info.platform.back() == '\0') info.platform.pop_back();
+      info.name = text_of(device, CL_DEVICE_NAME);
+      info.driver = text_of(device, CL_DRIVER_VERSION);
+      info.version = text_of(device, CL_DEVICE_VERSION);
+      const auto type = device.getInfo<CL_DEVICE_TYPE>();
+      info.type = (type & CL_DEVICE_TYPE_GPU) ? "gpu" : (type & CL_DEVICE_TYPE_CPU) ? "cpu" : "accelerator";
+      info.compute_units = static_cast<int>(device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>());
+      info.global_memory_bytes = device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>();
+      info.max_allocation_bytes = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
+      info.max_work_group_size = device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>();
+      info.has_double = text_of(device, CL_DEVICE_EXTENSIONS).find("cl_khr_fp64") != std::string::npos;
+      found.emplace_back(std::move(info), device);
+    }
+  }
+  return found;
+}
+
+}  // namespace
+
+std::vector<ClDeviceInfo> list_devices() {
+  std::vector<ClDeviceInfo> infos;
+  for (auto& [info, device] : enumerate()) infos.push_back(std::move(info));
+  return infos;
+}
+
+ClContext::ClContext(const std::string& selector) {
+  const auto devices = enumerate();
+  if (devices.empty())
+    throw DeviceError("no OpenCL device found; install a driver (Debian: apt-get install pocl-opencl-icd runs OpenCL on the CPU)");
+  std::string wanted = selector;
+  if (wanted.empty())
+    if (const char* variable = std::getenv("SKELETEX_DEVICE")) wanted = variable;
+  wanted = lower(wanted);
+
+  const auto pick = [&](const std::function<bool(const ClDeviceInfo&)>& accepts) {
+    const auto it = std::find_if(devices.begin(), devices.end(), [&](const auto& d) { return accepts(d.first); });
+    return it == devices.end() ? -1 : static_cast<int>(it - devices.begin());
+  };
+  int chosen = -1;
+  if (wanted.empty()) {
+    chosen = pick([](const ClDeviceInfo& d) { return d.type == "gpu"; });
+    if (chosen < 0) chosen = 0;
+  } else if (int index = -1; std::from_chars(wanted.data(), wanted.data() + wanted.size(), index).ptr == wanted.data() + wanted.size()) {
+    chosen = index >= 0 && index < static_cast<int>(devices.size()) ? index : -1;
+  } else {
+    chosen = pick([&](const ClDeviceInfo& d) {
+      return d.type == wanted || lower(d.name).find(wanted) != std::string::npos || lower(d.platform).find(wanted) != std::string::npos;
+    });
+  }
+  if (chosen < 0) {
+    std::string list;
+    for (const auto& [info, device] : devices) list += fmt::format("\n  {}: {} ({}, {})", info.index, info.name, info.type, info.platform);
+    throw DeviceError(fmt::format("no OpenCL device matches \"{}\"; there are:{}", wanted, list));
+  }
+  info_ = devices[chosen].first;
+  device_ = devices[chosen].second;
+  cl_int code = CL_SUCCESS;
+  context_ = ::cl::Context(device_, nullptr, nullptr, nullptr, &code);
+  check(code, "creating an OpenCL context");
+  queue_ = ::cl::CommandQueue(context_, device_, CL_QUEUE_PROFILING_ENABLE, &code);
+  check(code, "creating an OpenCL queue");
+}
+
+ClContext::~ClContext() = default;
+
+::cl::Buffer ClContext::allocate_bytes(std::size_t bytes) {
+  cl_int code = CL_SUCCESS;
+  ::cl::Buffer buffer(context_, CL_MEM_READ_WRITE, std::max<std::size_t>(bytes, 16), nullptr, &code);
+  check(code, fmt::format("allocating {:.1f} MiB on {}", static_cast<double>(bytes) / (1 << 20), info_.name));
+  return buffer;
+}
+
+void ClContext::write_bytes(const ::cl::Buffer& buffer, const void* data, std::size_t bytes) {
+  if (bytes > 0) check(queue_.enqueueWriteBuffer(buffer, CL_TRUE, 0, bytes, data), "writing to the device");
+}
+
+void ClContext::read_bytes(const ::cl::Buffer& buffer, void* data, std::size_t bytes) {
+  if (bytes > 0) check(queue_.enqueueReadBuffer(buffer, CL_TRUE, 0, bytes, data), "reading from the device");
+}
+
+void ClContext::fill_bytes(const ::cl::Buffer& buffer, const void* pattern, std::size_t pattern_bytes, std::size_t bytes) {
+  if (bytes > 0)
+    check(::clEnqueueFillBuffer(queue_(), buffer(), pattern, pattern_bytes, 0, bytes, 0, nullptr, nullptr), "filling a device buffer");
+}
+
+::cl::Kernel ClContext::get_kernel(const ClKernelName& name) {
+  const std::string key = fmt::format("{}|{}|{}", name.file, name.options, name.kernel);
+  if (const auto it = kernels_.find(key); it != kernels_.end()) return it->second;
+
+  const std::string program_key = fmt::format("{}|{}", name.file, name.options);
+  auto program = programs_.find(program_key);
+  if (program == programs_.end()) {
+    const std::string options = fmt::format("-cl-std=CL1.2 {}", name.options);
+    // The hash guards against drivers whose kernel cache overlooks a change of options.
+    const std::string body = kernel_source(name.file);
+    const std::string source = fmt::format("// {:016x}\n#line 1 \"{}\"\n{}", std::hash<std::string>{}(options + body), name.file, body);
+    cl_int code = CL_SUCCESS;
+    ::cl::Program built(context_, source, false, &code);
+    check(code, fmt::format("{}: creating the program", name.file));
+    code = built.build({device_}, options.c_str());
+    if (code != CL_SUCCESS) {
+      std::string log;
+      built.getBuildInfo(device_, CL_PROGRAM_BUILD_LOG, &log);
+      throw DeviceError(fmt::format("{}: {} on {}\n{}", name.file, describe(code), info_.name, log));
+    }
+    program = programs_.emplace(program_key, built).first;
+  }
+  cl_int code = CL_SUCCESS;
+  ::cl::Kernel kernel(program->second, std::string(name.kernel).c_str(), &code);
+  check(code, fmt::format("{}: kernel {}", name.file, name.kernel));
+  return kernels_.emplace(key, kernel).first->second;
+}
+
+void ClContext::check_argument(cl_int code, const ClKernelName& name, unsigned index) {
+  check(code, fmt::format("{}: kernel {}, argument {}", name.file, name.kernel, index));
+}
+
+void ClContext::enqueue(const ::cl::Kernel& kernel, const ClKernelName& name, const ClRange& range) {
+  if (range.global[0] == 0 || range.global[1] == 0) return;
+  std::array<std::size_t, 2> global = range.global;
+  const bool has_local = range.local[0] > 0;
+  if (has_local)
+    for (int d = 0; d < 2; ++d) global[d] = (global[d] + range.local[d] - 1) / range.local[d] * range.local[d];
+  ::cl::Event event;
+  const cl_int code = queue_.enqueueNDRangeKernel(kernel, ::cl::NullRange, ::cl::NDRange(global[0], global[1]),
+                                                  has_local ? ::cl::NDRange(range.local[0], range.local[1]) : ::cl::NullRange, nullptr, &event);
+  check(code, fmt::format("{}: launching {}", name.file, name.kernel));
+  pending_.push_back({fmt::format("{}:{}", name.file, name.kernel), event});
+  if (pending_.size() >= 1024) collect_events();
+}
+
+void ClContext::finish() { check(queue_.finish(), "waiting for the device"); }
+
+void ClContext::collect_events() {
+  finish();
+  for (const PendingEvent& pending : pending_) {
+    cl_ulong begin = 0, end = 0;
+    pending.event.getProfilingInfo(CL_PROFILING_COMMAND_START, &begin);
+    pending.event.getProfilingInfo(CL_PROFILING_COMMAND_END, &end);
+    ClProfileEntry& entry = profile_[pending.kernel];
+    entry.kernel = pending.kernel;
+    ++entry.launches;
+    entry.milliseconds += static_cast<double>(end - begin) * 1e-6;
+  }
+  pending_.clear();
+}
+
+std::vector<ClProfileEntry> ClContext::profile() {
+  collect_events();
+  std::vector<ClProfileEntry> entries;
+  for (const auto& [kernel, entry] : profile_) entries.push_back(entry);
+  std::sort(entries.begin(), entries.end(), [](const auto& a, const auto& b) { return a.milliseconds > b.milliseconds; });
+  return entries;
+}
+
+void ClContext::reset_profile() {
+  collect_events();
+  profile_.clear();
+}
+
+std::size_t ClContext::work_group_size(const ClKernelName& name, std::size_t wanted) {
+  std::size_t limit = 1;
+  get_kernel(name).getWorkGroupInfo(device_, CL_KERNEL_WORK_GROUP_SIZE, &limit);
+  return std::max<std::size_t>(1, std::min(wanted, limit));
+}
+
+}  // namespace skeletex

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <CL/opencl.hpp>
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+namespace skeletex {
+
+struct ClDeviceInfo {
+  int index = 0;         ///< position in list_devices()
+  std::string platform;  ///< "Portable Computing Language"
+  std::string name;
+  std::string driver;
+  std::string version;  ///< "OpenCL 3.0 ..."
+  std::string type;     ///< "cpu", "gpu", "accelerator"
+  int compute_units = 0;
+  std::uint64_t global_memory_bytes = 0;
+  std::uint64_t max_allocation_bytes = 0;
+  std::size_t max_work_group_size = 0;
+  bool has_double = false;
+};
+
+/// All devices of all platforms, in the driver loader's order; empty where no driver is installed.
+std::vector<ClDeviceInfo> list_devices();
+
+/// Device memory for `size` values of T. Owned; moves.
+template <class T>
+struct ClBuffer {
+  ::cl::Buffer memory;
+  std::size_t size = 0;
+};
+
+/// Work-group local memory of `bytes`, as a kernel argument.
+struct ClLocal {
+  std::size_t bytes;
+};
+
+/// A kernel by its file in `kernels/` and its name; `options` are -D flags.
+struct ClKernelName {
+  std::string_view file;  ///< "vsm.cl"
+  std::string_view kernel;
+  std::string_view options = "";
+};
+
+/// Global and local size of a launch. A local size of 0 leaves it to the driver; otherwise the global size is rounded
+/// up to a multiple of it, so that every kernel tests its bounds first.
+struct ClRange {
+  std::array<std::size_t, 2> global{1, 1};
+  std::array<std::size_t, 2> local{0, 0};
+  ClRange(std::size_t x) : global{x, 1} {}
+  ClRange(std::size_t x, std::size_t y) : global{x, y} {}
+  ClRange(std::array<std::size_t, 2> global_size, std::array<std::size_t, 2> local_size) : global(global_size), local(local_size) {}
+};
+
+/// Time on the device that the launches of one kernel took together.
+struct ClProfileEntry {
+  std::string kernel;
+  int launches = 0;
+  double milliseconds = 0;
+};
+
+/// The one owner of OpenCL state: device, context, an in-order queue, programs and profiling events.
+/// Not safe for use by several threads at once.
+class ClContext {
+ public:
+  /// \param selector  index of list_devices(), or a part of a device's or platform's name (any case), or "cpu" / "gpu";
+  ///                  empty: the variable SKELETEX_DEVICE, else the first GPU, else the first device
+  /// \throw DeviceError listing the devices when none matches
+  explicit ClContext(const std::string& selector = "");
+  ~ClContext();
+  ClContext(const ClContext&) = delete;
+  ClContext& operator=(const ClContext&) = delete;
+
+  const ClDeviceInfo& device() const { return info_; }
+
+  template <class T>
+  ClBuffer<T> allocate(std::size_t size) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    return {allocate_bytes(size * sizeof(T)), size};
+  }
+  /// A device copy of host values. An empty span gives a buffer of one value, as OpenCL has no empty ones.
+  template <class T>
+  ClBuffer<std::remove_const_t<T>> upload(std::span<T> values) {
+    auto buffer = allocate<std::remove_const_t<T>>(values.size());
+    write_bytes(buffer.memory, values.data(), values.size_bytes());
+    return buffer;
+  }
+  template <class T>
+  ClBuffer<T> upload(const std::vector<T>& values) {
+    return upload(std::span<const T>(values));
+  }
+  template <class T>
+  void write(ClBuffer<T>& buffer, const std::vector<T>& values) {
+    write_bytes(buffer.memory, values.data(), values.size() * sizeof(T));
+  }
+  /// Waits for the queue and copies the whole buffer to the host.
+  template <class T>
+  std::vector<T> download(const ClBuffer<T>& buffer) {
+    std::vector<T> values(buffer.size);
+    read_bytes(buffer.memory, values.data(), values.size() * sizeof(T));
+    return values;
+  }
+  /// Sets every byte of the buffer to that of a repeated 4-byte pattern.
+  template <class T>
+  void fill(ClBuffer<T>& buffer, std::type_identity_t<T> value) {
+    static_assert(sizeof(T) == 4);
+    fill_bytes(buffer.memory, &value, sizeof(T), buffer.size * sizeof(T));
+  }
+
+  /// Queues a kernel. Arguments: ClBuffer, ClLocal, or trivially copyable scalars of the kernel's own types (int,
+  /// unsigned, float). Programs are built on first use and kept.
+  /// \throw DeviceError naming the kernel, the failing call and its code in words; for a build the log with its lines
+  template <class... Args>
+  void launch(const ClKernelName& name, const ClRange& range, const Args&... args) {
+    ::cl::Kernel kernel = get_kernel(name);
+    unsigned index = 0;
+    (set_argument(kernel, name, index++, args), ...);
+    enqueue(kernel, name, range);
+  }
+  void finish();
+
+  /// Launches since the last reset, by kernel, longest first. Waits for the queue.
+  std::vector<ClProfileEntry> profile();
+  void reset_profile();
+
+  /// The largest work-group, at most `wanted`, that this kernel can run with here.
+  std::size_t work_group_size(const ClKernelName& name, std::size_t wanted);
+
+  const ::cl::Context& handle() const { return context_; }
+  const ::cl::CommandQueue& queue() const { return queue_; }
+
+ private:
+  ::cl::Kernel get_kernel(const ClKernelName& name);
+  ::cl::Buffer allocate_bytes(std::size_t bytes);
+  void write_bytes(const ::cl::Buffer& buffer, const void* data, std::size_t bytes);
+  void read_bytes(const ::cl::Buffer& buffer, void* data, std::size_t bytes);
+  void fill_bytes(const ::cl::Buffer& buffer, const void* pattern, std::size_t pattern_bytes, std::size_t bytes);
+  void enqueue(const ::cl::Kernel& kernel, const ClKernelName& name, const ClRange& range);
+  static void check_argument(cl_int code, const ClKernelName& name, unsigned index);
+
+  template <class T>
+  static void set_argument(::cl::Kernel& kernel, const ClKernelName& name, unsigned index, const ClBuffer<T>& buffer) {
+    check_argument(::clSetKernelArg(kernel(), index, sizeof(cl_mem), &buffer.memory()), name, index);
+  }
+  static void set_argument(::cl::Kernel& kernel, const ClKernelName& name, unsigned index, const ClLocal& local) {
+    check_argument(::clSetKernelArg(kernel(), index, local.bytes, nullptr), name, index);
+  }
+  template <class T>
+    requires std::is_arithmetic_v<T>
+  static void set_argument(::cl::Kernel& kernel, const ClKernelName& name, unsigned index, const T& value) {
+    static_assert(sizeof(T) == 4, "pass int, unsigned or float: the kernel's own type");
+    check_argument(::clSetKernelArg(kernel(), index, sizeof(T), &value), name, index);
+  }
+
+  struct PendingEvent {
+    std::string kernel;
+    ::cl::Event event;
+  };
+  void collect_events();
+
+  ClDeviceInfo info_;
+  ::cl::Device device_;
+  ::cl::Context context_;
+  ::cl::CommandQueue queue_;
+  std::map<std::string, ::cl::Program> programs_;
+  std::map<std::string, ::cl::Kernel> kernels_;
+  std::vector<PendingEvent> pending_;
+  std::map<std::string, ClProfileEntry> profile_;
+};
+
+}  // namespace skeletex

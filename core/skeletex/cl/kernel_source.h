@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace skeletex {
+
+struct EmbeddedKernelFile {
+  std::string_view name;  ///< "vsm.cl"
+  std::string_view text;
+};
+
+/// The files of `kernels/` as they were when the library was built.
+std::span<const EmbeddedKernelFile> embedded_kernel_files();
+
+/// Text of a kernel file: from the folder that SKELETEX_KERNEL_DIR names when it is set, else the embedded copy.
+/// Lines `#include "x.h"` are replaced by the file x.h, so that a program is one text on every driver.
+/// \throw DeviceError when the file does not exist
+std::string kernel_source(std::string_view file);
+
+}  // namespace skeletex

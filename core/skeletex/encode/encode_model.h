@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "skeletex/cl/context.h"
+#include "skeletex/model/texture.h"
+#include "skeletex/parameterize/spd.h"
+#include "skeletex/parameterize/vsm.h"
+
+namespace skeletex {
+
+enum class EncodeMethod { kSpd, kVsm, kHybrid };
+/// How rows are spread along a bone: evenly in surface length (the default), or evenly in the map's u (the paper).
+enum class RowSpacing { kSurfaceLength, kUniform };
+/// What a patch's share of the texels follows.
+enum class TexelShare { kTriangles, kArea };
+
+struct EncodeOptions {
+  int width = 512, height = 512;
+  EncodeMethod method = EncodeMethod::kVsm;
+  /// Hybrid: bones whose unseen share of area is above this take VSM, the others SPD.
+  double hybrid_unseen_threshold = 0.02;
+  /// Hybrid: bones by name whose method the user chose.
+  std::vector<std::pair<std::string, Method>> hybrid_overrides;
+  VsmOptions vsm;
+  SpdHit spd_hit = SpdHit::kLast;
+  RowSpacing row_spacing = RowSpacing::kSurfaceLength;
+  bool has_prefilter = true;
+  std::optional<TexelShare> texel_share;  ///< default: area for all-SPD models, triangles otherwise
+  /// Called with a stage's name and the share of work done; returning false cancels by throwing Error.
+  std::function<bool(const std::string& stage, double done)> progress;
+};
+
+struct BoneReport {
+  std::string name;
+  Method method = Method::kVsm;
+  SegmentTopology topology = SegmentTopology::kAnnulus;
+  double area = 0;  ///< world units squared
+  int vertices = 0, triangles = 0;
+  Rectangle rectangle;
+  double unseen_area_fraction = 0;
+  int flipped_triangles = 0;              ///< of the map; VSM only
+  double sampled_triangle_fraction = 0;   ///< share of the segment's triangles that a texel reads
+  int missed_texels = 0;                  ///< SPD rays that hit nothing, filled from their neighbours
+  VsmReport vsm;
+};
+
+struct EncodeReport {
+  int vertices = 0, triangles = 0, genus = 0;
+  double diagonal = 0;
+  std::vector<BoneReport> bones;
+  double used_fraction = 0;
+  double half_edge_ms = 0, segmentation_ms = 0, parameterization_ms = 0, encoding_ms = 0;
+  std::string device;
+};
+
+struct EncodeResult {
+  SkeletexModel model;
+  EncodeReport report;
+};
+
+/// Turns a closed mesh and its skeleton into a model (paper 3.1-3.4): half edges, segments, maps, atlas, texels.
+/// \pre validate_input reports no error      \throw TopologyError, InputError, DeviceError
+EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& skeleton, const EncodeOptions& options = {});
+
+}  // namespace skeletex

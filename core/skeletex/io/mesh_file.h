@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "skeletex/model/mesh.h"
+
+namespace skeletex {
+
+struct MeshFile {
+  TriangleMesh mesh;
+  int faces_in_file = 0;     ///< polygons as the file counts them
+  int triangles = 0;         ///< after polygons were split
+  int vertices_in_file = 0;
+  int merged_vertices = 0;   ///< equal positions welded (STL; other formats are not welded)
+};
+
+/// Reads OBJ, PLY (ascii, binary), OFF or STL through OpenMesh; faces are counted in and out, so that nothing the
+/// reader dislikes is dropped silently.
+/// \throw IoError naming the file, what is wrong and, where the format allows, the line
+MeshFile read_mesh(const std::filesystem::path& path);
+
+/// Extra per-vertex data for PLY.
+struct VertexColour {
+  unsigned char r, g, b;
+};
+struct PlyAttributes {
+  std::span<const VertexColour> vertex_colours;
+  std::span<const VertexColour> face_colours;
+  std::string vertex_property_name;  ///< with vertex_property: a float per vertex, e.g. "distance"
+  std::span<const float> vertex_property;
+};
+
+/// Writes binary PLY or OBJ by the ending, under a temporary name that is renamed when complete.
+/// \throw IoError (unknown ending, folder not writable, disk full): no file is left behind
+void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, const PlyAttributes& attributes = {});
+
+}  // namespace skeletex

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <stdexcept>
+#include <string>
+
+namespace skeletex {
+
+/// Base of everything the library throws. The message says what is wrong, where, and what to do about it.
+class Error : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+/// A file could not be read or written, or is not what its name says.
+class IoError : public Error {
+ public:
+  using Error::Error;
+};
+/// Mesh, skeleton or options are not usable as they are.
+class InputError : public Error {
+ public:
+  using Error::Error;
+};
+/// Mesh and skeleton do not fit together: a segment is no tube, disk or sphere.
+class TopologyError : public Error {
+ public:
+  using Error::Error;
+};
+/// An OpenCL call failed.
+class DeviceError : public Error {
+ public:
+  using Error::Error;
+};
+
+}  // namespace skeletex

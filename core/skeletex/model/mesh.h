@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+namespace skeletex {
+
+using Vec3 = Eigen::Vector3d;
+using Triangle = std::array<int, 3>;
+
+/// An indexed triangle mesh. Triangles are counter-clockwise seen from outside.
+struct TriangleMesh {
+  std::vector<Vec3> positions;
+  std::vector<Triangle> triangles;
+};
+
+struct BoundingBox {
+  Vec3 lower = Vec3::Zero();
+  Vec3 upper = Vec3::Zero();
+  Vec3 centre() const { return 0.5 * (lower + upper); }
+  /// Length of the diagonal: the unit in which the project states distances and tolerances ("diag").
+  double diagonal() const { return (upper - lower).norm(); }
+};
+
+/// Bounding box of all positions; zero for an empty mesh.
+BoundingBox bounding_box(const TriangleMesh& mesh);
+/// Area vector of a triangle: half the cross product of its edges, along the outward normal.
+Vec3 area_vector(const TriangleMesh& mesh, const Triangle& triangle);
+double surface_area(const TriangleMesh& mesh);
+/// Enclosed volume by the divergence theorem; negative when the mesh is inside out. \pre closed
+double signed_volume(const TriangleMesh& mesh);
+
+}  // namespace skeletex

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "skeletex/model/mesh.h"
+
+namespace skeletex {
+
+enum class BoneEnd { kHead = 0, kTail = 1 };
+
+struct Node {
+  std::string name;
+  Vec3 position = Vec3::Zero();
+};
+
+/// A bone from its head node to its tail node.
+struct Bone {
+  std::string name;
+  int head = -1;
+  int tail = -1;
+  std::optional<Vec3> s;  ///< direction of angle 0, as the file gives it; need not be unit or orthogonal
+};
+
+/// A graph of bones: a tree, or a graph with cycles (paper, Figure 12). A node may have any number of bones at it.
+struct Skeleton {
+  std::vector<Node> nodes;
+  std::vector<Bone> bones;
+};
+
+/// Orthonormal right-handed basis of a bone (paper 3.1): o along the bone, b = o x s. The angle about the bone runs
+/// from s towards b.
+struct BoneBasis {
+  Vec3 o, s, b;
+};
+
+/// A bone as seen from one of its end nodes.
+struct BoneAtNode {
+  int bone;
+  BoneEnd end;  ///< which end of the bone lies at the node
+};
+
+/// The bones at each node, in the order of the skeleton's bones.
+std::vector<std::vector<BoneAtNode>> bones_at_nodes(const Skeleton& skeleton);
+/// Unit direction from the node at `end` along the bone, away from that node.
+Vec3 direction_from(const Skeleton& skeleton, BoneAtNode bone);
+double bone_length(const Skeleton& skeleton, int bone);
+/// Position of the node at one end of a bone.
+const Vec3& end_position(const Skeleton& skeleton, int bone, BoneEnd end);
+int end_node(const Skeleton& skeleton, int bone, BoneEnd end);
+
+/// Bases of all bones. A given `s` is made orthonormal to o; a missing one is carried from a neighbouring bone with the
+/// smallest rotation (at a tail-to-head node the reflection in the wall, so nothing twists), breadth first from the
+/// first bone of each component, whose own s is the world axis least aligned with o, made orthogonal.
+/// \throw InputError naming a bone of no length, or one whose s is parallel to it
+std::vector<BoneBasis> bone_bases(const Skeleton& skeleton);
+
+/// Distance from a point to the bone segment [H,T].
+double distance_to_bone(const Vec3& point, const Vec3& head, const Vec3& tail);
+
+}  // namespace skeletex

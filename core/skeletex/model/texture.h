@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <array>
+#include <string>
+#include <vector>
+
+#include "skeletex/model/segment.h"
+#include "skeletex/model/skeleton.h"
+
+namespace skeletex {
+
+enum class Method { kSpd, kVsm };
+const char* to_string(Method method);
+const char* to_string(SegmentTopology topology);
+
+/// A rectangle of texels: columns [x, x + width), rows [y, y + height).
+struct Rectangle {
+  int x = 0, y = 0, width = 0, height = 0;
+};
+
+/// One bone's part of the texture. Row r is read at u = row_u[r], column j at v = j / width; v is periodic.
+/// Row 0 lies on the head's seam or pole, row height-1 on the tail's.
+struct Patch {
+  Rectangle rectangle;
+  Method method = Method::kVsm;
+  SegmentTopology topology = SegmentTopology::kAnnulus;
+  std::vector<double> row_u;  ///< height entries, increasing from 0 to 1
+};
+
+/// A point of a seam: its angle about the bone bones[0] of its arc (or corner), in turns, and its distance to the
+/// half-line from the node along that bone. The bones that meet there see the same distance.
+struct SeamSample {
+  double turn = 0;      ///< [0,1)
+  double distance = 0;  ///< world units
+};
+
+/// A point where three or more segments meet.
+struct SeamCorner {
+  int node = -1;
+  std::vector<int> bones;  ///< the bones that meet; the sample's angle is about bones[0]
+  SeamSample sample;
+};
+
+/// The shared boundary of two segments, stored once for both.
+struct SeamArc {
+  int node = -1;
+  std::array<int, 2> bones{-1, -1};
+  std::array<int, 2> corners{-1, -1};  ///< first and last corner; -1, -1 when closed
+  std::vector<SeamSample> samples;     ///< in the direction of growing v about bones[0]; without the corners
+  bool is_closed() const { return corners[0] < 0; }
+};
+
+/// How a patch's end runs through the seams.
+struct PatchEnd {
+  std::vector<ArcUse> arcs;  ///< in the direction of growing v; empty at a free end, which has a pole instead
+};
+
+/// The vector displacement texture: three planes, row-major, in bone tangent space. A texel is the direction from the
+/// foot W(u) to the surface in the frame (along, around, out), scaled to the distance e of the point from the bone
+/// segment, in world units. The frame (along, around, out) is left-handed: out x around = along.
+struct DisplacementTexture {
+  int width = 0, height = 0;
+  std::vector<float> along, around, out;
+};
+
+/// A model: one texture and what is needed to turn it back into a mesh.
+struct SkeletexModel {
+  Skeleton skeleton;  ///< bind pose, every bone with its s
+  Vec3 origin = Vec3::Zero();  ///< world position that device coordinates are relative to (the input's box centre)
+  double diagonal = 0;         ///< of the input mesh's bounding box
+  int genus = 0;
+  DisplacementTexture texture;
+  std::vector<Patch> patches;  ///< one per bone
+  std::vector<std::array<PatchEnd, 2>> ends;  ///< one pair per bone: head, tail
+  std::vector<SeamArc> arcs;
+  std::vector<SeamCorner> corners;
+  std::string encoder_settings;  ///< JSON object: the options and version of the encoder, for the record
+};
+
+}  // namespace skeletex

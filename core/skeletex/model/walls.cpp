@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/model/walls.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+
+namespace skeletex {
+
+Walls::Walls(const Skeleton& skeleton) : skeleton_(&skeleton), bases_(bone_bases(skeleton)), normals_(skeleton.bones.size()) {
+  for (const auto& at_node : bones_at_nodes(skeleton))
+    for (const BoneAtNode& i : at_node)
+      for (const BoneAtNode& j : at_node)
+        if (i.bone != j.bone)
+          normals_[i.bone][static_cast<int>(i.end)].push_back({j.bone, direction_from(skeleton, i) - direction_from(skeleton, j)});
+}
+
+Vec3 Walls::spoke(int bone, double turn) const {
+  const double angle = 2 * std::numbers::pi * turn;
+  return std::cos(angle) * bases_[bone].s + std::sin(angle) * bases_[bone].b;
+}
+
+double Walls::turn_of(int bone, const Vec3& offset) const {
+  const double turn = std::atan2(offset.dot(bases_[bone].b), offset.dot(bases_[bone].s)) / (2 * std::numbers::pi);
+  const double wrapped = turn - std::floor(turn);
+  return wrapped < 1 ? wrapped : 0;
+}
+
+namespace {
+
+/// x of the wall with normal n at the spoke; the wall's n.o is > 0 at the head and < 0 at the tail.
+double meet(const Vec3& normal, const Vec3& spoke, const Vec3& o) { return -spoke.dot(normal) / o.dot(normal); }
+
+}  // namespace
+
+double Walls::slope(int bone, BoneEnd end, double turn) const {
+  const auto& walls = normals_[bone][static_cast<int>(end)];
+  if (walls.empty()) return 0;
+  const Vec3 direction = spoke(bone, turn);
+  double best = meet(walls[0].normal, direction, bases_[bone].o);
+  for (const Neighbour& wall : walls) {
+    const double x = meet(wall.normal, direction, bases_[bone].o);
+    best = end == BoneEnd::kHead ? std::max(best, x) : std::min(best, x);
+  }
+  return best;
+}
+
+int Walls::neighbour(int bone, BoneEnd end, double turn) const {
+  const auto& walls = normals_[bone][static_cast<int>(end)];
+  const Vec3 direction = spoke(bone, turn);
+  int found = -1;
+  double best = 0;
+  for (const Neighbour& wall : walls) {
+    const double x = meet(wall.normal, direction, bases_[bone].o);
+    if (found < 0 || (end == BoneEnd::kHead ? x > best : x < best)) {
+      best = x;
+      found = wall.bone;
+    }
+  }
+  return found;
+}
+
+Vec3 Walls::seam_point(int bone, BoneEnd end, double turn, double distance) const {
+  const Vec3 f = (spoke(bone, turn) + slope(bone, end, turn) * bases_[bone].o).normalized();
+  const double cosine = f.dot(end == BoneEnd::kHead ? bases_[bone].o : Vec3(-bases_[bone].o));
+  const double r = cosine > 0 ? distance / std::sqrt(1 - cosine * cosine) : distance;
+  return end_position(*skeleton_, bone, end) + r * f;
+}
+
+double Walls::half_line_distance(int bone, BoneEnd end, const Vec3& point) const {
+  const Vec3 offset = point - end_position(*skeleton_, bone, end);
+  const Vec3 direction = end == BoneEnd::kHead ? bases_[bone].o : Vec3(-bases_[bone].o);
+  return (offset - std::max(0.0, offset.dot(direction)) * direction).norm();
+}
+
+}  // namespace skeletex

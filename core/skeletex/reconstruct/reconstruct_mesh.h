@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include "skeletex/cl/context.h"
+#include "skeletex/model/mesh.h"
+#include "skeletex/model/texture.h"
+
+namespace skeletex {
+
+/// A mesh from a model, in its bind pose, at the model's own resolution (paper 3.6). Closed, oriented, 2-manifold and
+/// of the input's genus by construction: inner rows are vertices of their own, seams and corners are shared polylines
+/// that both sides fill up to, poles are single vertices. Quads take the diagonal that is shorter on the surface.
+/// \throw DeviceError
+TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model);
+
+/// The same model with rectangles scaled to another texture size (longer side `size`, at least 4 x 4 each): texels are
+/// resampled as bind-pose positions, averaged where the lattice gets coarser, seams are kept and resampled.
+/// \throw InputError when the size is too small for the number of bones
+SkeletexModel resample_model(ClContext& context, const SkeletexModel& model, int size);
+
+}  // namespace skeletex

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+// Structs that host and device share. Read by C++20 and by OpenCL C 1.2; all members are 4 bytes wide, no padding.
+#ifndef SKELETEX_STRUCTS_H
+#define SKELETEX_STRUCTS_H
+
+#ifdef __OPENCL_VERSION__
+#define SKELETEX_INT int
+#else
+#include <cstdint>
+#define SKELETEX_INT std::int32_t
+namespace skeletex {
+#endif
+
+/// One bone's patch of the texture, as the kernels see it. Positions are relative to the model's origin.
+typedef struct PatchRecord {
+  float head[3];           ///< H
+  float length;            ///< L = |T - H|
+  float axis[3];           ///< o = (T - H) / L
+  float s[3];              ///< s, unit, orthogonal to o; angle 0
+  float b[3];              ///< b = o x s; angle pi/2
+  SKELETEX_INT x;          ///< left column of the rectangle in the texture
+  SKELETEX_INT y;          ///< first row of the rectangle in the texture
+  SKELETEX_INT width;      ///< columns, around the bone; v = column / width
+  SKELETEX_INT height;     ///< rows, along the bone; row 0 and row height-1 lie on seams or poles
+  SKELETEX_INT row_begin;  ///< first entry of this patch in the row table (RowRecord)
+  SKELETEX_INT column_begin;  ///< first entry of this patch in the column table (ColumnRecord)
+} PatchRecord;
+
+/// What the tangent frame needs along u: the foot W = H + station * L * o and the opening of the frame.
+typedef struct RowRecord {
+  float u;        ///< the row's map coordinate in [0,1]
+  float station;  ///< position of W between head (0) and tail (1)
+  float cap_cos;  ///< cosine of the cap's latitude, 1 outside caps
+  float cap_sin;  ///< signed sine of the cap's latitude, > 0 in the tail's cap, < 0 in the head's, 0 outside caps
+} RowRecord;
+
+/// What the tangent frame needs around v: s'(v) = cosine s + sine b and the slopes of the walls.
+typedef struct ColumnRecord {
+  float cosine;
+  float sine;
+  float slope_head;  ///< k_H(v): the head's wall is met at H + s'(v) + k_H o; 0 at a free end
+  float slope_tail;  ///< k_T(v)
+} ColumnRecord;
+
+#ifndef __OPENCL_VERSION__
+static_assert(sizeof(PatchRecord) == 4 * 19);
+static_assert(sizeof(RowRecord) == 16);
+static_assert(sizeof(ColumnRecord) == 16);
+}  // namespace skeletex
+#endif
+#undef SKELETEX_INT
+#endif
