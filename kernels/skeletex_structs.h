@@ -3,7 +3,7 @@
 #ifndef SKELETEX_STRUCTS_H
 #define SKELETEX_STRUCTS_H
 
-#ifdef __OPENCL_VERSION__
+#ifdef __OPENCL_C_VERSION__
 #define SKELETEX_INT int
 #else
 #include <cstdint>
@@ -42,7 +42,7 @@ typedef struct ColumnRecord {
   float slope_tail;  ///< k_T(v)
 } ColumnRecord;
 
-#ifndef __OPENCL_VERSION__
+#ifndef __OPENCL_C_VERSION__
 static_assert(sizeof(PatchRecord) == 4 * 19);
 static_assert(sizeof(RowRecord) == 16);
 static_assert(sizeof(ColumnRecord) == 16);

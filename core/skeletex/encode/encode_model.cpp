@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/encode/encode_model.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <map>
+
+#include <nlohmann/json.hpp>
+
+#include "skeletex/encode/read_texels.h"
+#include "skeletex/encode/row_profile.h"
+#include "skeletex/encode/sample_seams.h"
+#include "skeletex/model/error.h"
+#include "skeletex/pack/pack_atlas.h"
+#include "skeletex/segment/segment_mesh.h"
+
+namespace skeletex {
+namespace {
+
+class Stopwatch {
+ public:
+  /// Milliseconds since construction or the last call.
+  double lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const double ms = std::chrono::duration<double, std::milli>(now - start_).count();
+    start_ = now;
+    return ms;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+void check_options(const EncodeOptions& options, const Skeleton& skeleton) {
+  if (options.vsm.iterations < 0 || options.vsm.iterations > 100)
+    throw InputError(fmt::format("{} VSM iterations; give 0 to 100", options.vsm.iterations));
+  if (!(options.vsm.alpha >= 0 && options.vsm.alpha <= 1)) throw InputError(fmt::format("VSM alpha is {}; give 0 to 1", options.vsm.alpha));
+  if (!(options.hybrid_unseen_threshold >= 0)) throw InputError("the hybrid threshold is negative; give a share of area, such as 0.02");
+  for (const auto& [name, method] : options.hybrid_overrides)
+    if (std::none_of(skeleton.bones.begin(), skeleton.bones.end(), [&](const Bone& b) { return b.name == name; }))
+      throw InputError(fmt::format("a method is given for bone \"{}\", which the skeleton does not have", name));
+}
+
+std::vector<Method> choose_methods(const EncodeOptions& options, const Skeleton& skeleton, std::span<const double> unseen) {
+  std::vector<Method> methods(skeleton.bones.size(), options.method == EncodeMethod::kSpd ? Method::kSpd : Method::kVsm);
+  if (options.method != EncodeMethod::kHybrid) return methods;
+  for (std::size_t bone = 0; bone < methods.size(); ++bone)
+    methods[bone] = unseen[bone] > options.hybrid_unseen_threshold ? Method::kVsm : Method::kSpd;
+  for (const auto& [name, method] : options.hybrid_overrides)
+    for (std::size_t bone = 0; bone < methods.size(); ++bone)
+      if (skeleton.bones[bone].name == name) methods[bone] = method;
+  return methods;
+}
+
+/// The rays' own points on an even lattice in u: how surface length grows along an SPD patch.
+std::vector<RowProfile> spd_profiles(ClContext& context, const Skeleton& skeleton, const Walls& walls, std::span<const Chart> charts, SpdHit hit) {
+  constexpr int kRows = 257, kColumns = 64;
+  std::vector<Patch> probes(charts.size());
+  for (std::size_t i = 0; i < charts.size(); ++i) {
+    probes[i].rectangle = {0, 0, kColumns, kRows};
+    probes[i].row_u = spread_rows_uniformly(kRows);
+  }
+  const std::vector<SpdHits> hits = cast_spd_rays(context, skeleton, walls, charts, probes, hit);
+  std::vector<RowProfile> profiles;
+  for (std::size_t i = 0; i < charts.size(); ++i) {
+    std::vector<Vec3> points(static_cast<std::size_t>(kRows) * kColumns);
+    for (int j = 0; j < kColumns; ++j) {
+      // A ray that misses repeats the point before it, and adds no length.
+      int last_hit = -1;
+      for (int r = 0; r < kRows; ++r) {
+        const std::size_t at = static_cast<std::size_t>(r) * kColumns + j;
+        if (hits[i].triangles[at] >= 0) {
+          const TangentFrame frame = tangent_frame(skeleton, walls, charts[i].bone, probes[i].row_u[r], static_cast<double>(j) / kColumns);
+          points[at] = frame.foot + static_cast<double>(hits[i].distances[at]) * frame.out;
+          for (int q = last_hit < 0 ? 0 : r; q < r; ++q) points[static_cast<std::size_t>(q) * kColumns + j] = points[at];
+          last_hit = r;
+        } else if (last_hit >= 0) {
+          points[at] = points[static_cast<std::size_t>(last_hit) * kColumns + j];
+        }
+      }
+    }
+    profiles.push_back(row_profile(points, kRows, kColumns));
+  }
+  return profiles;
+}
+
+nlohmann::json settings_json(const EncodeOptions& options, const std::vector<double>& unseen) {
+  const char* method = options.method == EncodeMethod::kSpd ? "spd" : options.method == EncodeMethod::kVsm ? "vsm" : "hybrid";
+  nlohmann::json json{{"method", method},
+                      {"size", {options.width, options.height}},
+                      {"vsm", {{"iterations", options.vsm.iterations}, {"alpha", options.vsm.alpha}, {"stop_spread_change", options.vsm.stop_spread_change}}},
+                      {"rows", options.row_spacing == RowSpacing::kSurfaceLength ? "surface" : "uniform"},
+                      {"prefilter", options.has_prefilter},
+                      {"spd_hit", options.spd_hit == SpdHit::kFirst ? "first" : "last"}};
+  if (options.method == EncodeMethod::kHybrid) json["hybrid_unseen_threshold"] = options.hybrid_unseen_threshold;
+  if (!unseen.empty()) json["unseen_area_fractions"] = unseen;
+  return json;
+}
+
+/// Vertices where the pole of a chart's free end lies.
+int pole_of(const Chart& chart, ChartVertex kind) {
+  return static_cast<int>(std::find(chart.kinds.begin(), chart.kinds.end(), kind) - chart.kinds.begin());
+}
+
+}  // namespace
+
+EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& input_skeleton, const EncodeOptions& options) {
+  check_options(options, input_skeleton);
+  const auto progress = [&](const char* stage, double done) {
+    if (options.progress && !options.progress(stage, done)) throw Error("cancelled");
+  };
+  EncodeResult result;
+  EncodeReport& report = result.report;
+  SkeletexModel& model = result.model;
+  const int bones = static_cast<int>(input_skeleton.bones.size());
+
+  // The model's skeleton carries its angles of 0 with it.
+  model.skeleton = input_skeleton;
+  {
+    const std::vector<BoneBasis> bases = bone_bases(model.skeleton);
+    for (int bone = 0; bone < bones; ++bone) model.skeleton.bones[bone].s = bases[bone].s;
+  }
+  const Skeleton& skeleton = model.skeleton;
+  const Walls walls(skeleton);
+  const BoundingBox box = bounding_box(mesh);
+  model.origin = box.centre();
+  model.diagonal = box.diagonal();
+  // Euler's formula for a closed triangle mesh: edges are 3/2 of the triangles.
+  model.genus = (2 - (static_cast<int>(mesh.positions.size()) - static_cast<int>(mesh.triangles.size()) / 2)) / 2;
+
+  Stopwatch watch;
+  progress("half edges", 0);
+  const HalfEdgeMesh half_edges = build_half_edges(mesh);
+  report.half_edge_ms = watch.lap();
+  progress("segmentation", 0.05);
+  const Segmentation segmentation = segment_mesh(context, half_edges, skeleton);
+  report.segmentation_ms = watch.lap();
+
+  progress("parameterization", 0.2);
+  std::vector<Chart> charts;
+  for (const Segment& segment : segmentation.segments) charts.push_back(make_chart(segment, skeleton, walls));
+  const std::vector<double> unseen = unseen_area_fractions(context, skeleton, walls, charts);
+  const std::vector<Method> methods = choose_methods(options, skeleton, unseen);
+  std::vector<VsmReport> vsm_reports(bones);
+  {
+    std::vector<Chart> mapped;
+    for (int bone = 0; bone < bones; ++bone)
+      if (methods[bone] == Method::kVsm) mapped.push_back(std::move(charts[bone]));
+    const std::vector<VsmReport> solved = mapped.empty() ? std::vector<VsmReport>{} : solve_vsm(context, mapped, options.vsm);
+    for (int bone = 0, i = 0; bone < bones; ++bone)
+      if (methods[bone] == Method::kVsm) {
+        charts[bone] = std::move(mapped[i]);
+        vsm_reports[bone] = solved[i++];
+      }
+  }
+  report.parameterization_ms = watch.lap();
+
+  progress("encoding", 0.6);
+  // Texels are shared out by detail; rectangles have the sides' ratio of girth to length.
+  const std::vector<RowProfile> rays = std::find(methods.begin(), methods.end(), Method::kSpd) == methods.end()
+                                           ? std::vector<RowProfile>(bones)
+                                           : spd_profiles(context, skeleton, walls, charts, options.spd_hit);
+  const bool is_all_spd = std::find(methods.begin(), methods.end(), Method::kVsm) == methods.end();
+  const TexelShare share = options.texel_share.value_or(is_all_spd ? TexelShare::kArea : TexelShare::kTriangles);
+  std::vector<RowProfile> profiles;
+  std::vector<PatchDemand> demands;
+  std::vector<double> areas;
+  for (int bone = 0; bone < bones; ++bone) {
+    profiles.push_back(methods[bone] == Method::kVsm ? row_profile(charts[bone]) : rays[bone]);
+    areas.push_back(surface_area(segmentation.segments[bone].mesh));
+    const double length = std::max(profiles[bone].total_length(), 1e-9 * model.diagonal);
+    const double texels = share == TexelShare::kTriangles ? static_cast<double>(segmentation.segments[bone].mesh.triangles.size()) : areas[bone];
+    demands.push_back({texels, areas[bone] / (length * length)});
+  }
+  const AtlasLayout layout = pack_atlas(demands, options.width, options.height);
+  report.used_fraction = layout.used_fraction;
+
+  for (int bone = 0; bone < bones; ++bone) {
+    Patch patch{layout.rectangles[bone], methods[bone], segmentation.segments[bone].topology, {}};
+    patch.row_u = options.row_spacing == RowSpacing::kSurfaceLength ? spread_rows_by_length(profiles[bone], patch.rectangle.height)
+                                                                    : spread_rows_uniformly(patch.rectangle.height);
+    model.patches.push_back(std::move(patch));
+  }
+  Seams seams = sample_seams(segmentation, skeleton, walls, layout.rectangles);
+  model.arcs = std::move(seams.arcs);
+  model.corners = std::move(seams.corners);
+  model.ends = std::move(seams.ends);
+
+  std::vector<SpdHits> hits(bones);
+  {
+    std::vector<Chart> cast_charts;
+    std::vector<Patch> cast_patches;
+    for (int bone = 0; bone < bones; ++bone)
+      if (methods[bone] == Method::kSpd) {
+        cast_charts.push_back(charts[bone]);
+        cast_patches.push_back(model.patches[bone]);
+      }
+    std::vector<SpdHits> cast = cast_charts.empty() ? std::vector<SpdHits>{} : cast_spd_rays(context, skeleton, walls, cast_charts, cast_patches, options.spd_hit);
+    for (int bone = 0, i = 0; bone < bones; ++bone)
+      if (methods[bone] == Method::kSpd) hits[bone] = std::move(cast[i++]);
+  }
+  std::vector<std::array<std::vector<Vec3>, 2>> end_points(bones);
+  for (int bone = 0; bone < bones; ++bone)
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
+      auto& points = end_points[bone][static_cast<int>(end)];
+      if (walls.is_free(bone, end))
+        points = {charts[bone].positions[pole_of(charts[bone], end == BoneEnd::kHead ? ChartVertex::kHeadPole : ChartVertex::kTailPole)]};
+      else
+        points = points_on_loop(segmentation.segments[bone], skeleton, walls, end, model.patches[bone].rectangle.width);
+    }
+  progress("encoding", 0.8);
+  TexelResult texels = read_texels(context, skeleton, walls, {charts, model.patches, hits, end_points}, options.width, options.height, model.origin,
+                                   options.has_prefilter);
+  model.texture = std::move(texels.texture);
+  model.encoder_settings = settings_json(options, unseen).dump();
+  report.encoding_ms = watch.lap();
+
+  report.vertices = static_cast<int>(mesh.positions.size());
+  report.triangles = static_cast<int>(mesh.triangles.size());
+  report.genus = model.genus;
+  report.diagonal = model.diagonal;
+  report.device = context.device().name;
+  for (int bone = 0; bone < bones; ++bone) {
+    const Segment& segment = segmentation.segments[bone];
+    BoneReport entry;
+    entry.name = skeleton.bones[bone].name;
+    entry.method = methods[bone];
+    entry.topology = segment.topology;
+    entry.area = areas[bone];
+    entry.vertices = static_cast<int>(segment.mesh.positions.size());
+    entry.triangles = static_cast<int>(segment.mesh.triangles.size());
+    entry.rectangle = layout.rectangles[bone];
+    entry.unseen_area_fraction = unseen[bone];
+    entry.flipped_triangles = vsm_reports[bone].flipped_triangles;
+    entry.sampled_triangle_fraction = texels.report.sampled_triangle_fractions[bone];
+    entry.missed_texels = texels.report.missed_texels[bone];
+    entry.vsm = vsm_reports[bone];
+    report.bones.push_back(std::move(entry));
+  }
+  progress("done", 1);
+  return result;
+}
+
+}  // namespace skeletex

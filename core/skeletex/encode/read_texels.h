@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <array>
+#include <span>
+#include <vector>
+
+#include "skeletex/cl/context.h"
+#include "skeletex/model/frame.h"
+#include "skeletex/parameterize/chart.h"
+#include "skeletex/parameterize/spd.h"
+
+namespace skeletex {
+
+/// What the texels of a layout are read from, per bone.
+struct TexelSources {
+  std::span<const Chart> charts;    ///< maps; of SPD patches only the positions are used
+  std::span<const Patch> patches;   ///< rectangle, method, row_u
+  std::span<const SpdHits> spd_hits;  ///< per bone; of VSM patches empty
+  /// Per bone and end, the points of row 0 and of the last row: `width` points on a seam, or one point for a pole.
+  std::span<const std::array<std::vector<Vec3>, 2>> end_points;
+};
+
+struct TexelReport {
+  std::vector<double> sampled_triangle_fractions;  ///< per bone: share of the chart's triangles that a texel reads
+  std::vector<int> missed_texels;                  ///< per bone: filled from neighbours along the column
+};
+
+struct TexelResult {
+  DisplacementTexture texture;
+  TexelReport report;
+};
+
+/// Reads the surface at every texel and stores it in bone tangent space (paper 3.4), on the device. Texels between
+/// rectangles are zero.
+/// \param origin  world position that device coordinates are relative to
+TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Walls& walls, const TexelSources& sources, int texture_width, int texture_height,
+                        const Vec3& origin, bool has_prefilter);
+
+}  // namespace skeletex

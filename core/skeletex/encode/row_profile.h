@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <span>
+#include <vector>
+
+#include "skeletex/parameterize/chart.h"
+
+namespace skeletex {
+
+/// How surface length accumulates along a patch: g(u), the mean over v of the meridian's length from u = 0 to u.
+struct RowProfile {
+  std::vector<double> u;       ///< increasing from 0 to 1
+  std::vector<double> length;  ///< g(u), world units, increasing from 0
+  double total_length() const { return length.back(); }
+};
+
+/// Profile of a map: every triangle adds |dP/du| times its width in v at each u, exactly, into bins whose borders
+/// follow the vertices. \pre chart.u and chart.v are filled
+RowProfile row_profile(const Chart& chart);
+
+/// Profile of points on an even lattice in u: `positions` holds rows x columns points, row-major, row r at
+/// u = r / (rows - 1), the columns at any angles.
+RowProfile row_profile(std::span<const Vec3> positions, int rows, int columns);
+
+/// Where `height` rows are read: evenly in surface length, u_r = g^-1(r / (height - 1)).
+std::vector<double> spread_rows_by_length(const RowProfile& profile, int height);
+/// Evenly in u (the paper's recipe).
+std::vector<double> spread_rows_uniformly(int height);
+
+}  // namespace skeletex

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/encode/sample_seams.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace skeletex {
+namespace {
+
+BoneEnd end_at(const Skeleton& skeleton, int bone, int node) { return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail; }
+
+double wrapped(double turn) { return turn - std::round(turn); }
+
+}  // namespace
+
+Seams sample_seams(const Segmentation& segmentation, const Skeleton& skeleton, const Walls& walls, std::span<const Rectangle> rectangles) {
+  Seams seams;
+  const auto sample_of = [&](int bone, int node, const Vec3& point) {
+    const BoneEnd end = end_at(skeleton, bone, node);
+    return SeamSample{walls.turn_of(bone, point - skeleton.nodes[node].position), walls.half_line_distance(bone, end, point)};
+  };
+
+  std::map<int, int> corner_of_vertex;
+  for (const Arc& arc : segmentation.arcs) {
+    SeamArc seam{arc.node, arc.bones, {-1, -1}, {}};
+    if (!arc.is_closed) {
+      for (const int side : {0, 1}) {
+        const int vertex = side == 0 ? arc.vertices.front() : arc.vertices.back();
+        const auto [it, is_new] = corner_of_vertex.emplace(vertex, static_cast<int>(seams.corners.size()));
+        if (is_new) seams.corners.push_back({arc.node, {}, {}});
+        auto& bones = seams.corners[it->second].bones;
+        for (const int bone : arc.bones)
+          if (std::find(bones.begin(), bones.end(), bone) == bones.end()) bones.push_back(bone);
+        seam.corners[side] = it->second;
+      }
+    }
+    // The polyline, closed where the arc is.
+    std::vector<Vec3> points;
+    for (const int vertex : arc.vertices) points.push_back(segmentation.cut_mesh.positions[vertex]);
+    if (arc.is_closed) points.push_back(points.front());
+    std::vector<double> length{0};
+    for (std::size_t i = 1; i < points.size(); ++i) length.push_back(length.back() + (points[i] - points[i - 1]).norm());
+
+    double columns = 0;
+    for (const int bone : arc.bones) {
+      double turning = 0;
+      for (std::size_t i = 1; i < points.size(); ++i) {
+        const Vec3& node = skeleton.nodes[arc.node].position;
+        turning += wrapped(walls.turn_of(bone, points[i] - node) - walls.turn_of(bone, points[i - 1] - node));
+      }
+      columns = std::max(columns, std::abs(turning) * rectangles[bone].width);
+    }
+    const int intervals = std::max(arc.is_closed ? 3 : 2, static_cast<int>(std::lround(columns)));
+    std::size_t segment = 0;
+    for (int i = arc.is_closed ? 0 : 1; i < intervals; ++i) {
+      const double at = length.back() * i / intervals;
+      while (segment + 2 < points.size() && length[segment + 1] < at) ++segment;
+      const double span = length[segment + 1] - length[segment];
+      const double t = span > 0 ? (at - length[segment]) / span : 0.5;
+      seam.samples.push_back(sample_of(arc.bones[0], arc.node, points[segment] + t * (points[segment + 1] - points[segment])));
+    }
+    seams.arcs.push_back(std::move(seam));
+  }
+  for (const auto& [vertex, corner] : corner_of_vertex) {
+    SeamCorner& c = seams.corners[corner];
+    std::sort(c.bones.begin(), c.bones.end());
+    c.sample = sample_of(c.bones.front(), c.node, segmentation.cut_mesh.positions[vertex]);
+  }
+  for (const Segment& segment : segmentation.segments) seams.ends.push_back({PatchEnd{segment.loops[0].arcs}, PatchEnd{segment.loops[1].arcs}});
+  return seams;
+}
+
+std::vector<Vec3> points_on_loop(const Segment& segment, const Skeleton& skeleton, const Walls& walls, BoneEnd end, int columns) {
+  const std::vector<int>& loop = segment.loops[static_cast<int>(end)].vertices;
+  const Vec3& node = end_position(skeleton, segment.bone, end);
+  // Angles along the loop, lifted so that they grow by one turn, then made monotone.
+  std::vector<double> turns{walls.turn_of(segment.bone, segment.mesh.positions[loop[0]] - node)};
+  std::vector<Vec3> points{segment.mesh.positions[loop[0]]};
+  for (std::size_t i = 1; i <= loop.size(); ++i) {
+    points.push_back(segment.mesh.positions[loop[i % loop.size()]]);
+    turns.push_back(turns.back() + wrapped(walls.turn_of(segment.bone, points.back() - node) - turns.back()));
+  }
+  for (std::size_t i = 1; i < turns.size(); ++i) turns[i] = std::max(turns[i], turns[i - 1]);
+  const double begin = turns.front();
+  std::vector<Vec3> result(columns);
+  std::size_t at = 0;
+  const int first = static_cast<int>(std::ceil(begin * columns));
+  for (int i = 0; i < columns; ++i) {
+    const int column = first + i;
+    const double turn = static_cast<double>(column) / columns;
+    while (at + 2 < turns.size() && turns[at + 1] < turn) ++at;
+    const double span = turns[at + 1] - turns[at];
+    const double t = span > 0 ? std::clamp((turn - turns[at]) / span, 0.0, 1.0) : 0;
+    const Vec3 point = points[at] + t * (points[at + 1] - points[at]);
+    result[((column % columns) + columns) % columns] = walls.seam_point(segment.bone, end, turn, walls.half_line_distance(segment.bone, end, point));
+  }
+  return result;
+}
+
+}  // namespace skeletex

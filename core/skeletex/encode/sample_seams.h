@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <span>
+#include <vector>
+
+#include "skeletex/model/segment.h"
+#include "skeletex/model/texture.h"
+#include "skeletex/model/walls.h"
+
+namespace skeletex {
+
+/// The seams of a model: arcs and corners stored once, and how each patch's ends run through them.
+struct Seams {
+  std::vector<SeamArc> arcs;  ///< same indices as the segmentation's arcs
+  std::vector<SeamCorner> corners;
+  std::vector<std::array<PatchEnd, 2>> ends;
+};
+
+/// Samples every arc evenly in its length, as densely as the finer of its two patches has columns there; open arcs get
+/// at least one inner sample, closed ones at least three.
+/// \param rectangles  per bone
+Seams sample_seams(const Segmentation& segmentation, const Skeleton& skeleton, const Walls& walls, std::span<const Rectangle> rectangles);
+
+/// Points of a segment's boundary loop at the angles of `columns` texels: where the loop's polyline passes turn
+/// j / columns, placed in the wall. World coordinates.
+std::vector<Vec3> points_on_loop(const Segment& segment, const Skeleton& skeleton, const Walls& walls, BoneEnd end, int columns);
+
+}  // namespace skeletex

@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: MIT
+// From maps to texels. Positions are planes x, y, z over the whole texture, relative to the model's origin.
+//   cover_texels        triangles of all charts   -> per texel the triangle that covers it (lowest index wins)
+//   read_surface        that triangle             -> position, and a mark on every triangle that is read
+//   place_spd_points    distances along SPD rays  -> position
+//   place_points        a list of texels          -> position (end rows: seams and poles)
+//   prefilter_positions positions                 -> positions moved against their second differences
+//   encode_texels       positions                 -> texels in bone tangent space (along, around, out)
+// Map coordinates are pairs of floats (high + low): differences of near values keep their relative precision, however
+// small the triangle. A triangle's corner 2 is its pole where it has one; corner 0 is the base of all differences.
+#include "skeletex_structs.h"
+
+#define NO_TRIANGLE 0x7fffffff
+
+typedef struct MapTriangle {
+  float du1, dv1, du2, dv2;  // corners 1 and 2 from corner 0
+  float u_base_high, u_base_low, v_base_high, v_base_low;
+  int pole;  // 0, -1: head's, +1: tail's at corner 2 (then du2 reaches the pole's row and dv2 is unused)
+} MapTriangle;
+
+MapTriangle load_triangle(int t, int triangle_count, global const int* restrict corners, global const int* restrict turns, global const int* restrict poles,
+                          global const float* restrict u_high, global const float* restrict u_low, global const float* restrict v_high,
+                          global const float* restrict v_low) {
+  const int a = corners[t], b = corners[triangle_count + t], c = corners[2 * triangle_count + t];
+  MapTriangle m;
+  m.u_base_high = u_high[a];
+  m.u_base_low = u_low[a];
+  m.v_base_high = v_high[a] + (float)turns[t];
+  // The turn is exact; what its addition rounds off goes to the low part.
+  m.v_base_low = v_low[a] + (v_high[a] - (m.v_base_high - (float)turns[t]));
+  m.du1 = (u_high[b] - u_high[a]) + (u_low[b] - u_low[a]);
+  m.du2 = (u_high[c] - u_high[a]) + (u_low[c] - u_low[a]);
+  m.dv1 = ((v_high[b] - v_high[a]) + (float)(turns[triangle_count + t] - turns[t])) + (v_low[b] - v_low[a]);
+  m.dv2 = ((v_high[c] - v_high[a]) + (float)(turns[2 * triangle_count + t] - turns[t])) + (v_low[c] - v_low[a]);
+  m.pole = poles[t];
+  return m;
+}
+
+float column_offset(MapTriangle m, int column, int width) {
+  const float high = (float)column / (float)width;
+  const float low = fma(-high, (float)width, (float)column) / (float)width;
+  return (high - m.v_base_high) + (low - m.v_base_low);
+}
+
+// v at which the edge from (ua, va) to (ub, vb) crosses u; the caller has checked that it does.
+float crossing(float ua, float va, float ub, float vb, float u) {
+  const float span = ub - ua;
+  return span == 0.0f ? va : va + (vb - va) * clamp((u - ua) / span, 0.0f, 1.0f);
+}
+
+// NDRange (triangles, any): the second dimension strides over a triangle's rows.
+kernel void cover_texels(const int triangle_count, global const int* restrict corners, global const int* restrict turns, global const int* restrict poles,
+                         global const int* restrict triangle_patches, global const float* restrict u_high, global const float* restrict u_low,
+                         global const float* restrict v_high, global const float* restrict v_low, global const PatchRecord* restrict patches,
+                         global const float* restrict row_high, global const float* restrict row_low, const int texture_width,
+                         global int* restrict texel_triangles) {
+  const int t = (int)get_global_id(0);
+  if (t >= triangle_count) return;
+  const MapTriangle m = load_triangle(t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
+  const int patch = triangle_patches[t];
+  const int width = patches[patch].width, height = patches[patch].height;
+  const int row_begin = patches[patch].row_begin;
+  const int origin = patches[patch].y * texture_width + patches[patch].x;
+
+  const float lowest = fmin(0.0f, fmin(m.du1, m.du2)), highest = fmax(0.0f, fmax(m.du1, m.du2));
+  // First row not below the triangle, by bisection, with a row of slack for rounding.
+  int first = 0, last = height;
+  while (first < last) {
+    const int middle = (first + last) / 2;
+    const float u = (row_high[row_begin + middle] - m.u_base_high) + (row_low[row_begin + middle] - m.u_base_low);
+    if (u < lowest) first = middle + 1;
+    else last = middle;
+  }
+  const float tolerance_u = 4e-7f * (highest - lowest);
+  for (int row = max(1, first - 1) + (int)get_global_id(1); row < height - 1; row += (int)get_global_size(1)) {
+    const float u = (row_high[row_begin + row] - m.u_base_high) + (row_low[row_begin + row] - m.u_base_low);
+    if (u > highest + tolerance_u) break;
+    if (u < lowest - tolerance_u) continue;
+    float left = INFINITY, right = -INFINITY;
+    if (m.pole == 0) {
+      const float uc = clamp(u, lowest, highest);
+      if ((uc - 0.0f) * (uc - m.du1) <= 0.0f) {
+        const float v = crossing(0.0f, 0.0f, m.du1, m.dv1, uc);
+        left = fmin(left, v), right = fmax(right, v);
+        if (m.du1 == 0.0f) left = fmin(left, m.dv1), right = fmax(right, m.dv1);
+      }
+      if ((uc - m.du1) * (uc - m.du2) <= 0.0f) {
+        const float v = crossing(m.du1, m.dv1, m.du2, m.dv2, uc);
+        left = fmin(left, v), right = fmax(right, v);
+        if (m.du1 == m.du2) left = fmin(left, m.dv2), right = fmax(right, m.dv2);
+      }
+      if ((uc - m.du2) * (uc - 0.0f) <= 0.0f) {
+        const float v = crossing(m.du2, m.dv2, 0.0f, 0.0f, uc);
+        left = fmin(left, v), right = fmax(right, v);
+        if (m.du2 == 0.0f) left = fmin(left, m.dv2), right = fmax(right, m.dv2);
+      }
+    } else {
+      // The trapezoid between the edge 0-1 and the pole's row: all of the edge's v, or the part of it that u has passed.
+      const float side = (float)m.pole;
+      const bool past0 = side * u >= 0.0f, past1 = side * (u - m.du1) >= 0.0f;
+      if (!past0 && !past1) continue;
+      const float cut = crossing(0.0f, 0.0f, m.du1, m.dv1, u);
+      const float v0 = past0 ? 0.0f : cut, v1 = past1 ? m.dv1 : cut;
+      left = fmin(v0, v1), right = fmax(v0, v1);
+    }
+    if (!(left <= right)) continue;
+    const float extent = fmax(fabs(m.dv1), m.pole == 0 ? fabs(m.dv2) : 0.0f);
+    const float tolerance = 4e-7f * extent + 1e-12f;
+    const float base = m.v_base_high + m.v_base_low;
+    const int begin = (int)floor((base + left) * (float)width) - 1;
+    const int end = (int)ceil((base + right) * (float)width) + 1;
+    for (int column = begin; column <= end; ++column) {
+      const float v = column_offset(m, column, width);
+      if (v < left - tolerance || v > right + tolerance) continue;
+      const int wrapped = ((column % width) + width) % width;
+      atomic_min(&texel_triangles[origin + row * texture_width + wrapped], t);
+    }
+  }
+}
+
+// NDRange (texture width, texture height).
+kernel void read_surface(const int texture_width, const int texture_height, const int triangle_count, global const int* restrict texel_patches,
+                         global const int* restrict texel_triangles, global const int* restrict corners, global const int* restrict turns,
+                         global const int* restrict poles, global const float* restrict u_high, global const float* restrict u_low,
+                         global const float* restrict v_high, global const float* restrict v_low, global const float* restrict vertex_x,
+                         global const float* restrict vertex_y, global const float* restrict vertex_z, global const PatchRecord* restrict patches,
+                         global const float* restrict row_high, global const float* restrict row_low, global float* restrict x, global float* restrict y,
+                         global float* restrict z, global int* restrict is_triangle_read) {
+  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (column >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + column;
+  const int t = texel_triangles[texel];
+  if (t == NO_TRIANGLE) return;
+  const int patch = texel_patches[texel];
+  const MapTriangle m = load_triangle(t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
+  const int width = patches[patch].width;
+  const int row = patches[patch].row_begin + line - patches[patch].y;
+  const float u = (row_high[row] - m.u_base_high) + (row_low[row] - m.u_base_low);
+  // The lift of the column that lies nearest to the triangle's middle.
+  const int inner = column - patches[patch].x;
+  const float middle = m.pole == 0 ? (m.dv1 + m.dv2) / 3.0f : 0.5f * m.dv1;
+  float v = column_offset(m, inner, width);
+  const int lift = (int)rint(middle - v);
+  v = column_offset(m, inner + lift * width, width);
+
+  float w1, w2;
+  if (m.pole == 0) {
+    // Scaled by the extents, so that products of tiny differences stay in range.
+    const float scale_u = 1.0f / fmax(fmax(fabs(m.du1), fabs(m.du2)), 1e-30f), scale_v = 1.0f / fmax(fmax(fabs(m.dv1), fabs(m.dv2)), 1e-30f);
+    const float a1 = m.du1 * scale_u, b1 = m.dv1 * scale_v, a2 = m.du2 * scale_u, b2 = m.dv2 * scale_v;
+    const float pu = u * scale_u, pv = v * scale_v;
+    const float determinant = a1 * b2 - a2 * b1;
+    const float inverse = determinant == 0.0f ? 0.0f : 1.0f / determinant;
+    w1 = fmax(0.0f, (pu * b2 - a2 * pv) * inverse);
+    w2 = fmax(0.0f, (a1 * pv - pu * b1) * inverse);
+    const float sum = w1 + w2;
+    if (sum > 1.0f) w1 /= sum, w2 /= sum;
+  } else {
+    const float lambda = m.dv1 == 0.0f ? 0.0f : clamp(v / m.dv1, 0.0f, 1.0f);
+    const float edge = lambda * m.du1;
+    const float rest = m.du2 - edge;
+    const float tau = rest == 0.0f ? 1.0f : clamp((u - edge) / rest, 0.0f, 1.0f);
+    w1 = (1.0f - tau) * lambda;
+    w2 = tau;
+  }
+  const int a = corners[t], b = corners[triangle_count + t], c = corners[2 * triangle_count + t];
+  x[texel] = vertex_x[a] + w1 * (vertex_x[b] - vertex_x[a]) + w2 * (vertex_x[c] - vertex_x[a]);
+  y[texel] = vertex_y[a] + w1 * (vertex_y[b] - vertex_y[a]) + w2 * (vertex_y[c] - vertex_y[a]);
+  z[texel] = vertex_z[a] + w1 * (vertex_z[b] - vertex_z[a]) + w2 * (vertex_z[c] - vertex_z[a]);
+  is_triangle_read[t] = 1;
+}
+
+// The tangent frame's foot W and its axis `out`, from the tables (model/frame.h).
+void frame_of(global const PatchRecord* restrict p, RowRecord row, ColumnRecord column, float foot[3], float out[3]) {
+  const float slope = (1.0f - row.station) * column.slope_head + row.station * column.slope_tail;
+  const float o = row.cap_cos * slope + row.cap_sin;
+  const float scale = rsqrt(row.cap_cos * row.cap_cos + o * o);
+  for (int i = 0; i < 3; ++i) {
+    const float spoke = column.cosine * p->s[i] + column.sine * p->b[i];
+    foot[i] = p->head[i] + row.station * p->length * p->axis[i];
+    out[i] = (row.cap_cos * spoke + o * p->axis[i]) * scale;
+  }
+}
+
+// NDRange (texture width, texture height). Texels with a negative distance are left as they are.
+kernel void place_spd_points(const int texture_width, const int texture_height, global const int* restrict texel_patches,
+                             global const float* restrict distances, global const PatchRecord* restrict patches, global const RowRecord* restrict rows,
+                             global const ColumnRecord* restrict columns, global float* restrict x, global float* restrict y, global float* restrict z) {
+  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (column >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + column;
+  const int patch = texel_patches[texel];
+  const float distance = distances[texel];
+  if (patch < 0 || distance < 0.0f) return;
+  global const PatchRecord* p = patches + patch;
+  float foot[3], out[3];
+  frame_of(p, rows[p->row_begin + line - p->y], columns[p->column_begin + column - p->x], foot, out);
+  x[texel] = foot[0] + distance * out[0];
+  y[texel] = foot[1] + distance * out[1];
+  z[texel] = foot[2] + distance * out[2];
+}
+
+// NDRange (count).
+kernel void place_points(const int count, global const int* restrict texels, global const float* restrict from_x, global const float* restrict from_y,
+                         global const float* restrict from_z, global float* restrict x, global float* restrict y, global float* restrict z) {
+  const int i = (int)get_global_id(0);
+  if (i >= count) return;
+  const int texel = texels[i];
+  x[texel] = from_x[i];
+  y[texel] = from_y[i];
+  z[texel] = from_z[i];
+}
+
+// NDRange (texture width, texture height). Inner rows move by -1/16 of their second differences in both lattice
+// directions, along the lattice normal; end rows stay.
+kernel void prefilter_positions(const int texture_width, const int texture_height, global const int* restrict texel_patches,
+                                global const PatchRecord* restrict patches, global const float* restrict x, global const float* restrict y,
+                                global const float* restrict z, global float* restrict out_x, global float* restrict out_y, global float* restrict out_z) {
+  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (column >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + column;
+  const float px = x[texel], py = y[texel], pz = z[texel];
+  float move = 0.0f, nx = 0.0f, ny = 0.0f, nz = 0.0f;
+  const int patch = texel_patches[texel];
+  if (patch >= 0) {
+    global const PatchRecord* p = patches + patch;
+    const int row = line - p->y, inner = column - p->x;
+    if (row > 0 && row < p->height - 1) {
+      const int left = texel - inner + (inner == 0 ? p->width - 1 : inner - 1);
+      const int right = texel - inner + (inner == p->width - 1 ? 0 : inner + 1);
+      const int below = texel - texture_width, above = texel + texture_width;
+      const float ux = x[above] - x[below], uy = y[above] - y[below], uz = z[above] - z[below];
+      const float vx = x[right] - x[left], vy = y[right] - y[left], vz = z[right] - z[left];
+      nx = vy * uz - vz * uy, ny = vz * ux - vx * uz, nz = vx * uy - vy * ux;
+      const float length2 = nx * nx + ny * ny + nz * nz;
+      const float dx = (x[above] - px) + (x[below] - px) + (x[right] - px) + (x[left] - px);
+      const float dy = (y[above] - py) + (y[below] - py) + (y[right] - py) + (y[left] - py);
+      const float dz = (z[above] - pz) + (z[below] - pz) + (z[right] - pz) + (z[left] - pz);
+      move = length2 > 0.0f ? -0.0625f * (dx * nx + dy * ny + dz * nz) / length2 : 0.0f;
+    }
+  }
+  out_x[texel] = px + move * nx;
+  out_y[texel] = py + move * ny;
+  out_z[texel] = pz + move * nz;
+}
+
+// NDRange (texture width, texture height).
+kernel void encode_texels(const int texture_width, const int texture_height, global const int* restrict texel_patches,
+                          global const PatchRecord* restrict patches, global const RowRecord* restrict rows, global const ColumnRecord* restrict columns,
+                          global const float* restrict x, global const float* restrict y, global const float* restrict z, global float* restrict along,
+                          global float* restrict around, global float* restrict out_plane) {
+  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (column >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + column;
+  const int patch = texel_patches[texel];
+  if (patch < 0) {
+    along[texel] = 0.0f, around[texel] = 0.0f, out_plane[texel] = 0.0f;
+    return;
+  }
+  global const PatchRecord* p = patches + patch;
+  const ColumnRecord c = columns[p->column_begin + column - p->x];
+  float foot[3], out[3];
+  frame_of(p, rows[p->row_begin + line - p->y], c, foot, out);
+  const float dx = x[texel] - foot[0], dy = y[texel] - foot[1], dz = z[texel] - foot[2];
+  // around = o x s' = -sine s + cosine b; along = out x around
+  float around_axis[3];
+  for (int i = 0; i < 3; ++i) around_axis[i] = c.cosine * p->b[i] - c.sine * p->s[i];
+  const float ax = out[1] * around_axis[2] - out[2] * around_axis[1];
+  const float ay = out[2] * around_axis[0] - out[0] * around_axis[2];
+  const float az = out[0] * around_axis[1] - out[1] * around_axis[0];
+  // Distance to the bone segment.
+  const float hx = x[texel] - p->head[0], hy = y[texel] - p->head[1], hz = z[texel] - p->head[2];
+  const float station = clamp(hx * p->axis[0] + hy * p->axis[1] + hz * p->axis[2], 0.0f, p->length);
+  const float ex = hx - station * p->axis[0], ey = hy - station * p->axis[1], ez = hz - station * p->axis[2];
+  const float distance = sqrt(ex * ex + ey * ey + ez * ez);
+  const float length = sqrt(dx * dx + dy * dy + dz * dz);
+  const float scale = length > 0.0f ? distance / length : 0.0f;
+  along[texel] = scale * (dx * ax + dy * ay + dz * az);
+  around[texel] = scale * (dx * around_axis[0] + dy * around_axis[1] + dz * around_axis[2]);
+  out_plane[texel] = scale * (dx * out[0] + dy * out[1] + dz * out[2]);
+}
