@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <cstddef>
+#include <cstdio>
 #include <filesystem>
 #include <functional>
 #include <string_view>
@@ -7,9 +9,30 @@
 namespace skeletex {
 
 /// Calls `write` with a temporary path beside `path`, flushes to disk and renames it to `path`. When anything throws
-/// the temporary file is removed and `path` is as it was.
+/// the temporary file is removed and `path` is as it was. A symbolic link is followed; a device or a pipe is written
+/// in place.
 /// \throw IoError when the folder is missing or not writable, or the disk is full
 void write_atomically(const std::filesystem::path& path, const std::function<void(const std::filesystem::path& temporary)>& write);
 void write_text_atomically(const std::filesystem::path& path, std::string_view text);
+
+/// A file being written, every call checked: for use inside write_atomically.
+class OutputFile {
+ public:
+  /// \param temporary  the file that is written
+  /// \param target     the name that error messages give it
+  OutputFile(const std::filesystem::path& temporary, const std::filesystem::path& target);
+  ~OutputFile();
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+
+  void write(std::string_view bytes);
+  /// Must be called: a full disk may show only here. \throw IoError
+  void close();
+
+ private:
+  [[noreturn]] void fail();
+  std::filesystem::path target_;
+  std::FILE* file_;
+};
 
 }  // namespace skeletex

@@ -12,13 +12,14 @@ namespace skeletex {
 struct MeshFile {
   TriangleMesh mesh;
   int faces_in_file = 0;     ///< polygons as the file counts them
-  int triangles = 0;         ///< after polygons were split
+  int triangles = 0;         ///< after polygons were split into fans
+  int degenerate_faces = 0;  ///< faces with fewer than three different vertices (after welding): they have no area and are left out
   int vertices_in_file = 0;
   int merged_vertices = 0;   ///< equal positions welded (STL; other formats are not welded)
 };
 
 /// Reads OBJ, PLY (ascii, binary), OFF or STL through OpenMesh; faces are counted in and out, so that nothing the
-/// reader dislikes is dropped silently.
+/// reader dislikes is dropped silently. Positions have single precision, which is what OpenMesh's readers deliver.
 /// \throw IoError naming the file, what is wrong and, where the format allows, the line
 MeshFile read_mesh(const std::filesystem::path& path);
 
@@ -33,8 +34,9 @@ struct PlyAttributes {
   std::span<const float> vertex_property;
 };
 
-/// Writes binary PLY or OBJ by the ending, under a temporary name that is renamed when complete.
-/// \throw IoError (unknown ending, folder not writable, disk full): no file is left behind
+/// Writes binary PLY (little endian, float positions) or OBJ by the ending, under a temporary name that is renamed when
+/// complete. Attributes go into PLY only.
+/// \throw IoError (unknown ending, folder not writable, disk full, attributes that do not fit the mesh): no file is left behind
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, const PlyAttributes& attributes = {});
 
 }  // namespace skeletex

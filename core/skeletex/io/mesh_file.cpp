@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/io/mesh_file.h"
+
+#include <fmt/format.h>
+
+#include <OpenMesh/Core/IO/reader/OBJReader.hh>
+#include <OpenMesh/Core/IO/reader/OFFReader.hh>
+#include <OpenMesh/Core/IO/reader/PLYReader.hh>
+#include <OpenMesh/Core/IO/reader/STLReader.hh>
+#include <OpenMesh/Core/System/omstream.hh>
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <mutex>
+#include <sstream>
+
+#include "skeletex/io/atomic_file.h"
+#include "skeletex/io/mesh_importer.h"
+#include "skeletex/io/mesh_survey.h"
+#include "skeletex/io/read_file.h"
+#include "skeletex/model/error.h"
+
+namespace skeletex {
+namespace {
+
+std::string lower_extension(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+/// OpenMesh writes its opinions to global streams, which the library keeps quiet while it reads.
+class Silence {
+ public:
+  Silence() : log_(omlog().is_enabled()), out_(omout().is_enabled()), err_(omerr().is_enabled()) {
+    omlog().disable();
+    omout().disable();
+    omerr().disable();
+  }
+  ~Silence() {
+    if (log_) omlog().enable();
+    if (out_) omout().enable();
+    if (err_) omerr().enable();
+  }
+  Silence(const Silence&) = delete;
+  Silence& operator=(const Silence&) = delete;
+
+ private:
+  bool log_, out_, err_;
+};
+
+bool read_with_openmesh(MeshFormat format, std::istream& stream, MeshImporter& importer) {
+  OpenMesh::IO::Options options;
+  switch (format) {
+    case MeshFormat::kObj:
+      return OpenMesh::IO::OBJReader().read(stream, importer, options);
+    case MeshFormat::kOff:
+      return OpenMesh::IO::OFFReader().read(stream, importer, options);
+    case MeshFormat::kPly:
+      return OpenMesh::IO::PLYReader().read(stream, importer, options);
+    case MeshFormat::kStlBinary:
+      options += OpenMesh::IO::Options::Binary;
+      [[fallthrough]];
+    case MeshFormat::kStlAscii:
+      return OpenMesh::IO::STLReader().read(stream, importer, options);
+  }
+  return false;
+}
+
+template <typename T>
+void append(std::string& out, T value) {
+  static_assert(std::endian::native == std::endian::little, "binary PLY is written as it lies in memory");
+  out.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+/// Calls add(i, block) for i in [0, count) and writes what it appends in blocks.
+template <typename Add>
+void write_blocks(OutputFile& file, std::size_t count, const Add& add) {
+  std::string block;
+  for (std::size_t i = 0; i < count; ++i) {
+    add(i, block);
+    if (block.size() < (std::size_t{1} << 20)) continue;
+    file.write(block);
+    block.clear();
+  }
+  file.write(block);
+}
+
+void append(std::string& out, VertexColour colour) {
+  append(out, colour.r);
+  append(out, colour.g);
+  append(out, colour.b);
+}
+
+void write_ply(OutputFile& file, const TriangleMesh& mesh, const PlyAttributes& attributes) {
+  constexpr const char* kColour = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  std::string header = fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n", mesh.positions.size());
+  if (!attributes.vertex_colours.empty()) header += kColour;
+  if (!attributes.vertex_property.empty()) header += fmt::format("property float {}\n", attributes.vertex_property_name);
+  header += fmt::format("element face {}\nproperty list uchar int vertex_indices\n", mesh.triangles.size());
+  if (!attributes.face_colours.empty()) header += kColour;
+  file.write(header + "end_header\n");
+  write_blocks(file, mesh.positions.size(), [&](std::size_t i, std::string& out) {
+    for (const double x : mesh.positions[i]) append(out, static_cast<float>(x));
+    if (!attributes.vertex_colours.empty()) append(out, attributes.vertex_colours[i]);
+    if (!attributes.vertex_property.empty()) append(out, attributes.vertex_property[i]);
+  });
+  write_blocks(file, mesh.triangles.size(), [&](std::size_t i, std::string& out) {
+    append(out, static_cast<unsigned char>(3));
+    for (const int corner : mesh.triangles[i]) append(out, static_cast<std::int32_t>(corner));
+    if (!attributes.face_colours.empty()) append(out, attributes.face_colours[i]);
+  });
+}
+
+void write_obj(OutputFile& file, const TriangleMesh& mesh) {
+  write_blocks(file, mesh.positions.size(), [&](std::size_t i, std::string& out) {
+    const Vec3& p = mesh.positions[i];
+    fmt::format_to(std::back_inserter(out), "v {:.9g} {:.9g} {:.9g}\n", p[0], p[1], p[2]);
+  });
+  write_blocks(file, mesh.triangles.size(), [&](std::size_t i, std::string& out) {
+    const Triangle& t = mesh.triangles[i];
+    fmt::format_to(std::back_inserter(out), "f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
+  });
+}
+
+}  // namespace
+
+MeshFile read_mesh(const std::filesystem::path& path) {
+  const std::string where = path.string();
+  std::string bytes = read_file(path);
+  const MeshSurvey survey = survey_mesh(bytes, lower_extension(path), where);
+  std::istringstream stream(std::move(bytes));
+  MeshImporter importer;
+  bool ok;
+  {
+    static std::mutex mutex;  // OpenMesh's readers are singletons that keep the file's state in members
+    const std::lock_guard lock(mutex);
+    const Silence silence;
+    ok = read_with_openmesh(survey.format, stream, importer);
+  }
+  if (!ok) throw IoError(where + ": OpenMesh cannot read this file; it is not what its ending says, or damaged");
+  MeshFile result = importer.take(where);
+  return result;
+}
+
+void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, const PlyAttributes& attributes) {
+  const std::string extension = lower_extension(path);
+  if (extension != ".ply" && extension != ".obj")
+    throw IoError(fmt::format("{}: meshes are written as .ply or .obj, not as \"{}\"", path.string(), extension));
+  const auto fits = [](std::size_t size, std::size_t count) { return size == 0 || size == count; };
+  if (!fits(attributes.vertex_colours.size(), mesh.positions.size()) || !fits(attributes.vertex_property.size(), mesh.positions.size()) ||
+      !fits(attributes.face_colours.size(), mesh.triangles.size()))
+    throw IoError(fmt::format("{}: there must be as many colours or values as the mesh has vertices or triangles", path.string()));
+  if (!attributes.vertex_property.empty() && attributes.vertex_property_name.empty())
+    throw IoError(fmt::format("{}: the vertex property needs a name", path.string()));
+  write_atomically(path, [&](const std::filesystem::path& temporary) {
+    OutputFile file(temporary, path);
+    if (extension == ".ply")
+      write_ply(file, mesh, attributes);
+    else
+      write_obj(file, mesh);
+    file.close();
+  });
+}
+
+}  // namespace skeletex
