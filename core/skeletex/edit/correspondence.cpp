@@ -22,7 +22,8 @@ std::vector<NeighbourInterval> neighbour_order(const Skeleton& skeleton, BoneAtN
   const int node = end_node(skeleton, at.bone, at.end);
   const Vec3 d = direction_from(skeleton, at);
   std::vector<std::pair<int, Vec3>> normals;
-  for (const BoneAtNode& other : bones_at_nodes(skeleton)[node])
+  const auto at_nodes = bones_at_nodes(skeleton);
+  for (const BoneAtNode& other : at_nodes[node])
     if (other.bone != at.bone) normals.emplace_back(other.bone, d - direction_from(skeleton, other));
   if (normals.empty()) return {};
   Vec3 s = d.unitOrthogonal();
