@@ -78,8 +78,8 @@ Vec3 decode_texel(const TangentFrame& frame, const Vec3& texel, const Vec3& head
     if (z_exit >= 0 && z_exit <= length) return frame.foot + c * d;
   }
   const double a = along < 0 ? z : length - z;  // distance from the foot to the end node it runs towards
-  const double p = std::abs(along) * a;
-  return frame.foot + (p + std::sqrt(std::max(0.0, p * p + e * e - a * a))) * d;
+  const double q = across * a;  // how far the ray passes from that node: a sin(beta)
+  return frame.foot + (std::abs(along) * a + std::sqrt(std::max(0.0, (e - q) * (e + q)))) * d;
 }
 
 FrameTables frame_tables(const Skeleton& skeleton, const Walls& walls, const std::vector<Patch>& patches, const Vec3& origin) {

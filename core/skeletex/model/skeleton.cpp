@@ -83,15 +83,12 @@ std::vector<BoneBasis> bone_bases(const Skeleton& skeleton) {
       for (const BoneEnd end : {BoneEnd::kTail, BoneEnd::kHead}) {
         for (const BoneAtNode to : at[end_node(skeleton, from, end)]) {
           if (known[to.bone]) continue;
-          // Smallest rotation that takes the one axis to the other; opposite axes meet in a plane that holds s.
-          const Vec3& o = bases[from].o;
-          const Vec3& p = bases[to.bone].o;
+          // The reflection in the wall between the two takes one direction away from the node to the other and leaves
+          // what both see in their wall where it is. Where a tail meets a head it is the smallest rotation as well.
+          const Vec3 n = direction_from(skeleton, {from, end}) - direction_from(skeleton, to);
           Vec3 s = bases[from].s;
-          if (o.dot(p) > -1 + 1e-12) {
-            const Vec3 h = o + p;
-            s = s - h * (s.dot(p) / (1 + o.dot(p)));
-          }
-          bases[to.bone].s = orthonormalized(s, p);
+          if (n.squaredNorm() > 1e-24) s -= 2 * s.dot(n) / n.squaredNorm() * n;
+          bases[to.bone].s = orthonormalized(s, bases[to.bone].o);
           known[to.bone] = true;
           queue.push_back(to.bone);
         }

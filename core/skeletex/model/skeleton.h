@@ -50,9 +50,11 @@ double bone_length(const Skeleton& skeleton, int bone);
 const Vec3& end_position(const Skeleton& skeleton, int bone, BoneEnd end);
 int end_node(const Skeleton& skeleton, int bone, BoneEnd end);
 
-/// Bases of all bones. A given `s` is made orthonormal to o; a missing one is carried from a neighbouring bone with the
-/// smallest rotation (at a tail-to-head node the reflection in the wall, so nothing twists), breadth first from the
-/// first bone of each component, whose own s is the world axis least aligned with o, made orthogonal.
+/// Bases of all bones. A given `s` is made orthonormal to o; a missing one is carried from a neighbouring bone by the
+/// reflection in the wall between them, so that nothing twists: a point of the wall at angle v about the one bone lies
+/// at v about the other, or at -v when the same end of both is at the node. (Where a tail meets a head this is the
+/// smallest rotation between the two.) Carried breadth first from the given ones, else from the first bone of each
+/// component, whose own s is the world axis least aligned with o, made orthogonal.
 /// \throw InputError naming a bone of no length, or one whose s is parallel to it
 std::vector<BoneBasis> bone_bases(const Skeleton& skeleton);
 

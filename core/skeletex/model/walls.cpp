@@ -61,9 +61,12 @@ int Walls::neighbour(int bone, BoneEnd end, double turn) const {
 }
 
 Vec3 Walls::seam_point(int bone, BoneEnd end, double turn, double distance) const {
-  const Vec3 f = (spoke(bone, turn) + slope(bone, end, turn) * bases_[bone].o).normalized();
-  const double cosine = f.dot(end == BoneEnd::kHead ? bases_[bone].o : Vec3(-bases_[bone].o));
-  const double r = cosine > 0 ? distance / std::sqrt(1 - cosine * cosine) : distance;
+  // With |s'| = 1 and s' orthogonal to o, sin(phi) = 1 / |s' + k o|, and phi < 90 degrees where k points into the bone.
+  const double k = slope(bone, end, turn);
+  const double length = std::hypot(1, k);
+  const bool is_beside_bone = end == BoneEnd::kHead ? k > 0 : k < 0;
+  const Vec3 f = (spoke(bone, turn) + k * bases_[bone].o) / length;
+  const double r = is_beside_bone ? distance * length : distance;
   return end_position(*skeleton_, bone, end) + r * f;
 }
 
