@@ -10,6 +10,7 @@
 #include <functional>
 
 #include "skeletex/cl/kernel_source.h"
+#include "skeletex/cl/program_cache.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
@@ -38,6 +39,34 @@ std::string describe(cl_int code) {
 
 void check(cl_int code, std::string_view what) {
   if (code != CL_SUCCESS) throw DeviceError(fmt::format("{}: {}", what, describe(code)));
+}
+
+double mebibytes(std::uint64_t bytes) { return static_cast<double>(bytes) / (1 << 20); }
+
+const char* to_words(ClArgument kind) {
+  switch (kind) {
+    case ClArgument::kBuffer: return "a buffer";
+    case ClArgument::kLocal: return "local memory";
+    case ClArgument::kInt: return "an int";
+    case ClArgument::kUnsigned: return "an unsigned";
+    case ClArgument::kFloat: return "a float";
+    default: return "another kind of value";
+  }
+}
+
+/// kUnknown where the driver keeps no names (it need not for programs from binaries) or the type is another.
+ClArgument argument_kind(const ::cl::Kernel& kernel, cl_uint index) {
+  cl_kernel_arg_address_qualifier address = CL_KERNEL_ARG_ADDRESS_PRIVATE;
+  if (kernel.getArgInfo(index, CL_KERNEL_ARG_ADDRESS_QUALIFIER, &address) != CL_SUCCESS) return ClArgument::kUnknown;
+  if (address == CL_KERNEL_ARG_ADDRESS_LOCAL) return ClArgument::kLocal;
+  if (address != CL_KERNEL_ARG_ADDRESS_PRIVATE) return ClArgument::kBuffer;
+  std::string type;
+  if (kernel.getArgInfo(index, CL_KERNEL_ARG_TYPE_NAME, &type) != CL_SUCCESS) return ClArgument::kUnknown;
+  while (!type.empty() && type.back() == '\0') type.pop_back();
+  if (type == "float") return ClArgument::kFloat;
+  if (type == "int") return ClArgument::kInt;
+  if (type == "uint" || type == "unsigned int" || type == "unsigned") return ClArgument::kUnsigned;
+  return ClArgument::kUnknown;
 }
 
 std::string lower(std::string text) {
@@ -90,8 +119,7 @@ std::vector<ClDeviceInfo> list_devices() {
 
 ClContext::ClContext(const std::string& selector) {
   const auto devices = enumerate();
-  if (devices.empty())
-    throw DeviceError("no OpenCL device found; install a driver (Debian: apt-get install pocl-opencl-icd runs OpenCL on the CPU)");
+  if (devices.empty()) throw DeviceError("no OpenCL device found; install a driver (Debian: apt-get install pocl-opencl-icd runs OpenCL on the CPU)");
   std::string wanted = selector;
   if (wanted.empty())
     if (const char* variable = std::getenv("SKELETEX_DEVICE")) wanted = variable;
@@ -124,14 +152,19 @@ ClContext::ClContext(const std::string& selector) {
   check(code, "creating an OpenCL context");
   queue_ = ::cl::CommandQueue(context_, device_, CL_QUEUE_PROFILING_ENABLE, &code);
   check(code, "creating an OpenCL queue");
+  cache_folder_ = program_cache_folder();
 }
 
 ClContext::~ClContext() = default;
 
 ::cl::Buffer ClContext::allocate_bytes(std::size_t bytes) {
+  if (bytes > info_.max_allocation_bytes)
+    throw DeviceError(
+        fmt::format("{:.0f} MiB in one buffer are more than {} allows ({:.0f} MiB); ask for a smaller texture, or choose another device",
+                    mebibytes(bytes), info_.name, mebibytes(info_.max_allocation_bytes)));
   cl_int code = CL_SUCCESS;
   ::cl::Buffer buffer(context_, CL_MEM_READ_WRITE, std::max<std::size_t>(bytes, 16), nullptr, &code);
-  check(code, fmt::format("allocating {:.1f} MiB on {}", static_cast<double>(bytes) / (1 << 20), info_.name));
+  check(code, fmt::format("allocating {:.1f} MiB on {}", mebibytes(bytes), info_.name));
   return buffer;
 }
 
@@ -144,36 +177,81 @@ void ClContext::read_bytes(const ::cl::Buffer& buffer, void* data, std::size_t b
 }
 
 void ClContext::fill_bytes(const ::cl::Buffer& buffer, const void* pattern, std::size_t pattern_bytes, std::size_t bytes) {
-  if (bytes > 0)
-    check(::clEnqueueFillBuffer(queue_(), buffer(), pattern, pattern_bytes, 0, bytes, 0, nullptr, nullptr), "filling a device buffer");
+  if (bytes > 0) check(::clEnqueueFillBuffer(queue_(), buffer(), pattern, pattern_bytes, 0, bytes, 0, nullptr, nullptr), "filling a device buffer");
 }
 
-::cl::Kernel ClContext::get_kernel(const ClKernelName& name) {
-  const std::string key = fmt::format("{}|{}|{}", name.file, name.options, name.kernel);
-  if (const auto it = kernels_.find(key); it != kernels_.end()) return it->second;
-
+::cl::Program ClContext::get_program(const ClKernelName& name) {
   const std::string program_key = fmt::format("{}|{}", name.file, name.options);
-  auto program = programs_.find(program_key);
-  if (program == programs_.end()) {
-    const std::string options = fmt::format("-cl-std=CL1.2 {}", name.options);
-    // The hash guards against drivers whose kernel cache overlooks a change of options.
-    const std::string body = kernel_source(name.file);
-    const std::string source = fmt::format("// {:016x}\n#line 1 \"{}\"\n{}", std::hash<std::string>{}(options + body), name.file, body);
+  if (const auto it = programs_.find(program_key); it != programs_.end()) return it->second.program;
+
+  const std::string options = fmt::format("-cl-std=CL1.2 -cl-kernel-arg-info {}", name.options);
+  // The hash guards against drivers whose kernel cache overlooks a change of options.
+  const std::string body = kernel_source(name.file);
+  const std::string source = fmt::format("// {:016x}\n{}", std::hash<std::string>{}(options + body), body);
+  const std::string cache_key = fmt::format("{}\n{}\n{}\n{}\n{}\n{}", info_.platform, info_.name, info_.driver, info_.version, options, source);
+
+  if (const auto binary = load_program_binary(cache_folder_, cache_key)) {
     cl_int code = CL_SUCCESS;
-    ::cl::Program built(context_, source, false, &code);
-    check(code, fmt::format("{}: creating the program", name.file));
-    code = built.build({device_}, options.c_str());
-    if (code != CL_SUCCESS) {
-      std::string log;
-      built.getBuildInfo(device_, CL_PROGRAM_BUILD_LOG, &log);
-      throw DeviceError(fmt::format("{}: {} on {}\n{}", name.file, describe(code), info_.name, log));
+    ::cl::Program loaded(context_, {device_}, {*binary}, nullptr, &code);
+    if (code == CL_SUCCESS && loaded.build({device_}, options.c_str()) == CL_SUCCESS) {
+      ++cached_programs_;
+      return programs_.emplace(program_key, BuiltProgram{loaded, ""}).first->second.program;
     }
-    program = programs_.emplace(program_key, built).first;
   }
   cl_int code = CL_SUCCESS;
-  ::cl::Kernel kernel(program->second, std::string(name.kernel).c_str(), &code);
+  ::cl::Program built(context_, source, false, &code);
+  check(code, fmt::format("{}: creating the program", name.file));
+  code = built.build({device_}, options.c_str());
+  if (code != CL_SUCCESS) {
+    std::string log;
+    built.getBuildInfo(device_, CL_PROGRAM_BUILD_LOG, &log);
+    throw DeviceError(fmt::format("{}: {} on {}\n{}", name.file, describe(code), info_.name, quote_kernel_lines(log)));
+  }
+  return programs_.emplace(program_key, BuiltProgram{built, cache_key}).first->second.program;
+}
+
+const ClContext::BuiltKernel& ClContext::get_kernel(const ClKernelName& name) {
+  const std::string key = fmt::format("{}|{}|{}", name.file, name.options, name.kernel);
+  if (const auto it = kernels_.find(key); it != kernels_.end()) return it->second;
+  cl_int code = CL_SUCCESS;
+  ::cl::Kernel kernel(get_program(name), std::string(name.kernel).c_str(), &code);
   check(code, fmt::format("{}: kernel {}", name.file, name.kernel));
-  return kernels_.emplace(key, kernel).first->second;
+  cl_uint count = 0;
+  check(kernel.getInfo(CL_KERNEL_NUM_ARGS, &count), fmt::format("{}: kernel {}", name.file, name.kernel));
+  std::vector<ClArgument> arguments;
+  for (cl_uint i = 0; i < count; ++i) arguments.push_back(argument_kind(kernel, i));
+  return kernels_.emplace(key, BuiltKernel{kernel, std::move(arguments)}).first->second;
+}
+
+int ClContext::save_programs() noexcept {
+  int saved = 0;
+  try {
+    if (cache_folder_.empty()) return 0;
+    for (auto& [name, built] : programs_) {
+      if (built.cache_key.empty()) continue;
+      cl_int code = CL_SUCCESS;
+      const auto binaries = built.program.getInfo<CL_PROGRAM_BINARIES>(&code);
+      if (code != CL_SUCCESS || binaries.size() != 1 || binaries[0].empty()) continue;
+      if (save_program_binary(cache_folder_, built.cache_key, binaries[0])) ++saved;
+      built.cache_key.clear();
+    }
+  } catch (...) {  // a cache is never a reason to fail
+  }
+  return saved;
+}
+
+void ClContext::check_arguments(const BuiltKernel& kernel, const ClKernelName& name, std::span<const ClArgument> given) {
+  if (kernel.arguments.size() != given.size())
+    throw DeviceError(fmt::format("{}: kernel {} takes {} arguments, not {}", name.file, name.kernel, kernel.arguments.size(), given.size()));
+  const auto is_integer = [](ClArgument kind) { return kind == ClArgument::kInt || kind == ClArgument::kUnsigned; };
+  for (std::size_t i = 0; i < given.size(); ++i)
+    if (kernel.arguments[i] != ClArgument::kUnknown && kernel.arguments[i] != given[i] && !(is_integer(kernel.arguments[i]) && is_integer(given[i])))
+      throw DeviceError(fmt::format("{}: kernel {}, argument {}: the kernel takes {}, not {}", name.file, name.kernel, i,
+                                    to_words(kernel.arguments[i]), to_words(given[i])));
+}
+
+void ClContext::check_fits(std::size_t values, std::size_t room) {
+  if (values > room) throw DeviceError(fmt::format("{} values do not fit a device buffer of {}", values, room));
 }
 
 void ClContext::check_argument(cl_int code, const ClKernelName& name, unsigned index) {
@@ -189,6 +267,9 @@ void ClContext::enqueue(const ::cl::Kernel& kernel, const ClKernelName& name, co
   ::cl::Event event;
   const cl_int code = queue_.enqueueNDRangeKernel(kernel, ::cl::NullRange, ::cl::NDRange(global[0], global[1]),
                                                   has_local ? ::cl::NDRange(range.local[0], range.local[1]) : ::cl::NullRange, nullptr, &event);
+  if (code == CL_INVALID_WORK_GROUP_SIZE)
+    throw DeviceError(fmt::format("{}: kernel {} cannot run in work-groups of {} x {} on {}; ask ClContext::work_group_size", name.file, name.kernel,
+                                  range.local[0], range.local[1], info_.name));
   check(code, fmt::format("{}: launching {}", name.file, name.kernel));
   pending_.push_back({fmt::format("{}:{}", name.file, name.kernel), event});
   if (pending_.size() >= 1024) collect_events();
@@ -225,7 +306,7 @@ void ClContext::reset_profile() {
 
 std::size_t ClContext::work_group_size(const ClKernelName& name, std::size_t wanted) {
   std::size_t limit = 1;
-  get_kernel(name).getWorkGroupInfo(device_, CL_KERNEL_WORK_GROUP_SIZE, &limit);
+  get_kernel(name).kernel.getWorkGroupInfo(device_, CL_KERNEL_WORK_GROUP_SIZE, &limit);
   return std::max<std::size_t>(1, std::min(wanted, limit));
 }
 

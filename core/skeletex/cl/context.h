@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <CL/opencl.hpp>
-
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <string>
 #include <string_view>
@@ -68,6 +67,9 @@ struct ClProfileEntry {
   double milliseconds = 0;
 };
 
+/// What kind of value a kernel takes as an argument, or is given.
+enum class ClArgument { kUnknown, kBuffer, kLocal, kInt, kUnsigned, kFloat };
+
 /// The one owner of OpenCL state: device, context, an in-order queue, programs and profiling events.
 /// Not safe for use by several threads at once.
 class ClContext {
@@ -82,6 +84,8 @@ class ClContext {
 
   const ClDeviceInfo& device() const { return info_; }
 
+  /// Memory for `size` values, not initialised.
+  /// \throw DeviceError when it is more than the device allows in one buffer, or has left
   template <class T>
   ClBuffer<T> allocate(std::size_t size) {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -98,8 +102,10 @@ class ClContext {
   ClBuffer<T> upload(const std::vector<T>& values) {
     return upload(std::span<const T>(values));
   }
+  /// Copies host values to the front of a buffer. \throw DeviceError when they do not fit
   template <class T>
   void write(ClBuffer<T>& buffer, const std::vector<T>& values) {
+    check_fits(values.size(), buffer.size);
     write_bytes(buffer.memory, values.data(), values.size() * sizeof(T));
   }
   /// Waits for the queue and copies the whole buffer to the host.
@@ -117,16 +123,28 @@ class ClContext {
   }
 
   /// Queues a kernel. Arguments: ClBuffer, ClLocal, or trivially copyable scalars of the kernel's own types (int,
-  /// unsigned, float). Programs are built on first use and kept.
-  /// \throw DeviceError naming the kernel, the failing call and its code in words; for a build the log with its lines
+  /// unsigned, float). Programs are built on first use and kept; an entry of the cache on disk replaces the build (see
+  /// program_cache.h and save_programs).
+  /// \throw DeviceError naming the kernel, the failing call and its code in words; the argument whose number or kind is
+  ///        not the kernel's own (kinds where the driver tells them); for a build the log with the kernel file's lines
   template <class... Args>
   void launch(const ClKernelName& name, const ClRange& range, const Args&... args) {
-    ::cl::Kernel kernel = get_kernel(name);
+    const BuiltKernel& kernel = get_kernel(name);
+    constexpr std::array<ClArgument, sizeof...(Args)> kinds{kind_of(static_cast<const Args*>(nullptr))...};
+    check_arguments(kernel, name, kinds);
     unsigned index = 0;
-    (set_argument(kernel, name, index++, args), ...);
-    enqueue(kernel, name, range);
+    (set_argument(kernel.kernel, name, index++, args), ...);
+    enqueue(kernel.kernel, name, range);
   }
   void finish();
+
+  /// Puts the programs that this context built from source into the cache on disk. Costs about as much as building them
+  /// did (PoCL compiles each kernel again, for any work-group size); the next start saves the parsing. Tools call it
+  /// last, when the user has his results.
+  /// \return how many were written
+  int save_programs() noexcept;
+  /// Programs that this context took from the cache on disk.
+  int cached_program_count() const { return cached_programs_; }
 
   /// Launches since the last reset, by kernel, longest first. Waits for the queue.
   std::vector<ClProfileEntry> profile();
@@ -139,7 +157,18 @@ class ClContext {
   const ::cl::CommandQueue& queue() const { return queue_; }
 
  private:
-  ::cl::Kernel get_kernel(const ClKernelName& name);
+  struct BuiltKernel {
+    ::cl::Kernel kernel;
+    std::vector<ClArgument> arguments;  ///< kUnknown where the driver does not tell
+  };
+  struct BuiltProgram {
+    ::cl::Program program;
+    std::string cache_key;  ///< empty: already in the cache
+  };
+  const BuiltKernel& get_kernel(const ClKernelName& name);
+  ::cl::Program get_program(const ClKernelName& name);
+  static void check_arguments(const BuiltKernel& kernel, const ClKernelName& name, std::span<const ClArgument> given);
+  static void check_fits(std::size_t values, std::size_t room);
   ::cl::Buffer allocate_bytes(std::size_t bytes);
   void write_bytes(const ::cl::Buffer& buffer, const void* data, std::size_t bytes);
   void read_bytes(const ::cl::Buffer& buffer, void* data, std::size_t bytes);
@@ -148,15 +177,25 @@ class ClContext {
   static void check_argument(cl_int code, const ClKernelName& name, unsigned index);
 
   template <class T>
-  static void set_argument(::cl::Kernel& kernel, const ClKernelName& name, unsigned index, const ClBuffer<T>& buffer) {
+  static constexpr ClArgument kind_of(const ClBuffer<T>*) {
+    return ClArgument::kBuffer;
+  }
+  static constexpr ClArgument kind_of(const ClLocal*) { return ClArgument::kLocal; }
+  template <class T>
+  requires std::is_arithmetic_v<T>
+  static constexpr ClArgument kind_of(const T*) {
+    return std::is_floating_point_v<T> ? ClArgument::kFloat : std::is_signed_v<T> ? ClArgument::kInt : ClArgument::kUnsigned;
+  }
+  template <class T>
+  static void set_argument(const ::cl::Kernel& kernel, const ClKernelName& name, unsigned index, const ClBuffer<T>& buffer) {
     check_argument(::clSetKernelArg(kernel(), index, sizeof(cl_mem), &buffer.memory()), name, index);
   }
-  static void set_argument(::cl::Kernel& kernel, const ClKernelName& name, unsigned index, const ClLocal& local) {
+  static void set_argument(const ::cl::Kernel& kernel, const ClKernelName& name, unsigned index, const ClLocal& local) {
     check_argument(::clSetKernelArg(kernel(), index, local.bytes, nullptr), name, index);
   }
   template <class T>
-    requires std::is_arithmetic_v<T>
-  static void set_argument(::cl::Kernel& kernel, const ClKernelName& name, unsigned index, const T& value) {
+  requires std::is_arithmetic_v<T>
+  static void set_argument(const ::cl::Kernel& kernel, const ClKernelName& name, unsigned index, const T& value) {
     static_assert(sizeof(T) == 4, "pass int, unsigned or float: the kernel's own type");
     check_argument(::clSetKernelArg(kernel(), index, sizeof(T), &value), name, index);
   }
@@ -171,8 +210,10 @@ class ClContext {
   ::cl::Device device_;
   ::cl::Context context_;
   ::cl::CommandQueue queue_;
-  std::map<std::string, ::cl::Program> programs_;
-  std::map<std::string, ::cl::Kernel> kernels_;
+  std::filesystem::path cache_folder_;
+  std::map<std::string, BuiltProgram> programs_;
+  std::map<std::string, BuiltKernel> kernels_;
+  int cached_programs_ = 0;
   std::vector<PendingEvent> pending_;
   std::map<std::string, ClProfileEntry> profile_;
 };

@@ -3,9 +3,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
+#include <charconv>
 #include <cstdlib>
 #include <fstream>
+#include <optional>
 #include <sstream>
+#include <vector>
 
 #include "skeletex/model/error.h"
 
@@ -26,22 +31,98 @@ std::string load(std::string_view file) {
   throw DeviceError(fmt::format("the library holds no kernel file \"{}\"", file));
 }
 
-}  // namespace
-
-std::string kernel_source(std::string_view file) {
+void append_source(std::string& out, const std::string& file, std::vector<std::string>& open_files) {
+  if (std::find(open_files.begin(), open_files.end(), file) != open_files.end())
+    throw DeviceError(fmt::format("the kernel file \"{}\" includes itself", file));
+  open_files.push_back(file);
+  out += fmt::format("#line 1 \"{}\"\n", file);
   std::istringstream in(load(file));
-  std::string out, line;
-  int number = 0;
-  while (std::getline(in, line)) {
-    ++number;
+  std::string line;
+  for (int number = 1; std::getline(in, line); ++number) {
     constexpr std::string_view kInclude = "#include \"";
     if (line.starts_with(kInclude)) {
-      const std::string included = line.substr(kInclude.size(), line.find('"', kInclude.size()) - kInclude.size());
-      out += fmt::format("#line 1 \"{}\"\n{}#line {} \"{}\"\n", included, load(included), number + 1, file);
+      append_source(out, line.substr(kInclude.size(), line.find('"', kInclude.size()) - kInclude.size()), open_files);
+      out += fmt::format("#line {} \"{}\"\n", number + 1, file);
     } else {
       out += line;
       out += '\n';
     }
+  }
+  open_files.pop_back();
+}
+
+std::optional<std::string> line_of(const std::string& file, int number) {
+  std::string text;
+  try {
+    text = load(file);
+  } catch (const DeviceError&) {
+    return std::nullopt;  // a file of the driver's own
+  }
+  std::istringstream in(text);
+  std::string line;
+  for (int i = 0; i < number; ++i)
+    if (!std::getline(in, line)) return std::nullopt;
+  return line;
+}
+
+std::string_view trim(std::string_view text) {
+  const auto begin = text.find_first_not_of(" \t\r");
+  return begin == std::string_view::npos ? "" : text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
+}
+
+struct Place {
+  std::string file;
+  int line = 0, column = 0;  ///< from 1; column 0: unknown
+};
+
+/// The first "name.cl:12" or "name.h:12:5" of a log line.
+std::optional<Place> place_in(const std::string& log_line) {
+  for (const std::string_view ending : {".cl:", ".h:"}) {
+    const auto colon = log_line.find(ending);
+    if (colon == std::string::npos) continue;
+    std::size_t begin = colon;
+    while (begin > 0 && (std::isalnum(static_cast<unsigned char>(log_line[begin - 1])) || log_line[begin - 1] == '_')) --begin;
+    const char* const end = log_line.data() + log_line.size();
+    Place place{log_line.substr(begin, colon - begin) + std::string(ending.substr(0, ending.size() - 1))};
+    const auto line = std::from_chars(log_line.data() + colon + ending.size(), end, place.line);
+    if (line.ec != std::errc()) continue;
+    if (line.ptr != end && *line.ptr == ':') std::from_chars(line.ptr + 1, end, place.column);
+    return place;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::string kernel_source(std::string_view file) {
+  std::string out;
+  std::vector<std::string> open_files;
+  append_source(out, std::string(file), open_files);
+  return out;
+}
+
+std::string quote_kernel_lines(std::string_view build_log) {
+  std::vector<std::string> lines;
+  std::istringstream in{std::string(build_log)};
+  for (std::string line; std::getline(in, line);) lines.push_back(line);
+  while (!lines.empty() && trim(lines.back()).find_first_not_of('\0') == std::string_view::npos) lines.pop_back();
+
+  constexpr std::size_t kMaxLines = 100;
+  std::string out;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (i == kMaxLines) {
+      out += fmt::format("... and {} lines more\n", lines.size() - i);
+      break;
+    }
+    out += lines[i] + '\n';
+    const auto place = place_in(lines[i]);
+    if (!place) continue;
+    const auto text = line_of(place->file, place->line);
+    if (!text || trim(*text).empty()) continue;
+    // Some drivers (NVIDIA) quote the line themselves.
+    if (i + 1 < lines.size() && lines[i + 1].find(trim(*text)) != std::string::npos) continue;
+    out += fmt::format("{:>6} | {}\n", place->line, *text);
+    if (place->column > 0 && place->column <= static_cast<int>(text->size()) + 1) out += fmt::format("{:>6} | {:>{}}\n", "", "^", place->column);
   }
   return out;
 }

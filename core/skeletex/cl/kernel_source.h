@@ -15,8 +15,13 @@ struct EmbeddedKernelFile {
 std::span<const EmbeddedKernelFile> embedded_kernel_files();
 
 /// Text of a kernel file: from the folder that SKELETEX_KERNEL_DIR names when it is set, else the embedded copy.
-/// Lines `#include "x.h"` are replaced by the file x.h, so that a program is one text on every driver.
-/// \throw DeviceError when the file does not exist
+/// Lines `#include "x.h"` are replaced by the file x.h (in turn), so that a program is one text on every driver;
+/// `#line` keeps the files' own line numbers.
+/// \throw DeviceError when the file does not exist, or includes itself
 std::string kernel_source(std::string_view file);
+
+/// A driver's build log with the kernel file's own line below each message that names a file and a line, where the
+/// driver does not print it itself. Cut after some 100 lines.
+std::string quote_kernel_lines(std::string_view build_log);
 
 }  // namespace skeletex
