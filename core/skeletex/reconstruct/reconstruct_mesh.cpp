@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+
+#include "skeletex/model/frame.h"
+#include "skeletex/reconstruct/displace.h"
+#include "skeletex/reconstruct/lattice.h"
+#include "skeletex/reconstruct/seam_strip.h"
+
+namespace skeletex {
+namespace {
+
+/// The end of a bone that lies at a node.
+BoneEnd end_at(const Skeleton& skeleton, int bone, int node) { return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail; }
+
+Vec3 sample_point(const Skeleton& skeleton, const Walls& walls, int node, int bone, const SeamSample& sample) {
+  return walls.seam_point(bone, end_at(skeleton, bone, node), sample.turn, sample.distance);
+}
+
+/// Poles, seam samples and corners: few, and shared by several patches, so they are made on the host in double.
+void place_shared_vertices(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, std::vector<Vec3>& positions) {
+  const DisplacementTexture& texture = model.texture;
+  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
+    for (int end = 0; end < 2; ++end) {
+      if (lattice.poles[bone][end] < 0) continue;
+      const Rectangle& rectangle = model.patches[bone].rectangle;
+      const std::size_t texel = static_cast<std::size_t>(rectangle.y + (end == 0 ? 0 : rectangle.height - 1)) * texture.width + rectangle.x;
+      positions[lattice.poles[bone][end]] =
+          decode_texel(tangent_frame(model.skeleton, walls, bone, end, 0), Vec3(texture.along[texel], texture.around[texel], texture.out[texel]),
+                       end_position(model.skeleton, bone, BoneEnd::kHead), end_position(model.skeleton, bone, BoneEnd::kTail));
+    }
+  for (std::size_t a = 0; a < model.arcs.size(); ++a)
+    for (std::size_t i = 0; i < model.arcs[a].samples.size(); ++i)
+      positions[lattice.first_sample[a] + i] = sample_point(model.skeleton, walls, model.arcs[a].node, model.arcs[a].bones[0], model.arcs[a].samples[i]);
+  for (std::size_t i = 0; i < model.corners.size(); ++i)
+    positions[lattice.first_corner + i] = sample_point(model.skeleton, walls, model.corners[i].node, model.corners[i].bones[0], model.corners[i].sample);
+}
+
+/// Number of the first quad of every item's piece, for items of rows that have a next inner row.
+std::vector<int> first_quads(const std::vector<RowItem>& items, const Lattice& lattice) {
+  std::vector<int> firsts(items.size());
+  for (std::size_t i = 0; i < items.size(); ++i) firsts[i] = lattice.first_quad[items[i][0]] + items[i][3] - lattice.first_inner[items[i][0]];
+  return firsts;
+}
+
+}  // namespace
+
+TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model) {
+  const Lattice lattice = number_lattice(model);
+  const Walls walls(model.skeleton);
+  TriangleMesh mesh;
+  mesh.positions.resize(lattice.vertex_count);
+  place_shared_vertices(model, walls, lattice, mesh.positions);
+  {
+    DevicePlanes points = allocate_planes(context, lattice.inner_count);
+    ClBuffer<PatchRecord> patches;
+    {
+      const DeviceLattice device = upload_lattice(context, frame_tables(model.skeleton, walls, model.patches, model.origin), model.patches, model.texture,
+                                                  RowChoice::kInner);
+      displace(context, device, points);
+      patches = device.patches;
+    }
+    std::vector<RowItem> quads = row_items(model.patches, RowChoice::kInner);
+    std::erase_if(quads, [&](const RowItem& item) { return item[1] == model.patches[item[0]].rectangle.height - 2; });
+    const ClBuffer<RowItem> items = context.upload(quads);
+    const ClBuffer<int> firsts = context.upload(first_quads(quads, lattice));
+    // Room for the strips and fans at the end, so that the host's copy need not grow.
+    const auto triangles = context.allocate<Triangle>(lattice.triangle_count);
+    context.launch({"reconstruct.cl", "triangulate_quads"}, {{kItemColumns, quads.size()}, {kItemColumns, 1}}, static_cast<int>(quads.size()), items,
+                   patches, firsts, points.x, points.y, points.z, triangles);
+    mesh.triangles = context.download(triangles);
+    mesh.triangles.resize(2 * static_cast<std::size_t>(lattice.quad_count));
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::vector<float> plane = context.download(axis == 0 ? points.x : axis == 1 ? points.y : points.z);
+      for (int i = 0; i < lattice.inner_count; ++i) mesh.positions[i][axis] = model.origin[axis] + static_cast<double>(plane[i]);
+    }
+  }
+
+  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
+      if (lattice.poles[bone][static_cast<int>(end)] >= 0) {
+        append_pole_fan(model, lattice, bone, end, mesh.triangles);
+        continue;
+      }
+      Ring seam{end_loop(model, lattice, bone, end), {}}, row{end_row(model, lattice, bone, end), {}};
+      for (const int vertex : seam.vertices)
+        seam.turns.push_back(walls.turn_of(bone, mesh.positions[vertex] - end_position(model.skeleton, bone, end)));
+      for (std::size_t j = 0; j < row.vertices.size(); ++j) row.turns.push_back(static_cast<double>(j) / static_cast<double>(row.vertices.size()));
+      append_seam_strip(mesh.positions, seam, row, end, mesh.triangles);
+    }
+  return mesh;
+}
+
+}  // namespace skeletex

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <array>
+#include <vector>
+
+#include "skeletex/model/mesh.h"
+#include "skeletex/model/texture.h"
+
+namespace skeletex {
+
+/// How new samples follow from old ones, along one axis of the lattice.
+enum class ResampleFilter {
+  kSample,   ///< the polygon through the old samples, read at the new places
+  kAverage,  ///< a tent over the new cells: smooths, and shrinks what is convex
+  kProject,  ///< the polygon over the new samples that is nearest to the old one in the least-squares sense
+};
+
+/// Weights of one axis: new sample i = sum over t of weights[taps[i][2] + t] * old[taps[i][0] + t], t < taps[i][1].
+struct FilterTaps {
+  std::vector<std::array<int, 4>> taps;  ///< first old sample, count, first weight, 0
+  std::vector<float> weights;            ///< each new sample's sum to 1
+};
+/// \param is_periodic  sample i lies at i / count and old indices wrap round (they stay below old_count, so do counts);
+///                     otherwise at i / (count - 1), and the two ends are kept as they are
+FilterTaps filter_taps(int old_count, int new_count, bool is_periodic, ResampleFilter filter);
+
+/// A polyline with `cells` edges of equal length in place of another one: its first and last point stay, the others
+/// are those of the polyline nearest to it in the least-squares sense. Closed ones do not repeat their first point;
+/// no point of theirs stays.
+std::vector<Vec3> resample_polyline(const std::vector<Vec3>& points, bool is_closed, int cells, ResampleFilter filter);
+
+/// The rectangles of a width x height texture scaled to another one: edges keep their places relative to it, to rounding,
+/// so that nothing overlaps and covered stays covered.
+/// \return empty when a rectangle would fall below 4 x 4
+std::vector<Rectangle> scale_rectangles(const std::vector<Patch>& patches, int width, int height, int new_width, int new_height);
+
+}  // namespace skeletex

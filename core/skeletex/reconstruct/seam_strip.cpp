@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/reconstruct/seam_strip.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace skeletex {
+namespace {
+
+constexpr double kLargestStep = 0.45;  // with 4 columns still 1.2 columns of overlap between neighbouring ranges
+constexpr double kSlackColumns = 1.5;
+
+/// Steps between neighbours around the ring, each in [lower, lower + 1).
+std::vector<double> folded_steps(const std::vector<double>& turns, double lower) {
+  std::vector<double> steps(turns.size());
+  for (std::size_t i = 0; i < turns.size(); ++i) {
+    const double step = turns[(i + 1) % turns.size()] - turns[i] - lower;
+    steps[i] = step - std::floor(step) + lower;
+  }
+  return steps;
+}
+
+}  // namespace
+
+std::vector<double> unwrapped_turns(const std::vector<double>& turns) {
+  const int count = static_cast<int>(turns.size());
+  std::vector<double> steps;
+  double sum = 0;
+  for (const double lower : {-0.5, -0.25, 0.0}) {
+    steps = folded_steps(turns, lower);
+    sum = 0;
+    for (const double step : steps) sum += step;
+    if (std::abs(sum - 1) < 1e-6) break;
+  }
+  if (!(std::abs(sum - 1) < 1e-6)) steps.assign(count, 1.0 / count);
+
+  // Where the angle turns back, take the middle between the largest before and the smallest after; two windings reach
+  // far enough, since more than one turn back does not sum up to one.
+  std::vector<double> grown(3 * count);
+  grown[0] = (turns[0] >= 0 && turns[0] < 1 ? turns[0] : 0) - 1;
+  for (int i = 1; i < 3 * count; ++i) grown[i] = grown[i - 1] + steps[(i - 1) % count];
+  std::vector<double> highest = grown, lowest = grown;
+  for (int i = 1; i < 3 * count; ++i) highest[i] = std::max(highest[i], highest[i - 1]);
+  for (int i = 3 * count - 2; i >= 0; --i) lowest[i] = std::min(lowest[i], lowest[i + 1]);
+  std::vector<double> result(count);
+  for (int i = 0; i < count; ++i) result[i] = 0.5 * (highest[count + i] + lowest[count + i]);
+
+  double largest = 0;
+  for (int i = 0; i < count; ++i) largest = std::max(largest, i + 1 < count ? result[i + 1] - result[i] : result[0] + 1 - result[i]);
+  if (largest > kLargestStep) {
+    const double share = (largest - kLargestStep) / (largest - 1.0 / count);
+    for (int i = 1; i < count; ++i) result[i] = (1 - share) * result[i] + share * (result[0] + static_cast<double>(i) / count);
+  }
+  const double whole = std::floor(result[0]);
+  for (double& turn : result) turn -= whole;
+  return result;
+}
+
+void append_seam_strip(const std::vector<Vec3>& positions, const Ring& seam, const Ring& row, BoneEnd end, std::vector<Triangle>& triangles) {
+  const int m = static_cast<int>(seam.vertices.size()), n = static_cast<int>(row.vertices.size());
+  const std::vector<double> turns = unwrapped_turns(seam.turns);
+  // Columns in unwrapped numbers: row angles are column / n.
+  const auto column_of = [&](int i) { return n * (turns[(i % m + m) % m] + std::floor(static_cast<double>(i) / m)); };
+  const auto seam_vertex = [&](int i) { return seam.vertices[i % m]; };
+  const auto row_vertex = [&](int j) { return row.vertices[(j % n + n) % n]; };
+  const auto cost = [&](int i, int j) { return (positions[seam_vertex(i)] - positions[row_vertex(j)]).squaredNorm(); };
+
+  // The columns that a seam vertex may be joined to: those between its neighbours' angles and a little more, but never
+  // n + 1 of them, so that no column is met twice from the same vertex.
+  const auto first_column = [&](int i) {
+    return static_cast<int>(std::ceil(std::max(column_of(i - 1) - kSlackColumns, column_of(i) - 0.5 * (n - 1))));
+  };
+  const auto last_column = [&](int i) {
+    return static_cast<int>(std::floor(std::min(column_of(i + 1) + kSlackColumns, column_of(i) + 0.5 * (n - 1))));
+  };
+
+  int start = 0;
+  double shortest = 0;
+  for (int i = 0; i < m; ++i) {
+    const double length = cost(i, static_cast<int>(std::lround(column_of(i))));
+    if (i == 0 || length < shortest) {
+      start = i;
+      shortest = length;
+    }
+  }
+  const int start_column = static_cast<int>(std::lround(column_of(start)));
+
+  // best[k][j - first[k]]: the cheapest merge that joins seam vertex start + k to column j.
+  std::vector<int> first(m + 1);
+  std::vector<std::vector<double>> best(m + 1);
+  std::vector<std::vector<char>> along_row(m + 1);  // the last step went to the next column, not to the next seam vertex
+  for (int k = 0; k <= m; ++k) {
+    first[k] = std::max(first_column(start + k), start_column);
+    const int last = std::min(last_column(start + k), start_column + n);
+    best[k].resize(last - first[k] + 1);
+    along_row[k].resize(best[k].size());
+    for (int j = first[k]; j <= last; ++j) {
+      const int at = j - first[k];
+      const bool has_column = at > 0;
+      const bool has_seam = k > 0 && j < first[k - 1] + static_cast<int>(best[k - 1].size());
+      const double from_column = has_column ? best[k][at - 1] : 0, from_seam = has_seam ? best[k - 1][j - first[k - 1]] : 0;
+      along_row[k][at] = has_column && (!has_seam || from_column < from_seam);
+      best[k][at] = (along_row[k][at] ? from_column : from_seam) + cost(start + k, j);
+    }
+  }
+
+  const std::size_t begin = triangles.size();
+  const bool is_head = end == BoneEnd::kHead;
+  for (int k = m, j = start_column + n; k > 0 || j > start_column;) {
+    if (along_row[k][j - first[k]]) {
+      --j;
+      const int apex = seam_vertex(start + k), here = row_vertex(j), next = row_vertex(j + 1);
+      triangles.push_back(is_head ? Triangle{apex, next, here} : Triangle{here, next, apex});
+    } else {
+      --k;
+      const int apex = row_vertex(j), here = seam_vertex(start + k), next = seam_vertex(start + k + 1);
+      triangles.push_back(is_head ? Triangle{here, next, apex} : Triangle{apex, next, here});
+    }
+  }
+  std::reverse(triangles.begin() + begin, triangles.end());
+}
+
+}  // namespace skeletex

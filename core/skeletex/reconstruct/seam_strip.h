@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <vector>
+
+#include "skeletex/model/mesh.h"
+#include "skeletex/model/skeleton.h"
+
+namespace skeletex {
+
+/// A closed polyline around a bone: at a seam, or a row of the lattice.
+struct Ring {
+  std::vector<int> vertices;   ///< in the direction of growing v
+  std::vector<double> turns;   ///< angle of each about the bone; seams: measured, rows: column / width
+};
+
+/// Fills the strip between a seam and the inner row next to it with triangles, outward. Every edge of both rings is an
+/// edge of exactly one triangle, and no edge between the rings occurs twice, whatever the rings are. Among the merges
+/// whose cross edges stay within about a cell of v the one with the smallest sum of squared lengths is taken.
+/// \pre seam has at least 3 vertices, row at least 4
+void append_seam_strip(const std::vector<Vec3>& positions, const Ring& seam, const Ring& row, BoneEnd end, std::vector<Triangle>& triangles);
+
+/// Angles as they grow once around: the first in [0,1), never decreasing, ending below the first plus one, no step above
+/// 0.45 of a turn. Follows the given ones where they grow; where they turn back or wind otherwise, it evens them out.
+std::vector<double> unwrapped_turns(const std::vector<double>& turns);
+
+}  // namespace skeletex
