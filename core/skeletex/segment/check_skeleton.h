@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include "skeletex/model/skeleton.h"
+#include "skeletex/segment/cut.h"
+
+namespace skeletex {
+
+/// That the skeleton lies inside the closed mesh, with genus as many rings of bones as the mesh has handles.
+/// \throw TopologyError naming node or bone, the point, and what to move
+void check_skeleton_inside(const CutMesh& mesh, const Skeleton& skeleton);
+
+/// Whether a point lies inside a closed mesh: how often the surface winds around it, exact for points off the surface.
+int winding_number(const CutMesh& mesh, const Vec3& point);
+
+}  // namespace skeletex
