@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/parameterize/spd.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "spd_structs.h"
+
+namespace skeletex {
+namespace {
+
+constexpr int kWorkGroup = 32;
+// A CPU goes through a column's list once; a GPU needs more work-items than there are columns.
+constexpr int kTileRowsGpu = 64;
+// The pole's ray leans this much towards its column, so that it meets what holds the axis whatever rounding does there.
+constexpr double kPoleCosine = 1e-6;
+// Lists of triangles per turn for sight lines.
+constexpr int kSightSectors = 256;
+
+/// The triangles of all charts in the coordinates of their bones.
+struct LocalTriangles {
+  std::vector<int> begins;    // per chart, and the end
+  std::vector<float> points;  // 9 per triangle
+  // What angles about the bone a triangle covers, in turns; last - first >= 1: all.
+  std::vector<float> first_turn, last_turn;
+  double extent = 0;  // the largest coordinate
+
+  int count() const { return begins.back(); }
+};
+
+LocalTriangles localize(const Skeleton& skeleton, const Walls& walls, std::span<const Chart> charts) {
+  LocalTriangles local;
+  local.begins.push_back(0);
+  for (const Chart& chart : charts) local.begins.push_back(local.begins.back() + static_cast<int>(chart.triangles.size()));
+  local.points.resize(9 * static_cast<std::size_t>(local.count()));
+  local.first_turn.resize(local.count());
+  local.last_turn.resize(local.count());
+  std::vector<std::array<float, 3>> positions;
+  std::vector<double> turns;
+  int t = 0;
+  for (const Chart& chart : charts) {
+    const BoneBasis& basis = walls.bases()[chart.bone];
+    const Vec3& head = end_position(skeleton, chart.bone, BoneEnd::kHead);
+    positions.clear();
+    turns.clear();
+    for (const Vec3& position : chart.positions) {
+      const Vec3 offset = position - head;
+      positions.push_back({static_cast<float>(offset.dot(basis.s)), static_cast<float>(offset.dot(basis.b)), static_cast<float>(offset.dot(basis.o))});
+      // Of the rounded coordinates: the device must find the same half-planes.
+      turns.push_back(std::atan2(static_cast<double>(positions.back()[1]), static_cast<double>(positions.back()[0])) / (2 * std::numbers::pi));
+      local.extent = std::max(local.extent, offset.norm());
+    }
+    for (const Triangle& triangle : chart.triangles) {
+      for (int corner = 0; corner < 3; ++corner)
+        for (int i = 0; i < 3; ++i) local.points[9 * static_cast<std::size_t>(t) + 3 * corner + i] = positions[triangle[corner]][i];
+      double low = 0, high = 0;
+      bool is_on_axis = false;
+      for (int corner = 0; corner < 3; ++corner) {
+        const auto& p = positions[triangle[corner]];
+        is_on_axis = is_on_axis || (p[0] == 0 && p[1] == 0);
+        double turn = turns[triangle[corner]] - turns[triangle[0]];
+        turn -= std::round(turn);
+        low = std::min(low, turn);
+        high = std::max(high, turn);
+      }
+      // A triangle that the axis does not pass through covers less than half a turn.
+      if (is_on_axis || high - low > 0.5 - 1e-6) {
+        local.first_turn[t] = 0;
+        local.last_turn[t] = 1;
+      } else {
+        local.first_turn[t] = static_cast<float>(turns[triangle[0]] + low);
+        local.last_turn[t] = static_cast<float>(turns[triangle[0]] + high);
+      }
+      ++t;
+    }
+  }
+  return local;
+}
+
+/// Lists of numbers as compressed rows.
+struct Lists {
+  std::vector<int> begins;
+  std::vector<int> triangles;
+};
+
+/// Per chart, a list for each of `counts[chart]` angles (j / count) or sectors ([j, j + 1) / count): the triangles there.
+enum class AngleList { kAtAngles, kInSectors };
+Lists list_triangles(const LocalTriangles& local, std::span<const int> counts, AngleList kind) {
+  Lists lists;
+  std::vector<int> list_begins{0};
+  for (const int count : counts) list_begins.push_back(list_begins.back() + count);
+  lists.begins.assign(list_begins.back() + 1, 0);
+  const auto for_each_list = [&](auto&& visit) {
+    for (std::size_t chart = 0; chart < counts.size(); ++chart) {
+      const int count = counts[chart], begin = list_begins[chart];
+      for (int t = local.begins[chart]; t < local.begins[chart + 1]; ++t) {
+        if (local.last_turn[t] - local.first_turn[t] >= 1) {
+          for (int j = 0; j < count; ++j) visit(begin + j, t);
+          continue;
+        }
+        // Slack for the rounding of angles in single precision, here and on the device.
+        const double slack = 4e-7;
+        const double low = (local.first_turn[t] - slack) * count, high = (local.last_turn[t] + slack) * count;
+        const int first = static_cast<int>(kind == AngleList::kAtAngles ? std::ceil(low) : std::floor(low));
+        const int last = std::min(static_cast<int>(std::floor(high)), first + count - 1);
+        for (int j = first; j <= last; ++j) visit(begin + ((j % count) + count) % count, t);
+      }
+    }
+  };
+  for_each_list([&](int list, int) { ++lists.begins[list + 1]; });
+  for (std::size_t i = 1; i < lists.begins.size(); ++i) lists.begins[i] += lists.begins[i - 1];
+  lists.triangles.resize(lists.begins.back());
+  std::vector<int> next(lists.begins.begin(), lists.begins.end() - 1);
+  for_each_list([&](int list, int t) { lists.triangles[next[list]++] = t; });
+  return lists;
+}
+
+}  // namespace
+
+std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton, const Walls& walls, std::span<const Chart> charts,
+                                   std::span<const Patch> patches, SpdHit which) {
+  const LocalTriangles local = localize(skeleton, walls, charts);
+  std::vector<SpdPatch> records;
+  std::vector<int> column_patches, widths;
+  std::vector<RowRecord> rows;
+  std::vector<ColumnRecord> columns;
+  int texels = 0, tallest = 0;
+  for (std::size_t i = 0; i < charts.size(); ++i) {
+    const int bone = charts[i].bone, width = patches[i].rectangle.width, height = patches[i].rectangle.height;
+    const bool is_head_free = walls.is_free(bone, BoneEnd::kHead), is_tail_free = walls.is_free(bone, BoneEnd::kTail);
+    // Cuts lie off the walls by the segmentation's perturbation and by rounding; both are relative to the model's size.
+    const float tolerance = static_cast<float>(4e-6 * local.extent);
+    records.push_back({static_cast<float>(bone_length(skeleton, bone)), tolerance, is_head_free ? 0 : tolerance, is_tail_free ? 0 : tolerance, width, height,
+                       static_cast<int>(rows.size()), static_cast<int>(columns.size()), texels});
+    widths.push_back(width);
+    tallest = std::max(tallest, height);
+    texels += width * height;
+    for (const double u : patches[i].row_u) {
+      const Station at = station_of(u, is_head_free, is_tail_free);
+      rows.push_back({static_cast<float>(u), static_cast<float>(at.station), static_cast<float>(std::max(kPoleCosine, std::cos(at.latitude))),
+                      static_cast<float>(std::sin(at.latitude))});
+    }
+    for (int j = 0; j < width; ++j) {
+      const double turn = static_cast<double>(j) / width, angle = 2 * std::numbers::pi * turn;
+      columns.push_back({static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)),
+                         static_cast<float>(walls.slope(bone, BoneEnd::kHead, turn)), static_cast<float>(walls.slope(bone, BoneEnd::kTail, turn))});
+      column_patches.push_back(static_cast<int>(i));
+    }
+  }
+  const Lists lists = list_triangles(local, widths, AngleList::kAtAngles);
+
+  const int column_count = static_cast<int>(columns.size());
+  const int tile_rows = context.device().type == "cpu" ? std::max(tallest, 1) : kTileRowsGpu;
+  const std::size_t tiles = (tallest + tile_rows - 1) / tile_rows;
+  auto hit_triangles = context.allocate<int>(texels);
+  auto hit_distances = context.allocate<float>(texels);
+  const ClKernelName kernel{"spd.cl", "cast_rays"};
+  context.launch(kernel, ClRange({columns.size(), tiles}, {context.work_group_size(kernel, kWorkGroup), 1}), column_count, tile_rows,
+                 which == SpdHit::kLast ? 1 : 0, context.upload(records), context.upload(column_patches), context.upload(rows), context.upload(columns),
+                 context.upload(lists.begins), context.upload(lists.triangles), context.upload(local.points), hit_triangles, hit_distances);
+  const std::vector<int> found = context.download(hit_triangles);
+  const std::vector<float> distances = context.download(hit_distances);
+
+  std::vector<SpdHits> hits(charts.size());
+  for (std::size_t i = 0; i < charts.size(); ++i) {
+    const int begin = records[i].texel_begin, end = begin + records[i].width * records[i].height;
+    hits[i].triangles.assign(found.begin() + begin, found.begin() + end);
+    hits[i].distances.assign(distances.begin() + begin, distances.begin() + end);
+    for (int& triangle : hits[i].triangles)
+      if (triangle >= 0) triangle -= local.begins[i];
+  }
+  return hits;
+}
+
+std::vector<double> unseen_area_fractions(ClContext& context, const Skeleton& skeleton, const Walls& walls, std::span<const Chart> charts) {
+  const LocalTriangles local = localize(skeleton, walls, charts);
+  const std::vector<int> sectors(charts.size(), kSightSectors);
+  const Lists lists = list_triangles(local, sectors, AngleList::kInSectors);
+  std::vector<SpdSightLine> lines;
+  std::vector<float> lowest_z, highest_z;
+  lines.reserve(local.count());
+  for (std::size_t i = 0; i < charts.size(); ++i) {
+    const Chart& chart = charts[i];
+    const BoneBasis& basis = walls.bases()[chart.bone];
+    const Vec3& head = end_position(skeleton, chart.bone, BoneEnd::kHead);
+    const double length = bone_length(skeleton, chart.bone);
+    const bool is_head_free = walls.is_free(chart.bone, BoneEnd::kHead), is_tail_free = walls.is_free(chart.bone, BoneEnd::kTail);
+    for (const Triangle& triangle : chart.triangles) {
+      const Vec3 centre = (chart.positions[triangle[0]] + chart.positions[triangle[1]] + chart.positions[triangle[2]]) / 3;
+      const SpdCoordinates at = spd_coordinates(skeleton, walls, chart.bone, centre);
+      const Vec3 offset = centre - head;
+      const double x = offset.dot(basis.s), y = offset.dot(basis.b), r = std::hypot(x, y);
+      SpdSightLine line{};
+      line.distance = -1;
+      if (at.u >= 0 && at.u <= 1 && r > 0) {
+        const double foot = station_of(at.u, is_head_free, is_tail_free).station * length;
+        const double z = offset.dot(basis.o) - foot, distance = std::hypot(r, z);
+        const int sector = std::min(kSightSectors - 1, static_cast<int>(at.turn * kSightSectors));
+        line = {static_cast<float>(x / r),        static_cast<float>(y / r), static_cast<float>(foot), static_cast<float>(r / distance),
+                static_cast<float>(z / distance), static_cast<float>(distance), static_cast<int>(i) * kSightSectors + sector};
+      }
+      const float* p = &local.points[9 * lines.size()];
+      lowest_z.push_back(std::min({p[2], p[5], p[8]}));
+      highest_z.push_back(std::max({p[2], p[5], p[8]}));
+      lines.push_back(line);
+    }
+  }
+
+  auto is_hidden = context.allocate<int>(lines.size());
+  const ClKernelName kernel{"spd.cl", "find_hidden"};
+  context.launch(kernel, ClRange({lines.size(), 1}, {context.work_group_size(kernel, kWorkGroup), 1}), local.count(), context.upload(lines),
+                 context.upload(lists.begins), context.upload(lists.triangles), context.upload(local.points), context.upload(lowest_z),
+                 context.upload(highest_z), is_hidden);
+  const std::vector<int> hidden = context.download(is_hidden);
+
+  std::vector<double> fractions(charts.size(), 0);
+  for (std::size_t i = 0; i < charts.size(); ++i) {
+    double unseen = 0, area = 0;
+    for (std::size_t t = 0; t < charts[i].triangles.size(); ++t) {
+      const Triangle& triangle = charts[i].triangles[t];
+      const Vec3& p = charts[i].positions[triangle[0]];
+      const double a = 0.5 * (charts[i].positions[triangle[1]] - p).cross(charts[i].positions[triangle[2]] - p).norm();
+      area += a;
+      if (hidden[local.begins[i] + t]) unseen += a;
+    }
+    fractions[i] = area > 0 ? unseen / area : 0;
+  }
+  return fractions;
+}
+
+SpdCoordinates spd_coordinates(const Skeleton& skeleton, const Walls& walls, int bone, const Vec3& point) {
+  const BoneBasis& basis = walls.bases()[bone];
+  const Vec3 offset = point - end_position(skeleton, bone, BoneEnd::kHead);
+  const double length = bone_length(skeleton, bone);
+  const double z = offset.dot(basis.o), x = (offset - z * basis.o).norm();
+  const double turn = walls.turn_of(bone, offset);
+  const bool is_head_free = walls.is_free(bone, BoneEnd::kHead), is_tail_free = walls.is_free(bone, BoneEnd::kTail);
+  if (is_tail_free && z > length) return {u_of({1, std::atan2(z - length, x)}, is_head_free, is_tail_free), turn};
+  if (is_head_free && z < 0) return {u_of({0, std::atan2(z, x)}, is_head_free, is_tail_free), turn};
+  // Along the line through P parallel to the bone: A_H and A_T are where it meets the walls (paper, Figure 5).
+  const double a_head = x * walls.slope(bone, BoneEnd::kHead, turn), a_tail = length + x * walls.slope(bone, BoneEnd::kTail, turn);
+  double station = (z - a_head) / (a_tail - a_head);
+  // Past the edge where both walls meet, what lies between them is in neither half-space.
+  if (a_tail <= a_head) station = z < a_head ? std::min((z - a_head) / length, -1e-9) : 1 + std::max((z - a_tail) / length, 1e-9);
+  return {u_of({station, 0}, is_head_free, is_tail_free), turn};
+}
+
+}  // namespace skeletex

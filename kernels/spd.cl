@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: MIT
+// Rays of the separation planes driven parameterization (paper 3.2.1). All rays of one column lie in one half-plane that
+// the bone's axis bounds. There the surface is a set of line segments: the sections of the triangles at that angle. So
+// casting a ray against triangles becomes casting it against segments in the plane, and as the rays of a column fan
+// out without crossing, each point of the plane lies between two neighbouring rows.
+//   cast_rays       per column, its list of triangles -> per texel the triangle that its ray meets, and the distance
+//   find_hidden     per triangle, the list of triangles at its centre's angle -> whether one lies before it
+// Coordinates are those of each bone: x along s, y along b, z along o, from the head, world units. `points` holds nine of
+// them per triangle. Lists of triangles are compressed rows: list i is list_triangles[list_begins[i] .. list_begins[i+1]),
+// with triangle numbers over all charts, increasing.
+// Both triangles at an edge compute the same section point from the same numbers in the same order, and which row a
+// point belongs to depends on the point alone: no ray slips between two triangles. Contraction would break that.
+#pragma OPENCL FP_CONTRACT OFF
+#include "skeletex_structs.h"
+#include "spd_structs.h"
+
+// A segment in the half-plane: x away from the axis (>= 0), z along it.
+typedef struct Section {
+  float xa, za, xb, zb;
+} Section;
+
+// Where the edge from P (y >= 0) to Q (y < 0) crosses the plane.
+float edge_ratio(float yp, float yq) { return yp / (yp - yq); }
+
+// The section of a triangle by the half-plane at an angle; false when there is none.
+bool slice_triangle(global const float* restrict points, int triangle, float cosine, float sine, Section* section) {
+  global const float* p = points + 9 * triangle;
+  float x0 = cosine * p[0] + sine * p[1], y0 = cosine * p[1] - sine * p[0], z0 = p[2];
+  float x1 = cosine * p[3] + sine * p[4], y1 = cosine * p[4] - sine * p[3], z1 = p[5];
+  float x2 = cosine * p[6] + sine * p[7], y2 = cosine * p[7] - sine * p[6], z2 = p[8];
+  const bool is_up0 = y0 >= 0.0f, is_up1 = y1 >= 0.0f, is_up2 = y2 >= 0.0f;
+  if (is_up0 == is_up1 && is_up1 == is_up2) return false;
+  if (x0 < 0.0f && x1 < 0.0f && x2 < 0.0f) return false;
+  // Turn the corners so that 0 is alone on its side.
+  float t;
+  if (is_up0 == is_up2) {
+    t = x0, x0 = x1, x1 = t;
+    t = y0, y0 = y1, y1 = t;
+    t = z0, z0 = z1, z1 = t;
+  } else if (is_up0 == is_up1) {
+    t = x0, x0 = x2, x2 = t;
+    t = y0, y0 = y2, y2 = t;
+    t = z0, z0 = z2, z2 = t;
+  }
+  float xa, za, xb, zb;
+  if (y0 >= 0.0f) {
+    const float wa = edge_ratio(y0, y1), wb = edge_ratio(y0, y2);
+    xa = x0 + wa * (x1 - x0), za = z0 + wa * (z1 - z0);
+    xb = x0 + wb * (x2 - x0), zb = z0 + wb * (z2 - z0);
+  } else {
+    const float wa = edge_ratio(y1, y0), wb = edge_ratio(y2, y0);
+    xa = x1 + wa * (x0 - x1), za = z1 + wa * (z0 - z1);
+    xb = x2 + wb * (x0 - x2), zb = z2 + wb * (z0 - z2);
+  }
+  if (xa < 0.0f && xb < 0.0f) return false;
+  if (xa < 0.0f) {
+    za = zb + xb / (xb - xa) * (za - zb);
+    xa = 0.0f;
+  } else if (xb < 0.0f) {
+    zb = za + xa / (xa - xb) * (zb - za);
+    xb = 0.0f;
+  }
+  section->xa = xa;
+  section->za = za;
+  section->xb = xb;
+  section->zb = zb;
+  return true;
+}
+
+// How far a point lies from a row's ray on the tail's side, times the length of the ray's direction f.
+float side_of_ray(float x, float z, RowRecord row, float length, float slope_head, float slope_tail) {
+  const float slope = (1.0f - row.station) * slope_head + row.station * slope_tail;
+  return row.cap_cos * (z - row.station * length) - (row.cap_cos * slope + row.cap_sin) * x;
+}
+
+// The first row in [begin, end) whose ray passes a point on the tail's side. Points at a seam's ray count as between the
+// first and the last row, so that those rays meet the seam.
+int row_of_point(float x, float z, int begin, int end, global const RowRecord* restrict rows, const SpdPatch* patch, float slope_head, float slope_tail) {
+  const float length = patch->bone_length;
+  if (begin == 0 && side_of_ray(x, z, rows[0], length, slope_head, slope_tail) < patch->head_tolerance * hypot(1.0f, slope_head)) return 0;
+  if (end == patch->height && side_of_ray(x, z, rows[end - 1], length, slope_head, slope_tail) >= -patch->tail_tolerance * hypot(1.0f, slope_tail)) return end;
+  int first = begin, last = end;
+  while (first < last) {
+    const int middle = (first + last) / 2;
+    if (side_of_ray(x, z, rows[middle], length, slope_head, slope_tail) < 0.0f) last = middle;
+    else first = middle + 1;
+  }
+  return first;
+}
+
+// NDRange (columns of all patches, tiles of tile_rows rows): each work-item owns a column's part and goes through its list.
+kernel void cast_rays(const int column_count, const int tile_rows, const int wants_last, global const SpdPatch* restrict patches,
+                      global const int* restrict column_patches, global const RowRecord* restrict rows, global const ColumnRecord* restrict columns,
+                      global const int* restrict list_begins, global const int* restrict list_triangles, global const float* restrict points,
+                      global int* restrict hit_triangles, global float* restrict hit_distances) {
+  const int c = (int)get_global_id(0);
+  if (c >= column_count) return;
+  const SpdPatch patch = patches[column_patches[c]];
+  const int begin = (int)get_global_id(1) * tile_rows;
+  const int end = min(patch.height, begin + tile_rows);
+  if (begin >= end) return;
+  const ColumnRecord column = columns[c];
+  rows += patch.row_begin;
+  hit_triangles += patch.texel_begin + (c - patch.column_begin);
+  hit_distances += patch.texel_begin + (c - patch.column_begin);
+  for (int r = begin; r < end; ++r) {
+    hit_triangles[r * patch.width] = -1;
+    hit_distances[r * patch.width] = 0.0f;
+  }
+  for (int i = list_begins[c]; i < list_begins[c + 1]; ++i) {
+    Section s;
+    if (!slice_triangle(points, list_triangles[i], column.cosine, column.sine, &s)) continue;
+    const int ra = row_of_point(s.xa, s.za, begin, end, rows, &patch, column.slope_head, column.slope_tail);
+    const int rb = row_of_point(s.xb, s.zb, begin, end, rows, &patch, column.slope_head, column.slope_tail);
+    const int last = max(ra, rb);
+    for (int r = min(ra, rb); r < last; ++r) {
+      const RowRecord row = rows[r];
+      const float foot = row.station * patch.bone_length;
+      const float slope = (1.0f - row.station) * column.slope_head + row.station * column.slope_tail;
+      const float fx = row.cap_cos, fz = row.cap_cos * slope + row.cap_sin;
+      const float scale = 1.0f / sqrt(fx * fx + fz * fz);
+      const float out = fx * scale, along = fz * scale;
+      const float side_a = out * (s.za - foot) - along * s.xa, side_b = out * (s.zb - foot) - along * s.xb;
+      // Where the rays of a column have crossed, rows are not ordered any more: such a section is no hit.
+      if (side_a * side_b > 0.0f && fmin(fabs(side_a), fabs(side_b)) > patch.tolerance) continue;
+      const float t_a = out * s.xa + along * (s.za - foot), t_b = out * s.xb + along * (s.zb - foot);
+      const float w = side_a == side_b ? 0.5f : clamp(side_a / (side_a - side_b), 0.0f, 1.0f);
+      const float t = t_a + w * (t_b - t_a);
+      if (!(t >= 0.0f)) continue;
+      const int at = r * patch.width;
+      const bool is_first = hit_triangles[at] < 0;
+      if (is_first || (wants_last ? t > hit_distances[at] : t < hit_distances[at])) {
+        hit_triangles[at] = list_triangles[i];
+        hit_distances[at] = t;
+      }
+    }
+  }
+}
+
+// NDRange (triangles).
+kernel void find_hidden(const int triangle_count, global const SpdSightLine* restrict lines, global const int* restrict list_begins,
+                        global const int* restrict list_triangles, global const float* restrict points, global const float* restrict lowest_z,
+                        global const float* restrict highest_z, global int* restrict is_hidden) {
+  const int triangle = (int)get_global_id(0);
+  if (triangle >= triangle_count) return;
+  const SpdSightLine line = lines[triangle];
+  if (line.distance < 0.0f) {
+    is_hidden[triangle] = 1;
+    return;
+  }
+  const float end = line.foot + line.distance * line.along;
+  const float slack = 1e-6f * (fabs(line.foot) + fabs(end) + line.distance);
+  const float low = fmin(line.foot, end) - slack, high = fmax(line.foot, end) + slack;
+  const float nearer = line.distance * (1.0f - 1e-5f);
+  int found = 0;
+  for (int i = list_begins[line.list]; i < list_begins[line.list + 1] && !found; ++i) {
+    const int other = list_triangles[i];
+    if (highest_z[other] < low || lowest_z[other] > high || other == triangle) continue;
+    Section s;
+    if (!slice_triangle(points, other, line.cosine, line.sine, &s)) continue;
+    const float side_a = line.out * (s.za - line.foot) - line.along * s.xa, side_b = line.out * (s.zb - line.foot) - line.along * s.xb;
+    if ((side_a < 0.0f) == (side_b < 0.0f)) continue;
+    const float t_a = line.out * s.xa + line.along * (s.za - line.foot), t_b = line.out * s.xb + line.along * (s.zb - line.foot);
+    const float t = t_a + side_a / (side_a - side_b) * (t_b - t_a);
+    found = t >= 0.0f && t < nearer;
+  }
+  is_hidden[triangle] = found;
+}

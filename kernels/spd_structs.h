@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// Structs that the host and spd.cl share.
+#ifndef SKELETEX_SPD_STRUCTS_H
+#define SKELETEX_SPD_STRUCTS_H
+
+#ifdef __OPENCL_VERSION__
+#define SKELETEX_INT int
+#else
+#include <cstdint>
+#define SKELETEX_INT std::int32_t
+namespace skeletex {
+#endif
+
+/// One patch whose rays are cast.
+typedef struct SpdPatch {
+  float bone_length;       ///< L
+  float tolerance;         ///< rounding of a point's distance to a ray, world units
+  float head_tolerance;    ///< how far a point may miss the first row's ray and still count as on it; 0 at a pole
+  float tail_tolerance;    ///< the same for the last row
+  SKELETEX_INT width;      ///< columns
+  SKELETEX_INT height;     ///< rows
+  SKELETEX_INT row_begin;  ///< first entry in the row table (RowRecord)
+  SKELETEX_INT column_begin;  ///< first entry in the column table (ColumnRecord) and in the columns' lists of triangles
+  SKELETEX_INT texel_begin;   ///< first entry in the results
+} SpdPatch;
+
+/// One ray that starts on the bone's axis: towards the centre of a triangle.
+typedef struct SpdSightLine {
+  float cosine, sine;  ///< s' = cosine s + sine b: the half-plane that holds the ray
+  float foot;          ///< of W, along the bone from the head, world units
+  float out, along;    ///< the ray's unit direction: along s', along o
+  float distance;      ///< of the triangle's centre from W; negative: the centre has no ray, the triangle is unseen
+  SKELETEX_INT list;   ///< the list of triangles at this angle
+} SpdSightLine;
+
+#ifndef __OPENCL_VERSION__
+static_assert(sizeof(SpdPatch) == 36);
+static_assert(sizeof(SpdSightLine) == 28);
+}  // namespace skeletex
+#endif
+#undef SKELETEX_INT
+#endif
