@@ -297,10 +297,10 @@ TEST(ResampleKernels, FiltersAgreeWithTheirTwinOnRandomPlanes) {
       plane.resize(in_size);
       for (float& value : plane) value = random() % 20 ? normal(random) : 1e6f;
     }
-    const std::vector<RowItem> items = row_items(is_rows ? middle.patches : target.patches, RowChoice::kAll);
+    const std::vector<LatticeRow> rows = lattice_rows(is_rows ? middle.patches : target.patches, RowChoice::kAll);
     DevicePlanes out = allocate_planes(device(), out_size);
-    device().launch({"reconstruct.cl", is_rows ? "filter_rows" : "filter_columns"}, {{kItemColumns, items.size()}, {kItemColumns, 1}},
-                    static_cast<int>(items.size()), device().upload(items), device().upload(tables.patches), device().upload(widths),
+    device().launch({"reconstruct.cl", is_rows ? "filter_rows" : "filter_columns"}, row_range(device(), rows.size()),
+                    static_cast<int>(rows.size()), device().upload(rows), device().upload(tables.patches), device().upload(widths),
                     device().upload(first_in), device().upload(taps.taps), device().upload(taps.weights), device().upload(planes[0]),
                     device().upload(planes[1]), device().upload(planes[2]), out.x, out.y, out.z);
     const std::vector<float> results[3] = {device().download(out.x), device().download(out.y), device().download(out.z)};
@@ -327,7 +327,7 @@ TEST(ResampleKernels, TangentSpaceIsEnteredAsByItsTwin) {
   const SyntheticSurface surface(random_tree(8, 5), 0.2);
   const SkeletexModel model = surface.model(random_sizes(8, 4, 150, 6));
   const FrameTables tables = frame_tables(model.skeleton, surface.walls(), model.patches, model.origin);
-  const std::vector<RowItem> items = row_items(model.patches, RowChoice::kAll);
+  const std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kAll);
   std::size_t size = 0;
   for (const Patch& patch : model.patches) size += static_cast<std::size_t>(patch.rectangle.width) * patch.rectangle.height;
   std::mt19937 random(13);
@@ -338,11 +338,12 @@ TEST(ResampleKernels, TangentSpaceIsEnteredAsByItsTwin) {
     const float scale = std::pow(10.0f, normal(random));
     for (auto& plane : p) plane[i] = random() % 10 ? scale * normal(random) : 0.0f;
   }
+  const DeviceTables device_tables = upload_tables(device(), tables);
   const std::size_t area = static_cast<std::size_t>(model.texture.width) * model.texture.height;
   DevicePlanes texels = allocate_planes(device(), area);
-  device().launch({"reconstruct.cl", "enter_tangent_space"}, {{kItemColumns, items.size()}, {kItemColumns, 1}}, static_cast<int>(items.size()),
-                  model.texture.width, device().upload(items), device().upload(tables.patches), device().upload(tables.rows),
-                  device().upload(tables.columns), device().upload(p[0]), device().upload(p[1]), device().upload(p[2]), texels.x, texels.y, texels.z);
+  device().launch({"reconstruct.cl", "enter_tangent_space"}, row_range(device(), rows.size()), static_cast<int>(rows.size()),
+                  model.texture.width, device_tables.column_count, device().upload(rows), device_tables.patches, device_tables.rows,
+                  device_tables.columns, device().upload(p[0]), device().upload(p[1]), device().upload(p[2]), texels.x, texels.y, texels.z);
   const std::vector<float> along = device().download(texels.x), around = device().download(texels.y), out = device().download(texels.z);
   std::size_t at = 0;
   for (const PatchRecord& patch : tables.patches)

@@ -9,15 +9,16 @@
 
 namespace skeletex {
 
-/// A piece of a lattice row: patch, row, first column, number of its first vertex (see kernels/reconstruct.cl).
-using RowItem = std::array<int, 4>;
-/// Columns of a piece at most. Small enough that rows which are no multiple of it waste little.
-inline constexpr int kItemColumns = 64;
+/// A lattice row as the kernels see it: patch, row, number of its first vertex, number of its first quad (those between
+/// it and the next row of the table's patch).
+using LatticeRow = std::array<int, 4>;
 
 enum class RowChoice { kAll, kInner };  ///< kInner leaves out rows 0 and height-1
 
-/// The pieces of the chosen rows of every patch. Vertices are numbered patch by patch, row by row.
-std::vector<RowItem> row_items(const std::vector<Patch>& patches, RowChoice choice);
+/// The chosen rows of every patch. Vertices and quads are numbered patch by patch, row by row.
+std::vector<LatticeRow> lattice_rows(const std::vector<Patch>& patches, RowChoice choice);
+/// One work-group per row: see kernels/reconstruct.cl.
+ClRange row_range(const ClContext& context, std::size_t rows);
 
 /// Three planes of floats on the device.
 struct DevicePlanes {
@@ -25,20 +26,27 @@ struct DevicePlanes {
 };
 DevicePlanes allocate_planes(ClContext& context, std::size_t size);
 
+/// The frame tables on the device; columns as four planes behind each other: cosine, sine, slope_head, slope_tail.
+struct DeviceTables {
+  ClBuffer<PatchRecord> patches;
+  ClBuffer<RowRecord> rows;
+  ClBuffer<float> columns;
+  int column_count = 0;
+};
+DeviceTables upload_tables(ClContext& context, const FrameTables& tables);
+
 /// What the device needs to turn texels into points: texels, tables and the rows to do.
 struct DeviceLattice {
   int texture_width = 0;
   std::size_t vertex_count = 0;
   DevicePlanes texels;  ///< along, around, out
-  ClBuffer<PatchRecord> patches;
-  ClBuffer<RowRecord> rows;
-  ClBuffer<ColumnRecord> columns;
-  ClBuffer<RowItem> items;
+  DeviceTables tables;
+  ClBuffer<LatticeRow> rows;
 };
 DeviceLattice upload_lattice(ClContext& context, const FrameTables& tables, const std::vector<Patch>& patches, const DisplacementTexture& texture,
                              RowChoice choice);
 
-/// Queues the points of all items (one launch), relative to the origin of the tables.
+/// Queues the points of all rows (one launch), relative to the origin of the tables.
 void displace(ClContext& context, const DeviceLattice& lattice, DevicePlanes& points);
 
 }  // namespace skeletex

@@ -35,13 +35,6 @@ void place_shared_vertices(const SkeletexModel& model, const Walls& walls, const
     positions[lattice.first_corner + i] = sample_point(model.skeleton, walls, model.corners[i].node, model.corners[i].bones[0], model.corners[i].sample);
 }
 
-/// Number of the first quad of every item's piece, for items of rows that have a next inner row.
-std::vector<int> first_quads(const std::vector<RowItem>& items, const Lattice& lattice) {
-  std::vector<int> firsts(items.size());
-  for (std::size_t i = 0; i < items.size(); ++i) firsts[i] = lattice.first_quad[items[i][0]] + items[i][3] - lattice.first_inner[items[i][0]];
-  return firsts;
-}
-
 }  // namespace
 
 TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model) {
@@ -57,16 +50,14 @@ TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model) {
       const DeviceLattice device = upload_lattice(context, frame_tables(model.skeleton, walls, model.patches, model.origin), model.patches, model.texture,
                                                   RowChoice::kInner);
       displace(context, device, points);
-      patches = device.patches;
+      patches = device.tables.patches;
     }
-    std::vector<RowItem> quads = row_items(model.patches, RowChoice::kInner);
-    std::erase_if(quads, [&](const RowItem& item) { return item[1] == model.patches[item[0]].rectangle.height - 2; });
-    const ClBuffer<RowItem> items = context.upload(quads);
-    const ClBuffer<int> firsts = context.upload(first_quads(quads, lattice));
+    std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kInner);
+    std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == model.patches[row[0]].rectangle.height - 2; });
     // Room for the strips and fans at the end, so that the host's copy need not grow.
     const auto triangles = context.allocate<Triangle>(lattice.triangle_count);
-    context.launch({"reconstruct.cl", "triangulate_quads"}, {{kItemColumns, quads.size()}, {kItemColumns, 1}}, static_cast<int>(quads.size()), items,
-                   patches, firsts, points.x, points.y, points.z, triangles);
+    context.launch({"reconstruct.cl", "triangulate_quads"}, row_range(context, rows.size()), static_cast<int>(rows.size()), context.upload(rows), patches,
+                   points.x, points.y, points.z, triangles);
     mesh.triangles = context.download(triangles);
     mesh.triangles.resize(2 * static_cast<std::size_t>(lattice.quad_count));
     for (int axis = 0; axis < 3; ++axis) {

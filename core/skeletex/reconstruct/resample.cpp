@@ -278,32 +278,30 @@ void resample_texels(ClContext& context, const SkeletexModel& model, const Walls
   }
 
   const FrameTables tables = in_bone_axes(frame_tables(model.skeleton, walls, result.patches, model.origin));
-  const auto patches = context.upload(tables.patches);
+  const DeviceTables device_tables = upload_tables(context, tables);
   const auto old_widths = context.upload(widths);
   DevicePlanes points = allocate_planes(context, old_size);
   {
     const FrameTables old_tables = in_bone_axes(frame_tables(model.skeleton, walls, model.patches, model.origin));
     displace(context, upload_lattice(context, old_tables, model.patches, model.texture, RowChoice::kAll), points);
   }
-  const auto filter = [&](std::string_view kernel, const std::vector<RowItem>& row_pieces, const std::vector<int>& first_in, const FilterTaps& taps,
+  const auto filter = [&](std::string_view kernel, const std::vector<LatticeRow>& rows, const std::vector<int>& first_in, const FilterTaps& taps,
                           const DevicePlanes& in, std::size_t size) {
     DevicePlanes out = allocate_planes(context, size);
-    const auto items = context.upload(row_pieces);
-    context.launch({"reconstruct.cl", kernel}, {{kItemColumns, items.size}, {kItemColumns, 1}}, static_cast<int>(items.size), items, patches, old_widths,
-                   context.upload(first_in), context.upload(taps.taps), context.upload(taps.weights), in.x, in.y, in.z, out.x, out.y, out.z);
+    context.launch({"reconstruct.cl", kernel}, row_range(context, rows.size()), static_cast<int>(rows.size()), context.upload(rows), device_tables.patches,
+                   old_widths, context.upload(first_in), context.upload(taps.taps), context.upload(taps.weights), in.x, in.y, in.z, out.x, out.y, out.z);
     return out;
   };
-  points = filter("filter_rows", row_items(middle, RowChoice::kAll), first_old, row_taps, points, middle_size);
-  const std::vector<RowItem> pieces = row_items(result.patches, RowChoice::kAll);
-  points = filter("filter_columns", pieces, first_middle, column_taps, points, new_size);
+  points = filter("filter_rows", lattice_rows(middle, RowChoice::kAll), first_old, row_taps, points, middle_size);
+  const std::vector<LatticeRow> rows = lattice_rows(result.patches, RowChoice::kAll);
+  points = filter("filter_columns", rows, first_middle, column_taps, points, new_size);
 
   const std::size_t area = static_cast<std::size_t>(result.texture.width) * result.texture.height;
   DevicePlanes texels = allocate_planes(context, area);
   for (ClBuffer<float>* plane : {&texels.x, &texels.y, &texels.z}) context.fill(*plane, 0);
-  const auto items = context.upload(pieces);
-  context.launch({"reconstruct.cl", "enter_tangent_space"}, {{kItemColumns, items.size}, {kItemColumns, 1}}, static_cast<int>(items.size),
-                 result.texture.width, items, patches, context.upload(tables.rows), context.upload(tables.columns), points.x, points.y, points.z, texels.x,
-                 texels.y, texels.z);
+  context.launch({"reconstruct.cl", "enter_tangent_space"}, row_range(context, rows.size()), static_cast<int>(rows.size()), result.texture.width,
+                 device_tables.column_count, context.upload(rows), device_tables.patches, device_tables.rows, device_tables.columns, points.x, points.y,
+                 points.z, texels.x, texels.y, texels.z);
   result.texture.along = context.download(texels.x);
   result.texture.around = context.download(texels.y);
   result.texture.out = context.download(texels.z);
