@@ -76,6 +76,19 @@ double first_crossing(const CutMesh& mesh, const Vec3& head, const Vec3& tail, s
 }  // namespace
 
 void check_skeleton_inside(const CutMesh& mesh, const Skeleton& skeleton) {
+  // Spread from the first bone over shared nodes.
+  std::vector<bool> is_reached(skeleton.nodes.size(), false);
+  is_reached[skeleton.bones[0].head] = true;
+  for (bool is_changed = true; is_changed;) {
+    is_changed = false;
+    for (const Bone& bone : skeleton.bones)
+      if (is_reached[bone.head] != is_reached[bone.tail]) is_reached[bone.head] = is_reached[bone.tail] = is_changed = true;
+  }
+  for (const Bone& bone : skeleton.bones)
+    if (!is_reached[bone.head])
+      throw TopologyError(fmt::format("bone \"{}\" at {} is not connected with bone \"{}\"; let them share a node, or join them by further bones",
+                                      bone.name, text_of(skeleton.nodes[bone.head].position), skeleton.bones[0].name));
+
   std::vector<bool> is_used(skeleton.nodes.size(), false);
   for (const Bone& bone : skeleton.bones) is_used[bone.head] = is_used[bone.tail] = true;
   for (std::size_t n = 0; n < skeleton.nodes.size(); ++n) {

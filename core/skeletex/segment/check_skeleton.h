@@ -5,7 +5,7 @@
 
 namespace skeletex {
 
-/// That the skeleton lies inside the closed mesh, with genus as many rings of bones as the mesh has handles.
+/// That the skeleton is in one piece and lies inside the closed mesh.
 /// \throw TopologyError naming node or bone, the point, and what to move
 void check_skeleton_inside(const CutMesh& mesh, const Skeleton& skeleton);
 

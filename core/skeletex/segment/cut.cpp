@@ -257,24 +257,18 @@ void WallCutter::resolve(Ring ring, MixedTriangle& mixed) {
         third = l;
       }
     }
-    if (third < 0) third = ring.cells[2];
+    if (third < 0) {
+      third = ring.cells[2];
+      nearest = 0;
+    }
     WallPoint corner;
     corner.triangle = mixed.triangle;
     corner.cells = {i, j, third};
-    Weights slope_il;
-    for (int c = 0; c < 3; ++c) slope_il[c] = corner_values_[c][i] - corner_values_[c][third];
-    Weights w{slope_ij[1] * slope_il[2] - slope_ij[2] * slope_il[1], slope_ij[2] * slope_il[0] - slope_ij[0] * slope_il[2],
-              slope_ij[0] * slope_il[1] - slope_ij[1] * slope_il[0]};
-    double sum = w[0] + w[1] + w[2];
-    for (double& x : w) x = std::clamp(x / sum, 0.0, 1.0);
-    sum = w[0] + w[1] + w[2];
+    double sum = 0;
+    for (int c = 0; c < 3; ++c) sum += corner.weights[c] = std::clamp(start[c] + nearest * along[c], 0.0, 1.0);
     corner.position = Vec3::Zero();
-    if (!(sum > 0.5)) {
-      w = start;
-      sum = 1;
-    }
     for (int c = 0; c < 3; ++c) {
-      corner.weights[c] = w[c] / sum;
+      corner.weights[c] /= sum;
       corner.position += corner.weights[c] * mesh_.positions[mesh_.origins[3 * mixed.triangle + c]];
     }
     const int point = components_.add();

@@ -191,7 +191,7 @@ void Segmenter::flood() {
   std::vector<int> component_of_bone(bone_count, -1);
   for (int c = 0; c < static_cast<int>(components.size()); ++c) {
     const Vec3& there = position(mesh_.origins[3 * components[c].first]);
-    if (components[c].seam < 0 && (bone_count > 1 || c > 0))
+    if (components[c].seam < 0 && components.size() > 1)
       throw TopologyError(fmt::format("a part of the mesh at {} belongs to no bone; join the mesh to one piece, or remove the part", text_of(there)));
     const int bone = components[c].seam < 0 ? 0 : side(components[c].seam).bone.bone;
     if (component_of_bone[bone] >= 0)
@@ -397,6 +397,8 @@ void Segmenter::build_segments() {
 Segmentation segment_mesh(ClContext& context, const HalfEdgeMesh& mesh, const Skeleton& skeleton, const SegmentOptions& options) {
   if (skeleton.bones.empty()) throw InputError("the skeleton has no bones; give it at least one");
   if (mesh.n_faces() == 0) throw InputError("the mesh has no triangles");
+  for (const auto v : mesh.vertices())
+    if (!std::isfinite(mesh.point(v).sqrnorm())) throw InputError(fmt::format("vertex {} of the mesh has no finite position; remove it", v.idx()));
   for (const auto h : mesh.halfedges())
     if (mesh.is_boundary(h)) {
       const auto& p = mesh.point(mesh.from_vertex_handle(h));
