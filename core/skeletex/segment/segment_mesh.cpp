@@ -111,21 +111,15 @@ void Segmenter::cut() {
     for (const Cell& cell : nodes[n].cells) sides_.push_back({nodes[n].node, cell.bone});
   }
 
-  const auto count_seams = [&] {
-    seam_degree_.assign(mesh_.positions.size(), 0);
-    for (std::size_t h = 0; h < mesh_.origins.size(); ++h)
-      if (mesh_.seams[h] >= 0 && seam_degree_[mesh_.origins[h]] < 255) ++seam_degree_[mesh_.origins[h]];
-  };
-  count_seams();
-  // Every open arc gets an inner vertex.
-  const int half_edge_count = static_cast<int>(mesh_.origins.size());
-  bool is_split = false;
-  for (int h = 0; h < half_edge_count; ++h)
-    if (mesh_.seams[h] >= 0 && h < mesh_.opposites[h] && seam_degree_[mesh_.origins[h]] != 2 && seam_degree_[mesh_.target(h)] != 2) {
-      split_edge(mesh_, h);
-      is_split = true;
+  seam_degree_.assign(mesh_.positions.size(), 0);
+  for (std::size_t h = 0; h < mesh_.origins.size(); ++h)
+    if (mesh_.seams[h] >= 0 && seam_degree_[mesh_.origins[h]] < 255) ++seam_degree_[mesh_.origins[h]];
+  // Every open arc gets an inner vertex. Splitting appends half-edges, which old ones may have become.
+  for (std::size_t h = 0; h < mesh_.origins.size(); ++h)
+    if (mesh_.seams[h] >= 0 && seam_degree_[mesh_.origins[h]] != 2 && seam_degree_[mesh_.target(static_cast<int>(h))] != 2) {
+      split_edge(mesh_, static_cast<int>(h));
+      seam_degree_.push_back(2);
     }
-  if (is_split) count_seams();
 }
 
 void Segmenter::flood() {
