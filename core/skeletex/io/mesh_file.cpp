@@ -127,9 +127,9 @@ void write_obj(OutputFile& file, const TriangleMesh& mesh) {
 
 MeshFile read_mesh(const std::filesystem::path& path) {
   const std::string where = path.string();
-  std::string bytes = read_file(path);
-  const MeshSurvey survey = survey_mesh(bytes, lower_extension(path), where);
-  std::istringstream stream(std::move(bytes));
+  MeshSurvey survey = survey_mesh(read_file(path), lower_extension(path), where);
+  const bool is_welded = survey.format == MeshFormat::kStlAscii || survey.format == MeshFormat::kStlBinary;
+  std::istringstream stream(std::move(survey.plain));
   MeshImporter importer;
   bool ok;
   {
@@ -138,8 +138,17 @@ MeshFile read_mesh(const std::filesystem::path& path) {
     const Silence silence;
     ok = read_with_openmesh(survey.format, stream, importer);
   }
-  if (!ok) throw IoError(where + ": OpenMesh cannot read this file; it is not what its ending says, or damaged");
+  // What the readers leave out themselves: OBJ faces with too few vertices, and STL triangles that welding closed.
+  const std::size_t left_out = survey.faces - std::min(survey.faces, importer.n_faces());
+  if (!ok || (!is_welded && (importer.n_vertices() != survey.vertices || left_out != survey.small_faces)))
+    throw IoError(fmt::format("{}: OpenMesh took {} of {} vertices and {} of {} faces from this file; save it in another format", where, importer.n_vertices(),
+                              survey.vertices, importer.n_faces(), survey.faces));
+  for (const MeshSurvey::OddCoordinate& odd : survey.odd_coordinates) importer.set_coordinate(odd.vertex, odd.axis, odd.value);
   MeshFile result = importer.take(where);
+  result.degenerate_faces += static_cast<int>(left_out);
+  result.faces_in_file = static_cast<int>(survey.faces);
+  result.vertices_in_file = static_cast<int>(survey.vertices);
+  result.merged_vertices = static_cast<int>(survey.vertices - result.mesh.positions.size());
   return result;
 }
 

@@ -14,12 +14,14 @@ struct MeshFile {
   int faces_in_file = 0;     ///< polygons as the file counts them
   int triangles = 0;         ///< after polygons were split into fans
   int degenerate_faces = 0;  ///< faces with fewer than three different vertices (after welding): they have no area and are left out
-  int vertices_in_file = 0;
+  int vertices_in_file = 0;  ///< for STL, three per triangle
   int merged_vertices = 0;   ///< equal positions welded (STL; other formats are not welded)
 };
 
 /// Reads OBJ, PLY (ascii, binary), OFF or STL through OpenMesh; faces are counted in and out, so that nothing the
-/// reader dislikes is dropped silently. Positions have single precision, which is what OpenMesh's readers deliver.
+/// reader dislikes is dropped silently: faces in file = triangles - (corners beyond three of kept polygons) +
+/// degenerate faces. Positions have single precision, which is what OpenMesh's readers deliver; NaN and infinity are
+/// kept (not in STL) for validation to report.
 /// \throw IoError naming the file, what is wrong and, where the format allows, the line
 MeshFile read_mesh(const std::filesystem::path& path);
 

@@ -18,6 +18,7 @@ class MeshImporter : public OpenMesh::IO::BaseImporter {
     mesh_.positions.at(static_cast<std::size_t>(vertex.idx())) = Vec3(point[0], point[1], point[2]);
   }
   OpenMesh::FaceHandle add_face(const VHandles& corners) override;
+  void set_coordinate(std::size_t vertex, int axis, double value) { mesh_.positions.at(vertex)[axis] = value; }
 
   /// \throw IoError when a face names a vertex that does not exist, or one vertex twice with others between
   MeshFile take(const std::string& where);
