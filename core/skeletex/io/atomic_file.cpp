@@ -93,14 +93,25 @@ void OutputFile::write(std::string_view bytes) {
   if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) fail();
 }
 
+std::uint64_t OutputFile::position() {
+  const long position = std::ftell(file_);
+  if (position < 0) fail();
+  return static_cast<std::uint64_t>(position);
+}
+
+void OutputFile::seek(std::uint64_t position) {
+  if (std::fseek(file_, static_cast<long>(position), SEEK_SET) != 0) fail();
+}
+
 void OutputFile::close() {
   std::FILE* file = file_;
   file_ = nullptr;
-  if (std::fclose(file) != 0) fail();
+  if (std::fclose(file) != 0 || error_ != 0) fail();
 }
 
 void OutputFile::fail() {
-  throw IoError(fmt::format("{}: cannot write: {}", target_.string(), std::strerror(errno)));
+  if (error_ == 0) error_ = errno;
+  throw IoError(fmt::format("{}: cannot write: {}", target_.string(), std::strerror(error_)));
 }
 
 }  // namespace skeletex

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-#include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <functional>
@@ -26,13 +26,17 @@ class OutputFile {
   OutputFile& operator=(const OutputFile&) = delete;
 
   void write(std::string_view bytes);
-  /// Must be called: a full disk may show only here. \throw IoError
+  std::uint64_t position();
+  void seek(std::uint64_t position);
+  /// Must be called: a full disk may show only here, as may an earlier failure that somebody in between swallowed.
+  /// \throw IoError
   void close();
 
  private:
   [[noreturn]] void fail();
   std::filesystem::path target_;
   std::FILE* file_;
+  int error_ = 0;  ///< errno of the first failure
 };
 
 }  // namespace skeletex

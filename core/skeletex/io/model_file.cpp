@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/io/model_file.h"
+
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfIO.h>
+#include <OpenEXR/ImfInputFile.h>
+#include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfStringAttribute.h>
+#include <OpenEXR/ImfThreading.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <thread>
+
+#include "skeletex/io/atomic_file.h"
+#include "skeletex/io/exr_survey.h"
+#include "skeletex/io/json_file.h"
+#include "skeletex/io/model_json.h"
+#include "skeletex/model/error.h"
+
+namespace skeletex {
+namespace {
+
+constexpr const char* kAttribute = "skeletex";
+constexpr const char* kChannels[3] = {"R", "G", "B"};
+
+/// OpenEXR's own streams lose write errors of their last bytes; this one keeps them (see OutputFile::close).
+class ExrStream : public Imf::OStream {
+ public:
+  ExrStream(OutputFile& file, const std::string& name) : Imf::OStream(name.c_str()), file_(file) {}
+  void write(const char bytes[], int count) override { file_.write({bytes, static_cast<std::size_t>(count)}); }
+  std::uint64_t tellp() override { return file_.position(); }
+  void seekp(std::uint64_t position) override { file_.seek(position); }
+
+ private:
+  OutputFile& file_;
+};
+
+/// Chunks are compressed independently and written in order, so the number of threads does not show in the file.
+void use_threads() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    if (Imf::globalThreadCount() == 0) Imf::setGlobalThreadCount(static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1u, 8u)));
+  });
+}
+
+const std::vector<float>& plane(const DisplacementTexture& texture, int i) { return i == 0 ? texture.along : i == 1 ? texture.around : texture.out; }
+std::vector<float>& plane(DisplacementTexture& texture, int i) { return i == 0 ? texture.along : i == 1 ? texture.around : texture.out; }
+
+void check_texels(const DisplacementTexture& texture, const std::string& where) {
+  const std::size_t count = static_cast<std::size_t>(texture.width) * static_cast<std::size_t>(texture.height);
+  for (int i = 0; i < 3; ++i) {
+    if (plane(texture, i).size() != count) throw IoError(fmt::format("{}: channel {} must have {} texels", where, kChannels[i], count));
+    const auto bad = std::find_if(plane(texture, i).begin(), plane(texture, i).end(), [](float x) { return !std::isfinite(x); });
+    if (bad != plane(texture, i).end()) {
+      const auto at = static_cast<int>(bad - plane(texture, i).begin());
+      throw IoError(fmt::format("{}: channel {} at column {}, row {} is not a finite number", where, kChannels[i], at % texture.width, at / texture.width));
+    }
+  }
+}
+
+nlohmann::json header_json(const ExrSurvey& survey, const std::string& where) {
+  const auto found = survey.attributes.find(kAttribute);
+  if (found == survey.attributes.end() || found->second.type != "string")
+    throw IoError(fmt::format("{}: an OpenEXR image, but not a model: its header has no text \"{}\" (some programs drop it when they save)", where, kAttribute));
+  nlohmann::json json = parse_json(found->second.value, fmt::format("{}: header \"{}\"", where, kAttribute));
+  if (!json.is_object() || json.value("format", nlohmann::json()) != kAttribute) throw IoError(fmt::format("{}: an OpenEXR image, but its header is not that of a model", where));
+  return json;
+}
+
+/// Runs OpenEXR; whatever it throws becomes an IoError.
+template <typename Run>
+void with_openexr(const std::string& where, const char* what, const Run& run) {
+  try {
+    run();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& error) {
+    std::string text = error.what();
+    std::erase_if(text, [](unsigned char c) { return c < 32 || c > 126; });
+    throw IoError(fmt::format("{}: {}: {}", where, what, text.substr(0, 300)));
+  }
+}
+
+}  // namespace
+
+void write_model(const std::filesystem::path& path, const SkeletexModel& model, const ModelFileOptions& options) {
+  const std::string where = path.string();
+  check_model(model, where);
+  check_texels(model.texture, where);
+  const int width = model.texture.width, height = model.texture.height;
+  std::string json;
+  try {
+    json = model_to_json(model, where).dump();
+  } catch (const nlohmann::json::exception& error) {
+    throw IoError(fmt::format("{}: a name in the skeleton is not UTF-8 text: {}", where, error.what()));
+  }
+  const bool is_half = options.format == TexelFormat::kHalf;
+  std::vector<half> halves[3];
+  if (is_half)
+    for (int i = 0; i < 3; ++i) {
+      const std::vector<float>& texels = plane(model.texture, i);
+      const auto largest = std::max_element(texels.begin(), texels.end(), [](float a, float b) { return std::abs(a) < std::abs(b); });
+      if (std::abs(*largest) > HALF_MAX)
+        throw IoError(fmt::format("{}: channel {} has {}, beyond half precision's range of +-65504; store float, or scale the mesh", where, kChannels[i], *largest));
+      halves[i].assign(texels.begin(), texels.end());
+    }
+
+  use_threads();
+  write_atomically(path, [&](const std::filesystem::path& temporary) {
+    OutputFile file(temporary, path);
+    with_openexr(where, "cannot write", [&] {
+      Imf::Header header(width, height);
+      header.compression() = options.compression == ExrCompression::kZip ? Imf::ZIP_COMPRESSION : Imf::PIZ_COMPRESSION;
+      header.insert(kAttribute, Imf::StringAttribute(json));
+      Imf::FrameBuffer frame;
+      for (int i = 0; i < 3; ++i) {
+        const Imf::PixelType type = is_half ? Imf::HALF : Imf::FLOAT;
+        const std::size_t bytes = is_half ? sizeof(half) : sizeof(float);
+        const void* texels = is_half ? static_cast<const void*>(halves[i].data()) : plane(model.texture, i).data();
+        header.channels().insert(kChannels[i], Imf::Channel(type));
+        frame.insert(kChannels[i], Imf::Slice(type, static_cast<char*>(const_cast<void*>(texels)), bytes, bytes * static_cast<std::size_t>(width)));
+      }
+      ExrStream stream(file, where);
+      Imf::OutputFile exr(stream, header);
+      exr.setFrameBuffer(frame);
+      exr.writePixels(height);
+    });
+    file.close();
+  });
+}
+
+nlohmann::json read_model_header(const std::filesystem::path& path) {
+  return header_json(survey_exr(path, kMaxTextureSize, true), path.string());
+}
+
+SkeletexModel read_model(const std::filesystem::path& path) {
+  const std::string where = path.string();
+  SkeletexModel model;
+  {
+    const ExrSurvey survey = survey_exr(path, kMaxTextureSize, false);
+    model = model_from_json(header_json(survey, where), where);
+    if (model.texture.width != survey.width || model.texture.height != survey.height)
+      throw IoError(fmt::format("{}: the image has {} x {} texels, but the model in its header {} x {}; it was resized by another program", where, survey.width,
+                                survey.height, model.texture.width, model.texture.height));
+  }
+  const auto width = static_cast<std::size_t>(model.texture.width), height = static_cast<std::size_t>(model.texture.height);
+  use_threads();
+  with_openexr(where, "cannot read, the file is damaged", [&] {
+    Imf::InputFile exr(path.c_str());
+    Imf::FrameBuffer frame;
+    for (int i = 0; i < 3; ++i) {
+      const Imf::Channel* channel = exr.header().channels().findChannel(kChannels[i]);
+      if (channel == nullptr || channel->xSampling != 1 || channel->ySampling != 1 || channel->type == Imf::UINT)
+        throw IoError(fmt::format("{}: a model has the channels R, G and B in full resolution, float or half; {} is not like that", where, kChannels[i]));
+      plane(model.texture, i).resize(width * height);
+      frame.insert(kChannels[i], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(plane(model.texture, i).data()), sizeof(float), sizeof(float) * width));
+    }
+    const Imath::Box2i window = exr.header().dataWindow();
+    if (window.min != Imath::V2i(0, 0) || window.max != Imath::V2i(model.texture.width - 1, model.texture.height - 1)) throw IoError(where + ": the file changed while it was read");
+    exr.setFrameBuffer(frame);
+    exr.readPixels(0, model.texture.height - 1);
+  });
+  check_texels(model.texture, where);
+  return model;
+}
+
+}  // namespace skeletex
