@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/measure/self_intersection.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "skeletex/measure/parallel.h"
+#include "skeletex/measure/predicates.h"
+#include "skeletex/measure/triangle_tree.h"
+
+namespace skeletex {
+namespace {
+
+using Corners = std::array<Vec3, 3>;
+
+Corners corners_of(const TriangleMesh& mesh, int triangle) {
+  const Triangle& t = mesh.triangles[triangle];
+  return {mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]};
+}
+
+/// The plane of two coordinates in which a triangle is largest; -1 when it has no area in any.
+int drawing_plane(const Corners& t) {
+  const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
+  Eigen::Index axis;
+  normal.cwiseAbs().maxCoeff(&axis);
+  const auto drawn = [axis](const Vec3& p) { return Vec2(p[(axis + 1) % 3], p[(axis + 2) % 3]); };
+  return orientation(drawn(t[0]), drawn(t[1]), drawn(t[2])) != 0 ? static_cast<int>(axis) : -1;
+}
+
+Vec2 drawn(const Vec3& p, int plane) { return {p[(plane + 1) % 3], p[(plane + 2) % 3]}; }
+
+bool do_intervals_meet(double a, double b, double c, double d) { return std::max(std::min(a, b), std::min(c, d)) <= std::min(std::max(a, b), std::max(c, d)); }
+
+bool do_segments_meet(const Vec2& a, const Vec2& b, const Vec2& c, const Vec2& d) {
+  const int abc = orientation(a, b, c), abd = orientation(a, b, d), cda = orientation(c, d, a), cdb = orientation(c, d, b);
+  if (abc * abd > 0 || cda * cdb > 0) return false;
+  // All on one line, or touching: then the intervals decide.
+  return do_intervals_meet(a.x(), b.x(), c.x(), d.x()) && do_intervals_meet(a.y(), b.y(), c.y(), d.y());
+}
+
+/// Whether the segment from p to q meets a triangle with area (drawn in `plane`).
+bool does_segment_meet(const Vec3& p, const Vec3& q, const Corners& t, int plane) {
+  const int side_p = orientation(t[0], t[1], t[2], p), side_q = orientation(t[0], t[1], t[2], q);
+  if (side_p * side_q > 0) return false;
+  if (side_p == 0 && side_q == 0) {
+    const Vec2 a = drawn(t[0], plane), b = drawn(t[1], plane), c = drawn(t[2], plane), from = drawn(p, plane), to = drawn(q, plane);
+    const int way = orientation(a, b, c);
+    if (orientation(a, b, from) * way >= 0 && orientation(b, c, from) * way >= 0 && orientation(c, a, from) * way >= 0) return true;
+    return do_segments_meet(from, to, a, b) || do_segments_meet(from, to, b, c) || do_segments_meet(from, to, c, a);
+  }
+  const int ab = orientation(p, q, t[0], t[1]), bc = orientation(p, q, t[1], t[2]), ca = orientation(p, q, t[2], t[0]);
+  return (ab >= 0 && bc >= 0 && ca >= 0) || (ab <= 0 && bc <= 0 && ca <= 0);
+}
+
+bool do_disjoint_triangles_meet(const Corners& s, const Corners& t) {
+  const int plane_s = drawing_plane(s), plane_t = drawing_plane(t);
+  const auto is_off = [](const Corners& plane, const Corners& points) {
+    const int side = orientation(plane[0], plane[1], plane[2], points[0]);
+    return side != 0 && side == orientation(plane[0], plane[1], plane[2], points[1]) && side == orientation(plane[0], plane[1], plane[2], points[2]);
+  };
+  if ((plane_s >= 0 && is_off(s, t)) || (plane_t >= 0 && is_off(t, s))) return false;
+  for (int k = 0; k < 3; ++k) {
+    if (plane_t >= 0 && does_segment_meet(s[k], s[(k + 1) % 3], t, plane_t)) return true;
+    if (plane_s >= 0 && does_segment_meet(t[k], t[(k + 1) % 3], s, plane_s)) return true;
+  }
+  return false;
+}
+
+/// Two triangles with their shared vertex first.
+bool do_triangles_at_vertex_meet(const Corners& s, const Corners& t) {
+  const int plane_s = drawing_plane(s), plane_t = drawing_plane(t);
+  return (plane_t >= 0 && does_segment_meet(s[1], s[2], t, plane_t)) || (plane_s >= 0 && does_segment_meet(t[1], t[2], s, plane_s));
+}
+
+/// Two triangles that share the edge from a to b.
+bool do_triangles_at_edge_meet(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  const int plane = drawing_plane({a, b, c});
+  if (plane < 0 || orientation(a, b, c, d) != 0) return false;
+  return orientation(drawn(a, plane), drawn(b, plane), drawn(c, plane)) * orientation(drawn(a, plane), drawn(b, plane), drawn(d, plane)) > 0;
+}
+
+}  // namespace
+
+bool do_triangles_intersect(const TriangleMesh& mesh, int first, int second) {
+  const Triangle &i = mesh.triangles[first], &j = mesh.triangles[second];
+  int shared = 0, at_i = 0, at_j = 0, free_i = 0, free_j = 0;
+  for (int k = 0; k < 3; ++k) {
+    const auto there = std::find(j.begin(), j.end(), i[k]);
+    if (there == j.end()) {
+      free_i = k;
+    } else {
+      ++shared;
+      at_i = k;
+      at_j = static_cast<int>(there - j.begin());
+    }
+    if (std::find(i.begin(), i.end(), j[k]) == i.end()) free_j = k;
+  }
+  const Corners s = corners_of(mesh, first), t = corners_of(mesh, second);
+  switch (shared) {
+    case 0: return do_disjoint_triangles_meet(s, t);
+    case 1: return do_triangles_at_vertex_meet({s[at_i], s[(at_i + 1) % 3], s[(at_i + 2) % 3]}, {t[at_j], t[(at_j + 1) % 3], t[(at_j + 2) % 3]});
+    case 2: return do_triangles_at_edge_meet(s[(free_i + 1) % 3], s[(free_i + 2) % 3], s[free_i], t[free_j]);
+    default: return drawing_plane(s) >= 0;
+  }
+}
+
+std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh) {
+  if (mesh.triangles.empty()) return {};
+  constexpr int kWidth = TriangleTree::kWidth;
+  const TriangleTree tree = build_triangle_tree(mesh);
+  const std::size_t count = tree.order.size();
+  // Boxes of the triangles as the tree has them for its blocks: by place, six planes of eight per block.
+  std::vector<float> triangle_boxes(block_count(count, kWidth) * 6 * kWidth);
+  constexpr float kMargin = 3e-7f;  // rounding of the corners and of the edges that lead to them
+  for_each_block(block_count(count, kWidth), 1 << 12, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t block = begin; block < end; ++block) {
+      const float* from = tree.blocks.data() + block * 9 * kWidth;
+      float* to = triangle_boxes.data() + block * 6 * kWidth;
+      for (int d = 0; d < 3; ++d)
+        for (int k = 0; k < kWidth; ++k) {
+          const float corner = from[d * kWidth + k], second = from[(3 + d) * kWidth + k], third = from[(6 + d) * kWidth + k];
+          to[d * kWidth + k] = corner + std::min(0.0f, std::min(second, third)) - kMargin;
+          to[(3 + d) * kWidth + k] = corner + std::max(0.0f, std::max(second, third)) + kMargin;
+        }
+    }
+  });
+
+  constexpr std::size_t kBlock = 1024;
+  std::vector<std::vector<std::array<int, 2>>> found(block_count(count, kBlock));
+  for_each_block(count, kBlock, [&](std::size_t part, std::size_t begin, std::size_t end) {
+    struct Entry {
+      int level;
+      std::size_t index;
+    };
+    std::vector<Entry> stack;
+    std::array<float, 6> box;
+    const auto overlapping = [&box](const float* planes) {
+      std::array<bool, kWidth> hits;
+      for (int k = 0; k < kWidth; ++k)
+        hits[k] = (planes[k] <= box[3]) & (planes[kWidth + k] <= box[4]) & (planes[2 * kWidth + k] <= box[5]) & (planes[3 * kWidth + k] >= box[0]) &
+                  (planes[4 * kWidth + k] >= box[1]) & (planes[5 * kWidth + k] >= box[2]);
+      return hits;
+    };
+    for (std::size_t place = begin; place < end; ++place) {
+      const float* own = triangle_boxes.data() + place / kWidth * 6 * kWidth + place % kWidth;
+      for (int d = 0; d < 6; ++d) box[d] = own[d * kWidth];
+      stack.push_back({tree.top_level(), 0});
+      while (!stack.empty()) {
+        const auto [level, index] = stack.back();
+        stack.pop_back();
+        const float* planes = level > 0 ? tree.boxes.data() + (tree.level_begin[level] + index) * 6 * kWidth : triangle_boxes.data() + index * 6 * kWidth;
+        const auto hits = overlapping(planes);
+        for (int k = 0; k < kWidth; ++k) {
+          if (!hits[k]) continue;
+          const std::size_t child = kWidth * index + k;
+          if (level > 0) {
+            // Every pair once: with the triangles that come later. A node of this level covers 8^level places.
+            if ((child + 1) << (3 * level) > place + 1) stack.push_back({level - 1, child});
+          } else if (child > place && child < count) {
+            const int first = std::min(tree.order[place], tree.order[child]), second = std::max(tree.order[place], tree.order[child]);
+            if (do_triangles_intersect(mesh, first, second)) found[part].push_back({first, second});
+          }
+        }
+      }
+    }
+  });
+  std::vector<std::array<int, 2>> pairs;
+  for (const auto& some : found) pairs.insert(pairs.end(), some.begin(), some.end());
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
+}
+
+long count_self_intersections(const TriangleMesh& mesh) { return static_cast<long>(find_self_intersections(mesh).size()); }
+
+}  // namespace skeletex
