@@ -341,6 +341,11 @@ TEST(SegmentRefusal, NamesANodeOutsideAndItsBone) {
   EXPECT_TRUE(mentions(refusal(y.mesh, y.skeleton), {"node \"left\"", "bone \"left\"", "outside", "(-2.5, 3.2, 0)", "move"}));
 }
 
+TEST(SegmentRefusal, SaysThatTheMeshIsInsideOut) {
+  const Shape y = y_shape(0.3);
+  EXPECT_TRUE(mentions(refusal(inside_out(y.mesh), y.skeleton), {"inside out", "reverse"}));
+}
+
 TEST(SegmentRefusal, NamesABoneThatLeavesTheMeshAndThePlace) {
   const Shape chain = chain_shape(3, 0.9);
   const Skeleton shortcut{chain.skeleton.nodes, {{"shortcut", chain.skeleton.bones[0].head, chain.skeleton.bones[2].tail, std::nullopt}}};

@@ -93,7 +93,11 @@ void check_skeleton_inside(const CutMesh& mesh, const Skeleton& skeleton) {
   for (const Bone& bone : skeleton.bones) is_used[bone.head] = is_used[bone.tail] = true;
   for (std::size_t n = 0; n < skeleton.nodes.size(); ++n) {
     const Node& node = skeleton.nodes[n];
-    if (!is_used[n] || winding_number(mesh, node.position) > 0) continue;
+    const int winding = is_used[n] ? winding_number(mesh, node.position) : 1;
+    if (winding > 0) continue;
+    if (winding < 0)
+      throw TopologyError(fmt::format("the mesh is turned inside out around node \"{}\" at {}; reverse the order of every triangle's vertices", node.name,
+                                      text_of(node.position)));
     std::string bones;
     for (const Bone& bone : skeleton.bones)
       if (bone.head == static_cast<int>(n) || bone.tail == static_cast<int>(n)) bones += fmt::format("{}\"{}\"", bones.empty() ? "" : ", ", bone.name);

@@ -9,7 +9,7 @@ namespace skeletex {
 /// \throw TopologyError naming node or bone, the point, and what to move
 void check_skeleton_inside(const CutMesh& mesh, const Skeleton& skeleton);
 
-/// Whether a point lies inside a closed mesh: how often the surface winds around it, exact for points off the surface.
+/// How often a closed mesh winds around a point off its surface: 1 inside, 0 outside, -1 inside a mesh that is inside out.
 int winding_number(const CutMesh& mesh, const Vec3& point);
 
 }  // namespace skeletex
