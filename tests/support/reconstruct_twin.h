@@ -30,10 +30,26 @@ inline DisplacedPoint displace(const PatchRecord& patch, const RowRecord& row, c
   return {point, (point - frame.foot).norm(), texel.norm()};
 }
 
-/// Kernel triangulate_quads, one quad.
-inline std::array<Triangle, 2> split_quad(const std::vector<Vec3>& p, int v00, int v01, int v10, int v11) {
-  if ((p[v10] - p[v01]).squaredNorm() < 0.99999 * (p[v11] - p[v00]).squaredNorm()) return {Triangle{v00, v01, v10}, Triangle{v10, v01, v11}};
-  return {Triangle{v00, v01, v11}, Triangle{v00, v11, v10}};
+/// Kernel triangulate_quads, one quad of a patch: whether its diagonal from (row, column + 1) to (row + 1, column) is
+/// taken. `vertex(row, column)` gives the points of inner rows; `is_clear` says whether single precision can tell.
+template <class Vertices>
+bool takes_second_diagonal(const Vertices& vertex, int row, int column, int height, bool& is_clear) {
+  const auto point = [&](int r, int j) -> Vec3 {
+    if (r < 1) return 2 * vertex(1, j) - vertex(2, j);
+    if (r > height - 2) return 2 * vertex(height - 2, j) - vertex(height - 3, j);
+    return vertex(r, j);
+  };
+  Vec3 centre = Vec3::Zero();
+  const double weights[4] = {-1.0 / 16, 9.0 / 16, 9.0 / 16, -1.0 / 16};
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < 4; ++k) centre += weights[i] * weights[k] * point(row - 1 + i, column - 1 + k);
+  const Vec3 a = point(row, column), b = point(row, column + 1), c = point(row + 1, column), d = point(row + 1, column + 1);
+  const Vec3 normal = (d - a).cross(c - b).normalized();
+  const double blur = 3e-7 * centre.lpNorm<1>() + 1e-4 * (d - a).norm();
+  const double first = (std::abs((0.5 * (a + d) - centre).dot(normal)) + 0.9 * blur) * (d - a).squaredNorm();
+  const double second = (std::abs((0.5 * (b + c) - centre).dot(normal)) + blur) * (c - b).squaredNorm();
+  is_clear = std::abs(second - first) > 2 * blur * std::max((d - a).squaredNorm(), (c - b).squaredNorm());
+  return second < first;
 }
 
 /// Kernels filter_rows and filter_columns, one new sample of one plane: `stride` between old samples.
