@@ -79,11 +79,13 @@ int row_of_point(float x, float z, int begin, int end, global const RowRecord* r
   const float length = patch->bone_length;
   if (begin == 0 && side_of_ray(x, z, rows[0], length, slope_head, slope_tail) < patch->head_tolerance * hypot(1.0f, slope_head)) return 0;
   if (end == patch->height && side_of_ray(x, z, rows[end - 1], length, slope_head, slope_tail) >= -patch->tail_tolerance * hypot(1.0f, slope_tail)) return end;
-  int first = begin, last = end;
-  while (first < last) {
-    const int middle = (first + last) / 2;
-    if (side_of_ray(x, z, rows[middle], length, slope_head, slope_tail) < 0.0f) last = middle;
-    else first = middle + 1;
+  // Without branches: whether a row lies before or after is a toss-up.
+  int first = begin;
+  for (int count = end - begin; count > 0;) {
+    const int middle = count / 2;
+    const bool is_after = side_of_ray(x, z, rows[first + middle], length, slope_head, slope_tail) >= 0.0f;
+    first = is_after ? first + middle + 1 : first;
+    count = is_after ? count - middle - 1 : middle;
   }
   return first;
 }
@@ -137,25 +139,24 @@ kernel void cast_rays(const int column_count, const int tile_rows, const int wan
   }
 }
 
-// NDRange (triangles).
+// NDRange (triangles). Lists are by sector and by slab: slab k of a sector holds the triangles with points at a height
+// z in [k, k + 1) slab_height above the chart's lowest point. `spheres` hold each triangle: centre x, y, z and radius.
 kernel void find_hidden(const int triangle_count, global const SpdSightLine* restrict lines, global const int* restrict list_begins,
-                        global const int* restrict list_triangles, global const float* restrict points, global const float* restrict lowest_z,
-                        global const float* restrict highest_z, global int* restrict is_hidden) {
+                        global const int* restrict list_triangles, global const float* restrict spheres, global const float* restrict points,
+                        global int* restrict is_hidden) {
   const int triangle = (int)get_global_id(0);
   if (triangle >= triangle_count) return;
   const SpdSightLine line = lines[triangle];
-  if (line.distance < 0.0f) {
-    is_hidden[triangle] = 1;
-    return;
-  }
-  const float end = line.foot + line.distance * line.along;
-  const float slack = 1e-6f * (fabs(line.foot) + fabs(end) + line.distance);
-  const float low = fmin(line.foot, end) - slack, high = fmax(line.foot, end) + slack;
   const float nearer = line.distance * (1.0f - 1e-5f);
-  int found = 0;
-  for (int i = list_begins[line.list]; i < list_begins[line.list + 1] && !found; ++i) {
+  const float dx = line.out * line.cosine, dy = line.out * line.sine, dz = line.along;
+  int found = line.distance < 0.0f;
+  for (int i = list_begins[line.first_list]; !found && i < list_begins[line.last_list + 1]; ++i) {
     const int other = list_triangles[i];
-    if (highest_z[other] < low || lowest_z[other] > high || other == triangle) continue;
+    // Most of the list is nowhere near.
+    const float x = spheres[4 * other], y = spheres[4 * other + 1], z = spheres[4 * other + 2] - line.foot, radius = spheres[4 * other + 3];
+    const float along = x * dx + y * dy + z * dz;
+    const float rx = x - along * dx, ry = y - along * dy, rz = z - along * dz;
+    if (rx * rx + ry * ry + rz * rz > radius * radius || along - radius > nearer || along + radius < 0.0f || other == triangle) continue;
     Section s;
     if (!slice_triangle(points, other, line.cosine, line.sine, &s)) continue;
     const float side_a = line.out * (s.za - line.foot) - line.along * s.xa, side_b = line.out * (s.zb - line.foot) - line.along * s.xb;

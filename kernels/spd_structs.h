@@ -30,12 +30,12 @@ typedef struct SpdSightLine {
   float foot;          ///< of W, along the bone from the head, world units
   float out, along;    ///< the ray's unit direction: along s', along o
   float distance;      ///< of the triangle's centre from W; negative: the centre has no ray, the triangle is unseen
-  SKELETEX_INT list;   ///< the list of triangles at this angle
+  SKELETEX_INT first_list, last_list;  ///< the lists of triangles at this angle, from the foot's height to the centre's
 } SpdSightLine;
 
 #ifndef __OPENCL_VERSION__
 static_assert(sizeof(SpdPatch) == 36);
-static_assert(sizeof(SpdSightLine) == 28);
+static_assert(sizeof(SpdSightLine) == 32);
 }  // namespace skeletex
 #endif
 #undef SKELETEX_INT

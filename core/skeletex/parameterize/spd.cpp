@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "spd_structs.h"
@@ -16,8 +17,9 @@ constexpr int kWorkGroup = 32;
 constexpr int kTileRowsGpu = 64;
 // The pole's ray leans this much towards its column, so that it meets what holds the axis whatever rounding does there.
 constexpr double kPoleCosine = 1e-6;
-// Lists of triangles per turn for sight lines.
-constexpr int kSightSectors = 256;
+// Lists of triangles for sight lines: per turn, and along the bone.
+constexpr int kSightSectors = 128;
+constexpr int kSightSlabs = 64;
 
 /// The triangles of all charts in the coordinates of their bones.
 struct LocalTriangles {
@@ -85,30 +87,27 @@ struct Lists {
   std::vector<int> triangles;
 };
 
-/// Per chart, a list for each of `counts[chart]` angles (j / count) or sectors ([j, j + 1) / count): the triangles there.
-enum class AngleList { kAtAngles, kInSectors };
-Lists list_triangles(const LocalTriangles& local, std::span<const int> counts, AngleList kind) {
+/// Calls visit(index) for every one of `count` angles (j / count) or sectors ([j, j + 1) / count) that a triangle covers.
+enum class AngleCell { kAngle, kSector };
+template <class Visit>
+void for_each_angle(const LocalTriangles& local, int triangle, int count, AngleCell cell, Visit&& visit) {
+  // Slack for the rounding of angles in single precision, here and on the device.
+  constexpr double kSlack = 4e-7;
+  int first = 0, last = count - 1;
+  if (local.last_turn[triangle] - local.first_turn[triangle] < 1) {
+    const double low = (static_cast<double>(local.first_turn[triangle]) - kSlack) * count;
+    first = static_cast<int>(cell == AngleCell::kAngle ? std::ceil(low) : std::floor(low));
+    last = static_cast<int>(std::floor((static_cast<double>(local.last_turn[triangle]) + kSlack) * count));
+    last = std::min(last, first + count - 1);
+  }
+  for (int j = first; j <= last; ++j) visit(((j % count) + count) % count);
+}
+
+/// Compressed rows from a function that calls visit(list, triangle) for everything that belongs into them, in order.
+template <class ForEach>
+Lists fill_lists(int count, ForEach&& for_each_list) {
   Lists lists;
-  std::vector<int> list_begins{0};
-  for (const int count : counts) list_begins.push_back(list_begins.back() + count);
-  lists.begins.assign(list_begins.back() + 1, 0);
-  const auto for_each_list = [&](auto&& visit) {
-    for (std::size_t chart = 0; chart < counts.size(); ++chart) {
-      const int count = counts[chart], begin = list_begins[chart];
-      for (int t = local.begins[chart]; t < local.begins[chart + 1]; ++t) {
-        if (local.last_turn[t] - local.first_turn[t] >= 1) {
-          for (int j = 0; j < count; ++j) visit(begin + j, t);
-          continue;
-        }
-        // Slack for the rounding of angles in single precision, here and on the device.
-        const double slack = 4e-7;
-        const double low = (local.first_turn[t] - slack) * count, high = (local.last_turn[t] + slack) * count;
-        const int first = static_cast<int>(kind == AngleList::kAtAngles ? std::ceil(low) : std::floor(low));
-        const int last = std::min(static_cast<int>(std::floor(high)), first + count - 1);
-        for (int j = first; j <= last; ++j) visit(begin + ((j % count) + count) % count, t);
-      }
-    }
-  };
+  lists.begins.assign(count + 1, 0);
   for_each_list([&](int list, int) { ++lists.begins[list + 1]; });
   for (std::size_t i = 1; i < lists.begins.size(); ++i) lists.begins[i] += lists.begins[i - 1];
   lists.triangles.resize(lists.begins.back());
@@ -123,7 +122,7 @@ std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton,
                                    std::span<const Patch> patches, SpdHit which) {
   const LocalTriangles local = localize(skeleton, walls, charts);
   std::vector<SpdPatch> records;
-  std::vector<int> column_patches, widths;
+  std::vector<int> column_patches;
   std::vector<RowRecord> rows;
   std::vector<ColumnRecord> columns;
   int texels = 0, tallest = 0;
@@ -134,7 +133,6 @@ std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton,
     const float tolerance = static_cast<float>(4e-6 * local.extent);
     records.push_back({static_cast<float>(bone_length(skeleton, bone)), tolerance, is_head_free ? 0 : tolerance, is_tail_free ? 0 : tolerance, width, height,
                        static_cast<int>(rows.size()), static_cast<int>(columns.size()), texels});
-    widths.push_back(width);
     tallest = std::max(tallest, height);
     texels += width * height;
     for (const double u : patches[i].row_u) {
@@ -149,7 +147,11 @@ std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton,
       column_patches.push_back(static_cast<int>(i));
     }
   }
-  const Lists lists = list_triangles(local, widths, AngleList::kAtAngles);
+  const Lists lists = fill_lists(static_cast<int>(columns.size()), [&](auto&& visit) {
+    for (std::size_t i = 0; i < charts.size(); ++i)
+      for (int t = local.begins[i]; t < local.begins[i + 1]; ++t)
+        for_each_angle(local, t, records[i].width, AngleCell::kAngle, [&](int j) { visit(records[i].column_begin + j, t); });
+  });
 
   const int column_count = static_cast<int>(columns.size());
   const int tile_rows = context.device().type == "cpu" ? std::max(tallest, 1) : kTileRowsGpu;
@@ -176,10 +178,32 @@ std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton,
 
 std::vector<double> unseen_area_fractions(ClContext& context, const Skeleton& skeleton, const Walls& walls, std::span<const Chart> charts) {
   const LocalTriangles local = localize(skeleton, walls, charts);
-  const std::vector<int> sectors(charts.size(), kSightSectors);
-  const Lists lists = list_triangles(local, sectors, AngleList::kInSectors);
+  // The height of each chart along its bone, cut into slabs.
+  std::vector<float> lowest(charts.size(), 0), slabs_per_height(charts.size(), 0);
+  for (std::size_t i = 0; i < charts.size(); ++i) {
+    const auto [first, last] = std::pair{3 * local.begins[i], 3 * local.begins[i + 1]};
+    float low = std::numeric_limits<float>::max(), high = std::numeric_limits<float>::lowest();
+    for (int p = first; p < last; ++p) {
+      low = std::min(low, local.points[3 * static_cast<std::size_t>(p) + 2]);
+      high = std::max(high, local.points[3 * static_cast<std::size_t>(p) + 2]);
+    }
+    lowest[i] = low;
+    slabs_per_height[i] = high > low ? kSightSlabs / (high - low) : 0;
+  }
+  const auto slab_of = [&](std::size_t chart, float z) {
+    return std::clamp(static_cast<int>((z - lowest[chart]) * slabs_per_height[chart]), 0, kSightSlabs - 1);
+  };
+  const Lists lists = fill_lists(static_cast<int>(charts.size()) * kSightSectors * kSightSlabs, [&](auto&& visit) {
+    for (std::size_t i = 0; i < charts.size(); ++i)
+      for (int t = local.begins[i]; t < local.begins[i + 1]; ++t) {
+        const float* p = &local.points[9 * static_cast<std::size_t>(t)];
+        const int first = slab_of(i, std::min({p[2], p[5], p[8]})), last = slab_of(i, std::max({p[2], p[5], p[8]}));
+        for_each_angle(local, t, kSightSectors, AngleCell::kSector, [&](int sector) {
+          for (int slab = first; slab <= last; ++slab) visit((static_cast<int>(i) * kSightSectors + sector) * kSightSlabs + slab, t);
+        });
+      }
+  });
   std::vector<SpdSightLine> lines;
-  std::vector<float> lowest_z, highest_z;
   lines.reserve(local.count());
   for (std::size_t i = 0; i < charts.size(); ++i) {
     const Chart& chart = charts[i];
@@ -197,22 +221,35 @@ std::vector<double> unseen_area_fractions(ClContext& context, const Skeleton& sk
       if (at.u >= 0 && at.u <= 1 && r > 0) {
         const double foot = station_of(at.u, is_head_free, is_tail_free).station * length;
         const double z = offset.dot(basis.o) - foot, distance = std::hypot(r, z);
+        const double slack = 1e-6 * (std::abs(foot) + std::abs(z) + distance);
         const int sector = std::min(kSightSectors - 1, static_cast<int>(at.turn * kSightSectors));
-        line = {static_cast<float>(x / r),        static_cast<float>(y / r), static_cast<float>(foot), static_cast<float>(r / distance),
-                static_cast<float>(z / distance), static_cast<float>(distance), static_cast<int>(i) * kSightSectors + sector};
+        const int list = (static_cast<int>(i) * kSightSectors + sector) * kSightSlabs;
+        line = {static_cast<float>(x / r),
+                static_cast<float>(y / r),
+                static_cast<float>(foot),
+                static_cast<float>(r / distance),
+                static_cast<float>(z / distance),
+                static_cast<float>(distance),
+                list + slab_of(i, static_cast<float>(foot + std::min(z, 0.0) - slack)),
+                list + slab_of(i, static_cast<float>(foot + std::max(z, 0.0) + slack))};
       }
-      const float* p = &local.points[9 * lines.size()];
-      lowest_z.push_back(std::min({p[2], p[5], p[8]}));
-      highest_z.push_back(std::max({p[2], p[5], p[8]}));
       lines.push_back(line);
     }
+  }
+
+  std::vector<float> spheres(4 * static_cast<std::size_t>(local.count()));
+  const float slack = static_cast<float>(1e-6 * local.extent);
+  for (int t = 0; t < local.count(); ++t) {
+    const Eigen::Map<const Eigen::Matrix3f> corners(&local.points[9 * static_cast<std::size_t>(t)]);
+    const Eigen::Vector3f centre = corners.rowwise().mean();
+    const float radius = std::sqrt((corners.colwise() - centre).colwise().squaredNorm().maxCoeff());
+    Eigen::Map<Eigen::Vector4f>(&spheres[4 * static_cast<std::size_t>(t)]) << centre, radius + slack;
   }
 
   auto is_hidden = context.allocate<int>(lines.size());
   const ClKernelName kernel{"spd.cl", "find_hidden"};
   context.launch(kernel, ClRange({lines.size(), 1}, {context.work_group_size(kernel, kWorkGroup), 1}), local.count(), context.upload(lines),
-                 context.upload(lists.begins), context.upload(lists.triangles), context.upload(local.points), context.upload(lowest_z),
-                 context.upload(highest_z), is_hidden);
+                 context.upload(lists.begins), context.upload(lists.triangles), context.upload(spheres), context.upload(local.points), is_hidden);
   const std::vector<int> hidden = context.download(is_hidden);
 
   std::vector<double> fractions(charts.size(), 0);
