@@ -75,13 +75,23 @@ float side_of_ray(float x, float z, RowRecord row, float length, float slope_hea
 
 // The first row in [begin, end) whose ray passes a point on the tail's side. Points at a seam's ray count as between the
 // first and the last row, so that those rays meet the seam.
-int row_of_point(float x, float z, int begin, int end, global const RowRecord* restrict rows, const SpdPatch* patch, float slope_head, float slope_tail) {
+int row_of_point(float x, float z, int begin, int end, global const RowRecord* restrict rows, global const int* restrict row_guesses,
+                 const SpdPatch* patch, float slope_head, float slope_tail) {
   const float length = patch->bone_length;
-  if (begin == 0 && side_of_ray(x, z, rows[0], length, slope_head, slope_tail) < patch->head_tolerance * hypot(1.0f, slope_head)) return 0;
-  if (end == patch->height && side_of_ray(x, z, rows[end - 1], length, slope_head, slope_tail) >= -patch->tail_tolerance * hypot(1.0f, slope_tail)) return end;
-  // Without branches: whether a row lies before or after is a toss-up.
-  int first = begin;
-  for (int count = end - begin; count > 0;) {
+  if (begin == 0 && side_of_ray(x, z, rows[0], length, slope_head, slope_tail) < patch->head_tolerance * (1.0f + fabs(slope_head))) return 0;
+  if (end == patch->height && side_of_ray(x, z, rows[end - 1], length, slope_head, slope_tail) >= -patch->tail_tolerance * (1.0f + fabs(slope_tail)))
+    return end;
+  // Where the point's mark (see SpdPatch) falls among those of the rows, give or take rounding.
+  const float above = z - length;
+  const float mark = patch->is_tail_free && above > 0.0f ? 1.0f + above / (x + above)
+                     : patch->is_head_free && z < 0.0f   ? z / (x - z)
+                                                         : clamp((z - x * slope_head) / (length + x * (slope_tail - slope_head)), 0.0f, 1.0f);
+  const int cell = clamp((int)((mark + 1.0f) * patch->guesses_per_mark), 0, patch->guess_count - 2);
+  const int low = clamp(row_guesses[cell], begin, end), high = clamp(row_guesses[cell + 1], begin, end);
+  const bool is_above_low = low == begin || side_of_ray(x, z, rows[low - 1], length, slope_head, slope_tail) >= 0.0f;
+  const bool is_below_high = high == end || side_of_ray(x, z, rows[high], length, slope_head, slope_tail) < 0.0f;
+  int first = is_above_low ? low : begin;
+  for (int count = (is_below_high ? high : end) - first; count > 0;) {
     const int middle = count / 2;
     const bool is_after = side_of_ray(x, z, rows[first + middle], length, slope_head, slope_tail) >= 0.0f;
     first = is_after ? first + middle + 1 : first;
@@ -92,8 +102,8 @@ int row_of_point(float x, float z, int begin, int end, global const RowRecord* r
 
 // NDRange (columns of all patches, tiles of tile_rows rows): each work-item owns a column's part and goes through its list.
 kernel void cast_rays(const int column_count, const int tile_rows, const int wants_last, global const SpdPatch* restrict patches,
-                      global const int* restrict column_patches, global const RowRecord* restrict rows, global const ColumnRecord* restrict columns,
-                      global const int* restrict list_begins, global const int* restrict list_triangles, global const float* restrict points,
+                      global const int* restrict column_patches, global const RowRecord* restrict rows, global const int* restrict row_guesses,
+                      global const ColumnRecord* restrict columns, global const int* restrict list_begins, global const int* restrict list_triangles, global const float* restrict points,
                       global int* restrict hit_triangles, global float* restrict hit_distances) {
   const int c = (int)get_global_id(0);
   if (c >= column_count) return;
@@ -103,6 +113,7 @@ kernel void cast_rays(const int column_count, const int tile_rows, const int wan
   if (begin >= end) return;
   const ColumnRecord column = columns[c];
   rows += patch.row_begin;
+  row_guesses += patch.guess_begin;
   hit_triangles += patch.texel_begin + (c - patch.column_begin);
   hit_distances += patch.texel_begin + (c - patch.column_begin);
   for (int r = begin; r < end; ++r) {
@@ -112,23 +123,21 @@ kernel void cast_rays(const int column_count, const int tile_rows, const int wan
   for (int i = list_begins[c]; i < list_begins[c + 1]; ++i) {
     Section s;
     if (!slice_triangle(points, list_triangles[i], column.cosine, column.sine, &s)) continue;
-    const int ra = row_of_point(s.xa, s.za, begin, end, rows, &patch, column.slope_head, column.slope_tail);
-    const int rb = row_of_point(s.xb, s.zb, begin, end, rows, &patch, column.slope_head, column.slope_tail);
+    const int ra = row_of_point(s.xa, s.za, begin, end, rows, row_guesses, &patch, column.slope_head, column.slope_tail);
+    const int rb = row_of_point(s.xb, s.zb, begin, end, rows, row_guesses, &patch, column.slope_head, column.slope_tail);
     const int last = max(ra, rb);
     for (int r = min(ra, rb); r < last; ++r) {
       const RowRecord row = rows[r];
       const float foot = row.station * patch.bone_length;
       const float slope = (1.0f - row.station) * column.slope_head + row.station * column.slope_tail;
       const float fx = row.cap_cos, fz = row.cap_cos * slope + row.cap_sin;
-      const float scale = 1.0f / sqrt(fx * fx + fz * fz);
-      const float out = fx * scale, along = fz * scale;
-      const float side_a = out * (s.za - foot) - along * s.xa, side_b = out * (s.zb - foot) - along * s.xb;
+      const float side_a = fx * (s.za - foot) - fz * s.xa, side_b = fx * (s.zb - foot) - fz * s.xb;
       // Where the rays of a column have crossed, rows are not ordered any more: such a section is no hit.
-      if (side_a * side_b > 0.0f && fmin(fabs(side_a), fabs(side_b)) > patch.tolerance) continue;
-      const float t_a = out * s.xa + along * (s.za - foot), t_b = out * s.xb + along * (s.zb - foot);
+      if (side_a * side_b > 0.0f && fmin(fabs(side_a), fabs(side_b)) > patch.tolerance * (fx + fabs(fz))) continue;
       const float w = side_a == side_b ? 0.5f : clamp(side_a / (side_a - side_b), 0.0f, 1.0f);
-      const float t = t_a + w * (t_b - t_a);
-      if (!(t >= 0.0f)) continue;
+      const float x = s.xa + w * (s.xb - s.xa), z = s.za + w * (s.zb - s.za) - foot;
+      if (!(fx * x + fz * z >= 0.0f)) continue;
+      const float t = sqrt(x * x + z * z);
       const int at = r * patch.width;
       const bool is_first = hit_triangles[at] < 0;
       if (is_first || (wants_last ? t > hit_distances[at] : t < hit_distances[at])) {

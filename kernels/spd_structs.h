@@ -11,7 +11,8 @@
 namespace skeletex {
 #endif
 
-/// One patch whose rays are cast.
+/// One patch whose rays are cast. Rows are looked up by marks, which grow along a column as the rows' rays do: the station
+/// in [0, 1] along the bone, 1 + sin / (sin + cos) of the latitude in the tail's cap, -sin / (sin + cos) in the head's.
 typedef struct SpdPatch {
   float bone_length;       ///< L
   float tolerance;         ///< rounding of a point's distance to a ray, world units
@@ -22,6 +23,10 @@ typedef struct SpdPatch {
   SKELETEX_INT row_begin;  ///< first entry in the row table (RowRecord)
   SKELETEX_INT column_begin;  ///< first entry in the column table (ColumnRecord) and in the columns' lists of triangles
   SKELETEX_INT texel_begin;   ///< first entry in the results
+  SKELETEX_INT is_head_free, is_tail_free;
+  SKELETEX_INT guess_begin;   ///< first entry in the table of guesses: entry i is the first row with a mark >= i / guesses_per_mark - 1
+  SKELETEX_INT guess_count;
+  float guesses_per_mark;
 } SpdPatch;
 
 /// One ray that starts on the bone's axis: towards the centre of a triangle.
@@ -34,7 +39,7 @@ typedef struct SpdSightLine {
 } SpdSightLine;
 
 #ifndef __OPENCL_VERSION__
-static_assert(sizeof(SpdPatch) == 36);
+static_assert(sizeof(SpdPatch) == 56);
 static_assert(sizeof(SpdSightLine) == 32);
 }  // namespace skeletex
 #endif

@@ -116,6 +116,19 @@ Lists fill_lists(int count, ForEach&& for_each_list) {
   return lists;
 }
 
+/// Appends a patch's table of guesses and notes its size: one entry per half row or so.
+void append_guesses(std::span<const RowRecord> rows, SpdPatch& patch, std::vector<int>& guesses) {
+  patch.guesses_per_mark = 2 * static_cast<float>(rows.size());
+  patch.guess_count = 6 * static_cast<int>(rows.size()) + 2;
+  int row = 0;
+  for (int i = 0; i < patch.guess_count; ++i) {
+    const float mark = static_cast<float>(i) / patch.guesses_per_mark - 1;
+    const auto mark_of = [](const RowRecord& r) { return r.station + r.cap_sin / (r.cap_cos + std::abs(r.cap_sin)); };
+    while (row < static_cast<int>(rows.size()) && mark_of(rows[row]) < mark) ++row;
+    guesses.push_back(row);
+  }
+}
+
 }  // namespace
 
 std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton, const Walls& walls, std::span<const Chart> charts,
@@ -124,6 +137,7 @@ std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton,
   std::vector<SpdPatch> records;
   std::vector<int> column_patches;
   std::vector<RowRecord> rows;
+  std::vector<int> row_guesses;
   std::vector<ColumnRecord> columns;
   int texels = 0, tallest = 0;
   for (std::size_t i = 0; i < charts.size(); ++i) {
@@ -132,7 +146,8 @@ std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton,
     // Cuts lie off the walls by the segmentation's perturbation and by rounding; both are relative to the model's size.
     const float tolerance = static_cast<float>(4e-6 * local.extent);
     records.push_back({static_cast<float>(bone_length(skeleton, bone)), tolerance, is_head_free ? 0 : tolerance, is_tail_free ? 0 : tolerance, width, height,
-                       static_cast<int>(rows.size()), static_cast<int>(columns.size()), texels});
+                       static_cast<int>(rows.size()), static_cast<int>(columns.size()), texels, is_head_free, is_tail_free,
+                       static_cast<int>(row_guesses.size()), 0, 0});
     tallest = std::max(tallest, height);
     texels += width * height;
     for (const double u : patches[i].row_u) {
@@ -140,6 +155,7 @@ std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton,
       rows.push_back({static_cast<float>(u), static_cast<float>(at.station), static_cast<float>(std::max(kPoleCosine, std::cos(at.latitude))),
                       static_cast<float>(std::sin(at.latitude))});
     }
+    append_guesses(std::span(rows).last(height), records.back(), row_guesses);
     for (int j = 0; j < width; ++j) {
       const double turn = static_cast<double>(j) / width, angle = 2 * std::numbers::pi * turn;
       columns.push_back({static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)),
@@ -160,8 +176,8 @@ std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton,
   auto hit_distances = context.allocate<float>(texels);
   const ClKernelName kernel{"spd.cl", "cast_rays"};
   context.launch(kernel, ClRange({columns.size(), tiles}, {context.work_group_size(kernel, kWorkGroup), 1}), column_count, tile_rows,
-                 which == SpdHit::kLast ? 1 : 0, context.upload(records), context.upload(column_patches), context.upload(rows), context.upload(columns),
-                 context.upload(lists.begins), context.upload(lists.triangles), context.upload(local.points), hit_triangles, hit_distances);
+                 which == SpdHit::kLast ? 1 : 0, context.upload(records), context.upload(column_patches), context.upload(rows), context.upload(row_guesses),
+                 context.upload(columns), context.upload(lists.begins), context.upload(lists.triangles), context.upload(local.points), hit_triangles, hit_distances);
   const std::vector<int> found = context.download(hit_triangles);
   const std::vector<float> distances = context.download(hit_distances);
 
