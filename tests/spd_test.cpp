@@ -3,11 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
 #include <string>
 
+#include "skeletex/segment/segment_mesh.h"
+#include "support/load_model.h"
 #include "support/random_skeleton.h"
 #include "support/segments.h"
 #include "support/spd_twin.h"
@@ -343,6 +346,32 @@ TEST(Spd, UnseenAreaIsThatOfABruteForceSearch) {
 TEST(Spd, WhatLiesBehindAWallIsUnseen) {
   const MadeSegment made = revolve({{0.5, -1}, {0.5, 0}, {0.5, 1}, {0.5, 2}}, {.columns = 16});
   EXPECT_NEAR(unseen(bent_skeleton(0, 0), bare_chart(0, made.segment.mesh.positions, made.segment.mesh.triangles)), 2 / 3.0, 1e-12);
+}
+
+TEST(Spd, EveryRayOfRealModelsMeetsThemAndAllOfABearIsSeen) {
+  for (const auto& [name, unseen_share] : {std::pair{"bear", 0.0}, {"bunny00", 0.0345}, {"armadillo", 0.0366}, {"eight", 0.0}}) {
+    SCOPED_TRACE(name);
+    const TestModel model = load_standard_model(name);
+    const Walls walls(model.skeleton);
+    const Segmentation segmentation = segment_mesh(context(), build_half_edges(model.mesh), model.skeleton);
+    std::vector<Chart> charts;
+    std::vector<Patch> patches;
+    for (const Segment& segment : segmentation.segments) {
+      charts.push_back(make_chart(segment, model.skeleton, walls));
+      patches.push_back(patch_of(90, 80));
+    }
+    for (const SpdHits& hits : cast_spd_rays(context(), model.skeleton, walls, charts, patches, SpdHit::kLast))
+      EXPECT_EQ(std::count(hits.triangles.begin(), hits.triangles.end(), -1), 0);
+    const std::vector<double> shares = unseen_area_fractions(context(), model.skeleton, walls, charts);
+    double hidden = 0, area = 0;
+    for (std::size_t i = 0; i < charts.size(); ++i) {
+      const double a = surface_area(segmentation.segments[i].mesh);
+      hidden += shares[i] * a;
+      area += a;
+    }
+    // The shares are those that Embree finds with the same rays.
+    EXPECT_NEAR(hidden / area, unseen_share, 5e-4);
+  }
 }
 
 TEST(Spd, ChartsDoNotDisturbEachOther) {
