@@ -200,6 +200,41 @@ __kernel void filter_columns(const int row_count, __global const int* restrict l
   }
 }
 
+// Keeps fitted points near sampled ones: a fitted point is off by at most `share` of an edge of the sampled lattice that
+// ends there, the longer of (the shorter one along the rows, the shorter one around). A least-squares fit moves points by
+// a small part of an edge where the surface is smooth; where it jumps, one edge is long and the fit swings out beside it.
+// in   sampled_x, _y, _z; x, y, z: fitted; both in the order of the rows, all rows of every patch
+// out  x, y, z
+__kernel void limit_fit(const int row_count, const float share, __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
+                        __global const float* restrict sampled_x, __global const float* restrict sampled_y, __global const float* restrict sampled_z,
+                        __global float* restrict x, __global float* restrict y, __global float* restrict z) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  __global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
+  const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
+  const int width = patch->width;
+  const int below = row > 0 ? -width : width, above = row + 1 < patch->height ? width : -width;
+
+  const int step = get_local_size(0);
+  for (int j = get_local_id(0); j < width; j += step) {
+    const int v = vertex + j, left = vertex + (j > 0 ? j - 1 : width - 1), right = vertex + (j + 1 < width ? j + 1 : 0);
+    const float px = sampled_x[v], py = sampled_y[v], pz = sampled_z[v];
+    const int neighbours[4] = {v + below, v + above, left, right};
+    float lengths2[4];
+    for (int i = 0; i < 4; ++i) {
+      const float ex = sampled_x[neighbours[i]] - px, ey = sampled_y[neighbours[i]] - py, ez = sampled_z[neighbours[i]] - pz;
+      lengths2[i] = ex * ex + ey * ey + ez * ez;
+    }
+    const float most2 = share * share * fmax(fmin(lengths2[0], lengths2[1]), fmin(lengths2[2], lengths2[3]));
+    const float dx = x[v] - px, dy = y[v] - py, dz = z[v] - pz;
+    const float move2 = dx * dx + dy * dy + dz * dz;
+    const float kept = move2 > most2 ? sqrt(most2 / move2) : 1.0f;
+    x[v] = px + kept * dx;
+    y[v] = py + kept * dy;
+    z[v] = pz + kept * dz;
+  }
+}
+
 // Texels of points: the inverse of displace. A texel is the direction from the foot in the frame (along, around, out),
 // scaled to the distance of the point from the bone.
 // in   x, y, z: points in the bone's own axes: from H along s, b, o

@@ -135,6 +135,19 @@ TEST(Resample, CoarserVolumeStaysCloserThanThatOfSampledPoints) {
   }
 }
 
+TEST(Resample, ASurfaceThatJumpsGrowsNoSpikes) {
+  // Half of the columns lie twice as far out: a fit without limits swings out beside both edges.
+  const SyntheticSurface surface(lone_bone(), 0.3, 0);
+  SkeletexModel model = surface.model({{256, 256}});
+  for (std::size_t i = 0; i < model.texture.out.size(); ++i)
+    if (static_cast<int>(i) % 256 >= 128) model.texture.out[i] *= 2;
+  for (const int size : {40, 64, 100}) {
+    const TriangleMesh mesh = reconstruct_mesh(device(), resample_model(device(), model, size));
+    const Vec3 head = surface.skeleton().nodes[0].position, tail = surface.skeleton().nodes[1].position;
+    for (const Vec3& p : mesh.positions) EXPECT_LT(distance_to_bone(p, head, tail), 0.6 * 1.05) << size;
+  }
+}
+
 TEST(Resample, SeamSamplesStayOnTheWallAndNearTheOldPolyline) {
   const SyntheticSurface surface(cross(6), 0.3);
   const SkeletexModel model = surface.model(std::vector<std::pair<int, int>>(6, {60, 20}));
@@ -172,7 +185,7 @@ TEST(Resample, SeamSamplesStayOnTheWallAndNearTheOldPolyline) {
 TEST(FilterTaps, KeepConstantsAndStraightLines) {
   for (const ResampleFilter filter : kFilters)
     for (const auto& [from, to] : {std::pair{4, 4}, {4, 9}, {9, 4}, {40, 11}, {41, 40}, {40, 41}, {300, 7}, {7, 300}}) {
-      const FilterTaps rows = filter_taps(from, to, false, filter);
+      const FilterTaps rows = filter_taps(from, to, false, filter, 1.0 / 16);
       std::vector<double> line(from);
       std::iota(line.begin(), line.end(), 0.0);
       const std::vector<double> result = apply_taps(rows, line);
@@ -180,7 +193,7 @@ TEST(FilterTaps, KeepConstantsAndStraightLines) {
       for (int i = 0; i < to; ++i) EXPECT_NEAR(result[i], static_cast<double>(i) * (from - 1) / (to - 1), 1e-5 * from);
       EXPECT_EQ(result.front(), 0);
       EXPECT_EQ(result.back(), from - 1);
-      for (const double one : apply_taps(filter_taps(from, to, true, filter), std::vector<double>(from, 1.0))) EXPECT_NEAR(one, 1, 1e-6);
+      for (const double one : apply_taps(filter_taps(from, to, true, filter, 1.0 / 16), std::vector<double>(from, 1.0))) EXPECT_NEAR(one, 1, 1e-6);
     }
 }
 
@@ -192,7 +205,7 @@ TEST(FilterTaps, ProjectionIsTheLeastSquaresFit) {
     for (const auto& [from, to] : {std::pair{23, 7}, {40, 31}, {64, 16}, {200, 9}}) {
       std::vector<double> old(from);
       for (double& value : old) value = normal(random);
-      const std::vector<double> fit = apply_taps(filter_taps(from, to, is_periodic, ResampleFilter::kProject), old);
+      const std::vector<double> fit = apply_taps(filter_taps(from, to, is_periodic, ResampleFilter::kProject, 0), old);
       const auto read = [&](const std::vector<double>& values, double t) {  // t in [0,1]
         const int count = static_cast<int>(values.size());
         const double at = t * (is_periodic ? count : count - 1);
@@ -225,8 +238,11 @@ TEST(FilterTaps, FinerSamplesOfASmoothCurveTakeBackThePrefilter) {
     const auto f = [&](int k) { return std::sin(2 * std::numbers::pi * k / from); };
     old[i] = f(i) - (f(i + 1) - 2 * f(i) + f(i - 1)) / 16;
   }
-  const std::vector<double> fine = apply_taps(filter_taps(from, to, true, ResampleFilter::kSample), old);
+  const std::vector<double> fine = apply_taps(filter_taps(from, to, true, ResampleFilter::kSample, 1.0 / 16), old);
   for (int i = 0; i < to; ++i) EXPECT_NEAR(fine[i], std::sin(2 * std::numbers::pi * i / to), 4e-4);
+  // And without one passes through the samples.
+  const std::vector<double> through = apply_taps(filter_taps(from, to, true, ResampleFilter::kSample, 0), old);
+  for (int i = 0; i < from; ++i) EXPECT_NEAR(through[4 * i], old[i], 1e-6);
 }
 
 TEST(ResamplePolyline, KeepsEndsAndEvenSpacing) {
@@ -280,8 +296,8 @@ TEST(ResampleKernels, FiltersAgreeWithTheirTwinOnRandomPlanes) {
     std::vector<int> widths, first_in;
     std::size_t in_size = 0, out_size = 0;
     for (std::size_t i = 0; i < 6; ++i) {
-      const FilterTaps one = is_rows ? filter_taps(old_sizes[i].second, new_sizes[i].second, false, ResampleFilter::kProject)
-                                     : filter_taps(old_sizes[i].first, new_sizes[i].first, true, ResampleFilter::kProject);
+      const FilterTaps one = is_rows ? filter_taps(old_sizes[i].second, new_sizes[i].second, false, ResampleFilter::kProject, 1.0 / 16)
+                                     : filter_taps(old_sizes[i].first, new_sizes[i].first, true, ResampleFilter::kProject, 1.0 / 16);
       for (std::array<int, 4> tap : one.taps) {
         tap[2] += static_cast<int>(taps.weights.size());
         taps.taps.push_back(tap);
@@ -320,6 +336,47 @@ TEST(ResampleKernels, FiltersAgreeWithTheirTwinOnRandomPlanes) {
             ASSERT_NEAR(results[p][at], expected, 6e-8 * (tap[1] + 2) * magnitude);
           }
     EXPECT_EQ(at, out_size);
+  }
+}
+
+TEST(ResampleKernels, FitsAreLimitedAsByTheirTwin) {
+  const SyntheticSurface surface(random_tree(6, 1), 0.2);
+  const SkeletexModel model = surface.model(random_sizes(6, 4, 90, 9));
+  const FrameTables tables = frame_tables(model.skeleton, surface.walls(), model.patches, model.origin);
+  const std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kAll);
+  std::size_t size = 0;
+  for (const Patch& patch : model.patches) size += static_cast<std::size_t>(patch.rectangle.width) * patch.rectangle.height;
+  std::mt19937 random(14);
+  std::normal_distribution<float> normal;
+  std::vector<float> sampled[3], fitted[3];
+  for (auto* planes : {sampled, fitted})
+    for (int p = 0; p < 3; ++p)
+      for (std::size_t i = 0; i < size; ++i) planes[p].push_back((planes == fitted ? sampled[p][i] + 0.3f * normal(random) : normal(random)));
+  for (int p = 0; p < 3; ++p) {
+    sampled[p][7] = sampled[p][8] = sampled[p][6];  // edges of no length
+    fitted[p][20] = sampled[p][20];
+  }
+  DevicePlanes points{device().upload(fitted[0]), device().upload(fitted[1]), device().upload(fitted[2])};
+  device().launch({"reconstruct.cl", "limit_fit"}, row_range(device(), rows.size()), static_cast<int>(rows.size()), 0.25f, device().upload(rows),
+                  device().upload(tables.patches), device().upload(sampled[0]), device().upload(sampled[1]), device().upload(sampled[2]), points.x,
+                  points.y, points.z);
+  const std::vector<float> x = device().download(points.x), y = device().download(points.y), z = device().download(points.z);
+  std::size_t first = 0;
+  for (const Patch& patch : model.patches) {
+    const int width = patch.rectangle.width, height = patch.rectangle.height;
+    const auto at = [&](const std::vector<float>* planes, int r, int j) {
+      const std::size_t i = first + static_cast<std::size_t>(r < 0 ? 1 : r == height ? height - 2 : r) * width + (j + width) % width;
+      return Vec3(planes[0][i], planes[1][i], planes[2][i]);
+    };
+    for (int r = 0; r < height; ++r)
+      for (int j = 0; j < width; ++j) {
+        const Vec3 here = at(sampled, r, j);
+        const Vec3 expected = twin::limit_fit(here, at(fitted, r, j),
+                                              {at(sampled, r - 1, j) - here, at(sampled, r + 1, j) - here, at(sampled, r, j - 1) - here, at(sampled, r, (j + 1) % width) - here}, 0.25);
+        const std::size_t i = first + static_cast<std::size_t>(r) * width + j;
+        ASSERT_LE((Vec3(x[i], y[i], z[i]) - expected).norm(), 1e-6 * (here.norm() + expected.norm())) << "row " << r << " column " << j;
+      }
+    first += static_cast<std::size_t>(width) * height;
   }
 }
 

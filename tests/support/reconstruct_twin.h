@@ -59,6 +59,13 @@ inline double filter(const std::array<int, 4>& tap, const std::vector<float>& we
   return sum;
 }
 
+/// Kernel limit_fit, one point: `edges` are the sampled lattice's edges from there to before, after, left and right.
+inline Vec3 limit_fit(const Vec3& sampled, const Vec3& fitted, const std::array<Vec3, 4>& edges, double share) {
+  const double most = share * std::max(std::min(edges[0].norm(), edges[1].norm()), std::min(edges[2].norm(), edges[3].norm()));
+  const Vec3 move = fitted - sampled;
+  return move.norm() > most ? Vec3(sampled + most / move.norm() * move) : fitted;
+}
+
 /// Kernel enter_tangent_space, one texel; the point in the bone's own axes.
 inline Vec3 enter_tangent_space(const PatchRecord& patch, const RowRecord& row, const ColumnRecord& column, const Vec3& point) {
   const Vec3 o(0, 0, 1), spoke(column.cosine, column.sine, 0), tail(0, 0, patch.length);

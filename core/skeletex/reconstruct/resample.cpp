@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include <nlohmann/json.hpp>
+
 #include "skeletex/model/frame.h"
 #include "skeletex/pack/pack_atlas.h"
 #include "skeletex/reconstruct/displace.h"
@@ -13,17 +15,17 @@
 namespace skeletex {
 namespace {
 
-/// The surface between old samples, along one axis: linear where the lattice gets coarser; where it gets finer, the cubic
-/// of Mitchell and Netravali's family on the Keys line with B = 3/8. It passes through P + (second difference) / 16,
-/// which takes back the -1/16 by which the encoder's prefilter moves its texels.
+/// The surface between old samples, along one axis: linear where the lattice gets coarser; where it gets finer, a cubic of
+/// Mitchell and Netravali's family on the Keys line, which passes through P + B / 6 * (second difference of P).
 struct Interpolant {
   bool is_cubic = false;
+  double softness = 0;  // B / 6
 
   /// Weights of the samples floor(x) - 1 .. floor(x) + 2.
   std::array<double, 4> weights(double fraction) const {
     if (!is_cubic) return {0, 1 - fraction, fraction, 0};
-    constexpr double b = 3.0 / 8, c = (1 - b) / 2;
-    const auto kernel = [](double x) {
+    const double b = 6 * softness, c = (1 - b) / 2;
+    const auto kernel = [b, c](double x) {
       x = std::abs(x);
       return x < 1 ? ((12 - 9 * b - 6 * c) * x * x * x + (-18 + 12 * b + 6 * c) * x * x + (6 - 2 * b)) / 6
                    : ((-b - 6 * c) * x * x * x + (6 * b + 30 * c) * x * x + (-12 * b - 48 * c) * x + (8 * b + 24 * c)) / 6;
@@ -112,10 +114,10 @@ double inverse_mass(int k) { return std::numbers::sqrt3 * std::pow(std::numbers:
 
 }  // namespace
 
-FilterTaps filter_taps(int old_count, int new_count, bool is_periodic, ResampleFilter filter) {
+FilterTaps filter_taps(int old_count, int new_count, bool is_periodic, ResampleFilter filter, double softness) {
   FilterTaps taps;
   const double spacing = is_periodic ? static_cast<double>(old_count) / new_count : static_cast<double>(old_count - 1) / (new_count - 1);
-  const Interpolant interpolant{spacing < 1};
+  const Interpolant interpolant{spacing < 1, softness};
   for (int i = 0; i < new_count; ++i) {
     OpenWeights open;
     const double x = is_periodic || i + 1 < new_count ? i * spacing : old_count - 1;
@@ -203,7 +205,16 @@ std::vector<Rectangle> scale_rectangles(const std::vector<Patch>& patches, int w
 
 namespace {
 
-constexpr ResampleFilter kFilter = ResampleFilter::kProject;
+/// Fitted points keep within this share of an edge from the sampled ones (see limit_fit in kernels/reconstruct.cl).
+constexpr float kLargestFit = 0.25f;
+/// The encoder's prefilter moves texels by -1/16 of their second differences.
+constexpr double kPrefilter = 1.0 / 16;
+
+/// The encoder's record of what it did; empty where it left none.
+nlohmann::json settings_of(const SkeletexModel& model) {
+  nlohmann::json settings = nlohmann::json::parse(model.encoder_settings, nullptr, false);
+  return settings.is_object() ? settings : nlohmann::json::object();
+}
 
 /// Rows of the new rectangle at the same share of the way between the old ones.
 std::vector<double> scale_row_u(const std::vector<double>& row_u, int height) {
@@ -258,16 +269,28 @@ void append_taps(const FilterTaps& more, FilterTaps& taps) {
   taps.weights.insert(taps.weights.end(), more.weights.begin(), more.weights.end());
 }
 
+/// Taps of both axes for all patches.
+struct LatticeTaps {
+  FilterTaps rows, columns;
+};
+LatticeTaps lattice_taps(const SkeletexModel& model, const std::vector<Patch>& patches, ResampleFilter filter) {
+  const double softness = settings_of(model).value("prefilter", false) ? kPrefilter : 0;
+  LatticeTaps taps;
+  for (std::size_t bone = 0; bone < patches.size(); ++bone) {
+    const Rectangle &from = model.patches[bone].rectangle, &to = patches[bone].rectangle;
+    append_taps(filter_taps(from.height, to.height, false, filter, softness), taps.rows);
+    append_taps(filter_taps(from.width, to.width, true, filter, softness), taps.columns);
+  }
+  return taps;
+}
+
 void resample_texels(ClContext& context, const SkeletexModel& model, const Walls& walls, SkeletexModel& result) {
   const int count = static_cast<int>(model.patches.size());
-  FilterTaps row_taps, column_taps;
   std::vector<int> widths, first_old, first_middle;  // of the old lattice, and of the one with new rows and old columns
   std::vector<Patch> middle = result.patches;
   int old_size = 0, middle_size = 0, new_size = 0;
   for (int bone = 0; bone < count; ++bone) {
     const Rectangle &from = model.patches[bone].rectangle, &to = result.patches[bone].rectangle;
-    append_taps(filter_taps(from.height, to.height, false, kFilter), row_taps);
-    append_taps(filter_taps(from.width, to.width, true, kFilter), column_taps);
     middle[bone].rectangle.width = from.width;
     widths.push_back(from.width);
     first_old.push_back(old_size);
@@ -279,28 +302,40 @@ void resample_texels(ClContext& context, const SkeletexModel& model, const Walls
 
   const FrameTables tables = in_bone_axes(frame_tables(model.skeleton, walls, result.patches, model.origin));
   const DeviceTables device_tables = upload_tables(context, tables);
-  const auto old_widths = context.upload(widths);
-  DevicePlanes points = allocate_planes(context, old_size);
+  const auto old_widths = context.upload(widths), from_old = context.upload(first_old), from_middle = context.upload(first_middle);
+  const std::vector<LatticeRow> rows = lattice_rows(result.patches, RowChoice::kAll), middle_rows = lattice_rows(middle, RowChoice::kAll);
+  const auto device_rows = context.upload(rows), device_middle_rows = context.upload(middle_rows);
+  const int row_count = static_cast<int>(rows.size());
+  const ClRange range = row_range(context, rows.size());
+
+  DevicePlanes old_points = allocate_planes(context, old_size);
   {
     const FrameTables old_tables = in_bone_axes(frame_tables(model.skeleton, walls, model.patches, model.origin));
-    displace(context, upload_lattice(context, old_tables, model.patches, model.texture, RowChoice::kAll), points);
+    displace(context, upload_lattice(context, old_tables, model.patches, model.texture, RowChoice::kAll), old_points);
   }
-  const auto filter = [&](std::string_view kernel, const std::vector<LatticeRow>& rows, const std::vector<int>& first_in, const FilterTaps& taps,
-                          const DevicePlanes& in, std::size_t size) {
-    DevicePlanes out = allocate_planes(context, size);
-    context.launch({"reconstruct.cl", kernel}, row_range(context, rows.size()), static_cast<int>(rows.size()), context.upload(rows), device_tables.patches,
-                   old_widths, context.upload(first_in), context.upload(taps.taps), context.upload(taps.weights), in.x, in.y, in.z, out.x, out.y, out.z);
-    return out;
+  const auto filtered = [&](ResampleFilter filter) {
+    const LatticeTaps taps = lattice_taps(model, result.patches, filter);
+    DevicePlanes between = allocate_planes(context, middle_size), points = allocate_planes(context, new_size);
+    context.launch({"reconstruct.cl", "filter_rows"}, range, row_count, device_middle_rows, device_tables.patches, old_widths, from_old,
+                   context.upload(taps.rows.taps), context.upload(taps.rows.weights), old_points.x, old_points.y, old_points.z, between.x, between.y,
+                   between.z);
+    context.launch({"reconstruct.cl", "filter_columns"}, range, row_count, device_rows, device_tables.patches, old_widths, from_middle,
+                   context.upload(taps.columns.taps), context.upload(taps.columns.weights), between.x, between.y, between.z, points.x, points.y, points.z);
+    return points;
   };
-  points = filter("filter_rows", lattice_rows(middle, RowChoice::kAll), first_old, row_taps, points, middle_size);
-  const std::vector<LatticeRow> rows = lattice_rows(result.patches, RowChoice::kAll);
-  points = filter("filter_columns", rows, first_middle, column_taps, points, new_size);
+  DevicePlanes points = filtered(ResampleFilter::kProject);
+  {
+    const DevicePlanes sampled = filtered(ResampleFilter::kSample);
+    context.launch({"reconstruct.cl", "limit_fit"}, range, row_count, kLargestFit, device_rows, device_tables.patches, sampled.x, sampled.y, sampled.z,
+                   points.x, points.y, points.z);
+    context.finish();
+  }
 
   const std::size_t area = static_cast<std::size_t>(result.texture.width) * result.texture.height;
   DevicePlanes texels = allocate_planes(context, area);
   for (ClBuffer<float>* plane : {&texels.x, &texels.y, &texels.z}) context.fill(*plane, 0);
-  context.launch({"reconstruct.cl", "enter_tangent_space"}, row_range(context, rows.size()), static_cast<int>(rows.size()), result.texture.width,
-                 device_tables.column_count, context.upload(rows), device_tables.patches, device_tables.rows, device_tables.columns, points.x, points.y,
+  context.launch({"reconstruct.cl", "enter_tangent_space"}, range, row_count, result.texture.width,
+                 device_tables.column_count, device_rows, device_tables.patches, device_tables.rows, device_tables.columns, points.x, points.y,
                  points.z, texels.x, texels.y, texels.z);
   result.texture.along = context.download(texels.x);
   result.texture.around = context.download(texels.y);
@@ -322,7 +357,7 @@ SeamArc resample_arc(const SkeletexModel& model, const Walls& walls, const SeamA
   for (const SeamSample& sample : arc.samples) points.push_back(walls.seam_point(bone, end, sample.turn, sample.distance));
   if (!arc.is_closed()) points.push_back(corner_point(arc.corners[1]));
 
-  const std::vector<Vec3> fitted = resample_polyline(points, arc.is_closed(), cells, kFilter);
+  const std::vector<Vec3> fitted = resample_polyline(points, arc.is_closed(), cells, ResampleFilter::kProject);
   const std::vector<Vec3> sampled = resample_polyline(points, arc.is_closed(), cells, ResampleFilter::kSample);
   SeamArc result = arc;
   result.samples.clear();
@@ -357,6 +392,11 @@ SkeletexModel resample_model(ClContext& context, const SkeletexModel& model, int
     const int old_cells = static_cast<int>(arc.samples.size()) + (arc.is_closed() ? 0 : 1);
     arc = resample_arc(model, walls, arc, std::max(arc.is_closed() ? 3 : 2, static_cast<int>(std::lround(old_cells * ratio))));
   }
+  // For the record, and because a fit straddles the surface as prefiltered texels do.
+  nlohmann::json settings = settings_of(model);
+  settings["prefilter"] = true;
+  settings["resampled_from"] = {model.texture.width, model.texture.height};
+  result.encoder_settings = settings.dump();
   return result;
 }
 

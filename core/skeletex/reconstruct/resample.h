@@ -20,9 +20,11 @@ struct FilterTaps {
   std::vector<std::array<int, 4>> taps;  ///< first old sample, count, first weight, 0
   std::vector<float> weights;            ///< each new sample's sum to 1
 };
+/// \param softness  where the lattice gets finer, the surface between old samples is the cubic that passes through
+///                  p + softness * (second difference of p); 1/16 takes back the encoder's prefilter, 0 passes through p
 /// \param is_periodic  sample i lies at i / count and old indices wrap round (they stay below old_count, so do counts);
 ///                     otherwise at i / (count - 1), and the two ends are kept as they are
-FilterTaps filter_taps(int old_count, int new_count, bool is_periodic, ResampleFilter filter);
+FilterTaps filter_taps(int old_count, int new_count, bool is_periodic, ResampleFilter filter, double softness);
 
 /// A polyline with `cells` edges of equal length in place of another one: its first and last point stay, the others
 /// are those of the polyline nearest to it in the least-squares sense. Closed ones do not repeat their first point;
