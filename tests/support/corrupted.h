@@ -3,6 +3,7 @@
 #pragma once
 #include <algorithm>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -25,8 +26,10 @@ inline std::string read_bytes(const std::filesystem::path& path) {
 }
 
 /// Calls `visit` with `count` damaged versions of a file: cut short, with bytes or numbers changed, blocks removed,
-/// doubled or filled, and digits of text replaced. The same seed gives the same damage.
+/// doubled or filled, and digits of text replaced. The same seed gives the same damage. The environment variable
+/// SKELETEX_FUZZ multiplies the count, for a long run now and then.
 inline void for_each_corruption(const std::string& file, int count, std::uint64_t seed, const std::function<void(const std::string&)>& visit) {
+  if (const char* factor = std::getenv("SKELETEX_FUZZ")) count *= std::max(1, std::atoi(factor));
   std::mt19937_64 random(seed);
   const auto below = [&](std::size_t n) { return static_cast<std::size_t>(random() % std::max<std::size_t>(n, 1)); };
   for (int i = 0; i < count; ++i) {
