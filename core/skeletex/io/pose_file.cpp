@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/io/pose_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <initializer_list>
+#include <numbers>
+#include <numeric>
+#include <string_view>
+
+#include "skeletex/io/json_file.h"
+#include "skeletex/io/read_file.h"
+#include "skeletex/model/error.h"
+
+namespace skeletex {
+namespace {
+
+constexpr std::uintmax_t kMaxBytes = std::uintmax_t{1} << 30;
+
+/// Letters to insert, delete or replace to get from one name to the other.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i] != b[j]);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
+    }
+  }
+  return row[b.size()];
+}
+
+template <class Names>
+std::string nearest(const Names& names, std::string_view name) {
+  std::string best;
+  std::size_t least = 0;
+  for (const auto& candidate : names) {
+    const std::size_t distance = edit_distance(name, candidate);
+    if (best.empty() || distance < least) best = candidate, least = distance;
+  }
+  return best;
+}
+
+void check_keys(const nlohmann::json& object, std::initializer_list<const char*> known, const std::string& where) {
+  if (!object.is_object()) throw IoError(fmt::format("{}: an object {{...}} is expected", where));
+  for (const auto& [key, value] : object.items())
+    if (std::find(known.begin(), known.end(), key) == known.end())
+      throw IoError(fmt::format("{}: unknown key \"{}\"; did you mean \"{}\"?", where, key, nearest(known, key)));
+}
+
+/// Index of a bone or node by its name.
+template <class Named>
+std::size_t index_of(const std::vector<Named>& all, const std::string& name, const char* kind, const std::string& where) {
+  const auto found = std::find_if(all.begin(), all.end(), [&](const Named& candidate) { return candidate.name == name; });
+  if (found != all.end()) return static_cast<std::size_t>(found - all.begin());
+  std::vector<std::string> names;
+  for (const Named& candidate : all) names.push_back(candidate.name);
+  throw IoError(fmt::format("{}: there is no {} \"{}\"; did you mean \"{}\"?", where, kind, name, nearest(names, name)));
+}
+
+template <std::size_t N>
+Eigen::Matrix<double, N, 1> numbers_from_json(const nlohmann::json& json, const char* what, const std::string& where) {
+  if (!json.is_array() || json.size() != N) throw IoError(fmt::format("{}: {} is expected", where, what));
+  Eigen::Matrix<double, N, 1> v;
+  for (std::size_t i = 0; i < N; ++i) v[static_cast<Eigen::Index>(i)] = json_number(json[i], where);
+  return v;
+}
+
+Eigen::Quaterniond rotation_from_json(const nlohmann::json& json, const std::string& where) {
+  check_keys(json, {"axis", "degrees", "quaternion"}, where);
+  if (json.contains("quaternion")) {
+    if (json.size() != 1) throw IoError(where + ": either \"quaternion\", or \"axis\" and \"degrees\"");
+    const auto q = numbers_from_json<4>(json["quaternion"], "a quaternion [x, y, z, w]", where + ", \"quaternion\"");
+    if (!(q.norm() > 1e-12)) throw IoError(where + ", \"quaternion\": it has no length; [0, 0, 0, 1] is no rotation");
+    return Eigen::Quaterniond(q[3], q[0], q[1], q[2]).normalized();
+  }
+  const Vec3 axis = numbers_from_json<3>(json_member(json, "axis", where), "three numbers [x, y, z]", where + ", \"axis\"");
+  const double degrees = json_number(json_member(json, "degrees", where), where + ", \"degrees\"");
+  if (!(axis.norm() > 1e-12)) throw IoError(where + ", \"axis\": the zero vector is no axis");
+  return Eigen::Quaterniond(Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis.normalized()));
+}
+
+const nlohmann::json& object_member(const nlohmann::json& json, const char* key, const std::string& where) {
+  if (!json[key].is_object()) throw IoError(fmt::format("{}, \"{}\": an object {{name: ...}} is expected", where, key));
+  return json[key];
+}
+
+Pose pose_from_json(const nlohmann::json& json, const Skeleton& skeleton, const std::string& where) {
+  check_keys(json, {"rotations", "nodes", "roll"}, where);
+  if (json.contains("rotations") && json.contains("nodes"))
+    throw IoError(where + ": \"rotations\" and \"nodes\" do not go together; a pose either turns bones or moves nodes");
+  Pose pose;
+  if (json.contains("rotations")) {
+    pose.rotations.assign(skeleton.bones.size(), Eigen::Quaterniond::Identity());
+    for (const auto& [name, value] : object_member(json, "rotations", where).items())
+      pose.rotations[index_of(skeleton.bones, name, "bone", where + ", \"rotations\"")] =
+          rotation_from_json(value, fmt::format("{}, \"rotations\", \"{}\"", where, name));
+  }
+  if (json.contains("nodes")) {
+    for (const Node& node : skeleton.nodes) pose.nodes.push_back(node.position);
+    for (const auto& [name, value] : object_member(json, "nodes", where).items())
+      pose.nodes[index_of(skeleton.nodes, name, "node", where + ", \"nodes\"")] =
+          numbers_from_json<3>(value, "three numbers [x, y, z]", fmt::format("{}, \"nodes\", \"{}\"", where, name));
+  }
+  if (json.contains("roll")) {
+    pose.rolls.assign(skeleton.bones.size(), 0);
+    for (const auto& [name, value] : object_member(json, "roll", where).items())
+      pose.rolls[index_of(skeleton.bones, name, "bone", where + ", \"roll\"")] =
+          json_number(value, fmt::format("{}, \"roll\", \"{}\"", where, name)) * std::numbers::pi / 180;
+  }
+  return pose;
+}
+
+}  // namespace
+
+PoseAnimation animation_from_json(const nlohmann::json& json, const Skeleton& skeleton, const std::string& where) {
+  if (!json.is_object() || !json.contains("frames")) return {{{0, pose_from_json(json, skeleton, where)}}};
+  check_keys(json, {"frames"}, where);
+  PoseAnimation animation;
+  for (const nlohmann::json& entry : json_array(json["frames"], where + ": \"frames\"")) {
+    const std::string here = fmt::format("{}: frames[{}]", where, animation.frames.size());
+    check_keys(entry, {"time", "pose"}, here);
+    const double time = json_number(json_member(entry, "time", here), here + ", \"time\"");
+    if (!animation.frames.empty() && !(time > animation.frames.back().time))
+      throw IoError(fmt::format("{}, \"time\": {} is not after the frame before, {}; times must grow", here, time, animation.frames.back().time));
+    animation.frames.push_back({time, pose_from_json(json_member(entry, "pose", here), skeleton, here + ", \"pose\"")});
+  }
+  if (animation.frames.empty()) throw IoError(where + ": \"frames\" is empty; an animation has at least one");
+  return animation;
+}
+
+PoseAnimation read_animation(const std::filesystem::path& path, const Skeleton& skeleton) {
+  return animation_from_json(parse_json(read_file(path, kMaxBytes), path.string()), skeleton, path.string());
+}
+
+nlohmann::json pose_to_json(const Pose& pose, const Skeleton& skeleton) {
+  nlohmann::json json = nlohmann::json::object();
+  for (std::size_t i = 0; i < pose.rotations.size(); ++i) {
+    const Eigen::Quaterniond& q = pose.rotations[i];
+    if (q.vec() != Vec3::Zero()) json["rotations"][skeleton.bones[i].name] = {{"quaternion", {q.x(), q.y(), q.z(), q.w()}}};
+  }
+  for (std::size_t i = 0; i < pose.nodes.size(); ++i)
+    if (pose.nodes[i] != skeleton.nodes[i].position) json["nodes"][skeleton.nodes[i].name] = {pose.nodes[i][0], pose.nodes[i][1], pose.nodes[i][2]};
+  for (std::size_t i = 0; i < pose.rolls.size(); ++i)
+    if (pose.rolls[i] != 0) json["roll"][skeleton.bones[i].name] = pose.rolls[i] * 180 / std::numbers::pi;
+  return json;
+}
+
+}  // namespace skeletex

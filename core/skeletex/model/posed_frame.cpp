@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/model/posed_frame.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace skeletex {
+namespace {
+
+constexpr double kSeamShare = 0.25;  // of the bone's length, over which a seam's rule fades
+constexpr double kFarthest = 1e4;    // bone lengths that stand for "without bound"
+
+/// c with |x - bone| = radius at x = foot + c direction, for a bone on an axis from lower to upper; the foot lies at z
+/// on the axis, inside the capsule. \param along, across  parts of the direction, not both 0
+double leave_capsule(double z, double along, double across, double radius, double lower, double upper) {
+  if (across > 0) {
+    const double c = radius / across;
+    if (z + c * along >= lower && z + c * along <= upper) return c;
+  }
+  const double length = std::hypot(along, across);
+  const double a = along < 0 ? z - lower : upper - z;
+  const double p = std::abs(along) / length * a, side = across / length * a;
+  return (p + std::sqrt(std::max(0.0, (radius - side) * (radius + side)))) / length;
+}
+
+void store(float (&out)[3], const Vec3& v) {
+  for (int i = 0; i < 3; ++i) out[i] = static_cast<float>(v[i]);
+}
+
+}  // namespace
+
+PosedRow posed_row(const Station& at, double bind_length, bool is_head_free, bool is_tail_free) {
+  const auto reach = [&](double t) { return t < 1 ? bind_length * std::min(kFarthest, (1 - t) * (1 - t) / std::max(t, 1e-9)) : 0; };
+  const double from_head = at.station / kSeamShare, from_tail = (1 - at.station) / kSeamShare;
+  PosedRow row;
+  if (!is_head_free && from_head < 1) row.reach_tail = reach(from_head), row.weight_head = (1 - from_head) * (1 - from_head);
+  if (!is_tail_free && from_tail < 1) row.reach_head = reach(from_tail), row.weight_tail = (1 - from_tail) * (1 - from_tail);
+  return row;
+}
+
+Vec3 posed_point(const SkeletexModel& model, const Walls& bind, const PosedWalls& posed, int bone, double u, double turn, const Vec3& texel,
+                 DistanceRule rule) {
+  const bool is_head_free = bind.is_free(bone, BoneEnd::kHead), is_tail_free = bind.is_free(bone, BoneEnd::kTail);
+  const Station at = station_of(u, is_head_free, is_tail_free);
+  const double bind_length = bone_length(model.skeleton, bone), length = bone_length(posed.skeleton(), bone);
+  const PosedRow row = posed_row(at, bind_length, is_head_free, is_tail_free);
+  const PosedSpoke head = posed.spoke(bone, BoneEnd::kHead, turn), tail = posed.spoke(bone, BoneEnd::kTail, turn);
+  const Vec3 foot = end_position(posed.skeleton(), bone, BoneEnd::kHead) + at.station * length * posed.bases()[bone].o;
+  double radius = texel.norm();
+  if (!(radius > 0)) return foot;
+  const auto mix = [&](double a, double b) { return (1 - at.station) * a + at.station * b; };
+
+  // The texel in the bone's own axes (s', o x s', o), with the frame's opening f = f_s s' + f_o o.
+  const auto turned = [&](double slope) {
+    const Eigen::Vector2d f = Eigen::Vector2d(std::cos(at.latitude), std::cos(at.latitude) * slope + std::sin(at.latitude)).normalized();
+    return Vec3(texel[2] * f[0] - texel[0] * f[1], texel[1], texel[2] * f[1] + texel[0] * f[0]);
+  };
+  const auto across = [](const Vec3& q) { return std::hypot(q[0], q[1]); };
+  const Vec3 bound = turned(mix(bind.slope(bone, BoneEnd::kHead, turn), bind.slope(bone, BoneEnd::kTail, turn)));
+  const double bound_stretch = leave_capsule(at.station * bind_length, bound[2], across(bound), radius, 0, bind_length);
+  const Vec3 q = turned(mix(head.slope, tail.slope));
+  double stretch = bound_stretch;
+  if (rule == DistanceRule::kFromBone) {
+    const double z = at.station * bind_length + bound_stretch * bound[2];
+    if (row.reach_head > 0 || row.reach_tail > 0)
+      radius = std::hypot(bound_stretch * across(bound), std::max({0.0, -row.reach_head - z, z - bind_length - row.reach_tail}));
+    radius *= 1 + row.weight_head * (head.gain - 1) + row.weight_tail * (tail.gain - 1);
+    stretch = leave_capsule(at.station * length, q[2], across(q), radius, -row.reach_head, length + row.reach_tail);
+  }
+  const double angle = 2 * std::numbers::pi * (turn + mix(head.roll, tail.roll));
+  const BoneBasis& basis = posed.bases()[bone];
+  const Vec3 spoke = std::cos(angle) * basis.s + std::sin(angle) * basis.b;
+  return foot + stretch * (q[0] * spoke + q[1] * basis.o.cross(spoke) + q[2] * basis.o);
+}
+
+PoseTables pose_tables(const SkeletexModel& model, const PosedWalls& posed) {
+  PoseTables tables;
+  const Skeleton& skeleton = posed.skeleton();
+  BoundingBox box{skeleton.nodes[0].position, skeleton.nodes[0].position};
+  for (const Node& node : skeleton.nodes) {
+    box.lower = box.lower.cwiseMin(node.position);
+    box.upper = box.upper.cwiseMax(node.position);
+  }
+  tables.origin = box.centre();
+  int row_begin = 0;
+  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
+    const Patch& patch = model.patches[bone];
+    PatchRecord record{};
+    store(record.head, end_position(skeleton, bone, BoneEnd::kHead) - tables.origin);
+    record.length = static_cast<float>(bone_length(skeleton, bone));
+    store(record.axis, posed.bases()[bone].o);
+    store(record.s, posed.bases()[bone].s);
+    store(record.b, posed.bases()[bone].b);
+    record.x = patch.rectangle.x;
+    record.y = patch.rectangle.y;
+    record.width = patch.rectangle.width;
+    record.height = patch.rectangle.height;
+    record.row_begin = row_begin;
+    record.column_begin = static_cast<int>(tables.columns.size());
+    row_begin += patch.rectangle.height;
+    tables.patches.push_back(record);
+    const bool is_head_free = model.ends[bone][0].arcs.empty(), is_tail_free = model.ends[bone][1].arcs.empty();
+    for (const double u : patch.row_u) {
+      const PosedRow row = posed_row(station_of(u, is_head_free, is_tail_free), bone_length(model.skeleton, bone), is_head_free, is_tail_free);
+      tables.rows.push_back({static_cast<float>(row.reach_head), static_cast<float>(row.reach_tail), static_cast<float>(row.weight_head),
+                             static_cast<float>(row.weight_tail)});
+    }
+    for (int j = 0; j < patch.rectangle.width; ++j) {
+      const double turn = static_cast<double>(j) / patch.rectangle.width;
+      const PosedSpoke head = posed.spoke(bone, BoneEnd::kHead, turn), tail = posed.spoke(bone, BoneEnd::kTail, turn);
+      tables.columns.push_back({static_cast<float>(2 * std::numbers::pi * head.roll), static_cast<float>(2 * std::numbers::pi * tail.roll),
+                                static_cast<float>(head.slope), static_cast<float>(tail.slope), static_cast<float>(head.gain), static_cast<float>(tail.gain)});
+    }
+  }
+  return tables;
+}
+
+}  // namespace skeletex
