@@ -42,13 +42,13 @@ typedef struct ColumnRecord {
   float slope_tail;  ///< k_T(v)
 } ColumnRecord;
 
-/// What a pose adds to a row: how far past the bone's ends its capsule is drawn out (world units), and the shares of the
-/// columns' gains.
+/// What a pose adds to a row: how far past the bone's ends its capsule is drawn out (world units), in the bind pose and
+/// in this one.
 typedef struct PosedRowRecord {
+  float bind_reach_head;
+  float bind_reach_tail;
   float reach_head;
   float reach_tail;
-  float weight_head;
-  float weight_tail;
 } PosedRowRecord;
 
 /// What a pose adds to a column, at the bone's head and tail.
@@ -57,8 +57,6 @@ typedef struct PosedColumnRecord {
   float roll_tail;
   float slope_head;  ///< of the posed walls at the rolled angle
   float slope_tail;
-  float gain_head;  ///< factor of the distance from the bone at the seam; 1 in the bones' own wall
-  float gain_tail;
 } PosedColumnRecord;
 
 #ifndef __OPENCL_C_VERSION__
@@ -66,7 +64,7 @@ static_assert(sizeof(PatchRecord) == 4 * 19);
 static_assert(sizeof(RowRecord) == 16);
 static_assert(sizeof(ColumnRecord) == 16);
 static_assert(sizeof(PosedRowRecord) == 16);
-static_assert(sizeof(PosedColumnRecord) == 24);
+static_assert(sizeof(PosedColumnRecord) == 16);
 }  // namespace skeletex
 #endif
 #undef SKELETEX_INT

@@ -82,6 +82,17 @@ Vec3 decode_texel(const TangentFrame& frame, const Vec3& texel, const Vec3& head
   return frame.foot + (std::abs(along) * a + std::sqrt(std::max(0.0, (e - q) * (e + q)))) * d;
 }
 
+double leave_capsule(double z, double along, double across, double radius, double lower, double upper) {
+  if (across > 0) {
+    const double c = radius / across;
+    if (z + c * along >= lower && z + c * along <= upper) return c;
+  }
+  const double length = std::hypot(along, across);
+  const double a = along < 0 ? z - lower : upper - z;
+  const double p = std::abs(along) / length * a, side = across / length * a;
+  return (p + std::sqrt(std::max(0.0, (radius - side) * (radius + side)))) / length;
+}
+
 FrameTables frame_tables(const Skeleton& skeleton, const Walls& walls, const std::vector<Patch>& patches, const Vec3& origin) {
   FrameTables tables;
   for (int bone = 0; bone < static_cast<int>(patches.size()); ++bone) {

@@ -32,6 +32,10 @@ Vec3 encode_texel(const TangentFrame& frame, const Vec3& point, const Vec3& head
 /// (paper 3.6.1 and appendix A). The inverse of encode_texel.
 Vec3 decode_texel(const TangentFrame& frame, const Vec3& texel, const Vec3& head, const Vec3& tail);
 
+/// c at which the ray foot + c direction leaves the capsule of a radius around an axis from lower to upper; the foot lies
+/// on the axis, at z, inside the capsule. \param along, across  parts of the direction, not both 0
+double leave_capsule(double z, double along, double across, double radius, double lower, double upper);
+
 /// The tables that the kernels read (see skeletex_structs.h), for all patches of a model or of a layout.
 struct FrameTables {
   std::vector<PatchRecord> patches;

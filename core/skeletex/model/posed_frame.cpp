@@ -10,20 +10,6 @@ namespace skeletex {
 namespace {
 
 constexpr double kSeamShare = 0.25;  // of the bone's length, over which a seam's rule fades
-constexpr double kFarthest = 1e4;    // bone lengths that stand for "without bound"
-
-/// c with |x - bone| = radius at x = foot + c direction, for a bone on an axis from lower to upper; the foot lies at z
-/// on the axis, inside the capsule. \param along, across  parts of the direction, not both 0
-double leave_capsule(double z, double along, double across, double radius, double lower, double upper) {
-  if (across > 0) {
-    const double c = radius / across;
-    if (z + c * along >= lower && z + c * along <= upper) return c;
-  }
-  const double length = std::hypot(along, across);
-  const double a = along < 0 ? z - lower : upper - z;
-  const double p = std::abs(along) / length * a, side = across / length * a;
-  return (p + std::sqrt(std::max(0.0, (radius - side) * (radius + side)))) / length;
-}
 
 void store(float (&out)[3], const Vec3& v) {
   for (int i = 0; i < 3; ++i) out[i] = static_cast<float>(v[i]);
@@ -31,12 +17,16 @@ void store(float (&out)[3], const Vec3& v) {
 
 }  // namespace
 
-PosedRow posed_row(const Station& at, double bind_length, bool is_head_free, bool is_tail_free) {
-  const auto reach = [&](double t) { return t < 1 ? bind_length * std::min(kFarthest, (1 - t) * (1 - t) / std::max(t, 1e-9)) : 0; };
-  const double from_head = at.station / kSeamShare, from_tail = (1 - at.station) / kSeamShare;
+PosedRow posed_row(const SkeletexModel& model, const PosedWalls& posed, int bone, const Station& at) {
   PosedRow row;
-  if (!is_head_free && from_head < 1) row.reach_tail = reach(from_head), row.weight_head = (1 - from_head) * (1 - from_head);
-  if (!is_tail_free && from_tail < 1) row.reach_head = reach(from_tail), row.weight_tail = (1 - from_tail) * (1 - from_tail);
+  const auto fade = [](double from_seam) { return from_seam < kSeamShare ? std::pow(1 - from_seam / kSeamShare, 2) : 0.0; };
+  for (const int end : {0, 1}) {
+    if (model.ends[bone][end].arcs.empty()) continue;
+    const int node = end_node(model.skeleton, bone, static_cast<BoneEnd>(end));
+    const double share = fade(end == 0 ? at.station : 1 - at.station);
+    row.bind_reaches[1 - end] = share * (posed.bind_reach(node) - bone_length(model.skeleton, bone));
+    row.reaches[1 - end] = share * (posed.reach(node) - bone_length(posed.skeleton(), bone));
+  }
   return row;
 }
 
@@ -45,7 +35,7 @@ Vec3 posed_point(const SkeletexModel& model, const Walls& bind, const PosedWalls
   const bool is_head_free = bind.is_free(bone, BoneEnd::kHead), is_tail_free = bind.is_free(bone, BoneEnd::kTail);
   const Station at = station_of(u, is_head_free, is_tail_free);
   const double bind_length = bone_length(model.skeleton, bone), length = bone_length(posed.skeleton(), bone);
-  const PosedRow row = posed_row(at, bind_length, is_head_free, is_tail_free);
+  const PosedRow row = posed_row(model, posed, bone, at);
   const PosedSpoke head = posed.spoke(bone, BoneEnd::kHead, turn), tail = posed.spoke(bone, BoneEnd::kTail, turn);
   const Vec3 foot = end_position(posed.skeleton(), bone, BoneEnd::kHead) + at.station * length * posed.bases()[bone].o;
   double radius = texel.norm();
@@ -64,10 +54,9 @@ Vec3 posed_point(const SkeletexModel& model, const Walls& bind, const PosedWalls
   double stretch = bound_stretch;
   if (rule == DistanceRule::kFromBone) {
     const double z = at.station * bind_length + bound_stretch * bound[2];
-    if (row.reach_head > 0 || row.reach_tail > 0)
-      radius = std::hypot(bound_stretch * across(bound), std::max({0.0, -row.reach_head - z, z - bind_length - row.reach_tail}));
-    radius *= 1 + row.weight_head * (head.gain - 1) + row.weight_tail * (tail.gain - 1);
-    stretch = leave_capsule(at.station * length, q[2], across(q), radius, -row.reach_head, length + row.reach_tail);
+    if (row.bind_reaches[0] > 0 || row.bind_reaches[1] > 0)
+      radius = std::hypot(bound_stretch * across(bound), std::max({0.0, -row.bind_reaches[0] - z, z - bind_length - row.bind_reaches[1]}));
+    stretch = leave_capsule(at.station * length, q[2], across(q), radius, -row.reaches[0], length + row.reaches[1]);
   }
   const double angle = 2 * std::numbers::pi * (turn + mix(head.roll, tail.roll));
   const BoneBasis& basis = posed.bases()[bone];
@@ -101,17 +90,16 @@ PoseTables pose_tables(const SkeletexModel& model, const PosedWalls& posed) {
     record.column_begin = static_cast<int>(tables.columns.size());
     row_begin += patch.rectangle.height;
     tables.patches.push_back(record);
-    const bool is_head_free = model.ends[bone][0].arcs.empty(), is_tail_free = model.ends[bone][1].arcs.empty();
     for (const double u : patch.row_u) {
-      const PosedRow row = posed_row(station_of(u, is_head_free, is_tail_free), bone_length(model.skeleton, bone), is_head_free, is_tail_free);
-      tables.rows.push_back({static_cast<float>(row.reach_head), static_cast<float>(row.reach_tail), static_cast<float>(row.weight_head),
-                             static_cast<float>(row.weight_tail)});
+      const PosedRow row = posed_row(model, posed, bone, station_of(u, model.ends[bone][0].arcs.empty(), model.ends[bone][1].arcs.empty()));
+      tables.rows.push_back({static_cast<float>(row.bind_reaches[0]), static_cast<float>(row.bind_reaches[1]), static_cast<float>(row.reaches[0]),
+                             static_cast<float>(row.reaches[1])});
     }
     for (int j = 0; j < patch.rectangle.width; ++j) {
       const double turn = static_cast<double>(j) / patch.rectangle.width;
       const PosedSpoke head = posed.spoke(bone, BoneEnd::kHead, turn), tail = posed.spoke(bone, BoneEnd::kTail, turn);
       tables.columns.push_back({static_cast<float>(2 * std::numbers::pi * head.roll), static_cast<float>(2 * std::numbers::pi * tail.roll),
-                                static_cast<float>(head.slope), static_cast<float>(tail.slope), static_cast<float>(head.gain), static_cast<float>(tail.gain)});
+                                static_cast<float>(head.slope), static_cast<float>(tail.slope)});
     }
   }
   return tables;

@@ -5,14 +5,14 @@
 
 namespace skeletex {
 
-/// How a row of a patch keeps distances in a pose. Its capsule is drawn out past the bone's ends: at a seam past the
-/// bone's other end without bound, since the seam knows the half-line from its node only (so the two bones that meet
-/// there agree however short they are), and back to the bone itself over the first quarter of the bone's length.
+/// How a row of a patch keeps distances in a pose. Bones of different length meet at a seam, and where the surface lies
+/// past the end of the shorter one their distances disagree: there all take the longest one's length
+/// (PosedWalls::reach). So near a seam a bone's capsule is drawn out past its other end, at the seam by what is missing,
+/// less and less over the first quarter of the bone.
 struct PosedRow {
-  double reach_head = 0, reach_tail = 0;    ///< world units; 0: the capsule ends at the node
-  double weight_head = 0, weight_tail = 0;  ///< share of the gains of PosedSpoke; 1 at the seam, 0 past a quarter
+  std::array<double, 2> bind_reaches{0, 0}, reaches{0, 0};  ///< past head and tail, in the bind pose and in this one; world units
 };
-PosedRow posed_row(const Station& at, double bind_length, bool is_head_free, bool is_tail_free);
+PosedRow posed_row(const SkeletexModel& model, const PosedWalls& posed, int bone, const Station& at);
 
 /// The point of a texel at (u, turn) of a bone in a pose (paper 3.4 and 3.6.1): roll and slopes interpolated along the
 /// bone, direction from the posed foot, distance by the rule. In the bind pose the same as decode_texel.

@@ -7,13 +7,14 @@
 #include <cmath>
 #include <numbers>
 
+#include "skeletex/model/frame.h"
+
 namespace skeletex {
 namespace {
 
 constexpr double kTwoPi = 2 * std::numbers::pi;
-constexpr int kTrackingSteps = 64;
-constexpr double kLeastLength = 0.25;  // of its bind length that an arc keeps before its corners are held
-constexpr double kThinArc = 1e-3;      // turns; samples on thinner arcs are spread by their number, not by their angle
+constexpr int kTrackingSteps = 64;  // three bones at a node need no tracking: their arcs are always half a turn
+constexpr double kThinArc = 1e-3;  // turns; samples on thinner arcs are spread by their number, not by their angle
 
 BoneEnd end_at(const Skeleton& skeleton, int bone, int node) { return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail; }
 
@@ -39,14 +40,6 @@ Vec3 wall_normal(const Vec3& from_first, const Vec3& from_second) {
   return n.norm() > 1e-12 ? Vec3(n.normalized()) : from_first.unitOrthogonal();
 }
 
-/// Distance from the node, along a direction, of a point at distance 1 from the half-line along a bone.
-double distance_factor(const Vec3& direction, const Vec3& along_bone) {
-  const double cosine = direction.dot(along_bone);
-  return cosine > 0 ? 1 / std::sqrt(std::max(1e-6, 1 - cosine * cosine)) : 1;
-}
-
-Vec3 raised(const Vec3& in_plane, const Vec3& normal, double elevation) { return std::cos(elevation) * in_plane + std::sin(elevation) * normal; }
-
 Vec3 triple_axis(const Vec3& a, const Vec3& b, const Vec3& c) { return (a - b).cross(a - c); }
 
 /// Angle from one direction to another about an axis, turns.
@@ -71,17 +64,24 @@ PosedWalls::PosedWalls(const SkeletexModel& model, const Skeleton& posed)
       posed_(&posed),
       bind_bases_(bone_bases(model.skeleton)),
       bases_(bone_bases(posed)),
+      bind_reaches_(model.skeleton.nodes.size(), 0),
+      reaches_(model.skeleton.nodes.size(), 0),
       arcs_(model.arcs.size()),
       bind_corners_(model.corners.size(), Vec3::Zero()),
       corners_(model.corners.size(), Vec3::Zero()),
       loops_(model.skeleton.bones.size()) {
+  for (int bone = 0; bone < static_cast<int>(model.skeleton.bones.size()); ++bone)
+    for (const int node : {model.skeleton.bones[bone].head, model.skeleton.bones[bone].tail}) {
+      bind_reaches_[node] = std::max(bind_reaches_[node], bone_length(model.skeleton, bone));
+      reaches_[node] = std::max(reaches_[node], bone_length(posed, bone));
+    }
   std::vector<std::vector<int>> arcs_at(model.skeleton.nodes.size());
   for (int a = 0; a < static_cast<int>(arcs_.size()); ++a) {
     const SeamArc& seam = model.arcs[a];
     Arc& arc = arcs_[a];
     arc.is_closed = seam.is_closed();
-    arc.bind_normal = wall_normal(direction_of(model.skeleton, seam.bones[0], seam.node), direction_of(model.skeleton, seam.bones[1], seam.node));
-    arc.normal = wall_normal(direction_of(posed, seam.bones[0], seam.node), direction_of(posed, seam.bones[1], seam.node));
+    arc.bind_normal = wall_normal(bind_direction(seam.bones[0], seam.node), bind_direction(seam.bones[1], seam.node));
+    arc.normal = wall_normal(posed_direction(seam.bones[0], seam.node), posed_direction(seam.bones[1], seam.node));
     for (const int side : {0, 1}) {
       arc.sides[side].bone = seam.bones[side];
       arc.sides[side].end = end_at(model.skeleton, seam.bones[side], seam.node);
@@ -97,9 +97,12 @@ PosedWalls::PosedWalls(const SkeletexModel& model, const Skeleton& posed)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) wind_loop(bone, end);
 }
 
-Vec3 PosedWalls::direction_of(const Skeleton& skeleton, int bone, int node) const {
-  const std::vector<BoneBasis>& bases = &skeleton == posed_ ? bases_ : bind_bases_;
-  return skeleton.bones[bone].head == node ? bases[bone].o : Vec3(-bases[bone].o);
+Vec3 PosedWalls::bind_direction(int bone, int node) const {
+  return model_->skeleton.bones[bone].head == node ? bind_bases_[bone].o : Vec3(-bind_bases_[bone].o);
+}
+
+Vec3 PosedWalls::posed_direction(int bone, int node) const {
+  return posed_->bones[bone].head == node ? bases_[bone].o : Vec3(-bases_[bone].o);
 }
 
 void PosedWalls::join_linear(Arc& arc) {
@@ -124,8 +127,8 @@ void PosedWalls::build_node(int node, const std::vector<int>& arcs) {
   const auto add_bone = [&](int bone) {
     if (place_of[bone] >= 0) return;
     place_of[bone] = static_cast<int>(bind.size());
-    bind.push_back(direction_of(model_->skeleton, bone, node));
-    posed.push_back(direction_of(*posed_, bone, node));
+    bind.push_back(bind_direction(bone, node));
+    posed.push_back(posed_direction(bone, node));
   };
   for (const int a : arcs)
     for (const int bone : model_->arcs[a].bones) add_bone(bone);
@@ -177,10 +180,11 @@ void PosedWalls::build_node(int node, const std::vector<int>& arcs) {
     arcs_[a].posed_turns = arcs_[a].bind_turns;
   }
   std::vector<Vec3> directions = bind;
-  for (int step = 1; step <= kTrackingSteps; ++step) {
+  const int steps = bind.size() > 3 ? kTrackingSteps : 1;
+  for (int step = 1; step <= steps; ++step) {
     for (std::size_t i = 0; i < bind.size(); ++i)
-      directions[i] = step == kTrackingSteps ? Vec3(turned_back * posed[i])
-                                             : Vec3(Eigen::Quaterniond::Identity().slerp(static_cast<double>(step) / kTrackingSteps, motions[i]) * bind[i]);
+      directions[i] = step == steps ? Vec3(turned_back * posed[i])
+                                    : Vec3(Eigen::Quaterniond::Identity().slerp(static_cast<double>(step) / steps, motions[i]) * bind[i]);
     for (std::size_t i = 0; i < corners.size(); ++i) {
       const Vec3 axis = triple_axis(directions[triples[i].bones[0]], directions[triples[i].bones[1]], directions[triples[i].bones[2]]);
       if (axis.norm() > 1e-9) at[i] = triples[i].sign * axis.normalized();
@@ -188,36 +192,14 @@ void PosedWalls::build_node(int node, const std::vector<int>& arcs) {
     for (const int a : arcs) arcs_[a].posed_turns += wrapped(turns_of(a, directions) - arcs_[a].posed_turns);
   }
   for (std::size_t i = 0; i < corners.size(); ++i) corners_[corners[i]] = turned_back.conjugate() * at[i];
-  if (bind.size() > 3) hold_corners(arcs, corners);
-  for (const int a : arcs) place_arc(a);
-}
 
-void PosedWalls::hold_corners(const std::vector<int>&, const std::vector<int>&) {}
-
-void PosedWalls::place_arc(int a) {
-  const SeamArc& seam = model_->arcs[a];
-  Arc& arc = arcs_[a];
-  arc.is_in_wall = true;
-  std::array<Vec3, 2> in_wall;
-  for (const int k : {0, 1}) {
-    const Vec3& corner = corners_[seam.corners[k]];
-    const double above = std::clamp(corner.dot(arc.normal), -1.0, 1.0);
-    arc.elevations[k] = std::abs(above) < 1e-9 ? 0 : std::asin(above);
-    in_wall[k] = corner - above * arc.normal;
-    if (arc.elevations[k] == 0) continue;
-    arc.is_in_wall = false;
-    const auto factor = [&](int bone) { return distance_factor(corner, direction_of(*posed_, bone, seam.node)); };
-    double mean = 0;
-    for (const int bone : model_->corners[seam.corners[k]].bones) mean += factor(bone) / static_cast<double>(model_->corners[seam.corners[k]].bones.size());
-    arc.extra_gains[k] = mean - (factor(seam.bones[0]) + factor(seam.bones[1])) / 2;
-  }
-  for (Side& side : arc.sides) {
-    const auto roll = [&](int k) { return wrapped(turn_about(bases_[side.bone], in_wall[k]) - turn_about(bind_bases_[side.bone], bind_corners_[seam.corners[k]])); };
-    side.begin = folded(turn_about(bind_bases_[side.bone], bind_corners_[seam.corners[0]]));
-    side.rolls[0] = roll(0);
-    const double guess = side.rolls[0] + side.sign * (arc.posed_turns - arc.bind_turns);
-    side.rolls[1] = guess + wrapped(roll(1) - guess);
-  }
+  for (const int a : arcs)
+    for (Side& side : arcs_[a].sides) {
+      const int first = model_->arcs[a].corners[0];
+      side.begin = folded(turn_about(bind_bases_[side.bone], bind_corners_[first]));
+      side.rolls[0] = wrapped(turn_about(bases_[side.bone], corners_[first]) - side.begin);
+      side.rolls[1] = side.rolls[0] + side.sign * (arcs_[a].posed_turns - arcs_[a].bind_turns);
+    }
 }
 
 void PosedWalls::wind_loop(int bone, BoneEnd end) {
@@ -235,7 +217,7 @@ void PosedWalls::wind_loop(int bone, BoneEnd end) {
     // Whole turns: the roll runs on from arc to arc.
     const double shift = std::round(winding - side.rolls[first]);
     for (double& roll : side.rolls) roll += shift;
-    winding = side.rolls[first] + arc.posed_turns - arc.bind_turns;
+    winding = side.rolls[1 - first];
     mean += std::max(0.0, arc.bind_turns) * (side.rolls[0] + side.rolls[1]) / 2;
     loop.intervals.push_back({std::min(start, 1.0), use.arc, s});
     length += arc.bind_turns;
@@ -266,68 +248,56 @@ int PosedWalls::arc_at(int bone, BoneEnd end, double turn) const {
   return interval ? interval->arc : -1;
 }
 
-PosedWalls::Place PosedWalls::place(const Arc& arc, int s, double t, double turn) const {
+PosedSpoke PosedWalls::spoke_on(const Arc& arc, int s, double t, double turn) const {
   const Side& side = arc.sides[s];
-  const BoneBasis& basis = bases_[side.bone];
-  const auto along = [&](int k) { return arc.sides[k].end == BoneEnd::kHead ? bases_[arc.sides[k].bone].o : Vec3(-bases_[arc.sides[k].bone].o); };
-  Place place;
-  place.roll = (1 - t) * side.rolls[0] + t * side.rolls[1];
-  const Vec3 spoke = spoke_of(basis, turn + place.roll);
-  place.slope = meet(basis, spoke, arc.normal);
-  place.direction = (spoke + place.slope * basis.o).normalized();
-  if (arc.is_in_wall) {
-    place.factor = distance_factor(place.direction, along(s));
-    return place;
-  }
-  place.direction = raised(place.direction, arc.normal, (1 - t) * arc.elevations[0] + t * arc.elevations[1]);
-  place.roll += wrapped(turn_about(basis, place.direction) - turn - place.roll);
-  const double along_axis = place.direction.dot(basis.o);
-  place.slope = along_axis / std::sqrt(std::max(1e-12, 1 - along_axis * along_axis));
-  const double own = distance_factor(place.direction, along(s)), other = distance_factor(place.direction, along(1 - s));
-  place.factor = (own + other) / 2 + (1 - t) * arc.extra_gains[0] + t * arc.extra_gains[1];
-  place.gain = place.factor / own;
-  return place;
+  PosedSpoke result;
+  result.roll = (1 - t) * side.rolls[0] + t * side.rolls[1];
+  result.slope = meet(bases_[side.bone], spoke_of(bases_[side.bone], turn + result.roll), arc.normal);
+  return result;
 }
 
 PosedSpoke PosedWalls::spoke(int bone, BoneEnd end, double turn) const {
   double t = 0;
   const Interval* interval = interval_at(bone, end, turn, t);
-  if (!interval) return {};
-  const Place at = place(arcs_[interval->arc], interval->side, t, turn);
-  return {at.roll, at.slope, at.gain};
+  return interval ? spoke_on(arcs_[interval->arc], interval->side, t, turn) : PosedSpoke{};
 }
 
 Vec3 PosedWalls::sample_point(int a, int sample, DistanceRule rule, int s) const {
   const SeamArc& seam = model_->arcs[a];
   const Arc& arc = arcs_[a];
+  const Side& side = arc.sides[s];
   const SeamSample& stored = seam.samples[sample];
   double t = 0, turn = stored.turn;
   if (arc.is_closed) {
-    if (s == 1) turn = arc.sides[1].sign * turn + arc.sides[1].begin;
+    if (s == 1) turn = side.sign * turn + side.begin;
   } else {
     const double passed = wrapped(turn - arc.sides[0].begin - arc.bind_turns / 2) + arc.bind_turns / 2;
     t = arc.bind_turns > kThinArc ? std::clamp(passed / arc.bind_turns, 0.0, 1.0) : (sample + 1.0) / (static_cast<double>(seam.samples.size()) + 1);
-    if (s == 1) turn = arc.sides[1].begin + arc.sides[1].sign * passed;
+    if (s == 1) turn = side.begin + side.sign * passed;
   }
-  const Place at = place(arc, s, t, turn);
-  double factor = at.factor;
-  if (rule == DistanceRule::kFromFoot) {
-    const BoneBasis& basis = bind_bases_[arc.sides[s].bone];
-    const Vec3 spoke = spoke_of(basis, turn);
-    const Vec3 bind_direction = (spoke + meet(basis, spoke, arc.bind_normal) * basis.o).normalized();
-    factor = distance_factor(bind_direction, arc.sides[s].end == BoneEnd::kHead ? basis.o : Vec3(-basis.o));
-  }
-  return posed_->nodes[seam.node].position + stored.distance * factor * at.direction;
+  const auto in_wall = [&](const BoneBasis& basis, double angle, const Vec3& normal) -> Vec3 {
+    const Vec3 spoke = spoke_of(basis, angle);
+    return (spoke + meet(basis, spoke, normal) * basis.o).normalized();
+  };
+  const Vec3 bound = in_wall(bind_bases_[side.bone], turn, arc.bind_normal);
+  const Vec3 direction = in_wall(bases_[side.bone], turn + spoke_on(arc, s, t, turn).roll, arc.normal);
+  return posed_->nodes[seam.node].position + radius_at(seam.node, side.bone, stored.distance, bound, direction, rule) * direction;
 }
 
 Vec3 PosedWalls::corner_point(int c, DistanceRule rule) const {
   const SeamCorner& corner = model_->corners[c];
-  const bool is_posed = rule == DistanceRule::kFromBone;
-  const Vec3& direction = is_posed ? corners_[c] : bind_corners_[c];
-  double factor = 0;
-  for (const int bone : corner.bones)
-    factor += distance_factor(direction, direction_of(is_posed ? *posed_ : model_->skeleton, bone, corner.node)) / static_cast<double>(corner.bones.size());
-  return posed_->nodes[corner.node].position + corner.sample.distance * factor * corners_[c];
+  const double radius = radius_at(corner.node, corner.bones[0], corner.sample.distance, bind_corners_[c], corners_[c], rule);
+  return posed_->nodes[corner.node].position + radius * corners_[c];
+}
+
+double PosedWalls::radius_at(int node, int bone, double distance, const Vec3& bound, const Vec3& direction, DistanceRule rule) const {
+  // The bind point from the half-line's distance, its distance to the bone's reach, and out of the posed capsule.
+  const double cosine = bound.dot(bind_direction(bone, node));
+  const double bind_radius = cosine > 0 ? distance / std::sqrt(std::max(1e-12, 1 - cosine * cosine)) : distance;
+  if (rule == DistanceRule::kFromFoot) return bind_radius;
+  const double past = bind_radius * cosine - bind_reaches_[node];
+  const double along = direction.dot(posed_direction(bone, node));
+  return leave_capsule(0, along, std::sqrt(std::max(0.0, 1 - along * along)), past > 0 ? std::hypot(distance, past) : distance, 0, reaches_[node]);
 }
 
 }  // namespace skeletex

@@ -18,18 +18,18 @@ enum class DistanceRule {
 struct PosedSpoke {
   double roll = 0;   ///< turns, to be added to the bind angle; 0 at a free end
   double slope = 0;  ///< k' of the wall that separates the two bones there (see Walls::slope), at the rolled angle
-  double gain = 1;   ///< what the distance from the bone is multiplied by at the seam; 1 in the bones' own wall
 };
 
 /// The seams of a model in a pose (paper 3.3 and 3.4.1). Each node is a drawing on the sphere around it: corners are
 /// directions, arcs are curves between them, and every bone's end is the loop of arcs around it. In the bind pose this
 /// is the Voronoi diagram of the bones' directions. In a pose
-///   - a corner goes to the point that is equally far from the same three bones, on the side that continues the bind
-///     pose's,
-///   - an arc runs between its corners in the wall of its two bones, and angles move linearly along it, which both bones
-///     see alike; around a node of two bones the wall is one closed curve, and both turn by half of the twist,
-///   - where directions have moved so far that corners would pass each other and the surface would fold, both are held
-///     before that; arcs there leave their wall, and its distances are the mean of what the bones ask for.
+///   - a corner goes where it is equally far from the same three bones, on the side that continues the bind pose's,
+///   - an arc stays in the wall of its two bones and runs between its corners; angles move linearly along it, which both
+///     bones see alike,
+///   - around a node of two bones the wall is one closed curve, and both bones turn by half of the twist.
+/// Around a node of three bones every arc is half a turn in every pose. With more, directions can move so far that two
+/// corners pass each other: the arc between them then runs backwards, and the surface overlaps itself there. Distances
+/// hold and seams stay closed nevertheless.
 class PosedWalls {
  public:
   /// \param model  its skeleton is the bind pose; texels are not looked at. Must outlive this
@@ -42,12 +42,15 @@ class PosedWalls {
   /// \param turn  angle about the bone in the bind pose, turns
   PosedSpoke spoke(int bone, BoneEnd end, double turn) const;
 
+  /// How long the bones at a node are taken to be where they meet, so that all of them restore distances alike: as long
+  /// as the longest of them. In the bind pose and in this one, world units.
+  double bind_reach(int node) const { return bind_reaches_[node]; }
+  double reach(int node) const { return reaches_[node]; }
+
   /// Points of the seams, world. Every bone at a seam gives the same point; `side` chooses the one to compute it from.
   Vec3 sample_point(int arc, int sample, DistanceRule rule, int side = 0) const;
   Vec3 corner_point(int corner, DistanceRule rule) const;
 
-  /// Whether an arc runs in the wall of its two bones, so that distances to both are kept.
-  bool is_in_wall(int arc) const { return arcs_[arc].is_in_wall; }
   /// The arc at a bone's end and a bind angle; -1 at a free end.
   int arc_at(int bone, BoneEnd end, double turn) const;
 
@@ -56,19 +59,15 @@ class PosedWalls {
   struct Side {
     int bone = -1;
     BoneEnd end = BoneEnd::kHead;
-    double sign = 1;                       ///< +1: v grows with t
-    double begin = 0;                      ///< bind angle at t = 0, turns
-    std::array<double, 2> rolls{0, 0};     ///< at t = 0 and 1, in the wall, turns
+    double sign = 1;                    ///< +1: v grows with t, -1: it falls
+    double begin = 0;                   ///< bind angle at t = 0, turns
+    std::array<double, 2> rolls{0, 0};  ///< at t = 0 and 1, turns
   };
   struct Arc {
     bool is_closed = false;
-    bool is_in_wall = true;
-    double bind_turns = 1;                 ///< length in the bind pose
-    double posed_turns = 1;                ///< length in the pose, before corners are held; negative: they have passed each other
+    double bind_turns = 1, posed_turns = 1;  ///< length; negative: its corners have passed each other
     std::array<Side, 2> sides;
     Vec3 bind_normal = Vec3::Zero(), normal = Vec3::Zero();  ///< of the wall, unit, from bones[1] to bones[0]
-    std::array<double, 2> elevations{0, 0};   ///< of the corners above the wall, radians
-    std::array<double, 2> extra_gains{0, 0};  ///< what the corners' distance factor has over the mean of the two bones'
   };
   /// One bone's end: the loop of arcs around it.
   struct Interval {
@@ -80,26 +79,20 @@ class PosedWalls {
     double base = 0;
     std::vector<Interval> intervals;
   };
-  /// A point of an arc as a bone sees it.
-  struct Place {
-    double roll = 0, slope = 0;
-    Vec3 direction = Vec3::Zero();
-    double factor = 1;  ///< distance from the node per distance from the bones
-    double gain = 1;
-  };
 
-  void build_node(int node, const std::vector<int>& arcs);
-  void hold_corners(const std::vector<int>& arcs, const std::vector<int>& corners);
   void join_linear(Arc& arc);
-  void place_arc(int arc);
+  void build_node(int node, const std::vector<int>& arcs);
   void wind_loop(int bone, BoneEnd end);
   const Interval* interval_at(int bone, BoneEnd end, double turn, double& t) const;
-  Place place(const Arc& arc, int side, double t, double turn) const;
-  Vec3 direction_of(const Skeleton& skeleton, int bone, int node) const;
+  PosedSpoke spoke_on(const Arc& arc, int side, double t, double turn) const;
+  double radius_at(int node, int bone, double distance, const Vec3& bind_direction, const Vec3& direction, DistanceRule rule) const;
+  Vec3 bind_direction(int bone, int node) const;
+  Vec3 posed_direction(int bone, int node) const;
 
   const SkeletexModel* model_;
   const Skeleton* posed_;
   std::vector<BoneBasis> bind_bases_, bases_;
+  std::vector<double> bind_reaches_, reaches_;  ///< per node
   std::vector<Arc> arcs_;
   std::vector<Vec3> bind_corners_, corners_;  ///< unit directions from their node
   std::vector<std::array<Loop, 2>> loops_;    ///< per bone and end
