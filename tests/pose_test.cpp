@@ -4,12 +4,18 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <numbers>
+#include <numeric>
 #include <random>
 
 #include "skeletex/io/pose_file.h"
 #include "skeletex/model/error.h"
 #include "skeletex/model/posed_frame.h"
+#include "skeletex/reconstruct/lattice.h"
+#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "support/mesh_topology.h"
 #include "support/synthetic_model.h"
 
 namespace skeletex {
@@ -84,6 +90,77 @@ double largest_difference(const std::vector<Vec3>& a, const std::vector<Vec3>& b
   double worst = a.size() == b.size() ? 0 : 1e9;
   for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) worst = std::max(worst, (a[i] - b[i]).norm());
   return worst;
+}
+
+/// The model with one bone's head and tail exchanged, s kept: angles run the other way.
+SkeletexModel with_bone_reversed(SkeletexModel model, int bone) {
+  std::swap(model.skeleton.bones[bone].head, model.skeleton.bones[bone].tail);
+  Patch& patch = model.patches[bone];
+  const auto [x, y, width, height] = patch.rectangle;
+  std::reverse(patch.row_u.begin(), patch.row_u.end());
+  for (double& u : patch.row_u) u = 1 - u;
+  const DisplacementTexture old = model.texture;
+  for (int r = 0; r < height; ++r)
+    for (int j = 0; j < width; ++j) {
+      const std::size_t to = static_cast<std::size_t>(y + r) * old.width + x + j;
+      const std::size_t from = static_cast<std::size_t>(y + height - 1 - r) * old.width + x + (width - j) % width;
+      model.texture.along[to] = -old.along[from];
+      model.texture.around[to] = -old.around[from];
+      model.texture.out[to] = old.out[from];
+    }
+  const auto mirrored = [](double turn) { return turn > 0 ? 1 - turn : 0; };
+  std::vector<bool> is_turned(model.arcs.size(), false);
+  for (std::size_t a = 0; a < model.arcs.size(); ++a) {
+    SeamArc& arc = model.arcs[a];
+    if (arc.bones[0] != bone) continue;
+    is_turned[a] = true;
+    for (SeamSample& sample : arc.samples) sample.turn = mirrored(sample.turn);
+    std::reverse(arc.samples.begin(), arc.samples.end());
+    std::swap(arc.corners[0], arc.corners[1]);
+  }
+  for (SeamCorner& corner : model.corners)
+    if (corner.bones[0] == bone) corner.sample.turn = mirrored(corner.sample.turn);
+  std::swap(model.ends[bone][0], model.ends[bone][1]);
+  for (PatchEnd& end : model.ends[bone]) {
+    std::reverse(end.arcs.begin(), end.arcs.end());
+    for (ArcUse& use : end.arcs) use.is_reversed = !use.is_reversed;
+  }
+  for (auto& ends : model.ends)
+    for (PatchEnd& end : ends)
+      for (ArcUse& use : end.arcs) use.is_reversed = use.is_reversed != is_turned[use.arc];
+  return model;
+}
+
+/// Bone i becomes bone place[i], and takes another name; samples are told by another of the bones that meet.
+SkeletexModel with_bones_reordered(const SkeletexModel& model, const std::vector<int>& place) {
+  SkeletexModel result = model;
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    result.skeleton.bones[place[i]] = model.skeleton.bones[i];
+    result.skeleton.bones[place[i]].name = "renamed" + std::to_string(place[i]);
+    result.patches[place[i]] = model.patches[i];
+    result.ends[place[i]] = model.ends[i];
+  }
+  for (SeamArc& arc : result.arcs)
+    for (int& bone : arc.bones) bone = place[bone];
+  for (SeamCorner& corner : result.corners)
+    for (int& bone : corner.bones) bone = place[bone];
+  return result;
+}
+
+/// The largest distance from a point of one set to the nearest of the other.
+double farthest_from(const std::vector<Vec3>& points, const std::vector<Vec3>& others) {
+  double worst = 0;
+  for (const Vec3& p : points) {
+    double nearest = 1e9;
+    for (const Vec3& q : others) nearest = std::min(nearest, (p - q).squaredNorm());
+    worst = std::max(worst, std::sqrt(nearest));
+  }
+  return worst;
+}
+
+ClContext& device() {
+  static ClContext context;
+  return context;
 }
 
 std::string message_of(const nlohmann::json& json, const Skeleton& skeleton) {
@@ -173,7 +250,7 @@ TEST(Pose, BothSidesOfEverySeamAgree) {
   for (const NamedSkeleton& named : all_skeletons()) {
     const SyntheticSurface surface(named.skeleton, named.radius);
     const SkeletexModel model = model_of(surface, 40, 5);
-    double worst = 0, worst_row = 0, worst_corner = 0;
+    double worst = 0, worst_row = 0;
     for (unsigned seed = 0; seed < 200; ++seed) {
       const Skeleton posed = apply_pose(model.skeleton, random_pose(model.skeleton, kPi / 3, seed));
       const Walls bind(model.skeleton);
@@ -197,13 +274,11 @@ TEST(Pose, BothSidesOfEverySeamAgree) {
               worst_row = std::max(worst_row, (posed_point(model, bind, walls, bone, u, turn, texel, rule) - p).norm());
             }
           }
-        // Along every arc the points run on to its corners.
         for (int c = 0; c < static_cast<int>(model.corners.size()); ++c) ASSERT_TRUE(walls.corner_point(c, rule).allFinite());
       }
     }
     EXPECT_LT(worst, 1e-9) << named.name;
     EXPECT_LT(worst_row, 1e-6) << named.name;
-    (void)worst_corner;
   }
 }
 
@@ -234,6 +309,184 @@ TEST(Pose, DistancesToTheBonesAreKept) {
     }
     EXPECT_LT(worst, 1e-6) << named.name << " " << kept << " of " << all;
   }
+}
+
+TEST(Pose, ReversingABoneChangesNothing) {
+  for (const NamedSkeleton& named : all_skeletons()) {
+    if (named.skeleton.bones.size() == 1) continue;
+    const SyntheticSurface surface(named.skeleton, named.radius);
+    const SkeletexModel model = model_of(surface, 7, 5);
+    for (int bone = 0; bone < std::min(5, static_cast<int>(model.patches.size())); ++bone) {
+      const SkeletexModel reversed = with_bone_reversed(model, bone);
+      Pose pose;
+      for (const Node& node : apply_pose(model.skeleton, random_pose(model.skeleton, 0.9, 20 + bone)).nodes) pose.nodes.push_back(node.position);
+      pose.rolls.assign(model.skeleton.bones.size(), 0);
+      pose.rolls[bone] = 0.3;
+      Pose mirrored = pose;
+      mirrored.rolls[bone] = -0.3;
+      EXPECT_LT(farthest_from(all_points(model, apply_pose(model.skeleton, pose)), all_points(reversed, apply_pose(reversed.skeleton, mirrored))), 1e-6)
+          << named.name << " bone " << bone;
+    }
+  }
+}
+
+TEST(Pose, RenamingAndReorderingBonesChangesNothing) {
+  for (const NamedSkeleton& named : all_skeletons()) {
+    const SyntheticSurface surface(named.skeleton, named.radius);
+    const SkeletexModel model = model_of(surface, 7, 5);
+    std::vector<int> place(model.patches.size());
+    std::iota(place.begin(), place.end(), 0);
+    std::mt19937 random(4);
+    for (unsigned seed = 0; seed < 4; ++seed) {
+      std::shuffle(place.begin(), place.end(), random);
+      const SkeletexModel reordered = with_bones_reordered(model, place);
+      const Pose pose = random_pose(model.skeleton, 0.9, seed);
+      Pose other = pose;
+      for (std::size_t i = 0; i < place.size(); ++i) {
+        if (!pose.rotations.empty()) other.rotations[place[i]] = pose.rotations[i];
+        other.rolls[place[i]] = pose.rolls[i];
+      }
+      EXPECT_LT(farthest_from(all_points(model, apply_pose(model.skeleton, pose)), all_points(reordered, apply_pose(reordered.skeleton, other))), 1e-6)
+          << named.name << " seed " << seed;
+    }
+  }
+}
+
+TEST(Pose, MeshesAreClosedInTwoHundredPosesAndTheKernelsAgreeWithTheirTwin) {
+  for (const NamedSkeleton& named : all_skeletons()) {
+    const SyntheticSurface surface(named.skeleton, named.radius);
+    const SkeletexModel model = model_of(surface, 13, 9);
+    const Lattice lattice = number_lattice(model);
+    const Walls bind(model.skeleton);
+    for (unsigned seed = 0; seed < 200; ++seed) {
+      const Skeleton posed = apply_pose(model.skeleton, random_pose(model.skeleton, kPi / 3, 1000 + seed));
+      const PosedWalls walls(model, posed);
+      const DistanceRule rule = seed % 4 == 3 ? DistanceRule::kFromFoot : DistanceRule::kFromBone;
+      const TriangleMesh mesh = reconstruct_mesh(device(), model, posed, rule);
+      for (const Vec3& p : mesh.positions) ASSERT_TRUE(p.allFinite()) << named.name << " seed " << seed;
+      if (seed % 20 > 1) continue;  // all poses share their triangles
+      ASSERT_EQ(broken_rule(mesh, surface.genus()), "") << named.name << " seed " << seed;
+      double worst = 0, largest = model.diagonal;
+      for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
+        for (int r = 1; r + 1 < 9; ++r)
+          for (int j = 0; j < 13; ++j) {
+            const Vec3 expected = posed_point(model, bind, walls, bone, model.patches[bone].row_u[r], j / 13.0, texel_of(model, bone, r, j), rule);
+            largest = std::max(largest, (expected - posed.nodes[0].position).norm());
+            worst = std::max(worst, (mesh.positions[lattice.first_inner[bone] + (r - 1) * 13 + j] - expected).norm());
+          }
+      // Single precision; a wall between bones that nearly lie on each other is steep, which takes some digits.
+      EXPECT_LT(worst, 2e-5 * largest) << named.name << " seed " << seed;
+    }
+  }
+}
+
+TEST(Pose, TheKernelsLeaveTheBindPoseAlone) {
+  for (const NamedSkeleton& named : all_skeletons()) {
+    const SyntheticSurface surface(named.skeleton, named.radius);
+    const SkeletexModel model = model_of(surface, 33, 17);
+    const TriangleMesh bound = reconstruct_mesh(device(), model);
+    for (const DistanceRule rule : {DistanceRule::kFromBone, DistanceRule::kFromFoot})
+      EXPECT_LT(largest_difference(reconstruct_mesh(device(), model, apply_pose(model.skeleton, Pose{}), rule).positions, bound.positions), 1e-6 * model.diagonal)
+          << named.name;
+  }
+}
+
+TEST(Pose, APlaneOfConstantOffsetLiesAtThatDistanceFromItsBones) {
+  for (const NamedSkeleton& named : all_skeletons()) {
+    const SyntheticSurface surface(named.skeleton, named.radius);
+    const SkeletexModel model = model_of(surface, 20, 40);
+    const double offset = 0.7 * named.radius;
+    const Skeleton posed = apply_pose(model.skeleton, random_pose(model.skeleton, 0.7, 3));
+    const std::vector<int> bones{0};
+    const TriangleMesh mesh = constant_offset_mesh(device(), model, posed, bones, offset);
+    ASSERT_EQ(mesh.positions.size(), 800u);
+    EXPECT_EQ(mesh.triangles.size(), 2u * 20 * 39);
+    int inner = 0;
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+      const Station at = station_of(model.patches[0].row_u[i / 20], model.ends[0][0].arcs.empty(), model.ends[0][1].arcs.empty());
+      if (at.station < 0.25 || at.station > 0.75) continue;
+      ++inner;
+      EXPECT_NEAR(distance_to_bone(mesh.positions[i], end_position(posed, 0, BoneEnd::kHead), end_position(posed, 0, BoneEnd::kTail)), offset, 1e-6) << named.name;
+    }
+    EXPECT_GT(inner, 100);
+  }
+  EXPECT_THROW(constant_offset_mesh(device(), model_of(SyntheticSurface(y_branch(), 0.2)), y_branch(), {}, 0), InputError);
+}
+
+TEST(Pose, ATwistIsSharedByTheTwoBonesOfAJoint) {
+  Skeleton skeleton;
+  for (int i = 0; i < 3; ++i) skeleton.nodes.push_back({"n" + std::to_string(i), Vec3(0, 0, i)});
+  for (int i = 0; i < 2; ++i) skeleton.bones.push_back({"b" + std::to_string(i), i, i + 1, Vec3(1, 0, 0)});
+  const SyntheticSurface surface(skeleton, 0.2, 0);
+  const SkeletexModel model = model_of(surface);
+  Pose pose;
+  pose.rotations = {Eigen::Quaterniond::Identity(), Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Vec3(0, 0, 1)))};
+  for (const double roll : {0.0, 0.2}) {
+    pose.rolls = {0, roll};
+    const Skeleton posed = apply_pose(model.skeleton, pose);
+    const PosedWalls walls(model, posed);
+    EXPECT_NEAR(walls.spoke(0, BoneEnd::kTail, 0.3).roll * 2 * kPi, (0.5 + roll) / 2, 1e-12);
+    EXPECT_NEAR(walls.spoke(1, BoneEnd::kHead, 0.3).roll * 2 * kPi, -(0.5 + roll) / 2, 1e-12);
+    EXPECT_EQ(walls.spoke(0, BoneEnd::kHead, 0.3).roll, 0);
+  }
+}
+
+TEST(Pose, ArcsAroundANodeOfThreeBonesAreHalfATurnInEveryPose) {
+  const SyntheticSurface surface(y_branch(), 0.25);
+  const SkeletexModel model = model_of(surface);
+  for (unsigned seed = 0; seed < 50; ++seed) {
+    const Skeleton posed = apply_pose(model.skeleton, random_pose(model.skeleton, 1.5, seed));
+    const PosedWalls walls(model, posed);
+    for (int bone = 0; bone < 3; ++bone) {
+      const BoneEnd end = model.ends[bone][0].arcs.empty() ? BoneEnd::kTail : BoneEnd::kHead;
+      const double first = walls.spoke(bone, end, 0).roll;
+      for (int j = 1; j < 12; ++j) EXPECT_NEAR(std::remainder(walls.spoke(bone, end, j / 12.0).roll - first, 1.0), 0, 1e-9);
+    }
+  }
+}
+
+TEST(Pose, AnimationsInterpolateBoneByBoneAndNodeByNode) {
+  const Skeleton skeleton = y_branch();
+  const auto json = nlohmann::json::parse(R"({"frames":[{"time":1,"pose":{"rotations":{"bone1":{"axis":[0,0,2],"degrees":40}}}},
+    {"time":3,"pose":{"roll":{"bone2":20}}},{"time":4,"pose":{"nodes":{"end0":[0,0,-2]}}}]})");
+  const PoseAnimation animation = animation_from_json(json, skeleton, "animation");
+  EXPECT_NEAR(pose_at(skeleton, animation, 2).rotations[1].angularDistance(Eigen::Quaterniond(Eigen::AngleAxisd(kPi / 9, Vec3(0, 0, 1)))), 0, 1e-12);
+  EXPECT_NEAR(pose_at(skeleton, animation, 2).rolls[2], kPi / 18, 1e-12);
+  EXPECT_NEAR((pose_at(skeleton, animation, 3.25).nodes[1] - (0.75 * skeleton.nodes[1].position + 0.25 * Vec3(0, 0, -2))).norm(), 0, 1e-12);
+  EXPECT_NEAR(pose_at(skeleton, animation, 0).rotations[1].angularDistance(Eigen::Quaterniond(Eigen::AngleAxisd(kPi * 2 / 9, Vec3(0, 0, 1)))), 0, 1e-12);
+  EXPECT_EQ(pose_at(skeleton, animation, 9).nodes.size(), skeleton.nodes.size());
+  const PoseAnimation mixed{{animation.frames[0], {2, animation.frames[2].pose}}};
+  EXPECT_THROW(pose_at(skeleton, mixed, 1.5), InputError);
+}
+
+TEST(Pose, IsRefusedWithTheReasonWhereItCannotBe) {
+  const auto message = [](const Skeleton& skeleton, const Pose& pose) -> std::string {
+    try {
+      apply_pose(skeleton, pose);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  Pose turned;
+  turned.rotations.assign(7, Eigen::Quaterniond::Identity());
+  EXPECT_EQ(message(ring(7), turned), "accepted");
+  turned.rotations[3] = Eigen::AngleAxisd(0.1, Vec3(0, 0, 1));
+  EXPECT_NE(message(ring(7), turned).find("closes a cycle"), std::string::npos) << message(ring(7), turned);
+  EXPECT_NE(message(ring(6), turned).find("another skeleton"), std::string::npos);
+  Pose flat;
+  for (const Node& node : y_branch().nodes) flat.nodes.push_back(node.position);
+  flat.nodes[2] = flat.nodes[0];
+  EXPECT_NE(message(y_branch(), flat).find("\"bone1\" has no length"), std::string::npos) << message(y_branch(), flat);
+  flat.rotations.assign(3, Eigen::Quaterniond::Identity());
+  EXPECT_NE(message(y_branch(), flat).find("not both"), std::string::npos);
+}
+
+TEST(Pose, RootIsTheNodeThatBonesPointAwayFrom) {
+  Skeleton skeleton;
+  for (int i = 0; i < 5; ++i) skeleton.nodes.push_back({"n" + std::to_string(i), Vec3(i, i * i, 0)});
+  skeleton.bones = {{"a", 2, 1, {}}, {"b", 1, 0, {}}, {"c", 2, 3, {}}, {"d", 4, 3, {}}};  // d is reversed
+  EXPECT_EQ(root_nodes(skeleton), std::vector<int>{2});
 }
 
 TEST(PoseFile, RejectsWhatItDoesNotKnowWithTheNearestName) {

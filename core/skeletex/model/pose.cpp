@@ -87,6 +87,29 @@ void check_lengths(const Skeleton& posed) {
                                    posed.nodes[posed.bones[bone].tail].name, posed.nodes[posed.bones[bone].head].name));
 }
 
+/// The node of a tree with the shortest ways to all others, in length along bones; unlike the hierarchy's root it does
+/// not depend on which ends of the bones are heads.
+int central_node(const Skeleton& bind, const std::vector<std::vector<BoneAtNode>>& at, int start) {
+  const Component component = walk_from(bind, at, start);
+  std::vector<int> nodes{start};
+  for (const Link& link : component.links) nodes.push_back(other_end(bind, {link.bone, link.pivot}));
+  std::sort(nodes.begin(), nodes.end());
+  int best = -1;
+  double shortest = 0;
+  std::vector<double> way(bind.nodes.size());
+  for (const int node : nodes) {
+    way[node] = 0;
+    double sum = 0;
+    for (const Link& link : walk_from(bind, at, node).links) {
+      const int end = other_end(bind, {link.bone, link.pivot});
+      way[end] = way[end_node(bind, link.bone, link.pivot)] + bone_length(bind, link.bone);
+      sum += way[end];
+    }
+    if (best < 0 || sum < (1 - 1e-9) * shortest) best = node, shortest = sum;
+  }
+  return best;
+}
+
 /// Rotations of a tree's bones that follow its nodes.
 void follow_nodes(const Skeleton& bind, const Skeleton& posed, const Component& component, std::vector<Quaterniond>& rotations) {
   Matrix3d moment = Matrix3d::Zero();
@@ -196,7 +219,7 @@ Skeleton apply_pose(const Skeleton& bind, const Pose& pose) {
     for (const int root : root_nodes(bind)) {
       const Component component = walk_from(bind, at, root);
       if (!pose.nodes.empty()) {
-        if (component.first_cycle_bone < 0) follow_nodes(bind, posed, component, rotations);
+        if (component.first_cycle_bone < 0) follow_nodes(bind, posed, walk_from(bind, at, central_node(bind, at, root)), rotations);
         else spread_twist(bind, posed, at, component, rotations);
         continue;
       }

@@ -38,11 +38,11 @@ std::vector<int> root_nodes(const Skeleton& skeleton);
 /// The bind skeleton in a pose: node positions, and every bone's s.
 ///
 /// Rotations carry s along. Moved nodes: trees fit a rotation to the directions of all bones, where each step away
-/// from the root counts a tenth (Kabsch), and then turn bone by bone from the root on with the smallest rotation
-/// relative to the bone before. In graphs with cycles there is no bone before: every bone takes the smallest rotation
+/// from the tree's centre (the node with the shortest ways to all others) counts a tenth (Kabsch), and then turn bone by
+/// bone from there on with the smallest rotation relative to the bone before. In graphs with cycles there is no bone before: every bone takes the smallest rotation
 /// relative to one fit of the whole component, and then the rolls about the bones that spread the remaining twist
 /// evenly over all joints. Either way, a rigid motion of all nodes is that motion of all bases, and neither names nor
-/// the order of bones matter.
+/// order nor direction of the bones matter.
 /// \throw InputError when sizes do not match, rotations meet a cycle, or a bone has no length, naming the bone
 Skeleton apply_pose(const Skeleton& bind, const Pose& pose);
 

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/reconstruct/pose_mesh.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "skeletex/model/error.h"
+#include "skeletex/reconstruct/lattice.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+
+namespace skeletex {
+namespace {
+
+void download_points(ClContext& context, const DevicePlanes& points, const Vec3& origin, std::vector<Vec3>& positions) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::vector<float> plane = context.download(axis == 0 ? points.x : axis == 1 ? points.y : points.z);
+    for (std::size_t i = 0; i < plane.size(); ++i) positions[i][axis] = origin[axis] + static_cast<double>(plane[i]);
+  }
+}
+
+}  // namespace
+
+DevicePose upload_pose(ClContext& context, const SkeletexModel& model, const PosedWalls& posed, RowChoice choice, DistanceRule rule) {
+  const PoseTables tables = pose_tables(model, posed);
+  const std::size_t count = tables.columns.size();
+  std::vector<float> columns(4 * count);
+  for (std::size_t i = 0; i < count; ++i) {
+    columns[i] = tables.columns[i].roll_head;
+    columns[count + i] = tables.columns[i].roll_tail;
+    columns[2 * count + i] = tables.columns[i].slope_head;
+    columns[3 * count + i] = tables.columns[i].slope_tail;
+  }
+  std::vector<LatticeRow> plain = lattice_rows(model.patches, choice), other;
+  const auto is_plain = [&](const LatticeRow& row) {
+    const PosedRowRecord& record = tables.rows[tables.patches[row[0]].row_begin + row[1]];
+    return rule == DistanceRule::kFromBone && record.bind_reach_head == 0 && record.bind_reach_tail == 0 && record.reach_head == 0 && record.reach_tail == 0;
+  };
+  std::copy_if(plain.begin(), plain.end(), std::back_inserter(other), [&](const LatticeRow& row) { return !is_plain(row); });
+  std::erase_if(plain, [&](const LatticeRow& row) { return !is_plain(row); });
+  return {context.upload(tables.patches), context.upload(tables.rows), context.upload(columns), context.upload(plain), context.upload(other),
+          plain.size(), other.size(), rule == DistanceRule::kFromBone, tables.origin};
+}
+
+void displace_posed(ClContext& context, const DeviceLattice& lattice, const DevicePose& pose, DevicePlanes& points) {
+  const DeviceTables& bind = lattice.tables;
+  if (pose.plain_count > 0)
+    context.launch({"pose.cl", "displace_posed"}, row_range(context, pose.plain_count), static_cast<int>(pose.plain_count), lattice.texture_width,
+                   bind.column_count, pose.plain_rows, bind.rows, bind.columns, pose.patches, pose.columns, lattice.texels.x, lattice.texels.y,
+                   lattice.texels.z, points.x, points.y, points.z);
+  if (pose.other_count > 0)
+    context.launch({"pose.cl", "displace_posed_from_bind"}, row_range(context, pose.other_count), static_cast<int>(pose.other_count),
+                   lattice.texture_width, bind.column_count, static_cast<int>(pose.is_distance_kept), pose.other_rows, bind.patches, bind.rows,
+                   bind.columns, pose.patches, pose.rows, pose.columns, lattice.texels.x, lattice.texels.y, lattice.texels.z, points.x, points.y, points.z);
+}
+
+TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model, const Skeleton& posed, DistanceRule rule) {
+  TriangleMesh mesh = reconstruct_mesh(context, model);
+  const Lattice lattice = number_lattice(model);
+  const Walls bind(model.skeleton);
+  const PosedWalls walls(model, posed);
+  const DeviceLattice device =
+      upload_lattice(context, frame_tables(model.skeleton, bind, model.patches, model.origin), model.patches, model.texture, RowChoice::kInner);
+  const DevicePose pose = upload_pose(context, model, walls, RowChoice::kInner, rule);
+  DevicePlanes points = allocate_planes(context, device.vertex_count);
+  displace_posed(context, device, pose, points);
+  download_points(context, points, pose.origin, mesh.positions);
+
+  // Poles, samples and corners are few, and shared by several patches: on the host, in double.
+  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
+    for (const int end : {0, 1}) {
+      if (lattice.poles[bone][end] < 0) continue;
+      const Rectangle& rectangle = model.patches[bone].rectangle;
+      const std::size_t at = static_cast<std::size_t>(rectangle.y + (end == 0 ? 0 : rectangle.height - 1)) * model.texture.width + rectangle.x;
+      const Vec3 texel(model.texture.along[at], model.texture.around[at], model.texture.out[at]);
+      mesh.positions[lattice.poles[bone][end]] = posed_point(model, bind, walls, bone, end, 0, texel, rule);
+    }
+  for (int a = 0; a < static_cast<int>(model.arcs.size()); ++a)
+    for (int i = 0; i < static_cast<int>(model.arcs[a].samples.size()); ++i) mesh.positions[lattice.first_sample[a] + i] = walls.sample_point(a, i, rule);
+  for (int c = 0; c < static_cast<int>(model.corners.size()); ++c) mesh.positions[lattice.first_corner + c] = walls.corner_point(c, rule);
+  return mesh;
+}
+
+TriangleMesh constant_offset_mesh(ClContext& context, const SkeletexModel& model, const Skeleton& posed, std::span<const int> bones, double offset,
+                                  DistanceRule rule) {
+  if (!(offset > 0)) throw InputError(fmt::format("a plane in bone tangent space lies outside the bones: its offset, {}, must be above 0", offset));
+  const Walls bind(model.skeleton);
+  const PosedWalls walls(model, posed);
+  DisplacementTexture plane = model.texture;
+  std::fill(plane.along.begin(), plane.along.end(), 0.f);
+  std::fill(plane.around.begin(), plane.around.end(), 0.f);
+  std::fill(plane.out.begin(), plane.out.end(), static_cast<float>(offset));
+  const DeviceLattice device = upload_lattice(context, frame_tables(model.skeleton, bind, model.patches, model.origin), model.patches, plane, RowChoice::kAll);
+  const DevicePose pose = upload_pose(context, model, walls, RowChoice::kAll, rule);
+  DevicePlanes points = allocate_planes(context, device.vertex_count);
+  displace_posed(context, device, pose, points);
+  std::vector<Vec3> positions(device.vertex_count);
+  download_points(context, points, pose.origin, positions);
+
+  std::vector<int> firsts(model.patches.size() + 1, 0), all(model.patches.size());
+  for (std::size_t i = 0; i < model.patches.size(); ++i) firsts[i + 1] = firsts[i] + model.patches[i].rectangle.width * model.patches[i].rectangle.height;
+  std::iota(all.begin(), all.end(), 0);
+  TriangleMesh mesh;
+  for (const int bone : bones.empty() ? std::span<const int>(all) : bones) {
+    const auto [x, y, width, height] = model.patches[bone].rectangle;
+    const int base = static_cast<int>(mesh.positions.size());
+    mesh.positions.insert(mesh.positions.end(), positions.begin() + firsts[bone], positions.begin() + firsts[bone + 1]);
+    for (int row = 0; row + 1 < height; ++row)
+      for (int j = 0; j < width; ++j) {
+        const int v00 = base + row * width + j, v01 = base + row * width + (j + 1) % width, v10 = v00 + width, v11 = v01 + width;
+        mesh.triangles.push_back({v00, v01, v11});
+        mesh.triangles.push_back({v00, v11, v10});
+      }
+  }
+  return mesh;
+}
+
+}  // namespace skeletex

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <span>
+
+#include "skeletex/model/posed_frame.h"
+#include "skeletex/reconstruct/displace.h"
+
+namespace skeletex {
+
+/// The model's mesh in a pose: the vertices, triangles and numbering of reconstruct_mesh(context, model), with posed
+/// positions. So all poses of a model share their triangles, and every pose is as closed as the bind pose.
+/// \param posed  apply_pose(model.skeleton, ...)
+TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model, const Skeleton& posed, DistanceRule rule = DistanceRule::kFromBone);
+
+/// A plane of constant texels (0, 0, offset) in bone tangent space (paper, Figure 7): per chosen bone all rows and
+/// columns of its patch as a mesh that is closed around the bone and open at its ends.
+/// \param bones   empty: all    \param offset  world units, > 0
+TriangleMesh constant_offset_mesh(ClContext& context, const SkeletexModel& model, const Skeleton& posed, std::span<const int> bones, double offset,
+                                  DistanceRule rule = DistanceRule::kFromBone);
+
+/// A pose on the device.
+struct DevicePose {
+  ClBuffer<PatchRecord> patches;
+  ClBuffer<PosedRowRecord> rows;
+  ClBuffer<float> columns;  ///< four planes: roll_head, roll_tail, slope_head, slope_tail
+  ClBuffer<LatticeRow> plain_rows, other_rows;  ///< those whose capsule is the bone's own, and the rest; sizes below
+  std::size_t plain_count = 0, other_count = 0;
+  bool is_distance_kept = true;
+  Vec3 origin;  ///< world position that the points are relative to
+};
+DevicePose upload_pose(ClContext& context, const SkeletexModel& model, const PosedWalls& posed, RowChoice choice, DistanceRule rule);
+
+/// Queues the posed points of all rows (two launches at most), relative to the pose's origin.
+/// \pre lattice was uploaded from the model with the same choice of rows
+void displace_posed(ClContext& context, const DeviceLattice& lattice, const DevicePose& pose, DevicePlanes& points);
+
+}  // namespace skeletex

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: MIT
+// From texels to surface points in a pose (paper 3.4, 3.6.1, appendix A): kernel displace of reconstruct.cl with a roll
+// about the bone, the posed walls' slopes and the posed bones.
+//
+// Rows and launches as in reconstruct.cl: a table of lattice rows, four ints each (patch, row, number of its first vertex,
+// unused), one work-group per row, work-items take columns in turn, plain scalars and selects so that the loop over
+// columns becomes vector instructions on a CPU.
+//   bind_patches, rows, bind_columns   the bind pose's tables; columns as four planes: cosine, sine, slope_head, slope_tail
+//   patches, posed_rows, columns       the pose's; columns as four planes: roll_head, roll_tail, slope_head, slope_tail
+//   along, around, out                 texels
+//   x, y, z                            the points, relative to the origin of the posed patch records
+#include "skeletex_structs.h"
+
+// sin and cos of any angle, to about 2e-7: Taylor series of half of the angle, reduced to at most a quarter turn.
+#define SIN_COS(angle, sine, cosine)                                                                                                      \
+  {                                                                                                                                      \
+    const float half_angle = 0.5f * ((angle)-6.2831853f * rint((angle)*0.15915494f));                                                    \
+    const float t = half_angle * half_angle;                                                                                             \
+    const float half_sine =                                                                                                              \
+        half_angle * (1.0f + t * (-1.6666667e-1f + t * (8.3333333e-3f + t * (-1.9841270e-4f + t * (2.7557319e-6f - t * 2.5052108e-8f))))); \
+    const float half_cosine =                                                                                                            \
+        1.0f + t * (-0.5f + t * (4.1666667e-2f + t * (-1.3888889e-3f + t * (2.4801587e-5f + t * (-2.7557319e-7f + t * 2.0876757e-9f))))); \
+    sine = 2.0f * half_sine * half_cosine;                                                                                               \
+    cosine = 1.0f - 2.0f * half_sine * half_sine;                                                                                        \
+  }
+
+// Rows whose capsule is the bone's own. The texel's length is its distance from the bone; see displace for the rest.
+__kernel void displace_posed(const int row_count, const int texture_width, const int column_count, __global const int* restrict lattice_rows,
+                             __global const RowRecord* restrict rows, __global const float* restrict bind_columns,
+                             __global const PatchRecord* restrict patches, __global const float* restrict columns,
+                             __global const float* restrict along, __global const float* restrict around, __global const float* restrict out,
+                             __global float* restrict x, __global float* restrict y, __global float* restrict z) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  __global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
+  const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
+  const int width = patch->width;
+  const int texel = (patch->y + row) * texture_width + patch->x;
+  const float head_x = patch->head[0], head_y = patch->head[1], head_z = patch->head[2];
+  const float s_x = patch->s[0], s_y = patch->s[1], s_z = patch->s[2];
+  const float b_x = patch->b[0], b_y = patch->b[1], b_z = patch->b[2];
+  const float o_x = patch->axis[0], o_y = patch->axis[1], o_z = patch->axis[2];
+  __global const RowRecord* restrict record = rows + patch->row_begin + row;
+  const float station = record->station, cap_cos = record->cap_cos, cap_sin = record->cap_sin;
+  const float foot = station * patch->length, foot_to_tail = patch->length - foot;
+  __global const float* restrict cosines = bind_columns + patch->column_begin;
+  __global const float* restrict sines = cosines + column_count;
+  __global const float* restrict head_rolls = columns + patch->column_begin;
+  __global const float* restrict tail_rolls = head_rolls + column_count;
+  __global const float* restrict head_slopes = tail_rolls + column_count;
+  __global const float* restrict tail_slopes = head_slopes + column_count;
+
+  const int step = get_local_size(0);
+  for (int j = get_local_id(0); j < width; j += step) {
+    const float a = along[texel + j], c = around[texel + j], w = out[texel + j];
+    const float roll = head_rolls[j] + station * (tail_rolls[j] - head_rolls[j]);
+    float roll_sine, roll_cosine;
+    SIN_COS(roll, roll_sine, roll_cosine);
+    const float cosine = cosines[j] * roll_cosine - sines[j] * roll_sine;
+    const float sine = sines[j] * roll_cosine + cosines[j] * roll_sine;
+
+    const float slope = head_slopes[j] + station * (tail_slopes[j] - head_slopes[j]);
+    const float f_s = cap_cos;
+    const float f_o = cap_cos * slope + cap_sin;
+    const float f_inverse = 1.0f / sqrt(f_s * f_s + f_o * f_o);
+    const float q_s = (w * f_s - a * f_o) * f_inverse;
+    const float q_o = (w * f_o + a * f_s) * f_inverse;
+
+    const float q_o2 = q_o * q_o;
+    const float across2 = q_s * q_s + c * c;
+    const float e2 = across2 + q_o2;
+    const float e2_inverse = 1.0f / e2;
+    const float sin2 = across2 * e2_inverse;
+    const float rest = q_o < 0.0f ? foot : foot_to_tail;
+    const float rest2 = rest * rest;
+    const float remainder2 = fmax(0.0f, 1.0f - rest2 * e2_inverse * sin2);
+    const int is_cylinder = q_o2 <= rest2 * sin2;
+    const float root = sqrt(is_cylinder ? sin2 : remainder2);
+    const float m_cylinder = 1.0f / root;
+    const float m_sphere = rest * fabs(q_o) * e2_inverse + root;
+    const float m_capsule = is_cylinder ? m_cylinder : m_sphere;
+    const float m = e2 > 0.0f ? m_capsule : 0.0f;
+
+    const float p_s = m * (q_s * cosine - c * sine);
+    const float p_b = m * (q_s * sine + c * cosine);
+    const float p_o = foot + m * q_o;
+    x[vertex + j] = head_x + p_s * s_x + p_b * b_x + p_o * o_x;
+    y[vertex + j] = head_y + p_s * s_y + p_b * b_y + p_o * o_y;
+    z[vertex + j] = head_z + p_s * s_z + p_b * b_z + p_o * o_z;
+  }
+}
+
+// Any rows. The bind pose's point is restored first: near seams the capsule is drawn out past the bone's ends, in the bind
+// pose and in this one alike (PosedRowRecord), and its radius is the bind point's distance from the drawn-out bone. With
+// is_distance_kept = 0 the point keeps its distance from the foot instead.
+__kernel void displace_posed_from_bind(const int row_count, const int texture_width, const int column_count, const int is_distance_kept,
+                                       __global const int* restrict lattice_rows, __global const PatchRecord* restrict bind_patches,
+                                       __global const RowRecord* restrict rows, __global const float* restrict bind_columns,
+                                       __global const PatchRecord* restrict patches, __global const PosedRowRecord* restrict posed_rows,
+                                       __global const float* restrict columns, __global const float* restrict along,
+                                       __global const float* restrict around, __global const float* restrict out, __global float* restrict x,
+                                       __global float* restrict y, __global float* restrict z) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  __global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
+  const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
+  const int width = patch->width;
+  const int texel = (patch->y + row) * texture_width + patch->x;
+  const float head_x = patch->head[0], head_y = patch->head[1], head_z = patch->head[2];
+  const float s_x = patch->s[0], s_y = patch->s[1], s_z = patch->s[2];
+  const float b_x = patch->b[0], b_y = patch->b[1], b_z = patch->b[2];
+  const float o_x = patch->axis[0], o_y = patch->axis[1], o_z = patch->axis[2];
+  __global const RowRecord* restrict record = rows + patch->row_begin + row;
+  const float station = record->station, cap_cos = record->cap_cos, cap_sin = record->cap_sin;
+  __global const PosedRowRecord* restrict posed_row = posed_rows + patch->row_begin + row;
+  const float bind_length = bind_patches[lattice_rows[4 * k]].length;
+  const float bind_foot = station * bind_length, bind_foot_to_tail = bind_length - bind_foot;
+  const float lowest = -posed_row->bind_reach_head, highest = bind_length + posed_row->bind_reach_tail;
+  const float foot = station * patch->length;
+  const float foot_to_lower = foot + posed_row->reach_head, foot_to_upper = patch->length + posed_row->reach_tail - foot;
+  __global const float* restrict cosines = bind_columns + patch->column_begin;
+  __global const float* restrict sines = cosines + column_count;
+  __global const float* restrict bind_head_slopes = sines + column_count;
+  __global const float* restrict bind_tail_slopes = bind_head_slopes + column_count;
+  __global const float* restrict head_rolls = columns + patch->column_begin;
+  __global const float* restrict tail_rolls = head_rolls + column_count;
+  __global const float* restrict head_slopes = tail_rolls + column_count;
+  __global const float* restrict tail_slopes = head_slopes + column_count;
+
+  const int step = get_local_size(0);
+  for (int j = get_local_id(0); j < width; j += step) {
+    const float a = along[texel + j], c = around[texel + j], w = out[texel + j];
+    const float c2 = c * c;
+    const float e2 = a * a + c2 + w * w;
+    const float e2_inverse = e2 > 0.0f ? 1.0f / e2 : 0.0f;
+
+    // The bind point: bind_m times the texel from the bind foot.
+    const float bind_slope = bind_head_slopes[j] + station * (bind_tail_slopes[j] - bind_head_slopes[j]);
+    const float bind_f_o = cap_cos * bind_slope + cap_sin;
+    const float bind_f_inverse = 1.0f / sqrt(cap_cos * cap_cos + bind_f_o * bind_f_o);
+    const float bind_q_s = (w * cap_cos - a * bind_f_o) * bind_f_inverse;
+    const float bind_q_o = (w * bind_f_o + a * cap_cos) * bind_f_inverse;
+    const float bind_across2 = bind_q_s * bind_q_s + c2;
+    const float bind_sin2 = bind_across2 * e2_inverse;
+    const float bind_rest = bind_q_o < 0.0f ? bind_foot : bind_foot_to_tail;
+    const float bind_rest2 = bind_rest * bind_rest;
+    const int is_bind_cylinder = bind_q_o * bind_q_o <= bind_rest2 * bind_sin2;
+    const float bind_root = sqrt(is_bind_cylinder ? 1.0f / bind_sin2 : fmax(0.0f, 1.0f - bind_rest2 * e2_inverse * bind_sin2));
+    const float bind_m = is_bind_cylinder ? bind_root : bind_rest * fabs(bind_q_o) * e2_inverse + bind_root;
+
+    // The radius, squared, in units of e^2.
+    const float bind_z = bind_foot + bind_m * bind_q_o;
+    const float past = fmax(0.0f, fmax(lowest - bind_z, bind_z - highest));
+    const float g = (bind_m * bind_m * bind_across2 + past * past) * e2_inverse;
+
+    const float slope = head_slopes[j] + station * (tail_slopes[j] - head_slopes[j]);
+    const float f_o = cap_cos * slope + cap_sin;
+    const float f_inverse = 1.0f / sqrt(cap_cos * cap_cos + f_o * f_o);
+    const float q_s = (w * cap_cos - a * f_o) * f_inverse;
+    const float q_o = (w * f_o + a * cap_cos) * f_inverse;
+    const float sin2 = (q_s * q_s + c2) * e2_inverse;
+    const float rest = q_o < 0.0f ? foot_to_lower : foot_to_upper;
+    const float rest2 = rest * rest;
+    const int is_cylinder = q_o * q_o * g <= rest2 * sin2;
+    const float root = sqrt(is_cylinder ? g / sin2 : fmax(0.0f, g - rest2 * e2_inverse * sin2));
+    const float m_capsule = is_cylinder ? root : rest * fabs(q_o) * e2_inverse + root;
+    const float m_any = is_distance_kept ? m_capsule : bind_m;
+    const float m = e2 > 0.0f ? m_any : 0.0f;
+
+    const float roll = head_rolls[j] + station * (tail_rolls[j] - head_rolls[j]);
+    float roll_sine, roll_cosine;
+    SIN_COS(roll, roll_sine, roll_cosine);
+    const float cosine = cosines[j] * roll_cosine - sines[j] * roll_sine;
+    const float sine = sines[j] * roll_cosine + cosines[j] * roll_sine;
+    const float p_s = m * (q_s * cosine - c * sine);
+    const float p_b = m * (q_s * sine + c * cosine);
+    const float p_o = foot + m * q_o;
+    x[vertex + j] = head_x + p_s * s_x + p_b * b_x + p_o * o_x;
+    y[vertex + j] = head_y + p_s * s_y + p_b * b_y + p_o * o_y;
+    z[vertex + j] = head_z + p_s * s_z + p_b * b_z + p_o * o_z;
+  }
+}
