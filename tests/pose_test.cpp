@@ -352,13 +352,13 @@ TEST(Pose, RenamingAndReorderingBonesChangesNothing) {
   }
 }
 
-TEST(Pose, MeshesAreClosedInTwoHundredPosesAndTheKernelsAgreeWithTheirTwin) {
+TEST(Pose, MeshesAreClosedInRandomPosesAndTheKernelsAgreeWithTheirTwin) {
   for (const NamedSkeleton& named : all_skeletons()) {
     const SyntheticSurface surface(named.skeleton, named.radius);
     const SkeletexModel model = model_of(surface, 13, 9);
     const Lattice lattice = number_lattice(model);
     const Walls bind(model.skeleton);
-    for (unsigned seed = 0; seed < 200; ++seed) {
+    for (unsigned seed = 0; seed < 50; ++seed) {
       const Skeleton posed = apply_pose(model.skeleton, random_pose(model.skeleton, kPi / 3, 1000 + seed));
       const PosedWalls walls(model, posed);
       const DistanceRule rule = seed % 4 == 3 ? DistanceRule::kFromFoot : DistanceRule::kFromBone;
