@@ -36,9 +36,9 @@ std::vector<NamedSegment> all_kinds_of_segments() {
   MadeSegment rough = revolve(mushroom_profile(12), {.columns = 12, .noise = 0.1});
   flip_random_edges(rough.segment, 400, random);
   insert_random_vertices(rough.segment, 300, random);
-  raise_degree(rough.segment, 40, 200);
-  raise_degree(rough.segment, rough.segment.loops[0].vertices[3], 50);
-  add("flipped edges, slivers, degrees 3 and 200", rough);
+  raise_degree(rough.segment, 40, 60);
+  raise_degree(rough.segment, rough.segment.loops[0].vertices[3], 30);
+  add("flipped edges, slivers, degrees 3 to 60", rough);
   MadeSegment cap = revolve(cap_profile(12), {.columns = 12, .noise = 0.05});
   flip_random_edges(cap.segment, 300, random);
   insert_random_vertices(cap.segment, 100, random);
@@ -46,6 +46,9 @@ std::vector<NamedSegment> all_kinds_of_segments() {
   MadeSegment tilted = revolve(cap_profile(15), {.columns = 12});
   tilted.skeleton.nodes[2].position = {0.21, 0.13, 1.0};  // the ray leaves the cap inside some triangle
   add("pole inside a triangle", tilted);
+  MadeSegment hub = revolve(cap_profile(12), {.columns = 200});
+  hub.skeleton.nodes[2].position = {0.4, 0.1, 1.0};
+  add("an inner vertex with 200 neighbours", hub);
   return all;
 }
 

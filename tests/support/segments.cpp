@@ -128,22 +128,37 @@ void insert_random_vertices(Segment& segment, int count, std::mt19937& random) {
 }
 
 void raise_degree(Segment& segment, int vertex, int degree) {
-  const auto has_vertex = [&](int t) {
-    const Triangle& tri = segment.mesh.triangles[t];
-    return std::find(tri.begin(), tri.end(), vertex) != tri.end();
-  };
-  std::vector<int> around;
-  for (int t = 0; t < static_cast<int>(segment.mesh.triangles.size()); ++t)
-    if (has_vertex(t)) around.push_back(t);
-  for (std::size_t i = 0; static_cast<int>(around.size()) < degree; ++i) {
-    const int before = static_cast<int>(segment.mesh.triangles.size());
-    const int t = around[i];
-    insert_vertex(segment, t, Vec3::Constant(1.0 / 3));
-    std::vector<int> kept;
-    for (const int k : {t, before, before + 1})
-      if (has_vertex(k)) kept.push_back(k);
-    around[i] = kept[0];
-    around.push_back(kept[1]);
+  auto& mesh = segment.mesh;
+  while (true) {
+    // The longest edge opposite the vertex that has a triangle on its other side.
+    int around = 0, first = -1, second = -1;
+    double longest = 0;
+    for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t) {
+      const Triangle& tri = mesh.triangles[t];
+      const auto c = std::find(tri.begin(), tri.end(), vertex) - tri.begin();
+      if (c == 3) continue;
+      ++around;
+      const int a = tri[(c + 1) % 3], b = tri[(c + 2) % 3];
+      if ((mesh.positions[a] - mesh.positions[b]).norm() <= longest) continue;
+      for (int u = 0; u < static_cast<int>(mesh.triangles.size()); ++u)
+        for (int k = 0; k < 3; ++k)
+          if (mesh.triangles[u][k] == b && mesh.triangles[u][(k + 1) % 3] == a) {
+            longest = (mesh.positions[a] - mesh.positions[b]).norm();
+            first = t;
+            second = u;
+          }
+    }
+    if (around >= degree) return;
+    Triangle tri = mesh.triangles[first], other = mesh.triangles[second];
+    std::rotate(tri.begin(), std::find(tri.begin(), tri.end(), vertex), tri.end());
+    std::rotate(other.begin(), std::find(other.begin(), other.end(), tri[2]), other.end());
+    const int middle = static_cast<int>(mesh.positions.size());
+    mesh.positions.push_back(0.5 * (mesh.positions[tri[1]] + mesh.positions[tri[2]]));
+    segment.source_vertices.push_back(middle);
+    mesh.triangles[first] = {vertex, tri[1], middle};
+    mesh.triangles[second] = {tri[2], middle, other[2]};
+    mesh.triangles.push_back({vertex, middle, tri[2]});
+    mesh.triangles.push_back({middle, tri[1], other[2]});
   }
 }
 

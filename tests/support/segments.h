@@ -41,7 +41,7 @@ std::vector<ProfilePoint> capsule_profile(int rows);
 
 /// Puts `count` vertices into randomly chosen triangles (degree 3, slivers after a while).
 void insert_random_vertices(Segment& segment, int count, std::mt19937& random);
-/// Puts vertices into triangles at one vertex until it has `degree` neighbours.
+/// Splits edges opposite a vertex until it has `degree` triangles.
 void raise_degree(Segment& segment, int vertex, int degree);
 /// Flips up to `count` random inner edges where both triangles stay proper.
 void flip_random_edges(Segment& segment, int count, std::mt19937& random);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <Eigen/Geometry>
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <algorithm>
@@ -89,13 +90,14 @@ inline void twin_solve(Chart& chart, const std::vector<TwinEdge>& edges, bool is
 /// w <- w A / A3^alpha, then normalised to a largest weight of 1.
 inline void twin_reweight(const Chart& chart, std::vector<TwinEdge>& edges, double alpha) {
   const std::vector<double> areas = texture_areas(chart);
+  const TriangleMesh mesh{chart.positions, chart.triangles};
+  const double smallest = 1e-6 * surface_area(mesh) / static_cast<double>(mesh.triangles.size());
   double largest = 0;
   for (TwinEdge& e : edges) {
     double a = 0, a3 = 0;
     for (const int t : e.triangles) {
-      const Triangle& tri = chart.triangles[t];
       a += areas[t];
-      a3 += 0.5 * (chart.positions[tri[1]] - chart.positions[tri[0]]).cross(chart.positions[tri[2]] - chart.positions[tri[0]]).norm();
+      a3 += std::max(smallest, area_vector(mesh, chart.triangles[t]).norm());
     }
     e.weight *= a / std::pow(a3, alpha);
     largest = std::max(largest, e.weight);

@@ -12,12 +12,18 @@ namespace skeletex {
 struct VsmOptions {
   /// Reweightings after the first solve with unit weights; 0 is the plain barycentric map.
   int iterations = 4;
-  /// Weights are multiplied by A / A3^alpha (A texture area, A3 surface area of the edge's two triangles), then
-  /// normalised. 0 is the paper's rule.
+  /// Weights are multiplied by A / A3^alpha (A texture area, A3 surface area of the edge's two triangles,
+  /// slivers counted as 1e-6 of the mean), then normalised. 0 is the paper's rule.
   double alpha = 0.5;
   /// Stop earlier when an iteration changes the spread (coefficient of variation of texture area) of a segment by less
   /// than this share; 0: never.
   double stop_spread_change = 0;
+  /// The solver stops when max |x_i - weighted mean of neighbours| / mean |x_i - x_j| is below this, for u and for v: at
+  /// the last solve, and at those before it, which only serve to find weights.
+  double tolerance = 1e-3;
+  double intermediate_tolerance = 3e-2;
+  int max_steps = 2000;     ///< conjugate gradient steps per solve at most
+  int work_group_size = 0;  ///< of the solver; 0: by device. Another size changes the map within the tolerance
 };
 
 struct VsmReport {

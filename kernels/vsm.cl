@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: MIT
+// Vertex-sampling-maximizing maps of all charts together (design: docs/parameterization.md).
+//
+// Vertices of all charts lie in one list: each chart has a block that begins at a multiple of VSM_SLICE and holds its
+// inner vertices first, then its fixed ones. A vertex's map is (u, v) = (hi + lo)[2 * vertex], [2 * vertex + 1].
+// Rows of the sparse systems are the inner vertices. Their entries, one per neighbour, lie in slices of VSM_SLICE rows,
+// column-major inside a slice: entry k of row i is slice_begin[i / VSM_SLICE] + k * VSM_SLICE + i % VSM_SLICE.
+// Per entry: column (the neighbour), jump (lifted v of the neighbour = v + jump; VSM_POLE: the neighbour is a pole,
+// which acts through u only), weight = mantissa * 2^exponent. Both directions of an edge carry the same weight bits.
+
+#ifndef VSM_SLICE
+#define VSM_SLICE 32
+#endif
+#define VSM_POLE (-128)
+
+int entry_index(global const int* restrict slice_begin, int row, int k) {
+  return slice_begin[row / VSM_SLICE] + k * VSM_SLICE + row % VSM_SLICE;
+}
+
+// (b - a) + jump of two values that are each a sum of two floats. Rounded once, relative to the result: the rounding
+// error of b_hi - a_hi is kept, because across the cut jump cancels nearly all of it.
+float lifted_difference(float a_hi, float a_lo, float b_hi, float b_lo, float jump) {
+  const float difference = b_hi - a_hi;
+  const float part = difference - b_hi;
+  const float error = (b_hi - (difference - part)) - (a_hi + part);
+  return (difference + jump) + (error + (b_lo - a_lo));
+}
+
+// Texture area of each triangle, in (v, u); for a pole's triangle that of the trapezoid between its opposite edge and
+// the pole's line. A pole is always corner 0. Never below a rounding error's worth, so that weights stay positive.
+// In: corners (3 planes of `count` vertices), jumps (2 planes: corners 1 and 2 against corner 0; with a pole the first
+// is VSM_POLE and the second that of corner 2 against corner 1). Out: areas. NDRange: triangles.
+kernel void measure_areas(int count, global const int* restrict corners, global const char* restrict jumps, global const float* restrict hi,
+                          global const float* restrict lo, global float* restrict areas) {
+  const int t = get_global_id(0);
+  if (t >= count) return;
+  const int a = 2 * corners[t], b = 2 * corners[count + t], c = 2 * corners[2 * count + t];
+  const int jump_b = jumps[t], jump_c = jumps[count + t];
+  const float ub = lifted_difference(hi[a], lo[a], hi[b], lo[b], 0.0f);
+  const float uc = lifted_difference(hi[a], lo[a], hi[c], lo[c], 0.0f);
+  float first, second;
+  if (jump_b == VSM_POLE) {
+    first = lifted_difference(hi[b + 1], lo[b + 1], hi[c + 1], lo[c + 1], jump_c) * (-0.5f * (ub + uc));
+    second = 0.0f;
+  } else {
+    first = 0.5f * lifted_difference(hi[a + 1], lo[a + 1], hi[b + 1], lo[b + 1], jump_b) * uc;
+    second = 0.5f * lifted_difference(hi[a + 1], lo[a + 1], hi[c + 1], lo[c + 1], jump_c) * ub;
+  }
+  areas[t] = fmax(first - second, fmax(1e-7f * (fabs(first) + fabs(second)), 1e-36f));
+}
+
+// Multiplies each entry's weight by (A_left + A_right) * factor, where factor = 1 / A3^alpha, unless the row's slice is
+// frozen (first solve, or a chart that has stopped: weights as they are). Then normalises each row: share = weight / d with d the row's sum = sum *
+// 2^row_exponent, poles included; v_part is the share of d that does not belong to poles.
+// In: frozen (per slice), triangles (2 planes of `entries`: the two at the edge), factors. In and out: mantissas, exponents.
+// Out: shares, sums, row_exponents, v_parts. NDRange: vertices.
+kernel void weigh_rows(int vertices, int entries, global const int* restrict frozen, global const int* restrict slice_begin,
+                       global const int* restrict row_length,
+                       global const char* restrict jumps, global const int* restrict triangles, global const float* restrict factors,
+                       global const float* restrict areas, global float* restrict mantissas, global int* restrict exponents,
+                       global float* restrict shares, global float* restrict sums, global int* restrict row_exponents,
+                       global float* restrict v_parts) {
+  const int row = get_global_id(0);
+  if (row >= vertices) return;
+  const int length = row_length[row];
+  if (length == 0) return;
+  const int is_frozen = frozen[row / VSM_SLICE];
+  int largest = INT_MIN;
+  for (int k = 0; k < length; ++k) {
+    const int e = entry_index(slice_begin, row, k);
+    if (!is_frozen) {
+      int shift, exponent;
+      const float grown = frexp((areas[triangles[e]] + areas[triangles[entries + e]]) * factors[e], &shift);
+      mantissas[e] = frexp(mantissas[e] * grown, &exponent);
+      exponents[e] += shift + exponent;
+    }
+    largest = max(largest, exponents[e]);
+  }
+  float sum = 0.0f, v_sum = 0.0f;
+  for (int k = 0; k < length; ++k) {
+    const int e = entry_index(slice_begin, row, k);
+    const float weight = ldexp(mantissas[e], exponents[e] - largest);
+    sum += weight;
+    v_sum += jumps[e] == VSM_POLE ? 0.0f : weight;
+    shares[e] = weight;
+  }
+  for (int k = 0; k < length; ++k) shares[entry_index(slice_begin, row, k)] /= sum;
+  sums[row] = sum;
+  row_exponents[row] = largest;
+  v_parts[row] = v_sum / sum;
+}
+
+// The symmetric matrix scaled to a unit diagonal: a_ij = w_ij / sqrt(d_i d_j) = sqrt(share_ij share_ji); 0 where the
+// neighbour is fixed (twin -1). NDRange: vertices.
+kernel void scale_entries(int vertices, global const int* restrict slice_begin, global const int* restrict row_length, global const int* restrict twins,
+                          global const float* restrict shares, global float* restrict scaled) {
+  const int row = get_global_id(0);
+  if (row >= vertices) return;
+  const int length = row_length[row];
+  for (int k = 0; k < length; ++k) {
+    const int e = entry_index(slice_begin, row, k);
+    const int twin = twins[e];
+    scaled[e] = twin < 0 ? 0.0f : sqrt(shares[e]) * sqrt(shares[twin]);
+  }
+}
+
+// Sum (or maximum) of one value per work-item, the same for all of them; the order of additions is fixed. In two stages
+// of about sqrt(group size) values each, so the number of barriers is fixed too.
+// Local: scratch, VSM_STRIDE floats more than work-items.
+#define VSM_STRIDE 32
+float reduce_group(local float* scratch, float value, int is_maximum) {
+  const int lane = get_local_id(0), count = get_local_size(0);
+  if (count == 1) return value;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  scratch[lane] = value;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  local float* const stage = scratch + count;
+  const int used = min(count, VSM_STRIDE);
+  if (lane < used) {
+    float part = scratch[lane];
+    for (int k = lane + VSM_STRIDE; k < count; k += VSM_STRIDE) part = is_maximum ? fmax(part, scratch[k]) : part + scratch[k];
+    stage[lane] = part;
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  float total = stage[0];
+  for (int k = 1; k < used; ++k) total = is_maximum ? fmax(total, stage[k]) : total + stage[k];
+  return total;
+}
+
+// Conjugate gradients on the scaled systems, u and v as one vector (interleaved), one work-group per chart; the groups
+// take charts from a queue, so any number of groups will do. Every `check_steps` steps the correction is added to the
+// map, and the true residual replaces the recursive one: each residual is formed from differences of neighbours, so it
+// is accurate relative to them however small they are.
+// Stops when max over rows of |x_i - mean of neighbours| / mean |x_i - x_j| <= tolerance, or after max_steps.
+// In: order (charts, largest first), chart_begin, chart_rows, the systems; queue (1 int, 0). In and out: hi, lo.
+// Work space of 2 floats per vertex: residual, direction (0 at fixed vertices), product, correction; 1 float: roots.
+// Out: steps, ratios, per chart. Local: scratch (see reduce_group). NDRange: any number of work-groups.
+kernel void solve_charts(int charts, float tolerance, int max_steps, int check_steps, global int* restrict queue, global const int* restrict order,
+                         global const int* restrict chart_begin, global const int* restrict chart_rows, global const int* restrict slice_begin,
+                         global const int* restrict row_length, global const int* restrict column, global const char* restrict jumps,
+                         global const float* restrict shares, global const float* restrict scaled, global const float* restrict sums,
+                         global const int* restrict row_exponents, global const float* restrict v_parts, global float* restrict hi,
+                         global float* restrict lo, global float* restrict residual, global float* restrict direction,
+                         global float* restrict product, global float* restrict correction, global float* restrict roots,
+                         global int* restrict steps, global float* restrict ratios, local float* restrict scratch) {
+  const int lane = get_local_id(0), lanes = get_local_size(0);
+  local int taken;
+  while (true) {
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (lane == 0) taken = atomic_inc(queue);
+    barrier(CLK_LOCAL_MEM_FENCE);
+    const int position = taken;
+    if (position >= charts) return;
+    const int chart = order[position], begin = chart_begin[chart], end = begin + chart_rows[chart];
+
+    // roots_i = sqrt(d_i), relative to the chart's largest.
+    float largest = -1e30f;
+    for (int i = begin + lane; i < end; i += lanes) largest = fmax(largest, (float)row_exponents[i]);
+    largest = reduce_group(scratch, largest, 1);
+    for (int i = begin + lane; i < end; i += lanes) {
+      const int exponent = max(row_exponents[i] - (int)largest, -220);
+      roots[i] = ldexp(sqrt(exponent & 1 ? 2.0f * sums[i] : sums[i]), exponent >> 1);
+      correction[2 * i] = correction[2 * i + 1] = 0.0f;
+      direction[2 * i] = direction[2 * i + 1] = 0.0f;
+    }
+    barrier(CLK_GLOBAL_MEM_FENCE);
+
+    int step = 0;
+    float rho = 1.0f, rho_next = 0.0f, ratio;
+    while (true) {
+      // The true residual of the map goes to `product`, but only in the rows that are not good enough yet: without this
+      // rows of large weight, whose rounding errors outweigh all of a row of tiny weight, would blind the method to it.
+      float rho_true = 0.0f;
+      ratio = 0.0f;
+      for (int i = begin + lane; i < end; i += lanes) {
+        const float u_hi = hi[2 * i], u_lo = lo[2 * i], v_hi = hi[2 * i + 1], v_lo = lo[2 * i + 1];
+        const int length = row_length[i];
+        float ru = 0.0f, rv = 0.0f, mu = 0.0f, mv = 0.0f;
+        for (int k = 0; k < length; ++k) {
+          const int e = entry_index(slice_begin, i, k), j = 2 * column[e];
+          const int jump = jumps[e];
+          const float share = shares[e];
+          const float du = share * ((hi[j] - u_hi) + (lo[j] - u_lo));
+          const float dv = jump == VSM_POLE ? 0.0f : share * lifted_difference(v_hi, v_lo, hi[j + 1], lo[j + 1], jump);
+          ru += du;
+          rv += dv;
+          mu += fabs(du);
+          mv += fabs(dv);
+        }
+        const float ratio_u = fabs(ru) / (mu + 1e-13f), ratio_v = fabs(rv) / (mv + 1e-13f);
+        ratio = fmax(ratio, fmax(ratio_u, ratio_v));
+        ru = ratio_u > 0.1f * tolerance ? ru * roots[i] : 0.0f;
+        rv = ratio_v > 0.1f * tolerance ? rv * roots[i] : 0.0f;
+        product[2 * i] = ru;
+        product[2 * i + 1] = rv;
+        rho_true += ru * ru + rv * rv / v_parts[i];
+      }
+      ratio = reduce_group(scratch, ratio, 1);
+      rho_true = reduce_group(scratch, rho_true, 0);
+      if (ratio <= tolerance || step >= max_steps || !(rho_true > 0.0f)) break;
+
+      // Go on as long as the recursive residual says the same as the true one, else start again from the true one.
+      const int is_restart = !(rho_true < 4.0f * rho_next);
+      if (is_restart) {
+        for (int i = 2 * begin + lane; i < 2 * end; i += lanes) {
+          residual[i] = product[i];
+          direction[i] = 0.0f;
+        }
+        rho_next = rho_true;
+      }
+
+      for (int inner = 0; inner < check_steps; ++inner) {
+        const float beta = is_restart && inner == 0 ? 0.0f : rho_next / rho;
+        rho = rho_next;
+        ++step;
+        for (int i = begin + lane; i < end; i += lanes) {
+          direction[2 * i] = residual[2 * i] + beta * direction[2 * i];
+          direction[2 * i + 1] = residual[2 * i + 1] / v_parts[i] + beta * direction[2 * i + 1];
+        }
+        barrier(CLK_GLOBAL_MEM_FENCE);
+        float curvature = 0.0f;
+        for (int i = begin + lane; i < end; i += lanes) {
+          const int length = row_length[i];
+          const float pu = direction[2 * i], pv = direction[2 * i + 1];
+          float qu = pu, qv = v_parts[i] * pv;
+          for (int k = 0; k < length; ++k) {
+            const int e = entry_index(slice_begin, i, k), j = 2 * column[e];
+            const float a = scaled[e];
+            qu -= a * direction[j];
+            qv -= a * direction[j + 1];
+          }
+          product[2 * i] = qu;
+          product[2 * i + 1] = qv;
+          curvature += pu * qu + pv * qv;
+        }
+        curvature = reduce_group(scratch, curvature, 0);
+        if (!(curvature > 0.0f)) {
+          rho_next = 0.0f;
+          break;
+        }
+        const float alpha = rho / curvature;
+        rho_next = 0.0f;
+        for (int i = begin + lane; i < end; i += lanes) {
+          const float ru = residual[2 * i] - alpha * product[2 * i], rv = residual[2 * i + 1] - alpha * product[2 * i + 1];
+          residual[2 * i] = ru;
+          residual[2 * i + 1] = rv;
+          correction[2 * i] += alpha * direction[2 * i];
+          correction[2 * i + 1] += alpha * direction[2 * i + 1];
+          rho_next += ru * ru + rv * rv / v_parts[i];
+        }
+        rho_next = reduce_group(scratch, rho_next, 0);
+        if (!(rho_next > 0.0f)) break;
+      }
+      for (int i = 2 * begin + lane; i < 2 * end; i += lanes) {
+        const float change = lo[i] + correction[i] / roots[i / 2];
+        const float sum = hi[i] + change;
+        const float part = sum - hi[i];
+        lo[i] = (hi[i] - (sum - part)) + (change - part);
+        hi[i] = sum;
+        correction[i] = 0.0f;
+      }
+      barrier(CLK_GLOBAL_MEM_FENCE);
+    }
+    if (lane == 0) {
+      steps[chart] += step;
+      ratios[chart] = ratio;
+    }
+  }
+}
