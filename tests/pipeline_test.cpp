@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: MIT
+// The main path from end to end: mesh and skeleton -> model -> mesh.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <numeric>
+
+#include "skeletex/encode/encode_model.h"
+#include "skeletex/io/model_file.h"
+#include "skeletex/measure/manifold.h"
+#include "skeletex/measure/metro.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "support/load_model.h"
+#include "support/shapes.h"
+
+namespace skeletex {
+namespace {
+
+const char* const kStandardModels[] = {"armadillo", "bear",       "bear_bis", "bull",           "bull_16", "bunny00",     "bunny00_9", "cactus",
+                                       "camel",     "camel_16",   "cow",      "diplodocus",     "double_torus", "eight",  "eight_dumbbell", "eight_theta",
+                                       "homer",     "knot1",      "man",      "pinion",         "pinion_5", "triceratops", "triceratops_17"};
+
+void expect_watertight(const TriangleMesh& mesh, int genus, const std::string& what) {
+  const ManifoldReport report = measure_manifold(mesh);
+  EXPECT_TRUE(report.is_closed_manifold()) << what << ": " << report.boundary_edges.size() << " boundary edges, " << report.non_manifold_edges.size()
+                                           << " non-manifold edges, " << report.misoriented_edges.size() << " misoriented";
+  EXPECT_EQ(report.components, 1) << what;
+  EXPECT_EQ(report.genus, genus) << what;
+  EXPECT_TRUE(report.non_finite_vertices.empty()) << what;
+  EXPECT_GT(signed_volume(mesh), 0) << what;
+}
+
+double symmetric_mean(const MetroReport& report) { return (report.forward.mean + report.backward.mean) / 2; }
+
+}  // namespace
+
+class StandardModel : public testing::TestWithParam<const char*> {};
+
+TEST_P(StandardModel, ComesBackClosedByEveryMethod) {
+  ClContext context;
+  const TestModel model = load_standard_model(GetParam());
+  for (const EncodeMethod method : {EncodeMethod::kVsm, EncodeMethod::kSpd, EncodeMethod::kHybrid}) {
+    EncodeOptions options;
+    options.method = method;
+    options.width = options.height = 128;
+    const EncodeResult encoded = encode_model(context, model.mesh, model.skeleton, options);
+    const std::string what = model.name + " method " + std::to_string(static_cast<int>(method));
+    EXPECT_GE(encoded.report.used_fraction, 0.95) << what;
+    double area = 0;
+    for (const BoneReport& bone : encoded.report.bones) {
+      area += bone.area;
+      if (bone.method == Method::kVsm) { EXPECT_EQ(bone.flipped_triangles, 0) << what << " " << bone.name; }
+    }
+    EXPECT_NEAR(area, surface_area(model.mesh), 1e-9 * area) << what;
+    expect_watertight(reconstruct_mesh(context, encoded.model), encoded.report.genus, what);
+    for (const int size : {32, 81}) expect_watertight(reconstruct_mesh(context, resample_model(context, encoded.model, size)), encoded.report.genus, what + " at " + std::to_string(size));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, StandardModel, testing::ValuesIn(kStandardModels), [](const auto& info) { return std::string(info.param); });
+
+TEST(Pipeline, ErrorFallsAsTheTextureGrowsAndStaysBelowTheIssuesFigures) {
+  ClContext context;
+  const TestModel model = load_standard_model("bear");
+  double last = 1;
+  for (const auto& [size, limit] : {std::pair{128, 1.5e-4}, std::pair{512, 1.15e-5}}) {
+    EncodeOptions options;
+    options.width = options.height = size;
+    const EncodeResult encoded = encode_model(context, model.mesh, model.skeleton, options);
+    const double mean = symmetric_mean(measure_metro(context, model.mesh, reconstruct_mesh(context, encoded.model)));
+    EXPECT_LT(mean, limit);
+    EXPECT_LT(mean, last);
+    last = mean;
+  }
+}
+
+TEST(Pipeline, ASecondEncodeGivesTheSameBytes) {
+  ClContext context;
+  const TestModel model = load_standard_model("eight");
+  EncodeOptions options;
+  options.width = 96, options.height = 64;
+  const EncodeResult first = encode_model(context, model.mesh, model.skeleton, options), second = encode_model(context, model.mesh, model.skeleton, options);
+  EXPECT_EQ(first.model.texture.along, second.model.texture.along);
+  EXPECT_EQ(first.model.texture.around, second.model.texture.around);
+  EXPECT_EQ(first.model.texture.out, second.model.texture.out);
+}
+
+TEST(Pipeline, AModelSurvivesItsFileBitByBit) {
+  ClContext context;
+  const TestModel model = load_standard_model("bear");
+  EncodeOptions options;
+  options.width = options.height = 128;
+  const SkeletexModel encoded = encode_model(context, model.mesh, model.skeleton, options).model;
+  const auto path = std::filesystem::temp_directory_path() / "skeletex_pipeline_test.skx.exr";
+  write_model(path, encoded);
+  const TriangleMesh before = reconstruct_mesh(context, encoded), after = reconstruct_mesh(context, read_model(path));
+  std::filesystem::remove(path);
+  EXPECT_EQ(before.triangles, after.triangles);
+  EXPECT_EQ(before.positions, after.positions);
+}
+
+TEST(Pipeline, ThePapersRecipeAndOtherOptionsWorkOnGeneratedShapes) {
+  ClContext context;
+  for (const auto& [name, genus, shape] : all_shapes()) {
+    EncodeOptions options;
+    options.width = 80, options.height = 56;
+    options.vsm = {1, 0, 0};
+    options.row_spacing = RowSpacing::kUniform;
+    options.has_prefilter = false;
+    options.texel_share = TexelShare::kArea;
+    for (const EncodeMethod method : {EncodeMethod::kVsm, EncodeMethod::kSpd}) {
+      options.method = method;
+      const EncodeResult encoded = encode_model(context, shape.mesh, shape.skeleton, options);
+      expect_watertight(reconstruct_mesh(context, encoded.model), genus, name);
+    }
+  }
+}
+
+}  // namespace skeletex
