@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
+#include <numbers>
 #include <random>
 #include <set>
 
@@ -259,7 +260,9 @@ TEST(SeamStrip, AnglesUnwrapToOneTurnThatNeverGoesBack) {
       const double turn = (i + 0.5) / m + shift + noise * (unit(random) - 0.5);
       turns.push_back(turn - std::floor(turn));
     }
-    const std::vector<double> result = unwrapped_turns(turns);
+    std::vector<Vec3> points;
+    for (const double turn : turns) points.push_back(Vec3(std::cos(2 * std::numbers::pi * turn), std::sin(2 * std::numbers::pi * turn), 0));
+    const std::vector<double> result = seam_turns(points, turns);
     for (int i = 0; i + 1 < m; ++i) {
       EXPECT_LE(result[i], result[i + 1]);
       EXPECT_LE(result[i + 1] - result[i], 0.45 + 1e-12);

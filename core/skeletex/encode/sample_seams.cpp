@@ -5,6 +5,8 @@
 #include <cmath>
 #include <map>
 
+#include "skeletex/model/loop_turns.h"
+
 namespace skeletex {
 namespace {
 
@@ -74,14 +76,16 @@ Seams sample_seams(const Segmentation& segmentation, const Skeleton& skeleton, c
 std::vector<Vec3> points_on_loop(const Segment& segment, const Skeleton& skeleton, const Walls& walls, BoneEnd end, int columns) {
   const std::vector<int>& loop = segment.loops[static_cast<int>(end)].vertices;
   const Vec3& node = end_position(skeleton, segment.bone, end);
-  // Angles along the loop, lifted so that they grow by one turn, then made monotone.
-  std::vector<double> turns{walls.turn_of(segment.bone, segment.mesh.positions[loop[0]] - node)};
-  std::vector<Vec3> points{segment.mesh.positions[loop[0]]};
-  for (std::size_t i = 1; i <= loop.size(); ++i) {
-    points.push_back(segment.mesh.positions[loop[i % loop.size()]]);
-    turns.push_back(turns.back() + wrapped(walls.turn_of(segment.bone, points.back() - node) - turns.back()));
+  std::vector<Vec3> points;
+  std::vector<double> angles;
+  for (const int vertex : loop) {
+    points.push_back(segment.mesh.positions[vertex]);
+    angles.push_back(walls.turn_of(segment.bone, points.back() - node));
   }
-  for (std::size_t i = 1; i < turns.size(); ++i) turns[i] = std::max(turns[i], turns[i - 1]);
+  // The chart's own v: make_chart has refused loops that do not wind once.
+  std::vector<double> turns = loop_turns(points, angles).value();
+  points.push_back(points.front());
+  turns.push_back(turns.front() + 1);
   const double begin = turns.front();
   std::vector<Vec3> result(columns);
   std::size_t at = 0;
@@ -92,8 +96,7 @@ std::vector<Vec3> points_on_loop(const Segment& segment, const Skeleton& skeleto
     while (at + 2 < turns.size() && turns[at + 1] < turn) ++at;
     const double span = turns[at + 1] - turns[at];
     const double t = span > 0 ? std::clamp((turn - turns[at]) / span, 0.0, 1.0) : 0;
-    const Vec3 point = points[at] + t * (points[at + 1] - points[at]);
-    result[((column % columns) + columns) % columns] = walls.seam_point(segment.bone, end, turn, walls.half_line_distance(segment.bone, end, point));
+    result[((column % columns) + columns) % columns] = points[at] + t * (points[at + 1] - points[at]);
   }
   return result;
 }

@@ -21,8 +21,8 @@ struct Seams {
 /// \param rectangles  per bone
 Seams sample_seams(const Segmentation& segmentation, const Skeleton& skeleton, const Walls& walls, std::span<const Rectangle> rectangles);
 
-/// Points of a segment's boundary loop at the angles of `columns` texels: where the loop's polyline passes turn
-/// j / columns, placed in the wall. World coordinates.
+/// Points of a segment's boundary loop at `columns` texels: where the loop's polyline passes v = j / columns (loop_turns).
+/// World coordinates.
 std::vector<Vec3> points_on_loop(const Segment& segment, const Skeleton& skeleton, const Walls& walls, BoneEnd end, int columns);
 
 }  // namespace skeletex

@@ -11,6 +11,7 @@
 #include <queue>
 
 #include "skeletex/model/error.h"
+#include "skeletex/model/loop_turns.h"
 #include "skeletex/parameterize/half_edge_table.h"
 
 namespace skeletex {
@@ -32,51 +33,29 @@ struct Row {
   std::vector<double> lifted;    ///< the row's v before wrapping
 };
 
-/// The increasing sequence with steps >= `spacing` that is nearest to y in the least-squares sense, for a sequence
-/// that goes on with y[i + n] = y[i] + 1. Pool-adjacent-violators on three periods: the middle one feels no end.
-std::vector<double> nearest_increasing(const std::vector<double>& y, double spacing) {
-  const int n = static_cast<int>(y.size());
-  struct Block {
-    double sum;
-    int count;
-    double mean() const { return sum / count; }
-  };
-  std::vector<Block> blocks;
-  for (int i = 0; i < 3 * n; ++i) {
-    blocks.push_back({y[i % n] + i / n - spacing * i, 1});
-    while (blocks.size() > 1 && blocks[blocks.size() - 2].mean() > blocks.back().mean()) {
-      const Block last = blocks.back();
-      blocks.pop_back();
-      blocks.back().sum += last.sum;
-      blocks.back().count += last.count;
-    }
-  }
-  std::vector<double> x(n);
-  int i = 0;
-  for (const Block& block : blocks)
-    for (int k = 0; k < block.count; ++k, ++i)
-      if (i / n == 1) x[i - n] = block.count == 1 ? y[i - n] : block.mean() + spacing * i - 1;
-  return x;
-}
-
 Row make_row(const BoundaryLoop& loop, const Segment& segment, const Skeleton& skeleton, const Walls& walls, BoneEnd end) {
   const Vec3& node = end_position(skeleton, segment.bone, end);
   const int count = static_cast<int>(loop.vertices.size());
   Row row;
   row.vertices = loop.vertices;
   std::vector<double> turns;
-  for (const int v : loop.vertices) turns.push_back(walls.turn_of(segment.bone, segment.mesh.positions[v] - node));
+  std::vector<Vec3> points;
+  for (const int v : loop.vertices) {
+    points.push_back(segment.mesh.positions[v]);
+    turns.push_back(walls.turn_of(segment.bone, points.back() - node));
+  }
   double lift = turns.empty() ? 0 : turns[0];
   for (int i = 0; i < count; ++i) {
     row.measured.push_back(lift);
     lift += wrapped(turns[(i + 1) % count] - turns[i]);
   }
-  if (count < 3 || std::abs(lift - turns[0] - 1) > 1e-6)
+  std::optional<std::vector<double>> lifted = loop_turns(points, turns);
+  if (!lifted)
     throw TopologyError(fmt::format("bone \"{}\": its segment's boundary at node \"{}\" winds {:.0f} times around the bone instead of once; move the node "
                                     "to the middle of the body",
                                     skeleton.bones[segment.bone].name, skeleton.nodes[end_node(skeleton, segment.bone, end)].name,
                                     count < 3 ? 0.0 : lift - turns[0]));
-  row.lifted = nearest_increasing(row.measured, 1e-4 / count);
+  row.lifted = std::move(*lifted);
   return row;
 }
 

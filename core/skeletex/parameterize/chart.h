@@ -31,8 +31,8 @@ struct Chart {
   std::vector<double> u, v;  ///< per vertex; rows are fixed, the rest is filled by a parameterization
 };
 
-/// Fixes the boundary rows of a segment by the angle about its bone (made strictly monotone where the loop is no graph
-/// over the angle), inserts the poles at free ends (where the ray from the free node along the bone, away from it,
+/// Fixes the boundary rows of a segment by the angle about its bone (see loop_turns for loops that are no graphs over the
+/// angle), inserts the poles at free ends (where the ray from the free node along the bone, away from it,
 /// leaves the segment last), splits edges and triangles that join two vertices of one row, and counts the turns
 /// between the rows so that the map is not twisted.
 /// \throw TopologyError naming the bone when the pole's ray misses the segment

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+
+#include "skeletex/model/loop_turns.h"
 
 namespace skeletex {
 namespace {
@@ -10,40 +13,14 @@ namespace {
 constexpr double kLargestStep = 0.45;  // with 4 columns still 1.2 columns of overlap between neighbouring ranges
 constexpr double kSlackColumns = 1.5;
 
-/// Steps between neighbours around the ring, each in [lower, lower + 1).
-std::vector<double> folded_steps(const std::vector<double>& turns, double lower) {
-  std::vector<double> steps(turns.size());
-  for (std::size_t i = 0; i < turns.size(); ++i) {
-    const double step = turns[(i + 1) % turns.size()] - turns[i] - lower;
-    steps[i] = step - std::floor(step) + lower;
-  }
-  return steps;
-}
-
 }  // namespace
 
-std::vector<double> unwrapped_turns(const std::vector<double>& turns) {
+std::vector<double> seam_turns(const std::vector<Vec3>& points, const std::vector<double>& turns) {
   const int count = static_cast<int>(turns.size());
-  std::vector<double> steps;
-  double sum = 0;
-  for (const double lower : {-0.5, -0.25, 0.0}) {
-    steps = folded_steps(turns, lower);
-    sum = 0;
-    for (const double step : steps) sum += step;
-    if (std::abs(sum - 1) < 1e-6) break;
-  }
-  if (!(std::abs(sum - 1) < 1e-6)) steps.assign(count, 1.0 / count);
-
-  // Where the angle turns back, take the middle between the largest before and the smallest after; two windings reach
-  // far enough, since more than one turn back does not sum up to one.
-  std::vector<double> grown(3 * count);
-  grown[0] = (turns[0] >= 0 && turns[0] < 1 ? turns[0] : 0) - 1;
-  for (int i = 1; i < 3 * count; ++i) grown[i] = grown[i - 1] + steps[(i - 1) % count];
-  std::vector<double> highest = grown, lowest = grown;
-  for (int i = 1; i < 3 * count; ++i) highest[i] = std::max(highest[i], highest[i - 1]);
-  for (int i = 3 * count - 2; i >= 0; --i) lowest[i] = std::min(lowest[i], lowest[i + 1]);
   std::vector<double> result(count);
-  for (int i = 0; i < count; ++i) result[i] = 0.5 * (highest[count + i] + lowest[count + i]);
+  if (std::optional<std::vector<double>> grown = loop_turns(points, turns)) result = std::move(*grown);
+  else
+    for (int i = 0; i < count; ++i) result[i] = (std::isfinite(turns[0]) ? turns[0] : 0) + static_cast<double>(i) / count;
 
   double largest = 0;
   for (int i = 0; i < count; ++i) largest = std::max(largest, i + 1 < count ? result[i + 1] - result[i] : result[0] + 1 - result[i]);
@@ -58,7 +35,9 @@ std::vector<double> unwrapped_turns(const std::vector<double>& turns) {
 
 void append_seam_strip(const std::vector<Vec3>& positions, const Ring& seam, const Ring& row, BoneEnd end, std::vector<Triangle>& triangles) {
   const int m = static_cast<int>(seam.vertices.size()), n = static_cast<int>(row.vertices.size());
-  const std::vector<double> turns = unwrapped_turns(seam.turns);
+  std::vector<Vec3> points;
+  for (const int vertex : seam.vertices) points.push_back(positions[vertex]);
+  const std::vector<double> turns = seam_turns(points, seam.turns);
   // Columns in unwrapped numbers: row angles are column / n.
   const auto column_of = [&](int i) { return n * (turns[(i % m + m) % m] + std::floor(static_cast<double>(i) / m)); };
   const auto seam_vertex = [&](int i) { return seam.vertices[i % m]; };

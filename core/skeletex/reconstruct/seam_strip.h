@@ -19,8 +19,8 @@ struct Ring {
 /// \pre seam has at least 3 vertices, row at least 4
 void append_seam_strip(const std::vector<Vec3>& positions, const Ring& seam, const Ring& row, BoneEnd end, std::vector<Triangle>& triangles);
 
-/// Angles as they grow once around: the first in [0,1), never decreasing, ending below the first plus one, no step above
-/// 0.45 of a turn. Follows the given ones where they grow; where they turn back or wind otherwise, it evens them out.
-std::vector<double> unwrapped_turns(const std::vector<double>& turns);
+/// v of a seam's vertices: that of its loop (loop_turns), the first in [0,1), with no step above 0.45 of a turn; evenly
+/// spread when the points do not wind once around the bone.
+std::vector<double> seam_turns(const std::vector<Vec3>& points, const std::vector<double>& turns);
 
 }  // namespace skeletex

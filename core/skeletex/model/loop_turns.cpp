@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/model/loop_turns.h"
+
+#include <cmath>
+
+namespace skeletex {
+namespace {
+
+/// Part of a turn that is spread over the steps evenly, so that equal points get different v.
+constexpr double kEvenPart = 1e-4;
+
+/// The sequence that is nearest to y in the least-squares sense and grows by at least spacing[i] from i to i + 1, for a
+/// sequence that goes on with y[i + n] = y[i] + 1. Pool-adjacent-violators on three periods: the middle one feels no end.
+std::vector<double> nearest_increasing(const std::vector<double>& y, const std::vector<double>& spacing) {
+  const int n = static_cast<int>(y.size());
+  struct Block {
+    double sum;
+    int count;
+    double mean() const { return sum / count; }
+  };
+  std::vector<double> offset(3 * n, 0);
+  for (int i = 1; i < 3 * n; ++i) offset[i] = offset[i - 1] + spacing[(i - 1) % n];
+  std::vector<Block> blocks;
+  for (int i = 0; i < 3 * n; ++i) {
+    blocks.push_back({y[i % n] + i / n - offset[i], 1});
+    while (blocks.size() > 1 && blocks[blocks.size() - 2].mean() > blocks.back().mean()) {
+      const Block last = blocks.back();
+      blocks.pop_back();
+      blocks.back().sum += last.sum;
+      blocks.back().count += last.count;
+    }
+  }
+  std::vector<double> x(n);
+  int i = 0;
+  for (const Block& block : blocks)
+    for (int k = 0; k < block.count; ++k, ++i)
+      if (i / n == 1) x[i - n] = block.count == 1 ? y[i - n] : block.mean() + offset[i] - 1;
+  return x;
+}
+
+}  // namespace
+
+std::optional<std::vector<double>> loop_turns(const std::vector<Vec3>& points, const std::vector<double>& turns, double least_density) {
+  const std::size_t count = points.size();
+  if (count < 3) return {};
+  std::vector<double> lifted{turns[0]}, spacing(count);
+  double total = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double step = turns[(i + 1) % count] - turns[i];
+    lifted.push_back(lifted.back() + step - std::round(step));
+    total += spacing[i] = (points[(i + 1) % count] - points[i]).norm();
+  }
+  if (std::abs(lifted.back() - lifted.front() - 1) > 1e-6) return {};
+  lifted.pop_back();
+  for (double& s : spacing) s = (least_density - kEvenPart) * (total > 0 ? s / total : 0) + kEvenPart / static_cast<double>(count);
+  return nearest_increasing(lifted, spacing);
+}
+
+}  // namespace skeletex

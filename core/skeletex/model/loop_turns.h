@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <optional>
+#include <vector>
+
+#include "skeletex/model/mesh.h"
+
+namespace skeletex {
+
+/// The v of a boundary loop's points: the angles about the bone, as near as possible in the least-squares sense while v
+/// grows everywhere, by at least `least_density` of the mean rate along the loop's length. Most loops keep their angles
+/// to within a fraction of a column; where a loop turns back about the bone, or runs towards it, v follows its length
+/// instead, so that no stretch of the seam falls between two columns.
+/// \param points  once around in the direction of growing angle, the first not repeated
+/// \param turns   their angles about the bone, in turns, any lift
+/// \return increasing values, the last below the first plus 1; nothing when the loop does not wind once around the bone
+std::optional<std::vector<double>> loop_turns(const std::vector<Vec3>& points, const std::vector<double>& turns, double least_density = 0.4);
+
+}  // namespace skeletex
