@@ -1,3 +1,94 @@
 // SPDX-License-Identifier: MIT
+#include <fmt/format.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
 #include <cstdio>
-int main() { std::puts("skeletex"); }
+#include <new>
+
+#include "command.h"
+#include "skeletex/model/error.h"
+#include "suggestion.h"
+
+namespace skeletex::cli {
+namespace {
+
+/// Reports a mistyped command or option with the nearest name before the parser, whose message has none.
+void check_names(const CLI::App& program, int argc, char** argv) {
+  const std::vector<const CLI::App*> all = program.get_subcommands([](const CLI::App*) { return true; });
+  std::vector<std::string> commands;
+  for (const CLI::App* command : all) commands.push_back(command->get_name());
+  const CLI::App* app = &program;
+  for (int i = 1; i < argc; ++i) {
+    const std::string argument = argv[i];
+    if (argument == "--") return;
+    if (argument.starts_with("--")) {
+      const std::string name = argument.substr(0, argument.find('='));
+      std::vector<std::string> names;
+      for (const CLI::Option* option : app->get_options())
+        for (const std::string& known : option->get_lnames()) names.push_back("--" + known);
+      if (std::find(names.begin(), names.end(), name) == names.end())
+        throw CLI::ExtrasError(fmt::format("unknown option {}{}", name, did_you_mean(name, names)), CLI::ExitCodes::ExtrasError);
+    } else if (app == &program && !argument.starts_with('-')) {
+      const auto found = std::find(commands.begin(), commands.end(), argument);
+      if (found == commands.end())
+        throw CLI::ExtrasError(fmt::format("unknown command {}{}", argument, did_you_mean(argument, commands)), CLI::ExitCodes::ExtrasError);
+      app = all[found - commands.begin()];
+    }
+  }
+}
+
+int run(int argc, char** argv) {
+  CLI::App program("A closed triangle mesh and its skeleton as one displacement texture, and back.", "skeletex");
+  program.set_version_flag("--version", std::string("skeletex ") + SKELETEX_VERSION);
+  program.require_subcommand(1);
+  program.get_formatter()->column_width(34);
+  add_encode_command(program);
+  add_reconstruct_command(program);
+  add_metro_command(program);
+  add_segment_command(program);
+  add_validate_command(program);
+  add_inspect_command(program);
+  add_devices_command(program);
+  program.footer(
+      "`skeletex COMMAND --help` tells more. Exit codes: 0 done, 1 input or run, 2 usage.\n"
+      "Examples:\n"
+      "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr\n"
+      "  skeletex reconstruct bear.skx.exr -o bear.ply\n"
+      "  skeletex metro bear.off bear.ply");
+  try {
+    check_names(program, argc, argv);
+    program.parse(argc, argv);
+  } catch (const CLI::RuntimeError& end) {
+    return end.get_exit_code();
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return program.exit(error);  // help and version
+    const auto chosen = program.get_subcommands();
+    spdlog::error("{}\nsee skeletex {}--help", error.what(), chosen.empty() ? "" : chosen.front()->get_name() + " ");
+    return kExitUsage;
+  } catch (const Error& error) {
+    spdlog::error("{}", error.what());
+    return kExitBad;
+  } catch (const std::bad_alloc&) {
+    spdlog::error("out of memory; ask for a smaller --size");
+    return kExitBad;
+  } catch (const std::exception& error) {
+    spdlog::error("unexpected: {}", error.what());
+    return kExitBad;
+  }
+  if (std::fflush(stdout) != 0 || std::ferror(stdout)) {
+    spdlog::error("standard output cannot be written; is the disk full?");
+    return kExitBad;
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace skeletex::cli
+
+int main(int argc, char** argv) {
+  auto log = spdlog::stderr_color_st("skeletex");
+  log->set_pattern("%^%l:%$ %v");
+  spdlog::set_default_logger(log);
+  return skeletex::cli::run(argc, argv);
+}

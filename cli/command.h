@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "skeletex/cl/context.h"
+#include "skeletex/model/mesh.h"
+#include "skeletex/model/skeleton.h"
+
+/// The program `skeletex`: one file per command, each adds itself to the program and runs as its callback. Results go
+/// to standard output, everything else to standard error.
+namespace skeletex::cli {
+
+using Json = nlohmann::ordered_json;
+
+void add_encode_command(CLI::App& program);
+void add_reconstruct_command(CLI::App& program);
+void add_metro_command(CLI::App& program);
+void add_segment_command(CLI::App& program);
+void add_validate_command(CLI::App& program);
+void add_inspect_command(CLI::App& program);
+void add_devices_command(CLI::App& program);
+
+/// Exit code of the process when what a command found is bad news, but no error: `throw CLI::RuntimeError(kExitBad)`.
+constexpr int kExitBad = 1;
+constexpr int kExitUsage = 2;
+
+void add_device_option(CLI::App& command, std::string& selector);
+/// --json FILE or -; with "-" the command prints nothing else to standard output.
+void add_json_option(CLI::App& command, std::string& target);
+/// One of a few words; the message about another one names the nearest.
+CLI::Validator one_of(std::vector<std::string> words);
+
+/// Writes to the file (atomically) or, for "-", to standard output. Does nothing for "".
+void write_json(const std::string& target, const Json& json);
+
+/// Prints to standard output unless the JSON goes there.
+void print(const std::string& json_target, const std::string& text);
+void warn(const std::string& text);
+
+/// Fails before the work rather than after it. \throw IoError when the folder of `path` is missing or not writable
+void check_output(const std::filesystem::path& path);
+
+/// Reads a mesh, and says on standard error what the reader did to it (polygons split, vertices welded).
+TriangleMesh load_mesh(const std::filesystem::path& path);
+/// Checks that mesh and skeleton fit (validate_input, which turns a mesh that is inside out) and prints every finding to
+/// standard error. \throw CLI::RuntimeError(kExitBad) when one is an error
+void require_valid(ClContext& context, TriangleMesh& mesh, const Skeleton& skeleton);
+
+/// Milliseconds since it was made or last read.
+class Stopwatch {
+ public:
+  double lap_ms();
+
+ private:
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
+
+/// Time on the device by kernel, for the JSON.
+Json profile_json(ClContext& context);
+
+}  // namespace skeletex::cli

@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: MIT
+#include <fmt/format.h>
+
+#include <charconv>
+#include <filesystem>
+#include <map>
+#include <memory>
+
+#include "command.h"
+#include "progress_bar.h"
+#include "skeletex/encode/encode_model.h"
+#include "skeletex/io/model_file.h"
+#include "skeletex/io/skeleton_file.h"
+#include "skeletex/model/error.h"
+#include "suggestion.h"
+#include "table.h"
+
+namespace skeletex::cli {
+namespace {
+
+struct Arguments {
+  std::string mesh, skeleton, output, device, json, size = "512", method = "vsm";
+  int iterations = 4;
+  double alpha = 0.5, stop_spread = 0, hybrid_threshold = 0.02;
+  std::string rows = "surface", spd_hit = "last", share, compression = "zip";
+  bool has_no_prefilter = false, is_paper_recipe = false, is_half = false;
+  std::vector<std::string> bone_methods;
+};
+
+/// "512" or "1024x512".
+std::array<int, 2> parse_size(const std::string& text) {
+  std::array<int, 2> size{0, 0};
+  const char* const end = text.data() + text.size();
+  auto [rest, code] = std::from_chars(text.data(), end, size[0]);
+  size[1] = size[0];
+  if (code == std::errc() && rest != end && (*rest == 'x' || *rest == 'X')) {
+    const auto second = std::from_chars(rest + 1, end, size[1]);
+    rest = second.ptr;
+    code = second.ec;
+  }
+  if (code != std::errc() || rest != end || size[0] < 4 || size[1] < 4 || size[0] > 16384 || size[1] > 16384)
+    throw CLI::ValidationError("--size", "\"" + text + "\" is no texture size; give N or WIDTHxHEIGHT, 4 to 16384 texels, e.g. 512 or 1024x512");
+  return size;
+}
+
+std::vector<std::pair<std::string, Method>> parse_bone_methods(const std::vector<std::string>& texts) {
+  std::vector<std::pair<std::string, Method>> methods;
+  for (const std::string& text : texts) {
+    const auto equals = text.rfind('=');
+    const std::string method = equals == std::string::npos ? "" : text.substr(equals + 1);
+    if (method != "vsm" && method != "spd") throw CLI::ValidationError("--bone-method", "\"" + text + "\" is not BONE=vsm or BONE=spd");
+    methods.emplace_back(text.substr(0, equals), method == "vsm" ? Method::kVsm : Method::kSpd);
+  }
+  return methods;
+}
+
+EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command) {
+  EncodeOptions options;
+  const auto size = parse_size(arguments.size);
+  options.width = size[0];
+  options.height = size[1];
+  options.method = arguments.method == "spd" ? EncodeMethod::kSpd : arguments.method == "vsm" ? EncodeMethod::kVsm : EncodeMethod::kHybrid;
+  options.hybrid_unseen_threshold = arguments.hybrid_threshold;
+  options.hybrid_overrides = parse_bone_methods(arguments.bone_methods);
+  if (options.method != EncodeMethod::kHybrid && (!arguments.bone_methods.empty() || command.count("--hybrid-threshold") > 0))
+    throw CLI::ValidationError("--bone-method and --hybrid-threshold", "need --method hybrid");
+  if (arguments.is_paper_recipe) {
+    options.vsm = {.iterations = 1, .alpha = 0};
+    options.row_spacing = RowSpacing::kUniform;
+    options.has_prefilter = false;
+  }
+  const auto is_given = [&](const char* name) { return command.count(name) > 0; };
+  if (is_given("--iterations")) options.vsm.iterations = arguments.iterations;
+  if (is_given("--alpha")) options.vsm.alpha = arguments.alpha;
+  options.vsm.stop_spread_change = arguments.stop_spread;
+  if (is_given("--rows")) options.row_spacing = arguments.rows == "uniform" ? RowSpacing::kUniform : RowSpacing::kSurfaceLength;
+  if (arguments.has_no_prefilter) options.has_prefilter = false;
+  options.spd_hit = arguments.spd_hit == "first" ? SpdHit::kFirst : SpdHit::kLast;
+  if (is_given("--share")) options.texel_share = arguments.share == "area" ? TexelShare::kArea : TexelShare::kTriangles;
+  return options;
+}
+
+void check_bone_names(const Arguments& arguments, const EncodeOptions& options, const Skeleton& skeleton) {
+  std::vector<std::string> names;
+  for (const Bone& bone : skeleton.bones) names.push_back(bone.name);
+  for (const auto& [name, method] : options.hybrid_overrides)
+    if (std::find(names.begin(), names.end(), name) == names.end())
+      throw InputError(fmt::format("--bone-method: {} has no bone \"{}\"{}", arguments.skeleton, name, did_you_mean(name, names)));
+}
+
+Json report_json(const EncodeReport& report, const EncodeOptions& options, double used_seconds) {
+  Json bones = Json::array();
+  for (const BoneReport& bone : report.bones) {
+    const Rectangle& r = bone.rectangle;
+    Json json{{"name", bone.name},
+              {"method", to_string(bone.method)},
+              {"topology", to_string(bone.topology)},
+              {"area", bone.area},
+              {"vertices", bone.vertices},
+              {"triangles", bone.triangles},
+              {"rectangle", {r.x, r.y, r.width, r.height}},
+              {"unseen_area_fraction", bone.unseen_area_fraction},
+              {"flipped_triangles", bone.flipped_triangles},
+              {"sampled_triangle_fraction", bone.sampled_triangle_fraction},
+              {"missed_texels", bone.missed_texels}};
+    if (bone.method == Method::kVsm)
+      json["vsm"] = {{"iterations", bone.vsm.iterations},
+                     {"spread", bone.vsm.spread},
+                     {"solver_steps", bone.vsm.solver_steps},
+                     {"residual", bone.vsm.residual},
+                     {"used_direct_solver", bone.vsm.used_direct_solver}};
+    bones.push_back(std::move(json));
+  }
+  return {{"mesh", {{"vertices", report.vertices}, {"triangles", report.triangles}, {"diagonal", report.diagonal}, {"genus", report.genus}}},
+          {"bones", std::move(bones)},
+          {"atlas", {{"size", {options.width, options.height}}, {"used_fraction", report.used_fraction}}},
+          {"times_ms",
+           {{"half_edge", report.half_edge_ms},
+            {"segmentation", report.segmentation_ms},
+            {"parameterization", report.parameterization_ms},
+            {"encoding", report.encoding_ms}}},
+          {"seconds", used_seconds},
+          {"device", report.device}};
+}
+
+std::string report_text(const EncodeReport& report, const EncodeOptions& options, const std::string& output) {
+  Table table({"bone", "method", "surface", "triangles", "texels", "columns x rows", "unseen %", "read %"});
+  for (const BoneReport& bone : report.bones) {
+    const Rectangle& r = bone.rectangle;
+    table.add({bone.name, to_string(bone.method), to_string(bone.topology), fmt::format("{}", bone.triangles), fmt::format("{}", r.width * r.height),
+               fmt::format("{} x {}", r.width, r.height), fmt::format("{:.1f}", 100 * bone.unseen_area_fraction),
+               fmt::format("{:.0f}", 100 * bone.sampled_triangle_fraction)});
+  }
+  std::error_code ignored;
+  return fmt::format(
+      "{}\n{} vertices, {} triangles, genus {}; {} x {} texels, {:.1f} % used, on {}\n"
+      "half edges {:.0f} ms, segmentation {:.0f} ms, parameterization {:.0f} ms, encoding {:.0f} ms\n{} ({:.1f} MiB)\n",
+      table.text(), report.vertices, report.triangles, report.genus, options.width, options.height, 100 * report.used_fraction, report.device,
+      report.half_edge_ms, report.segmentation_ms, report.parameterization_ms, report.encoding_ms, output,
+      static_cast<double>(std::filesystem::file_size(output, ignored)) / (1 << 20));
+}
+
+void run(const Arguments& arguments, const CLI::App& command) {
+  EncodeOptions options = encode_options(arguments, command);
+  Stopwatch watch;
+  check_output(arguments.output);
+  TriangleMesh mesh = load_mesh(arguments.mesh);
+  const Skeleton skeleton = read_skeleton(arguments.skeleton);
+  check_bone_names(arguments, options, skeleton);
+  ClContext context(arguments.device);
+  EncodeResult result;
+  {
+    ProgressBar bar;
+    bar.show("checking the input", 0);
+    require_valid(context, mesh, skeleton);
+    context.reset_profile();
+    options.progress = [&](const std::string& stage, double done) {
+      bar.show(stage, done);
+      return true;
+    };
+    result = encode_model(context, mesh, skeleton, options);
+    bar.show("writing", 1);
+    write_model(arguments.output, result.model,
+                {.format = arguments.is_half ? TexelFormat::kHalf : TexelFormat::kFloat,
+                 .compression = arguments.compression == "piz" ? ExrCompression::kPiz : ExrCompression::kZip});
+  }
+  for (const BoneReport& bone : result.report.bones) {
+    if (bone.flipped_triangles > 0) warn(fmt::format("bone \"{}\": {} triangles are flipped in its map", bone.name, bone.flipped_triangles));
+    if (bone.method == Method::kSpd && bone.unseen_area_fraction > 0.02)
+      warn(fmt::format("bone \"{}\": SPD does not see {:.1f} % of its surface; --method hybrid or vsm does", bone.name,
+                       100 * bone.unseen_area_fraction));
+  }
+  Json json = report_json(result.report, options, watch.lap_ms() / 1000);
+  json["kernels"] = profile_json(context);
+  print(arguments.json, report_text(result.report, options, arguments.output));
+  write_json(arguments.json, json);
+  context.save_programs();
+}
+
+}  // namespace
+
+void add_encode_command(CLI::App& program) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("encode", "Turn a closed mesh and its skeleton into a model: one texture in an OpenEXR file");
+  command.option_defaults()->always_capture_default();
+  command.add_option("MESH", arguments->mesh, "closed triangle mesh: .obj, .ply, .off or .stl")->required()->option_text("FILE");
+  command.add_option("SKELETON", arguments->skeleton, "skeleton: JSON with nodes and bones, in the mesh's coordinates")
+      ->required()
+      ->option_text("FILE");
+  command.add_option("-o,--output", arguments->output, "the model; by custom its name ends in .skx.exr")->required()->type_name("FILE");
+  command.add_option("--size", arguments->size, "texels: N for N x N, or WIDTHxHEIGHT")->type_name("N");
+  command
+      .add_option(
+          "--method", arguments->method,
+          "how bones are mapped: spd casts rays from the bone (a height field), vsm spreads the triangles over the texels, hybrid takes spd where "
+          "it sees the surface and vsm elsewhere")
+      ->check(one_of({"spd", "vsm", "hybrid"}))
+      ->type_name("");
+  command.add_option("--iterations", arguments->iterations, "vsm: reweightings after the first solve; 0 is the plain barycentric map")
+      ->check(CLI::Range(0, 100))
+      ->group("VSM");
+  command
+      .add_option(
+          "--alpha", arguments->alpha,
+          "vsm: weights grow by texture area / surface area ^ alpha; 0 evens out texture areas (the paper), 1 evens out density on the surface")
+      ->check(CLI::Range(0.0, 2.0))
+      ->group("VSM");
+  command
+      .add_option("--stop-spread", arguments->stop_spread,
+                  "vsm: stop when a reweighting changes the spread of texture areas by less than this share, e.g. 0.01; 0: never")
+      ->check(CLI::Range(0.0, 1.0))
+      ->group("VSM");
+  command.add_option("--spd-hit", arguments->spd_hit, "spd: which of several hits of a ray counts")
+      ->check(one_of({"first", "last"}))
+      ->type_name("")
+      ->group("SPD");
+  command
+      .add_option("--hybrid-threshold", arguments->hybrid_threshold,
+                  "hybrid: bones take vsm where spd does not see more than this share of their area")
+      ->check(CLI::Range(0.0, 1.0))
+      ->group("Hybrid");
+  command.add_option("--bone-method", arguments->bone_methods, "hybrid: method of a bone by its name; repeat for more bones")
+      ->type_name("BONE=vsm|spd")
+      ->expected(1)
+      ->take_all()
+      ->group("Hybrid");
+  command.add_option("--rows", arguments->rows, "where rows lie along a bone: evenly in surface length, or uniform in the map (the paper)")
+      ->check(one_of({"surface", "uniform"}))
+      ->type_name("")
+      ->group("Texels");
+  command.add_flag("--no-prefilter", arguments->has_no_prefilter, "texels exactly on the mesh, so that flat triangles lie inside its curved parts")
+      ->group("Texels");
+  command.add_option("--share", arguments->share, "what a bone's share of the texels follows (default: area with --method spd, triangles otherwise)")
+      ->check(one_of({"triangles", "area"}))
+      ->type_name("")
+      ->group("Texels");
+  command
+      .add_flag("--paper-recipe", arguments->is_paper_recipe,
+                "as the paper: --rows uniform --alpha 0 --iterations 1 --no-prefilter (single ones can be overridden)")
+      ->group("Texels");
+  command.add_flag("--half", arguments->is_half, "16 bits a channel: half the file, but an error of some 2e-5 of the diagonal; for drafts")
+      ->group("File");
+  command.add_option("--compression", arguments->compression, "lossless compression of the file")
+      ->check(one_of({"zip", "piz"}))
+      ->type_name("")
+      ->group("File");
+  add_device_option(command, arguments->device);
+  add_json_option(command, arguments->json);
+  command.footer(
+      "Examples:\n"
+      "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr\n"
+      "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr --method hybrid --bone-method head=vsm --size 1024\n"
+      "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr --json - | jq .times_ms\n"
+      "Areas are in the mesh's units squared, times in milliseconds.");
+  command.callback([arguments, &command] { run(*arguments, command); });
+}
+
+}  // namespace skeletex::cli

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: MIT
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <memory>
+
+#include "command.h"
+#include "skeletex/io/model_file.h"
+#include "skeletex/measure/manifold.h"
+#include "table.h"
+
+namespace skeletex::cli {
+namespace {
+
+struct Arguments {
+  std::string file, json;
+};
+
+bool is_mesh_file(const std::filesystem::path& path) {
+  std::string ending = path.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  constexpr std::array<std::string_view, 4> kEndings{".obj", ".ply", ".off", ".stl"};
+  return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
+}
+
+/// The items of a list as "3 x 4, 5, true".
+std::string in_one_line(const nlohmann::json& value) {
+  if (value.is_string()) return value.get<std::string>();
+  if (!value.is_structured()) return value.dump();
+  std::string text;
+  for (const auto& [key, item] : value.items()) text += (text.empty() ? "" : ", ") + (value.is_object() ? key + " " : "") + in_one_line(item);
+  return text;
+}
+
+std::string model_text(const nlohmann::json& header, const std::string& path) {
+  const auto& skeleton = header.at("skeleton");
+  const auto& patches = header.at("patches");
+  Table table({"bone", "method", "surface", "columns x rows", "at", "seams at head", "at tail"});
+  long texels = 0;
+  for (std::size_t i = 0; i < patches.size(); ++i) {
+    const auto& patch = patches.at(i);
+    const auto r = patch.at("rectangle").get<std::array<int, 4>>();
+    texels += static_cast<long>(r[2]) * r[3];
+    const auto seams = [&patch](const char* end) {
+      const std::size_t count = patch.at("ends").at(end).size();
+      return count == 0 ? std::string("pole") : fmt::format("{}", count);
+    };
+    table.add({skeleton.at("bones").at(i).at("name").get<std::string>(), patch.at("method").get<std::string>(),
+               patch.at("topology").get<std::string>(), fmt::format("{} x {}", r[2], r[3]), fmt::format("{}, {}", r[0], r[1]), seams("head"),
+               seams("tail")});
+  }
+  std::size_t samples = 0;
+  for (const auto& arc : header.at("arcs")) samples += arc.at("samples").size() / 2;
+  const int width = header.at("texture").at("width").get<int>(), height = header.at("texture").at("height").get<int>();
+  std::string text = fmt::format(
+      "{}: model, format version {}\n{} x {} texels, {:.1f} % used; {} nodes, {} bones, genus {}; {} seams with {} samples, {} corners; diagonal of "
+      "the input "
+      "{:.6g}\n\n{}",
+      path, header.at("version").dump(), width, height, 100.0 * static_cast<double>(texels) / width / height, skeleton.at("nodes").size(),
+      skeleton.at("bones").size(), header.at("genus").get<int>(), header.at("arcs").size(), samples, header.at("corners").size(),
+      header.at("diagonal").get<double>(), table.text());
+  if (header.contains("encoder")) {
+    text += "\nencoder\n";
+    for (const auto& [key, value] : header.at("encoder").items()) text += fmt::format("  {}: {}\n", key, in_one_line(value));
+  }
+  return text;
+}
+
+void inspect_mesh(const Arguments& arguments) {
+  const TriangleMesh mesh = load_mesh(arguments.file);
+  const ManifoldReport report = measure_manifold(mesh);
+  const BoundingBox box = bounding_box(mesh);
+  const bool is_closed = report.is_closed_manifold();
+  const double area = surface_area(mesh);
+  Json json{{"vertices", report.vertices},
+            {"edges", report.edges},
+            {"triangles", report.triangles},
+            {"components", report.components},
+            {"closed_manifold", is_closed},
+            {"boundary_edges", report.boundary_edges.size()},
+            {"non_manifold_edges", report.non_manifold_edges.size()},
+            {"misoriented_edges", report.misoriented_edges.size()},
+            {"non_manifold_vertices", report.non_manifold_vertices.size()},
+            {"unreferenced_vertices", report.unreferenced_vertices.size()},
+            {"non_finite_vertices", report.non_finite_vertices.size()},
+            {"degenerate_triangles", report.degenerate_triangles.size()},
+            {"diagonal", box.diagonal()},
+            {"lower", {box.lower.x(), box.lower.y(), box.lower.z()}},
+            {"upper", {box.upper.x(), box.upper.y(), box.upper.z()}},
+            {"area", area}};
+  std::string text =
+      fmt::format("{}: mesh\n{} vertices, {} edges, {} triangles, {} component{}; diagonal {:.6g}, area {:.6g}\n", arguments.file, report.vertices,
+                  report.edges, report.triangles, report.components, report.components == 1 ? "" : "s", box.diagonal(), area);
+  if (is_closed) {
+    json["genus"] = report.genus;
+    json["volume"] = signed_volume(mesh);
+    text += fmt::format("closed, oriented, 2-manifold; genus {}, volume {:.6g}\n", report.genus, signed_volume(mesh));
+  } else {
+    json["genus"] = nullptr;
+    text += "not a closed, oriented 2-manifold:\n";
+  }
+  const auto say = [&text](std::size_t count, const char* what) {
+    if (count > 0) text += fmt::format("  {} {}\n", count, what);
+  };
+  say(report.boundary_edges.size(), "edges with one triangle only");
+  say(report.non_manifold_edges.size(), "edges with more than two triangles");
+  say(report.misoriented_edges.size(), "edges whose triangles face opposite sides");
+  say(report.non_manifold_vertices.size(), "vertices where surfaces only touch");
+  say(report.unreferenced_vertices.size(), "vertices without a triangle");
+  say(report.non_finite_vertices.size(), "vertices that are not finite numbers");
+  say(report.degenerate_triangles.size(), "triangles with a vertex twice");
+  print(arguments.json, text);
+  write_json(arguments.json, json);
+}
+
+void run(const Arguments& arguments) {
+  if (is_mesh_file(arguments.file)) {
+    inspect_mesh(arguments);
+    return;
+  }
+  const nlohmann::json header = read_model_header(arguments.file);
+  if (arguments.json != "-") print(arguments.json, model_text(header, arguments.file));
+  write_json(arguments.json, Json(header));
+}
+
+}  // namespace
+
+void add_inspect_command(CLI::App& program) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("inspect", "Say what a model, or a mesh, consists of");
+  command.add_option("FILE", arguments->file, "model (.skx.exr), or mesh (.obj, .ply, .off, .stl)")->required()->option_text("FILE");
+  add_json_option(command, arguments->json);
+  command.footer(
+      "Examples:\n"
+      "  skeletex inspect bear.skx.exr\n"
+      "  skeletex inspect bear.skx.exr --json - | jq '.patches[0]'\n"
+      "  skeletex inspect bear.ply\n"
+      "The JSON of a model is its header as it stands in the file (docs/file-format.md); texels are not read. Lengths are in the mesh's units.");
+  command.callback([arguments] { run(*arguments); });
+}
+
+}  // namespace skeletex::cli

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+#include "progress_bar.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+
+namespace skeletex::cli {
+
+ProgressBar::ProgressBar() : is_terminal_(::isatty(STDERR_FILENO) != 0) {}
+
+ProgressBar::~ProgressBar() {
+  if (is_drawn_) std::fputs("\r\033[K", stderr);
+}
+
+void ProgressBar::show(const std::string& stage, double done) {
+  if (!is_terminal_) return;
+  const auto now = std::chrono::steady_clock::now();
+  if (stage == stage_ && now - last_ < std::chrono::milliseconds(50)) return;
+  stage_ = stage;
+  last_ = now;
+  constexpr int kWidth = 32;
+  const int filled = static_cast<int>(std::clamp(done, 0.0, 1.0) * kWidth);
+  fmt::print(stderr, "\r\033[K[{}{}] {:3.0f} % {}", std::string(filled, '#'), std::string(kWidth - filled, '.'), 100 * std::clamp(done, 0.0, 1.0),
+             stage);
+  std::fflush(stderr);
+  is_drawn_ = true;
+}
+
+}  // namespace skeletex::cli

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <chrono>
+#include <string>
+
+namespace skeletex::cli {
+
+/// A bar on standard error while a command works; nothing at all when that is no terminal. Gone when destroyed.
+class ProgressBar {
+ public:
+  ProgressBar();
+  ~ProgressBar();
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+  /// \param done  share of all the work, 0 to 1
+  void show(const std::string& stage, double done);
+
+ private:
+  bool is_terminal_;
+  bool is_drawn_ = false;
+  std::chrono::steady_clock::time_point last_{};
+  std::string stage_;
+};
+
+}  // namespace skeletex::cli

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "command.h"
+#include "progress_bar.h"
+#include "skeletex/io/mesh_file.h"
+#include "skeletex/io/model_file.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+
+namespace skeletex::cli {
+namespace {
+
+struct Arguments {
+  std::string model, output, device, json;
+  int size = 0;
+};
+
+void run(const Arguments& arguments) {
+  check_output(arguments.output);
+  Stopwatch total, watch;
+  SkeletexModel model = read_model(arguments.model);
+  const double read_ms = watch.lap_ms();
+  ClContext context(arguments.device);
+  const double start_ms = watch.lap_ms();
+  double resample_ms = 0, reconstruct_ms = 0, write_ms = 0;
+  TriangleMesh mesh;
+  {
+    ProgressBar bar;
+    if (arguments.size > 0 && arguments.size != std::max(model.texture.width, model.texture.height)) {
+      bar.show("resampling", 0.1);
+      model = resample_model(context, model, arguments.size);
+    }
+    resample_ms = watch.lap_ms();
+    bar.show("reconstructing", 0.3);
+    mesh = reconstruct_mesh(context, model);
+    reconstruct_ms = watch.lap_ms();
+    bar.show("writing", 0.7);
+    write_mesh(arguments.output, mesh);
+    write_ms = watch.lap_ms();
+  }
+  const double total_ms = total.lap_ms();
+  print(arguments.json, fmt::format("{} vertices, {} triangles from {} x {} texels, on {}\n"
+                                    "read {:.0f} ms, device {:.0f} ms, resample {:.0f} ms, reconstruct {:.0f} ms, write {:.0f} ms\n{}\n",
+                                    mesh.positions.size(), mesh.triangles.size(), model.texture.width, model.texture.height, context.device().name,
+                                    read_ms, start_ms, resample_ms, reconstruct_ms, write_ms, arguments.output));
+  write_json(arguments.json, {{"vertices", mesh.positions.size()},
+                              {"triangles", mesh.triangles.size()},
+                              {"size", {model.texture.width, model.texture.height}},
+                              {"times_ms",
+                               {{"read", read_ms},
+                                {"device", start_ms},
+                                {"resample", resample_ms},
+                                {"reconstruct", reconstruct_ms},
+                                {"write", write_ms},
+                                {"total", total_ms}}},
+                              {"device", context.device().name},
+                              {"kernels", profile_json(context)}});
+  context.save_programs();
+}
+
+}  // namespace
+
+void add_reconstruct_command(CLI::App& program) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("reconstruct", "Turn a model back into a closed mesh, at any resolution");
+  command.add_option("MODEL", arguments->model, "model: .skx.exr")->required()->option_text("FILE");
+  command.add_option("-o,--output", arguments->output, "mesh: .ply (binary) or .obj")->required()->type_name("FILE");
+  command.add_option("--size", arguments->size, "texels along the longer side, 4 to 16384 (default: the model's own size)")
+      ->check(CLI::Range(4, 16384))
+      ->type_name("N");
+  add_device_option(command, arguments->device);
+  add_json_option(command, arguments->json);
+  command.footer(
+      "Examples:\n"
+      "  skeletex reconstruct bear.skx.exr -o bear.ply\n"
+      "  skeletex reconstruct bear.skx.exr -o draft.obj --size 64\n"
+      "The mesh is closed, oriented, 2-manifold and of the input's genus at every size. Coordinates are in the input mesh's units.");
+  command.callback([arguments] { run(*arguments); });
+}
+
+}  // namespace skeletex::cli

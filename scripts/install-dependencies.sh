@@ -1,0 +1,62 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# Installs the Debian packages that Skeletex is built and tested with, where they are missing, and unpacks the standard
+# meshes (from the package libcgal-demo) into build/meshes. As root, or with sudo. Nothing to do: ends at once.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+packages=(
+  g++ cmake ninja-build                                              # build
+  ocl-icd-opencl-dev ocl-icd-libopencl1 opencl-headers opencl-clhpp-headers pocl-opencl-icd  # OpenCL, on the CPU
+  libopenmesh-dev libeigen3-dev libopenexr-dev nlohmann-json3-dev libfmt-dev                 # library
+  libcli11-dev libspdlog-dev                                         # program
+  libgtest-dev libembree-dev openexr                                 # tests (metro against Embree, models against exrheader)
+  libbenchmark-dev python3                                           # benchmarks, tables of the experiments
+)
+
+as_root() {
+  if [ "$(id -u)" -eq 0 ]; then "$@"; elif command -v sudo >/dev/null; then sudo "$@"; else
+    echo "install-dependencies: run this as root, or install sudo: $*" >&2
+    exit 1
+  fi
+}
+have_lists=
+update_lists() {
+  [ -n "$have_lists" ] || as_root env DEBIAN_FRONTEND=noninteractive apt-get update -q </dev/null
+  have_lists=1
+}
+
+missing=()
+for package in "${packages[@]}"; do
+  dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing+=("$package")
+done
+if [ ${#missing[@]} -gt 0 ]; then
+  echo "Installing ${missing[*]}"
+  update_lists
+  as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}" </dev/null
+fi
+
+meshes_complete() {
+  local name
+  for name in $(sed -n 's/.*"mesh": *"\([^"]*\)".*/\1/p' configs/skeletons/*.json | sort -u); do
+    [ -s "build/meshes/$name" ] || return 1
+  done
+}
+if ! meshes_complete; then
+  echo "Unpacking the standard meshes into build/meshes"
+  mkdir -p build/meshes
+  work=$(mktemp -d)
+  trap 'rm -rf "$work"' EXIT
+  data=/usr/share/doc/libcgal-dev/data.tar.gz
+  if [ ! -s "$data" ]; then  # not installed, or an image that drops /usr/share/doc: the package is only unpacked
+    update_lists
+    chmod 755 "$work"
+    (cd "$work" && apt-get download -q libcgal-demo </dev/null && dpkg-deb -x libcgal-demo_*.deb .)
+    data=$(find "$work" -name data.tar.gz | head -n 1)
+    [ -n "$data" ] || { echo "install-dependencies: libcgal-demo holds no data.tar.gz" >&2; exit 1; }
+  fi
+  mkdir "$work/data"
+  tar -xzf "$data" -C "$work/data"
+  find "$work/data" -path '*/meshes/*.off' -exec cp -n {} build/meshes/ \;
+  meshes_complete || { echo "install-dependencies: $data lacks meshes that configs/skeletons names" >&2; exit 1; }
+fi
