@@ -50,7 +50,7 @@ if ! meshes_complete; then
   data=/usr/share/doc/libcgal-dev/data.tar.gz
   if [ ! -s "$data" ]; then  # not installed, or an image that drops /usr/share/doc: the package is only unpacked
     update_lists
-    chmod 755 "$work"
+    [ "$(id -u)" -ne 0 ] || chown _apt "$work" || true  # apt downloads as its own user
     (cd "$work" && apt-get download -q libcgal-demo </dev/null && dpkg-deb -x libcgal-demo_*.deb .)
     data=$(find "$work" -name data.tar.gz | head -n 1)
     [ -n "$data" ] || { echo "install-dependencies: libcgal-demo holds no data.tar.gz" >&2; exit 1; }

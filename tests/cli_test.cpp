@@ -1,0 +1,358 @@
+// SPDX-License-Identifier: MIT
+// The built program as a user drives it: arguments in, exit code, output and files out.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <pty.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "skeletex/io/mesh_file.h"
+#include "skeletex/io/skeleton_file.h"
+#include "support/shapes.h"
+
+namespace skeletex {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string text_of(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+struct Outcome {
+  int code = -1;
+  std::string out, err;
+};
+
+/// A folder of its own with y.off and y.skeleton.json, in which the program runs.
+class Program : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    std::string pattern = (fs::temp_directory_path() / "skeletex-cli-XXXXXX").string();
+    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+    const Shape shape = y_shape();
+    // write_mesh writes PLY and OBJ; input in other formats is io_test's business.
+    write_mesh(folder_ / "y.ply", shape.mesh);
+    std::ofstream(folder_ / "y.skeleton.json") << skeleton_to_json(shape.skeleton);
+    const Outcome encoded = run({"encode", "y.ply", "y.skeleton.json", "-o", "y.skx.exr", "--size", "64"});
+    ASSERT_EQ(encoded.code, 0) << encoded.err;
+  }
+  static void TearDownTestSuite() {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
+
+  static void exec(const std::vector<std::string>& arguments) {
+    std::vector<char*> argv{const_cast<char*>("skeletex")};
+    for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
+    argv.push_back(nullptr);
+    if (::chdir(folder_.c_str()) == 0) ::execv(SKELETEX_PROGRAM, argv.data());
+    ::_exit(127);
+  }
+  static int code_of(::pid_t child) {
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  }
+  static Outcome run(const std::vector<std::string>& arguments, const std::string& out = "stdout.txt") {
+    const ::pid_t child = ::fork();
+    if (child == 0) {
+      const auto redirect = [](const fs::path& path, int to) {
+        const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+        ::dup2(file, to);
+      };
+      redirect(folder_ / out, STDOUT_FILENO);
+      redirect(folder_ / "stderr.txt", STDERR_FILENO);
+      exec(arguments);
+    }
+    Outcome outcome{code_of(child), "", text_of(folder_ / "stderr.txt")};
+    if (!out.starts_with('/')) outcome.out = text_of(folder_ / out);
+    return outcome;
+  }
+  /// What a terminal would show of both streams.
+  static std::string run_on_terminal(const std::vector<std::string>& arguments) {
+    int terminal = -1;
+    const ::pid_t child = ::forkpty(&terminal, nullptr, nullptr, nullptr);
+    if (child == 0) exec(arguments);
+    std::string text;
+    char buffer[4096];
+    for (::ssize_t count; (count = ::read(terminal, buffer, sizeof(buffer))) > 0;) text.append(buffer, static_cast<std::size_t>(count));
+    ::close(terminal);
+    EXPECT_EQ(code_of(child), 0) << text;
+    return text;
+  }
+  static nlohmann::json json_of(std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"--json", "-"});
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_EQ(outcome.err, "");
+    return nlohmann::json::parse(outcome.out);
+  }
+  static std::set<std::string> files() {
+    std::set<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder_)) names.insert(entry.path().filename().string());
+    return names;
+  }
+  /// Runs what must fail: exit code, one message that names every part, nothing on standard output, no file left behind.
+  static void expect_refused(int code, const std::vector<std::string>& arguments, const std::vector<std::string>& parts) {
+    const auto before = files();
+    const Outcome outcome = run(arguments);
+    std::string line = "skeletex";
+    for (const std::string& argument : arguments) line += ' ' + argument;
+    EXPECT_EQ(outcome.code, code) << line << '\n' << outcome.err;
+    EXPECT_EQ(outcome.out, "") << line;
+    for (const std::string& part : parts) EXPECT_NE(outcome.err.find(part), std::string::npos) << line << ": \"" << part << "\" in\n" << outcome.err;
+    EXPECT_EQ(outcome.err.find("terminate"), std::string::npos) << outcome.err;
+    EXPECT_EQ(files(), before) << line;
+  }
+  static void expect_keys(const nlohmann::json& json, const std::vector<std::string>& keys) {
+    for (const std::string& key : keys) EXPECT_TRUE(json.contains(key)) << key << " in\n" << json.dump(1).substr(0, 2000);
+  }
+  static inline fs::path folder_;
+};
+
+const std::vector<std::string> kCommands{"encode", "reconstruct", "metro", "segment", "validate", "inspect", "devices"};
+
+}  // namespace
+
+TEST_F(Program, HelpsWithEveryCommandOnStandardOutput) {
+  const Outcome help = run({"--help"});
+  EXPECT_EQ(help.code, 0);
+  EXPECT_EQ(help.err, "");
+  for (const std::string& command : kCommands) {
+    EXPECT_NE(help.out.find("\n  " + command), std::string::npos) << command;
+    const Outcome own = run({command, "--help"});
+    EXPECT_EQ(own.code, 0);
+    EXPECT_EQ(own.err, "");
+    EXPECT_NE(own.out.find("Example"), std::string::npos) << command;
+    EXPECT_NE(own.out.find("--json"), std::string::npos) << command;
+  }
+}
+
+TEST_F(Program, SaysItsVersion) { EXPECT_TRUE(run({"--version"}).out.starts_with("skeletex 0.")); }
+
+TEST_F(Program, EndsWithTwoOnWrongUsageAndGivesTheNearestName) {
+  expect_refused(2, {}, {"skeletex --help"});
+  expect_refused(2, {"encoed", "y.ply"}, {"unknown command encoed", "did you mean encode?"});
+  expect_refused(2, {"encode", "--meshod", "vsm"}, {"unknown option --meshod", "did you mean --method?", "skeletex encode --help"});
+  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--iteration=3"}, {"did you mean --iterations?"});
+  expect_refused(2, {"metro", "y.ply", "y.ply", "--jsno", "-"}, {"did you mean --json?"});
+  expect_refused(2, {"reconstruct", "y.skx.exr", "-q"}, {"-q"});
+  expect_refused(2, {"encode", "y.ply", "y.skeleton.json"}, {"--output"});
+  expect_refused(2, {"encode", "y.ply", "-o", "a.skx.exr"}, {"SKELETON"});
+  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--method", "hybird"}, {"hybird", "did you mean hybrid?"});
+  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--bone-method", "trunk"}, {"trunk", "BONE=vsm"});
+  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--bone-method", "trunk=vsm"}, {"need --method hybrid"});
+  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--iterations", "many"}, {"--iterations"});
+  expect_refused(2, {"segment", "y.ply", "y.skeleton.json", "-o", "a.obj"}, {".ply"});
+  expect_refused(2, {"metro", "y.ply", "y.ply", "--samples", "0"}, {"--samples"});
+}
+
+TEST_F(Program, RefusesSizesThatAreNone) {
+  for (const char* size : {"", "0", "-5", "3", "12x", "x12", "12x3", "512.5", "1e3", "99999", "512x512x3"})
+    expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", std::string("--size=") + size}, {"--size"});
+  for (const char* size : {"0", "-5", "3", "many"})
+    expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", std::string("--size=") + size}, {"--size"});
+}
+
+TEST_F(Program, EncodesAndReportsWhatTheContractNames) {
+  const nlohmann::json json = json_of({"encode", "y.ply", "y.skeleton.json", "-o", "contract.skx.exr", "--method", "hybrid", "--size", "96x64"});
+  expect_keys(json, {"mesh", "bones", "atlas", "times_ms", "device"});
+  expect_keys(json["mesh"], {"vertices", "triangles", "diagonal", "genus"});
+  expect_keys(json["atlas"], {"size", "used_fraction"});
+  expect_keys(json["times_ms"], {"half_edge", "segmentation", "parameterization", "encoding"});
+  ASSERT_EQ(json["bones"].size(), 3u);
+  double area = 0;
+  long texels = 0;
+  for (const auto& bone : json["bones"]) {
+    expect_keys(bone, {"name", "method", "topology", "area", "vertices", "triangles", "rectangle", "unseen_area_fraction", "flipped_triangles",
+                       "sampled_triangle_fraction"});
+    ASSERT_EQ(bone["rectangle"].size(), 4u);
+    area += bone["area"].get<double>();
+    texels += bone["rectangle"][2].get<long>() * bone["rectangle"][3].get<long>();
+  }
+  const TriangleMesh mesh = read_mesh(folder_ / "y.ply").mesh;
+  EXPECT_NEAR(area, surface_area(mesh), 1e-6 * area);
+  EXPECT_EQ(json["mesh"]["vertices"], mesh.positions.size());
+  EXPECT_EQ(json["mesh"]["genus"], 0);
+  EXPECT_EQ(json["atlas"]["size"], nlohmann::json({96, 64}));
+  EXPECT_DOUBLE_EQ(json["atlas"]["used_fraction"].get<double>(), static_cast<double>(texels) / (96 * 64));
+  fs::remove(folder_ / "contract.skx.exr");
+}
+
+TEST_F(Program, ReconstructsAndReportsWhatTheContractNames) {
+  for (const char* size : {"64", "32", "100"}) {
+    const nlohmann::json json = json_of({"reconstruct", "y.skx.exr", "-o", "again.ply", "--size", size});
+    expect_keys(json, {"vertices", "triangles", "times_ms"});
+    const nlohmann::json mesh = json_of({"inspect", "again.ply"});
+    EXPECT_EQ(mesh["vertices"], json["vertices"]);
+    EXPECT_EQ(mesh["triangles"], json["triangles"]);
+    EXPECT_EQ(mesh["closed_manifold"], true);
+    EXPECT_EQ(mesh["genus"], 0);
+    EXPECT_EQ(mesh["components"], 1);
+  }
+  EXPECT_EQ(run({"reconstruct", "y.skx.exr", "-o", "again.obj"}).code, 0);
+  EXPECT_TRUE(text_of(folder_ / "again.obj").find("\nf ") != std::string::npos);
+  fs::remove(folder_ / "again.ply");
+  fs::remove(folder_ / "again.obj");
+}
+
+TEST_F(Program, MeasuresAndReportsWhatTheContractNames) {
+  ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "again.ply"}).code, 0);
+  const nlohmann::json json = json_of({"metro", "y.ply", "again.ply", "--samples", "20000", "--csv", "d.csv", "--ply", "d.ply"});
+  expect_keys(json, {"diagonal", "forward", "backward", "vertex", "seconds"});
+  for (const char* part : {"forward", "backward", "vertex"}) {
+    expect_keys(json[part], {"mean", "std", "rms", "max"});
+    const double mean = json[part]["mean"], rms = json[part]["rms"], max = json[part]["max"], std = json[part]["std"];
+    EXPECT_GT(mean, 0);
+    EXPECT_LE(mean, rms);
+    EXPECT_LE(rms, max);
+    EXPECT_LT(max, 0.1);
+    EXPECT_NEAR(rms * rms, mean * mean + std * std, 1e-6 * rms * rms);
+  }
+  const std::string csv = text_of(folder_ / "d.csv");
+  const auto vertices = read_mesh(folder_ / "y.ply").mesh.positions.size();
+  EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), vertices + 1);
+  EXPECT_TRUE(csv.starts_with("vertex,x,y,z,distance\n0,"));
+  const std::string ply = text_of(folder_ / "d.ply");
+  EXPECT_NE(ply.substr(0, 1000).find("property float distance"), std::string::npos);
+  EXPECT_NE(ply.substr(0, 1000).find("property uchar red"), std::string::npos);
+  for (const char* name : {"again.ply", "d.csv", "d.ply"}) fs::remove(folder_ / name);
+}
+
+TEST_F(Program, FindsNoDistanceFromAMeshToItself) {
+  const nlohmann::json json = json_of({"metro", "y.ply", "y.ply", "--samples", "5000"});
+  EXPECT_LT(json["forward"]["max"].get<double>(), 1e-6);
+  EXPECT_LT(json["vertex"]["max"].get<double>(), 1e-6);
+}
+
+TEST_F(Program, ColoursEachBonesSegmentAndSaysWhichColourIsWhose) {
+  const nlohmann::json json = json_of({"segment", "y.ply", "y.skeleton.json", "-o", "s.ply"});
+  std::set<std::string> colours;
+  for (const auto& bone : json["bones"]) colours.insert(bone["colour"].get<std::string>());
+  EXPECT_EQ(colours.size(), 3u);
+  EXPECT_NE(text_of(folder_ / "s.ply").substr(0, 1000).find("property uchar red"), std::string::npos);
+  EXPECT_EQ(read_mesh(folder_ / "s.ply").mesh.triangles.size(), json["triangles"].get<std::size_t>());
+  fs::remove(folder_ / "s.ply");
+}
+
+TEST_F(Program, ValidatesWithExitCodesAndFindings) {
+  const nlohmann::json good = json_of({"validate", "y.ply", "y.skeleton.json"});
+  EXPECT_EQ(good["valid"], true);
+  TriangleMesh open = read_mesh(folder_ / "y.ply").mesh;
+  open.triangles.pop_back();
+  write_mesh(folder_ / "open.ply", open);
+  const Outcome bad = run({"validate", "open.ply", "y.skeleton.json", "--json", "-"});
+  EXPECT_EQ(bad.code, 1);
+  const auto json = nlohmann::json::parse(bad.out);
+  EXPECT_EQ(json["valid"], false);
+  ASSERT_FALSE(json["findings"].empty());
+  for (const auto& finding : json["findings"]) expect_keys(finding, {"severity", "rule", "message", "remedy"});
+  expect_refused(1, {"encode", "open.ply", "y.skeleton.json", "-o", "a.skx.exr"}, {"error:", "remedy:"});
+  fs::remove(folder_ / "open.ply");
+}
+
+TEST_F(Program, InspectsAModelForPeopleAndForPrograms) {
+  const Outcome people = run({"inspect", "y.skx.exr"});
+  EXPECT_EQ(people.code, 0) << people.err;
+  for (const char* part : {"64 x 64 texels", "3 bones", "genus 0", "disk", "pole"})
+    EXPECT_NE(people.out.find(part), std::string::npos) << part << people.out;
+  const nlohmann::json json = json_of({"inspect", "y.skx.exr"});
+  EXPECT_EQ(json["skeleton"]["bones"].size(), 3u);
+  EXPECT_EQ(json["patches"].size(), 3u);
+}
+
+TEST_F(Program, ListsTheDevices) {
+  const nlohmann::json json = json_of({"devices"});
+  ASSERT_FALSE(json["devices"].empty());
+  const std::string name = json["devices"][0]["name"];
+  EXPECT_NE(run({"devices"}).out.find(name), std::string::npos);
+  expect_refused(1, {"metro", "y.ply", "y.ply", "--device", "no such device"}, {"no such device", name});
+}
+
+TEST_F(Program, GivesTheSameBytesTwice) {
+  ASSERT_EQ(run({"encode", "y.ply", "y.skeleton.json", "-o", "twin.skx.exr", "--size", "64"}).code, 0);
+  EXPECT_TRUE(text_of(folder_ / "twin.skx.exr") == text_of(folder_ / "y.skx.exr"));
+  fs::remove(folder_ / "twin.skx.exr");
+}
+
+TEST_F(Program, TakesThePapersRecipeAndItsPartsAlike) {
+  ASSERT_EQ(run({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64", "--paper-recipe"}).code, 0);
+  ASSERT_EQ(run({"encode", "y.ply", "y.skeleton.json", "-o", "b.skx.exr", "--size", "64", "--rows", "uniform", "--alpha", "0", "--iterations", "1",
+                 "--no-prefilter"})
+                .code,
+            0);
+  EXPECT_TRUE(text_of(folder_ / "a.skx.exr") == text_of(folder_ / "b.skx.exr"));
+  EXPECT_FALSE(text_of(folder_ / "a.skx.exr") == text_of(folder_ / "y.skx.exr"));
+  fs::remove(folder_ / "a.skx.exr");
+  fs::remove(folder_ / "b.skx.exr");
+}
+
+TEST_F(Program, NamesTheNearestBone) {
+  const std::string name = read_skeleton(folder_ / "y.skeleton.json").bones[0].name;
+  expect_refused(1, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--method", "hybrid", "--bone-method", name + "x=vsm"},
+                 {"no bone \"" + name + "x\"", "did you mean " + name});
+}
+
+TEST_F(Program, EndsWithOneOnInputThatIsMissingOrForeign) {
+  std::ofstream(folder_ / "broken.json") << "{\"nodes\": [";
+  std::ofstream(folder_ / "text.exr") << "no image at all, though long enough to be read as one";
+  std::ofstream(folder_ / "broken.ply") << "ply\nformat ascii 1.0\nelement vertex 3\n";
+  std::ofstream(folder_ / "empty.off") << "OFF\n0 0 0\n";
+  expect_refused(1, {"encode", "absent.off", "y.skeleton.json", "-o", "a.skx.exr"}, {"absent.off"});
+  expect_refused(1, {"encode", "y.ply", "absent.json", "-o", "a.skx.exr"}, {"absent.json"});
+  expect_refused(1, {"encode", "y.ply", "broken.json", "-o", "a.skx.exr"}, {"broken.json"});
+  expect_refused(1, {"encode", "broken.ply", "y.skeleton.json", "-o", "a.skx.exr"}, {"broken.ply"});
+  expect_refused(1, {"reconstruct", "absent.skx.exr", "-o", "a.ply"}, {"absent.skx.exr"});
+  expect_refused(1, {"reconstruct", "text.exr", "-o", "a.ply"}, {"text.exr"});
+  expect_refused(1, {"inspect", "text.exr"}, {"text.exr"});
+  expect_refused(1, {"inspect", "absent.ply"}, {"absent.ply"});
+  expect_refused(1, {"metro", "empty.off", "y.ply"}, {"empty.off"});
+  expect_refused(1, {"metro", "y.ply", "empty.off"}, {"empty.off"});
+  expect_refused(1, {"validate", "y.skeleton.json", "y.skeleton.json"}, {"y.skeleton.json"});
+  for (const char* name : {"broken.json", "text.exr", "broken.ply", "empty.off"}) fs::remove(folder_ / name);
+}
+
+TEST_F(Program, RefusesATruncatedModel) {
+  const std::string whole = text_of(folder_ / "y.skx.exr");
+  for (const double part : {0.0, 0.01, 0.3, 0.6, 0.99}) {
+    std::ofstream(folder_ / "cut.skx.exr", std::ios::binary) << whole.substr(0, static_cast<std::size_t>(part * static_cast<double>(whole.size())));
+    expect_refused(1, {"reconstruct", "cut.skx.exr", "-o", "a.ply"}, {"cut.skx.exr"});
+  }
+  fs::remove(folder_ / "cut.skx.exr");
+}
+
+TEST_F(Program, RefusesOutputsThatCannotBeWrittenAndLeavesNothingBehind) {
+  expect_refused(1, {"encode", "y.ply", "y.skeleton.json", "-o", "no/such/folder/a.skx.exr"}, {"no/such/folder"});
+  expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "."}, {"."});
+  expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "a.xyz"}, {"a.xyz"});
+  expect_refused(1, {"metro", "y.ply", "y.ply", "--csv", "no/d.csv"}, {"no/d.csv"});
+  expect_refused(1, {"inspect", "y.skx.exr", "--json", "no/i.json"}, {"no/i.json"});
+  expect_refused(1, {"segment", "y.ply", "y.skeleton.json", "-o", "/proc/a.ply"}, {"/proc"});
+}
+
+TEST_F(Program, SaysWhenStandardOutputIsFull) {
+  const Outcome outcome = run({"inspect", "y.skx.exr", "--json", "-"}, "/dev/full");
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_NE(outcome.err.find("standard output"), std::string::npos) << outcome.err;
+}
+
+TEST_F(Program, ShowsProgressOnATerminalAndNeverInAPipe) {
+  const std::vector<std::string> arguments{"encode", "y.ply", "y.skeleton.json", "-o", "p.skx.exr", "--size", "64"};
+  const Outcome piped = run(arguments);
+  EXPECT_EQ(piped.code, 0);
+  EXPECT_EQ(piped.err, "");
+  for (const char c : {'\r', '\033'}) EXPECT_EQ((piped.out + piped.err).find(c), std::string::npos);
+  EXPECT_NE(run_on_terminal(arguments).find("\r\033[K[###"), std::string::npos);
+  fs::remove(folder_ / "p.skx.exr");
+}
+
+}  // namespace skeletex
