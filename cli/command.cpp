@@ -27,14 +27,15 @@ void add_json_option(CLI::App& command, std::string& target) {
   command.add_option("--json", target, "write the results as JSON to this file; - for standard output")->type_name("FILE|-");
 }
 
-CLI::Validator one_of(std::vector<std::string> words) {
+void take_one_of(CLI::Option& option, const std::vector<std::string>& words) {
   std::string list;
   for (const std::string& word : words) list += (list.empty() ? "" : "|") + word;
-  const auto check = [words, list](const std::string& given) -> std::string {
-    if (std::find(words.begin(), words.end(), given) != words.end()) return {};
-    return fmt::format("\"{}\" is not one of {}{}", given, list, did_you_mean(given, words));
-  };
-  return {check, list};
+  option.type_name(list)->check(
+      [words, list](const std::string& given) -> std::string {
+        if (std::find(words.begin(), words.end(), given) != words.end()) return {};
+        return fmt::format("\"{}\" is not one of {}{}", given, list, did_you_mean(given, words));
+      },
+      "");
 }
 
 void write_json(const std::string& target, const Json& json) {

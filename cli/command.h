@@ -33,9 +33,8 @@ constexpr int kExitUsage = 2;
 void add_device_option(CLI::App& command, std::string& selector);
 /// --json FILE or -; with "-" the command prints nothing else to standard output.
 void add_json_option(CLI::App& command, std::string& target);
-/// One of a few words; the message about another one names the nearest.
-CLI::Validator one_of(std::vector<std::string> words);
-
+/// The option takes one of a few words; the message about another one names the nearest.
+void take_one_of(CLI::Option& option, const std::vector<std::string>& words);
 /// Writes to the file (atomically) or, for "-", to standard output. Does nothing for "".
 void write_json(const std::string& target, const Json& json);
 

@@ -183,67 +183,50 @@ void add_encode_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("encode", "Turn a closed mesh and its skeleton into a model: one texture in an OpenEXR file");
   command.option_defaults()->always_capture_default();
-  command.add_option("MESH", arguments->mesh, "closed triangle mesh: .obj, .ply, .off or .stl")->required()->option_text("FILE");
-  command.add_option("SKELETON", arguments->skeleton, "skeleton: JSON with nodes and bones, in the mesh's coordinates")
-      ->required()
-      ->option_text("FILE");
-  command.add_option("-o,--output", arguments->output, "the model; by custom its name ends in .skx.exr")->required()->type_name("FILE");
-  command.add_option("--size", arguments->size, "texels: N for N x N, or WIDTHxHEIGHT")->type_name("N");
-  command
-      .add_option(
-          "--method", arguments->method,
-          "how bones are mapped: spd casts rays from the bone (a height field), vsm spreads the triangles over the texels, hybrid takes spd where "
-          "it sees the surface and vsm elsewhere")
-      ->check(one_of({"spd", "vsm", "hybrid"}))
-      ->type_name("");
-  command.add_option("--iterations", arguments->iterations, "vsm: reweightings after the first solve; 0 is the plain barycentric map")
-      ->check(CLI::Range(0, 100))
-      ->group("VSM");
-  command
-      .add_option(
-          "--alpha", arguments->alpha,
-          "vsm: weights grow by texture area / surface area ^ alpha; 0 evens out texture areas (the paper), 1 evens out density on the surface")
-      ->check(CLI::Range(0.0, 2.0))
-      ->group("VSM");
-  command
-      .add_option("--stop-spread", arguments->stop_spread,
-                  "vsm: stop when a reweighting changes the spread of texture areas by less than this share, e.g. 0.01; 0: never")
-      ->check(CLI::Range(0.0, 1.0))
-      ->group("VSM");
-  command.add_option("--spd-hit", arguments->spd_hit, "spd: which of several hits of a ray counts")
-      ->check(one_of({"first", "last"}))
-      ->type_name("")
-      ->group("SPD");
-  command
-      .add_option("--hybrid-threshold", arguments->hybrid_threshold,
-                  "hybrid: bones take vsm where spd does not see more than this share of their area")
-      ->check(CLI::Range(0.0, 1.0))
-      ->group("Hybrid");
-  command.add_option("--bone-method", arguments->bone_methods, "hybrid: method of a bone by its name; repeat for more bones")
-      ->type_name("BONE=vsm|spd")
+  const auto add = [&](const char* group, const char* name, auto& value, const char* description) -> CLI::Option& {
+    return *command.add_option(name, value, description)->group(group);
+  };
+  Arguments& a = *arguments;
+  add("Positionals", "MESH", a.mesh, "closed triangle mesh: .obj, .ply, .off or .stl").required();
+  add("Positionals", "SKELETON", a.skeleton, "skeleton: JSON with nodes and bones, in the mesh's coordinates").required();
+  add("Options", "-o,--output", a.output, "the model; by custom its name ends in .skx.exr").required()->type_name("FILE");
+  add("Options", "--size", a.size, "texels: N for N x N, or WIDTHxHEIGHT").type_name("N|WxH");
+  take_one_of(add("Options", "--method", a.method,
+                  "how bones are mapped: spd casts rays from the bone (a height field), vsm spreads the triangles over the texels, hybrid takes spd "
+                  "where it sees the surface and vsm elsewhere"),
+              {"spd", "vsm", "hybrid"});
+  add("VSM", "--iterations", a.iterations, "reweightings after the first solve, 0 to 100; 0 is the plain barycentric map")
+      .type_name("N")
+      ->check(CLI::Range(0, 100).description(""));
+  add("VSM", "--alpha", a.alpha,
+      "weights grow by texture area / surface area ^ alpha, 0 to 2; 0 evens out texture areas (the paper), 1 density on the surface")
+      .type_name("X")
+      ->check(CLI::Range(0.0, 2.0).description(""));
+  add("VSM", "--stop-spread", a.stop_spread,
+      "stop when a reweighting changes the spread of texture areas by less than this share, e.g. 0.01; 0: never")
+      .type_name("X")
+      ->check(CLI::Range(0.0, 1.0).description(""));
+  take_one_of(add("SPD", "--spd-hit", a.spd_hit, "which hit of a ray counts where there are several"), {"first", "last"});
+  add("Hybrid", "--hybrid-threshold", a.hybrid_threshold, "bones take vsm where spd does not see more than this share of their area, 0 to 1")
+      .type_name("X")
+      ->check(CLI::Range(0.0, 1.0).description(""));
+  add("Hybrid", "--bone-method", a.bone_methods, "method of a bone by its name; repeat for more bones")
+      .type_name("BONE=vsm|spd")
       ->expected(1)
-      ->take_all()
-      ->group("Hybrid");
-  command.add_option("--rows", arguments->rows, "where rows lie along a bone: evenly in surface length, or uniform in the map (the paper)")
-      ->check(one_of({"surface", "uniform"}))
-      ->type_name("")
-      ->group("Texels");
-  command.add_flag("--no-prefilter", arguments->has_no_prefilter, "texels exactly on the mesh, so that flat triangles lie inside its curved parts")
-      ->group("Texels");
-  command.add_option("--share", arguments->share, "what a bone's share of the texels follows (default: area with --method spd, triangles otherwise)")
-      ->check(one_of({"triangles", "area"}))
-      ->type_name("")
+      ->take_all();
+  take_one_of(add("Texels", "--rows", a.rows, "where rows lie along a bone: evenly in surface length, or uniform in the map (the paper)"),
+              {"surface", "uniform"});
+  take_one_of(
+      add("Texels", "--share", a.share, "what a bone's share of the texels follows; unless given: area with --method spd, triangles otherwise"),
+      {"triangles", "area"});
+  command.add_flag("--no-prefilter", a.has_no_prefilter, "texels exactly on the mesh, so that flat triangles lie inside its curved parts")
       ->group("Texels");
   command
-      .add_flag("--paper-recipe", arguments->is_paper_recipe,
-                "as the paper: --rows uniform --alpha 0 --iterations 1 --no-prefilter (single ones can be overridden)")
+      .add_flag("--paper-recipe", a.is_paper_recipe,
+                "as the paper: --rows uniform --alpha 0 --iterations 1 --no-prefilter (rows, alpha and iterations can still be given)")
       ->group("Texels");
-  command.add_flag("--half", arguments->is_half, "16 bits a channel: half the file, but an error of some 2e-5 of the diagonal; for drafts")
-      ->group("File");
-  command.add_option("--compression", arguments->compression, "lossless compression of the file")
-      ->check(one_of({"zip", "piz"}))
-      ->type_name("")
-      ->group("File");
+  command.add_flag("--half", a.is_half, "16 bits a channel: half the file, but an error of some 2e-5 of the diagonal; for drafts")->group("File");
+  take_one_of(add("File", "--compression", a.compression, "lossless compression of the file"), {"zip", "piz"});
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(

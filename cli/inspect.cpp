@@ -130,7 +130,7 @@ void run(const Arguments& arguments) {
 void add_inspect_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("inspect", "Say what a model, or a mesh, consists of");
-  command.add_option("FILE", arguments->file, "model (.skx.exr), or mesh (.obj, .ply, .off, .stl)")->required()->option_text("FILE");
+  command.add_option("FILE", arguments->file, "model (.skx.exr), or mesh (.obj, .ply, .off, .stl)")->required();
   add_json_option(command, arguments->json);
   command.footer(
       "Examples:\n"

@@ -3,10 +3,13 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cstdio>
+#include <memory>
 #include <new>
 
 #include "command.h"
+#include "help_formatter.h"
 #include "skeletex/model/error.h"
 #include "suggestion.h"
 
@@ -14,7 +17,8 @@ namespace skeletex::cli {
 namespace {
 
 /// Reports a mistyped command or option with the nearest name before the parser, whose message has none.
-void check_names(const CLI::App& program, int argc, char** argv) {
+/// \param chosen  the command's name, as soon as it is known
+void check_names(const CLI::App& program, int argc, char** argv, std::string& chosen) {
   const std::vector<const CLI::App*> all = program.get_subcommands([](const CLI::App*) { return true; });
   std::vector<std::string> commands;
   for (const CLI::App* command : all) commands.push_back(command->get_name());
@@ -34,6 +38,7 @@ void check_names(const CLI::App& program, int argc, char** argv) {
       if (found == commands.end())
         throw CLI::ExtrasError(fmt::format("unknown command {}{}", argument, did_you_mean(argument, commands)), CLI::ExitCodes::ExtrasError);
       app = all[found - commands.begin()];
+      chosen = argument + ' ';
     }
   }
 }
@@ -42,7 +47,7 @@ int run(int argc, char** argv) {
   CLI::App program("A closed triangle mesh and its skeleton as one displacement texture, and back.", "skeletex");
   program.set_version_flag("--version", std::string("skeletex ") + SKELETEX_VERSION);
   program.require_subcommand(1);
-  program.get_formatter()->column_width(34);
+  program.formatter(std::make_shared<HelpFormatter>());
   add_encode_command(program);
   add_reconstruct_command(program);
   add_metro_command(program);
@@ -56,15 +61,15 @@ int run(int argc, char** argv) {
       "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr\n"
       "  skeletex reconstruct bear.skx.exr -o bear.ply\n"
       "  skeletex metro bear.off bear.ply");
+  std::string chosen;
   try {
-    check_names(program, argc, argv);
+    check_names(program, argc, argv, chosen);
     program.parse(argc, argv);
   } catch (const CLI::RuntimeError& end) {
     return end.get_exit_code();
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.exit(error);  // help and version
-    const auto chosen = program.get_subcommands();
-    spdlog::error("{}\nsee skeletex {}--help", error.what(), chosen.empty() ? "" : chosen.front()->get_name() + " ");
+    spdlog::error("{}\nsee skeletex {}--help", error.what(), chosen);
     return kExitUsage;
   } catch (const Error& error) {
     spdlog::error("{}", error.what());

@@ -107,18 +107,18 @@ void run(const Arguments& arguments) {
 void add_metro_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("metro", "Measure the distance between two surfaces, in both directions");
-  command.add_option("A", arguments->a, "mesh, usually the original: its diagonal is the unit")->required()->option_text("FILE");
-  command.add_option("B", arguments->b, "mesh, usually the reconstruction")->required()->option_text("FILE");
+  command.add_option("A", arguments->a, "mesh, usually the original: its diagonal is the unit")->required();
+  command.add_option("B", arguments->b, "mesh, usually the reconstruction")->required();
   command
       .add_option("--samples", arguments->samples,
                   "points spread evenly over each surface (default: ten per vertex of the larger mesh, at least 100000)")
-      ->check(CLI::Range(1L, 1000000000L))
+      ->check(CLI::Range(1L, 1000000000L).description(""))
       ->type_name("N");
   command.add_option("--csv", arguments->csv, "write A's vertices and their distances to B, in A's units")->type_name("FILE");
   command.add_option("--ply", arguments->ply, "write A with the property distance and colours from dark blue (0) to yellow")->type_name("FILE");
   command
       .add_option("--ply-max", arguments->ply_max, "distance that is yellow, divided by the diagonal (default: what 99 % of the vertices lie below)")
-      ->check(CLI::PositiveNumber)
+      ->check(CLI::Validator(CLI::PositiveNumber).description(""))
       ->type_name("X");
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);

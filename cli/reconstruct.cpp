@@ -66,10 +66,10 @@ void run(const Arguments& arguments) {
 void add_reconstruct_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("reconstruct", "Turn a model back into a closed mesh, at any resolution");
-  command.add_option("MODEL", arguments->model, "model: .skx.exr")->required()->option_text("FILE");
+  command.add_option("MODEL", arguments->model, "model: .skx.exr")->required();
   command.add_option("-o,--output", arguments->output, "mesh: .ply (binary) or .obj")->required()->type_name("FILE");
   command.add_option("--size", arguments->size, "texels along the longer side, 4 to 16384 (default: the model's own size)")
-      ->check(CLI::Range(4, 16384))
+      ->check(CLI::Range(4, 16384).description(""))
       ->type_name("N");
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);

@@ -80,10 +80,8 @@ void run(const Arguments& arguments) {
 void add_segment_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("segment", "Cut a mesh into one piece per bone and colour the pieces");
-  command.add_option("MESH", arguments->mesh, "closed triangle mesh: .obj, .ply, .off or .stl")->required()->option_text("FILE");
-  command.add_option("SKELETON", arguments->skeleton, "skeleton: JSON with nodes and bones, in the mesh's coordinates")
-      ->required()
-      ->option_text("FILE");
+  command.add_option("MESH", arguments->mesh, "closed triangle mesh: .obj, .ply, .off or .stl")->required();
+  command.add_option("SKELETON", arguments->skeleton, "skeleton: JSON with nodes and bones, in the mesh's coordinates")->required();
   command.add_option("-o,--output", arguments->output, "cut mesh with a colour per face: .ply")->required()->type_name("FILE");
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);

@@ -64,10 +64,8 @@ void run(const Arguments& arguments) {
 void add_validate_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("validate", "Say everything that is wrong with a mesh and a skeleton, each with its place and remedy");
-  command.add_option("MESH", arguments->mesh, "triangle mesh: .obj, .ply, .off or .stl")->required()->option_text("FILE");
-  command.add_option("SKELETON", arguments->skeleton, "skeleton: JSON with nodes and bones, in the mesh's coordinates")
-      ->required()
-      ->option_text("FILE");
+  command.add_option("MESH", arguments->mesh, "triangle mesh: .obj, .ply, .off or .stl")->required();
+  command.add_option("SKELETON", arguments->skeleton, "skeleton: JSON with nodes and bones, in the mesh's coordinates")->required();
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(
