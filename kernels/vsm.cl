@@ -104,13 +104,23 @@ kernel void scale_entries(int vertices, global const int* restrict slice_begin, 
   }
 }
 
+// VSM_SINGLE: work-groups of one work-item, which need no barriers. Some CPU compilers copy a kernel's tail at every barrier
+// in a branch, and take minutes over a loop nest with many of them.
+#ifdef VSM_SINGLE
+#define VSM_BARRIER(flags)
+#else
+#define VSM_BARRIER(flags) barrier(flags)
+#endif
+
 // Sum (or maximum) of one value per work-item, the same for all of them; the order of additions is fixed. In two stages
 // of about sqrt(group size) values each, so the number of barriers is fixed too.
 // Local: scratch, VSM_STRIDE floats more than work-items.
 #define VSM_STRIDE 32
 float reduce_group(local float* scratch, float value, int is_maximum) {
+#ifdef VSM_SINGLE
+  return value;
+#else
   const int lane = get_local_id(0), count = get_local_size(0);
-  if (count == 1) return value;
   barrier(CLK_LOCAL_MEM_FENCE);
   scratch[lane] = value;
   barrier(CLK_LOCAL_MEM_FENCE);
@@ -125,6 +135,7 @@ float reduce_group(local float* scratch, float value, int is_maximum) {
   float total = stage[0];
   for (int k = 1; k < used; ++k) total = is_maximum ? fmax(total, stage[k]) : total + stage[k];
   return total;
+#endif
 }
 
 // Conjugate gradients on the scaled systems, u and v as one vector (interleaved), one work-group per chart; the groups
@@ -146,9 +157,9 @@ kernel void solve_charts(int charts, float tolerance, int max_steps, int check_s
   const int lane = get_local_id(0), lanes = get_local_size(0);
   local int taken;
   while (true) {
-    barrier(CLK_LOCAL_MEM_FENCE);
+    VSM_BARRIER(CLK_LOCAL_MEM_FENCE);
     if (lane == 0) taken = atomic_inc(queue);
-    barrier(CLK_LOCAL_MEM_FENCE);
+    VSM_BARRIER(CLK_LOCAL_MEM_FENCE);
     const int position = taken;
     if (position >= charts) return;
     const int chart = order[position], begin = chart_begin[chart], end = begin + chart_rows[chart];
@@ -163,7 +174,7 @@ kernel void solve_charts(int charts, float tolerance, int max_steps, int check_s
       correction[2 * i] = correction[2 * i + 1] = 0.0f;
       direction[2 * i] = direction[2 * i + 1] = 0.0f;
     }
-    barrier(CLK_GLOBAL_MEM_FENCE);
+    VSM_BARRIER(CLK_GLOBAL_MEM_FENCE);
 
     int step = 0;
     float rho = 1.0f, rho_next = 0.0f, ratio;
@@ -217,7 +228,7 @@ kernel void solve_charts(int charts, float tolerance, int max_steps, int check_s
           direction[2 * i] = residual[2 * i] + beta * direction[2 * i];
           direction[2 * i + 1] = residual[2 * i + 1] / v_parts[i] + beta * direction[2 * i + 1];
         }
-        barrier(CLK_GLOBAL_MEM_FENCE);
+        VSM_BARRIER(CLK_GLOBAL_MEM_FENCE);
         float curvature = 0.0f;
         for (int i = begin + lane; i < end; i += lanes) {
           const int length = row_length[i];
@@ -259,7 +270,7 @@ kernel void solve_charts(int charts, float tolerance, int max_steps, int check_s
         hi[i] = sum;
         correction[i] = 0.0f;
       }
-      barrier(CLK_GLOBAL_MEM_FENCE);
+      VSM_BARRIER(CLK_GLOBAL_MEM_FENCE);
     }
     if (lane == 0) {
       steps[chart] += step;

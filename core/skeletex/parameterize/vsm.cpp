@@ -263,9 +263,9 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
   context.fill(direction, 0.0f);
   context.fill(steps, 0);
 
-  const ClKernelName solve{"vsm.cl", "solve_charts"};
   // On a CPU one work-item runs a plain loop over the rows; elsewhere a group is as large as the device allows.
   const std::size_t wanted = options.work_group_size > 0 ? options.work_group_size : context.device().type == "cpu" ? 1 : 1024;
+  const ClKernelName solve{"vsm.cl", "solve_charts", wanted == 1 ? "-DVSM_SINGLE" : ""};
   const std::size_t group = context.work_group_size(solve, wanted);
   // More groups than charts do no harm, and drivers that hand groups to threads in blocks then use every thread.
   const std::size_t groups = std::max<std::size_t>(charts.size(), 64);
