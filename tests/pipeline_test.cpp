@@ -58,7 +58,7 @@ TEST_P(StandardModel, ComesBackClosedByEveryMethod) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, StandardModel, testing::ValuesIn(kStandardModels), [](const auto& info) { return std::string(info.param); });
+INSTANTIATE_TEST_SUITE_P(All, StandardModel, testing::ValuesIn(kStandardModels), [](const auto& parameter) { return std::string(parameter.param); });
 
 TEST(Pipeline, ErrorFallsAsTheTextureGrowsAndStaysBelowTheIssuesFigures) {
   ClContext context;

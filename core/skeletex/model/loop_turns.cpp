@@ -50,9 +50,10 @@ std::optional<std::vector<double>> loop_turns(const std::vector<Vec3>& points, c
     lifted.push_back(lifted.back() + step - std::round(step));
     total += spacing[i] = (points[(i + 1) % count] - points[i]).norm();
   }
-  if (std::abs(lifted.back() - lifted.front() - 1) > 1e-6) return {};
+  if (!(std::abs(lifted.back() - lifted.front() - 1) <= 1e-6)) return {};  // also when an angle is no number
   lifted.pop_back();
-  for (double& s : spacing) s = (least_density - kEvenPart) * (total > 0 ? s / total : 0) + kEvenPart / static_cast<double>(count);
+  const bool has_length = total > 0 && std::isfinite(total);
+  for (double& s : spacing) s = (least_density - kEvenPart) * (has_length ? s / total : 0) + kEvenPart / static_cast<double>(count);
   return nearest_increasing(lifted, spacing);
 }
 
