@@ -137,7 +137,7 @@ void add_inspect_command(CLI::App& program) {
       "  skeletex inspect bear.skx.exr\n"
       "  skeletex inspect bear.skx.exr --json - | jq '.patches[0]'\n"
       "  skeletex inspect bear.ply\n"
-      "The JSON of a model is its header as it stands in the file (docs/file-format.md); texels are not read. Lengths are in the mesh's units.");
+      "The JSON of a model is its header as it stands in the file (docs/file-formats.md); texels are not read. Lengths are in the mesh's units.");
   command.callback([arguments] { run(*arguments); });
 }
 
