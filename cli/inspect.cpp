@@ -120,6 +120,7 @@ void run(const Arguments& arguments) {
     inspect_mesh(arguments);
     return;
   }
+  if (!arguments.json.empty() && arguments.json != "-") check_output(arguments.json);
   const nlohmann::json header = read_model_header(arguments.file);
   if (arguments.json != "-") print(arguments.json, model_text(header, arguments.file));
   write_json(arguments.json, Json(header));

@@ -145,7 +145,7 @@ TEST_F(Program, EndsWithTwoOnWrongUsageAndGivesTheNearestName) {
   expect_refused(2, {"encode", "--meshod", "vsm"}, {"unknown option --meshod", "did you mean --method?", "skeletex encode --help"});
   expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--iteration=3"}, {"did you mean --iterations?"});
   expect_refused(2, {"metro", "y.ply", "y.ply", "--jsno", "-"}, {"did you mean --json?"});
-  expect_refused(2, {"reconstruct", "y.skx.exr", "-q"}, {"-q"});
+  expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "y.ply", "-q"}, {"-q"});
   expect_refused(2, {"encode", "y.ply", "y.skeleton.json"}, {"--output"});
   expect_refused(2, {"encode", "y.ply", "-o", "a.skx.exr"}, {"SKELETON"});
   expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--method", "hybird"}, {"hybird", "did you mean hybrid?"});
