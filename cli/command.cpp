@@ -62,6 +62,10 @@ void check_output(const std::filesystem::path& path) {
   if (::access(folder.c_str(), W_OK) != 0) throw IoError(fmt::format("{}: the folder {} is not writable", path.string(), folder.string()));
 }
 
+void check_json_target(const std::string& target) {
+  if (!target.empty() && target != "-") check_output(target);
+}
+
 TriangleMesh load_mesh(const std::filesystem::path& path) {
   MeshFile file = read_mesh(path);
   if (file.triangles != file.faces_in_file) spdlog::info("{}: {} polygons became {} triangles", path.string(), file.faces_in_file, file.triangles);

@@ -44,6 +44,8 @@ void warn(const std::string& text);
 
 /// Fails before the work rather than after it. \throw IoError when the folder of `path` is missing or not writable
 void check_output(const std::filesystem::path& path);
+/// The same for the target of --json, where "" and - need no folder.
+void check_json_target(const std::string& target);
 
 /// Reads a mesh, and says on standard error what the reader did to it (polygons split, vertices welded).
 TriangleMesh load_mesh(const std::filesystem::path& path);

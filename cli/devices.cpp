@@ -11,6 +11,7 @@ namespace skeletex::cli {
 namespace {
 
 void run(const std::string& json_target) {
+  check_json_target(json_target);
   const std::vector<ClDeviceInfo> devices = list_devices();
   const double gib = 1024.0 * 1024.0 * 1024.0;
   Table table({"device", "type", "platform", "version", "units", "memory GiB", "buffer GiB", "double"});

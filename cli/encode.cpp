@@ -144,6 +144,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
   EncodeOptions options = encode_options(arguments, command);
   Stopwatch watch;
   check_output(arguments.output);
+  check_json_target(arguments.json);
   TriangleMesh mesh = load_mesh(arguments.mesh);
   const Skeleton skeleton = read_skeleton(arguments.skeleton);
   check_bone_names(arguments, options, skeleton);

@@ -116,11 +116,11 @@ void inspect_mesh(const Arguments& arguments) {
 }
 
 void run(const Arguments& arguments) {
+  check_json_target(arguments.json);
   if (is_mesh_file(arguments.file)) {
     inspect_mesh(arguments);
     return;
   }
-  if (!arguments.json.empty() && arguments.json != "-") check_output(arguments.json);
   const nlohmann::json header = read_model_header(arguments.file);
   if (arguments.json != "-") print(arguments.json, model_text(header, arguments.file));
   write_json(arguments.json, Json(header));

@@ -62,6 +62,7 @@ void write_coloured(const std::string& path, const TriangleMesh& mesh, const std
 void run(const Arguments& arguments) {
   for (const std::string& path : {arguments.csv, arguments.ply})
     if (!path.empty()) check_output(path);
+  check_json_target(arguments.json);
   if (!arguments.ply.empty() && !arguments.ply.ends_with(".ply"))
     throw CLI::ValidationError("--ply", "\"" + arguments.ply + "\" does not end in .ply");
   const TriangleMesh a = load_surface(arguments.a), b = load_surface(arguments.b);

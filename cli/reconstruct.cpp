@@ -3,25 +3,36 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 
 #include "command.h"
 #include "progress_bar.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_file.h"
+#include "skeletex/io/pose_file.h"
+#include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 
 namespace skeletex::cli {
 namespace {
 
 struct Arguments {
-  std::string model, output, device, json;
+  std::string model, output, pose, device, json;
   int size = 0;
+  std::optional<double> time;
+  bool is_distance_dropped = false;
 };
 
 void run(const Arguments& arguments) {
   check_output(arguments.output);
+  check_json_target(arguments.json);
   Stopwatch total, watch;
   SkeletexModel model = read_model(arguments.model);
+  std::optional<Skeleton> posed;
+  if (!arguments.pose.empty()) {
+    const PoseAnimation animation = read_animation(arguments.pose, model.skeleton);
+    posed = apply_pose(model.skeleton, pose_at(model.skeleton, animation, arguments.time.value_or(animation.frames.front().time)));
+  }
   const double read_ms = watch.lap_ms();
   ClContext context(arguments.device);
   const double start_ms = watch.lap_ms();
@@ -35,7 +46,8 @@ void run(const Arguments& arguments) {
     }
     resample_ms = watch.lap_ms();
     bar.show("reconstructing", 0.3);
-    mesh = reconstruct_mesh(context, model);
+    mesh = posed ? reconstruct_mesh(context, model, *posed, arguments.is_distance_dropped ? DistanceRule::kFromFoot : DistanceRule::kFromBone)
+                 : reconstruct_mesh(context, model);
     reconstruct_ms = watch.lap_ms();
     bar.show("writing", 0.7);
     write_mesh(arguments.output, mesh);
@@ -65,19 +77,23 @@ void run(const Arguments& arguments) {
 
 void add_reconstruct_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App& command = *program.add_subcommand("reconstruct", "Turn a model back into a closed mesh, at any resolution");
+  CLI::App& command = *program.add_subcommand("reconstruct", "Turn a model back into a closed mesh, at any resolution and in any pose");
   command.add_option("MODEL", arguments->model, "model: .skx.exr")->required();
   command.add_option("-o,--output", arguments->output, "mesh: .ply (binary) or .obj")->required()->type_name("FILE");
   command.add_option("--size", arguments->size, "texels along the longer side, 4 to 16384 (default: the model's own size)")
       ->check(CLI::Range(4, 16384).description(""))
       ->type_name("N");
+  CLI::Option* pose = command.add_option("--pose", arguments->pose, "pose or animation: .json")->type_name("FILE");
+  command.add_option("--time", arguments->time, "time in the animation (default: its first frame)")->type_name("T")->needs(pose);
+  command.add_flag("--no-distance", arguments->is_distance_dropped, "do not restore the distances to the bones in the pose")->needs(pose);
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(
       "Examples:\n"
       "  skeletex reconstruct bear.skx.exr -o bear.ply\n"
       "  skeletex reconstruct bear.skx.exr -o draft.obj --size 64\n"
-      "The mesh is closed, oriented, 2-manifold and of the input's genus at every size. Coordinates are in the input mesh's units.");
+      "  skeletex reconstruct bear.skx.exr -o waving.ply --pose wave.json --time 0.5\n"
+      "The mesh is closed, oriented, 2-manifold and of the input's genus at every size and in every pose. Coordinates are in the input mesh's units.");
   command.callback([arguments] { run(*arguments); });
 }
 

@@ -24,6 +24,7 @@ void run(const Arguments& arguments) {
   if (!arguments.output.ends_with(".ply"))
     throw CLI::ValidationError("--output", "\"" + arguments.output + "\" does not end in .ply, which carries the colours");
   check_output(arguments.output);
+  check_json_target(arguments.json);
   TriangleMesh mesh = load_mesh(arguments.mesh);
   const Skeleton skeleton = read_skeleton(arguments.skeleton);
   ClContext context(arguments.device);

@@ -24,6 +24,7 @@ const char* to_word(Severity severity) {
 }
 
 void run(const Arguments& arguments) {
+  check_json_target(arguments.json);
   TriangleMesh mesh = load_mesh(arguments.mesh);
   const Skeleton skeleton = read_skeleton(arguments.skeleton);
   ClContext context(arguments.device);

@@ -205,6 +205,37 @@ TEST_F(Program, ReconstructsAndReportsWhatTheContractNames) {
   fs::remove(folder_ / "again.obj");
 }
 
+TEST_F(Program, ReconstructsInPosesAndAnimations) {
+  const Skeleton skeleton = read_skeleton(folder_ / "y.skeleton.json");
+  const std::string bone = skeleton.bones[1].name;
+  const nlohmann::json turned = {{"rotations", {{bone, {{"axis", {1, 0, 0}}, {"degrees", 40}}}}}};
+  std::ofstream(folder_ / "pose.json") << turned;
+  std::ofstream(folder_ / "animation.json") << nlohmann::json{
+      {"frames", {{{"time", 0}, {"pose", nlohmann::json::object()}}, {{"time", 2}, {"pose", turned}}}}};
+  ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "bind.ply"}).code, 0);
+  ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "posed.ply", "--pose", "pose.json"}).code, 0);
+  EXPECT_EQ(json_of({"inspect", "posed.ply"})["closed_manifold"], true);
+  const auto positions = [&](const char* name) { return read_mesh(folder_ / name).mesh.positions; };
+  const auto difference = [](const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+    double worst = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) worst = std::max(worst, (a[i] - b.at(i)).norm());
+    return worst;
+  };
+  EXPECT_GT(difference(positions("posed.ply"), positions("bind.ply")), 0.1);
+  for (const auto& [time, same] : {std::pair{"0", "bind.ply"}, {"-1", "bind.ply"}, {"2", "posed.ply"}, {"7.5", "posed.ply"}}) {
+    ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "animation.json", "--time", time}).code, 0);
+    EXPECT_LT(difference(positions("again.ply"), positions(same)), 1e-5) << time;
+  }
+  ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "pose.json", "--no-distance"}).code, 0);
+  EXPECT_GT(difference(positions("again.ply"), positions("posed.ply")), 1e-3);
+
+  expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--no-distance"}, {"--pose"});
+  expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--time", "1"}, {"--pose"});
+  std::ofstream(folder_ / "pose.json") << nlohmann::json{{"roll", {{bone + "x", 10}}}};
+  expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--pose", "pose.json"}, {"pose.json", "no bone \"" + bone + "x\"", "did you mean \"" + bone + "\"?"});
+  for (const char* name : {"pose.json", "animation.json", "bind.ply", "posed.ply", "again.ply"}) fs::remove(folder_ / name);
+}
+
 TEST_F(Program, MeasuresAndReportsWhatTheContractNames) {
   ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "again.ply"}).code, 0);
   const nlohmann::json json = json_of({"metro", "y.ply", "again.ply", "--samples", "20000", "--csv", "d.csv", "--ply", "d.ply"});
@@ -336,6 +367,7 @@ TEST_F(Program, RefusesOutputsThatCannotBeWrittenAndLeavesNothingBehind) {
   expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "a.xyz"}, {"a.xyz"});
   expect_refused(1, {"metro", "y.ply", "y.ply", "--csv", "no/d.csv"}, {"no/d.csv"});
   expect_refused(1, {"inspect", "y.skx.exr", "--json", "no/i.json"}, {"no/i.json"});
+  expect_refused(1, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--json", "no/e.json"}, {"no/e.json"});
   expect_refused(1, {"segment", "y.ply", "y.skeleton.json", "-o", "/proc/a.ply"}, {"/proc"});
 }
 
