@@ -10,14 +10,17 @@
 namespace skeletex::cli {
 namespace {
 
+/// "OpenCL 3.0 and what the vendor adds" without what the vendor adds.
+std::string short_version(const std::string& version) { return version.substr(0, version.find(' ', version.find(' ') + 1)); }
+
 void run(const std::string& json_target) {
   check_json_target(json_target);
   const std::vector<ClDeviceInfo> devices = list_devices();
   const double gib = 1024.0 * 1024.0 * 1024.0;
-  Table table({"device", "type", "platform", "version", "units", "memory GiB", "buffer GiB", "double"});
+  Table table({"device", "type", "platform", "version", "driver", "units", "memory GiB", "buffer GiB", "double"});
   Json list = Json::array();
   for (const ClDeviceInfo& device : devices) {
-    table.add({fmt::format("{}: {}", device.index, device.name), device.type, device.platform, device.version,
+    table.add({fmt::format("{}: {}", device.index, device.name), device.type, device.platform, short_version(device.version), device.driver,
                fmt::format("{}", device.compute_units), fmt::format("{:.1f}", static_cast<double>(device.global_memory_bytes) / gib),
                fmt::format("{:.1f}", static_cast<double>(device.max_allocation_bytes) / gib), device.has_double ? "yes" : "no"});
     list.push_back({{"index", device.index},

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+#include "result_file.h"
+
+#include <fmt/format.h>
+
+#include "skeletex/io/mesh_file.h"
+#include "skeletex/io/model_file.h"
+#include "skeletex/model/error.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+
+namespace skeletex::cli {
+namespace {
+
+bool is_model(const std::string& path) { return path.ends_with(".exr"); }
+
+}  // namespace
+
+void add_result_option(CLI::App& command, std::string& path) {
+  command.add_option("-o,--output", path, "model (.skx.exr) or mesh (.ply, .obj)")->required()->type_name("FILE");
+}
+
+void check_result(const std::string& path) {
+  if (!is_model(path) && !path.ends_with(".ply") && !path.ends_with(".obj"))
+    throw IoError(fmt::format("{}: a result is a model (.skx.exr) or a mesh (.ply, .obj), by its ending", path));
+  check_output(path);
+}
+
+Json write_result(ClContext& context, const SkeletexModel& model, const std::string& path) {
+  Json json{{"path", path}, {"kind", is_model(path) ? "model" : "mesh"}, {"size", {model.texture.width, model.texture.height}}};
+  if (is_model(path)) {
+    write_model(path, model);
+  } else {
+    const TriangleMesh mesh = reconstruct_mesh(context, model);
+    write_mesh(path, mesh);
+    json["vertices"] = mesh.positions.size();
+    json["triangles"] = mesh.triangles.size();
+  }
+  return json;
+}
+
+}  // namespace skeletex::cli
