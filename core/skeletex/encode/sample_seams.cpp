@@ -83,22 +83,7 @@ std::vector<Vec3> points_on_loop(const Segment& segment, const Skeleton& skeleto
     angles.push_back(walls.turn_of(segment.bone, points.back() - node));
   }
   // The chart's own v: make_chart has refused loops that do not wind once.
-  std::vector<double> turns = loop_turns(points, angles).value();
-  points.push_back(points.front());
-  turns.push_back(turns.front() + 1);
-  const double begin = turns.front();
-  std::vector<Vec3> result(columns);
-  std::size_t at = 0;
-  const int first = static_cast<int>(std::ceil(begin * columns));
-  for (int i = 0; i < columns; ++i) {
-    const int column = first + i;
-    const double turn = static_cast<double>(column) / columns;
-    while (at + 2 < turns.size() && turns[at + 1] < turn) ++at;
-    const double span = turns[at + 1] - turns[at];
-    const double t = span > 0 ? std::clamp((turn - turns[at]) / span, 0.0, 1.0) : 0;
-    result[((column % columns) + columns) % columns] = points[at] + t * (points[at + 1] - points[at]);
-  }
-  return result;
+  return points_at_columns(points, loop_turns(points, angles).value(), columns);
 }
 
 }  // namespace skeletex

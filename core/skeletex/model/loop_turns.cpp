@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/model/loop_turns.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace skeletex {
@@ -55,6 +56,23 @@ std::optional<std::vector<double>> loop_turns(const std::vector<Vec3>& points, c
   const bool has_length = total > 0 && std::isfinite(total);
   for (double& s : spacing) s = (least_density - kEvenPart) * (has_length ? s / total : 0) + kEvenPart / static_cast<double>(count);
   return nearest_increasing(lifted, spacing);
+}
+
+std::vector<Vec3> points_at_columns(std::vector<Vec3> points, std::vector<double> turns, int columns) {
+  points.push_back(points.front());
+  turns.push_back(turns.front() + 1);
+  std::vector<Vec3> result(columns);
+  std::size_t at = 0;
+  const int first = static_cast<int>(std::ceil(turns.front() * columns));
+  for (int i = 0; i < columns; ++i) {
+    const int column = first + i;
+    const double turn = static_cast<double>(column) / columns;
+    while (at + 2 < turns.size() && turns[at + 1] < turn) ++at;
+    const double span = turns[at + 1] - turns[at];
+    const double t = span > 0 ? std::clamp((turn - turns[at]) / span, 0.0, 1.0) : 0;
+    result[((column % columns) + columns) % columns] = points[at] + t * (points[at + 1] - points[at]);
+  }
+  return result;
 }
 
 }  // namespace skeletex

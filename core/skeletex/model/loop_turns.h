@@ -16,4 +16,8 @@ namespace skeletex {
 /// \return increasing values, the last below the first plus 1; nothing when the loop does not wind once around the bone
 std::optional<std::vector<double>> loop_turns(const std::vector<Vec3>& points, const std::vector<double>& turns, double least_density = 0.4);
 
+/// Where a loop's polyline passes v = j / columns, for each column j.
+/// \param turns  increasing, the last below the first plus 1
+std::vector<Vec3> points_at_columns(std::vector<Vec3> points, std::vector<double> turns, int columns);
+
 }  // namespace skeletex

@@ -35,49 +35,70 @@ void place_shared_vertices(const SkeletexModel& model, const Walls& walls, const
     positions[lattice.first_corner + i] = sample_point(model.skeleton, walls, model.corners[i].node, model.corners[i].bones[0], model.corners[i].sample);
 }
 
+DevicePlanes displace_inner(ClContext& context, const SkeletexModel& model, const Walls& walls, const Lattice& lattice) {
+  DevicePlanes points = allocate_planes(context, lattice.inner_count);
+  displace(context, upload_lattice(context, frame_tables(model.skeleton, walls, model.patches, model.origin), model.patches, model.texture, RowChoice::kInner),
+           points);
+  return points;
+}
+
+std::vector<Vec3> place_vertices(ClContext& context, const SkeletexModel& model, const Walls& walls, const Lattice& lattice, const DevicePlanes& inner) {
+  std::vector<Vec3> positions(lattice.vertex_count);
+  place_shared_vertices(model, walls, lattice, positions);
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::vector<float> plane = context.download(axis == 0 ? inner.x : axis == 1 ? inner.y : inner.z);
+    for (int i = 0; i < lattice.inner_count; ++i) positions[i][axis] = model.origin[axis] + static_cast<double>(plane[i]);
+  }
+  return positions;
+}
+
+void append_end_triangles(const SkeletexModel& model, const Lattice& lattice, const std::vector<Vec3>& positions, std::vector<Triangle>& triangles) {
+  const Walls walls(model.skeleton);
+  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
+      if (lattice.poles[bone][static_cast<int>(end)] >= 0) {
+        append_pole_fan(model, lattice, bone, end, triangles);
+        continue;
+      }
+      Ring seam{end_loop(model, lattice, bone, end), {}}, row{end_row(model, lattice, bone, end), {}};
+      for (const int vertex : seam.vertices) seam.turns.push_back(walls.turn_of(bone, positions[vertex] - end_position(model.skeleton, bone, end)));
+      for (std::size_t j = 0; j < row.vertices.size(); ++j) row.turns.push_back(static_cast<double>(j) / static_cast<double>(row.vertices.size()));
+      append_seam_strip(positions, seam, row, end, triangles);
+    }
+}
+
 }  // namespace
+
+std::vector<Vec3> lattice_positions(ClContext& context, const SkeletexModel& model) {
+  const Lattice lattice = number_lattice(model);
+  const Walls walls(model.skeleton);
+  return place_vertices(context, model, walls, lattice, displace_inner(context, model, walls, lattice));
+}
+
+std::vector<Triangle> end_triangles(const SkeletexModel& model, const Lattice& lattice, const std::vector<Vec3>& positions) {
+  std::vector<Triangle> triangles;
+  append_end_triangles(model, lattice, positions, triangles);
+  return triangles;
+}
 
 TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model) {
   const Lattice lattice = number_lattice(model);
   const Walls walls(model.skeleton);
+  const DevicePlanes points = displace_inner(context, model, walls, lattice);
   TriangleMesh mesh;
-  mesh.positions.resize(lattice.vertex_count);
-  place_shared_vertices(model, walls, lattice, mesh.positions);
+  mesh.positions = place_vertices(context, model, walls, lattice, points);
   {
-    DevicePlanes points = allocate_planes(context, lattice.inner_count);
-    ClBuffer<PatchRecord> patches;
-    {
-      const DeviceLattice device = upload_lattice(context, frame_tables(model.skeleton, walls, model.patches, model.origin), model.patches, model.texture,
-                                                  RowChoice::kInner);
-      displace(context, device, points);
-      patches = device.tables.patches;
-    }
     std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kInner);
     std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == model.patches[row[0]].rectangle.height - 2; });
+    const auto patches = context.upload(frame_tables(model.skeleton, walls, model.patches, model.origin).patches);
     // Room for the strips and fans at the end, so that the host's copy need not grow.
     const auto triangles = context.allocate<Triangle>(lattice.triangle_count);
     context.launch({"reconstruct.cl", "triangulate_quads"}, row_range(context, rows.size()), static_cast<int>(rows.size()), context.upload(rows), patches,
                    points.x, points.y, points.z, triangles);
     mesh.triangles = context.download(triangles);
     mesh.triangles.resize(2 * static_cast<std::size_t>(lattice.quad_count));
-    for (int axis = 0; axis < 3; ++axis) {
-      const std::vector<float> plane = context.download(axis == 0 ? points.x : axis == 1 ? points.y : points.z);
-      for (int i = 0; i < lattice.inner_count; ++i) mesh.positions[i][axis] = model.origin[axis] + static_cast<double>(plane[i]);
-    }
   }
-
-  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
-    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
-      if (lattice.poles[bone][static_cast<int>(end)] >= 0) {
-        append_pole_fan(model, lattice, bone, end, mesh.triangles);
-        continue;
-      }
-      Ring seam{end_loop(model, lattice, bone, end), {}}, row{end_row(model, lattice, bone, end), {}};
-      for (const int vertex : seam.vertices)
-        seam.turns.push_back(walls.turn_of(bone, mesh.positions[vertex] - end_position(model.skeleton, bone, end)));
-      for (std::size_t j = 0; j < row.vertices.size(); ++j) row.turns.push_back(static_cast<double>(j) / static_cast<double>(row.vertices.size()));
-      append_seam_strip(mesh.positions, seam, row, end, mesh.triangles);
-    }
+  append_end_triangles(model, lattice, mesh.positions, mesh.triangles);
   return mesh;
 }
 

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <vector>
+
 #include "skeletex/cl/context.h"
 #include "skeletex/model/mesh.h"
 #include "skeletex/model/texture.h"
+#include "skeletex/reconstruct/lattice.h"
 
 namespace skeletex {
 
@@ -11,6 +14,11 @@ namespace skeletex {
 /// that both sides fill up to, poles are single vertices. Quads take the diagonal that lies nearer to the surface.
 /// \throw DeviceError
 TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model);
+
+/// The vertices of that mesh alone, in the order of lattice.h. \throw DeviceError
+std::vector<Vec3> lattice_positions(ClContext& context, const SkeletexModel& model);
+/// Its triangles that touch a pole or a seam: fans and strips. \param positions  of all vertices of the lattice
+std::vector<Triangle> end_triangles(const SkeletexModel& model, const Lattice& lattice, const std::vector<Vec3>& positions);
 
 /// The same model with rectangles scaled to another texture size (longer side `size`, at least 4 x 4 each): texels are
 /// resampled as bind-pose positions, averaged where the lattice gets coarser, seams are kept and resampled.
