@@ -16,13 +16,17 @@
 namespace skeletex {
 namespace {
 
-constexpr int kSlice = 32;  // VSM_SLICE
+constexpr int kSlice = 32;   // VSM_SLICE
 constexpr int kStride = 32;  // VSM_STRIDE
+constexpr int kBlock = 8;    // VSM_BLOCK
 constexpr signed char kPoleJump = -128;  // VSM_POLE
 
 /// Slivers of the cut count as this much of the mean surface area: their weights stay in the others' range.
 constexpr double kSmallestArea = 1e-6;
-constexpr int kCheckSteps = 30;  // between two looks at the true residual, which costs as much as two steps
+constexpr int kCheckSteps = 10;  // between two looks at the true residual, which costs as much as two steps
+/// Cells of the coarse space have about this many vertices, more in charts that would get more cells than this: the cells'
+/// matrix is dense.
+constexpr std::size_t kCellSize = 16, kMaxCells = 192;
 
 bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind == ChartVertex::kTailPole; }
 
@@ -49,11 +53,84 @@ double spread_of(const std::vector<double>& areas) {
   return std::sqrt(variance) / mean;
 }
 
+/// The inner neighbours of inner vertex i are vertices[begin[i]] to vertices[begin[i + 1] - 1].
+struct InnerNeighbours {
+  std::vector<int> begin, vertices;
+};
+
+InnerNeighbours find_inner_neighbours(const Chart& chart) {
+  const auto is_inner = [&](int v) { return chart.kinds[v] == ChartVertex::kInner; };
+  const auto for_edges = [&](const auto& visit) {
+    for (const Triangle& t : chart.triangles)
+      for (const int c : {0, 1, 2})
+        if (const int from = t[c], to = t[(c + 1) % 3]; is_inner(from) && is_inner(to)) visit(from, to);
+  };
+  InnerNeighbours found;
+  found.begin.assign(chart.positions.size() + 1, 0);
+  for_edges([&](int from, int) { ++found.begin[from + 1]; });
+  std::partial_sum(found.begin.begin(), found.begin.end(), found.begin.begin());
+  found.vertices.resize(found.begin.back());
+  std::vector<int> next(found.begin.begin(), found.begin.end() - 1);
+  for_edges([&](int from, int to) { found.vertices[next[from]++] = to; });
+  return found;
+}
+
+/// Groups the inner vertices of a chart into cells of `size` connected vertices, each grown breadth first from a vertex next
+/// to the cells before it. A cell that is walled in before it has more than half that size joins the smallest one beside it.
+std::vector<std::vector<int>> grow_cells(const Chart& chart, std::size_t size) {
+  const int count = static_cast<int>(chart.positions.size());
+  const InnerNeighbours neighbours = find_inner_neighbours(chart);
+  const auto beside = [&](int v) {
+    return std::span(neighbours.vertices).subspan(neighbours.begin[v], neighbours.begin[v + 1] - neighbours.begin[v]);
+  };
+  std::vector<std::vector<int>> cells;
+  std::vector<int> cell_of(count, -1);
+  std::vector<int> front;  // neighbours of cells, in the order in which the cells reached them
+  std::vector<bool> is_in_front(count, false);
+  auto take_seed = [&, next_front = std::size_t{0}, next_vertex = 0]() mutable {
+    for (; next_front < front.size(); ++next_front)
+      if (cell_of[front[next_front]] < 0) return front[next_front];
+    for (; next_vertex < count; ++next_vertex)
+      if (chart.kinds[next_vertex] == ChartVertex::kInner && cell_of[next_vertex] < 0) return next_vertex;
+    return -1;
+  };
+  for (int seed = take_seed(); seed >= 0; seed = take_seed()) {
+    const int id = static_cast<int>(cells.size());
+    std::vector<int> cell{seed};
+    cell_of[seed] = id;
+    for (std::size_t i = 0; i < cell.size(); ++i)
+      for (const int v : beside(cell[i]))
+        if (cell_of[v] < 0 && cell.size() < size) {
+          cell_of[v] = id;
+          cell.push_back(v);
+        }
+    int smallest = -1;
+    for (const int member : cell)
+      for (const int v : beside(member)) {
+        const int other = cell_of[v];
+        if (other >= 0 && other != id && (smallest < 0 || cells[other].size() < cells[smallest].size())) smallest = other;
+        if (!is_in_front[v]) {
+          is_in_front[v] = true;
+          front.push_back(v);
+        }
+      }
+    if (2 * cell.size() <= size && smallest >= 0) {
+      for (const int v : cell) cell_of[v] = smallest;
+      cells[smallest].insert(cells[smallest].end(), cell.begin(), cell.end());
+    } else {
+      cells.push_back(std::move(cell));
+    }
+  }
+  return cells;
+}
+
 /// The systems of all charts in the layout of vsm.cl.
 struct DeviceSystems {
   int vertices = 0, triangles = 0, entries = 0;
+  int coarse = 0, matrices = 0;  ///< values in a coarse vector and in the coarse matrices of all charts
   std::vector<int> chart_begin, chart_rows, order;
   std::vector<std::vector<int>> device_vertices;  ///< per chart and vertex
+  std::vector<int> cell_first, cell_counts, cell_begin, row_cells, matrix_begin;
   std::vector<int> slice_begin, row_length;
   std::vector<int> columns, twins, entry_triangles;  ///< entry_triangles: two planes
   std::vector<signed char> jumps;
@@ -63,21 +140,38 @@ struct DeviceSystems {
   std::vector<float> hi, lo;
 };
 
-int padded(int count) { return (count + kSlice - 1) / kSlice * kSlice; }
+int padded(int count, int unit) { return (count + unit - 1) / unit * unit; }
 
 DeviceSystems build_systems(std::span<const Chart> charts, double alpha) {
   DeviceSystems s;
+  std::vector<HalfEdgeTable> tables;
   for (const Chart& chart : charts) {
     const int count = static_cast<int>(chart.positions.size());
+    tables.push_back(link_half_edges(chart.triangles, count));
+    const auto cells = grow_cells(chart, std::max(kCellSize, chart.positions.size() / kMaxCells));
+    const int cell_count = static_cast<int>(cells.size());
     s.chart_begin.push_back(s.vertices);
     std::vector<int>& map = s.device_vertices.emplace_back(count);
     int next = s.vertices;
-    for (int v = 0; v < count; ++v)
-      if (chart.kinds[v] == ChartVertex::kInner) map[v] = next++;
+    s.cell_first.push_back(s.coarse);
+    s.cell_counts.push_back(cell_count);
+    s.matrix_begin.push_back(s.matrices);
+    s.row_cells.resize(s.vertices + padded(count, kSlice), 0);
+    for (int cell = 0; cell < cell_count; ++cell) {
+      s.cell_begin.push_back(next);
+      for (const int v : cells[cell]) {
+        s.row_cells[next] = cell;
+        map[v] = next++;
+      }
+    }
+    s.cell_begin.push_back(next);
+    s.coarse += padded(cell_count + 1, kBlock);
+    s.cell_begin.resize(s.coarse, next);
+    s.matrices += cell_count * padded(cell_count, kBlock);
     s.chart_rows.push_back(next - s.vertices);
     for (int v = 0; v < count; ++v)
       if (chart.kinds[v] != ChartVertex::kInner) map[v] = next++;
-    s.vertices += padded(count);
+    s.vertices += padded(count, kSlice);
     s.triangles += static_cast<int>(chart.triangles.size());
   }
   s.order.resize(charts.size());
@@ -117,7 +211,7 @@ DeviceSystems build_systems(std::span<const Chart> charts, double alpha) {
   for (std::size_t k = 0; k < charts.size(); ++k) {
     const Chart& chart = charts[k];
     const std::vector<int>& map = s.device_vertices[k];
-    const HalfEdgeTable table = link_half_edges(chart.triangles, static_cast<int>(chart.positions.size()));
+    const HalfEdgeTable& table = tables[k];
     const std::vector<double> surface = relative_surface_areas(chart);
     // An inner vertex's neighbours are the ends of its outgoing half-edges.
     std::vector<int> entry_of(table.twins.size(), -1);
@@ -253,6 +347,10 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
   auto exponents = context.allocate<int>(s.entries);
   auto sums = context.allocate<float>(s.vertices), v_parts = context.allocate<float>(s.vertices), roots = context.allocate<float>(s.vertices);
   auto row_exponents = context.allocate<int>(s.vertices);
+  const auto cell_first = context.upload(s.cell_first), cell_counts = context.upload(s.cell_counts), cell_begin = context.upload(s.cell_begin);
+  const auto row_cells = context.upload(s.row_cells), matrix_begin = context.upload(s.matrix_begin);
+  auto basis = context.allocate<float>(s.vertices), inverses = context.allocate<float>(s.matrices),
+       coarse = context.allocate<float>(4 * static_cast<std::size_t>(s.coarse));
   const std::size_t pairs = 2 * static_cast<std::size_t>(s.vertices);
   auto residual = context.allocate<float>(pairs), direction = context.allocate<float>(pairs), product = context.allocate<float>(pairs),
        correction = context.allocate<float>(pairs);
@@ -261,29 +359,38 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
   context.fill(mantissas, 0.5f);
   context.fill(exponents, 1);
   context.fill(direction, 0.0f);
+  context.fill(correction, 0.0f);
   context.fill(steps, 0);
 
-  // On a CPU one work-item runs a plain loop over the rows; elsewhere a group is as large as the device allows.
+  // On a CPU one work-item runs a plain loop over the rows; elsewhere a group is as large as the device allows. One program
+  // holds all kernels: each is compiled once.
   const std::size_t wanted = options.work_group_size > 0 ? options.work_group_size : context.device().type == "cpu" ? 1 : 1024;
-  const ClKernelName solve{"vsm.cl", "solve_charts", wanted == 1 ? "-DVSM_SINGLE" : ""};
-  const std::size_t group = context.work_group_size(solve, wanted);
+  const auto kernel = [&](std::string_view name) { return ClKernelName{"vsm.cl", name, wanted == 1 ? "-DVSM_SINGLE" : ""}; };
+  const std::size_t group = context.work_group_size(kernel("invert_coarse"), context.work_group_size(kernel("solve_charts"), wanted));
   // More groups than charts do no harm, and drivers that hand groups to threads in blocks then use every thread.
   const std::size_t groups = std::max<std::size_t>(charts.size(), 64);
+  const ClRange group_range({groups * group, 1}, {group, 1});
+  const ClLocal scratch{(group + kStride) * sizeof(float)};
   const int chart_count = static_cast<int>(charts.size());
   std::vector<int> frozen(s.vertices / kSlice, 1), iterations(charts.size(), 0);
   std::vector<bool> is_stopped(charts.size(), false);
   std::vector<double> spreads(charts.size(), 0);
   auto frozen_slices = context.upload(frozen);
   for (bool is_last = options.iterations == 0;;) {
-    context.launch({"vsm.cl", "weigh_rows"}, ClRange(s.vertices), s.vertices, s.entries, frozen_slices, slice_begin, row_length, jumps, entry_triangles,
+    context.launch(kernel("weigh_rows"), ClRange(s.vertices), s.vertices, s.entries, frozen_slices, slice_begin, row_length, jumps, entry_triangles,
                    factors, areas, mantissas, exponents, shares, sums, row_exponents, v_parts);
-    context.launch({"vsm.cl", "scale_entries"}, ClRange(s.vertices), s.vertices, slice_begin, row_length, twins, shares, scaled);
+    context.launch(kernel("scale_entries"), ClRange(s.vertices), s.vertices, slice_begin, row_length, twins, shares, scaled);
     context.fill(queue, 0);
-    context.launch(solve, ClRange({groups * group, 1}, {group, 1}), chart_count, static_cast<float>(is_last ? options.tolerance : options.intermediate_tolerance),
-                   options.max_steps, kCheckSteps, queue, order, chart_begin, chart_rows, slice_begin, row_length, columns, jumps, shares, scaled, sums,
-                   row_exponents, v_parts, hi, lo, residual, direction, product, correction, roots, steps, ratios, ClLocal{(group + kStride) * sizeof(float)});
+    context.launch(kernel("invert_coarse"), group_range, chart_count, queue, order, chart_begin, chart_rows, cell_first, cell_counts, cell_begin,
+                   row_cells, matrix_begin, slice_begin, row_length, columns, shares, scaled, sums, row_exponents, roots, basis, inverses, coarse, scratch);
+    context.fill(queue, 0);
+    context.launch(kernel("solve_charts"), group_range, chart_count,
+                   static_cast<float>(is_last ? options.tolerance : options.intermediate_tolerance), options.max_steps, kCheckSteps, s.coarse, queue,
+                   order, chart_begin, chart_rows, cell_first, cell_counts, cell_begin, row_cells, matrix_begin, slice_begin, row_length, columns,
+                   jumps, shares, scaled, v_parts, roots, basis, inverses, hi, lo, residual, direction, product, correction, coarse, steps, ratios,
+                   scratch);
     if (is_last) break;
-    context.launch({"vsm.cl", "measure_areas"}, ClRange(s.triangles), s.triangles, corners, corner_jumps, hi, lo, areas);
+    context.launch(kernel("measure_areas"), ClRange(s.triangles), s.triangles, corners, corner_jumps, hi, lo, areas);
     if (options.stop_spread_change > 0) {
       const std::vector<float> now = context.download(areas);
       auto first = now.begin();
@@ -302,7 +409,7 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
         is_last &= iterations[k] == options.iterations;
       }
       const auto begin = frozen.begin() + s.chart_begin[k] / kSlice;
-      std::fill(begin, begin + padded(static_cast<int>(charts[k].positions.size())) / kSlice, is_stopped[k] ? 1 : 0);
+      std::fill(begin, begin + padded(static_cast<int>(charts[k].positions.size()), kSlice) / kSlice, is_stopped[k] ? 1 : 0);
     }
     context.write(frozen_slices, frozen);
   }
