@@ -16,6 +16,10 @@
 namespace skeletex {
 namespace {
 
+/// Work-items of a group where the caller leaves it open. Drivers choose by the number of work-items, and one that
+/// compiles for every size of group (PoCL) would compile again for every mesh.
+constexpr std::size_t kGroupSize = 64;
+
 /// The OpenCL codes that a user can meet, in words.
 std::string describe(cl_int code) {
   switch (code) {
@@ -260,16 +264,15 @@ void ClContext::check_argument(cl_int code, const ClKernelName& name, unsigned i
 
 void ClContext::enqueue(const ::cl::Kernel& kernel, const ClKernelName& name, const ClRange& range) {
   if (range.global[0] == 0 || range.global[1] == 0) return;
-  std::array<std::size_t, 2> global = range.global;
-  const bool has_local = range.local[0] > 0;
-  if (has_local)
-    for (int d = 0; d < 2; ++d) global[d] = (global[d] + range.local[d] - 1) / range.local[d] * range.local[d];
+  std::array<std::size_t, 2> global = range.global, local = range.local;
+  if (local[0] == 0) local = {work_group_size(name, kGroupSize), 1};
+  for (int d = 0; d < 2; ++d) global[d] = (global[d] + local[d] - 1) / local[d] * local[d];
   ::cl::Event event;
-  const cl_int code = queue_.enqueueNDRangeKernel(kernel, ::cl::NullRange, ::cl::NDRange(global[0], global[1]),
-                                                  has_local ? ::cl::NDRange(range.local[0], range.local[1]) : ::cl::NullRange, nullptr, &event);
+  const cl_int code = queue_.enqueueNDRangeKernel(kernel, ::cl::NullRange, ::cl::NDRange(global[0], global[1]), ::cl::NDRange(local[0], local[1]),
+                                                  nullptr, &event);
   if (code == CL_INVALID_WORK_GROUP_SIZE)
     throw DeviceError(fmt::format("{}: kernel {} cannot run in work-groups of {} x {} on {}; ask ClContext::work_group_size", name.file, name.kernel,
-                                  range.local[0], range.local[1], info_.name));
+                                  local[0], local[1], info_.name));
   check(code, fmt::format("{}: launching {}", name.file, name.kernel));
   pending_.push_back({fmt::format("{}:{}", name.file, name.kernel), event});
   if (pending_.size() >= 1024) collect_events();

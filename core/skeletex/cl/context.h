@@ -50,8 +50,8 @@ struct ClKernelName {
   std::string_view options = "";
 };
 
-/// Global and local size of a launch. A local size of 0 leaves it to the driver; otherwise the global size is rounded
-/// up to a multiple of it, so that every kernel tests its bounds first.
+/// Global and local size of a launch. A local size of 0 leaves it to the context, which takes groups of 64 x 1. The global size
+/// is rounded up to a multiple of it, so every kernel tests its bounds first.
 struct ClRange {
   std::array<std::size_t, 2> global{1, 1};
   std::array<std::size_t, 2> local{0, 0};
