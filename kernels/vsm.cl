@@ -173,7 +173,7 @@ kernel VSM_GROUP void invert_coarse(int charts, global int* restrict queue, glob
     for (int i = begin + lane; i < end; i += lanes) largest = fmax(largest, (float)row_exponents[i]);
     largest = reduce_group(scratch, largest, 1);
     for (int i = begin + lane; i < end; i += lanes) {
-      const int exponent = max(row_exponents[i] - (int)largest, -220);
+      const int exponent = max(row_exponents[i] - (int)largest, -260) + 80;
       roots[i] = ldexp(sqrt(exponent & 1 ? 2.0f * sums[i] : sums[i]), exponent >> 1);
     }
     VSM_BARRIER();
@@ -263,13 +263,14 @@ kernel VSM_GROUP void solve_charts(int charts, float tolerance, int max_steps, i
 
     // energy: residual times preconditioned residual; norm: this work-item's part of the same without the coarse half.
     int step = 0, is_going = 1, is_stuck = 0;
-    float energy = 1.0f, norm = 0.0f, ratio = 0.0f;
+    // Both in units of the residual's largest entry at the last start, because entries are as far apart as weights are.
+    float energy = 1.0f, norm = 0.0f, ratio = 0.0f, unit = 1.0f;
     while (is_going) {
       int is_restart = 0;
       if (step % check_steps == 0) {
         // The correction goes to the map; the rounding error of the sum is kept in `lo`.
         for (int i = 2 * begin + lane; i < 2 * end; i += lanes) {
-          const float change = lo[i] + correction[i] / roots[i / 2];
+          const float change = lo[i] + correction[i] * (unit / roots[i / 2]);
           const float sum = hi[i] + change;
           const float part = sum - hi[i];
           lo[i] = (hi[i] - (sum - part)) + (change - part);
@@ -279,7 +280,7 @@ kernel VSM_GROUP void solve_charts(int charts, float tolerance, int max_steps, i
         VSM_BARRIER();
         // The true residual goes to `product`, but only in the rows that are not good enough yet: without this, rows of
         // large weight, whose rounding errors outweigh all of a row of tiny weight, would blind the method to it.
-        float true_norm = 0.0f;
+        float largest = 0.0f;
         ratio = 0.0f;
         for (int i = begin + lane; i < end; i += lanes) {
           const float u_hi = hi[2 * i], u_lo = lo[2 * i], v_hi = hi[2 * i + 1], v_lo = lo[2 * i + 1];
@@ -302,18 +303,26 @@ kernel VSM_GROUP void solve_charts(int charts, float tolerance, int max_steps, i
           rv = ratio_v > 0.1f * tolerance ? rv * roots[i] : 0.0f;
           product[2 * i] = ru;
           product[2 * i + 1] = rv;
-          true_norm += ru * ru + rv * rv / v_parts[i];
+          largest = fmax(largest, fmax(fabs(ru), fabs(rv)));
         }
         ratio = reduce_group(scratch, ratio, 1);
+        largest = reduce_group(scratch, largest, 1);
+        float true_norm = 0.0f;
+        for (int i = begin + lane; i < end; i += lanes) {
+          const float ru = product[2 * i] / largest, rv = product[2 * i + 1] / largest;
+          true_norm += ru * ru + rv * rv / v_parts[i];
+        }
         const float expected = reduce_group(scratch, norm, 0), found = reduce_group(scratch, true_norm, 0);
-        is_going = ratio > tolerance && step < max_steps && found > 0.0f;
+        const float change = largest / unit;
+        is_going = ratio > tolerance && step < max_steps && largest > 0.0f;
         // Go on as long as the recursive residual says the same as the true one, else start again from the true one.
-        is_restart = is_stuck || !(found < 4.0f * expected);
+        is_restart = is_stuck || !(found * change * change < 4.0f * expected);
         if (is_restart) {
           is_stuck = 0;
+          unit = largest;
           norm = true_norm;
           for (int i = 2 * begin + lane; i < 2 * end; i += lanes) {
-            residual[i] = product[i];
+            residual[i] = product[i] / unit;
             direction[i] = 0.0f;
           }
           VSM_BARRIER();
