@@ -25,6 +25,7 @@ void add_segment_command(CLI::App& program);
 void add_validate_command(CLI::App& program);
 void add_inspect_command(CLI::App& program);
 void add_devices_command(CLI::App& program);
+void add_render_command(CLI::App& program);
 
 /// Exit code of the process when what a command found is bad news, but no error: `throw CLI::RuntimeError(kExitBad)`.
 constexpr int kExitBad = 1;

@@ -50,6 +50,7 @@ int run(int argc, char** argv) {
   program.formatter(std::make_shared<HelpFormatter>());
   add_encode_command(program);
   add_reconstruct_command(program);
+  add_render_command(program);
   add_metro_command(program);
   add_segment_command(program);
   add_validate_command(program);

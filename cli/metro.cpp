@@ -7,12 +7,12 @@
 #include <iterator>
 #include <memory>
 
-#include "colours.h"
 #include "command.h"
 #include "progress_bar.h"
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/model/error.h"
+#include "skeletex/render/colours.h"
 #include "table.h"
 
 namespace skeletex::cli {

@@ -3,13 +3,13 @@
 
 #include <memory>
 
-#include "colours.h"
 #include "command.h"
 #include "progress_bar.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/model/error.h"
 #include "skeletex/model/texture.h"
+#include "skeletex/render/colours.h"
 #include "skeletex/segment/segment_mesh.h"
 #include "table.h"
 

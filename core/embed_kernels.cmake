@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# Writes OUTPUT, a C++ file with the text of every file of the list FILES.
+# Writes OUTPUT, a C++ file whose function FUNCTION gives the names and texts of the list FILES.
 set(arrays "")
 set(entries "")
 set(index 0)
@@ -19,6 +19,6 @@ namespace {
 ${arrays}const EmbeddedKernelFile kFiles[] = {
 ${entries}};
 }  // namespace
-std::span<const EmbeddedKernelFile> embedded_kernel_files() { return kFiles; }
+std::span<const EmbeddedKernelFile> ${FUNCTION}() { return kFiles; }
 }  // namespace skeletex
 ")

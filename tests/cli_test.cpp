@@ -333,6 +333,39 @@ TEST_F(Program, NamesTheNearestBone) {
                  {"no bone \"" + name + "x\"", "did you mean " + name});
 }
 
+TEST_F(Program, DrawsModelsAndMeshesInEveryMode) {
+  std::ofstream(folder_ / "y.json") << R"({"name": "y", "mesh": "y.ply", "skeleton": "y.skeleton.json", "credits": "", "view": {"azimuth": 60}})";
+  const std::vector<std::vector<std::string>> drawn{{"y.skx.exr"},
+                                                    {"y.skx.exr", "--mode", "segments", "--show-skeleton"},
+                                                    {"y.skx.exr", "--mode", "checker", "--lattice", "32", "--flat"},
+                                                    {"y.skx.exr", "--mode", "map"},
+                                                    {"y.skx.exr", "--mode", "layout"},
+                                                    {"y.ply", "--mode", "normals", "--background", "transparent"},
+                                                    {"y.ply", "--mode", "error", "--against", "y.ply", "--wireframe", "--views", "2"},
+                                                    {"y.json", "--mode", "segments"}};
+  for (std::vector<std::string> arguments : drawn) {
+    arguments.insert(arguments.begin(), "render");
+    for (const char* more : {"-o", "a.png", "--size", "64x48", "--samples", "1", "--json", "a.json"}) arguments.push_back(more);
+    const Outcome outcome = run(arguments);
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_TRUE(text_of(folder_ / "a.png").starts_with("\x89PNG")) << arguments[1];
+    EXPECT_EQ(nlohmann::json::parse(text_of(folder_ / "a.json")).at("picture"), "a.png");
+    fs::remove(folder_ / "a.png");
+  }
+  expect_refused(2, {"render", "y.ply", "-o", "a.jpg"}, {".png"});
+  expect_refused(2, {"render", "y.ply", "-o", "a.png", "--mode", "map"}, {"a mesh has none"});
+  expect_refused(2, {"render", "y.ply", "-o", "a.png", "--mode", "segments"}, {"--skeleton"});
+  expect_refused(2, {"render", "y.ply", "-o", "a.png", "--mode", "error"}, {"--against"});
+  expect_refused(2, {"render", "y.ply", "-o", "a.png", "--mode", "shadde"}, {"did you mean shaded?"});
+  expect_refused(2, {"render", "y.ply", "-o", "a.png", "--size", "64"}, {"1200x900"});
+  expect_refused(2, {"render", "y.ply", "-o", "a.png", "--background", "whitish"}, {"#rrggbb"});
+  expect_refused(2, {"render", "y.ply", "-o", "a.png", "--up", "0,1"}, {"0,1,0"});
+  expect_refused(1, {"render", "y.ply", "-o", "no/a.png"}, {"no/a.png"});
+  std::ofstream(folder_ / "view.json") << R"({"azimut": 3})";
+  expect_refused(1, {"render", "y.ply", "-o", "a.png", "--camera", "view.json"}, {"view.json", "azimut"});
+  for (const char* name : {"y.json", "a.json", "view.json"}) fs::remove(folder_ / name);
+}
+
 TEST_F(Program, EndsWithOneOnInputThatIsMissingOrForeign) {
   std::ofstream(folder_ / "broken.json") << "{\"nodes\": [";
   std::ofstream(folder_ / "text.exr") << "no image at all, though long enough to be read as one";

@@ -55,6 +55,21 @@ void displace_posed(ClContext& context, const DeviceLattice& lattice, const Devi
                    bind.columns, pose.patches, pose.rows, pose.columns, lattice.texels.x, lattice.texels.y, lattice.texels.z, points.x, points.y, points.z);
 }
 
+void place_shared_vertices(const SkeletexModel& model, const PosedWalls& walls, const Lattice& lattice, DistanceRule rule, std::vector<Vec3>& positions) {
+  const Walls bind(model.skeleton);
+  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
+    for (const int end : {0, 1}) {
+      if (lattice.poles[bone][end] < 0) continue;
+      const Rectangle& rectangle = model.patches[bone].rectangle;
+      const std::size_t at = static_cast<std::size_t>(rectangle.y + (end == 0 ? 0 : rectangle.height - 1)) * model.texture.width + rectangle.x;
+      const Vec3 texel(model.texture.along[at], model.texture.around[at], model.texture.out[at]);
+      positions[lattice.poles[bone][end]] = posed_point(model, bind, walls, bone, end, 0, texel, rule);
+    }
+  for (int a = 0; a < static_cast<int>(model.arcs.size()); ++a)
+    for (int i = 0; i < static_cast<int>(model.arcs[a].samples.size()); ++i) positions[lattice.first_sample[a] + i] = walls.sample_point(a, i, rule);
+  for (int c = 0; c < static_cast<int>(model.corners.size()); ++c) positions[lattice.first_corner + c] = walls.corner_point(c, rule);
+}
+
 TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model, const Skeleton& posed, DistanceRule rule) {
   TriangleMesh mesh = reconstruct_mesh(context, model);
   const Lattice lattice = number_lattice(model);
@@ -67,18 +82,7 @@ TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model, co
   displace_posed(context, device, pose, points);
   download_points(context, points, pose.origin, mesh.positions);
 
-  // Poles, samples and corners are few, and shared by several patches: on the host, in double.
-  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
-    for (const int end : {0, 1}) {
-      if (lattice.poles[bone][end] < 0) continue;
-      const Rectangle& rectangle = model.patches[bone].rectangle;
-      const std::size_t at = static_cast<std::size_t>(rectangle.y + (end == 0 ? 0 : rectangle.height - 1)) * model.texture.width + rectangle.x;
-      const Vec3 texel(model.texture.along[at], model.texture.around[at], model.texture.out[at]);
-      mesh.positions[lattice.poles[bone][end]] = posed_point(model, bind, walls, bone, end, 0, texel, rule);
-    }
-  for (int a = 0; a < static_cast<int>(model.arcs.size()); ++a)
-    for (int i = 0; i < static_cast<int>(model.arcs[a].samples.size()); ++i) mesh.positions[lattice.first_sample[a] + i] = walls.sample_point(a, i, rule);
-  for (int c = 0; c < static_cast<int>(model.corners.size()); ++c) mesh.positions[lattice.first_corner + c] = walls.corner_point(c, rule);
+  place_shared_vertices(model, walls, lattice, rule, mesh.positions);
   return mesh;
 }
 

@@ -4,6 +4,7 @@
 
 #include "skeletex/model/posed_frame.h"
 #include "skeletex/reconstruct/displace.h"
+#include "skeletex/reconstruct/lattice.h"
 
 namespace skeletex {
 
@@ -11,6 +12,10 @@ namespace skeletex {
 /// positions. So all poses of a model share their triangles, and every pose is as closed as the bind pose.
 /// \param posed  apply_pose(model.skeleton, ...)
 TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model, const Skeleton& posed, DistanceRule rule = DistanceRule::kFromBone);
+
+/// Poles, seam samples and corners of a pose: few, and shared by several patches, so they are made on the host in double.
+/// \param positions  by lattice vertex, world; inner vertices are left as they are
+void place_shared_vertices(const SkeletexModel& model, const PosedWalls& walls, const Lattice& lattice, DistanceRule rule, std::vector<Vec3>& positions);
 
 /// A plane of constant texels (0, 0, offset) in bone tangent space (paper, Figure 7): per chosen bone all rows and
 /// columns of its patch as a mesh that is closed around the bone and open at its ends.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "colours.h"
+#include "skeletex/render/colours.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace skeletex::cli {
+namespace skeletex {
 namespace {
 
 unsigned char to_byte(double value) { return static_cast<unsigned char>(std::lround(255 * std::clamp(value, 0.0, 1.0))); }
@@ -55,4 +55,4 @@ VertexColour viridis(double value) {
 
 std::string hex(VertexColour colour) { return fmt::format("#{:02x}{:02x}{:02x}", colour.r, colour.g, colour.b); }
 
-}  // namespace skeletex::cli
+}  // namespace skeletex

@@ -4,7 +4,7 @@
 
 #include "skeletex/io/mesh_file.h"
 
-namespace skeletex::cli {
+namespace skeletex {
 
 /// A colour for the i-th bone, well apart from those of the bones before it; always the same one.
 VertexColour bone_colour(int bone);
@@ -13,4 +13,4 @@ VertexColour viridis(double value);
 /// "#1f77b4"
 std::string hex(VertexColour colour);
 
-}  // namespace skeletex::cli
+}  // namespace skeletex

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/render/camera.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "skeletex/model/error.h"
+
+namespace skeletex {
+namespace {
+
+constexpr double kMargin = 0.04;
+constexpr double kRadians = std::numbers::pi / 180;
+
+Vec3 vector_of(const nlohmann::json& json, const std::string& where) {
+  if (!json.is_array() || json.size() != 3 || !std::all_of(json.begin(), json.end(), [](const auto& x) { return x.is_number(); }))
+    throw IoError(fmt::format("{} must be three numbers", where));
+  return {json[0].get<double>(), json[1].get<double>(), json[2].get<double>()};
+}
+
+}  // namespace
+
+View parse_view(const nlohmann::json& json, const std::string& source) {
+  if (!json.is_object()) throw IoError(fmt::format("{}: a view is an object like {{\"azimuth\": 30, \"elevation\": 15}}", source));
+  View view;
+  for (const auto& [key, value] : json.items()) {
+    const std::string where = fmt::format("{}: \"{}\"", source, key);
+    const auto number = [&](double lowest, double highest) {
+      if (!value.is_number()) throw IoError(where + " must be a number");
+      const double x = value.get<double>();
+      if (!(x >= lowest && x <= highest)) throw IoError(fmt::format("{} is {}, not within {} to {}", where, x, lowest, highest));
+      return x;
+    };
+    if (key == "azimuth") view.azimuth_deg = number(-3600, 3600);
+    else if (key == "elevation") view.elevation_deg = number(-90, 90);
+    else if (key == "fov") view.fov_deg = number(0, 120);
+    else if (key == "zoom") view.zoom = number(0.01, 1000);
+    else if (key == "up") view.up = vector_of(value, where);
+    else if (key == "front") view.front = vector_of(value, where);
+    else if (key == "target") view.target = vector_of(value, where);
+    else if (key == "eye") view.eye = vector_of(value, where);
+    else throw IoError(fmt::format("{} is no part of a view; there are azimuth, elevation, fov, zoom, up, front, target and eye", where));
+  }
+  return view;
+}
+
+Camera fit_camera(const View& view, std::span<const Vec3> points, int width, int height) {
+  if (!(view.up.norm() > 0)) throw InputError("the view's up direction has no length");
+  const Vec3 up = view.up.normalized();
+  Vec3 front = view.front - up * up.dot(view.front);
+  if (!(front.norm() > 1e-9 * view.front.norm())) throw InputError("the view's front direction must not be parallel to its up direction");
+  front.normalize();
+  const Vec3 left = up.cross(front);
+  Vec3 lower = Vec3::Constant(std::numeric_limits<double>::infinity()), upper = -lower;
+  for (const Vec3& p : points) {
+    lower = lower.cwiseMin(p);
+    upper = upper.cwiseMax(p);
+  }
+  if (points.empty()) lower = upper = Vec3::Zero();
+  const double radius = std::max(0.5 * (upper - lower).norm(), 1e-12);
+
+  Camera camera;
+  const double azimuth = view.azimuth_deg * kRadians, elevation = view.elevation_deg * kRadians;
+  const Vec3 sideways = std::cos(azimuth) * front + std::sin(azimuth) * left;
+  camera.back = std::cos(elevation) * sideways + std::sin(elevation) * up;
+  Vec3 target = view.target.value_or(0.5 * (lower + upper));
+  if (view.eye) {
+    camera.back = *view.eye - target;
+    if (!(camera.back.norm() > 0)) throw InputError("the view's eye lies on its target");
+    camera.back.normalize();
+  }
+  camera.right = up.cross(camera.back);
+  if (camera.right.norm() < 1e-9) camera.right = -sideways.cross(up);  // from straight above or below
+  camera.right.normalize();
+  camera.up = camera.back.cross(camera.right);
+  camera.is_orthographic = view.fov_deg == 0;
+  const double aspect = static_cast<double>(width) / height;
+  const double half = camera.is_orthographic ? 1 : std::tan(0.5 * view.fov_deg * kRadians);
+  camera.tan_x = aspect >= 1 ? half * aspect : half;
+  camera.tan_y = aspect >= 1 ? half : half / aspect;
+
+  // Extents as the camera sees them, about the target.
+  const auto seen = [&](const Vec3& p) { return Vec3(camera.right.dot(p - target), camera.up.dot(p - target), camera.back.dot(p - target)); };
+  const double usable = 1 - 2 * kMargin;
+  if (view.eye) {
+    camera.eye = *view.eye;
+    if (camera.is_orthographic) {
+      double scale = 1e-12;
+      for (const Vec3& p : points) scale = std::max({scale, std::abs(seen(p).x()) / camera.tan_x, std::abs(seen(p).y()) / camera.tan_y});
+      camera.tan_x *= scale / usable;
+      camera.tan_y *= scale / usable;
+    }
+  } else if (camera.is_orthographic) {
+    Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
+    for (const Vec3& p : points) {
+      low = low.cwiseMin(seen(p));
+      high = high.cwiseMax(seen(p));
+    }
+    if (points.empty()) low = high = Vec3::Zero();
+    if (!view.target) target += 0.5 * (low.x() + high.x()) * camera.right + 0.5 * (low.y() + high.y()) * camera.up;
+    const double scale = std::max({0.5 * (high.x() - low.x()) / camera.tan_x, 0.5 * (high.y() - low.y()) / camera.tan_y, 1e-12}) / usable / view.zoom;
+    camera.tan_x *= scale;
+    camera.tan_y *= scale;
+    camera.eye = target + 3 * radius * camera.back;
+  } else {
+    // The pyramid through a point meets the axis at z + |x| / tan. Its four sides fix the tightest eye and its shift.
+    double distance = 0;
+    for (int pass = 0; pass < 8; ++pass) {
+      double left_most = -1e300, right_most = -1e300, top = -1e300, bottom = -1e300;
+      for (const Vec3& p : points) {
+        const Vec3 q = seen(p);
+        right_most = std::max(right_most, q.x() + q.z() * camera.tan_x * usable);
+        left_most = std::max(left_most, -q.x() + q.z() * camera.tan_x * usable);
+        top = std::max(top, q.y() + q.z() * camera.tan_y * usable);
+        bottom = std::max(bottom, -q.y() + q.z() * camera.tan_y * usable);
+      }
+      if (points.empty()) left_most = right_most = top = bottom = radius;
+      if (!view.target) target += 0.5 * (right_most - left_most) * camera.right + 0.5 * (top - bottom) * camera.up;
+      const double across = view.target ? std::max(right_most, left_most) : 0.5 * (right_most + left_most);
+      const double along = view.target ? std::max(top, bottom) : 0.5 * (top + bottom);
+      distance = std::max(across / (camera.tan_x * usable), along / (camera.tan_y * usable));
+      if (view.target) break;
+    }
+    camera.eye = target + distance * camera.back;
+    camera.tan_x /= view.zoom;
+    camera.tan_y /= view.zoom;
+  }
+  double nearest = std::numeric_limits<double>::infinity(), farthest = 0;
+  for (const Vec3& p : points) {
+    const double depth = camera.back.dot(camera.eye - p);
+    nearest = std::min(nearest, depth);
+    farthest = std::max(farthest, depth);
+  }
+  camera.far = std::max(farthest, radius) + 0.05 * radius;
+  camera.near = std::max(std::min(nearest, camera.far) - 0.05 * radius, 1e-3 * camera.far);
+  return camera;
+}
+
+Eigen::Matrix4d view_projection(const Camera& camera, const Vec3& origin) {
+  Eigen::Matrix4d view = Eigen::Matrix4d::Identity();
+  view.row(0).head<3>() = camera.right;
+  view.row(1).head<3>() = camera.up;
+  view.row(2).head<3>() = camera.back;
+  view.col(3).head<3>() = view.topLeftCorner<3, 3>() * (origin - camera.eye);
+  Eigen::Matrix4d projection = Eigen::Matrix4d::Zero();
+  const double depth = camera.far - camera.near;
+  projection(0, 0) = 1 / camera.tan_x;
+  projection(1, 1) = 1 / camera.tan_y;
+  if (camera.is_orthographic) {
+    projection(2, 2) = -2 / depth;
+    projection(2, 3) = -(camera.far + camera.near) / depth;
+    projection(3, 3) = 1;
+  } else {
+    projection(2, 2) = -(camera.far + camera.near) / depth;
+    projection(2, 3) = -2 * camera.far * camera.near / depth;
+    projection(3, 2) = -1;
+  }
+  return projection * view;
+}
+
+}  // namespace skeletex

@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/render/draw.h"
+
+#define GL_GLEXT_PROTOTYPES
+#include <GL/glcorearb.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "skeletex/model/error.h"
+
+namespace skeletex {
+namespace {
+
+constexpr int kShadowSize = 1024;
+constexpr int kKeyShadowSize = 2048;
+constexpr int kBatch = 8;  // lights per pass: MAX_LIGHTS of light.frag
+constexpr std::array<float, 3> kAmbient{0.13f, 0.13f, 0.14f};
+
+/// Vertex array state, which core profiles want even where there are no attributes.
+class VertexArray {
+ public:
+  VertexArray() { glCreateVertexArrays(1, &id_); }
+  ~VertexArray() { glDeleteVertexArrays(1, &id_); }
+  VertexArray(const VertexArray&) = delete;
+  VertexArray& operator=(const VertexArray&) = delete;
+  void bind() const { glBindVertexArray(id_); }
+  unsigned id() const { return id_; }
+
+ private:
+  unsigned id_ = 0;
+};
+
+void set_matrix(int location, const Eigen::Matrix4d& matrix) {
+  const Eigen::Matrix4f values = matrix.cast<float>();
+  glUniformMatrix4fv(location, 1, GL_FALSE, values.data());
+}
+void set_vector(int location, const Vec3& v) {
+  glUniform3f(location, static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z()));
+}
+
+struct Light {
+  Vec3 direction;  ///< towards the light
+  Vec3 intensity;
+};
+
+Light key_light(const Camera& camera) {
+  return {(-0.55 * camera.right + 0.65 * camera.up + 0.75 * camera.back).normalized(), Vec3(0.90, 0.88, 0.83)};
+}
+
+/// Directions spread evenly (Fibonacci) over the half of the sphere that is up in the picture, so that pictures of models
+/// look alike whatever way their own up is, and weakly a little below: light that a floor would send back.
+std::vector<Light> sky_light(const Camera& camera, int count) {
+  std::vector<Light> lights;
+  double total = 0;
+  for (int i = 0; i < count; ++i) {
+    const double height = (i + 0.5) / count * 1.35 - 0.35;
+    const double angle = 2 * std::numbers::pi * 0.6180339887498949 * i, radius = std::sqrt(1 - height * height);
+    const Vec3 direction = radius * std::cos(angle) * camera.right + height * camera.up + radius * std::sin(angle) * camera.back;
+    const double weight = height > 0 ? 1 : 0.45;
+    lights.push_back({direction, weight * Vec3(0.94, 0.98, 1.06)});
+    total += weight * std::max(0.0, direction.dot(camera.up));
+  }
+  for (Light& light : lights) light.intensity *= 0.6 / std::max(total, 1e-9);
+  return lights;
+}
+
+struct Sphere {
+  Vec3 centre = Vec3::Zero();
+  double radius = 1;
+};
+
+Sphere bounding_sphere(const GpuSurface& surface) {
+  BoundingBox box{Vec3::Constant(1e300), Vec3::Constant(-1e300)};
+  std::vector<float> values(3 * static_cast<std::size_t>(surface.vertex_count));
+  surface.positions.read(values.size() * sizeof(float), values.data());
+  for (std::size_t i = 0; i < values.size(); i += 3) {
+    const Vec3 p(values[i], values[i + 1], values[i + 2]);
+    box.lower = box.lower.cwiseMin(p);
+    box.upper = box.upper.cwiseMax(p);
+  }
+  if (values.empty()) return {};
+  return {box.centre(), std::max(0.5 * box.diagonal(), 1e-12)};
+}
+
+Eigen::Matrix4d light_projection(const Sphere& bounds, const Vec3& direction) {
+  const Vec3 any = std::abs(direction.x()) < 0.7 ? Vec3::UnitX() : Vec3::UnitY();
+  const Vec3 right = any.cross(direction).normalized(), up = direction.cross(right);
+  const double scale = 1 / (1.01 * bounds.radius);
+  Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
+  matrix.row(0).head<3>() = scale * right;
+  matrix.row(1).head<3>() = scale * up;
+  matrix.row(2).head<3>() = -scale * direction;
+  matrix.col(3).head<3>() = -matrix.topLeftCorner<3, 3>() * bounds.centre;
+  return matrix;
+}
+
+/// What some lights see: a depth map each.
+struct ShadowMaps {
+  ShadowMaps(int side, int layers) : size(side), depths(GL_DEPTH_COMPONENT32F, side, side, layers) {
+    for (int i = 0; i < layers; ++i) framebuffers.emplace_back(std::span<const unsigned>(), depths.id(), i);
+  }
+  void draw(GlContext& context, const GpuSurface& surface, std::span<const Light> lights, const Sphere& bounds) const {
+    glViewport(0, 0, size, size);
+    glEnable(GL_DEPTH_TEST);
+    glDisable(GL_BLEND);
+    glUseProgram(context.program({"shadow.vert", "shadow.frag"}));
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+      framebuffers[i].bind();
+      glClear(GL_DEPTH_BUFFER_BIT);
+      set_matrix(0, light_projection(bounds, lights[i].direction));
+      glDrawElements(GL_TRIANGLES, 3 * surface.triangle_count, GL_UNSIGNED_INT, nullptr);
+    }
+  }
+  int size;
+  GlTexture depths;
+  std::vector<GlFramebuffer> framebuffers;
+};
+
+void draw_geometry(GlContext& context, const GpuSurface& surface, const SurfacePaint& paint, const Camera& camera, const DrawOptions& options) {
+  glEnable(GL_DEPTH_TEST);
+  glDisable(GL_BLEND);
+  glDisable(GL_CULL_FACE);
+  glClearColor(0, 0, 0, 0);
+  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  glUseProgram(context.program({"surface.vert", "surface.frag"}));
+  surface.positions.bind(0);
+  surface.indices.bind(1);
+  surface.normals.bind(2);
+  // Every binding that the shader names must hold a buffer, read or not.
+  (paint.colours.id() != 0 ? paint.colours : surface.indices).bind(3);
+  (paint.corner_uv.id() != 0 ? paint.corner_uv : surface.positions).bind(4);
+  set_matrix(0, view_projection(camera, surface.origin));
+  glUniform1i(1, options.is_flat ? 1 : 0);
+  glUniform1i(2, static_cast<int>(paint.paint));
+  glUniform3f(3, paint.base[0], paint.base[1], paint.base[2]);
+  glUniform1f(4, static_cast<float>(options.wire_pixels * options.samples));
+  glUniform1f(5, paint.paint == Paint::kNormal ? 0.0f : static_cast<float>(options.lighting));
+  glUniform3f(6, 0.02f, 0.025f, 0.03f);
+  glDrawArrays(GL_TRIANGLES, 0, 3 * surface.triangle_count);
+}
+
+}  // namespace
+
+GlBuffer upload_colours(std::span<const VertexColour> colours) {
+  std::vector<std::array<unsigned char, 4>> bytes;
+  bytes.reserve(colours.size());
+  for (const auto& [r, g, b] : colours) bytes.push_back({r, g, b, 255});
+  return gl_buffer(bytes);
+}
+
+Image draw(GlContext& context, const GpuSurface& surface, const SurfacePaint& paint, const Camera& camera, const DrawOptions& options) {
+  GLint largest = 0;
+  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);
+  const int samples = std::max(1, options.samples), width = options.width * samples, height = options.height * samples;
+  if (width > largest || height > largest)
+    throw InputError(fmt::format("a picture of {} x {} with {} samples is larger than this device can draw ({} pixels a side); ask for a smaller one",
+                                 options.width, options.height, samples, largest));
+  const VertexArray array;
+  array.bind();
+  const GlTexture albedo(GL_RGBA16F, width, height), normals(GL_RGBA16F, width, height), depth(GL_DEPTH_COMPONENT32F, width, height);
+  const GlTexture irradiance(GL_RGBA32F, width, height);
+  const GlFramebuffer geometry(std::array{albedo.id(), normals.id()}, depth.id());
+  const GlFramebuffer lighting(std::array{irradiance.id()}, 0);
+  geometry.bind();
+  glViewport(0, 0, width, height);
+  draw_geometry(context, surface, paint, camera, options);
+  lighting.bind();
+  glClear(GL_COLOR_BUFFER_BIT);
+
+  if (options.lighting > 0 && paint.paint != Paint::kNormal) {
+    const Sphere bounds = bounding_sphere(surface);
+    const Eigen::Matrix4d unprojection = view_projection(camera, surface.origin).inverse();
+    glEnableVertexArrayAttrib(array.id(), 0);
+    glVertexArrayVertexBuffer(array.id(), 0, surface.positions.id(), 0, 3 * sizeof(float));
+    glVertexArrayAttribFormat(array.id(), 0, 3, GL_FLOAT, GL_FALSE, 0);
+    glVertexArrayAttribBinding(array.id(), 0, 0);
+    glVertexArrayElementBuffer(array.id(), surface.indices.id());
+    const auto shine = [&](std::span<const Light> lights, const ShadowMaps& maps, int taps, float spread) {
+      maps.draw(context, surface, lights, bounds);
+      lighting.bind();
+      glViewport(0, 0, width, height);
+      glDisable(GL_DEPTH_TEST);
+      glEnable(GL_BLEND);
+      glBlendFunc(GL_ONE, GL_ONE);
+      glUseProgram(context.program({"screen.vert", "light.frag"}));
+      glBindTextureUnit(0, normals.id());
+      glBindTextureUnit(1, depth.id());
+      glBindTextureUnit(2, maps.depths.id());
+      set_matrix(0, unprojection);
+      glUniform1i(1, static_cast<int>(lights.size()));
+      glUniform1f(2, static_cast<float>((static_cast<float>(taps) * spread + 1) * 2.6 * bounds.radius / maps.size));
+      glUniform1i(3, taps);
+      glUniform1f(4, spread);
+      for (int i = 0; i < static_cast<int>(lights.size()); ++i) {
+        set_matrix(8 + i, light_projection(bounds, lights[i].direction));
+        set_vector(16 + i, lights[i].direction);
+        set_vector(24 + i, lights[i].intensity);
+      }
+      glDrawArrays(GL_TRIANGLES, 0, 3);
+    };
+    shine(std::array{key_light(camera)}, ShadowMaps(kKeyShadowSize, 1), 2, 1.5f);
+    const std::vector<Light> sky = sky_light(camera, options.sky_lights);
+    const ShadowMaps maps(kShadowSize, kBatch);
+    for (std::size_t i = 0; i < sky.size(); i += kBatch) shine(std::span(sky).subspan(i, std::min<std::size_t>(kBatch, sky.size() - i)), maps, 0, 0);
+    glDisable(GL_BLEND);
+  }
+
+  const GlTexture picture(GL_RGBA32F, options.width, options.height);
+  const GlFramebuffer resolved(std::array{picture.id()}, 0);
+  resolved.bind();
+  glViewport(0, 0, options.width, options.height);
+  glDisable(GL_DEPTH_TEST);
+  glUseProgram(context.program({"screen.vert", "resolve.frag"}));
+  glBindTextureUnit(0, albedo.id());
+  glBindTextureUnit(1, normals.id());
+  glBindTextureUnit(2, irradiance.id());
+  glUniform1i(0, samples);
+  glUniform3f(1, kAmbient[0], kAmbient[1], kAmbient[2]);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+
+  Image image = make_image(options.width, options.height), flipped = image;
+  glReadPixels(0, 0, options.width, options.height, GL_RGBA, GL_FLOAT, flipped.rgba.data());
+  check_gl("drawing");
+  for (int y = 0; y < image.height; ++y) std::copy_n(flipped.at(0, image.height - 1 - y), 4 * static_cast<std::size_t>(image.width), image.at(0, y));
+  return image;
+}
+
+}  // namespace skeletex

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/render/gpu_model.h"
+
+#define GL_GLEXT_PROTOTYPES
+#include <GL/glcorearb.h>
+
+#include <algorithm>
+
+#include "skeletex/model/frame.h"
+#include "skeletex/model/posed_frame.h"
+#include "skeletex/reconstruct/displace.h"
+#include "skeletex/reconstruct/pose_mesh.h"
+
+namespace skeletex {
+namespace {
+
+/// Planes behind each other, as displace.comp reads them.
+template <typename Record>
+GlBuffer upload_planes(const std::vector<Record>& records) {
+  static_assert(sizeof(Record) == 4 * sizeof(float));
+  std::vector<float> planes(4 * records.size());
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const auto values = std::bit_cast<std::array<float, 4>>(records[i]);
+    for (std::size_t k = 0; k < 4; ++k) planes[k * records.size() + i] = values[k];
+  }
+  return gl_buffer(planes);
+}
+
+}  // namespace
+
+GpuModel upload_model(const SkeletexModel& model) {
+  GpuModel device;
+  device.lattice = number_lattice(model);
+  const DisplacementTexture& texture = model.texture;
+  std::vector<std::array<float, 3>> texels(texture.along.size());
+  for (std::size_t i = 0; i < texels.size(); ++i) texels[i] = {texture.along[i], texture.around[i], texture.out[i]};
+  device.texels = GlTexture(GL_RGB32F, texture.width, texture.height);
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  glTextureSubImage2D(device.texels.id(), 0, 0, 0, texture.width, texture.height, GL_RGB, GL_FLOAT, texels.data());
+  const Walls walls(model.skeleton);
+  const FrameTables tables = frame_tables(model.skeleton, walls, model.patches, model.origin);
+  const std::vector<LatticeRow> lattice_rows = skeletex::lattice_rows(model.patches, RowChoice::kInner);
+  device.lattice_rows = gl_buffer(lattice_rows);
+  device.row_count = static_cast<int>(lattice_rows.size());
+  device.patches = gl_buffer(tables.patches);
+  device.rows = gl_buffer(tables.rows);
+  device.columns = upload_planes(tables.columns);
+  device.column_count = static_cast<int>(tables.columns.size());
+  for (const Patch& patch : model.patches) device.widest = std::max(device.widest, patch.rectangle.width);
+  check_gl("a model");
+  return device;
+}
+
+void displace(GlContext& context, const GpuModel& device, const SkeletexModel& model, const Skeleton& posed, DistanceRule rule, GpuSurface& surface) {
+  const PosedWalls walls(model, posed);
+  const PoseTables tables = pose_tables(model, walls);
+  const GlBuffer patches = gl_buffer(tables.patches), rows = gl_buffer(tables.rows), columns = upload_planes(tables.columns);
+  surface.origin = tables.origin;
+  glUseProgram(context.program({"displace.comp"}));
+  glBindTextureUnit(0, device.texels.id());
+  surface.positions.bind(0);
+  device.lattice_rows.bind(1);
+  device.patches.bind(2);
+  patches.bind(3);
+  device.rows.bind(4);
+  rows.bind(5);
+  device.columns.bind(6);
+  columns.bind(7);
+  glUniform1i(0, device.column_count);
+  glUniform1i(1, rule == DistanceRule::kFromBone ? 1 : 0);
+  glDispatchCompute((device.widest + 63) / 64, device.row_count, 1);
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+
+  std::vector<Vec3> points(device.lattice.vertex_count);
+  place_shared_vertices(model, walls, device.lattice, rule, points);
+  std::vector<std::array<float, 3>> shared;
+  for (std::size_t i = device.lattice.inner_count; i < points.size(); ++i) {
+    const Eigen::Vector3f p = (points[i] - surface.origin).cast<float>();
+    shared.push_back({p.x(), p.y(), p.z()});
+  }
+  surface.positions.write(device.lattice.inner_count * sizeof(shared[0]), shared.size() * sizeof(shared[0]), shared.data());
+  check_gl("displacing");
+  update_normals(context, surface);
+}
+
+}  // namespace skeletex
