@@ -10,9 +10,9 @@
 
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/mesh_file.h"
+#include "skeletex/io/suggestion.h"
 #include "skeletex/model/error.h"
 #include "skeletex/validate/validate_input.h"
-#include "suggestion.h"
 
 namespace skeletex::cli {
 

@@ -26,6 +26,8 @@ void add_validate_command(CLI::App& program);
 void add_inspect_command(CLI::App& program);
 void add_devices_command(CLI::App& program);
 void add_render_command(CLI::App& program);
+void add_run_command(CLI::App& program);
+void add_replay_command(CLI::App& program);
 
 /// Exit code of the process when what a command found is bad news, but no error: `throw CLI::RuntimeError(kExitBad)`.
 constexpr int kExitBad = 1;

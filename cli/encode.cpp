@@ -11,8 +11,8 @@
 #include "skeletex/encode/encode_model.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/skeleton_file.h"
+#include "skeletex/io/suggestion.h"
 #include "skeletex/model/error.h"
-#include "suggestion.h"
 #include "table.h"
 
 namespace skeletex::cli {

@@ -10,8 +10,8 @@
 
 #include "command.h"
 #include "help_formatter.h"
+#include "skeletex/io/suggestion.h"
 #include "skeletex/model/error.h"
-#include "suggestion.h"
 
 namespace skeletex::cli {
 namespace {
@@ -55,6 +55,8 @@ int run(int argc, char** argv) {
   add_segment_command(program);
   add_validate_command(program);
   add_inspect_command(program);
+  add_run_command(program);
+  add_replay_command(program);
   add_devices_command(program);
   program.footer(
       "`skeletex COMMAND --help` tells more. Exit codes: 0 done, 1 input or run, 2 usage.\n"

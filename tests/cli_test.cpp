@@ -232,7 +232,7 @@ TEST_F(Program, ReconstructsInPosesAndAnimations) {
   expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--no-distance"}, {"--pose"});
   expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--time", "1"}, {"--pose"});
   std::ofstream(folder_ / "pose.json") << nlohmann::json{{"roll", {{bone + "x", 10}}}};
-  expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--pose", "pose.json"}, {"pose.json", "no bone \"" + bone + "x\"", "did you mean \"" + bone + "\"?"});
+  expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--pose", "pose.json"}, {"pose.json", "no bone \"" + bone + "x\"", "did you mean " + bone + "?"});
   for (const char* name : {"pose.json", "animation.json", "bind.ply", "posed.ply", "again.ply"}) fs::remove(folder_ / name);
 }
 
@@ -364,6 +364,29 @@ TEST_F(Program, DrawsModelsAndMeshesInEveryMode) {
   std::ofstream(folder_ / "view.json") << R"({"azimut": 3})";
   expect_refused(1, {"render", "y.ply", "-o", "a.png", "--camera", "view.json"}, {"view.json", "azimut"});
   for (const char* name : {"y.json", "a.json", "view.json"}) fs::remove(folder_ / name);
+}
+
+TEST_F(Program, RunsAnExperimentOnTheUsersOwnModelResumesAndReplaysIt) {
+  std::ofstream(folder_ / "e.json") << R"({"name": "e", "sweep": {"size": [32, 48]}, "steps": [
+    {"name": "encode", "run": ["encode", "{mesh}", "{skeleton}", "-o", "{work}/m.skx.exr", "--size", "{size}"]},
+    {"name": "shape", "run": ["reconstruct", "{work}/m.skx.exr", "-o", "{work}/m.ply"]}],
+    "columns": {"vertices": "shape.vertices", "used": "encode.atlas.used_fraction"}})";
+  const std::vector<std::string> arguments{"run", "e.json", "--mesh", "y.ply", "--skeleton", "y.skeleton.json", "-o", "out", "--resume", "--json", "run.json"};
+  for (const int kept : {0, 2}) {
+    const Outcome outcome = run(arguments);
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    const auto report = nlohmann::json::parse(text_of(folder_ / "run.json")).at(0);
+    EXPECT_EQ(report.at("done"), 2);
+    EXPECT_EQ(report.at("kept"), kept);
+  }
+  const Outcome again = run({"replay", "out/e", "--json", "replay.json"});
+  EXPECT_EQ(again.code, 0) << again.err << again.out;
+  EXPECT_EQ(nlohmann::json::parse(text_of(folder_ / "replay.json")).at("differences").size(), 0u);
+  expect_refused(1, {"run", "e.json", "--set", "swep.size=1"}, {"swep", "did you mean sweep?"});
+  expect_refused(1, {"run", "absent.json"}, {"absent.json"});
+  expect_refused(2, {"run", "e.json", "--mesh", "y.ply"}, {"--skeleton"});
+  fs::remove_all(folder_ / "out");
+  for (const char* name : {"e.json", "run.json", "replay.json"}) fs::remove(folder_ / name);
 }
 
 TEST_F(Program, EndsWithOneOnInputThatIsMissingOrForeign) {

@@ -496,11 +496,11 @@ TEST(PoseFile, RejectsWhatItDoesNotKnowWithTheNearestName) {
     EXPECT_NE(message.find(part), std::string::npos) << text << " -> " << message;
   };
   has(R"({"rotations":{"bone1":{"axis":[0,0,1],"degrees":30}}})", "accepted");
-  has(R"({"rotation":{}})", "did you mean \"rotations\"");
-  has(R"({"rotations":{"bon1":{"axis":[0,0,1],"degrees":30}}})", "did you mean \"bone1\"");
-  has(R"({"nodes":{"center":[0,0,0]}})", "did you mean \"centre\"");
-  has(R"({"roll":{"bne2":3}})", "did you mean \"bone2\"");
-  has(R"({"rotations":{"bone1":{"axis":[0,0,1],"degree":30}}})", "did you mean \"degrees\"");
+  has(R"({"rotation":{}})", "did you mean rotations?");
+  has(R"({"rotations":{"bon1":{"axis":[0,0,1],"degrees":30}}})", "did you mean bone1?");
+  has(R"({"nodes":{"center":[0,0,0]}})", "did you mean centre?");
+  has(R"({"roll":{"bne2":3}})", "did you mean bone2?");
+  has(R"({"rotations":{"bone1":{"axis":[0,0,1],"degree":30}}})", "did you mean degrees?");
   has(R"({"rotations":{"bone1":{"axis":[0,0,0],"degrees":30}}})", "zero vector");
   has(R"({"rotations":{"bone1":{"axis":[0,0,1]}}})", "\"degrees\" is missing");
   has(R"({"rotations":{"bone1":{"quaternion":[0,0,0,0]}}})", "no length");
@@ -509,7 +509,7 @@ TEST(PoseFile, RejectsWhatItDoesNotKnowWithTheNearestName) {
   has(R"({"nodes":{"centre":[0,0]}})", "three numbers");
   has(R"({"frames":[]})", "empty");
   has(R"({"frames":[{"time":0,"pose":{}},{"time":0,"pose":{}}]})", "times must grow");
-  has(R"({"frames":[{"time":0,"pos":{}}]})", "did you mean \"pose\"");
+  has(R"({"frames":[{"time":0,"pos":{}}]})", "did you mean pose?");
   has(R"([])", "object");
 }
 

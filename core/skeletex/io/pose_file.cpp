@@ -4,13 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <initializer_list>
 #include <numbers>
-#include <numeric>
-#include <string_view>
 
 #include "skeletex/io/json_file.h"
 #include "skeletex/io/read_file.h"
+#include "skeletex/io/suggestion.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
@@ -18,38 +16,11 @@ namespace {
 
 constexpr std::uintmax_t kMaxBytes = std::uintmax_t{1} << 30;
 
-/// Letters to insert, delete or replace to get from one name to the other.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i + 1;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i] != b[j]);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
-    }
-  }
-  return row[b.size()];
-}
-
-template <class Names>
-std::string nearest(const Names& names, std::string_view name) {
-  std::string best;
-  std::size_t least = 0;
-  for (const auto& candidate : names) {
-    const std::size_t distance = edit_distance(name, candidate);
-    if (best.empty() || distance < least) best = candidate, least = distance;
-  }
-  return best;
-}
-
-void check_keys(const nlohmann::json& object, std::initializer_list<const char*> known, const std::string& where) {
+void check_keys(const nlohmann::json& object, const std::vector<std::string>& known, const std::string& where) {
   if (!object.is_object()) throw IoError(fmt::format("{}: an object {{...}} is expected", where));
   for (const auto& [key, value] : object.items())
     if (std::find(known.begin(), known.end(), key) == known.end())
-      throw IoError(fmt::format("{}: unknown key \"{}\"; did you mean \"{}\"?", where, key, nearest(known, key)));
+      throw IoError(fmt::format("{}: unknown key \"{}\"{}", where, key, did_you_mean(key, known)));
 }
 
 /// Index of a bone or node by its name.
@@ -59,7 +30,7 @@ std::size_t index_of(const std::vector<Named>& all, const std::string& name, con
   if (found != all.end()) return static_cast<std::size_t>(found - all.begin());
   std::vector<std::string> names;
   for (const Named& candidate : all) names.push_back(candidate.name);
-  throw IoError(fmt::format("{}: there is no {} \"{}\"; did you mean \"{}\"?", where, kind, name, nearest(names, name)));
+  throw IoError(fmt::format("{}: there is no {} \"{}\"{}", where, kind, name, did_you_mean(name, names)));
 }
 
 template <std::size_t N>

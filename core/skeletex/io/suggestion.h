@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-namespace skeletex::cli {
+namespace skeletex {
 
 /// Number of letters to insert, remove, replace or swap with the next to turn one word into the other.
 int edit_distance(std::string_view a, std::string_view b);
@@ -13,4 +13,4 @@ std::string nearest_name(std::string_view typed, const std::vector<std::string>&
 /// "; did you mean X?", or nothing.
 std::string did_you_mean(std::string_view typed, const std::vector<std::string>& names);
 
-}  // namespace skeletex::cli
+}  // namespace skeletex

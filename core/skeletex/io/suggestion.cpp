@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "suggestion.h"
+#include "skeletex/io/suggestion.h"
 
 #include <algorithm>
 
-namespace skeletex::cli {
+namespace skeletex {
 
 int edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::vector<int>> d(a.size() + 1, std::vector<int>(b.size() + 1));
@@ -36,4 +36,4 @@ std::string did_you_mean(std::string_view typed, const std::vector<std::string>&
   return nearest.empty() ? "" : "; did you mean " + nearest + "?";
 }
 
-}  // namespace skeletex::cli
+}  // namespace skeletex

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: MIT
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "command.h"
+#include "progress_bar.h"
+#include "runner/run_experiment.h"
+#include "skeletex/io/json_file.h"
+#include "skeletex/io/read_file.h"
+#include "skeletex/model/error.h"
+#include "table.h"
+
+namespace skeletex::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Arguments {
+  std::string config, output = "results", device, json, mesh, skeleton;
+  std::vector<std::string> settings, only, models;
+  bool is_quick = false, is_resumed = false;
+  int jobs = 1;
+};
+
+struct ReplayArguments {
+  std::string record, output, device, json;
+  double tolerance = 0.02;
+  int jobs = 1;
+};
+
+std::string this_program() { return fs::read_symlink("/proc/self/exe").string(); }
+
+std::string duration(double seconds) {
+  const long whole = std::lround(seconds);
+  return whole >= 3600 ? fmt::format("{} h {} min", whole / 3600, whole / 60 % 60) : whole >= 60 ? fmt::format("{} min {} s", whole / 60, whole % 60) : fmt::format("{} s", whole);
+}
+
+/// A run's rows as a table, and why items failed.
+std::string rows_text(const Experiment& experiment, const RunSummary& summary) {
+  std::vector<std::string> head{experiment.name};
+  for (const auto& [column, place] : experiment.columns) head.push_back(column);
+  Table table(head);
+  std::string reasons;
+  for (const OrderedJson& row : summary.results.at("rows")) {
+    std::vector<std::string> cells{row.at("key").get<std::string>()};
+    for (const auto& [column, place] : experiment.columns) {
+      const OrderedJson& value = row.at("columns").at(column);
+      cells.push_back(value.is_null() ? "-" : value.is_number_float() ? fmt::format("{:.4g}", value.get<double>()) : value.is_string() ? value.get<std::string>() : value.dump());
+    }
+    table.add(std::move(cells));
+    if (row.at("status") == "failed") reasons += fmt::format("failed: {}: {}\n", row.at("key").get<std::string>(), row.at("reason").get<std::string>());
+  }
+  return table.text() + reasons;
+}
+
+RunSummary run_with_bar(const Experiment& experiment, RunOptions options) {
+  ProgressBar bar;
+  bar.show(experiment.name, 0);
+  options.program = this_program();
+  options.progress = [&](int done, int total, const std::string& key, double seconds_left) {
+    bar.show(fmt::format("{} {}/{} {}, {} left", experiment.name, done, total, key, duration(seconds_left)), static_cast<double>(done) / total);
+  };
+  return run_experiment(experiment, options);
+}
+
+ExperimentChanges changes_from(const OrderedJson& source) {
+  ExperimentChanges changes;
+  changes.settings = source.at("settings").get<std::vector<std::string>>();
+  changes.only = source.at("only").get<std::vector<std::string>>();
+  changes.is_quick = source.at("quick").get<bool>();
+  for (const auto& model : source.at("models"))
+    changes.models.push_back({model.at("name").get<std::string>(), model.at("mesh").get<std::string>(), model.at("skeleton").get<std::string>(), "",
+                              nlohmann::json(model.at("view"))});
+  return changes;
+}
+
+void run(const Arguments& arguments) {
+  check_json_target(arguments.json);
+  OrderedJson source{{"config", ""}, {"settings", arguments.settings}, {"only", arguments.only}, {"quick", arguments.is_quick}, {"models", OrderedJson::array()}};
+  const auto add_model = [&](const ModelConfig& model) {
+    source["models"].push_back({{"name", model.name}, {"mesh", model.mesh.string()}, {"skeleton", model.skeleton.string()}, {"view", OrderedJson(model.view)}});
+  };
+  if (!arguments.mesh.empty()) add_model({fs::path(arguments.mesh).stem().string(), arguments.mesh, arguments.skeleton, "", nlohmann::json()});
+  for (const std::string& model : arguments.models) add_model(find_model(model, model.ends_with(".json") ? "." : fs::path(arguments.config).parent_path() / "experiments"));
+  Json report = Json::array();
+  int failed = 0;
+  for (const fs::path& file : experiment_files(arguments.config)) {
+    source["config"] = file.string();
+    Experiment experiment = read_experiment(file, changes_from(source));
+    RunOptions options{.program = "", .folder = fs::path(arguments.output) / experiment.name, .is_resumed = arguments.is_resumed, .jobs = arguments.jobs,
+                       .device = arguments.device, .source = source, .progress = {}};
+    const RunSummary summary = run_with_bar(experiment, options);
+    failed += summary.failed;
+    print(arguments.json, fmt::format("{}{} done ({} kept), {} failed: {}\n\n", rows_text(experiment, summary), summary.done, summary.kept, summary.failed, options.folder.string()));
+    report.push_back({{"experiment", experiment.name}, {"folder", options.folder.string()}, {"done", summary.done}, {"kept", summary.kept}, {"failed", summary.failed}});
+  }
+  write_json(arguments.json, report);
+  if (failed > 0) throw CLI::RuntimeError(kExitBad);
+}
+
+void replay(const ReplayArguments& arguments) {
+  check_json_target(arguments.json);
+  const fs::path path = fs::is_directory(arguments.record) ? fs::path(arguments.record) / "record.json" : fs::path(arguments.record);
+  const auto load = [](const fs::path& file) {
+    const std::string text = read_file(file);
+    parse_json(text, file.string());
+    return OrderedJson::parse(text);
+  };
+  const OrderedJson record = load(path), expected = load(path.parent_path() / "results.json");
+  if (!record.is_object() || !record.contains("source") || !record.at("source").is_object()) throw IoError(path.string() + ": no record of a run; it lacks \"source\"");
+  const OrderedJson& source = record.at("source");
+  const Experiment experiment = read_experiment(source.at("config").get<std::string>(), changes_from(source));
+  const fs::path folder = arguments.output.empty() ? path.parent_path() / "replay" : fs::path(arguments.output);
+  const RunSummary summary =
+      run_with_bar(experiment, {.program = "", .folder = folder, .is_resumed = false, .jobs = arguments.jobs, .device = arguments.device, .source = source, .progress = {}});
+  const std::vector<std::string> differences = compare_results(expected, summary.results, arguments.tolerance);
+  std::string text;
+  for (const std::string& difference : differences) text += difference + '\n';
+  print(arguments.json, fmt::format("{}{}: {} rows, {} differences above {:.2g} %: {}\n", text, experiment.name, summary.results.at("rows").size(), differences.size(),
+                                    100 * arguments.tolerance, folder.string()));
+  write_json(arguments.json, {{"experiment", experiment.name}, {"rows", summary.results.at("rows").size()}, {"differences", differences}, {"folder", folder.string()}});
+  if (!differences.empty()) throw CLI::RuntimeError(kExitBad);
+}
+
+}  // namespace
+
+void add_run_command(CLI::App& program) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("run", "Run an experiment, or a list of them, from its JSON");
+  command.add_option("CONFIG", arguments->config, "experiment or list: .json (configs/experiments, configs/paper.json)")->required();
+  command.add_option("-o,--output", arguments->output, "results go to FOLDER/NAME (default: results)")->type_name("FOLDER");
+  command.add_option("--set", arguments->settings, "change a value of the experiment: sweep.size=[64,128]")->type_name("KEY=VALUE")->take_all();
+  command.add_flag("--quick", arguments->is_quick, "the experiment's own quick settings");
+  command.add_flag("--resume", arguments->is_resumed, "keep items that are done and whose commands and inputs are the same");
+  command.add_option("--jobs", arguments->jobs, "items at a time; timings want 1")->check(CLI::Range(1, 256).description(""))->type_name("N");
+  command.add_option("--only", arguments->only, "only this model of the experiment's")->type_name("MODEL")->take_all();
+  command.add_option("--model", arguments->models, "this model instead: a name, or a .json with name, mesh, skeleton, view")->type_name("MODEL")->take_all();
+  CLI::Option* mesh = command.add_option("--mesh", arguments->mesh, "your own mesh instead, with --skeleton")->type_name("FILE");
+  CLI::Option* skeleton = command.add_option("--skeleton", arguments->skeleton, "its skeleton")->type_name("FILE")->needs(mesh);
+  mesh->needs(skeleton);
+  add_device_option(command, arguments->device);
+  add_json_option(command, arguments->json);
+  command.footer(
+      "Examples:\n"
+      "  skeletex run configs/experiments/fidelity.json --only bear --set sweep.size=[64,128]\n"
+      "  skeletex run configs/experiments/fidelity.json --mesh my.obj --skeleton my.skeleton.json -o mine\n"
+      "  skeletex run configs/paper.json --quick --resume\n"
+      "Writes results.json, results.csv, record.json and items/. A failed item is recorded and does not stop the rest; then the exit code is 1.");
+  command.callback([arguments] { run(*arguments); });
+}
+
+void add_replay_command(CLI::App& program) {
+  auto arguments = std::make_shared<ReplayArguments>();
+  CLI::App& command = *program.add_subcommand("replay", "Run an experiment again from its record and compare");
+  command.add_option("RECORD", arguments->record, "record.json of a run, or its folder")->required();
+  command.add_option("-o,--output", arguments->output, "folder of the new run (default: replay, beside the record)")->type_name("FOLDER");
+  command.add_option("--tolerance", arguments->tolerance, "relative difference of numbers that counts as the same (default: 0.02)")->check(CLI::NonNegativeNumber.description(""))->type_name("X");
+  command.add_option("--jobs", arguments->jobs, "items at a time")->check(CLI::Range(1, 256).description(""))->type_name("N");
+  add_device_option(command, arguments->device);
+  add_json_option(command, arguments->json);
+  command.footer("Example:\n  skeletex replay results/fidelity\nTimes and memory (columns that end in _ms, _s, _mb) are not compared.");
+  command.callback([arguments] { replay(*arguments); });
+}
+
+}  // namespace skeletex::cli

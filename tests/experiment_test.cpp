@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: MIT
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <set>
+
+#include "runner/run_experiment.h"
+#include "skeletex/io/mesh_file.h"
+#include "skeletex/io/read_file.h"
+#include "skeletex/io/skeleton_file.h"
+#include "skeletex/model/error.h"
+#include "support/scratch.h"
+#include "support/shapes.h"
+
+namespace skeletex {
+namespace {
+
+/// An experiment in a folder of its own whose steps are shell commands: "tool" instead of the program.
+class Runner : public ::testing::Test {
+ protected:
+  Runner() {
+    const Shape shape = y_shape();
+    write_mesh(folder_ / "y.ply", shape.mesh);
+    std::ofstream(folder_ / "y.skeleton.json") << skeleton_to_json(shape.skeleton);
+  }
+  std::filesystem::path write(const std::string& text) {
+    std::ofstream(folder_ / "e.json") << text;
+    return folder_ / "e.json";
+  }
+  std::string refusal(const std::string& text, const ExperimentChanges& changes = {}) {
+    try {
+      plan_items(read_experiment(write(text), changes));
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "accepted";
+  }
+  RunSummary run(const Experiment& experiment, bool is_resumed = false, int jobs = 1) {
+    return run_experiment(experiment, {.program = "/bin/false", .folder = folder_ / "out", .is_resumed = is_resumed, .jobs = jobs, .device = "", .source = {}, .progress = {}});
+  }
+  static constexpr const char* kModel = R"({"name": "y", "mesh": "y.ply", "skeleton": "y.skeleton.json"})";
+  ScratchFolder folder_;
+};
+
+bool holds(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+TEST_F(Runner, EveryModelAndEveryCombinationIsAnItemOfItsOwn) {
+  const Experiment experiment = read_experiment(write(fmt::format(
+      R"({{"name": "e", "models": [{}], "sweep": {{"size": [32, 64], "recipe": ["a", {{"label": "b", "arguments": ["--x", "{{size}}"], "values": {{"other": "o"}}}}]}},
+          "steps": [{{"name": "s", "run": ["{{model}}", "{{recipe}}", "{{size}}.{{recipe}}"]}}]}})",
+      kModel)));
+  const std::vector<Item> items = plan_items(experiment);
+  std::set<std::string> keys;
+  for (const Item& item : items) keys.insert(item.key);
+  EXPECT_EQ(keys, (std::set<std::string>{"y-32-a", "y-32-b", "y-64-a", "y-64-b"}));
+  for (const Item& item : items)
+    if (item.key == "y-64-b") {
+      EXPECT_EQ(fill_arguments(experiment, item, experiment.steps[0].run, {}), (std::vector<std::string>{"y", "--x", "64", "64.b"}));
+      EXPECT_EQ(fill_arguments(experiment, item, {"{other}"}, {}), std::vector<std::string>{"o"});
+    }
+}
+
+TEST_F(Runner, SaysWhatIsWrongWithAnExperimentAndWhatWasMeant) {
+  const std::string steps = R"("steps": [{"name": "s", "run": ["x"]}])";
+  EXPECT_TRUE(holds(refusal(R"({"name": "e", "swep": {}, )" + steps + "}"), "did you mean sweep?"));
+  EXPECT_TRUE(holds(refusal(R"({"name": "e"})"), "\"steps\""));
+  EXPECT_TRUE(holds(refusal("{" + steps + "}"), "\"name\" is missing"));
+  EXPECT_TRUE(holds(refusal(R"({"name": "e", "sweep": {"a": []}, )" + steps + "}"), "has no values"));
+  EXPECT_TRUE(holds(refusal(R"({"name": "e", "sweep": {"a": [1, 1]}, )" + steps + "}"), "two items"));
+  EXPECT_TRUE(holds(refusal(R"({"name": "e", "steps": [{"name": "s", "runs": []}]})"), "did you mean run?"));
+  EXPECT_TRUE(holds(refusal(R"({"name": "e", "columns": {"c": "t.x"}, )" + steps + "}"), "no step"));
+  EXPECT_TRUE(holds(refusal(R"({"name": "e", "models": ["absent.json"], )" + steps + "}"), "absent.json"));
+  EXPECT_TRUE(holds(refusal("{\n\"name\": }"), "line 2"));
+  EXPECT_TRUE(holds(refusal(R"({"name": "e", )" + steps + "}", {.settings = {"size"}, .is_quick = false, .only = {}, .models = {}}), "KEY=VALUE"));
+  EXPECT_EQ(refusal(R"({"name": "e", )" + steps + "}"), "accepted");
+  const Experiment experiment = read_experiment(write(R"({"name": "e", "sweep": {"a": ["{a}"]}, )" + steps + "}"));
+  EXPECT_THROW(fill_arguments(experiment, plan_items(experiment)[0], {"{absent}"}, {}), IoError);
+  EXPECT_THROW(fill_arguments(experiment, plan_items(experiment)[0], {"x{a}"}, {}), IoError);  // stands for itself
+}
+
+TEST_F(Runner, SettingsQuickAndOnlyChangeTheExperiment) {
+  const std::filesystem::path file = write(fmt::format(
+      R"({{"name": "e", "models": [{}], "sweep": {{"size": [32, 64]}}, "steps": [{{"name": "s", "run": []}}], "quick": {{"sweep.size": [8]}}}})", kModel));
+  EXPECT_EQ(plan_items(read_experiment(file)).size(), 2u);
+  EXPECT_EQ(plan_items(read_experiment(file, {.settings = {}, .is_quick = true, .only = {}, .models = {}}))[0].key, "y-8");
+  EXPECT_EQ(plan_items(read_experiment(file, {.settings = {"sweep.size=[1,2,3]"}, .is_quick = true, .only = {}, .models = {}})).size(), 3u);
+  EXPECT_THROW(read_experiment(file, {.settings = {}, .is_quick = false, .only = {"z"}, .models = {}}), InputError);
+}
+
+TEST_F(Runner, RecordsAFailureWithItsReasonAndGoesOn) {
+  const Experiment experiment = read_experiment(write(
+      R"({"name": "e", "sweep": {"n": [0, 3, 0.5]}, "steps": [{"name": "s", "tool": "sh", "run": ["-c", "echo because >&2; printf 12345 > {out}/f{n}; exit {n}"], "file_sizes": {"bytes": "{out}/f{n}"}},
+          {"name": "kill", "tool": "sh", "run": ["-c", "test {n} = 0 || kill -9 $$"]}], "columns": {"bytes": "s.bytes"}})"));
+  const RunSummary summary = run(experiment, false, 2);
+  EXPECT_EQ(summary.done, 1);
+  EXPECT_EQ(summary.failed, 2);
+  const OrderedJson& rows = summary.results.at("rows");
+  EXPECT_EQ(rows[0].at("columns").at("bytes"), 5);
+  EXPECT_EQ(rows[1].at("reason"), "because");
+  for (const char* file : {"results.json", "results.csv", "record.json", "items/0.json", "items/3.json"}) EXPECT_TRUE(std::filesystem::exists(folder_ / "out" / file)) << file;
+  EXPECT_TRUE(holds(read_file(folder_ / "out/results.csv"), "because"));
+  const OrderedJson record = OrderedJson::parse(read_file(folder_ / "out/record.json"));
+  for (const char* key : {"source", "experiment", "inputs", "git", "compiler", "device", "machine", "seconds", "peak_memory_mb"}) EXPECT_TRUE(record.contains(key)) << key;
+}
+
+TEST_F(Runner, ResumesWhatIsDoneUnlessCommandsOrInputsChanged) {
+  const std::string text = fmt::format(
+      R"({{"name": "e", "models": [{}], "sweep": {{"n": [1, 2]}}, "steps": [{{"name": "s", "tool": "sh", "run": ["-c", "echo x >> {{out}}/log; test {{n}} = 1"]}}]}})", kModel);
+  const auto runs = [&] { return read_file(folder_ / "out/log").size() / 2; };
+  run(read_experiment(write(text)));
+  EXPECT_EQ(runs(), 2u);
+  const RunSummary again = run(read_experiment(write(text)), true);
+  EXPECT_EQ(again.kept, 1);  // the one that failed runs again
+  EXPECT_EQ(runs(), 3u);
+  std::ofstream(folder_ / "y.skeleton.json", std::ios::app) << "\n";
+  EXPECT_EQ(run(read_experiment(write(text)), true).kept, 0);
+}
+
+TEST_F(Runner, ComparesNumbersByToleranceAndLeavesTimesOut) {
+  const auto results = [](double mean, double ms, const char* status) {
+    return OrderedJson{{"rows", {{{"key", "a"}, {"status", status}, {"columns", {{"mean", mean}, {"encode_ms", ms}, {"closed", true}}}}}}};
+  };
+  EXPECT_TRUE(compare_results(results(1, 5, "done"), results(1.01, 50, "done"), 0.02).empty());
+  EXPECT_EQ(compare_results(results(1, 5, "done"), results(1.1, 5, "done"), 0.02).size(), 1u);
+  EXPECT_EQ(compare_results(results(1, 5, "done"), results(1, 5, "failed"), 0.02).size(), 1u);
+  EXPECT_EQ(compare_results(results(1, 5, "done"), OrderedJson{{"rows", OrderedJson::array()}}, 0.02).size(), 1u);
+}
+
+TEST(ExperimentFiles, EveryCommittedExperimentCanBePlannedAndHasKnownCommands) {
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(SKELETEX_SOURCE_DIR "/configs/experiments")) {
+    SCOPED_TRACE(entry.path().string());
+    for (const bool is_quick : {false, true}) {
+      const Experiment experiment = read_experiment(entry.path(), {.settings = {}, .is_quick = is_quick, .only = {}, .models = {}});
+      EXPECT_EQ(experiment.name, entry.path().stem());
+      for (const Item& item : plan_items(experiment))
+        for (const Step& step : experiment.steps)
+          EXPECT_NO_THROW(fill_arguments(experiment, item, step.run, {{"work", "w"}, {"out", "o"}, {"view", "v"}, {"config", "c"}}));
+    }
+    ++count;
+  }
+  EXPECT_GT(count, 0);
+  for (const std::filesystem::path& file : experiment_files(SKELETEX_SOURCE_DIR "/configs/paper.json")) EXPECT_TRUE(std::filesystem::exists(file)) << file;
+}
+
+}  // namespace
+}  // namespace skeletex
