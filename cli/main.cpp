@@ -51,6 +51,8 @@ int run(int argc, char** argv) {
   add_encode_command(program);
   add_reconstruct_command(program);
   add_render_command(program);
+  add_correspond_command(program);
+  add_morph_command(program);
   add_metro_command(program);
   add_segment_command(program);
   add_validate_command(program);

@@ -417,6 +417,50 @@ TEST_F(Program, RefusesATruncatedModel) {
   fs::remove(folder_ / "cut.skx.exr");
 }
 
+TEST_F(Program, CorrespondsModelsAndSkeletonFiles) {
+  const nlohmann::json json = json_of({"correspond", "y.skx.exr", "y.skeleton.json"});
+  EXPECT_EQ(json.at("bones").size(), read_skeleton(folder_ / "y.skeleton.json").bones.size());
+  for (const auto& bone : json.at("bones")) {
+    EXPECT_EQ(bone.at("a"), bone.at("b"));
+    EXPECT_EQ(bone.at("reversed"), false);
+  }
+  EXPECT_NEAR(json.at("cost").get<double>(), 0, 1e-9);
+  const std::string first = json.at("bones")[0].at("a");
+  expect_refused(2, {"correspond", "y.skx.exr", "y.skx.exr", "--bones", first}, {first, "BONE=BONE"});
+  expect_refused(1, {"correspond", "y.skx.exr", "y.skx.exr", "--bones", first + "=" + first + "x"}, {first + "x", "did you mean " + first});
+  std::ofstream(folder_ / "two.json") << R"({"nodes":[{"name":"p","position":[0,0,0]},{"name":"q","position":[1,0,0]}],"bones":[{"name":"b","head":0,"tail":1}]})";
+  expect_refused(1, {"correspond", "y.skx.exr", "two.json"}, {"y.skx.exr", "two.json", "joins"});
+}
+
+TEST_F(Program, MorphsToModelsAndMeshes) {
+  const nlohmann::json one = json_of({"morph", "y.skx.exr", "y.skx.exr", "--t", "0.25", "-o", "half.skx.exr"});
+  EXPECT_EQ(one.at("results").at(0).at("kind"), "model");
+  EXPECT_NEAR(one.at("maps").at(0).at("distortion").at("symmetric_dirichlet").get<double>(), 1, 0.01);
+  EXPECT_EQ(run({"reconstruct", "half.skx.exr", "-o", "half.ply"}).code, 0);
+  const nlohmann::json frames = json_of({"morph", "y.skx.exr", "half.skx.exr", "--frames", "3", "-o", "frame.ply"});
+  ASSERT_EQ(frames.at("results").size(), 3u);
+  for (const char* name : {"frame_000.ply", "frame_001.ply", "frame_002.ply"}) EXPECT_TRUE(fs::remove(folder_ / name)) << name;
+  EXPECT_EQ(run({"morph", "y.skx.exr", "half.skx.exr", "y.skx.exr", "--weights", "0.2,0.3,0.5", "-o", "three.skx.exr", "--size", "32"}).code, 0);
+  EXPECT_TRUE(fs::remove(folder_ / "three.skx.exr"));
+
+  const auto refused = [](int code, std::vector<std::string> more, const std::vector<std::string>& parts) {
+    std::vector<std::string> arguments{"morph", "y.skx.exr", "half.skx.exr", "-o", "no.ply"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    expect_refused(code, arguments, parts);
+  };
+  refused(2, {}, {"--t", "--weights", "--frames"});
+  refused(2, {"--t", "1.5"}, {"--t"});
+  refused(2, {"--weights", "1"}, {"1 weights for 2 models"});
+  refused(1, {"--weights", "0.5,0.4"}, {"sum"});
+  refused(2, {"--t", "0.5", "--frames", "3"}, {"--t"});
+  refused(2, {"--t", "0.5", "--layout", "3"}, {"--layout"});
+  refused(1, {"--t", "0.5", "--bones", "nope=nope"}, {"nope"});
+  expect_refused(2, {"morph", "y.skx.exr", "-o", "no.ply", "--t", "0"}, {"two models"});
+  expect_refused(1, {"morph", "y.skx.exr", "y.ply", "--t", "0", "-o", "no.ply"}, {"y.ply"});
+  expect_refused(1, {"morph", "y.skx.exr", "half.skx.exr", "--t", "0", "-o", "no.xyz"}, {"no.xyz"});
+  for (const char* name : {"half.skx.exr", "half.ply"}) fs::remove(folder_ / name);
+}
+
 TEST_F(Program, RefusesOutputsThatCannotBeWrittenAndLeavesNothingBehind) {
   expect_refused(1, {"encode", "y.ply", "y.skeleton.json", "-o", "no/such/folder/a.skx.exr"}, {"no/such/folder"});
   expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "."}, {"."});

@@ -18,6 +18,27 @@
 
 namespace skeletex {
 
+Correspondence inverse(const Correspondence& a_to_b) {
+  Correspondence result = a_to_b;
+  for (std::size_t i = 0; i < a_to_b.bones.size(); ++i) {
+    result.bones[a_to_b.bones[i]] = static_cast<int>(i);
+    result.is_reversed[a_to_b.bones[i]] = a_to_b.is_reversed[i];
+  }
+  for (std::size_t i = 0; i < a_to_b.nodes.size(); ++i) result.nodes[a_to_b.nodes[i]] = static_cast<int>(i);
+  return result;
+}
+
+Correspondence composed(const Correspondence& a_to_b, const Correspondence& b_to_c) {
+  Correspondence result = a_to_b;
+  for (std::size_t i = 0; i < a_to_b.bones.size(); ++i) {
+    result.bones[i] = b_to_c.bones[a_to_b.bones[i]];
+    result.is_reversed[i] = a_to_b.is_reversed[i] != b_to_c.is_reversed[a_to_b.bones[i]];
+  }
+  for (int& node : result.nodes) node = b_to_c.nodes[node];
+  result.cost += b_to_c.cost;
+  return result;
+}
+
 std::vector<NeighbourInterval> neighbour_order(const Skeleton& skeleton, BoneAtNode at) {
   const int node = end_node(skeleton, at.bone, at.end);
   const Vec3 d = direction_from(skeleton, at);

@@ -17,6 +17,11 @@ struct Correspondence {
   double cost = 0;                 ///< mean over bones: 0 for equal names, lengths and directions, about 1 for nothing in common
 };
 
+/// From B to A.
+Correspondence inverse(const Correspondence& a_to_b);
+/// From A to C by way of B. The costs add up.
+Correspondence composed(const Correspondence& a_to_b, const Correspondence& b_to_c);
+
 struct CorrespondenceOptions {
   /// Pairs (name in A, name in B) that must correspond; the rest is found.
   std::vector<std::pair<std::string, std::string>> given;

@@ -242,6 +242,16 @@ const PosedWalls::Interval* PosedWalls::interval_at(int bone, BoneEnd end, doubl
   return &interval;
 }
 
+std::vector<PosedBound> PosedWalls::bounds(int bone, BoneEnd end) const {
+  const Loop& loop = loops_[bone][static_cast<int>(end)];
+  std::vector<PosedBound> bounds;
+  for (const Interval& interval : loop.intervals) {
+    const Side& side = arcs_[interval.arc].sides[interval.side];
+    bounds.push_back({loop.base + interval.start, side.rolls[side.sign > 0 ? 0 : 1]});
+  }
+  return bounds;
+}
+
 int PosedWalls::arc_at(int bone, BoneEnd end, double turn) const {
   double t;
   const Interval* interval = interval_at(bone, end, turn, t);

@@ -20,6 +20,12 @@ struct PosedSpoke {
   double slope = 0;  ///< k' of the wall that separates the two bones there (see Walls::slope), at the rolled angle
 };
 
+/// Where an arc around a bone's end begins.
+struct PosedBound {
+  double turn = 0;  ///< angle in the bind pose, turns
+  double roll = 0;  ///< turns, to be added to it
+};
+
 /// The seams of a model in a pose (paper 3.3 and 3.4.1). Each node is a drawing on the sphere around it: corners are
 /// directions, arcs are curves between them, and every bone's end is the loop of arcs around it. In the bind pose this
 /// is the Voronoi diagram of the bones' directions. In a pose
@@ -41,6 +47,9 @@ class PosedWalls {
 
   /// \param turn  angle about the bone in the bind pose, turns
   PosedSpoke spoke(int bone, BoneEnd end, double turn) const;
+  /// Where the arcs at an end begin, in the order of SkeletexModel::ends; angles grow by less than a turn in all, rolls
+  /// run on from arc to arc. A closed arc begins anywhere. Empty at a free end.
+  std::vector<PosedBound> bounds(int bone, BoneEnd end) const;
 
   /// How long the bones at a node are taken to be where they meet, so that all of them restore distances alike: as long
   /// as the longest of them. In the bind pose and in this one, world units.

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <vector>
+
+#include "blend_structs.h"
+#include "skeletex/edit/overlay.h"
+#include "skeletex/reconstruct/displace.h"
+
+namespace skeletex {
+
+/// What the kernel blend_texels reads beside the texels: where the rows of some patches read in each source.
+struct BlendTables {
+  int source_count = 0;
+  std::vector<BlendSource> sources;   ///< per source and patch of the result
+  std::vector<BlendRow> rows;         ///< per source and row to do
+  std::vector<float> head_columns, tail_columns;
+};
+
+/// Appends the columns that one patch of the result, `width` columns wide, reads in a source.
+/// \param bone  of the result
+void append_columns(const Overlay& overlay, int bone, int width, BlendTables& tables);
+
+/// Row of a patch of `source_height` rows at the same share of the way as a row of one of `height` rows.
+double row_at_same_share(int row, int height, int source_height, bool is_reversed);
+/// u at a row between a patch's rows.
+double u_at_row(const Patch& patch, double row);
+
+/// Queues the blend. \param texels  of all sources   \param rows  of the result's patches, those to do
+void blend_texels(ClContext& context, const BlendTables& tables, const std::vector<LatticeRow>& rows, const FrameTables& result, int texture_width,
+                  const DevicePlanes& texels, DevicePlanes& blended);
+
+}  // namespace skeletex

@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/edit/morph.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <numeric>
+
+#include "skeletex/edit/blend.h"
+#include "skeletex/edit/overlay.h"
+#include "skeletex/edit/seam_network.h"
+#include "skeletex/model/error.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+
+namespace skeletex {
+namespace {
+
+Correspondence identity(const Skeleton& skeleton) {
+  Correspondence result;
+  result.bones.resize(skeleton.bones.size());
+  result.nodes.resize(skeleton.nodes.size());
+  std::iota(result.bones.begin(), result.bones.end(), 0);
+  std::iota(result.nodes.begin(), result.nodes.end(), 0);
+  result.is_reversed.assign(skeleton.bones.size(), false);
+  return result;
+}
+
+/// The rotation that turns one set of points about the origin best onto another (Kabsch). Points on a line leave their
+/// turn about it open: there the smallest rotation.
+Eigen::Quaterniond best_rotation(const std::vector<Vec3>& from, const std::vector<Vec3>& to) {
+  Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < from.size(); ++i) moment += to[i] * from[i].transpose();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(moment, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  if (svd.singularValues()[1] < 1e-9 * svd.singularValues()[0])
+    return Eigen::Quaterniond::FromTwoVectors(svd.matrixV().col(0), svd.matrixU().col(0));
+  Eigen::Matrix3d flip = Eigen::Matrix3d::Identity();
+  flip(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  return Eigen::Quaterniond(Eigen::Matrix3d(svd.matrixU() * flip * svd.matrixV().transpose()));
+}
+
+/// Each bone's s: the models' own, carried to the mean skeleton, turned about the bone to their mean angle, counted from
+/// that of the layout.
+void set_mean_s(Skeleton& skeleton, const std::deque<Overlay>& overlays, std::span<const double> weights, const Overlay& layout) {
+  for (int bone = 0; bone < static_cast<int>(skeleton.bones.size()); ++bone) {
+    const Vec3 o = (end_position(skeleton, bone, BoneEnd::kTail) - end_position(skeleton, bone, BoneEnd::kHead)).normalized();
+    const Vec3& s = layout.carried_s(bone);
+    double angle = 0;
+    for (std::size_t m = 0; m < overlays.size(); ++m) {
+      const Vec3& other = overlays[m].carried_s(bone);
+      const double turned = std::atan2(other.dot(o.cross(s)), other.dot(s));
+      // Half a turn goes the same way whatever its rounding.
+      angle += weights[m] * (turned < 1e-6 - std::numbers::pi ? turned + 2 * std::numbers::pi : turned);
+    }
+    skeleton.bones[bone].s = angle == 0 ? s : Vec3(Eigen::AngleAxisd(angle, o) * s);
+  }
+}
+
+std::vector<Patch> mean_patches(const std::deque<Overlay>& overlays, std::span<const double> weights, const SkeletexModel& layout) {
+  std::vector<Patch> patches = layout.patches;
+  for (int bone = 0; bone < static_cast<int>(patches.size()); ++bone) {
+    Patch& patch = patches[bone];
+    const int height = patch.rectangle.height;
+    std::fill(patch.row_u.begin(), patch.row_u.end(), 0.0);
+    patch.method = Method::kSpd;
+    for (std::size_t m = 0; m < overlays.size(); ++m) {
+      if (weights[m] == 0) continue;
+      const Patch& from = overlays[m].model().patches[overlays[m].model_bone(bone)];
+      const bool is_reversed = overlays[m].is_reversed(bone);
+      if (from.method == Method::kVsm) patch.method = Method::kVsm;
+      for (int r = 0; r < height; ++r) {
+        const double u = u_at_row(from, row_at_same_share(r, height, from.rectangle.height, is_reversed));
+        patch.row_u[r] += weights[m] * (is_reversed ? 1 - u : u);
+      }
+    }
+    patch.row_u.front() = 0;
+    patch.row_u.back() = 1;
+  }
+  return patches;
+}
+
+/// Angle of an arc's point about its other bone.
+double turn_from_other_side(const Walls& walls, const SeamArc& arc, BoneEnd end, double turn) {
+  const BoneBasis& basis = walls.bases()[arc.bones[0]];
+  return walls.turn_of(arc.bones[1], walls.spoke(arc.bones[0], turn) + walls.slope(arc.bones[0], end, turn) * basis.o);
+}
+
+/// Fills the network around the mean skeleton with the models' seams.
+class SeamMean {
+ public:
+  SeamMean(const Skeleton& skeleton, const Walls& walls, const std::deque<Overlay>& overlays, std::span<const double> weights, const Overlay& layout)
+      : skeleton_(skeleton), walls_(walls), overlays_(overlays), weights_(weights), layout_(layout) {}
+
+  void fill(SeamNetwork& network) const {
+    for (std::size_t c = 0; c < network.corners.size(); ++c) {
+      SeamCorner& corner = network.corners[c];
+      for (std::size_t m = 0; m < overlays_.size(); ++m)
+        for (const int bone : corner.bones) {
+          if (weights_[m] == 0) continue;
+          const double distance = overlays_[m].seam_at(bone, end_at(bone, corner.node), walls_.turn_of(bone, network.directions[c])).distance;
+          corner.sample.distance += weights_[m] * distance / static_cast<double>(corner.bones.size());
+        }
+    }
+    for (SeamArc& arc : network.arcs) fill_arc(network, arc);
+  }
+
+ private:
+  BoneEnd end_at(int bone, int node) const { return skeleton_.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail; }
+
+  void fill_arc(const SeamNetwork& network, SeamArc& arc) const {
+    const int bone = arc.bones[0];
+    const BoneEnd end = end_at(bone, arc.node), other_end = end_at(arc.bones[1], arc.node);
+    std::vector<Overlay::ArcPoint> points{{0.5, {}}};
+    const int layout_arc = layout_.model_arc(arc.node, bone, arc.bones[1]);
+    if (layout_arc >= 0) points = layout_.arc_points(bone, end, layout_arc);
+    double begin = 0, width = 1;
+    if (!arc.is_closed()) {
+      begin = walls_.turn_of(bone, network.directions[arc.corners[0]]);
+      width = walls_.turn_of(bone, network.directions[arc.corners[1]]) - begin;
+      width -= std::floor(width + 0.25);  // half a turn at most, and rounding
+    }
+    for (const Overlay::ArcPoint& point : points) {
+      double turn = begin + width * point.place, offset = 0, distance = 0;
+      const double other_turn = turn_from_other_side(walls_, arc, end, turn);
+      for (std::size_t m = 0; m < overlays_.size(); ++m) {
+        if (weights_[m] == 0) continue;
+        Overlay::SeamPoint read = point.point;
+        if (&overlays_[m] != &layout_ || layout_arc < 0) {
+          read = overlays_[m].seam_at(bone, end, turn);
+          read.distance = (read.distance + overlays_[m].seam_at(arc.bones[1], other_end, other_turn).distance) / 2;
+        }
+        offset += weights_[m] * read.turn_offset;
+        distance += weights_[m] * read.distance;
+      }
+      turn += offset;
+      arc.samples.push_back({turn - std::floor(turn), distance});
+    }
+  }
+
+  const Skeleton& skeleton_;
+  const Walls& walls_;
+  const std::deque<Overlay>& overlays_;
+  std::span<const double> weights_;
+  const Overlay& layout_;
+};
+
+std::vector<double> checked_weights(std::span<const double> weights, std::size_t count) {
+  if (weights.size() != count) throw InputError(fmt::format("{} weights for {} models; give one per model", weights.size(), count));
+  double sum = 0;
+  for (const double weight : weights) {
+    if (!(weight >= 0)) throw InputError(fmt::format("a weight of {}; weights are 0 or more", weight));
+    sum += weight;
+  }
+  if (!(std::abs(sum - 1) <= 1e-6)) throw InputError(fmt::format("the weights sum to {:.9g}; they must sum to 1", sum));
+  std::vector<double> result(weights.begin(), weights.end());
+  for (double& weight : result) weight /= sum;
+  return result;
+}
+
+}  // namespace
+
+std::vector<Vec3> mean_nodes(std::span<const Skeleton* const> skeletons, std::span<const Correspondence> from_layout, std::span<const double> weights,
+                             int layout) {
+  const std::size_t count = skeletons[layout]->nodes.size();
+  std::vector<std::vector<Vec3>> nodes(skeletons.size());
+  std::vector<Vec3> centres(skeletons.size(), Vec3::Zero());
+  for (std::size_t m = 0; m < skeletons.size(); ++m) {
+    for (std::size_t n = 0; n < count; ++n) nodes[m].push_back(skeletons[m]->nodes[from_layout[m].nodes[n]].position);
+    if (weights[m] == 1) return nodes[m];
+    for (const Vec3& node : nodes[m]) centres[m] += node / static_cast<double>(count);
+    for (Vec3& node : nodes[m]) node -= centres[m];
+  }
+  std::vector<Vec3> mean(count, Vec3::Zero());
+  Eigen::Vector4d turn_sum = Eigen::Vector4d::Zero();
+  Vec3 centre = Vec3::Zero();
+  for (std::size_t m = 0; m < skeletons.size(); ++m) {
+    Eigen::Quaterniond turn = best_rotation(nodes[layout], nodes[m]);
+    if (turn.w() < 0) turn.coeffs() = -turn.coeffs();
+    turn_sum += weights[m] * turn.coeffs();
+    centre += weights[m] * centres[m];
+    for (std::size_t n = 0; n < count; ++n) mean[n] += weights[m] * (turn.conjugate() * nodes[m][n]);
+  }
+  const Eigen::Quaterniond turn(Eigen::Vector4d(turn_sum.normalized()));
+  for (Vec3& node : mean) node = centre + turn * node;
+  return mean;
+}
+
+Morph::Morph(ClContext& context, std::vector<SkeletexModel> models, std::span<const Correspondence> from_first, const MorphOptions& options)
+    : context_(&context), models_(std::move(models)), layout_(options.layout) {
+  if (models_.size() < 2) throw InputError("a morph needs two models or more");
+  if (from_first.size() + 1 != models_.size())
+    throw InputError(fmt::format("{} correspondences for {} models; give one for each but the first", from_first.size(), models_.size()));
+  if (layout_ && (*layout_ < 0 || *layout_ >= static_cast<int>(models_.size())))
+    throw InputError(fmt::format("there is no model {} whose layout to take; models are numbered from 0 to {}", *layout_, models_.size() - 1));
+  from_first_.push_back(identity(models_[0].skeleton));
+  from_first_.insert(from_first_.end(), from_first.begin(), from_first.end());
+  int size = options.size;
+  for (std::size_t m = 0; m < models_.size(); ++m) {
+    if (models_[m].genus != models_[0].genus)
+      throw InputError(fmt::format("model {} has genus {}, the first one {}; they cannot become each other", m + 1, models_[m].genus, models_[0].genus));
+    if (options.size == 0) size = std::max({size, models_[m].texture.width, models_[m].texture.height});
+  }
+  DisplacementTexture all;
+  for (SkeletexModel& model : models_) {
+    model = resample_model(context, model, size);
+    texel_begins_.push_back(static_cast<int>(all.out.size()));
+    all.along.insert(all.along.end(), model.texture.along.begin(), model.texture.along.end());
+    all.around.insert(all.around.end(), model.texture.around.begin(), model.texture.around.end());
+    all.out.insert(all.out.end(), model.texture.out.begin(), model.texture.out.end());
+  }
+  texels_ = {context.upload(all.along), context.upload(all.around), context.upload(all.out)};
+}
+
+Correspondence Morph::correspondence(int from, int to) const { return composed(inverse(from_first_[from]), from_first_[to]); }
+
+SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) const {
+  const std::vector<double> weights = checked_weights(given, models_.size());
+  const int layout_index = layout_.value_or(static_cast<int>(std::max_element(weights.begin(), weights.end()) - weights.begin()));
+  const SkeletexModel& layout = models_[layout_index];
+
+  SkeletexModel result;
+  result.skeleton = layout.skeleton;
+  result.genus = layout.genus;
+  result.encoder_settings = layout.encoder_settings;
+  std::vector<const Skeleton*> skeletons;
+  std::vector<Correspondence> from_layout;
+  for (std::size_t m = 0; m < models_.size(); ++m) {
+    skeletons.push_back(&models_[m].skeleton);
+    from_layout.push_back(correspondence(layout_index, static_cast<int>(m)));
+    result.origin += weights[m] * models_[m].origin;
+    result.diagonal += weights[m] * models_[m].diagonal;
+  }
+  const std::vector<Vec3> nodes = mean_nodes(skeletons, from_layout, weights, layout_index);
+  for (std::size_t n = 0; n < nodes.size(); ++n) result.skeleton.nodes[n].position = nodes[n];
+  for (int bone = 0; bone < static_cast<int>(result.skeleton.bones.size()); ++bone)
+    if (!(bone_length(result.skeleton, bone) > 0))
+      throw InputError(fmt::format("bone \"{}\" shrinks to nothing between the models", result.skeleton.bones[bone].name));
+
+  std::deque<Overlay> overlays;
+  for (std::size_t m = 0; m < models_.size(); ++m) overlays.emplace_back(models_[m], result.skeleton, from_layout[m]);
+  set_mean_s(result.skeleton, overlays, weights, overlays[layout_index]);
+  const Walls walls(result.skeleton);
+  SeamNetwork network = seam_network(result.skeleton, walls);
+  for (Overlay& overlay : overlays) overlay.set_seams(walls, network);
+
+  result.patches = mean_patches(overlays, weights, layout);
+  SeamMean(result.skeleton, walls, overlays, weights, overlays[layout_index]).fill(network);
+  result.arcs = std::move(network.arcs);
+  result.corners = std::move(network.corners);
+  result.ends = std::move(network.ends);
+
+  BlendTables tables;
+  const std::vector<LatticeRow> rows = lattice_rows(result.patches, RowChoice::kAll);
+  for (std::size_t m = 0; m < models_.size(); ++m) {
+    if (weights[m] == 0) continue;
+    ++tables.source_count;
+    const Overlay& overlay = overlays[m];
+    for (int bone = 0; bone < static_cast<int>(result.patches.size()); ++bone) {
+      const Rectangle& from = models_[m].patches[overlay.model_bone(bone)].rectangle;
+      const int stride = models_[m].texture.width;
+      tables.sources.push_back({texel_begins_[m] + from.y * stride + from.x, stride, from.width, from.height,
+                                static_cast<int>(tables.head_columns.size()), overlay.is_reversed(bone) ? -1.0f : 1.0f});
+      append_columns(overlay, bone, result.patches[bone].rectangle.width, tables);
+    }
+    for (const LatticeRow& row : rows) {
+      const int source_height = models_[m].patches[overlay.model_bone(row[0])].rectangle.height;
+      const double at = row_at_same_share(row[1], result.patches[row[0]].rectangle.height, source_height, overlay.is_reversed(row[0]));
+      tables.rows.push_back({static_cast<float>(at), static_cast<float>(weights[m])});
+    }
+  }
+  result.texture.width = layout.texture.width;
+  result.texture.height = layout.texture.height;
+  const std::size_t area = static_cast<std::size_t>(result.texture.width) * result.texture.height;
+  if (texels.x.size != area) {
+    texels = allocate_planes(*context_, area);
+    for (ClBuffer<float>* plane : {&texels.x, &texels.y, &texels.z}) context_->fill(*plane, 0);
+  }
+  blend_texels(*context_, tables, rows, frame_tables(result.skeleton, walls, result.patches, result.origin), result.texture.width, texels_, texels);
+
+  nlohmann::json settings = nlohmann::json::parse(result.encoder_settings, nullptr, false);
+  if (!settings.is_object()) settings = nlohmann::json::object();
+  settings["morphed"] = weights;
+  result.encoder_settings = settings.dump();
+  return result;
+}
+
+SkeletexModel Morph::at(std::span<const double> weights) const {
+  DevicePlanes texels;
+  SkeletexModel model = queue(weights, texels);
+  model.texture.along = context_->download(texels.x);
+  model.texture.around = context_->download(texels.y);
+  model.texture.out = context_->download(texels.z);
+  return model;
+}
+
+}  // namespace skeletex

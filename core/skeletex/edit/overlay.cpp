@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/edit/overlay.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "skeletex/model/loop_turns.h"
+#include "skeletex/model/pose.h"
+
+namespace skeletex {
+namespace {
+
+constexpr double kNoWidth = 1e-9;  // turns
+
+BoneEnd end_at(const Skeleton& skeleton, int bone, int node) { return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail; }
+
+double share_of(const std::vector<double>& grown, std::size_t first, std::size_t last, std::size_t i) {
+  const double begin = grown[first], width = (last < grown.size() ? grown[last] : grown[0] + 1) - begin;
+  return width > kNoWidth ? (grown[i] - begin) / width : static_cast<double>(i - first) / static_cast<double>(last - first);
+}
+
+/// y at x of a map that grows by a turn per turn, linear between its bounds.
+template <class Bound>
+double along_bounds(const std::vector<Bound>& bounds, double Bound::*x_of, double Bound::*y_of, double x) {
+  const double first = bounds.front().*x_of, whole = std::floor(x - first);
+  const double local = x - whole;
+  std::size_t i = bounds.size() - 1;
+  while (i > 0 && bounds[i].*x_of > local) --i;
+  const bool is_last = i + 1 == bounds.size();
+  const double begin = bounds[i].*x_of, width = (is_last ? first + 1 : bounds[i + 1].*x_of) - begin;
+  const double y = bounds[i].*y_of, height = (is_last ? bounds.front().*y_of + 1 : bounds[i + 1].*y_of) - y;
+  return whole + y + (width > 0 ? (local - begin) / width * height : height / 2);
+}
+
+/// Bounds of equal neighbours of two loops, both in the direction of growing angle. Neighbours that follow each other in
+/// another order than the rest are left out, the thinnest first; so are those that only one loop has.
+template <class Bound, class Interval>
+std::vector<Bound> paired_bounds(const std::vector<Interval>& here, std::vector<Interval> model) {
+  const auto find = [](const std::vector<Interval>& loop, int neighbour) {
+    return std::find_if(loop.begin(), loop.end(), [&](const Interval& interval) { return interval.neighbour == neighbour; });
+  };
+  std::erase_if(model, [&](const Interval& interval) { return find(here, interval.neighbour) == here.end(); });
+  std::vector<Interval> common;
+  for (bool is_ordered = false; !is_ordered;) {
+    if (model.empty()) return {};
+    common.clear();
+    // The loop here from the model's first neighbour on.
+    const auto first = find(here, model[0].neighbour);
+    for (std::size_t i = 0; i < here.size(); ++i) {
+      const std::size_t at = (static_cast<std::size_t>(first - here.begin()) + i) % here.size();
+      const double lift = at < static_cast<std::size_t>(first - here.begin()) ? 1 : 0;
+      if (find(model, here[at].neighbour) != model.end()) common.push_back({here[at].neighbour, here[at].begin + lift, here[at].end + lift});
+    }
+    is_ordered = std::equal(common.begin(), common.end(), model.begin(), model.end(), [](const Interval& p, const Interval& q) { return p.neighbour == q.neighbour; });
+    if (!is_ordered)
+      model.erase(std::min_element(model.begin(), model.end(), [](const Interval& p, const Interval& q) { return p.end - p.begin < q.end - q.begin; }));
+  }
+  std::vector<Bound> bounds;
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    const bool is_last = i + 1 == model.size();
+    const double next_here = is_last ? common[0].begin + 1 : common[i + 1].begin, next_model = is_last ? model[0].begin + 1 : model[i + 1].begin;
+    if (i == 0) bounds.push_back({model[0].begin, common[0].begin});
+    if (next_here - common[i].end > kNoWidth) {
+      bounds.push_back({model[i].end, common[i].end});
+      bounds.push_back({next_model, next_here});
+    } else {
+      bounds.push_back({(model[i].end + next_model) / 2, (common[i].end + next_here) / 2});
+    }
+  }
+  // The last bound is the first one, a turn later; the first one's middle is known only now.
+  bounds[0] = {bounds.back().turn - 1, bounds.back().here - 1};
+  bounds.pop_back();
+  return bounds;
+}
+
+}  // namespace
+
+Skeleton posed_to(const Skeleton& model, const Skeleton& here, const Correspondence& to_model) {
+  Pose pose;
+  pose.nodes.resize(model.nodes.size());
+  for (std::size_t n = 0; n < here.nodes.size(); ++n) pose.nodes[to_model.nodes[n]] = here.nodes[n].position;
+  return apply_pose(model, pose);
+}
+
+Overlay::Overlay(const SkeletexModel& model, const Skeleton& here, Correspondence to_model)
+    : model_(&model),
+      to_model_(std::move(to_model)),
+      posed_(posed_to(model.skeleton, here, to_model_)),
+      walls_(model.skeleton),
+      posed_walls_(model, posed_),
+      bones_here_(model.skeleton.bones.size(), -1),
+      loops_(here.bones.size()) {
+  for (int bone = 0; bone < static_cast<int>(loops_.size()); ++bone) bones_here_[model_bone(bone)] = bone;
+  for (int bone = 0; bone < static_cast<int>(loops_.size()); ++bone)
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) trace_seam(bone, end);
+}
+
+std::vector<Overlay::Interval> Overlay::intervals_here(int bone, BoneEnd end, const Walls& walls, const SeamNetwork& network) const {
+  std::vector<Interval> intervals;
+  for (const ArcUse use : network.ends[bone][static_cast<int>(end)].arcs) {
+    const SeamArc& arc = network.arcs[use.arc];
+    double begin = walls.turn_of(bone, network.directions[arc.corners[use.is_reversed ? 1 : 0]]);
+    if (!intervals.empty()) {
+      const double step = begin - intervals.back().begin;
+      begin -= std::floor(step + kNoWidth);  // rounding may turn a sliver's bounds round
+      begin = std::max(begin, intervals.back().begin);
+    }
+    intervals.push_back({arc.bones[0] == bone ? arc.bones[1] : arc.bones[0], begin, 0});
+  }
+  for (std::size_t i = 0; i < intervals.size(); ++i) intervals[i].end = i + 1 < intervals.size() ? intervals[i + 1].begin : intervals[0].begin + 1;
+  if (!is_reversed(bone)) return intervals;
+  std::reverse(intervals.begin(), intervals.end());
+  for (Interval& interval : intervals) interval = {interval.neighbour, -interval.end, -interval.begin};
+  return intervals;
+}
+
+std::vector<Overlay::Interval> Overlay::intervals_of_model(int bone, BoneEnd end) const {
+  const int own = model_bone(bone);
+  const BoneEnd own_end = model_end(bone, end);
+  const std::vector<PosedBound> bounds = posed_walls_.bounds(own, own_end);
+  std::vector<Interval> intervals;
+  for (std::size_t i = 0; i < bounds.size(); ++i) {
+    const SeamArc& arc = model_->arcs[model_->ends[own][static_cast<int>(own_end)].arcs[i].arc];
+    intervals.push_back({bones_here_[arc.bones[0] == own ? arc.bones[1] : arc.bones[0]], bounds[i].turn,
+                         i + 1 < bounds.size() ? bounds[i + 1].turn : bounds[0].turn + 1});
+  }
+  return intervals;
+}
+
+void Overlay::set_seams(const Walls& walls, const SeamNetwork& network) {
+  for (int bone = 0; bone < static_cast<int>(loops_.size()); ++bone)
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
+      std::vector<Bound>& bounds = loops_[bone][static_cast<int>(end)].bounds;
+      bounds.clear();
+      const std::vector<ArcUse>& uses = network.ends[bone][static_cast<int>(end)].arcs;
+      if (!uses.empty() && !network.arcs[uses[0].arc].is_closed())
+        bounds = paired_bounds<Bound>(intervals_here(bone, end, walls, network), intervals_of_model(bone, end));
+      if (!bounds.empty()) continue;
+      // A rotation: that of the posed frame, in a wall between two bones with its roll.
+      const BoneBasis& posed = posed_walls_.bases()[model_bone(bone)];
+      const Vec3& s = walls.bases()[bone].s;
+      const double zero = std::atan2(s.dot(posed.b), s.dot(posed.s)) / (2 * std::numbers::pi);
+      const std::vector<PosedBound> rolls = posed_walls_.bounds(model_bone(bone), model_end(bone, end));
+      bounds.push_back({0, (rolls.size() == 1 ? rolls[0].roll : 0) - zero});
+    }
+}
+
+void Overlay::trace_seam(int bone_here, BoneEnd end_here) {
+  Loop& loop = loops_[bone_here][static_cast<int>(end_here)];
+  const int bone = model_bone(bone_here);
+  const BoneEnd end = model_end(bone_here, end_here);
+  const std::vector<ArcUse>& uses = model_->ends[bone][static_cast<int>(end)].arcs;
+  if (uses.empty()) return;
+  const int node = end_node(model_->skeleton, bone, end);
+  std::vector<Vec3> positions;
+  std::vector<double> turns;
+  std::vector<std::size_t> arc_begins;
+  const auto add = [&](int owner, const SeamSample& sample, int arc) {
+    positions.push_back(walls_.seam_point(owner, end_at(model_->skeleton, owner, node), sample.turn, sample.distance));
+    turns.push_back(owner == bone ? sample.turn : walls_.turn_of(bone, positions.back() - model_->skeleton.nodes[node].position));
+    loop.points.push_back({0, 0, sample.distance, arc});
+  };
+  for (const ArcUse use : uses) {
+    const SeamArc& arc = model_->arcs[use.arc];
+    arc_begins.push_back(positions.size());
+    if (!arc.is_closed()) {
+      const SeamCorner& corner = model_->corners[arc.corners[use.is_reversed ? 1 : 0]];
+      add(corner.bones[0], corner.sample, -1);
+    }
+    for (std::size_t i = 0; i < arc.samples.size(); ++i)
+      add(arc.bones[0], arc.samples[use.is_reversed ? arc.samples.size() - 1 - i : i], use.arc);
+  }
+  arc_begins.push_back(positions.size());
+
+  // Angles are made to grow where the seam turns back about its bone; corners belong where the walls meet, so that each
+  // arc fills its interval.
+  const std::vector<Interval> intervals = intervals_of_model(bone_here, end_here);
+  const int count = static_cast<int>(positions.size());
+  std::vector<double> grown(count);
+  if (std::optional<std::vector<double>> found = loop_turns(positions, turns)) grown = std::move(*found);
+  else
+    for (int i = 0; i < count; ++i) grown[i] = intervals[0].begin + static_cast<double>(i) / count;
+  for (std::size_t a = 0; a < uses.size(); ++a)
+    for (std::size_t i = arc_begins[a]; i < arc_begins[a + 1]; ++i) {
+      LoopPoint& point = loop.points[i];
+      const double share = share_of(grown, arc_begins[a], arc_begins[a + 1], i);
+      point.turn = model_->arcs[uses[a].arc].is_closed() ? grown[i] : (1 - share) * intervals[a].begin + share * intervals[a].end;
+      const double offset = turns[i] - point.turn;
+      point.turn_offset = point.arc < 0 ? 0 : offset - std::round(offset);
+    }
+}
+
+double Overlay::model_turn(int bone, BoneEnd end, double turn) const {
+  const Loop& at = loop(bone, end);
+  return along_bounds(at.bounds, &Bound::here, &Bound::turn, is_reversed(bone) ? -turn : turn);
+}
+
+double Overlay::turn_here(int bone, BoneEnd end, double model_turn) const {
+  const Loop& at = loop(bone, end);
+  const double here = along_bounds(at.bounds, &Bound::turn, &Bound::here, model_turn);
+  return is_reversed(bone) ? -here : here;
+}
+
+Overlay::SeamPoint Overlay::seam_at(int bone, BoneEnd end, double turn) const {
+  const std::vector<LoopPoint>& points = loop(bone, end).points;
+  const double at = model_turn(bone, end, turn), first = points.front().turn;
+  const double local = std::max(first, at - std::floor(at - first));
+  const auto after = std::upper_bound(points.begin(), points.end(), local, [](double value, const LoopPoint& point) { return value < point.turn; });
+  const LoopPoint &p = *(after - 1), &q = after == points.end() ? points.front() : *after;
+  const double width = (after == points.end() ? first + 1 : q.turn) - p.turn, share = width > 0 ? (local - p.turn) / width : 0;
+  const double offset = (1 - share) * p.turn_offset + share * q.turn_offset;
+  return {is_reversed(bone) ? -offset : offset, (1 - share) * p.distance + share * q.distance};
+}
+
+std::vector<Overlay::ArcPoint> Overlay::arc_points(int bone, BoneEnd end, int arc) const {
+  const std::vector<LoopPoint>& points = loop(bone, end).points;
+  const double sign = is_reversed(bone) ? -1 : 1;
+  const bool is_closed = model_->arcs[arc].is_closed();
+  double begin = 0, width = 1;
+  if (!is_closed) {
+    std::size_t first = 0;
+    while (points[first].arc >= 0 || points[first + 1].arc != arc) ++first;
+    std::size_t last = first + 1;
+    while (last < points.size() && points[last].arc >= 0) ++last;
+    begin = points[first].turn;
+    width = (last < points.size() ? points[last].turn : points[0].turn + 1) - begin;
+  }
+  std::vector<ArcPoint> result;
+  for (const LoopPoint& point : points) {
+    if (point.arc != arc) continue;
+    const double share = width > 0 ? (point.turn - begin) / width : (static_cast<double>(result.size()) + 1) / (static_cast<double>(model_->arcs[arc].samples.size()) + 1);
+    const double place = is_closed ? turn_here(bone, end, point.turn) : sign > 0 ? share : 1 - share;
+    result.push_back({place, {sign * point.turn_offset, point.distance}});
+  }
+  if (sign < 0) std::reverse(result.begin(), result.end());
+  return result;
+}
+
+int Overlay::model_arc(int node, int first_bone, int second_bone) const {
+  const int a = model_bone(first_bone), b = model_bone(second_bone);
+  for (int i = 0; i < static_cast<int>(model_->arcs.size()); ++i) {
+    const SeamArc& arc = model_->arcs[i];
+    if (arc.node == to_model_.nodes[node] && ((arc.bones[0] == a && arc.bones[1] == b) || (arc.bones[0] == b && arc.bones[1] == a))) return i;
+  }
+  return -1;
+}
+
+}  // namespace skeletex

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <array>
+#include <vector>
+
+#include "skeletex/edit/correspondence.h"
+#include "skeletex/edit/seam_network.h"
+#include "skeletex/model/posed_walls.h"
+
+namespace skeletex {
+
+/// A model laid over another skeleton of the same branching: the roll correction of morphs and transfers (paper 5). Angles
+/// about a bone of the one become angles about a bone of the other: where bones meet, linearly between the bounds of
+/// equal neighbours; in a linear node's wall turned as a whole, and at a free end as they are, after the model was posed
+/// so that its nodes lie where the other skeleton has them. A sliver between neighbours that only the other skeleton has
+/// is a point of the model; one that only the model has is left out from its middle to both sides.
+///
+/// Bones, ends and angles are those of the other skeleton ("here") unless they are called the model's.
+class Overlay {
+ public:
+  /// \param model  its texels are not looked at. Must outlive this
+  /// \param here   s is not looked at (see set_seams)
+  /// \param to_model  from the bones here to those of the model
+  Overlay(const SkeletexModel& model, const Skeleton& here, Correspondence to_model);
+  Overlay(const Overlay&) = delete;
+  Overlay& operator=(const Overlay&) = delete;
+
+  const SkeletexModel& model() const { return *model_; }
+  int model_bone(int bone) const { return to_model_.bones[bone]; }
+  bool is_reversed(int bone) const { return to_model_.is_reversed[bone]; }
+  BoneEnd model_end(int bone, BoneEnd end) const { return is_reversed(bone) == (end == BoneEnd::kHead) ? BoneEnd::kTail : BoneEnd::kHead; }
+  /// The model's direction of angle 0, carried here.
+  const Vec3& carried_s(int bone) const { return posed_walls_.bases()[model_bone(bone)].s; }
+
+  /// Says what angles here are counted from and where the seams run; before any angle is asked for.
+  void set_seams(const Walls& walls, const SeamNetwork& network);
+
+  /// The model's angle at an angle here, in turns; one grows with the other, or falls where the bone is reversed, by a turn per turn.
+  double model_turn(int bone, BoneEnd end, double turn) const;
+  /// The inverse.
+  double turn_here(int bone, BoneEnd end, double model_turn) const;
+
+  /// A point of the model's seam: its distance from the bone's half-line, and how far its angle lies from the one that it
+  /// is found by (not at all, but where a seam turns back about its bone), turns here.
+  struct SeamPoint {
+    double turn_offset = 0;
+    double distance = 0;
+  };
+  SeamPoint seam_at(int bone, BoneEnd end, double turn) const;
+  /// The samples of one of the model's arcs in the direction of growing angles here, each with its share of the way
+  /// between the arc's corners (of a closed arc: its angle here).
+  struct ArcPoint {
+    double place;
+    SeamPoint point;
+  };
+  std::vector<ArcPoint> arc_points(int bone, BoneEnd end, int arc) const;
+  /// The model's arc between two bones; -1 when it has none.
+  int model_arc(int node, int first_bone, int second_bone) const;
+
+ private:
+  /// An arc as one end runs through it: the bone beyond, here, and the angles where it begins and ends.
+  struct Interval {
+    int neighbour;
+    double begin, end;
+  };
+  /// The seam around an end, by its angle in the model.
+  struct LoopPoint {
+    double turn = 0;  ///< growing
+    double turn_offset = 0;
+    double distance = 0;
+    int arc = -1;  ///< -1: a corner
+  };
+  struct Bound {
+    double turn = 0;  ///< the model's
+    double here = 0;  ///< in the model's direction of turning
+  };
+  struct Loop {
+    std::vector<Bound> bounds;  ///< both growing; one is enough for a rotation
+    std::vector<LoopPoint> points;
+  };
+  void trace_seam(int bone, BoneEnd end);
+  std::vector<Interval> intervals_here(int bone, BoneEnd end, const Walls& walls, const SeamNetwork& network) const;
+  std::vector<Interval> intervals_of_model(int bone, BoneEnd end) const;
+  const Loop& loop(int bone, BoneEnd end) const { return loops_[bone][static_cast<int>(end)]; }
+
+  const SkeletexModel* model_;
+  Correspondence to_model_;
+  Skeleton posed_;
+  Walls walls_;
+  PosedWalls posed_walls_;
+  std::vector<int> bones_here_;             ///< per bone of the model
+  std::vector<std::array<Loop, 2>> loops_;  ///< per bone here
+};
+
+/// The skeleton of the model posed to the nodes of another one.
+Skeleton posed_to(const Skeleton& model, const Skeleton& here, const Correspondence& to_model);
+
+}  // namespace skeletex

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+// Texels as weighted sums of the texels of other textures, each read at a place of its own: morphs and transfers (paper 5).
+//
+// in   lattice_rows: the rows to do, four ints each: patch, row, two unused (see reconstruct.cl)
+//      patches, rows: the result's. sources: per source and patch [source * patch_count + patch]
+//      source_rows: per source and row to do [source * row_count + k]
+//      columns: two planes of column_count floats behind each other: the source's column that a column of the result
+//      reads at the bone's head and at its tail, in between linearly by the foot's station; any lift, the patch is periodic
+//      in_along, in_around, in_out: texels of all sources
+// out  along, around, out: the result's texture, texture_width columns
+// NDRange: one work-group per row, of any size; work-items take columns in turn (see reconstruct.cl). A column of the
+// result is done by one work-item for all sources, so sums need no barrier and have a fixed order.
+// Reads are linear between the four texels around. Where a place is a texel's own, the result is weight * texel exactly.
+#include "skeletex_structs.h"
+#include "blend_structs.h"
+
+__kernel void blend_texels(const int row_count, const int source_count, const int patch_count, const int texture_width, const int column_count,
+                           __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
+                           __global const RowRecord* restrict rows, __global const BlendSource* restrict sources,
+                           __global const BlendRow* restrict source_rows, __global const float* restrict columns,
+                           __global const float* restrict in_along, __global const float* restrict in_around,
+                           __global const float* restrict in_out, __global float* restrict along, __global float* restrict around,
+                           __global float* restrict out) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  const int patch_index = lattice_rows[4 * k], row = lattice_rows[4 * k + 1];
+  __global const PatchRecord* restrict patch = patches + patch_index;
+  const int width = patch->width;
+  const int texel = (patch->y + row) * texture_width + patch->x;
+  const float station = rows[patch->row_begin + row].station;
+  const int first = get_local_id(0), step = get_local_size(0);
+
+  for (int i = 0; i < source_count; ++i) {
+    __global const BlendSource* restrict source = sources + i * patch_count + patch_index;
+    const float weight = source_rows[i * row_count + k].weight, from_row = source_rows[i * row_count + k].row;
+    const int source_width = source->width, stride = source->stride;
+    const int below = clamp((int)from_row, 0, source->height - 2);
+    const float above_share = from_row - (float)below;
+    const float w_above = weight * above_share, w_below = weight * (1.0f - above_share);
+    const float sign = source->sign;
+    const float period = (float)source_width, frequency = 1.0f / period;
+    const int begin = source->begin + below * stride;
+    __global const float* restrict head_columns = columns + source->column_begin;
+    __global const float* restrict tail_columns = head_columns + column_count;
+
+    for (int j = first; j < width; j += step) {
+      const float lifted = head_columns[j] + station * (tail_columns[j] - head_columns[j]);
+      const float column = lifted - period * floor(lifted * frequency);
+      const int left_any = (int)column;
+      const float right_share = column - (float)left_any;
+      const int left = left_any >= source_width ? left_any - source_width : left_any;
+      const int right = left + 1 < source_width ? left + 1 : 0;
+      const float left_share = 1.0f - right_share;
+      const float w00 = w_below * left_share, w01 = w_below * right_share, w10 = w_above * left_share, w11 = w_above * right_share;
+      const int a = begin + left, b = begin + right, c = a + stride, d = b + stride;
+      const float read_along = sign * (w00 * in_along[a] + w01 * in_along[b] + w10 * in_along[c] + w11 * in_along[d]);
+      const float read_around = sign * (w00 * in_around[a] + w01 * in_around[b] + w10 * in_around[c] + w11 * in_around[d]);
+      const float read_out = w00 * in_out[a] + w01 * in_out[b] + w10 * in_out[c] + w11 * in_out[d];
+      along[texel + j] = i == 0 ? read_along : along[texel + j] + read_along;
+      around[texel + j] = i == 0 ? read_around : around[texel + j] + read_around;
+      out[texel + j] = i == 0 ? read_out : out[texel + j] + read_out;
+    }
+  }
+}

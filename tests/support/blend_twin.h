@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <cmath>
+#include <span>
+
+#include "blend_structs.h"
+#include "skeletex/model/mesh.h"
+
+namespace skeletex::twin {
+
+/// One source of kernel blend_texels at one place.
+struct BlendRead {
+  BlendSource source;
+  BlendRow row;
+  double column;  ///< any lift
+};
+
+/// Kernel blend_texels, one texel: the weighted sum over its sources.
+inline Vec3 blend(std::span<const BlendRead> reads, const std::vector<float>& along, const std::vector<float>& around, const std::vector<float>& out) {
+  Vec3 sum = Vec3::Zero();
+  for (const BlendRead& read : reads) {
+    const double column = read.column - read.source.width * std::floor(read.column / read.source.width);
+    const int left = static_cast<int>(column) % read.source.width, right = (left + 1) % read.source.width;
+    const int below = std::min(static_cast<int>(read.row.row), read.source.height - 2);
+    const double x = column - std::floor(column), y = double(read.row.row) - below;
+    const auto texel = [&](int row, int j) {
+      const int at = read.source.begin + row * read.source.stride + j;
+      return Vec3(read.source.sign * along[at], read.source.sign * around[at], out[at]);
+    };
+    sum += double(read.row.weight) * ((1 - y) * ((1 - x) * texel(below, left) + x * texel(below, right)) +
+                                      y * ((1 - x) * texel(below + 1, left) + x * texel(below + 1, right)));
+  }
+  return sum;
+}
+
+}  // namespace skeletex::twin
