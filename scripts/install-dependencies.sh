@@ -12,7 +12,7 @@ packages=(
   libegl-dev libopengl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libcairo2-dev pkg-config fonts-dejavu-core  # renderer, without a GPU too
   libcli11-dev libspdlog-dev                                         # program
   libgtest-dev libembree-dev openexr                                 # tests (metro against Embree, models against exrheader)
-  libbenchmark-dev python3                                           # benchmarks, tables of the experiments
+  libbenchmark-dev python3 python3-matplotlib                                           # benchmarks, tables of the experiments
 )
 
 as_root() {

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""The paper's figures that are pictures: tables of what the experiments rendered, with their numbers."""
+import style
+
+
+def _models(rows):
+    return style.unique(row["model"] for row in rows)
+
+
+def fig04_11_segments(results, folder):
+    rows = style.rows(results, "segments")
+    if not rows:
+        return []
+    kinds = ["segments", "layout", "map"]
+    return [style.sheet(results, "segments", [[f"{model}-{kind}.png" for model in _models(rows)] for kind in kinds], _models(rows), kinds, folder, "fig04_11_segments")]
+
+
+def fig05_06_methods(results, folder):
+    rows = style.rows(results, "methods")
+    if not rows:
+        return []
+    methods = style.unique(row["parameters"]["method"] for row in rows)
+    made = []
+    for model in _models(rows):
+        titles = [f"{row['parameters']['method']}: mean {style.symmetric(row['columns']):.1e}, max {style.largest(row['columns']):.1e}" for row in rows if row["model"] == model]
+        made.append(style.sheet(results, "methods", [[f"{model}-{method}-{kind}.png" for method in methods] for kind in ("shaded", "checker")], titles, [model, "(u, v)"], folder,
+                                f"fig05_06_methods_{model}", cell=3.2))
+    return made
+
+
+def fig10_distance(results, folder):
+    rows = style.rows(results, "distance")
+    if not rows:
+        return []
+    model = rows[0]["model"]
+    return [style.sheet(results, "distance", [[f"{model}-{kind}.png" for kind in ("not_restored", "restored")]], ["not restored", "distances to the bones restored"], None, folder,
+                        "fig10_distance", cell=3.6)]
+
+
+def fig12_cyclic(results, folder):
+    rows = style.rows(results, "cyclic")
+    if not rows:
+        return []
+    titles = [f"{row['model']}, genus {row['columns']['genus']}" for row in rows]
+    return [style.sheet(results, "cyclic", [[f"{model}-{kind}.png" for model in _models(rows)] for kind in ("segments", "checker")], titles, None, folder, "fig12_cyclic", cell=3.0)]
+
+
+def fig13_detail(results, folder):
+    rows = style.rows(results, "detail")
+    if not rows:
+        return []
+    rows.sort(key=lambda row: row["parameters"]["size"])
+    model = rows[0]["model"]
+    titles = [f"{row['parameters']['size']}: {row['columns']['triangles']} triangles\nmean {style.symmetric(row['columns']):.1e}" for row in rows]
+    return [style.sheet(results, "detail", [[f"{model}-{row['parameters']['size']}-flat.png" for row in rows]], titles, None, folder, "fig13_detail", cell=2.8)]
+
+
+def fig15_results(results, folder):
+    rows = style.rows(results, "results")
+    if not rows:
+        return []
+    kinds = ["input", "layout", "map", "shaded", "error"]
+    titles = ["input, skeleton", "layout", "texture", "reconstruction", "error of the vertices"]
+    names = [f"{row['model']}\nmean {row['columns']['vertex_mean']:.1e}, deviation {row['columns']['vertex_std']:.1e}" for row in rows]
+    return [style.sheet(results, "results", [[f"{row['model']}-{kind}.png" for kind in kinds] for row in rows], titles, names, folder, "fig15_results", cell=2.8)]
+
+
+ALL = [fig04_11_segments, fig05_06_methods, fig10_distance, fig12_cyclic, fig13_detail, fig15_results]

@@ -1,0 +1,106 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Draws every figure whose experiment has been run, and one self-contained page with all of them, the tables and the numbers.
+
+    paper_figures/report.py [RESULTS]      # default: results/; writes RESULTS/figures/ and RESULTS/report/index.html
+"""
+import base64
+import html
+import json
+import pathlib
+import sys
+
+import fig14_fidelity
+import pictures
+import style
+import sweeps
+import table1_times
+
+SECTIONS = [
+    ("Figures 4 and 11: segments, layout, texture", "segments", pictures.fig04_11_segments,
+     "Other models than the paper's, whose data were not published. Every texel is used; the paper's textures leave blank patches."),
+    ("Figures 5 and 6: SPD, VSM, hybrid", "methods", pictures.fig05_06_methods,
+     "SPD loses what the rays from the bone do not see (inside of the ears); VSM keeps all of the surface; hybrid takes SPD where it sees enough."),
+    ("Figure 10: distance restoration", "distance", pictures.fig10_distance,
+     "Bent without and with the distances to the bones restored: without, the outer side of a bend thins and the inner one swells."),
+    ("Figure 12: skeletons with cycles", "cyclic", pictures.fig12_cyclic, "Genus and closedness are measured on the reconstruction."),
+    ("Figure 13: levels of detail", "detail", pictures.fig13_detail, "All from one model of 1024 x 1024 texels; every level is closed."),
+    ("Figure 14: error against texture size", "fidelity", fig14_fidelity.draw,
+     "The paper shows the distances of the original's vertices (top). They say little about the surface between them, so the symmetric surface distance is below."),
+    ("Figure 15: input, layout, texture, reconstruction, error", "results", pictures.fig15_results, "Error: distance of the original's vertices, as in the paper; each row has its own scale."),
+    ("Beyond the paper: iterations of VSM", "iterations", sweeps.draw_iterations,
+     "Weights w A (the paper's) get worse with iterations: they even out areas in the texture, not on the surface. Divided by the root of the surface area they get better and stay."),
+    ("Beyond the paper: what the recipe's parts bring", "recipe", sweeps.draw_recipe, "The paper's own recipe, the default, and the default with one part taken back."),
+]
+
+STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:72rem;margin:2rem auto;padding:0 1rem;color:#222}
+img{max-width:100%;height:auto}table{border-collapse:collapse;font-size:.85rem;margin:.5rem 0}td,th{padding:.2rem .6rem;text-align:right;border-bottom:1px solid #ddd}
+td:first-child,th:first-child{text-align:left}figure{margin:1rem 0}.quiet{color:#666;font-size:.85rem}details{margin:.5rem 0}"""
+
+
+def table_html(head, lines):
+    cells = "".join(f"<th>{html.escape(cell)}</th>" for cell in head)
+    body = "".join("<tr>" + "".join(f"<td>{html.escape(str(cell))}</td>" for cell in line) + "</tr>" for line in lines)
+    return f"<table><thead><tr>{cells}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def number(value):
+    return "" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def numbers_html(results, experiment):
+    path = results / experiment / "results.json"
+    data = json.loads(path.read_text())["rows"]
+    columns = style.unique(column for row in data for column in row["columns"])
+    failed = [row for row in data if row["status"] != "done"]
+    lines = [[row["key"]] + [number(row["columns"].get(column)) for column in columns] for row in data]
+    text = f"<details><summary>Numbers ({len(data)} rows)</summary>{table_html(['item'] + columns, lines)}</details>"
+    for row in failed:
+        text += f"<p>Failed: {html.escape(row['key'])}: {html.escape(row.get('reason', ''))}</p>"
+    return text
+
+
+def record_html(results, experiment):
+    record = json.loads((results / experiment / "record.json").read_text())
+    parts = [f"commit {record['git']['commit'][:10] or 'unknown'}" + (f" with {record['git']['changed_files']} changed files" if record["git"]["changed_files"] not in ("", "0") else ""),
+             record["compiler"], f"{record['device']['name']} ({record['device']['driver']})", f"{record['machine']['processor']}, {record['machine']['cores']} cores",
+             f"{record['seconds']:.0f} s", f"peak {record['peak_memory_mb']:.0f} MB"]
+    return f"<p class=quiet>{html.escape('; '.join(parts))}</p>"
+
+
+def main():
+    results = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else style.ROOT / "results"
+    figures = results / "figures"
+    body, missing = [], []
+    for title, experiment, draw, note in SECTIONS:
+        images = draw(results, figures)
+        if not images:
+            missing.append(experiment)
+            continue
+        body.append(f"<h2>{html.escape(title)}</h2><p>{html.escape(note)}</p>")
+        for image in images:
+            data = base64.b64encode(image.read_bytes()).decode()
+            body.append(f'<figure><img alt="{html.escape(title)}" src="data:image/png;base64,{data}"></figure>')
+        body.append(numbers_html(results, experiment) + record_html(results, experiment))
+    times = table1_times.table(results)
+    if times:
+        body.append("<h2>Table 1: preprocessing times at 512 x 512</h2><p>Medians, with the smallest and the largest in brackets. The paper's machine and models differ; its "
+                    "times leave the encoding of texels out, ours name it.</p>")
+        body.append(table_html(*times) + "<p>The paper:</p>" + table_html(*table1_times.paper_table()) + record_html(results, "times"))
+    else:
+        missing.append("times")
+    if missing:
+        body.append(f"<h2>Not run</h2><p>{html.escape(', '.join(missing))}. Run them with <code>skeletex run configs/experiments/NAME.json</code>.</p>")
+    if len(missing) == len(SECTIONS) + 1:
+        sys.exit(f"report: {results} holds no results; run skeletex run configs/paper.json first")
+    page = results / "report" / "index.html"
+    page.parent.mkdir(parents=True, exist_ok=True)
+    temporary = page.with_suffix(".tmp")
+    temporary.write_text(f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Skeletex: results</title><style>{STYLE}</style><body><h1>Skeletex: figures and tables</h1>'
+                         + "".join(body) + "</body></html>\n")
+    temporary.replace(page)
+    print(page)
+
+
+if __name__ == "__main__":
+    main()

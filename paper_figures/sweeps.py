@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: MIT
+"""Beyond the paper: iterations of VSM and the area exponent against error; the paper's recipe against the default; levels of
+detail (Figure 13) against error."""
+import style
+from style import plt
+
+
+def draw_iterations(results, folder):
+    rows = style.rows(results, "iterations")
+    if not rows:
+        return []
+    models = style.unique(row["model"] for row in rows)
+    figure, axes = plt.subplots(1, len(models), figsize=(3.0 * len(models), 2.8), squeeze=False)
+    for j, model in enumerate(models):
+        for k, alpha in enumerate(style.unique(row["parameters"]["alpha"] for row in rows)):
+            some = [row for row in rows if row["model"] == model and row["parameters"]["alpha"] == alpha]
+            colour, marker, dash = style.SERIES[k]
+            axes[0][j].plot([row["parameters"]["iterations"] for row in some], [style.symmetric(row["columns"]) for row in some], marker=marker, linestyle=dash,
+                            color=colour, markersize=4, label=f"w A / A3^{alpha}" if alpha else "w A (paper)")
+        axes[0][j].set_title(model)
+        axes[0][j].set_xlabel("iterations")
+        axes[0][j].set_ylim(bottom=0)
+    axes[0][0].set_ylabel("symmetric mean / diagonal")
+    axes[0][-1].legend(fontsize=8)
+    figure.tight_layout()
+    return [style.save(figure, folder, "iterations")]
+
+
+def draw_recipe(results, folder):
+    rows = style.rows(results, "recipe")
+    if not rows:
+        return []
+    sizes = style.unique(row["parameters"]["size"] for row in rows)
+    models = style.unique(row["model"] for row in rows)
+    recipes = style.unique(row["parameters"]["recipe"] for row in rows)
+    figure, axes = plt.subplots(1, len(sizes), figsize=(max(3.4, 0.9 * len(models) * len(recipes) / 2) * len(sizes), 3.0), squeeze=False)
+    width = 0.8 / len(recipes)
+    for j, size in enumerate(sizes):
+        for k, recipe in enumerate(recipes):
+            heights = [next((style.symmetric(row["columns"]) for row in rows if row["model"] == model and row["parameters"] == {"recipe": recipe, "size": size}), 0)
+                       for model in models]
+            axes[0][j].bar([i + (k - len(recipes) / 2 + 0.5) * width for i in range(len(models))], heights, width, color=style.SERIES[k][0],
+                           hatch=["", "//", "..", "\\\\", "xx"][k % 5], edgecolor="white", label=recipe)
+        axes[0][j].set_xticks(range(len(models)), models)
+        axes[0][j].set_title(f"{size} x {size}")
+        axes[0][j].grid(axis="x", visible=False)
+    axes[0][0].set_ylabel("symmetric mean / diagonal")
+    axes[0][-1].legend(fontsize=8)
+    figure.tight_layout()
+    return [style.save(figure, folder, "recipe")]
