@@ -48,7 +48,9 @@ void write_json(const std::string& target, const Json& json) {
 }
 
 void print(const std::string& json_target, const std::string& text) {
-  if (json_target != "-") std::fwrite(text.data(), 1, text.size(), stdout);
+  if (json_target == "-") return;
+  std::fwrite(text.data(), 1, text.size(), stdout);
+  std::fflush(stdout);  // long runs are watched through pipes and files
 }
 
 void warn(const std::string& text) { spdlog::warn("{}", text); }
