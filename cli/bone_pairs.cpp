@@ -6,8 +6,8 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
+#include "skeletex/io/suggestion.h"
 #include "skeletex/model/error.h"
-#include "suggestion.h"
 
 namespace skeletex::cli {
 
