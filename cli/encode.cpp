@@ -23,7 +23,7 @@ struct Arguments {
   int iterations = 4;
   double alpha = 0.5, stop_spread = 0, hybrid_threshold = 0.02;
   std::string rows = "surface", spd_hit = "last", share, compression = "zip";
-  bool has_no_prefilter = false, is_paper_recipe = false, is_half = false;
+  bool has_no_prefilter = false, is_snapped = false, is_paper_recipe = false, is_half = false;
   std::vector<std::string> bone_methods;
 };
 
@@ -68,6 +68,7 @@ EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command
     options.vsm = {.iterations = 1, .alpha = 0};
     options.row_spacing = RowSpacing::kUniform;
     options.has_prefilter = false;
+    options.has_snap = false;
   }
   const auto is_given = [&](const char* name) { return command.count(name) > 0; };
   if (is_given("--iterations")) options.vsm.iterations = arguments.iterations;
@@ -75,6 +76,7 @@ EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command
   options.vsm.stop_spread_change = arguments.stop_spread;
   if (is_given("--rows")) options.row_spacing = arguments.rows == "uniform" ? RowSpacing::kUniform : RowSpacing::kSurfaceLength;
   if (arguments.has_no_prefilter) options.has_prefilter = false;
+  if (is_given("--snap")) options.has_snap = arguments.is_snapped;
   options.spd_hit = arguments.spd_hit == "first" ? SpdHit::kFirst : SpdHit::kLast;
   if (is_given("--share")) options.texel_share = arguments.share == "area" ? TexelShare::kArea : TexelShare::kTriangles;
   return options;
@@ -111,7 +113,7 @@ Json report_json(const EncodeReport& report, const EncodeOptions& options, doubl
                      {"used_direct_solver", bone.vsm.used_direct_solver}};
     bones.push_back(std::move(json));
   }
-  return {{"mesh", {{"vertices", report.vertices}, {"triangles", report.triangles}, {"diagonal", report.diagonal}, {"genus", report.genus}}},
+  Json json{{"mesh", {{"vertices", report.vertices}, {"triangles", report.triangles}, {"diagonal", report.diagonal}, {"genus", report.genus}}},
           {"bones", std::move(bones)},
           {"atlas", {{"size", {options.width, options.height}}, {"used_fraction", report.used_fraction}}},
           {"times_ms",
@@ -121,6 +123,14 @@ Json report_json(const EncodeReport& report, const EncodeOptions& options, doubl
             {"encoding", report.encoding_ms}}},
           {"seconds", used_seconds},
           {"device", report.device}};
+  if (report.snap)
+    json["snap"] = {{"vertices", report.snap->vertices},
+                    {"snapped_vertices", report.snap->snapped_vertices},
+                    {"edges", report.snap->edges},
+                    {"snapped_edges", report.snap->snapped_edges},
+                    {"texels_on_edges", report.snap->texels_on_edges},
+                    {"texels_put_back", report.snap->texels_put_back}};
+  return json;
 }
 
 std::string report_text(const EncodeReport& report, const EncodeOptions& options, const std::string& output) {
@@ -131,11 +141,16 @@ std::string report_text(const EncodeReport& report, const EncodeOptions& options
                fmt::format("{} x {}", r.width, r.height), fmt::format("{:.1f}", 100 * bone.unseen_area_fraction),
                fmt::format("{:.0f}", 100 * bone.sampled_triangle_fraction)});
   }
+  const auto percent = [](int part, int whole) { return whole > 0 ? 100.0 * part / whole : 100.0; };
+  const std::string snap = !report.snap ? ""
+                                        : fmt::format("snapped to {:.1f} % of {} vertices and {:.1f} % of {} edges; {} texels put back\n",
+                                                      percent(report.snap->snapped_vertices, report.snap->vertices), report.snap->vertices,
+                                                      percent(report.snap->snapped_edges, report.snap->edges), report.snap->edges, report.snap->texels_put_back);
   std::error_code ignored;
   return fmt::format(
       "{}\n{} vertices, {} triangles, genus {}; {} x {} texels, {:.1f} % used, on {}\n"
-      "half edges {:.0f} ms, segmentation {:.0f} ms, parameterization {:.0f} ms, encoding {:.0f} ms\n{} ({:.1f} MiB)\n",
-      table.text(), report.vertices, report.triangles, report.genus, options.width, options.height, 100 * report.used_fraction, report.device,
+      "{}half edges {:.0f} ms, segmentation {:.0f} ms, parameterization {:.0f} ms, encoding {:.0f} ms\n{} ({:.1f} MiB)\n",
+      table.text(), report.vertices, report.triangles, report.genus, options.width, options.height, 100 * report.used_fraction, report.device, snap,
       report.half_edge_ms, report.segmentation_ms, report.parameterization_ms, report.encoding_ms, output,
       static_cast<double>(std::filesystem::file_size(output, ignored)) / (1 << 20));
 }
@@ -223,8 +238,12 @@ void add_encode_command(CLI::App& program) {
   command.add_flag("--no-prefilter", a.has_no_prefilter, "texels exactly on the mesh, so that flat triangles lie inside its curved parts")
       ->group("Texels");
   command
+      .add_flag("--snap,!--no-snap", a.is_snapped,
+                "texels sit on the mesh's own vertices and edges where they can, or at an even lattice; unless given: from 1 texel per vertex on")
+      ->group("Texels");
+  command
       .add_flag("--paper-recipe", a.is_paper_recipe,
-                "as the paper: --rows uniform --alpha 0 --iterations 1 --no-prefilter (rows, alpha and iterations can still be given)")
+                "as the paper: --rows uniform --alpha 0 --iterations 1 --no-prefilter --no-snap (rows, alpha and iterations can still be given)")
       ->group("Texels");
   command.add_flag("--half", a.is_half, "16 bits a channel: half the file, but an error of some 2e-5 of the diagonal; for drafts")->group("File");
   take_one_of(add("File", "--compression", a.compression, "lossless compression of the file"), {"zip", "piz"});

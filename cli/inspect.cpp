@@ -9,6 +9,8 @@
 #include "command.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/measure/manifold.h"
+#include "skeletex/measure/self_intersection.h"
+#include "skeletex/model/error.h"
 #include "table.h"
 
 namespace skeletex::cli {
@@ -16,6 +18,7 @@ namespace {
 
 struct Arguments {
   std::string file, json;
+  bool has_self_intersections = false;
 };
 
 bool is_mesh_file(const std::filesystem::path& path) {
@@ -111,6 +114,11 @@ void inspect_mesh(const Arguments& arguments) {
   say(report.unreferenced_vertices.size(), "vertices without a triangle");
   say(report.non_finite_vertices.size(), "vertices that are not finite numbers");
   say(report.degenerate_triangles.size(), "triangles with a vertex twice");
+  if (arguments.has_self_intersections) {
+    const long pairs = count_self_intersections(mesh);
+    json["self_intersections"] = pairs;
+    text += fmt::format("{} pairs of triangles that intersect\n", pairs);
+  }
   print(arguments.json, text);
   write_json(arguments.json, json);
 }
@@ -121,6 +129,8 @@ void run(const Arguments& arguments) {
     inspect_mesh(arguments);
     return;
   }
+  if (arguments.has_self_intersections)
+    throw InputError(fmt::format("{}: --self-intersections is for meshes; reconstruct the model first", arguments.file));
   const nlohmann::json header = read_model_header(arguments.file);
   if (arguments.json != "-") print(arguments.json, model_text(header, arguments.file));
   write_json(arguments.json, Json(header));
@@ -132,6 +142,7 @@ void add_inspect_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("inspect", "Say what a model, or a mesh, consists of");
   command.add_option("FILE", arguments->file, "model (.skx.exr), or mesh (.obj, .ply, .off, .stl)")->required();
+  command.add_flag("--self-intersections", arguments->has_self_intersections, "of a mesh: count the pairs of triangles that intersect");
   add_json_option(command, arguments->json);
   command.footer(
       "Examples:\n"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // From maps to texels. Positions are planes x, y, z over the whole texture, relative to the model's origin.
 //   cover_texels        triangles of all charts   -> per texel the triangle that covers it (lowest index wins)
+//   walk_to_positions   the same for texels that read beside their place in the lattice
 //   read_surface        that triangle             -> position, and a mark on every triangle that is read
 //   place_spd_points    distances along SPD rays  -> position
 //   place_points        a list of texels          -> position (end rows: seams and poles)
@@ -36,6 +37,7 @@ MapTriangle load_triangle(int t, int triangle_count, global const int* restrict 
   return m;
 }
 
+// v of a column from the triangle's base.
 float column_offset(MapTriangle m, int column, int width) {
   const float high = (float)column / (float)width;
   const float low = fma(-high, (float)width, (float)column) / (float)width;
@@ -118,14 +120,86 @@ kernel void cover_texels(const int triangle_count, global const int* restrict co
   }
 }
 
-// NDRange (texture width, texture height).
+// u from the triangle's base of a reading position: a row of the table, and the share of the way to the next one.
+float row_offset(MapTriangle m, global const float* restrict row_high, global const float* restrict row_low, int row, float share) {
+  const int next = share < 0.0f ? row - 1 : share > 0.0f ? row + 1 : row;
+  const float span = (row_high[next] - row_high[row]) + (row_low[next] - row_low[row]);
+  return ((row_high[row] - m.u_base_high) + (row_low[row] - m.u_base_low)) + fabs(share) * span;
+}
+
+// Where a map's triangle has a point at (u, v), both from the triangle's base: the weights of corners 1 and 2. They are
+// negative, or their sum is above 1, outside the triangle.
+void weights_at(MapTriangle m, float u, float v, float* w1, float* w2) {
+  if (m.pole == 0) {
+    // Scaled by the extents, so that products of tiny differences stay in range.
+    const float scale_u = 1.0f / fmax(fmax(fabs(m.du1), fabs(m.du2)), 1e-30f), scale_v = 1.0f / fmax(fmax(fabs(m.dv1), fabs(m.dv2)), 1e-30f);
+    const float a1 = m.du1 * scale_u, b1 = m.dv1 * scale_v, a2 = m.du2 * scale_u, b2 = m.dv2 * scale_v;
+    const float pu = u * scale_u, pv = v * scale_v;
+    const float determinant = a1 * b2 - a2 * b1;
+    const float inverse = determinant == 0.0f ? 0.0f : 1.0f / determinant;
+    *w1 = (pu * b2 - a2 * pv) * inverse;
+    *w2 = (a1 * pv - pu * b1) * inverse;
+  } else {
+    const float lambda = m.dv1 == 0.0f ? 0.0f : v / m.dv1;
+    const float edge = lambda * m.du1;
+    const float rest = m.du2 - edge;
+    const float tau = rest == 0.0f ? 1.0f : (u - edge) / rest;
+    *w1 = (1.0f - tau) * lambda;
+    *w2 = tau;
+  }
+}
+
+// v from the triangle's base of a reading position, at the turn that lies nearest to the triangle's middle.
+float turned_offset(MapTriangle m, int column, float share, int width) {
+  const float middle = m.pole == 0 ? (m.dv1 + m.dv2) / 3.0f : 0.5f * m.dv1;
+  const float beside = share / (float)width;
+  const int lift = (int)rint(middle - (column_offset(m, column, width) + beside));
+  return column_offset(m, column + lift * width, width) + beside;
+}
+
+// NDRange (texture width, texture height). Texels that read beside their place in the lattice, and are held by nothing,
+// walk from the triangle that covers their place to the one that covers where they read: always across the edge that the
+// point is furthest behind. A walk that does not arrive stays at its last triangle, and read_surface at its border.
+// across: per triangle the ones behind the edges opposite to its corners, three planes; -1 at the map's border
+kernel void walk_to_positions(const int texture_width, const int texture_height, const int triangle_count, global const int* restrict texel_patches,
+                              global const int* restrict corners, global const int* restrict turns, global const int* restrict poles,
+                              global const int* restrict across, global const float* restrict u_high, global const float* restrict u_low,
+                              global const float* restrict v_high, global const float* restrict v_low, global const PatchRecord* restrict patches,
+                              global const float* restrict row_high, global const float* restrict row_low, global const float* restrict offset_x,
+                              global const float* restrict offset_y, global const int* restrict anchors, global int* restrict texel_triangles) {
+  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (column >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + column;
+  int t = texel_triangles[texel];
+  if (t == NO_TRIANGLE || anchors[texel] != 0 || (offset_x[texel] == 0.0f && offset_y[texel] == 0.0f)) return;
+  global const PatchRecord* p = patches + texel_patches[texel];
+  const int row = p->row_begin + line - p->y;
+  for (int steps = 0; steps < 1000; ++steps) {
+    const MapTriangle m = load_triangle(t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
+    const float u = row_offset(m, row_high, row_low, row, offset_y[texel]);
+    const float v = turned_offset(m, column - p->x, offset_x[texel], p->width);
+    float w1, w2;
+    weights_at(m, u, v, &w1, &w2);
+    const float w0 = 1.0f - w1 - w2;
+    const float least = fmin(w0, fmin(w1, w2));
+    if (!(least < -1e-6f)) break;
+    const int corner = least == w0 ? 0 : least == w1 ? 1 : 2;
+    const int next = across[corner * triangle_count + t];
+    if (next < 0) break;
+    t = next;
+  }
+  texel_triangles[texel] = t;
+}
+
+// NDRange (texture width, texture height). Every texel reads at its place in the lattice plus its offset, in cells.
 kernel void read_surface(const int texture_width, const int texture_height, const int triangle_count, global const int* restrict texel_patches,
                          global const int* restrict texel_triangles, global const int* restrict corners, global const int* restrict turns,
                          global const int* restrict poles, global const float* restrict u_high, global const float* restrict u_low,
                          global const float* restrict v_high, global const float* restrict v_low, global const float* restrict vertex_x,
                          global const float* restrict vertex_y, global const float* restrict vertex_z, global const PatchRecord* restrict patches,
-                         global const float* restrict row_high, global const float* restrict row_low, global float* restrict x, global float* restrict y,
-                         global float* restrict z, global int* restrict is_triangle_read) {
+                         global const float* restrict row_high, global const float* restrict row_low, global const float* restrict offset_x,
+                         global const float* restrict offset_y, global float* restrict x, global float* restrict y, global float* restrict z,
+                         global int* restrict is_triangle_read) {
   const int column = (int)get_global_id(0), line = (int)get_global_id(1);
   if (column >= texture_width || line >= texture_height) return;
   const int texel = line * texture_width + column;
@@ -135,34 +209,15 @@ kernel void read_surface(const int texture_width, const int texture_height, cons
   const MapTriangle m = load_triangle(t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
   const int width = patches[patch].width;
   const int row = patches[patch].row_begin + line - patches[patch].y;
-  const float u = (row_high[row] - m.u_base_high) + (row_low[row] - m.u_base_low);
-  // The lift of the column that lies nearest to the triangle's middle.
-  const int inner = column - patches[patch].x;
-  const float middle = m.pole == 0 ? (m.dv1 + m.dv2) / 3.0f : 0.5f * m.dv1;
-  float v = column_offset(m, inner, width);
-  const int lift = (int)rint(middle - v);
-  v = column_offset(m, inner + lift * width, width);
+  const float u = row_offset(m, row_high, row_low, row, offset_y[texel]);
+  const float v = turned_offset(m, column - patches[patch].x, offset_x[texel], width);
 
+  // Rounding may have put it a little outside.
   float w1, w2;
-  if (m.pole == 0) {
-    // Scaled by the extents, so that products of tiny differences stay in range.
-    const float scale_u = 1.0f / fmax(fmax(fabs(m.du1), fabs(m.du2)), 1e-30f), scale_v = 1.0f / fmax(fmax(fabs(m.dv1), fabs(m.dv2)), 1e-30f);
-    const float a1 = m.du1 * scale_u, b1 = m.dv1 * scale_v, a2 = m.du2 * scale_u, b2 = m.dv2 * scale_v;
-    const float pu = u * scale_u, pv = v * scale_v;
-    const float determinant = a1 * b2 - a2 * b1;
-    const float inverse = determinant == 0.0f ? 0.0f : 1.0f / determinant;
-    w1 = fmax(0.0f, (pu * b2 - a2 * pv) * inverse);
-    w2 = fmax(0.0f, (a1 * pv - pu * b1) * inverse);
-    const float sum = w1 + w2;
-    if (sum > 1.0f) w1 /= sum, w2 /= sum;
-  } else {
-    const float lambda = m.dv1 == 0.0f ? 0.0f : clamp(v / m.dv1, 0.0f, 1.0f);
-    const float edge = lambda * m.du1;
-    const float rest = m.du2 - edge;
-    const float tau = rest == 0.0f ? 1.0f : clamp((u - edge) / rest, 0.0f, 1.0f);
-    w1 = (1.0f - tau) * lambda;
-    w2 = tau;
-  }
+  weights_at(m, u, v, &w1, &w2);
+  w1 = fmax(0.0f, w1), w2 = fmax(0.0f, w2);
+  const float sum = w1 + w2;
+  if (sum > 1.0f) w1 /= sum, w2 /= sum;
   const int a = corners[t], b = corners[triangle_count + t], c = corners[2 * triangle_count + t];
   x[texel] = vertex_x[a] + w1 * (vertex_x[b] - vertex_x[a]) + w2 * (vertex_x[c] - vertex_x[a]);
   y[texel] = vertex_y[a] + w1 * (vertex_y[b] - vertex_y[a]) + w2 * (vertex_y[c] - vertex_y[a]);
@@ -211,10 +266,10 @@ kernel void place_points(const int count, global const int* restrict texels, glo
   z[texel] = from_z[i];
 }
 
-// NDRange (texture width, texture height). Inner rows move by -1/16 of their second differences in both lattice
+// NDRange (texture width, texture height). Inner rows that nothing holds move by -1/16 of their second differences in both lattice
 // directions, along the lattice normal; end rows stay.
 kernel void prefilter_positions(const int texture_width, const int texture_height, global const int* restrict texel_patches,
-                                global const PatchRecord* restrict patches, global const float* restrict x, global const float* restrict y,
+                                global const PatchRecord* restrict patches, global const int* restrict anchors, global const float* restrict x, global const float* restrict y,
                                 global const float* restrict z, global float* restrict out_x, global float* restrict out_y, global float* restrict out_z) {
   const int column = (int)get_global_id(0), line = (int)get_global_id(1);
   if (column >= texture_width || line >= texture_height) return;
@@ -225,7 +280,7 @@ kernel void prefilter_positions(const int texture_width, const int texture_heigh
   if (patch >= 0) {
     global const PatchRecord* p = patches + patch;
     const int row = line - p->y, inner = column - p->x;
-    if (row > 0 && row < p->height - 1) {
+    if (row > 0 && row < p->height - 1 && anchors[texel] == 0) {
       const int left = texel - inner + (inner == 0 ? p->width - 1 : inner - 1);
       const int right = texel - inner + (inner == p->width - 1 ? 0 : inner + 1);
       const int below = texel - texture_width, above = texel + texture_width;

@@ -113,7 +113,7 @@ TEST(Encode, TexelsOfRandomMapsDecodeToThePointsThatTheTwinFinds) {
     const Setting s = random_setting(seed, seed % 4 == 0 ? 9.0 : 1.0);
     const Walls walls(s.skeleton);
     const TexelResult result =
-        read_texels(context, s.skeleton, walls, {s.charts, s.patches, s.hits, s.end_points}, 72, 80, Vec3(0, 0.2, 0.5), false);
+        read_texels(context, s.skeleton, walls, {s.charts, s.patches, s.hits, s.end_points}, 72, 80, Vec3(0, 0.2, 0.5), {.has_prefilter = false});
     EXPECT_EQ(result.report.missed_texels[0], 0);
     for (int row = 1; row + 1 < s.patches[0].rectangle.height; ++row)
       for (int j = 0; j < s.patches[0].rectangle.width; ++j) {
@@ -127,7 +127,7 @@ TEST(Encode, PolesAndEndRowsHoldTheirPoints) {
   ClContext context;
   const Setting s = random_setting(7, 1);
   const Walls walls(s.skeleton);
-  const TexelResult result = read_texels(context, s.skeleton, walls, {s.charts, s.patches, s.hits, s.end_points}, 72, 80, Vec3::Zero(), true);
+  const TexelResult result = read_texels(context, s.skeleton, walls, {s.charts, s.patches, s.hits, s.end_points}, 72, 80, Vec3::Zero());
   for (int j = 0; j < s.patches[0].rectangle.width; ++j) {
     EXPECT_LT((decoded(s, walls, result.texture, 0, j) - s.end_points[0][0][0]).norm(), 1e-6);
     EXPECT_LT((decoded(s, walls, result.texture, s.patches[0].rectangle.height - 1, j) - s.end_points[0][1][0]).norm(), 1e-6);
@@ -141,8 +141,8 @@ TEST(Encode, PrefilterMovesPointsAsItsTwinDoes) {
     const Walls walls(s.skeleton);
     const int rows = s.patches[0].rectangle.height, columns = s.patches[0].rectangle.width;
     const TexelSources sources{s.charts, s.patches, s.hits, s.end_points};
-    const TexelResult plain = read_texels(context, s.skeleton, walls, sources, 72, 80, Vec3::Zero(), false);
-    const TexelResult filtered = read_texels(context, s.skeleton, walls, sources, 72, 80, Vec3::Zero(), true);
+    const TexelResult plain = read_texels(context, s.skeleton, walls, sources, 72, 80, Vec3::Zero(), {.has_prefilter = false});
+    const TexelResult filtered = read_texels(context, s.skeleton, walls, sources, 72, 80, Vec3::Zero());
     std::vector<Vec3> points;
     for (int r = 0; r < rows; ++r)
       for (int j = 0; j < columns; ++j) points.push_back(decoded(s, walls, plain.texture, r, j));
@@ -170,7 +170,7 @@ TEST(Encode, SpdTexelsAreHeightsAndMissesAreFilledFromTheirColumn) {
   const std::size_t miss = 2 * r.width + 1;
   s.hits[0].triangles[miss] = -1;
   s.hits[0].distances[miss] = 0;
-  const TexelResult result = read_texels(context, s.skeleton, walls, {s.charts, s.patches, s.hits, s.end_points}, 72, 80, Vec3::Zero(), false);
+  const TexelResult result = read_texels(context, s.skeleton, walls, {s.charts, s.patches, s.hits, s.end_points}, 72, 80, Vec3::Zero(), {.has_prefilter = false});
   EXPECT_EQ(result.report.missed_texels[0], 1);
   for (int row = 1; row + 1 < r.height; ++row)
     for (int j = 0; j < r.width; ++j) {

@@ -11,7 +11,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "skeletex/encode/read_texels.h"
 #include "skeletex/encode/row_profile.h"
 #include "skeletex/encode/sample_seams.h"
 #include "skeletex/model/error.h"
@@ -88,13 +87,19 @@ std::vector<RowProfile> spd_profiles(ClContext& context, const Skeleton& skeleto
   return profiles;
 }
 
-nlohmann::json settings_json(const EncodeOptions& options, const std::vector<double>& unseen) {
+bool has_snap(const EncodeOptions& options, const TriangleMesh& mesh) {
+  constexpr double kLeastTexelsPerVertex = 1;
+  return options.has_snap.value_or(static_cast<double>(options.width) * options.height >= kLeastTexelsPerVertex * static_cast<double>(mesh.positions.size()));
+}
+
+nlohmann::json settings_json(const EncodeOptions& options, const TexelOptions& texel_options, const std::vector<double>& unseen) {
   const char* method = options.method == EncodeMethod::kSpd ? "spd" : options.method == EncodeMethod::kVsm ? "vsm" : "hybrid";
   nlohmann::json json{{"method", method},
                       {"size", {options.width, options.height}},
                       {"vsm", {{"iterations", options.vsm.iterations}, {"alpha", options.vsm.alpha}, {"stop_spread_change", options.vsm.stop_spread_change}}},
                       {"rows", options.row_spacing == RowSpacing::kSurfaceLength ? "surface" : "uniform"},
-                      {"prefilter", options.has_prefilter},
+                      {"prefilter", texel_options.has_prefilter},
+                      {"snap", texel_options.has_snap},
                       {"spd_hit", options.spd_hit == SpdHit::kFirst ? "first" : "last"}};
   if (options.method == EncodeMethod::kHybrid) json["hybrid_unseen_threshold"] = options.hybrid_unseen_threshold;
   if (!unseen.empty()) json["unseen_area_fractions"] = unseen;
@@ -185,7 +190,8 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
                                                                     : spread_rows_uniformly(patch.rectangle.height);
     model.patches.push_back(std::move(patch));
   }
-  Seams seams = sample_seams(segmentation, skeleton, walls, layout.rectangles);
+  const TexelOptions texel_options{.has_prefilter = options.has_prefilter, .has_snap = has_snap(options, mesh)};
+  Seams seams = sample_seams(segmentation, skeleton, walls, layout.rectangles, texel_options.has_snap ? SeamSampling::kSnapped : SeamSampling::kEven);
   model.arcs = std::move(seams.arcs);
   model.corners = std::move(seams.corners);
   model.ends = std::move(seams.ends);
@@ -214,15 +220,16 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
     }
   progress("encoding", 0.8);
   TexelResult texels = read_texels(context, skeleton, walls, {charts, model.patches, hits, end_points}, options.width, options.height, model.origin,
-                                   options.has_prefilter);
+                                   texel_options);
   model.texture = std::move(texels.texture);
-  model.encoder_settings = settings_json(options, unseen).dump();
+  model.encoder_settings = settings_json(options, texel_options, unseen).dump();
   report.encoding_ms = watch.lap();
 
   report.vertices = static_cast<int>(mesh.positions.size());
   report.triangles = static_cast<int>(mesh.triangles.size());
   report.genus = model.genus;
   report.diagonal = model.diagonal;
+  report.snap = texels.report.snap;
   report.device = context.device().name;
   for (int bone = 0; bone < bones; ++bone) {
     const Segment& segment = segmentation.segments[bone];

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "skeletex/cl/context.h"
+#include "skeletex/encode/read_texels.h"
 #include "skeletex/model/texture.h"
 #include "skeletex/parameterize/spd.h"
 #include "skeletex/parameterize/vsm.h"
@@ -29,6 +30,8 @@ struct EncodeOptions {
   SpdHit spd_hit = SpdHit::kLast;
   RowSpacing row_spacing = RowSpacing::kSurfaceLength;
   bool has_prefilter = true;
+  /// Texels sit on the mesh's own vertices and edges where they can; default: from 1 texel per vertex on.
+  std::optional<bool> has_snap;
   std::optional<TexelShare> texel_share;  ///< default: area for all-SPD models, triangles otherwise
   /// Called with a stage's name and the share of work done; returning false cancels by throwing Error.
   std::function<bool(const std::string& stage, double done)> progress;
@@ -53,6 +56,7 @@ struct EncodeReport {
   double diagonal = 0;
   std::vector<BoneReport> bones;
   double used_fraction = 0;
+  std::optional<SnapReport> snap;  ///< when it was on
   double half_edge_ms = 0, segmentation_ms = 0, parameterization_ms = 0, encoding_ms = 0;
   std::string device;
 };

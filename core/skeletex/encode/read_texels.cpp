@@ -8,70 +8,6 @@ namespace skeletex {
 namespace {
 
 constexpr int kNoTriangle = std::numeric_limits<int>::max();  // as in encode.cl
-constexpr std::array<std::size_t, 2> kTexelGroup{64, 1};
-
-bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind == ChartVertex::kTailPole; }
-
-/// A number as two floats whose sum is exact to 2^-48.
-struct SplitValues {
-  std::vector<float> high, low;
-  void push_back(double value) {
-    high.push_back(static_cast<float>(value));
-    low.push_back(static_cast<float>(value - high.back()));
-  }
-};
-
-/// All VSM charts, concatenated for the kernels.
-struct ChartPlanes {
-  int triangle_count = 0;
-  std::vector<int> corners, turns;  // three planes of triangle_count
-  std::vector<int> poles, patches;
-  std::vector<int> first_triangle;  // per bone, and the end
-  SplitValues u, v;
-  std::vector<float> x, y, z;
-};
-
-ChartPlanes concatenate(const TexelSources& sources, const Vec3& origin) {
-  ChartPlanes planes;
-  for (std::size_t bone = 0; bone < sources.charts.size(); ++bone) {
-    planes.first_triangle.push_back(planes.triangle_count);
-    if (sources.patches[bone].method == Method::kVsm) planes.triangle_count += static_cast<int>(sources.charts[bone].triangles.size());
-  }
-  planes.first_triangle.push_back(planes.triangle_count);
-  const int count = planes.triangle_count;
-  planes.corners.resize(3 * static_cast<std::size_t>(count));
-  planes.turns.resize(3 * static_cast<std::size_t>(count));
-  planes.poles.resize(count, 0);
-  planes.patches.resize(count);
-  for (std::size_t bone = 0; bone < sources.charts.size(); ++bone) {
-    if (sources.patches[bone].method != Method::kVsm) continue;
-    const Chart& chart = sources.charts[bone];
-    const int base = static_cast<int>(planes.x.size());
-    for (std::size_t i = 0; i < chart.positions.size(); ++i) {
-      planes.u.push_back(chart.u[i]);
-      planes.v.push_back(is_pole(chart.kinds[i]) ? 0 : chart.v[i]);
-      const Vec3 p = chart.positions[i] - origin;
-      planes.x.push_back(static_cast<float>(p[0]));
-      planes.y.push_back(static_cast<float>(p[1]));
-      planes.z.push_back(static_cast<float>(p[2]));
-    }
-    for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
-      const int at = planes.first_triangle[bone] + static_cast<int>(t);
-      int pole = -1;
-      for (int k = 0; k < 3; ++k)
-        if (is_pole(chart.kinds[chart.triangles[t][k]])) pole = k;
-      const int shift = pole < 0 ? 0 : (pole + 1) % 3;  // the pole becomes corner 2
-      for (int k = 0; k < 3; ++k) {
-        const int from = (k + shift) % 3;
-        planes.corners[k * static_cast<std::size_t>(count) + at] = base + chart.triangles[t][from];
-        planes.turns[k * static_cast<std::size_t>(count) + at] = from == pole ? 0 : chart.turns[t][from];
-      }
-      if (pole >= 0) planes.poles[at] = chart.kinds[chart.triangles[t][pole]] == ChartVertex::kTailPole ? 1 : -1;
-      planes.patches[at] = static_cast<int>(bone);
-    }
-  }
-  return planes;
-}
 
 /// Distances along the rays of one SPD patch; a missed texel takes the mean of the nearest hits of its column, weighted
 /// by nearness, or of its row where the whole column missed. \return texels filled
@@ -116,78 +52,112 @@ int fill_missed(const SpdHits& hits, const Rectangle& r, std::vector<float>& dis
   return missed;
 }
 
+/// Texels that rounding leaves to no triangle take that of a neighbour in their row; their points are clamped into it.
+/// \return per patch how many
+std::vector<int> fill_uncovered(std::span<const Patch> patches, int texture_width, std::vector<int>& texel_triangles) {
+  std::vector<int> counts(patches.size(), 0);
+  for (std::size_t bone = 0; bone < patches.size(); ++bone) {
+    if (patches[bone].method != Method::kVsm) continue;
+    const Rectangle& r = patches[bone].rectangle;
+    for (int row = 1; row + 1 < r.height; ++row) {
+      int* line = texel_triangles.data() + (r.y + row) * static_cast<std::size_t>(texture_width) + r.x;
+      for (int j = 0; j < r.width; ++j) {
+        if (line[j] != kNoTriangle) continue;
+        ++counts[bone];
+        for (int step = 1; step < r.width && line[j] == kNoTriangle; ++step) {
+          line[j] = line[(j + step) % r.width];
+          if (line[j] == kNoTriangle) line[j] = line[(j + r.width - step) % r.width];
+        }
+      }
+    }
+  }
+  return counts;
+}
+
+TexelPoints allocate_points(ClContext& context, std::size_t size) {
+  return {context.allocate<float>(size), context.allocate<float>(size), context.allocate<float>(size)};
+}
+
+TexelPoints copy_points(ClContext& context, const TexelPoints& points) {
+  TexelPoints copy = allocate_points(context, points.x.size);
+  const auto copy_plane = [&](const ClBuffer<float>& from, ClBuffer<float>& to) {
+    context.queue().enqueueCopyBuffer(from.memory, to.memory, 0, 0, from.size * sizeof(float));
+  };
+  copy_plane(points.x, copy.x), copy_plane(points.y, copy.y), copy_plane(points.z, copy.z);
+  return copy;
+}
+
+/// Rows 0 and height - 1: seams and poles.
+void place_end_rows(ClContext& context, const TexelSources& sources, int texture_width, const Vec3& origin, TexelPoints& points) {
+  std::vector<int> texels;
+  std::array<std::vector<float>, 3> values;
+  for (std::size_t bone = 0; bone < sources.patches.size(); ++bone) {
+    const Rectangle& r = sources.patches[bone].rectangle;
+    for (const int end : {0, 1}) {
+      const std::vector<Vec3>& end_points = sources.end_points[bone][end];
+      const int row = r.y + (end == 0 ? 0 : r.height - 1);
+      for (int j = 0; j < r.width; ++j) {
+        texels.push_back(row * texture_width + r.x + j);
+        const Vec3 p = (end_points.size() == 1 ? end_points[0] : end_points[j]) - origin;
+        for (int i = 0; i < 3; ++i) values[i].push_back(static_cast<float>(p[i]));
+      }
+    }
+  }
+  context.launch({"encode.cl", "place_points"}, ClRange(texels.size()), static_cast<int>(texels.size()), context.upload(texels), context.upload(values[0]),
+                 context.upload(values[1]), context.upload(values[2]), points.x, points.y, points.z);
+}
+
+SnapReport report_snap(ClContext& context, const SnapFeatures& features, int put_back, const ReadingPositions& positions) {
+  SnapReport report;
+  report.vertices = static_cast<int>(features.vertices.size());
+  report.edges = static_cast<int>(features.edges.size());
+  report.texels_put_back = put_back;
+  std::vector<bool> has_texel(features.edges.size(), false);
+  for (const int anchor : context.download(positions.anchors)) {
+    if (anchor > 0) ++report.snapped_vertices;
+    if (anchor >= 0) continue;
+    ++report.texels_on_edges;
+    has_texel[-1 - anchor] = true;
+  }
+  report.snapped_edges = static_cast<int>(std::count(has_texel.begin(), has_texel.end(), true));
+  return report;
+}
+
 }  // namespace
 
 TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Walls& walls, const TexelSources& sources, int texture_width, int texture_height,
-                        const Vec3& origin, bool has_prefilter) {
-  const std::size_t texels = static_cast<std::size_t>(texture_width) * texture_height;
+                        const Vec3& origin, const TexelOptions& options) {
   const int bones = static_cast<int>(sources.patches.size());
   TexelResult result;
   result.report.sampled_triangle_fractions.resize(bones, 0);
   result.report.missed_texels.resize(bones, 0);
 
-  std::vector<int> texel_patches(texels, -1);
-  for (int bone = 0; bone < bones; ++bone) {
-    const Rectangle& r = sources.patches[bone].rectangle;
-    for (int row = 0; row < r.height; ++row)
-      std::fill_n(texel_patches.begin() + (r.y + row) * static_cast<std::size_t>(texture_width) + r.x, r.width, bone);
-  }
   const FrameTables tables = frame_tables(skeleton, walls, {sources.patches.begin(), sources.patches.end()}, origin);
-  const auto owner = context.upload(texel_patches);
-  const auto patches = context.upload(tables.patches);
+  const DeviceLayout layout = upload_layout(context, sources.patches, tables, texture_width, texture_height);
+  const std::size_t texels = layout.size();
   const auto rows = context.upload(tables.rows);
   const auto columns = context.upload(tables.columns);
-  auto x = context.allocate<float>(texels), y = context.allocate<float>(texels), z = context.allocate<float>(texels);
-  context.fill(x, 0.f), context.fill(y, 0.f), context.fill(z, 0.f);
-  const ClRange over_texels({static_cast<std::size_t>(texture_width), static_cast<std::size_t>(texture_height)}, kTexelGroup);
+  TexelPoints points = allocate_points(context, texels);
+  context.fill(points.x, 0.f), context.fill(points.y, 0.f), context.fill(points.z, 0.f);
+  ReadingPositions positions = even_positions(context, layout);
 
-  // Maps: which triangle covers each texel, and its point there.
-  const ChartPlanes planes = concatenate(sources, origin);
-  std::vector<int> texel_triangles;
-  if (planes.triangle_count > 0) {
-    SplitValues row_u;
-    for (const Patch& patch : sources.patches)
-      for (const double u : patch.row_u) row_u.push_back(u);
-    const int count = planes.triangle_count;
-    const auto corners = context.upload(planes.corners), turns = context.upload(planes.turns), poles = context.upload(planes.poles);
-    const auto triangle_patches = context.upload(planes.patches);
-    const auto u_high = context.upload(planes.u.high), u_low = context.upload(planes.u.low);
-    const auto v_high = context.upload(planes.v.high), v_low = context.upload(planes.v.low);
-    const auto row_high = context.upload(row_u.high), row_low = context.upload(row_u.low);
-    const auto vertex_x = context.upload(planes.x), vertex_y = context.upload(planes.y), vertex_z = context.upload(planes.z);
-    auto covering = context.allocate<int>(texels);
+  const DeviceMaps maps = upload_maps(context, sources.charts, sources.patches, origin);
+  auto covering = context.allocate<int>(texels);
+  auto is_read = context.allocate<int>(std::max(1, maps.triangle_count));
+  context.fill(is_read, 0);
+  const auto read = [&] {
+    context.launch({"encode.cl", "read_surface"}, layout.range(), texture_width, texture_height, maps.triangle_count, layout.texel_patches, covering,
+                   maps.corners, maps.turns, maps.poles, maps.u_high, maps.u_low, maps.v_high, maps.v_low, maps.x, maps.y, maps.z, layout.patches,
+                   maps.row_high, maps.row_low, positions.x, positions.y, points.x, points.y, points.z, is_read);
+  };
+  if (maps.triangle_count > 0) {
     context.fill(covering, kNoTriangle);
-    auto is_read = context.allocate<int>(count);
-    context.fill(is_read, 0);
-    context.launch({"encode.cl", "cover_texels"}, ClRange(count, 8), count, corners, turns, poles, triangle_patches, u_high, u_low, v_high, v_low, patches,
-                   row_high, row_low, texture_width, covering);
-    // A texel that rounding leaves to no triangle takes that of a neighbour in its row; its point is clamped into it.
-    texel_triangles = context.download(covering);
-    bool has_filled = false;
-    for (int bone = 0; bone < bones; ++bone) {
-      if (sources.patches[bone].method != Method::kVsm) continue;
-      const Rectangle& r = sources.patches[bone].rectangle;
-      for (int row = 1; row + 1 < r.height; ++row) {
-        int* line = texel_triangles.data() + (r.y + row) * static_cast<std::size_t>(texture_width) + r.x;
-        for (int j = 0; j < r.width; ++j) {
-          if (line[j] != kNoTriangle) continue;
-          ++result.report.missed_texels[bone];
-          has_filled = true;
-          for (int step = 1; step < r.width && line[j] == kNoTriangle; ++step) {
-            line[j] = line[(j + step) % r.width];
-            if (line[j] == kNoTriangle) line[j] = line[(j + r.width - step) % r.width];
-          }
-        }
-      }
-    }
-    if (has_filled) context.write(covering, texel_triangles);
-    context.launch({"encode.cl", "read_surface"}, over_texels, texture_width, texture_height, count, owner, covering, corners, turns, poles, u_high, u_low,
-                   v_high, v_low, vertex_x, vertex_y, vertex_z, patches, row_high, row_low, x, y, z, is_read);
-    const std::vector<int> marks = context.download(is_read);
-    for (int bone = 0; bone < bones; ++bone) {
-      const int begin = planes.first_triangle[bone], end = planes.first_triangle[bone + 1];
-      if (end > begin) result.report.sampled_triangle_fractions[bone] = static_cast<double>(std::count(marks.begin() + begin, marks.begin() + end, 1)) / (end - begin);
-    }
+    context.launch({"encode.cl", "cover_texels"}, ClRange(maps.triangle_count, 8), maps.triangle_count, maps.corners, maps.turns, maps.poles,
+                   maps.triangle_patches, maps.u_high, maps.u_low, maps.v_high, maps.v_low, layout.patches, maps.row_high, maps.row_low, texture_width, covering);
+    std::vector<int> texel_triangles = context.download(covering);
+    result.report.missed_texels = fill_uncovered(sources.patches, texture_width, texel_triangles);
+    context.write(covering, texel_triangles);
+    read();
   }
 
   // Rays.
@@ -209,35 +179,40 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   }
   if (has_spd) {
     const auto device_distances = context.upload(distances);
-    context.launch({"encode.cl", "place_spd_points"}, over_texels, texture_width, texture_height, owner, device_distances, patches, rows, columns, x, y, z);
+    context.launch({"encode.cl", "place_spd_points"}, layout.range(), texture_width, texture_height, layout.texel_patches, device_distances, layout.patches,
+                   rows, columns, points.x, points.y, points.z);
   }
+  place_end_rows(context, sources, texture_width, origin, points);
 
-  // End rows: seams and poles.
-  std::vector<int> end_texels;
-  std::array<std::vector<float>, 3> end_values;
-  for (int bone = 0; bone < bones; ++bone) {
-    const Rectangle& r = sources.patches[bone].rectangle;
-    for (const int end : {0, 1}) {
-      const std::vector<Vec3>& points = sources.end_points[bone][end];
-      const int row = r.y + (end == 0 ? 0 : r.height - 1);
-      for (int j = 0; j < r.width; ++j) {
-        end_texels.push_back(row * texture_width + r.x + j);
-        const Vec3 p = (points.size() == 1 ? points[0] : points[j]) - origin;
-        for (int i = 0; i < 3; ++i) end_values[i].push_back(static_cast<float>(p[i]));
-      }
+  if (options.has_snap && maps.triangle_count > 0) {
+    const SnapFeatures features = find_features(sources.charts, sources.patches, options.snap_dihedral);
+    snap_positions(context, layout, features, positions);
+    const TexelPoints even = points;
+    points = copy_points(context, even);
+    context.launch({"encode.cl", "walk_to_positions"}, layout.range(), texture_width, texture_height, maps.triangle_count, layout.texel_patches, maps.corners,
+                   maps.turns, maps.poles, maps.across, maps.u_high, maps.u_low, maps.v_high, maps.v_low, layout.patches, maps.row_high, maps.row_low,
+                   positions.x, positions.y, positions.anchors, covering);
+    read();
+    place_snapped(context, layout, maps, features, positions, points);
+    result.report.snap = report_snap(context, features, put_back_folds(context, layout, even, positions, points), positions);
+  }
+  if (maps.triangle_count > 0) {
+    const std::vector<int> marks = context.download(is_read);
+    for (int bone = 0; bone < bones; ++bone) {
+      const int begin = maps.first_triangle[bone], end = maps.first_triangle[bone + 1];
+      if (end > begin) result.report.sampled_triangle_fractions[bone] = static_cast<double>(std::count(marks.begin() + begin, marks.begin() + end, 1)) / (end - begin);
     }
   }
-  const auto place = context.upload(end_texels);
-  const auto place_x = context.upload(end_values[0]), place_y = context.upload(end_values[1]), place_z = context.upload(end_values[2]);
-  context.launch({"encode.cl", "place_points"}, ClRange(end_texels.size()), static_cast<int>(end_texels.size()), place, place_x, place_y, place_z, x, y, z);
 
-  if (has_prefilter) {
-    auto fx = context.allocate<float>(texels), fy = context.allocate<float>(texels), fz = context.allocate<float>(texels);
-    context.launch({"encode.cl", "prefilter_positions"}, over_texels, texture_width, texture_height, owner, patches, x, y, z, fx, fy, fz);
-    x = fx, y = fy, z = fz;
+  if (options.has_prefilter) {
+    TexelPoints filtered = allocate_points(context, texels);
+    context.launch({"encode.cl", "prefilter_positions"}, layout.range(), texture_width, texture_height, layout.texel_patches, layout.patches,
+                   positions.anchors, points.x, points.y, points.z, filtered.x, filtered.y, filtered.z);
+    points = filtered;
   }
   auto along = context.allocate<float>(texels), around = context.allocate<float>(texels), out = context.allocate<float>(texels);
-  context.launch({"encode.cl", "encode_texels"}, over_texels, texture_width, texture_height, owner, patches, rows, columns, x, y, z, along, around, out);
+  context.launch({"encode.cl", "encode_texels"}, layout.range(), texture_width, texture_height, layout.texel_patches, layout.patches, rows, columns, points.x,
+                 points.y, points.z, along, around, out);
   result.texture = {texture_width, texture_height, context.download(along), context.download(around), context.download(out)};
   return result;
 }

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "skeletex/cl/context.h"
+#include "skeletex/encode/snap.h"
 #include "skeletex/model/frame.h"
 #include "skeletex/parameterize/chart.h"
 #include "skeletex/parameterize/spd.h"
@@ -20,9 +22,24 @@ struct TexelSources {
   std::span<const std::array<std::vector<Vec3>, 2>> end_points;
 };
 
+struct TexelOptions {
+  bool has_prefilter = true;
+  bool has_snap = false;        ///< texels of VSM patches move to vertices and creased edges
+  double snap_dihedral = 0.004;  ///< radians: edges flatter than this are no creases
+};
+
+/// What snapping did; of VSM patches.
+struct SnapReport {
+  int vertices = 0, snapped_vertices = 0;  ///< inner vertices that are not flat; those that a texel sits on
+  int edges = 0, snapped_edges = 0;        ///< creased edges; those with a texel between their ends
+  int texels_on_edges = 0;
+  int texels_put_back = 0;                 ///< by the guard
+};
+
 struct TexelReport {
   std::vector<double> sampled_triangle_fractions;  ///< per bone: share of the chart's triangles that a texel reads
   std::vector<int> missed_texels;                  ///< per bone: filled from neighbours along the column
+  std::optional<SnapReport> snap;
 };
 
 struct TexelResult {
@@ -34,6 +51,6 @@ struct TexelResult {
 /// rectangles are zero.
 /// \param origin  world position that device coordinates are relative to
 TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Walls& walls, const TexelSources& sources, int texture_width, int texture_height,
-                        const Vec3& origin, bool has_prefilter);
+                        const Vec3& origin, const TexelOptions& options = {});
 
 }  // namespace skeletex

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/encode/sample_seams.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -14,9 +15,39 @@ BoneEnd end_at(const Skeleton& skeleton, int bone, int node) { return skeleton.b
 
 double wrapped(double turn) { return turn - std::round(turn); }
 
+/// Moves evenly spread places along a polyline to its bends, the sharpest first, each to the nearest place that is free
+/// and within 0.7 of a step; their order stays.
+/// \param reached  length up to each of the points
+void snap_places(const std::vector<Vec3>& points, const std::vector<double>& reached, std::vector<double>& places) {
+  constexpr double kReach = 0.7, kLeastGap = 0.1, kLeastBend = 1e-3;  // steps, steps, radians
+  const double step = reached.back() / static_cast<double>(places.size() + 1);
+  std::vector<std::pair<double, int>> bends;
+  for (int i = 1; i + 1 < static_cast<int>(points.size()); ++i) {
+    const Vec3 before = points[i] - points[i - 1], after = points[i + 1] - points[i];
+    const double bend = std::atan2(before.cross(after).norm(), before.dot(after));
+    if (bend > kLeastBend) bends.emplace_back(-bend * (before.norm() + after.norm()), i);
+  }
+  std::sort(bends.begin(), bends.end());
+  std::vector<bool> is_taken(places.size(), false);
+  for (const auto& [strength, i] : bends) {
+    const int right = static_cast<int>(std::upper_bound(places.begin(), places.end(), reached[i]) - places.begin());
+    int best = -1;
+    for (const int k : {right - 1, right}) {
+      if (k < 0 || k >= static_cast<int>(places.size()) || is_taken[k] || std::abs(places[k] - reached[i]) > kReach * step) continue;
+      const double low = k > 0 ? places[k - 1] : 0, high = k + 1 < static_cast<int>(places.size()) ? places[k + 1] : reached.back();
+      if (reached[i] - low < kLeastGap * step || high - reached[i] < kLeastGap * step) continue;
+      if (best < 0 || std::abs(places[k] - reached[i]) < std::abs(places[best] - reached[i])) best = k;
+    }
+    if (best < 0) continue;
+    places[best] = reached[i];
+    is_taken[best] = true;
+  }
+}
+
 }  // namespace
 
-Seams sample_seams(const Segmentation& segmentation, const Skeleton& skeleton, const Walls& walls, std::span<const Rectangle> rectangles) {
+Seams sample_seams(const Segmentation& segmentation, const Skeleton& skeleton, const Walls& walls, std::span<const Rectangle> rectangles,
+                   SeamSampling sampling) {
   Seams seams;
   const auto sample_of = [&](int bone, int node, const Vec3& point) {
     const BoneEnd end = end_at(skeleton, bone, node);
@@ -54,9 +85,12 @@ Seams sample_seams(const Segmentation& segmentation, const Skeleton& skeleton, c
       columns = std::max(columns, std::abs(turning) * rectangles[bone].width);
     }
     const int intervals = std::max(arc.is_closed ? 3 : 2, static_cast<int>(std::lround(columns)));
+    std::vector<double> places;
+    for (int i = 1; i < intervals; ++i) places.push_back(length.back() * i / intervals);
+    if (sampling == SeamSampling::kSnapped) snap_places(points, length, places);
+    if (arc.is_closed) places.insert(places.begin(), 0.0);
     std::size_t segment = 0;
-    for (int i = arc.is_closed ? 0 : 1; i < intervals; ++i) {
-      const double at = length.back() * i / intervals;
+    for (const double at : places) {
       while (segment + 2 < points.size() && length[segment + 1] < at) ++segment;
       const double span = length[segment + 1] - length[segment];
       const double t = span > 0 ? (at - length[segment]) / span : 0.5;

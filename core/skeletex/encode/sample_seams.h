@@ -16,10 +16,16 @@ struct Seams {
   std::vector<std::array<PatchEnd, 2>> ends;
 };
 
-/// Samples every arc evenly in its length, as densely as the finer of its two patches has columns there; open arcs get
-/// at least one inner sample, closed ones at least three.
+enum class SeamSampling {
+  kEven,     ///< evenly in the arc's length
+  kSnapped,  ///< evenly, but for samples near a bend of the arc (where it crosses an edge of the mesh), which sit on it
+};
+
+/// Samples every arc as densely as the finer of its two patches has columns there; open arcs get at least one inner
+/// sample, closed ones at least three.
 /// \param rectangles  per bone
-Seams sample_seams(const Segmentation& segmentation, const Skeleton& skeleton, const Walls& walls, std::span<const Rectangle> rectangles);
+Seams sample_seams(const Segmentation& segmentation, const Skeleton& skeleton, const Walls& walls, std::span<const Rectangle> rectangles,
+                   SeamSampling sampling = SeamSampling::kEven);
 
 /// Points of a segment's boundary loop at `columns` texels: where the loop's polyline passes v = j / columns (loop_turns).
 /// World coordinates.

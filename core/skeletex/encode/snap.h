@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <span>
+#include <vector>
+
+#include "skeletex/encode/device_maps.h"
+
+namespace skeletex {
+
+/// Points and edges of the maps that texels should sit on, in the cells of their patch: x = v width, unwrapped;
+/// y the row, with fractions, by the patch's row table.
+struct SnapFeatures {
+  struct Vertex {
+    int patch = -1;
+    int point = -1;  ///< its number among the vertices of DeviceMaps
+    double x = 0, y = 0;
+    double strength = 0;  ///< sum over its edges of dihedral angle (radians) x length
+  };
+  struct Edge {
+    int patch = -1;
+    std::array<int, 2> points{-1, -1};
+    std::array<double, 2> x{0, 0}, y{0, 0};
+    double dihedral = 0;  ///< radians
+  };
+  std::vector<Vertex> vertices;  ///< inner ones that are not flat
+  std::vector<Edge> edges;       ///< inner ones whose dihedral angle is above the least
+};
+
+/// The features of all VSM patches.
+/// \param least_dihedral  radians; flatter edges are left out
+SnapFeatures find_features(std::span<const Chart> charts, std::span<const Patch> patches, double least_dihedral);
+
+/// Where each texel reads, a thing of its own between the map and the texel: per texel an offset from its place in the
+/// even lattice, in cells, at most 1 along each axis, and what holds it there.
+struct ReadingPositions {
+  ClBuffer<float> x, y;         ///< around, along
+  ClBuffer<int> anchors;        ///< 0: nothing; 1 + i: vertex i of the features; -1 - i: edge i
+  ClBuffer<float> parameters;   ///< place on the edge, 0 at its first point, 1 at its last
+};
+/// The even lattice.
+ReadingPositions even_positions(ClContext& context, const DeviceLayout& layout);
+
+/// Moves reading positions to vertices, strongest first, and then to creased edges; the map does not fold.
+void snap_positions(ClContext& context, const DeviceLayout& layout, const SnapFeatures& features, ReadingPositions& positions);
+
+/// Planes of points, one per texel.
+struct TexelPoints {
+  ClBuffer<float> x, y, z;
+};
+
+/// Puts texels on vertices and edges exactly there.
+void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps, const SnapFeatures& features,
+                   const ReadingPositions& positions, TexelPoints& points);
+
+/// Texels of quads that fold in the map, or in space where the even lattice does not, go back to it, until none does.
+/// \return how many went back
+int put_back_folds(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, ReadingPositions& positions, TexelPoints& points);
+
+}  // namespace skeletex

@@ -1,0 +1,340 @@
+// SPDX-License-Identifier: MIT
+// Where texels read: from the even lattice to the mesh's own vertices and creased edges.
+//   claim_texels, decide_claims  vertices, strongest first, take the nearest texel that is free
+//   relax_texels                 free texels follow their neighbours half way
+//   offer_edges, place_on_edges  free texels go to the nearest point of a creased edge
+//   place_snapped                positions of texels on vertices and edges
+//   find_bad_quads, put_back     what folds in the map or in space goes back to the even lattice
+// A reading position is an offset from the texel's own place in the lattice, in cells: two planes over the texture, x
+// around, y along. Rows 0 and height-1 stay. `anchors` says what holds a texel: 0 nothing, 1 + i vertex i of the list
+// of vertices, -1 - i edge i. Vertices and edges come with their patch and their place (x, y) in its cells, x unwrapped.
+// Texels of one launch never look at each other's offsets where these may change: claims wait for stronger ones next to
+// them, the other kernels run once per colour (see colour_of). So nothing depends on the order of work-items.
+#include "skeletex_structs.h"
+
+#define REACH 0.7f         // cells from where a texel is to where it goes
+#define FURTHEST 1.0f      // cells from a texel's own place, along each axis
+#define LEAST_CROSS 0.05f  // cells squared: twice the area that the triangles around a texel keep in the map
+#define LEAST_COSINE 0.5f  // between a triangle and the even lattice's quad in space
+#define MARGIN 0.6f        // cells that the rows next to a seam or pole keep from it
+#define LEAST_MOVE 0.01f   // cells: shorter steps of free texels are not worth their test
+#define PLACED 5           // states of a vertex: 0 to 3 the candidate it claims, 4 none is left
+#define NO_EDGE 0x7fffffff
+
+// The texel `columns` to the right and `rows` up from one at (column, row) of its patch; columns wrap round.
+int texel_at(global const PatchRecord* restrict p, int texture_width, int column, int row) {
+  const int wrapped = column < 0 ? column + p->width : column >= p->width ? column - p->width : column;
+  return (p->y + row) * texture_width + p->x + wrapped;
+}
+
+// Colours 0 to 5: texels of one colour are two cells apart or more, also where an odd width wraps round.
+int colour_of(int column, int row, int width) { return 3 * (row & 1) + ((width & 1) && column == width - 1 ? 2 : column & 1); }
+
+// The smallest cross product at the four corners of a quad in the map; 1 in the even lattice.
+float quad_cross(const float x[4], const float y[4]) {
+  float least = INFINITY;
+  for (int i = 0; i < 4; ++i) {
+    const int before = (i + 3) & 3, after = (i + 1) & 3;
+    const float cross = (x[after] - x[i]) * (y[before] - y[i]) - (y[after] - y[i]) * (x[before] - x[i]);
+    least = fmin(least, cross);
+  }
+  return least;
+}
+
+// The smallest cross product of the four quads around a texel, if its offset were (dx, dy); 0 when it would come too near
+// to a seam, whose own samples are not at the columns.
+float cross_around(global const PatchRecord* restrict p, int texture_width, int column, int row, float dx, float dy,
+                   global const float* restrict offset_x, global const float* restrict offset_y) {
+  if ((float)row + dy < MARGIN || (float)row + dy > (float)(p->height - 1) - MARGIN) return 0.0f;
+  float x[3][3], y[3][3];
+  for (int i = -1; i <= 1; ++i)
+    for (int j = -1; j <= 1; ++j) {
+      const int texel = texel_at(p, texture_width, column + j, row + i);
+      const int is_own = i == 0 && j == 0;
+      x[i + 1][j + 1] = (float)j + (is_own ? dx : offset_x[texel]);
+      y[i + 1][j + 1] = (float)i + (is_own ? dy : offset_y[texel]);
+    }
+  float least = INFINITY;
+  for (int i = 0; i < 2; ++i)
+    for (int j = 0; j < 2; ++j) {
+      const float qx[4] = {x[i][j], x[i][j + 1], x[i + 1][j + 1], x[i + 1][j]};
+      const float qy[4] = {y[i][j], y[i][j + 1], y[i + 1][j + 1], y[i + 1][j]};
+      least = fmin(least, quad_cross(qx, qy));
+    }
+  return least;
+}
+
+// The candidate of a vertex: the k-th nearest corner of its cell, and the vertex' offset from it.
+void candidate_of(float x, float y, int k, int* column, int* row, float* dx, float* dy) {
+  const float base_x = floor(x), base_y = floor(y);
+  const float fx = x - base_x, fy = y - base_y;
+  const int near_x = fx > 0.5f, near_y = fy > 0.5f;
+  // The nearest, then across the nearer side, then across the other one, then the opposite corner.
+  const int is_x_first = fabs(fx - 0.5f) < fabs(fy - 0.5f);
+  const int flip_x = k == 3 || k == (is_x_first ? 1 : 2), flip_y = k == 3 || k == (is_x_first ? 2 : 1);
+  const int right = near_x ^ flip_x, up = near_y ^ flip_y;
+  *column = (int)base_x + right, *row = (int)base_y + up;
+  *dx = fx - (float)right, *dy = fy - (float)up;
+}
+
+// NDRange (vertices). A vertex that is not placed claims the first of its candidates that it can still have.
+kernel void claim_texels(const int vertex_count, const int texture_width, global const int* restrict vertex_patches, global const float* restrict vertex_x,
+                         global const float* restrict vertex_y, global const int* restrict strengths, global const PatchRecord* restrict patches,
+                         global const int* restrict anchors, global int* restrict states, global int* restrict claims) {
+  const int v = (int)get_global_id(0);
+  if (v >= vertex_count) return;
+  global const PatchRecord* p = patches + vertex_patches[v];
+  int state = states[v];
+  for (; state < 4; ++state) {
+    int column, row;
+    float dx, dy;
+    candidate_of(vertex_x[v], vertex_y[v], state, &column, &row, &dx, &dy);
+    if (row < 1 || row > p->height - 2 || dx * dx + dy * dy > REACH * REACH) continue;
+    const int texel = texel_at(p, texture_width, (column % p->width + p->width) % p->width, row);
+    if (anchors[texel] != 0) continue;
+    atomic_max(claims + texel, strengths[v]);
+    break;
+  }
+  states[v] = state;
+}
+
+// NDRange (vertices). A claim that is the strongest on its texel and the eight around is decided: it stands when the map
+// does not fold. `open_count` counts the vertices that wait.
+kernel void decide_claims(const int vertex_count, const int texture_width, global const int* restrict vertex_patches, global const float* restrict vertex_x,
+                          global const float* restrict vertex_y, global const int* restrict strengths, global const PatchRecord* restrict patches,
+                          global const int* restrict claims, global int* restrict states, global int* restrict anchors, global float* restrict offset_x,
+                          global float* restrict offset_y, global int* restrict open_count) {
+  const int v = (int)get_global_id(0);
+  if (v >= vertex_count || states[v] >= 4) return;
+  global const PatchRecord* p = patches + vertex_patches[v];
+  int column, row;
+  float dx, dy;
+  candidate_of(vertex_x[v], vertex_y[v], states[v], &column, &row, &dx, &dy);
+  column = (column % p->width + p->width) % p->width;
+  int is_strongest = 1;
+  for (int i = -1; i <= 1; ++i)
+    for (int j = -1; j <= 1; ++j) is_strongest &= claims[texel_at(p, texture_width, column + j, row + i)] <= strengths[v];
+  if (!is_strongest) {
+    atomic_inc(open_count);
+    return;
+  }
+  if (cross_around(p, texture_width, column, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) {
+    states[v] += 1;
+    if (states[v] < 4) atomic_inc(open_count);
+    return;
+  }
+  const int texel = texel_at(p, texture_width, column, row);
+  offset_x[texel] = dx;
+  offset_y[texel] = dy;
+  anchors[texel] = 1 + v;
+  states[v] = PLACED;
+}
+
+// NDRange (texture width, texture height). Free texels of a colour go half way to the mean of their four neighbours.
+kernel void relax_texels(const int texture_width, const int texture_height, const int colour, global const int* restrict texel_patches,
+                         global const PatchRecord* restrict patches, global const int* restrict anchors, global float* restrict offset_x,
+                         global float* restrict offset_y) {
+  const int across = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (across >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + across;
+  const int patch = texel_patches[texel];
+  if (patch < 0 || anchors[texel] != 0) return;
+  global const PatchRecord* p = patches + patch;
+  const int column = across - p->x, row = line - p->y;
+  if (row < 1 || row > p->height - 2 || colour_of(column, row, p->width) != colour) return;
+  const int left = texel_at(p, texture_width, column - 1, row), right = texel_at(p, texture_width, column + 1, row);
+  const int below = texel - texture_width, above = texel + texture_width;
+  const float mean_x = 0.25f * (offset_x[left] + offset_x[right] + offset_x[below] + offset_x[above]);
+  const float mean_y = 0.25f * (offset_y[left] + offset_y[right] + offset_y[below] + offset_y[above]);
+  const float dx = 0.5f * (offset_x[texel] + mean_x), dy = 0.5f * (offset_y[texel] + mean_y);
+  if (fabs(dx - offset_x[texel]) + fabs(dy - offset_y[texel]) < LEAST_MOVE) return;
+  if (cross_around(p, texture_width, column, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) return;
+  offset_x[texel] = dx;
+  offset_y[texel] = dy;
+}
+
+// The point of an edge nearest to (x, y): its parameter.
+float nearest_on_edge(const float ends[4], float x, float y) {
+  const float ex = ends[2] - ends[0], ey = ends[3] - ends[1];
+  const float length2 = ex * ex + ey * ey;
+  return length2 > 0.0f ? clamp(((x - ends[0]) * ex + (y - ends[1]) * ey) / length2, 0.0f, 1.0f) : 0.0f;
+}
+
+// NDRange (edges). Offers every free texel within reach a point of the edge. An offer is the distance divided by the
+// edge's weight: pass 0 finds the least of a texel, pass 1 the first edge that makes it.
+// edge_ends: per edge x, y of its first and of its last point
+kernel void offer_edges(const int edge_count, const int texture_width, const int pass, global const int* restrict edge_patches,
+                        global const float* restrict edge_ends, global const float* restrict edge_weights, global const PatchRecord* restrict patches,
+                        global const int* restrict anchors, global const float* restrict offset_x, global const float* restrict offset_y,
+                        global int* restrict least_offers, global int* restrict best_edges) {
+  const int e = (int)get_global_id(0);
+  if (e >= edge_count) return;
+  global const PatchRecord* p = patches + edge_patches[e];
+  const float ends[4] = {edge_ends[4 * e], edge_ends[4 * e + 1], edge_ends[4 * e + 2], edge_ends[4 * e + 3]};
+  const float margin = REACH + FURTHEST;
+  const float slope = ends[3] == ends[1] ? 0.0f : (ends[2] - ends[0]) / (ends[3] - ends[1]);
+  const int first_row = max(1, (int)ceil(fmin(ends[1], ends[3]) - margin)), last_row = min(p->height - 2, (int)floor(fmax(ends[1], ends[3]) + margin));
+  for (int row = first_row; row <= last_row; ++row) {
+    // The part of the edge near this row.
+    const float low = clamp((float)row - margin, fmin(ends[1], ends[3]), fmax(ends[1], ends[3]));
+    const float high = clamp((float)row + margin, fmin(ends[1], ends[3]), fmax(ends[1], ends[3]));
+    const float a = ends[3] == ends[1] ? ends[0] : ends[0] + slope * (low - ends[1]);
+    const float b = ends[3] == ends[1] ? ends[2] : ends[0] + slope * (high - ends[1]);
+    const int first = (int)ceil(fmin(a, b) - margin), last = min((int)floor(fmax(a, b) + margin), first + p->width - 1);
+    int wrapped = (first % p->width + p->width) % p->width;
+    for (int column = first; column <= last; ++column) {
+      const int texel = (p->y + row) * texture_width + p->x + wrapped;
+      wrapped = wrapped + 1 < p->width ? wrapped + 1 : 0;
+      if (anchors[texel] != 0) continue;
+      const float x = (float)column + offset_x[texel], y = (float)row + offset_y[texel];
+      const float t = nearest_on_edge(ends, x, y);
+      const float dx = ends[0] + t * (ends[2] - ends[0]) - x, dy = ends[1] + t * (ends[3] - ends[1]) - y;
+      const float distance2 = dx * dx + dy * dy;
+      if (distance2 > REACH * REACH) continue;
+      // In fixed point, so that both passes see the same number.
+      const int offer = (int)rint(65536.0f * sqrt(distance2) / edge_weights[e]);
+      if (pass == 0) atomic_min(least_offers + texel, offer);
+      else if (offer == least_offers[texel]) atomic_min(best_edges + texel, e);
+    }
+  }
+}
+
+// NDRange (texture width, texture height). Free texels of a colour go to the edge that made the least offer.
+// out  parameters: where on its edge a texel is, 0 to 1
+kernel void place_on_edges(const int texture_width, const int texture_height, const int colour, global const int* restrict texel_patches,
+                           global const PatchRecord* restrict patches, global const float* restrict edge_ends, global const int* restrict best_edges,
+                           global int* restrict anchors, global float* restrict parameters, global float* restrict offset_x, global float* restrict offset_y) {
+  const int across = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (across >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + across;
+  const int e = best_edges[texel];
+  if (e == NO_EDGE || anchors[texel] != 0) return;
+  global const PatchRecord* p = patches + texel_patches[texel];
+  const int column = across - p->x, row = line - p->y;
+  if (colour_of(column, row, p->width) != colour) return;
+  const float ends[4] = {edge_ends[4 * e], edge_ends[4 * e + 1], edge_ends[4 * e + 2], edge_ends[4 * e + 3]};
+  // The turn of v at which the edge lies next to the texel.
+  const float y = (float)row + offset_y[texel];
+  float x = (float)column + offset_x[texel];
+  const float width = (float)p->width;
+  const float middle = 0.5f * (ends[0] + ends[2]);
+  float best = INFINITY, t = 0.0f, dx = 0.0f, dy = 0.0f;
+  const int turn = (int)rint((middle - x) / width);
+  for (int k = turn - 1; k <= turn + 1; ++k) {
+    const float lifted = x + (float)k * width;
+    const float at = nearest_on_edge(ends, lifted, y);
+    const float ex = ends[0] + at * (ends[2] - ends[0]) - lifted, ey = ends[1] + at * (ends[3] - ends[1]) - y;
+    if (ex * ex + ey * ey < best) best = ex * ex + ey * ey, t = at, dx = ex + offset_x[texel], dy = ey + offset_y[texel];
+  }
+  if (fabs(dx) > FURTHEST || fabs(dy) > FURTHEST) return;
+  if (cross_around(p, texture_width, column, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) return;
+  offset_x[texel] = dx;
+  offset_y[texel] = dy;
+  parameters[texel] = t;
+  anchors[texel] = -1 - e;
+}
+
+// NDRange (texture width, texture height). points: number of the vertex' point in the planes; edge_points: two per edge.
+kernel void place_snapped(const int texture_width, const int texture_height, global const int* restrict anchors, global const float* restrict parameters,
+                          global const int* restrict vertex_points, global const int* restrict edge_points, global const float* restrict point_x,
+                          global const float* restrict point_y, global const float* restrict point_z, global float* restrict x, global float* restrict y,
+                          global float* restrict z) {
+  const int across = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (across >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + across;
+  const int anchor = anchors[texel];
+  if (anchor == 0) return;
+  const int a = anchor > 0 ? vertex_points[anchor - 1] : edge_points[2 * (-1 - anchor)];
+  const int b = anchor > 0 ? a : edge_points[2 * (-1 - anchor) + 1];
+  const float t = anchor > 0 ? 0.0f : parameters[texel];
+  x[texel] = point_x[a] + t * (point_x[b] - point_x[a]);
+  y[texel] = point_y[a] + t * (point_y[b] - point_y[a]);
+  z[texel] = point_z[a] + t * (point_z[b] - point_z[a]);
+}
+
+void cross_product(const float a[3], const float b[3], const float c[3], float n[3]) {
+  const float u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+  n[0] = u[1] * v[2] - u[2] * v[1];
+  n[1] = u[2] * v[0] - u[0] * v[2];
+  n[2] = u[0] * v[1] - u[1] * v[0];
+}
+
+// Whether a triangle does not look along a direction; one without area looks along every direction.
+int is_turned(const float a[3], const float b[3], const float c[3], const float direction[3]) {
+  float n[3];
+  cross_product(a, b, c, n);
+  const float dot = n[0] * direction[0] + n[1] * direction[1] + n[2] * direction[2];
+  const float lengths2 = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) * (direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2]);
+  return dot < LEAST_COSINE * sqrt(lengths2);
+}
+
+// NDRange (texture width, texture height): the quad to the right of and above a texel. It is bad when it folds in the map,
+// or when for both diagonals a triangle is turned from the even lattice's quad where the even lattice's own is not. Quads
+// next to seams and poles take the points of the end rows. Only quads with a texel that is marked as changed are looked at.
+kernel void find_bad_quads(const int texture_width, const int texture_height, global const int* restrict texel_patches,
+                           global const PatchRecord* restrict patches, global const int* restrict is_changed, global const float* restrict offset_x,
+                           global const float* restrict offset_y, global const float* restrict even_x, global const float* restrict even_y,
+                           global const float* restrict even_z, global const float* restrict x, global const float* restrict y,
+                           global const float* restrict z, global int* restrict is_bad) {
+  const int across = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (across >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + across;
+  is_bad[texel] = 0;
+  const int patch = texel_patches[texel];
+  if (patch < 0) return;
+  global const PatchRecord* p = patches + patch;
+  const int column = across - p->x, row = line - p->y;
+  if (row > p->height - 2) return;
+  const int at[4] = {texel, texel_at(p, texture_width, column + 1, row), texel_at(p, texture_width, column + 1, row + 1), texel + texture_width};
+  if (!(is_changed[at[0]] | is_changed[at[1]] | is_changed[at[2]] | is_changed[at[3]])) return;
+  float map_x[4], map_y[4], even[4][3], now[4][3];
+  int is_moved = 0;
+  for (int i = 0; i < 4; ++i) {
+    const int t = at[i];
+    map_x[i] = (float)(i == 1 || i == 2) + offset_x[t], map_y[i] = (float)(i >= 2) + offset_y[t];
+    even[i][0] = even_x[t], even[i][1] = even_y[t], even[i][2] = even_z[t];
+    now[i][0] = x[t], now[i][1] = y[t], now[i][2] = z[t];
+    is_moved |= even[i][0] != now[i][0] || even[i][1] != now[i][1] || even[i][2] != now[i][2];
+  }
+  if (!is_moved) return;
+  // The quad's normal: the sum of those of its triangles.
+  float normal[3], other[3];
+  cross_product(even[0], even[1], even[2], normal);
+  cross_product(even[0], even[2], even[3], other);
+  for (int i = 0; i < 3; ++i) normal[i] += other[i];
+  const int first = (is_turned(now[0], now[1], now[2], normal) && !is_turned(even[0], even[1], even[2], normal)) ||
+                    (is_turned(now[0], now[2], now[3], normal) && !is_turned(even[0], even[2], even[3], normal));
+  const int second = (is_turned(now[0], now[1], now[3], normal) && !is_turned(even[0], even[1], even[3], normal)) ||
+                     (is_turned(now[1], now[2], now[3], normal) && !is_turned(even[1], even[2], even[3], normal));
+  is_bad[texel] = (first && second) || quad_cross(map_x, map_y) <= 0.0f;
+}
+
+// NDRange (texture width, texture height). Texels of bad quads go back to their place in the even lattice; those on
+// vertices only when `with_vertices` says so.
+kernel void put_back(const int texture_width, const int texture_height, const int with_vertices, global const int* restrict texel_patches, global const PatchRecord* restrict patches,
+                     global const int* restrict is_bad, global const float* restrict even_x, global const float* restrict even_y,
+                     global const float* restrict even_z, global int* restrict anchors, global float* restrict offset_x, global float* restrict offset_y,
+                     global float* restrict x, global float* restrict y, global float* restrict z, global int* restrict is_changed,
+                     global int* restrict back_count) {
+  const int across = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (across >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + across;
+  is_changed[texel] = 0;
+  const int patch = texel_patches[texel];
+  if (patch < 0) return;
+  global const PatchRecord* p = patches + patch;
+  const int column = across - p->x, row = line - p->y;
+  if (row < 1 || row > p->height - 2) return;
+  const int left = texel_at(p, texture_width, column - 1, row);
+  if (!is_bad[texel] && !is_bad[left] && !is_bad[texel - texture_width] && !is_bad[left - texture_width]) return;
+  if (anchors[texel] > 0 && !with_vertices) return;
+  if (x[texel] == even_x[texel] && y[texel] == even_y[texel] && z[texel] == even_z[texel]) return;
+  x[texel] = even_x[texel];
+  y[texel] = even_y[texel];
+  z[texel] = even_z[texel];
+  offset_x[texel] = 0.0f;
+  offset_y[texel] = 0.0f;
+  anchors[texel] = 0;
+  is_changed[texel] = 1;
+  atomic_inc(back_count);
+}

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: MIT
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <numbers>
+#include <random>
+
+#include "skeletex/encode/encode_model.h"
+#include "skeletex/encode/row_profile.h"
+#include "skeletex/encode/snap.h"
+#include "skeletex/measure/manifold.h"
+#include "skeletex/measure/metro.h"
+#include "skeletex/measure/self_intersection.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "support/load_model.h"
+#include "support/snap_twin.h"
+
+namespace skeletex {
+namespace {
+
+constexpr int kTextureWidth = 70, kTextureHeight = 48;
+
+ClContext& device() {
+  static ClContext context;
+  return context;
+}
+
+/// A texture with one patch.
+struct OnePatch {
+  Skeleton skeleton{{{"head", Vec3(0, 0, 0)}, {"tail", Vec3(0, 0, 1)}}, {{"bone", 0, 1, Vec3(1, 0, 0)}}};
+  std::vector<Patch> patches;
+  DeviceLayout layout;
+
+  explicit OnePatch(const Rectangle& rectangle) {
+    patches.push_back({rectangle, Method::kVsm, SegmentTopology::kSphere, spread_rows_uniformly(rectangle.height)});
+    layout = upload_layout(device(), patches, frame_tables(skeleton, Walls(skeleton), patches, Vec3::Zero()), kTextureWidth, kTextureHeight);
+  }
+  const Rectangle& rectangle() const { return patches[0].rectangle; }
+  std::size_t texel(int column, int row) const { return static_cast<std::size_t>(rectangle().y + row) * kTextureWidth + rectangle().x + column; }
+};
+
+/// Vertices and edges anywhere in a patch, some beyond v = 0 or 1, some of the edges long and some of no length.
+SnapFeatures random_features(const Rectangle& r, std::mt19937& random) {
+  std::uniform_real_distribution<double> unit(0, 1);
+  SnapFeatures features;
+  const int count = r.width * r.height / 3;
+  for (int i = 0; i < count; ++i)
+    features.vertices.push_back({0, i, (1.4 * unit(random) - 0.2) * r.width, unit(random) * (r.height - 1), unit(random)});
+  for (int i = 0; i < count; ++i) {
+    const double x = (1.4 * unit(random) - 0.2) * r.width, y = unit(random) * (r.height - 1);
+    const double angle = 7 * unit(random), length = i % 10 == 0 ? 8 : 2 * unit(random);
+    features.edges.push_back({0, {2 * i, 2 * i + 1}, {x, x + length * std::cos(angle)}, {y, std::clamp(y + length * std::sin(angle), 0.0, r.height - 1.0)}, 2 * unit(random)});
+  }
+  return features;
+}
+
+Rectangle random_rectangle(std::mt19937& random) {
+  const int width = 4 + static_cast<int>(random() % 50), height = 4 + static_cast<int>(random() % 40);
+  return {static_cast<int>(random() % (kTextureWidth - width + 1)), static_cast<int>(random() % (kTextureHeight - height + 1)), width, height};
+}
+
+struct HostPositions {
+  std::vector<float> x, y, parameters;
+  std::vector<int> anchors;
+};
+HostPositions snapped(const OnePatch& patch, const SnapFeatures& features) {
+  ReadingPositions positions = even_positions(device(), patch.layout);
+  snap_positions(device(), patch.layout, features, positions);
+  return {device().download(positions.x), device().download(positions.y), device().download(positions.parameters), device().download(positions.anchors)};
+}
+
+/// A box of a tube, square across, with a vertex on every edge and in the middle of every side.
+Chart square_tube(int rows) {
+  Chart chart;
+  chart.bone = 0;
+  chart.topology = SegmentTopology::kAnnulus;
+  const double side[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
+  for (int r = 0; r < rows; ++r)
+    for (int j = 0; j < 8; ++j) {
+      chart.u.push_back(static_cast<double>(r) / (rows - 1));
+      chart.v.push_back(j / 8.0);
+      chart.positions.emplace_back(side[j][0], side[j][1], 0.25 * r);
+      chart.kinds.push_back(r == 0 ? ChartVertex::kHeadRow : r == rows - 1 ? ChartVertex::kTailRow : ChartVertex::kInner);
+    }
+  for (int r = 0; r + 1 < rows; ++r)
+    for (int j = 0; j < 8; ++j) {
+      const int k = (j + 1) % 8, a = 8 * r + j, b = 8 * r + k, c = b + 8, d = a + 8;
+      const auto turn = static_cast<std::int8_t>(k == 0);
+      chart.triangles.push_back({a, b, c});
+      chart.turns.push_back({0, turn, turn});
+      chart.triangles.push_back({a, c, d});
+      chart.turns.push_back({0, turn, 0});
+    }
+  return chart;
+}
+
+double symmetric_mean(const MetroReport& report) { return (report.forward.mean + report.backward.mean) / 2; }
+
+}  // namespace
+
+TEST(SnapFeatures, OfASquareTubeAreItsFourEdgesAndTheVerticesOnThem) {
+  const OnePatch patch({3, 2, 20, 13});
+  const SnapFeatures features = find_features(std::vector{square_tube(7)}, patch.patches, 0.1);
+  EXPECT_EQ(features.edges.size(), 4u * 6);
+  for (const SnapFeatures::Edge& edge : features.edges) {
+    EXPECT_NEAR(edge.dihedral, std::numbers::pi / 2, 1e-12);
+    EXPECT_NEAR(edge.x[0], edge.x[1], 1e-12);
+    EXPECT_NEAR(std::abs(edge.y[1] - edge.y[0]), 2, 1e-12) << "6 rows of quads over 12 cells";
+    EXPECT_NEAR(std::fmod(edge.x[0], 5), 2.5, 1e-12) << "8 columns over 20 cells";
+  }
+  EXPECT_EQ(features.vertices.size(), 4u * 5);
+  for (const SnapFeatures::Vertex& vertex : features.vertices) EXPECT_NEAR(vertex.strength, std::numbers::pi / 2 * 0.5, 1e-12);
+}
+
+TEST(Snap, PutsTexelsWhereItsTwinDoes) {
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    const OnePatch patch(random_rectangle(random));
+    const SnapFeatures features = random_features(patch.rectangle(), random);
+    const HostPositions got = snapped(patch, features);
+    twin::SnapLattice expected(patch.rectangle().width, patch.rectangle().height);
+    expected.snap(features);
+    // Rounding can turn a decision that stands on edge, and with it those beside it.
+    int different = 0;
+    for (int r = 0; r < expected.height; ++r)
+      for (int j = 0; j < expected.width; ++j) {
+        const std::size_t texel = patch.texel(j, r);
+        different += got.anchors[texel] != expected.anchors[expected.at(j, r)] || std::abs(got.x[texel] - expected.x[expected.at(j, r)]) > 1e-4 ||
+                     std::abs(got.y[texel] - expected.y[expected.at(j, r)]) > 1e-4;
+      }
+    EXPECT_LE(different, expected.width * expected.height / 20);
+  }
+}
+
+TEST(Snap, NeverFoldsTheMapAndHoldsTexelsExactlyOnTheirVertexOrEdge) {
+  for (unsigned seed = 100; seed < 112; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    const OnePatch patch(random_rectangle(random));
+    const SnapFeatures features = random_features(patch.rectangle(), random);
+    const HostPositions got = snapped(patch, features);
+    const int width = patch.rectangle().width, height = patch.rectangle().height;
+    twin::SnapLattice lattice(width, height);
+    int anchored = 0;
+    for (int r = 0; r < height; ++r)
+      for (int j = 0; j < width; ++j) {
+        const std::size_t texel = patch.texel(j, r);
+        const double dx = got.x[texel], dy = got.y[texel];
+        lattice.x[lattice.at(j, r)] = dx, lattice.y[lattice.at(j, r)] = dy;
+        EXPECT_LE(std::max(std::abs(dx), std::abs(dy)), 1);
+        if (r == 0 || r == height - 1) { EXPECT_TRUE(dx == 0 && dy == 0); }
+        const int anchor = got.anchors[texel];
+        if (anchor == 0) continue;
+        ++anchored;
+        double x, y;
+        if (anchor > 0) {
+          x = features.vertices[anchor - 1].x, y = features.vertices[anchor - 1].y;
+        } else {
+          const SnapFeatures::Edge& edge = features.edges[-1 - anchor];
+          x = edge.x[0] + got.parameters[texel] * (edge.x[1] - edge.x[0]), y = edge.y[0] + got.parameters[texel] * (edge.y[1] - edge.y[0]);
+        }
+        EXPECT_NEAR(std::remainder(j + dx - x, width), 0, 2e-5);
+        EXPECT_NEAR(r + dy, y, 2e-5);
+      }
+    if (width * height > 60) { EXPECT_GT(anchored, 0); }
+    for (int r = 0; r + 1 < height; ++r)
+      for (int j = 0; j < width; ++j) EXPECT_GE(lattice.quad_cross(j, r), 0.05 - 1e-4) << r << " " << j;
+  }
+}
+
+TEST(Snap, DoesNotDependOnTheOrderOfTheVertices) {
+  std::mt19937 random(7);
+  const OnePatch patch({5, 3, 47, 39});
+  SnapFeatures features = random_features(patch.rectangle(), random);
+  const HostPositions first = snapped(patch, features);
+  std::shuffle(features.vertices.begin(), features.vertices.end(), random);
+  const HostPositions second = snapped(patch, features);
+  EXPECT_EQ(first.x, second.x);
+  EXPECT_EQ(first.y, second.y);
+}
+
+TEST(Snap, WhatFoldsInSpaceGoesBackAndNothingThatDoesNot) {
+  std::mt19937 random(11);
+  const OnePatch patch({4, 2, 31, 29});
+  const int width = patch.rectangle().width, height = patch.rectangle().height;
+  std::normal_distribution<float> normal(0, 0.3f);
+  const std::size_t size = patch.layout.size();
+  // A tube, and the same with a tenth of its points thrown about.
+  std::array<std::vector<float>, 3> even, moved;
+  for (int i = 0; i < 3; ++i) even[i].resize(size, 0);
+  for (int r = 0; r < height; ++r)
+    for (int j = 0; j < width; ++j) {
+      const double angle = 2 * std::numbers::pi * j / width;
+      even[0][patch.texel(j, r)] = static_cast<float>(4 * std::cos(angle));
+      even[1][patch.texel(j, r)] = static_cast<float>(4 * std::sin(angle));
+      even[2][patch.texel(j, r)] = static_cast<float>(r);
+    }
+  moved = even;
+  for (int r = 1; r + 1 < height; ++r)
+    for (int j = 0; j < width; ++j)
+      if (random() % 10 == 0)
+        for (int i = 0; i < 3; ++i) moved[i][patch.texel(j, r)] += normal(random);
+  const TexelPoints even_points{device().upload(even[0]), device().upload(even[1]), device().upload(even[2])};
+  TexelPoints points{device().upload(moved[0]), device().upload(moved[1]), device().upload(moved[2])};
+  ReadingPositions positions = even_positions(device(), patch.layout);
+  const int back = put_back_folds(device(), patch.layout, even_points, positions, points);
+  EXPECT_GT(back, 0);
+  const std::array<std::vector<float>, 3> got{device().download(points.x), device().download(points.y), device().download(points.z)};
+
+  const auto point = [&](const std::array<std::vector<float>, 3>& planes, int j, int r) {
+    const std::size_t texel = patch.texel((j + width) % width, r);
+    return Vec3(planes[0][texel], planes[1][texel], planes[2][texel]);
+  };
+  // The tube's own quads are flat but for their bend of 2 pi / 31: none of its triangles is turned itself.
+  const auto is_bad = [&](const std::array<std::vector<float>, 3>& planes, int j, int r) {
+    const Vec3 e[4] = {point(even, j, r), point(even, j + 1, r), point(even, j + 1, r + 1), point(even, j, r + 1)};
+    const Vec3 n[4] = {point(planes, j, r), point(planes, j + 1, r), point(planes, j + 1, r + 1), point(planes, j, r + 1)};
+    const Vec3 direction = (e[2] - e[0]).cross(e[3] - e[1]).normalized();
+    const auto cosine = [&](int a, int b, int c) { return (n[b] - n[a]).cross(n[c] - n[a]).normalized().dot(direction); };
+    return std::min(cosine(0, 1, 2), cosine(0, 2, 3)) < 0.5 && std::min(cosine(0, 1, 3), cosine(1, 2, 3)) < 0.5;
+  };
+  int still_moved = 0;
+  for (int r = 1; r + 1 < height; ++r)
+    for (int j = 0; j < width; ++j) {
+      EXPECT_FALSE(is_bad(got, j, r)) << r << " " << j;
+      const bool is_back = point(got, j, r) == point(even, j, r);
+      if (point(moved, j, r) == point(even, j, r)) continue;
+      still_moved += !is_back;
+      if (is_back) { EXPECT_TRUE(is_bad(moved, j, r) || is_bad(moved, j - 1, r) || is_bad(moved, j, r - 1) || is_bad(moved, j - 1, r - 1)); }
+    }
+  EXPECT_GT(still_moved, 0);
+}
+
+TEST(Snap, BringsABearToAThirdOfTheErrorWithoutFoldingIt) {
+  const TestModel model = load_standard_model("bear");
+  EncodeOptions options;
+  options.width = options.height = 256;
+  options.has_snap = false;
+  const TriangleMesh plain = reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model);
+  options.has_snap = true;
+  const EncodeResult encoded = encode_model(device(), model.mesh, model.skeleton, options);
+  const TriangleMesh snapped_mesh = reconstruct_mesh(device(), encoded.model);
+  const SnapReport& report = encoded.report.snap.value();
+  EXPECT_GT(report.snapped_vertices, 0.95 * report.vertices);
+  EXPECT_LT(report.texels_put_back, 0.02 * 256 * 256);
+  const MetroReport before = measure_metro(device(), model.mesh, plain), after = measure_metro(device(), model.mesh, snapped_mesh);
+  EXPECT_LT(symmetric_mean(after), 0.3 * symmetric_mean(before));
+  EXPECT_LT(after.vertex.mean, 0.05 * before.vertex.mean);
+  // Without the prefilter every texel lies on the mesh, wherever it reads.
+  options.has_prefilter = false;
+  const TriangleMesh unfiltered = reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model);
+  EXPECT_LT(measure_metro(device(), unfiltered, model.mesh).vertex.max, 2e-6);
+  options.has_prefilter = true;
+  EXPECT_TRUE(measure_manifold(snapped_mesh).is_closed_manifold());
+  EXPECT_LE(static_cast<double>(count_self_intersections(snapped_mesh)), 1.2 * static_cast<double>(count_self_intersections(plain)) + 10);
+  const EncodeResult again = encode_model(device(), model.mesh, model.skeleton, options);
+  EXPECT_EQ(encoded.model.texture.out, again.model.texture.out);
+  EXPECT_EQ(encoded.model.texture.around, again.model.texture.around);
+}
+
+TEST(Snap, IsOnFromOneTexelPerVertexOn) {
+  const TestModel model = load_standard_model("bear");
+  EncodeOptions options;
+  const int least = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(model.mesh.positions.size()))));
+  options.width = options.height = least;
+  EXPECT_TRUE(encode_model(device(), model.mesh, model.skeleton, options).report.snap.has_value());
+  options.width = options.height = least - 1;
+  EXPECT_FALSE(encode_model(device(), model.mesh, model.skeleton, options).report.snap.has_value());
+}
+
+}  // namespace skeletex
