@@ -119,7 +119,7 @@ class Program : public ::testing::Test {
   static inline fs::path folder_;
 };
 
-const std::vector<std::string> kCommands{"encode", "reconstruct", "metro", "segment", "validate", "inspect", "devices"};
+const std::vector<std::string> kCommands{"encode", "reconstruct", "filter", "metro", "segment", "validate", "inspect", "devices"};
 
 }  // namespace
 
@@ -234,6 +234,33 @@ TEST_F(Program, ReconstructsInPosesAndAnimations) {
   std::ofstream(folder_ / "pose.json") << nlohmann::json{{"roll", {{bone + "x", 10}}}};
   expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--pose", "pose.json"}, {"pose.json", "no bone \"" + bone + "x\"", "did you mean " + bone + "?"});
   for (const char* name : {"pose.json", "animation.json", "bind.ply", "posed.ply", "again.ply"}) fs::remove(folder_ / name);
+}
+
+TEST_F(Program, FiltersModelsAndReportsWhatTheContractNames) {
+  for (const std::string filter : {"smooth", "enhance", "noise"}) {
+    const Outcome outcome = run({"filter", "y.skx.exr", filter, "-o", filter + ".skx.exr", "--bones", y_shape().skeleton.bones[0].name, "--json", "-"});
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    const nlohmann::json json = nlohmann::json::parse(outcome.out);
+    EXPECT_EQ(json.at("filter"), filter);
+    EXPECT_EQ(json.at("output").at("kind"), "model");
+    EXPECT_GT(json.at("moved").at("max").get<double>(), 0);
+    EXPECT_GT(json.at("volume").at("after").get<double>(), 0);
+    EXPECT_GT(json.at("solver").at("steps").get<int>(), 0);
+    EXPECT_EQ(run({"inspect", filter + ".skx.exr"}).code, 0);
+  }
+  ASSERT_EQ(run({"filter", "y.skx.exr", "smooth", "-o", "smooth.ply", "--keep-volume", "--scale", "0.05"}).code, 0);
+  EXPECT_TRUE(nlohmann::json::parse(run({"inspect", "smooth.ply", "--json", "-"}).out).at("closed_manifold").get<bool>());
+  ASSERT_EQ(run({"filter", "y.skx.exr", "curvature", "-o", "curvature.ply"}).code, 0);
+  EXPECT_NE(text_of(folder_ / "curvature.ply").find("property float nx"), std::string::npos);
+  EXPECT_NE(text_of(folder_ / "curvature.ply").find("property float mean_curvature"), std::string::npos);
+}
+
+TEST_F(Program, RefusesOptionsThatAreAnotherFiltersAndBonesThatAreNone) {
+  expect_refused(2, {"filter", "y.skx.exr", "smooth", "-o", "no.ply", "--gain", "2"}, {"--gain is for enhance, not for smooth"});
+  expect_refused(2, {"filter", "y.skx.exr", "smoth", "-o", "no.ply"}, {"smoth", "smooth"});
+  expect_refused(1, {"filter", "y.skx.exr", "smooth", "-o", "no.ply", "--bones", "nose"}, {"nose"});
+  expect_refused(1, {"filter", "y.skx.exr", "curvature", "-o", "no.skx.exr"}, {".ply"});
+  expect_refused(1, {"filter", "y.skx.exr", "noise", "-o", "no.stl"}, {".stl", ".ply"});
 }
 
 TEST_F(Program, MeasuresAndReportsWhatTheContractNames) {

@@ -95,6 +95,7 @@ void append(std::string& out, VertexColour colour) {
 void write_ply(OutputFile& file, const TriangleMesh& mesh, const PlyAttributes& attributes) {
   constexpr const char* kColour = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   std::string header = fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n", mesh.positions.size());
+  if (!attributes.vertex_normals.empty()) header += "property float nx\nproperty float ny\nproperty float nz\n";
   if (!attributes.vertex_colours.empty()) header += kColour;
   if (!attributes.vertex_property.empty()) header += fmt::format("property float {}\n", attributes.vertex_property_name);
   header += fmt::format("element face {}\nproperty list uchar int vertex_indices\n", mesh.triangles.size());
@@ -102,6 +103,7 @@ void write_ply(OutputFile& file, const TriangleMesh& mesh, const PlyAttributes& 
   file.write(header + "end_header\n");
   write_blocks(file, mesh.positions.size(), [&](std::size_t i, std::string& out) {
     for (const double x : mesh.positions[i]) append(out, static_cast<float>(x));
+    for (int axis = 0; axis < 3 && !attributes.vertex_normals.empty(); ++axis) append(out, static_cast<float>(attributes.vertex_normals[i][axis]));
     if (!attributes.vertex_colours.empty()) append(out, attributes.vertex_colours[i]);
     if (!attributes.vertex_property.empty()) append(out, attributes.vertex_property[i]);
   });
@@ -157,9 +159,9 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, con
   if (extension != ".ply" && extension != ".obj")
     throw IoError(fmt::format("{}: meshes are written as .ply or .obj, not as \"{}\"", path.string(), extension));
   const auto fits = [](std::size_t size, std::size_t count) { return size == 0 || size == count; };
-  if (!fits(attributes.vertex_colours.size(), mesh.positions.size()) || !fits(attributes.vertex_property.size(), mesh.positions.size()) ||
-      !fits(attributes.face_colours.size(), mesh.triangles.size()))
-    throw IoError(fmt::format("{}: there must be as many colours or values as the mesh has vertices or triangles", path.string()));
+  if (!fits(attributes.vertex_colours.size(), mesh.positions.size()) || !fits(attributes.vertex_normals.size(), mesh.positions.size()) ||
+      !fits(attributes.vertex_property.size(), mesh.positions.size()) || !fits(attributes.face_colours.size(), mesh.triangles.size()))
+    throw IoError(fmt::format("{}: there must be as many colours, normals or values as the mesh has vertices or triangles", path.string()));
   if (!attributes.vertex_property.empty() && attributes.vertex_property_name.empty())
     throw IoError(fmt::format("{}: the vertex property needs a name", path.string()));
   write_atomically(path, [&](const std::filesystem::path& temporary) {

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/edit/diffusion.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "skeletex/model/error.h"
+#include "skeletex/reconstruct/displace.h"
+
+namespace skeletex {
+namespace {
+
+constexpr const char* kFile = "filter.cl";
+// Sums may be taken in any order that the compiler likes: their loops become vector instructions.
+constexpr const char* kFastSums = "-cl-unsafe-math-optimizations";
+constexpr int kFanChunk = 64, kVertexChunk = 4096;  // FAN_CHUNK, VERTEX_CHUNK of the kernels
+
+int chunks(std::size_t values, int chunk) { return static_cast<int>((values + chunk - 1) / chunk); }
+ClRange fan_range(const ClContext& context, const DeviceNeighbours& neighbours) {
+  return row_range(context, chunks(neighbours.fan_vertices.size, kFanChunk));
+}
+/// Work-items that share the vertices in no row.
+ClRange other_range(const ClContext& context, const DeviceNeighbours& neighbours) {
+  return row_range(context, chunks(std::max(1, neighbours.vertex_count - neighbours.inner_count), kFanChunk));
+}
+
+int size(const auto& buffer) { return static_cast<int>(buffer.size); }
+
+/// Sums that work-items leave behind, and where they are added up.
+struct DeviceSums {
+  ClBuffer<float> partials;
+  ClBuffer<float> scalars;
+};
+DeviceSums allocate_sums(ClContext& context, const DeviceNeighbours& neighbours) {
+  const std::size_t rows = row_range(context, std::max(neighbours.rows.size, neighbours.column_blocks.size)).global[0];
+  const std::size_t others = std::max(fan_range(context, neighbours).global[0], other_range(context, neighbours).global[0]);
+  return {context.allocate<float>(rows + others), context.allocate<float>(3)};
+}
+void sum_partials(ClContext& context, const DeviceSums& sums, std::size_t partials, int slot) {
+  const std::size_t group = context.device().type == "cpu" ? 1 : context.work_group_size({kFile, "sum_partials", kFastSums}, 256);
+  context.launch({kFile, "sum_partials", kFastSums}, ClRange({group, 1}, {group, 1}), static_cast<int>(partials), slot, sums.partials,
+                 ClLocal{group * sizeof(float)}, sums.scalars);
+}
+
+/// Queues q = is_free (mass_share M + time L) p. \return the number of partial sums of p q
+std::size_t queue_operator(ClContext& context, const SurfaceOperator& surface, float mass_share, float time, const ClBuffer<float>& is_free,
+                           const DeviceField& p, const DeviceField& q, const ClBuffer<float>& partials) {
+  const DeviceNeighbours& n = *surface.neighbours;
+  const ClRange rows = row_range(context, n.rows.size), fans = fan_range(context, n);
+  context.launch({kFile, "apply_rows", kFastSums}, rows, size(n.rows), p.components, n.vertex_count, mass_share, time, n.rows, surface.weights,
+                 surface.mass, is_free, p.values, q.values, partials);
+  context.launch({kFile, "apply_fans", kFastSums}, fans, size(n.fan_vertices), n.inner_count, p.components, n.vertex_count,
+                 static_cast<int>(rows.global[0]), mass_share, time, n.fan_vertices, n.fan_begin, n.fans, surface.fan_weights, surface.mass, is_free,
+                 p.values, q.values, partials);
+  return rows.global[0] + fans.global[0];
+}
+
+}  // namespace
+
+SurfaceOperator make_surface_operator(ClContext& context, const DeviceNeighbours& neighbours, const DeviceField& points) {
+  const std::size_t count = neighbours.vertex_count;
+  SurfaceOperator surface{&neighbours, context.allocate<float>(4 * count), context.allocate<float>(2 * neighbours.fans.size),
+                          context.allocate<float>(count), context.allocate<float>(count)};
+  context.launch({kFile, "weigh_rows"}, row_range(context, neighbours.rows.size), size(neighbours.rows), neighbours.vertex_count, neighbours.rows,
+                 points.values, surface.weights, surface.mass, surface.stiffness);
+  context.launch({kFile, "weigh_fans"}, fan_range(context, neighbours), size(neighbours.fan_vertices), neighbours.inner_count, neighbours.vertex_count,
+                 neighbours.fan_vertices, neighbours.fan_begin, neighbours.fans, points.values, surface.weights, surface.fan_weights, surface.mass,
+                 surface.stiffness);
+  return surface;
+}
+
+DeviceField apply_operator(ClContext& context, const SurfaceOperator& surface, float mass_share, float time, const ClBuffer<float>& is_free,
+                           const DeviceField& x) {
+  DeviceField q{x.components, context.allocate<float>(x.values.size)};
+  const DeviceSums sums = allocate_sums(context, *surface.neighbours);
+  queue_operator(context, surface, mass_share, time, is_free, x, q, sums.partials);
+  return q;
+}
+
+SolveResult solve_diffusion(ClContext& context, const SurfaceOperator& surface, float time, const ClBuffer<float>& is_free, const DeviceField& b,
+                            double tolerance, int most_steps) {
+  constexpr int kStepsBetweenLooks = 4;
+  constexpr int kPq = 2;  // slots 0 and 1 hold r z of even and odd steps
+  const DeviceNeighbours& n = *surface.neighbours;
+  const int count = n.vertex_count, values = size(b.values);
+  const auto field = [&] { return DeviceField{b.components, context.allocate<float>(b.values.size)}; };
+  SolveResult result{field(), {}};
+  const DeviceField r = field(), p = field(), q = field(), z = field();
+  const DeviceSums sums = allocate_sums(context, n);
+  const ClRange rows = row_range(context, n.rows.size), columns = row_range(context, n.column_blocks.size), others = other_range(context, n);
+  const ClRange range = row_range(context, chunks(b.values.size, kVertexChunk));
+
+  const auto plane = [&] { return context.allocate<float>(count); };
+  const auto row_pivots = plane(), row_below = plane(), row_last = plane(), column_pivots = plane(), column_below = plane();
+  context.launch({kFile, "factor_rows", kFastSums}, rows, size(n.rows), time, n.rows, surface.weights, surface.mass, surface.stiffness, row_pivots,
+                 row_below, row_last);
+  context.launch({kFile, "factor_columns", kFastSums}, columns, size(n.column_blocks), count, time, n.column_blocks, surface.weights, surface.mass,
+                 surface.stiffness, column_pivots, column_below);
+  // q is free between the steps that use it.
+  const auto precondition = [&](int slot) {
+    context.launch({kFile, "precondition_rows", kFastSums}, rows, size(n.rows), b.components, count, n.rows, row_pivots, row_below, row_last, r.values,
+                   z.values);
+    context.launch({kFile, "precondition_columns", kFastSums}, columns, size(n.column_blocks), b.components, count, n.column_blocks, column_pivots,
+                   column_below, is_free, r.values, q.values, z.values, sums.partials);
+    context.launch({kFile, "precondition_others", kFastSums}, others, n.inner_count, b.components, count, static_cast<int>(columns.global[0]), time,
+                   surface.mass, surface.stiffness, is_free, r.values, z.values, sums.partials);
+    sum_partials(context, sums, columns.global[0] + others.global[0], slot);
+  };
+  const auto turn_direction = [&](int old_rz, int new_rz) {
+    context.launch({kFile, "turn_direction", kFastSums}, range, values, old_rz, new_rz, sums.scalars, z.values, p.values);
+  };
+
+  context.launch({kFile, "begin_solve", kFastSums}, range, values, count, is_free, b.values, result.x.values, r.values, p.values);
+  precondition(0);
+  turn_direction(0, 0);
+  const double first = context.download(sums.scalars)[0];
+  if (!std::isfinite(first)) throw InputError("the surface is too far out of shape to be filtered: its weights are no finite numbers");
+  result.report.residual = first > 0 ? 1 : 0;
+  for (int step = 0; step < most_steps && result.report.residual > tolerance; ++step) {
+    const int old_rz = step % 2, new_rz = 1 - old_rz;
+    sum_partials(context, sums, queue_operator(context, surface, 1.0f, time, is_free, p, q, sums.partials), kPq);
+    context.launch({kFile, "take_step", kFastSums}, range, values, old_rz, kPq, sums.scalars, p.values, q.values, result.x.values, r.values);
+    precondition(new_rz);
+    turn_direction(old_rz, new_rz);
+    result.report.steps = step + 1;
+    if ((step + 1) % kStepsBetweenLooks == 0 || step + 1 == most_steps)
+      result.report.residual = std::sqrt(static_cast<double>(context.download(sums.scalars)[new_rz]) / first);
+  }
+  return result;
+}
+
+DeviceField area_vectors(ClContext& context, const DeviceNeighbours& neighbours, const DeviceField& points) {
+  DeviceField vectors{3, context.allocate<float>(points.values.size)};
+  context.launch({kFile, "sum_row_vectors"}, row_range(context, neighbours.rows.size), size(neighbours.rows), neighbours.vertex_count, neighbours.rows,
+                 points.values, vectors.values);
+  context.launch({kFile, "sum_fan_vectors"}, fan_range(context, neighbours), size(neighbours.fan_vertices), neighbours.inner_count,
+                 neighbours.vertex_count, neighbours.fan_vertices, neighbours.fan_begin, neighbours.fans, points.values, vectors.values);
+  return vectors;
+}
+
+DeviceField upload_points(ClContext& context, std::span<const Vec3> positions, const Vec3& origin, double unit) {
+  std::vector<float> values(3 * positions.size());
+  for (int axis = 0; axis < 3; ++axis)
+    for (std::size_t i = 0; i < positions.size(); ++i) values[axis * positions.size() + i] = static_cast<float>((positions[i][axis] - origin[axis]) / unit);
+  return {3, context.upload(values)};
+}
+
+std::vector<Vec3> download_vectors(ClContext& context, const DeviceField& field) {
+  const std::vector<float> values = context.download(field.values);
+  const std::size_t count = values.size() / 3;
+  std::vector<Vec3> vectors(count);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (std::size_t i = 0; i < count; ++i) vectors[i][static_cast<int>(axis)] = values[axis * count + i];
+  return vectors;
+}
+
+}  // namespace skeletex

@@ -1,0 +1,519 @@
+// SPDX-License-Identifier: MIT
+// Texture-space filters: the Laplace operator of the surface, diffusion by conjugate gradients, normals, noise.
+//
+// Vertices are those of the model's lattice (reconstruct/lattice.h). Who is next to whom:
+//   Inside a patch, by arithmetic. `rows` has four ints per inner row of every patch: its first vertex, its width, and
+//   whether rows before and after it are inner rows too. Columns wrap. Kernels over rows run one work-group per row, of
+//   any size, whose work-items take columns in turn (see reconstruct.cl).
+//   At the ends of patches, by a table. `fan_vertices` lists the vertices there (first and last inner row, poles, seam
+//   samples, corners); entries fan_begin[k] .. fan_begin[k + 1] of `fans` hold two ints per triangle at vertex k outside
+//   the quads between inner rows: its other two corners, counter-clockwise. Both sides of a seam are in one fan. Kernels
+//   over fans run one work-group per FAN_CHUNK vertices. They add to what kernels over rows have written.
+// Quads count half for each of their two diagonals, so that no choice between them shows.
+//
+// A field has one or three components, planes of `count` floats behind each other. Positions are a field of three,
+// relative to the model's origin, in diagonals.
+// Sums are partial sums, one per work-item of every group, that sum_partials adds up: no result depends on the order in
+// which groups run.
+
+#define FAN_CHUNK 64
+#define VERTEX_CHUNK 4096
+// Where twice a triangle's area is below this share of half the sum of its squared edges, it counts as that much: weights
+// stay finite, the same seen from all three corners, and the operator positive.
+#define LEAST_AREA 1.2e-4f
+
+// Adds half the cotangent weights of the triangle (0, e, f) to the edges from 0 to e and to f, and its area to *area.
+void add_triangle(const float ex, const float ey, const float ez, const float fx, const float fy, const float fz, float* to_e, float* to_f, float* area) {
+  const float nx = ey * fz - ez * fy, ny = ez * fx - ex * fz, nz = ex * fy - ey * fx;
+  const float ee = ex * ex + ey * ey + ez * ez, ff = fx * fx + fy * fy + fz * fz, ef = ex * fx + ey * fy + ez * fz;
+  const float twice = sqrt(nx * nx + ny * ny + nz * nz);
+  const float scale = 0.25f / fmax(twice, fmax(LEAST_AREA * (ee + ff - ef), 1e-30f));
+  *to_e += scale * (ff - ef);
+  *to_f += scale * (ee - ef);
+  *area += 0.5f * twice;
+}
+
+// Corner a of the quad a, b, c, d, given as b - a, c - a, d - a: both triangulations, half each.
+// weights: of the edges to b, c, d
+void weigh_corner(const float* restrict b, const float* restrict c, const float* restrict d, float* restrict weights, float* restrict area) {
+  add_triangle(b[0], b[1], b[2], c[0], c[1], c[2], weights, weights + 1, area);
+  add_triangle(c[0], c[1], c[2], d[0], d[1], d[2], weights + 1, weights + 2, area);
+  add_triangle(b[0], b[1], b[2], d[0], d[1], d[2], weights, weights + 2, area);
+}
+
+void edge_between(__global const float* restrict points, const int count, const int from, const int to, float* restrict edge) {
+  edge[0] = points[to] - points[from];
+  edge[1] = points[count + to] - points[count + from];
+  edge[2] = points[2 * count + to] - points[2 * count + from];
+}
+
+// Weights of the edges from each vertex of a row to its right (0, +1), and to the next row at (+1, -1), (+1, 0), (+1, +1):
+// four planes of `count`; the other four are those of its neighbours. mass: its share of the area; stiffness: the sum of
+// all its weights.
+void weigh_vertex(const int count, __global const float* restrict points, const int before, const int here, const int after, const int left, const int j,
+                  const int right, const float has_before, const float has_after, __global float* restrict weights, __global float* restrict mass,
+                  __global float* restrict stiffness) {
+  const int v = here + j;
+  float e[8][3];
+  edge_between(points, count, v, here + right, e[0]);
+  edge_between(points, count, v, after + right, e[1]);
+  edge_between(points, count, v, after + j, e[2]);
+  edge_between(points, count, v, after + left, e[3]);
+  edge_between(points, count, v, here + left, e[4]);
+  edge_between(points, count, v, before + left, e[5]);
+  edge_between(points, count, v, before + j, e[6]);
+  edge_between(points, count, v, before + right, e[7]);
+  float w[4][3] = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
+  float area_after = 0.0f, area_before = 0.0f;
+  weigh_corner(e[0], e[1], e[2], w[0], &area_after);
+  weigh_corner(e[2], e[3], e[4], w[1], &area_after);
+  weigh_corner(e[4], e[5], e[6], w[2], &area_before);
+  weigh_corner(e[6], e[7], e[0], w[3], &area_before);
+  const float to_right = has_after * w[0][0] + has_before * w[3][2];
+  const float to_left = has_after * w[1][2] + has_before * w[2][0];
+  const float ahead = has_after * (w[0][2] + w[1][0]), ahead_right = has_after * w[0][1], ahead_left = has_after * w[1][1];
+  const float behind = has_before * (w[2][2] + w[3][0] + w[2][1] + w[3][1]);
+  weights[v] = to_right;
+  weights[count + v] = ahead_left;
+  weights[2 * count + v] = ahead;
+  weights[3 * count + v] = ahead_right;
+  mass[v] = (has_after * area_after + has_before * area_before) / 6.0f;
+  stiffness[v] = to_right + to_left + ahead + ahead_right + ahead_left + behind;
+}
+
+// NDRange: rows.
+// in   points     out  weights: four planes; mass, stiffness: one plane each
+__kernel void weigh_rows(const int row_count, const int count, __global const int* restrict rows, __global const float* restrict points,
+                         __global float* restrict weights, __global float* restrict mass, __global float* restrict stiffness) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  const int here = rows[4 * k], width = rows[4 * k + 1], has_before = rows[4 * k + 2], has_after = rows[4 * k + 3];
+  const int before = has_before ? here - width : here, after = has_after ? here + width : here;
+  const int begin = get_local_id(0), step = get_local_size(0);
+  for (int j = 1 + begin; j < width - 1; j += step)
+    weigh_vertex(count, points, before, here, after, j - 1, j, j + 1, has_before, has_after, weights, mass, stiffness);
+  if (begin == 0) {
+    weigh_vertex(count, points, before, here, after, width - 1, 0, 1, has_before, has_after, weights, mass, stiffness);
+    weigh_vertex(count, points, before, here, after, width - 2, width - 1, 0, has_before, has_after, weights, mass, stiffness);
+  }
+}
+
+// Whether the edge between two vertices of one row (at least four wide, and wrapping) leads from v to its right.
+int is_right(const int v, const int other) { return other == v + 1 || other < v - 1; }
+
+// NDRange: fans.
+// in   points     out  fan_weights: two floats per triangle, of the edges to its two corners
+// in and out  weights: edges along a row get their whole weight there, none in fan_weights; mass, stiffness: of vertices in
+//      no row they begin here
+__kernel void weigh_fans(const int fan_count, const int inner_count, const int count, __global const int* restrict fan_vertices,
+                         __global const int* restrict fan_begin, __global const int* restrict fans, __global const float* restrict points,
+                         __global float* restrict weights, __global float* restrict fan_weights, __global float* restrict mass,
+                         __global float* restrict stiffness) {
+  const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, fan_count);
+  for (int k = begin + (int)get_local_id(0); k < end; k += get_local_size(0)) {
+    const int v = fan_vertices[k];
+    float area = 0.0f, sum = 0.0f;
+    for (int i = fan_begin[k]; i < fan_begin[k + 1]; ++i) {
+      float e[3], f[3], to[2] = {0.0f, 0.0f};
+      edge_between(points, count, v, fans[2 * i], e);
+      edge_between(points, count, v, fans[2 * i + 1], f);
+      add_triangle(e[0], e[1], e[2], f[0], f[1], f[2], to, to + 1, &area);
+      sum += 2.0f * (to[0] + to[1]);
+      for (int side = 0; side < 2; ++side) {
+        const int other = fans[2 * i + side];
+        const int is_in_row = v < inner_count && other < inner_count;
+        fan_weights[2 * i + side] = is_in_row ? 0.0f : 2.0f * to[side];
+        if (is_in_row && is_right(v, other)) weights[v] += 2.0f * to[side];
+      }
+    }
+    mass[v] = (v < inner_count ? mass[v] : 0.0f) + area / 3.0f;
+    stiffness[v] = (v < inner_count ? stiffness[v] : 0.0f) + sum;
+  }
+}
+
+// Sum of w (p here - p there) over the eight neighbours in the rows.
+float laplacian_at(const int count, __global const float* restrict weights, __global const float* restrict p, const int before, const int here,
+                   const int after, const int left, const int j, const int right, const float has_before) {
+  const int v = here + j;
+  const float centre = p[v];
+  const float beside = weights[v] * (centre - p[here + right]) + weights[here + left] * (centre - p[here + left]);
+  const float ahead = weights[count + v] * (centre - p[after + left]) + weights[2 * count + v] * (centre - p[after + j]) +
+                      weights[3 * count + v] * (centre - p[after + right]);
+  const float behind = weights[count + before + right] * (centre - p[before + right]) + weights[2 * count + before + j] * (centre - p[before + j]) +
+                       weights[3 * count + before + left] * (centre - p[before + left]);
+  return beside + ahead + has_before * behind;
+}
+
+// q = is_free (mass_share M + time L) p, and partial sums of p q.
+// NDRange: rows. in  p: field; is_free: 1 or 0 per vertex     out  q: field; partials: one per work-item
+__kernel void apply_rows(const int row_count, const int components, const int count, const float mass_share, const float time,
+                         __global const int* restrict rows, __global const float* restrict weights, __global const float* restrict mass,
+                         __global const float* restrict is_free, __global const float* restrict p, __global float* restrict q,
+                         __global float* restrict partials) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  const int here = rows[4 * k], width = rows[4 * k + 1], has_before = rows[4 * k + 2], has_after = rows[4 * k + 3];
+  const int before = has_before ? here - width : here, after = has_after ? here + width : here;
+  const int begin = get_local_id(0), step = get_local_size(0);
+  float sum = 0.0f;
+  for (int c = 0; c < components; ++c) {
+    __global const float* restrict from = p + c * count;
+    __global float* restrict to = q + c * count;
+    for (int j = 1 + begin; j < width - 1; j += step)
+      to[here + j] = time * laplacian_at(count, weights, from, before, here, after, j - 1, j, j + 1, has_before);
+    if (begin == 0) {
+      to[here] = time * laplacian_at(count, weights, from, before, here, after, width - 1, 0, 1, has_before);
+      to[here + width - 1] = time * laplacian_at(count, weights, from, before, here, after, width - 2, width - 1, 0, has_before);
+    }
+    // A work-item goes on with what it has written itself.
+    for (int j = 1 + begin; j < width - 1; j += step) {
+      const int v = here + j;
+      const float value = is_free[v] * (mass_share * mass[v] * from[v] + to[v]);
+      to[v] = value;
+      sum += from[v] * value;
+    }
+    if (begin == 0)
+      for (int v = here; v < here + width; v += width - 1) {
+        const float value = is_free[v] * (mass_share * mass[v] * from[v] + to[v]);
+        to[v] = value;
+        sum += from[v] * value;
+      }
+  }
+  partials[k * step + begin] = sum;
+}
+
+// The same for the triangles of the fans; M of vertices in no row. NDRange: fans.
+// in and out  q     out  partials, from `first_partial` on
+__kernel void apply_fans(const int fan_count, const int inner_count, const int components, const int count, const int first_partial,
+                         const float mass_share, const float time, __global const int* restrict fan_vertices, __global const int* restrict fan_begin,
+                         __global const int* restrict fans, __global const float* restrict fan_weights, __global const float* restrict mass,
+                         __global const float* restrict is_free, __global const float* restrict p, __global float* restrict q,
+                         __global float* restrict partials) {
+  const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, fan_count);
+  float sum = 0.0f;
+  for (int k = begin + (int)get_local_id(0); k < end; k += get_local_size(0)) {
+    const int v = fan_vertices[k];
+    for (int c = 0; c < components; ++c) {
+      __global const float* restrict from = p + c * count;
+      const float centre = from[v];
+      float laplacian = 0.0f;
+      for (int i = 2 * fan_begin[k]; i < 2 * fan_begin[k + 1]; ++i) laplacian += fan_weights[i] * (centre - from[fans[i]]);
+      const float value = is_free[v] * (time * laplacian + (v < inner_count ? 0.0f : mass_share * mass[v] * centre));
+      q[c * count + v] = value + (v < inner_count ? q[c * count + v] : 0.0f);
+      sum += centre * value;
+    }
+  }
+  partials[first_partial + (int)get_global_id(0)] = sum;
+}
+
+// result[slot] = the sum of the partial sums. One work-group, with a local float per work-item.
+__kernel void sum_partials(const int partial_count, const int slot, __global const float* restrict partials, __local float* restrict sums,
+                           __global float* restrict result) {
+  const int begin = get_local_id(0), step = get_local_size(0);
+  float sum = 0.0f;
+  for (int i = begin; i < partial_count; i += step) sum += partials[i];
+  sums[begin] = sum;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (begin > 0) return;
+  for (int i = 1; i < step; ++i) sum += sums[i];
+  result[slot] = sum;
+}
+
+// Conjugate gradients. The preconditioner is 1 / R + 1 / C: R takes the matrix's part along each row, periodic and
+// tridiagonal, C that along each column of inner rows, tridiagonal; for the other vertices both take its diagonal. So
+// neither dense rings around a pole nor rows that a slanting seam presses together count, which the diagonal alone would
+// need many steps for. Where a diagonal does not outweigh its neighbours it is raised until it does, so both are positive.
+// R = L D L^T, with L's entries next to the diagonal in `below` and those of its last row in `last`; C alike, no last.
+
+float raised_diagonal(const float mass, const float stiffness, const float one, const float other, const float time) {
+  return mass + time * fmax(stiffness, fabs(one) + fabs(other)) + 1e-35f;
+}
+
+// NDRange: rows; one work-item each does it. out  inverse_pivots (1 / D), below, last: one plane each
+__kernel void factor_rows(const int row_count, const float time, __global const int* restrict rows, __global const float* restrict weights,
+                          __global const float* restrict mass, __global const float* restrict stiffness, __global float* restrict inverse_pivots,
+                          __global float* restrict below, __global float* restrict last) {
+  const int k = get_group_id(0);
+  if (k >= row_count || get_local_id(0) > 0) return;
+  const int here = rows[4 * k], end = here + rows[4 * k + 1] - 1;
+  float before = weights[end];  // of the edge from the vertex before
+  float pivot_change = 0.0f, fill = -time * weights[end], end_change = 0.0f;
+  for (int v = here; v < end; ++v) {
+    const float coupling = -time * weights[v];
+    const float diagonal = raised_diagonal(mass[v], stiffness[v], before, weights[v], time);
+    const float inverse = 1.0f / fmax(diagonal + pivot_change, 1e-6f * diagonal);
+    if (v + 1 == end) fill += coupling;
+    inverse_pivots[v] = inverse;
+    below[v] = v + 1 == end ? 0.0f : coupling * inverse;
+    last[v] = fill * inverse;
+    end_change -= fill * fill * inverse;
+    pivot_change = -coupling * coupling * inverse;
+    fill *= -coupling * inverse;
+    before = weights[v];
+  }
+  const float diagonal = raised_diagonal(mass[end], stiffness[end], before, weights[end], time);
+  inverse_pivots[end] = 1.0f / fmax(diagonal + end_change, 1e-6f * diagonal);
+}
+
+// NDRange of this and precondition_columns: one work-group per four ints of `blocks`: first vertex in the first inner row,
+// number of columns, distance between rows, number of rows; work-items take columns in turn.
+// out  inverse_pivots, below: one plane each
+__kernel void factor_columns(const int block_count, const int count, const float time, __global const int* restrict blocks,
+                             __global const float* restrict weights, __global const float* restrict mass, __global const float* restrict stiffness,
+                             __global float* restrict inverse_pivots, __global float* restrict below) {
+  const int k = get_group_id(0);
+  if (k >= block_count) return;
+  const int first = blocks[4 * k], columns = blocks[4 * k + 1], stride = blocks[4 * k + 2], rows = blocks[4 * k + 3];
+  __global const float* restrict ahead = weights + 2 * count;
+  const int begin = get_local_id(0), step = get_local_size(0);
+  for (int row = 0; row < rows; ++row) {
+    const int here = first + row * stride, back = row > 0 ? stride : 0;
+    for (int v = here + begin; v < here + columns; v += step) {
+      const float before = back > 0 ? ahead[v - back] : 0.0f, eliminated = back > 0 ? time * before * below[v - back] : 0.0f;
+      const float diagonal = raised_diagonal(mass[v], stiffness[v], before, ahead[v], time);
+      const float inverse = 1.0f / fmax(diagonal + eliminated, 1e-6f * diagonal);
+      inverse_pivots[v] = inverse;
+      below[v] = -time * ahead[v] * inverse;
+    }
+  }
+}
+
+// z = 1 / R r, in the rows. NDRange: rows; one work-item each does it, all components at once: their chains of dependent
+// steps overlap.
+__kernel void precondition_rows(const int row_count, const int components, const int count, __global const int* restrict rows,
+                                __global const float* restrict inverse_pivots, __global const float* restrict below, __global const float* restrict last,
+                                __global const float* restrict r, __global float* restrict z) {
+  const int k = get_group_id(0);
+  if (k >= row_count || get_local_id(0) > 0) return;
+  const int here = rows[4 * k], end = here + rows[4 * k + 1] - 1;
+  // A field of one component is done three times over.
+  const int second = components > 1 ? count : 0, third = 2 * second;
+  float x = r[here], y = r[second + here], w = r[third + here];
+  float end_x = r[end], end_y = r[second + end], end_w = r[third + end];
+  for (int v = here; v < end; ++v) {
+    z[v] = x;
+    z[second + v] = y;
+    z[third + v] = w;
+    end_x -= last[v] * x;
+    end_y -= last[v] * y;
+    end_w -= last[v] * w;
+    x = r[v + 1] - below[v] * x;
+    y = r[second + v + 1] - below[v] * y;
+    w = r[third + v + 1] - below[v] * w;
+  }
+  end_x *= inverse_pivots[end];
+  end_y *= inverse_pivots[end];
+  end_w *= inverse_pivots[end];
+  z[end] = end_x;
+  z[second + end] = end_y;
+  z[third + end] = end_w;
+  x = 0.0f;
+  y = 0.0f;
+  w = 0.0f;
+  for (int v = end - 1; v >= here; --v) {
+    const float inverse = inverse_pivots[v];
+    x = z[v] * inverse - below[v] * x - last[v] * end_x;
+    y = z[second + v] * inverse - below[v] * y - last[v] * end_y;
+    w = z[third + v] * inverse - below[v] * w - last[v] * end_w;
+    z[v] = x;
+    z[second + v] = y;
+    z[third + v] = w;
+  }
+}
+
+// z = is_free (z + 1 / C r), in the rows, and partial sums of r z. y: a field for use in between
+__kernel void precondition_columns(const int block_count, const int components, const int count, __global const int* restrict blocks,
+                                   __global const float* restrict inverse_pivots, __global const float* restrict below,
+                                   __global const float* restrict is_free, __global const float* restrict r, __global float* restrict y,
+                                   __global float* restrict z, __global float* restrict partials) {
+  const int k = get_group_id(0);
+  if (k >= block_count) return;
+  const int first = blocks[4 * k], columns = blocks[4 * k + 1], stride = blocks[4 * k + 2], rows = blocks[4 * k + 3];
+  const int begin = get_local_id(0), step = get_local_size(0);
+  float sum = 0.0f;
+  for (int c = 0; c < components; ++c) {
+    __global const float* restrict from = r + c * count;
+    __global float* restrict between = y + c * count;
+    __global float* restrict to = z + c * count;
+    for (int v = first + begin; v < first + columns; v += step) between[v] = from[v];
+    for (int row = 1; row < rows; ++row) {
+      const int here = first + row * stride;
+      for (int v = here + begin; v < here + columns; v += step) between[v] = from[v] - below[v - stride] * between[v - stride];
+    }
+    for (int row = rows - 1; row >= 0; --row) {
+      const int here = first + row * stride, ahead = row + 1 < rows ? stride : 0;
+      const float has_after = row + 1 < rows;
+      for (int v = here + begin; v < here + columns; v += step) {
+        const float value = between[v] * inverse_pivots[v] - has_after * below[v] * between[v + ahead];
+        const float both = is_free[v] * (to[v] + value);
+        between[v] = value;
+        to[v] = both;
+        sum += from[v] * both;
+      }
+    }
+  }
+  partials[k * step + begin] = sum;
+}
+
+// z = 2 is_free r / D for the vertices in no row, from inner_count on. NDRange: work-items take them in turn.
+// out  partials of r z, from `first_partial` on
+__kernel void precondition_others(const int inner_count, const int components, const int count, const int first_partial, const float time,
+                                  __global const float* restrict mass, __global const float* restrict stiffness,
+                                  __global const float* restrict is_free, __global const float* restrict r, __global float* restrict z,
+                                  __global float* restrict partials) {
+  float sum = 0.0f;
+  for (int v = inner_count + (int)get_global_id(0); v < count; v += get_global_size(0))
+    for (int c = 0; c < components; ++c) {
+      const float value = 2.0f * is_free[v] * r[c * count + v] / (mass[v] + time * stiffness[v] + 1e-35f);
+      z[c * count + v] = value;
+      sum += r[c * count + v] * value;
+    }
+  partials[first_partial + (int)get_global_id(0)] = sum;
+}
+
+// r = is_free b, x = 0, p = 0. NDRange of this and the next two: one work-group per VERTEX_CHUNK values of the fields.
+__kernel void begin_solve(const int values, const int count, __global const float* restrict is_free, __global const float* restrict b,
+                          __global float* restrict x, __global float* restrict r, __global float* restrict p) {
+  const int begin = get_group_id(0) * VERTEX_CHUNK, end = min(begin + VERTEX_CHUNK, values);
+  for (int i = begin + (int)get_local_id(0); i < end; i += get_local_size(0)) {
+    x[i] = 0.0f;
+    r[i] = is_free[i < count ? i : i < 2 * count ? i - count : i - 2 * count] * b[i];
+    p[i] = 0.0f;
+  }
+}
+
+// x += a p, r -= a q, where a = (r z) / (p q). scalars: sums, by slot
+__kernel void take_step(const int values, const int rz, const int pq, __global const float* restrict scalars, __global const float* restrict p,
+                        __global const float* restrict q, __global float* restrict x, __global float* restrict r) {
+  const int begin = get_group_id(0) * VERTEX_CHUNK, end = min(begin + VERTEX_CHUNK, values);
+  const float length = scalars[pq] > 0.0f ? scalars[rz] / scalars[pq] : 0.0f;
+  for (int i = begin + (int)get_local_id(0); i < end; i += get_local_size(0)) {
+    x[i] += length * p[i];
+    r[i] -= length * q[i];
+  }
+}
+
+// p = z + (new r z) / (old r z) p.
+__kernel void turn_direction(const int values, const int old_rz, const int new_rz, __global const float* restrict scalars,
+                             __global const float* restrict z, __global float* restrict p) {
+  const int begin = get_group_id(0) * VERTEX_CHUNK, end = min(begin + VERTEX_CHUNK, values);
+  const float kept = scalars[old_rz] > 0.0f ? scalars[new_rz] / scalars[old_rz] : 0.0f;
+  for (int i = begin + (int)get_local_id(0); i < end; i += get_local_size(0)) p[i] = z[i] + kept * p[i];
+}
+
+// e x f
+void add_cross(const float* restrict e, const float* restrict f, const float share, float* restrict sum) {
+  sum[0] += share * (e[1] * f[2] - e[2] * f[1]);
+  sum[1] += share * (e[2] * f[0] - e[0] * f[2]);
+  sum[2] += share * (e[0] * f[1] - e[1] * f[0]);
+}
+
+void add_corner_vector(const float* restrict b, const float* restrict c, const float* restrict d, const float share, float* restrict sum) {
+  add_cross(b, c, share, sum);
+  add_cross(c, d, share, sum);
+  add_cross(b, d, share, sum);
+}
+
+void area_vector_at(const int count, __global const float* restrict points, const int before, const int here, const int after, const int left,
+                    const int j, const int right, const float has_before, const float has_after, __global float* restrict vectors) {
+  const int v = here + j;
+  float e[8][3];
+  edge_between(points, count, v, here + right, e[0]);
+  edge_between(points, count, v, after + right, e[1]);
+  edge_between(points, count, v, after + j, e[2]);
+  edge_between(points, count, v, after + left, e[3]);
+  edge_between(points, count, v, here + left, e[4]);
+  edge_between(points, count, v, before + left, e[5]);
+  edge_between(points, count, v, before + j, e[6]);
+  edge_between(points, count, v, before + right, e[7]);
+  float sum[3] = {0.0f, 0.0f, 0.0f};
+  add_corner_vector(e[0], e[1], e[2], has_after / 12.0f, sum);
+  add_corner_vector(e[2], e[3], e[4], has_after / 12.0f, sum);
+  add_corner_vector(e[4], e[5], e[6], has_before / 12.0f, sum);
+  add_corner_vector(e[6], e[7], e[0], has_before / 12.0f, sum);
+  vectors[v] = sum[0];
+  vectors[count + v] = sum[1];
+  vectors[2 * count + v] = sum[2];
+}
+
+// Each vertex's third of the area vectors around it, outward. NDRange: rows. in  points     out  vectors: field of three
+__kernel void sum_row_vectors(const int row_count, const int count, __global const int* restrict rows, __global const float* restrict points,
+                              __global float* restrict vectors) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  const int here = rows[4 * k], width = rows[4 * k + 1], has_before = rows[4 * k + 2], has_after = rows[4 * k + 3];
+  const int before = has_before ? here - width : here, after = has_after ? here + width : here;
+  const int begin = get_local_id(0), step = get_local_size(0);
+  for (int j = 1 + begin; j < width - 1; j += step) area_vector_at(count, points, before, here, after, j - 1, j, j + 1, has_before, has_after, vectors);
+  if (begin == 0) {
+    area_vector_at(count, points, before, here, after, width - 1, 0, 1, has_before, has_after, vectors);
+    area_vector_at(count, points, before, here, after, width - 2, width - 1, 0, has_before, has_after, vectors);
+  }
+}
+
+// NDRange: fans. in  points     in and out  vectors
+__kernel void sum_fan_vectors(const int fan_count, const int inner_count, const int count, __global const int* restrict fan_vertices,
+                              __global const int* restrict fan_begin, __global const int* restrict fans, __global const float* restrict points,
+                              __global float* restrict vectors) {
+  const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, fan_count);
+  for (int k = begin + (int)get_local_id(0); k < end; k += get_local_size(0)) {
+    const int v = fan_vertices[k];
+    float sum[3] = {0.0f, 0.0f, 0.0f};
+    for (int i = fan_begin[k]; i < fan_begin[k + 1]; ++i) {
+      float e[3], f[3];
+      edge_between(points, count, v, fans[2 * i], e);
+      edge_between(points, count, v, fans[2 * i + 1], f);
+      add_cross(e, f, 1.0f / 6.0f, sum);
+    }
+    for (int c = 0; c < 3; ++c) vectors[c * count + v] = (v < inner_count ? vectors[c * count + v] : 0.0f) + sum[c];
+  }
+}
+
+uint scramble(uint h) {
+  h ^= h >> 16;
+  h *= 0x7feb352du;
+  h ^= h >> 15;
+  h *= 0x846ca68bu;
+  return h ^ (h >> 16);
+}
+
+// The slope at a point of the integer lattice, one of twelve (Perlin 2002), times the way from there.
+float slope_times(const int x, const int y, const int z, const uint seed, const float fx, const float fy, const float fz) {
+  const uint h = scramble(scramble(scramble(scramble(seed) + (uint)x) + (uint)y) + (uint)z) % 12u;
+  const float first = h < 8u ? fx : fy, second = h < 4u ? fy : fz;
+  return (h & 1u ? -first : first) + (h & 2u ? -second : second);
+}
+
+// Gradient noise, about -1 .. 1, 0 at integer points, with two continuous derivatives.
+float gradient_noise(const float x, const float y, const float z, const uint seed) {
+  const float bx = floor(x), by = floor(y), bz = floor(z);
+  const int ix = (int)bx, iy = (int)by, iz = (int)bz;
+  const float fx = x - bx, fy = y - by, fz = z - bz;
+  const float sx = fx * fx * fx * (fx * (fx * 6.0f - 15.0f) + 10.0f);
+  const float sy = fy * fy * fy * (fy * (fy * 6.0f - 15.0f) + 10.0f);
+  const float sz = fz * fz * fz * (fz * (fz * 6.0f - 15.0f) + 10.0f);
+  float planes[2];
+  for (int k = 0; k < 2; ++k) {
+    const float gz = fz - (float)k;
+    const float n00 = slope_times(ix, iy, iz + k, seed, fx, fy, gz), n10 = slope_times(ix + 1, iy, iz + k, seed, fx - 1.0f, fy, gz);
+    const float n01 = slope_times(ix, iy + 1, iz + k, seed, fx, fy - 1.0f, gz), n11 = slope_times(ix + 1, iy + 1, iz + k, seed, fx - 1.0f, fy - 1.0f, gz);
+    const float low = n00 + sx * (n10 - n00), high = n01 + sx * (n11 - n01);
+    planes[k] = low + sy * (high - low);
+  }
+  return planes[0] + sz * (planes[1] - planes[0]);
+}
+
+// Noise at every vertex by its position: octaves of half the wavelength and half the height each. NDRange: vertices.
+// in  points; frequency: 1 / wavelength, in the points' unit     out  heights: field of one
+__kernel void noise_at_points(const int count, const float frequency, const int octaves, const uint seed, __global const float* restrict points,
+                              __global float* restrict heights) {
+  const int v = get_global_id(0);
+  if (v >= count) return;
+  float sum = 0.0f, height = 1.0f, scale = frequency;
+  for (int octave = 0; octave < octaves; ++octave) {
+    sum += height * gradient_noise(scale * points[v], scale * points[count + v], scale * points[2 * count + v], seed + (uint)octave);
+    height *= 0.5f;
+    scale *= 2.0f;
+  }
+  heights[v] = sum;
+}
