@@ -132,7 +132,10 @@ void run(const Arguments& arguments) {
   if (arguments.has_self_intersections)
     throw InputError(fmt::format("{}: --self-intersections is for meshes; reconstruct the model first", arguments.file));
   const nlohmann::json header = read_model_header(arguments.file);
-  if (arguments.json != "-") print(arguments.json, model_text(header, arguments.file));
+  std::string levels;
+  const std::vector<std::array<int, 2>> sizes = read_model_levels(arguments.file);
+  for (std::size_t level = 1; level < sizes.size(); ++level) levels += fmt::format("level {}: {} x {}\n", level, sizes[level][0], sizes[level][1]);
+  if (arguments.json != "-") print(arguments.json, model_text(header, arguments.file) + levels);
   write_json(arguments.json, Json(header));
 }
 

@@ -54,6 +54,7 @@ int run(int argc, char** argv) {
   add_correspond_command(program);
   add_morph_command(program);
   add_filter_command(program);
+  add_lod_command(program);
   add_metro_command(program);
   add_segment_command(program);
   add_validate_command(program);

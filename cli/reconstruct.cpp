@@ -18,7 +18,7 @@ namespace {
 
 struct Arguments {
   std::string model, output, pose, device, json;
-  int size = 0;
+  int size = 0, level = 0;
   std::optional<double> time;
   bool is_distance_dropped = false;
 };
@@ -27,7 +27,7 @@ void run(const Arguments& arguments) {
   check_output(arguments.output);
   check_json_target(arguments.json);
   Stopwatch total, watch;
-  SkeletexModel model = read_model(arguments.model);
+  SkeletexModel model = read_model(arguments.model, arguments.level);
   std::optional<Skeleton> posed;
   if (!arguments.pose.empty()) {
     const PoseAnimation animation = read_animation(arguments.pose, model.skeleton);
@@ -83,6 +83,9 @@ void add_reconstruct_command(CLI::App& program) {
   command.add_option("--size", arguments->size, "texels along the longer side, 4 to 16384 (default: the model's own size)")
       ->check(CLI::Range(4, 16384).description(""))
       ->type_name("N");
+  command.add_option("--level", arguments->level, "level of a file that `skeletex lod --levels` has written (default: 0, the finest)")
+      ->check(CLI::NonNegativeNumber.description(""))
+      ->type_name("K");
   CLI::Option* pose = command.add_option("--pose", arguments->pose, "pose or animation: .json")->type_name("FILE");
   command.add_option("--time", arguments->time, "time in the animation (default: its first frame)")->type_name("T")->needs(pose);
   command.add_flag("--no-distance", arguments->is_distance_dropped, "do not restore the distances to the bones in the pose")->needs(pose);

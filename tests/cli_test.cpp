@@ -119,7 +119,7 @@ class Program : public ::testing::Test {
   static inline fs::path folder_;
 };
 
-const std::vector<std::string> kCommands{"encode", "reconstruct", "filter", "metro", "segment", "validate", "inspect", "devices"};
+const std::vector<std::string> kCommands{"encode", "reconstruct", "filter", "lod", "metro", "segment", "validate", "inspect", "devices"};
 
 }  // namespace
 
@@ -261,6 +261,31 @@ TEST_F(Program, RefusesOptionsThatAreAnotherFiltersAndBonesThatAreNone) {
   expect_refused(1, {"filter", "y.skx.exr", "smooth", "-o", "no.ply", "--bones", "nose"}, {"nose"});
   expect_refused(1, {"filter", "y.skx.exr", "curvature", "-o", "no.skx.exr"}, {".ply"});
   expect_refused(1, {"filter", "y.skx.exr", "noise", "-o", "no.stl"}, {".stl", ".ply"});
+}
+
+TEST_F(Program, WritesSmallerModelsAndChainsOfLevels) {
+  ASSERT_EQ(run({"lod", "y.skx.exr", "--size", "32", "-o", "y32.skx.exr"}).code, 0);
+  EXPECT_EQ(json_of({"inspect", "y32.skx.exr"})["texture"]["width"], 32);
+  const nlohmann::json json = json_of({"lod", "y.skx.exr", "--levels", "--smallest", "16", "-o", "levels.skx.exr"});
+  EXPECT_EQ(json["levels"], nlohmann::json::parse("[[64,64],[32,32],[16,16]]"));
+  EXPECT_EQ(json_of({"inspect", "levels.skx.exr"}), json_of({"inspect", "y.skx.exr"})) << "level 0 is the model";
+  EXPECT_NE(run({"inspect", "levels.skx.exr"}).out.find("level 2: 16 x 16"), std::string::npos);
+  ASSERT_EQ(run({"reconstruct", "levels.skx.exr", "-o", "a.ply"}).code, 0);
+  ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "b.ply"}).code, 0);
+  EXPECT_EQ(text_of(folder_ / "a.ply"), text_of(folder_ / "b.ply"));
+  ASSERT_EQ(run({"reconstruct", "levels.skx.exr", "--level", "1", "-o", "a.ply"}).code, 0);
+  ASSERT_EQ(run({"reconstruct", "y32.skx.exr", "-o", "b.ply"}).code, 0);
+  EXPECT_EQ(text_of(folder_ / "a.ply"), text_of(folder_ / "b.ply"));
+  const std::string bytes = text_of(folder_ / "levels.skx.exr");
+  ASSERT_EQ(run({"lod", "y.skx.exr", "--levels", "--smallest", "16", "-o", "levels.skx.exr"}).code, 0);
+  EXPECT_EQ(text_of(folder_ / "levels.skx.exr"), bytes);
+
+  std::ofstream(folder_ / "cut.skx.exr", std::ios::binary) << bytes.substr(0, bytes.size() - 100);
+  expect_refused(1, {"reconstruct", "cut.skx.exr", "-o", "no.ply"}, {"cut.skx.exr", "ends early"});
+  expect_refused(1, {"reconstruct", "levels.skx.exr", "--level", "3", "-o", "no.ply"}, {"no level 3", "levels 0 to 2"});
+  expect_refused(1, {"reconstruct", "y.skx.exr", "--level", "1", "-o", "no.ply"}, {"no level 1", "level 0 alone"});
+  expect_refused(1, {"lod", "y.skx.exr", "--levels", "-o", "no.ply"}, {".skx.exr"});
+  expect_refused(2, {"lod", "y.skx.exr", "-o", "no.ply"}, {"--size", "--levels"});
 }
 
 TEST_F(Program, MeasuresAndReportsWhatTheContractNames) {

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
+#include <string_view>
 
 #include "skeletex/model/error.h"
 
@@ -15,6 +16,8 @@ namespace skeletex {
 namespace {
 
 constexpr int kMaxChannels = 16;
+constexpr std::size_t kMaxParts = 32;
+constexpr std::string_view kScanlines = "scanlineimage";
 constexpr std::uintmax_t kMaxAttributeBytes = std::uintmax_t{1} << 30;
 
 class Reader {
@@ -80,15 +83,8 @@ int rows_per_chunk(unsigned char compression) {
   }
 }
 
-}  // namespace
-
-ExrSurvey survey_exr(const std::filesystem::path& path, int max_size, bool is_header_only) {
-  Reader in(path);
-  constexpr std::string_view kMagic("\x76\x2f\x31\x01", 4);
-  if (in.size() < 8 || in.bytes(4) != kMagic) in.fail("not an OpenEXR file, which a model is (.skx.exr)");
-  const auto version = in.number<std::uint32_t>();
-  if ((version & 0xff) != 2 || (version & ~0x4ffu) != 0) in.fail("a tiled, deep or multi-part OpenEXR file; a model is a single scanline image");
-
+/// The attributes of one header, up to the empty name that ends it.
+ExrSurvey read_header(Reader& in) {
   ExrSurvey survey;
   for (std::string name; !(name = in.name()).empty();) {
     ExrSurvey::Attribute attribute{in.name(), {}};
@@ -97,6 +93,11 @@ ExrSurvey survey_exr(const std::filesystem::path& path, int max_size, bool is_he
     attribute.value = in.bytes(static_cast<std::uint64_t>(size));
     survey.attributes[name] = std::move(attribute);
   }
+  return survey;
+}
+
+/// Checks the attributes and takes the size from them. \return rows per chunk
+int check_header(const Reader& in, int max_size, bool is_one_of_several, ExrSurvey& survey) {
   const auto required = [&](const char* name, const char* type, std::size_t size) -> const std::string& {
     const auto found = survey.attributes.find(name);
     if (found == survey.attributes.end() || found->second.type != type || found->second.value.size() != size) in.fail(fmt::format("the header is damaged (no \"{}\")", name));
@@ -125,25 +126,59 @@ ExrSurvey survey_exr(const std::filesystem::path& path, int max_size, bool is_he
   survey.height = static_cast<int>(height);
   const int rows = rows_per_chunk(static_cast<unsigned char>(required("compression", "compression", 1)[0]));
   if (rows == 0) in.fail("the image is compressed with a lossy method; save it with ZIP or PIZ");
-  if (is_header_only) return survey;
-
-  const std::int64_t chunks = (height + rows - 1) / rows;
-  const std::string table = in.bytes(static_cast<std::uint64_t>(chunks) * 8);
-  const std::uint64_t begin = in.position();
-  for (std::int64_t i = 0; i < chunks; ++i) {
-    std::uint64_t offset;
-    std::memcpy(&offset, table.data() + 8 * i, 8);
-    const auto missing = [&] { in.fail(fmt::format("the file ends early: texel rows from {} on are missing; it was not copied or written completely", i * rows)); };
-    if (offset == 0 || offset > in.size()) missing();
-    if (offset < begin) in.fail(fmt::format("damaged (the texel rows from {} on lie inside the header)", i * rows));
-    if (in.size() - offset < 8) missing();
-    in.seek(offset);
-    const auto y = in.number<std::int32_t>();
-    const auto bytes = in.number<std::int32_t>();
-    if (y != i * rows || bytes < 0) in.fail(fmt::format("damaged (at texel row {})", i * rows));
-    if (static_cast<std::uint64_t>(bytes) > in.size() - in.position()) missing();
+  if (is_one_of_several) {
+    if (required("type", "string", kScanlines.size()) != kScanlines) in.fail("a part of the file is tiled or deep; the levels of a model are scanline images");
+    std::int32_t chunks;
+    std::memcpy(&chunks, required("chunkCount", "int", sizeof chunks).data(), sizeof chunks);
+    if (chunks != (height + rows - 1) / rows) in.fail(fmt::format("the header is damaged ({} chunks for {} rows)", chunks, height));
   }
-  return survey;
+  return rows;
+}
+
+}  // namespace
+
+std::vector<ExrSurvey> survey_exr(const std::filesystem::path& path, int max_size, bool is_header_only) {
+  constexpr std::uint32_t kLongNames = 0x400, kSeveralParts = 0x1000;
+  Reader in(path);
+  constexpr std::string_view kMagic("\x76\x2f\x31\x01", 4);
+  if (in.size() < 8 || in.bytes(4) != kMagic) in.fail("not an OpenEXR file, which a model is (.skx.exr)");
+  const auto version = in.number<std::uint32_t>();
+  if ((version & 0xff) != 2 || (version & ~(0xffu | kLongNames | kSeveralParts)) != 0) in.fail("a tiled or deep OpenEXR file; a model is a scanline image");
+  const bool has_several = (version & kSeveralParts) != 0;
+
+  std::vector<ExrSurvey> parts;
+  std::vector<int> rows;
+  do {
+    ExrSurvey part = read_header(in);
+    if (has_several && part.attributes.empty()) break;
+    if (parts.size() == kMaxParts) in.fail(fmt::format("more than {} parts; a model has a few levels", kMaxParts));
+    rows.push_back(check_header(in, max_size, has_several, part));
+    parts.push_back(std::move(part));
+  } while (has_several);
+  if (parts.empty()) in.fail("the header is damaged (no parts)");
+  if (is_header_only) return parts;
+
+  std::vector<std::string> tables;
+  for (std::size_t part = 0; part < parts.size(); ++part)
+    tables.push_back(in.bytes(static_cast<std::uint64_t>((parts[part].height + rows[part] - 1) / rows[part]) * 8));
+  const std::uint64_t begin = in.position();
+  for (std::size_t part = 0; part < parts.size(); ++part)
+    for (std::size_t i = 0; i < tables[part].size() / 8; ++i) {
+      const std::size_t row = i * static_cast<std::size_t>(rows[part]);
+      std::uint64_t offset;
+      std::memcpy(&offset, tables[part].data() + 8 * i, 8);
+      const auto missing = [&] { in.fail(fmt::format("the file ends early: texel rows from {} on are missing; it was not copied or written completely", row)); };
+      if (offset == 0 || offset > in.size()) missing();
+      if (offset < begin) in.fail(fmt::format("damaged (the texel rows from {} on lie inside the header)", row));
+      if (in.size() - offset < (has_several ? 12 : 8)) missing();
+      in.seek(offset);
+      if (has_several && in.number<std::int32_t>() != static_cast<std::int32_t>(part)) in.fail(fmt::format("damaged (at texel row {} of part {})", row, part));
+      const auto y = in.number<std::int32_t>();
+      const auto bytes = in.number<std::int32_t>();
+      if (y != static_cast<std::int64_t>(row) || bytes < 0) in.fail(fmt::format("damaged (at texel row {})", row));
+      if (static_cast<std::uint64_t>(bytes) > in.size() - in.position()) missing();
+    }
+  return parts;
 }
 
 }  // namespace skeletex

@@ -5,8 +5,12 @@
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfIO.h>
-#include <OpenEXR/ImfInputFile.h>
+#include <OpenEXR/ImfInputPart.h>
+#include <OpenEXR/ImfMultiPartInputFile.h>
+#include <OpenEXR/ImfMultiPartOutputFile.h>
 #include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfOutputPart.h>
+#include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/ImfThreading.h>
 #include <fmt/format.h>
@@ -86,10 +90,13 @@ void with_openexr(const std::string& where, const char* what, const Run& run) {
   }
 }
 
-}  // namespace
-
-void write_model(const std::filesystem::path& path, const SkeletexModel& model, const ModelFileOptions& options) {
-  const std::string where = path.string();
+/// A model checked and turned into what OpenEXR writes; the model must outlive it.
+struct ExrPart {
+  Imf::Header header;
+  Imf::FrameBuffer frame;
+  std::vector<half> halves[3];
+};
+ExrPart make_part(const SkeletexModel& model, const ModelFileOptions& options, const std::string& where) {
   check_model(model, where);
   check_texels(model.texture, where);
   const int width = model.texture.width, height = model.texture.height;
@@ -100,49 +107,94 @@ void write_model(const std::filesystem::path& path, const SkeletexModel& model, 
     throw IoError(fmt::format("{}: a name in the skeleton is not UTF-8 text: {}", where, error.what()));
   }
   const bool is_half = options.format == TexelFormat::kHalf;
-  std::vector<half> halves[3];
-  if (is_half)
-    for (int i = 0; i < 3; ++i) {
-      const std::vector<float>& texels = plane(model.texture, i);
+  ExrPart part{Imf::Header(width, height), {}, {}};
+  part.header.compression() = options.compression == ExrCompression::kZip ? Imf::ZIP_COMPRESSION : Imf::PIZ_COMPRESSION;
+  part.header.insert(kAttribute, Imf::StringAttribute(json));
+  for (int i = 0; i < 3; ++i) {
+    const std::vector<float>& texels = plane(model.texture, i);
+    if (is_half) {
       const auto largest = std::max_element(texels.begin(), texels.end(), [](float a, float b) { return std::abs(a) < std::abs(b); });
       if (std::abs(*largest) > HALF_MAX)
         throw IoError(fmt::format("{}: channel {} has {}, beyond half precision's range of +-65504; store float, or scale the mesh", where, kChannels[i], *largest));
-      halves[i].assign(texels.begin(), texels.end());
+      part.halves[i].assign(texels.begin(), texels.end());
     }
+    const Imf::PixelType type = is_half ? Imf::HALF : Imf::FLOAT;
+    const std::size_t bytes = is_half ? sizeof(half) : sizeof(float);
+    const void* data = is_half ? static_cast<const void*>(part.halves[i].data()) : texels.data();
+    part.header.channels().insert(kChannels[i], Imf::Channel(type));
+    part.frame.insert(kChannels[i], Imf::Slice(type, static_cast<char*>(const_cast<void*>(data)), bytes, bytes * static_cast<std::size_t>(width)));
+  }
+  return part;
+}
 
+}  // namespace
+
+void write_model(const std::filesystem::path& path, const SkeletexModel& model, const ModelFileOptions& options) {
+  write_model_levels(path, std::span(&model, 1), options);
+}
+
+void write_model_levels(const std::filesystem::path& path, std::span<const SkeletexModel> levels, const ModelFileOptions& options) {
+  const std::string where = path.string();
+  if (levels.empty()) throw IoError(where + ": a model has at least one level");
+  std::vector<ExrPart> parts;
+  for (const SkeletexModel& level : levels) parts.push_back(make_part(level, options, where));
   use_threads();
   write_atomically(path, [&](const std::filesystem::path& temporary) {
     OutputFile file(temporary, path);
     with_openexr(where, "cannot write", [&] {
-      Imf::Header header(width, height);
-      header.compression() = options.compression == ExrCompression::kZip ? Imf::ZIP_COMPRESSION : Imf::PIZ_COMPRESSION;
-      header.insert(kAttribute, Imf::StringAttribute(json));
-      Imf::FrameBuffer frame;
-      for (int i = 0; i < 3; ++i) {
-        const Imf::PixelType type = is_half ? Imf::HALF : Imf::FLOAT;
-        const std::size_t bytes = is_half ? sizeof(half) : sizeof(float);
-        const void* texels = is_half ? static_cast<const void*>(halves[i].data()) : plane(model.texture, i).data();
-        header.channels().insert(kChannels[i], Imf::Channel(type));
-        frame.insert(kChannels[i], Imf::Slice(type, static_cast<char*>(const_cast<void*>(texels)), bytes, bytes * static_cast<std::size_t>(width)));
-      }
       ExrStream stream(file, where);
-      Imf::OutputFile exr(stream, header);
-      exr.setFrameBuffer(frame);
-      exr.writePixels(height);
+      if (parts.size() == 1) {
+        Imf::OutputFile exr(stream, parts[0].header);
+        exr.setFrameBuffer(parts[0].frame);
+        exr.writePixels(levels[0].texture.height);
+        return;
+      }
+      std::vector<Imf::Header> headers;
+      for (std::size_t level = 0; level < parts.size(); ++level) {
+        headers.push_back(parts[level].header);
+        headers.back().setName(fmt::format("level {}", level));
+        headers.back().setType(Imf::SCANLINEIMAGE);
+        // Viewers show all parts of a file within one window.
+        headers.back().displayWindow() = headers.front().displayWindow();
+      }
+      Imf::MultiPartOutputFile exr(stream, headers.data(), static_cast<int>(headers.size()));
+      for (std::size_t level = 0; level < parts.size(); ++level) {
+        Imf::OutputPart part(exr, static_cast<int>(level));
+        part.setFrameBuffer(parts[level].frame);
+        part.writePixels(levels[level].texture.height);
+      }
     });
     file.close();
   });
 }
 
-nlohmann::json read_model_header(const std::filesystem::path& path) {
-  return header_json(survey_exr(path, kMaxTextureSize, true), path.string());
+namespace {
+
+const ExrSurvey& part_of(const std::vector<ExrSurvey>& parts, int level, const std::string& where) {
+  if (level < 0 || level >= static_cast<int>(parts.size()))
+    throw IoError(fmt::format("{}: there is no level {}; the file has {}", where, level, parts.size() == 1 ? "level 0 alone" : fmt::format("levels 0 to {}", parts.size() - 1)));
+  return parts[level];
 }
 
-SkeletexModel read_model(const std::filesystem::path& path) {
+}  // namespace
+
+nlohmann::json read_model_header(const std::filesystem::path& path, int level) {
+  const std::vector<ExrSurvey> parts = survey_exr(path, kMaxTextureSize, true);
+  return header_json(part_of(parts, level, path.string()), path.string());
+}
+
+std::vector<std::array<int, 2>> read_model_levels(const std::filesystem::path& path) {
+  std::vector<std::array<int, 2>> sizes;
+  for (const ExrSurvey& part : survey_exr(path, kMaxTextureSize, true)) sizes.push_back({part.width, part.height});
+  return sizes;
+}
+
+SkeletexModel read_model(const std::filesystem::path& path, int level) {
   const std::string where = path.string();
   SkeletexModel model;
   {
-    const ExrSurvey survey = survey_exr(path, kMaxTextureSize, false);
+    const std::vector<ExrSurvey> parts = survey_exr(path, kMaxTextureSize, false);
+    const ExrSurvey& survey = part_of(parts, level, where);
     model = model_from_json(header_json(survey, where), where);
     if (model.texture.width != survey.width || model.texture.height != survey.height)
       throw IoError(fmt::format("{}: the image has {} x {} texels, but the model in its header {} x {}; it was resized by another program", where, survey.width,
@@ -151,7 +203,8 @@ SkeletexModel read_model(const std::filesystem::path& path) {
   const auto width = static_cast<std::size_t>(model.texture.width), height = static_cast<std::size_t>(model.texture.height);
   use_threads();
   with_openexr(where, "cannot read, the file is damaged", [&] {
-    Imf::InputFile exr(path.c_str());
+    Imf::MultiPartInputFile file(path.c_str());
+    Imf::InputPart exr(file, level);
     Imf::FrameBuffer frame;
     for (int i = 0; i < 3; ++i) {
       const Imf::Channel* channel = exr.header().channels().findChannel(kChannels[i]);

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <array>
 #include <filesystem>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -22,11 +25,20 @@ struct ModelFileOptions {
 /// \throw IoError
 void write_model(const std::filesystem::path& path, const SkeletexModel& model, const ModelFileOptions& options = {});
 
-/// \throw IoError: not an EXR, truncated, no skeletex attribute, a newer version, or contents that do not fit together
+/// Writes a chain of levels of detail, the finest first, as one OpenEXR file with a part for each (docs/file-formats.md).
+/// One level is written as write_model does.
+/// \throw IoError
+void write_model_levels(const std::filesystem::path& path, std::span<const SkeletexModel> levels, const ModelFileOptions& options = {});
+
+/// \param level  part of the file: 0, the finest, is what files of one part have
+/// \throw IoError: there is no such level; not an EXR, truncated, no skeletex attribute, a newer version, or contents that do not fit together
 /// (every index, size and number is checked before use)
-SkeletexModel read_model(const std::filesystem::path& path);
+SkeletexModel read_model(const std::filesystem::path& path, int level = 0);
 
 /// The header's JSON alone, without reading texels, for `skeletex inspect`.
-nlohmann::json read_model_header(const std::filesystem::path& path);
+nlohmann::json read_model_header(const std::filesystem::path& path, int level = 0);
+
+/// Width and height of every level in a file, without reading texels. \throw IoError
+std::vector<std::array<int, 2>> read_model_levels(const std::filesystem::path& path);
 
 }  // namespace skeletex
