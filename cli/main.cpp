@@ -55,6 +55,7 @@ int run(int argc, char** argv) {
   add_morph_command(program);
   add_filter_command(program);
   add_lod_command(program);
+  add_transfer_command(program);
   add_metro_command(program);
   add_segment_command(program);
   add_validate_command(program);
