@@ -65,4 +65,11 @@ def fig15_results(results, folder):
     return [style.sheet(results, "results", [[f"{row['model']}-{kind}.png" for kind in kinds] for row in rows], titles, names, folder, "fig15_results", cell=2.8)]
 
 
-ALL = [fig04_11_segments, fig05_06_methods, fig10_distance, fig12_cyclic, fig13_detail, fig15_results]
+def fig16_morph(results, folder):
+    rows = style.rows(results, "morph")
+    if not rows:
+        return []
+    pairs = style.unique(row["parameters"]["pair"] for row in rows)
+    times = sorted(style.unique(row["parameters"]["t"] for row in rows))
+    titles = [f"t = {t:g}" for t in times]
+    return [style.sheet(results, "morph", [[f"{pair}-{t}.png" for t in times] for pair in pairs], titles, pairs, folder, "fig16_morph", cell=2.6)]
