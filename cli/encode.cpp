@@ -68,7 +68,6 @@ EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command
     options.vsm = {.iterations = 1, .alpha = 0};
     options.row_spacing = RowSpacing::kUniform;
     options.has_prefilter = false;
-    options.has_snap = false;
   }
   const auto is_given = [&](const char* name) { return command.count(name) > 0; };
   if (is_given("--iterations")) options.vsm.iterations = arguments.iterations;
@@ -76,7 +75,7 @@ EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command
   options.vsm.stop_spread_change = arguments.stop_spread;
   if (is_given("--rows")) options.row_spacing = arguments.rows == "uniform" ? RowSpacing::kUniform : RowSpacing::kSurfaceLength;
   if (arguments.has_no_prefilter) options.has_prefilter = false;
-  if (is_given("--snap")) options.has_snap = arguments.is_snapped;
+  options.has_snap = arguments.is_snapped;
   options.spd_hit = arguments.spd_hit == "first" ? SpdHit::kFirst : SpdHit::kLast;
   if (is_given("--share")) options.texel_share = arguments.share == "area" ? TexelShare::kArea : TexelShare::kTriangles;
   return options;
@@ -238,12 +237,12 @@ void add_encode_command(CLI::App& program) {
   command.add_flag("--no-prefilter", a.has_no_prefilter, "texels exactly on the mesh, so that flat triangles lie inside its curved parts")
       ->group("Texels");
   command
-      .add_flag("--snap,!--no-snap", a.is_snapped,
-                "texels sit on the mesh's own vertices and edges where they can, or at an even lattice; unless given: from 1 texel per vertex on")
+      .add_flag("--snap", a.is_snapped,
+                "texels sit on the mesh's own vertices and edges where they can; for more than 1 texel per vertex (default: an even lattice)")
       ->group("Texels");
   command
       .add_flag("--paper-recipe", a.is_paper_recipe,
-                "as the paper: --rows uniform --alpha 0 --iterations 1 --no-prefilter --no-snap (rows, alpha and iterations can still be given)")
+                "as the paper: --rows uniform --alpha 0 --iterations 1 --no-prefilter (rows, alpha and iterations can still be given)")
       ->group("Texels");
   command.add_flag("--half", a.is_half, "16 bits a channel: half the file, but an error of some 2e-5 of the diagonal; for drafts")->group("File");
   take_one_of(add("File", "--compression", a.compression, "lossless compression of the file"), {"zip", "piz"});

@@ -77,32 +77,10 @@ __kernel void displace(const int row_count, const int texture_width, const int c
   }
 }
 
-// Unit normals of triangles, as three numbers.
-typedef struct Normal {
-  float x, y, z;
-} Normal;
-
-Normal normal_of(__global const float* restrict x, __global const float* restrict y, __global const float* restrict z, int a, int b, int c) {
-  const float ux = x[b] - x[a], uy = y[b] - y[a], uz = z[b] - z[a];
-  const float vx = x[c] - x[a], vy = y[c] - y[a], vz = z[c] - z[a];
-  const float nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
-  const float inverse = 1.0f / sqrt(fmax(nx * nx + ny * ny + nz * nz, 1e-37f));
-  const Normal n = {nx * inverse, ny * inverse, nz * inverse};
-  return n;
-}
-
-// The turn from one normal to another as the length of their difference: 2 sin(angle / 2), precise for small angles.
-float turn_between(Normal a, Normal b) {
-  const float dx = a.x - b.x, dy = a.y - b.y, dz = a.z - b.z;
-  return sqrt(dx * dx + dy * dy + dz * dz);
-}
-
-float least_turn(Normal own, Normal first, Normal second) { return fmin(turn_between(own, first), turn_between(own, second)); }
-
-// Both triangles of every quad between a row and the next. Of its diagonals the one is taken whose triangles go on more
-// smoothly into the quads around: the smaller sum over the four sides of the turn between the quad's triangle there and
-// the better of the two that the neighbour can have. A diagonal whose two triangles face apart comes last. So an edge of
-// the surface that runs through texels is an edge of the mesh as well. Sides next to a seam or a pole do not count.
+// Both triangles of every quad between a row and the next. Of its diagonals the one with the smaller d l^2 is taken: l is
+// its length and d the distance, along the quad's normal, of its midpoint from where a cubic through the 4 x 4 vertices
+// around has the surface. (Against the shorter diagonal: mean error -6 %, maximum up to -20 %.) Where rounding
+// blurs d the shorter one is taken, and of two as good the one from (row, column) to (row + 1, column + 1).
 // in   x, y, z: the vertices of inner rows; the next row follows its row in them
 // out  triangles: six indices per quad, counter-clockwise from outside (u along, v around is clockwise)
 __kernel void triangulate_quads(const int row_count, __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
@@ -112,47 +90,36 @@ __kernel void triangulate_quads(const int row_count, __global const int* restric
   if (k >= row_count) return;
   const int width = patches[lattice_rows[4 * k]].width;
   const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2], quad = lattice_rows[4 * k + 3];
-  // Rows before, below, above, after the quad.
+  // Rows before, below, above, after the quad. Beyond the first and last inner row the lattice goes on straight.
   const int has_before = row > 1, has_after = row + 2 < patches[lattice_rows[4 * k]].height - 1;
   const int before = has_before ? vertex - width : vertex, after = has_after ? vertex + 2 * width : vertex + width;
-  const float w_before = has_before ? 1.0f : 0.0f, w_after = has_after ? 1.0f : 0.0f;
+  const float w_before = has_before ? -0.0625f : 0.0f, w_after = has_after ? -0.0625f : 0.0f;
+  const float w_below = 0.5625f - (has_before ? 0.0f : 0.125f) + (has_after ? 0.0f : 0.0625f);
+  const float w_above = 0.5625f - (has_after ? 0.0f : 0.125f) + (has_before ? 0.0f : 0.0625f);
 
   const int step = get_local_size(0);
   for (int j = get_local_id(0); j < width; j += step) {
     const int left = j > 0 ? j - 1 : width - 1, next = j + 1 < width ? j + 1 : 0, right = next + 1 < width ? next + 1 : 0;
     const int v00 = vertex + j, v01 = vertex + next, v10 = v00 + width, v11 = v01 + width;
-    const Normal a = normal_of(x, y, z, v00, v01, v11), b = normal_of(x, y, z, v00, v11, v10);
-    const Normal c = normal_of(x, y, z, v00, v01, v10), d = normal_of(x, y, z, v01, v11, v10);
     const float fx = x[v11] - x[v00], fy = y[v11] - y[v00], fz = z[v11] - z[v00];
+    const float gx = x[v10] - x[v01], gy = y[v10] - y[v01], gz = z[v10] - z[v01];
     const float first2 = fx * fx + fy * fy + fz * fz;
-    float first = 0.0f, second = 0.0f;
-    {
-      const Normal m = normal_of(x, y, z, before + j, v01, v00), n = normal_of(x, y, z, before + next, v01, v00);
-      first += w_before * least_turn(a, m, n);
-      second += w_before * least_turn(c, m, n);
+    const float second2 = gx * gx + gy * gy + gz * gz;
+    const float nx = fy * gz - fz * gy, ny = fz * gx - fx * gz, nz = fx * gy - fy * gx;
+    const float n_inverse = 1.0f / sqrt(fmax(nx * nx + ny * ny + nz * nz, 1e-37f));
+    const int columns[4] = {left, j, next, right};
+    float cx = 0.0f, cy = 0.0f, cz = 0.0f;
+    for (int i = 0; i < 4; ++i) {
+      const float w = i == 0 || i == 3 ? -0.0625f : 0.5625f;
+      const int b = before + columns[i], v = vertex + columns[i], a = after + columns[i];
+      cx += w * (w_before * x[b] + w_below * x[v] + w_above * x[v + width] + w_after * x[a]);
+      cy += w * (w_before * y[b] + w_below * y[v] + w_above * y[v + width] + w_after * y[a]);
+      cz += w * (w_before * z[b] + w_below * z[v] + w_above * z[v + width] + w_after * z[a]);
     }
-    {
-      const Normal m = normal_of(x, y, z, v10, v11, after + next), n = normal_of(x, y, z, v10, v11, after + j);
-      first += w_after * least_turn(b, m, n);
-      second += w_after * least_turn(d, m, n);
-    }
-    {
-      const int r0 = vertex + right, r1 = r0 + width;
-      const Normal m = normal_of(x, y, z, v01, r1, v11), n = normal_of(x, y, z, v01, r0, v11);
-      first += least_turn(a, m, n);
-      second += least_turn(d, m, n);
-    }
-    {
-      const int l0 = vertex + left, l1 = l0 + width;
-      const Normal m = normal_of(x, y, z, l0, v00, v10), n = normal_of(x, y, z, v00, v10, l1);
-      first += least_turn(b, m, n);
-      second += least_turn(c, m, n);
-    }
-    first += a.x * b.x + a.y * b.y + a.z * b.z < 0.0f ? 9.0f : 0.0f;
-    second += c.x * d.x + c.y * d.y + c.z * d.z < 0.0f ? 9.0f : 0.0f;
-    // Rounding of the points turns normals by about this much; where it could decide, the first diagonal is taken.
-    const float blur = 1e-6f * (fabs(x[v00]) + fabs(y[v00]) + fabs(z[v00])) * rsqrt(fmax(first2, 1e-37f));
-    const int is_second = second < first - blur;
+    const float first = fabs((0.5f * (x[v00] + x[v11]) - cx) * nx + (0.5f * (y[v00] + y[v11]) - cy) * ny + (0.5f * (z[v00] + z[v11]) - cz) * nz);
+    const float second = fabs((0.5f * (x[v01] + x[v10]) - cx) * nx + (0.5f * (y[v01] + y[v10]) - cy) * ny + (0.5f * (z[v01] + z[v10]) - cz) * nz);
+    const float blur = 3e-7f * (fabs(cx) + fabs(cy) + fabs(cz)) + 1e-4f * sqrt(first2);
+    const int is_second = (second * n_inverse + blur) * second2 < (first * n_inverse + 0.9f * blur) * first2;
 
     __global int* restrict t = triangles + 6 * (quad + j);
     t[0] = v00;

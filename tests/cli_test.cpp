@@ -370,7 +370,7 @@ TEST_F(Program, GivesTheSameBytesTwice) {
 TEST_F(Program, TakesThePapersRecipeAndItsPartsAlike) {
   ASSERT_EQ(run({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64", "--paper-recipe"}).code, 0);
   ASSERT_EQ(run({"encode", "y.ply", "y.skeleton.json", "-o", "b.skx.exr", "--size", "64", "--rows", "uniform", "--alpha", "0", "--iterations", "1",
-                 "--no-prefilter", "--no-snap"})
+                 "--no-prefilter"})
                 .code,
             0);
   EXPECT_TRUE(text_of(folder_ / "a.skx.exr") == text_of(folder_ / "b.skx.exr"));
@@ -384,7 +384,7 @@ TEST_F(Program, SnapsTexelsAndSaysHowMany) {
   EXPECT_GT(snapped["snap"]["snapped_vertices"], 0);
   EXPECT_LE(snapped["snap"]["snapped_vertices"], snapped["snap"]["vertices"]);
   EXPECT_TRUE(json_of({"inspect", "a.skx.exr"})["encoder"]["snap"]);
-  EXPECT_FALSE(json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64", "--no-snap"}).contains("snap"));
+  EXPECT_FALSE(json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64"}).contains("snap"));
   EXPECT_EQ(json_of({"inspect", "y.ply", "--self-intersections"})["self_intersections"], 0);
   expect_refused(1, {"inspect", "y.skx.exr", "--self-intersections"}, {"for meshes"});
   fs::remove(folder_ / "a.skx.exr");

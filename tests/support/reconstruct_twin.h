@@ -34,29 +34,22 @@ inline DisplacedPoint displace(const PatchRecord& patch, const RowRecord& row, c
 /// taken. `vertex(row, column)` gives the points of inner rows; `is_clear` says whether single precision can tell.
 template <class Vertices>
 bool takes_second_diagonal(const Vertices& vertex, int row, int column, int height, bool& is_clear) {
-  // A quad's two triangles by its diagonal: each holds two of the sides 0 (below), 1 (right), 2 (above), 3 (left).
-  const auto normal_at = [&](int r, int j, int diagonal, int side) {
-    const Vec3 q[4] = {vertex(r, j), vertex(r, j + 1), vertex(r + 1, j + 1), vertex(r + 1, j)};
-    const int begin = side, end = (side + 1) % 4;
-    // The apex: of the other two corners the one on the diagonal.
-    const int apex = (end + 1) % 4 % 2 == diagonal ? (end + 1) % 4 : (end + 2) % 4;
-    return Vec3((q[end] - q[begin]).cross(q[apex] - q[begin]).normalized());
+  const auto point = [&](int r, int j) -> Vec3 {
+    if (r < 1) return 2 * vertex(1, j) - vertex(2, j);
+    if (r > height - 2) return 2 * vertex(height - 2, j) - vertex(height - 3, j);
+    return vertex(r, j);
   };
-  const int neighbours[4][2] = {{row - 1, column}, {row, column + 1}, {row + 1, column}, {row, column - 1}};
-  double costs[2];
-  for (const int diagonal : {0, 1}) {
-    costs[diagonal] = normal_at(row, column, diagonal, 0).dot(normal_at(row, column, diagonal, 2)) < 0 ? 9 : 0;
-    for (int side = 0; side < 4; ++side) {
-      const auto [r, j] = neighbours[side];
-      if (r < 1 || r > height - 3) continue;
-      const Vec3 own = normal_at(row, column, diagonal, side);
-      const Vec3 first = normal_at(r, j, 0, (side + 2) % 4), second = normal_at(r, j, 1, (side + 2) % 4);
-      costs[diagonal] += std::min((own - first).norm(), (own - second).norm());
-    }
-  }
-  const double blur = 1e-6 * vertex(row, column).template lpNorm<1>() / (vertex(row + 1, column + 1) - vertex(row, column)).norm();
-  is_clear = std::abs(costs[1] - costs[0]) > 10 * blur + 1e-5;
-  return costs[1] < costs[0] - blur;
+  Vec3 centre = Vec3::Zero();
+  const double weights[4] = {-1.0 / 16, 9.0 / 16, 9.0 / 16, -1.0 / 16};
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < 4; ++k) centre += weights[i] * weights[k] * point(row - 1 + i, column - 1 + k);
+  const Vec3 a = point(row, column), b = point(row, column + 1), c = point(row + 1, column), d = point(row + 1, column + 1);
+  const Vec3 normal = (d - a).cross(c - b).normalized();
+  const double blur = 3e-7 * centre.lpNorm<1>() + 1e-4 * (d - a).norm();
+  const double first = (std::abs((0.5 * (a + d) - centre).dot(normal)) + 0.9 * blur) * (d - a).squaredNorm();
+  const double second = (std::abs((0.5 * (b + c) - centre).dot(normal)) + blur) * (c - b).squaredNorm();
+  is_clear = std::abs(second - first) > 2 * blur * std::max((d - a).squaredNorm(), (c - b).squaredNorm());
+  return second < first;
 }
 
 /// Kernels filter_rows and filter_columns, one new sample of one plane: `stride` between old samples.

@@ -87,11 +87,6 @@ std::vector<RowProfile> spd_profiles(ClContext& context, const Skeleton& skeleto
   return profiles;
 }
 
-bool has_snap(const EncodeOptions& options, const TriangleMesh& mesh) {
-  constexpr double kLeastTexelsPerVertex = 1;
-  return options.has_snap.value_or(static_cast<double>(options.width) * options.height >= kLeastTexelsPerVertex * static_cast<double>(mesh.positions.size()));
-}
-
 nlohmann::json settings_json(const EncodeOptions& options, const TexelOptions& texel_options, const std::vector<double>& unseen) {
   const char* method = options.method == EncodeMethod::kSpd ? "spd" : options.method == EncodeMethod::kVsm ? "vsm" : "hybrid";
   nlohmann::json json{{"method", method},
@@ -190,7 +185,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
                                                                     : spread_rows_uniformly(patch.rectangle.height);
     model.patches.push_back(std::move(patch));
   }
-  const TexelOptions texel_options{.has_prefilter = options.has_prefilter, .has_snap = has_snap(options, mesh)};
+  const TexelOptions texel_options{.has_prefilter = options.has_prefilter, .has_snap = options.has_snap};
   Seams seams = sample_seams(segmentation, skeleton, walls, layout.rectangles, texel_options.has_snap ? SeamSampling::kSnapped : SeamSampling::kEven);
   model.arcs = std::move(seams.arcs);
   model.corners = std::move(seams.corners);

@@ -30,8 +30,8 @@ struct EncodeOptions {
   SpdHit spd_hit = SpdHit::kLast;
   RowSpacing row_spacing = RowSpacing::kSurfaceLength;
   bool has_prefilter = true;
-  /// Texels sit on the mesh's own vertices and edges where they can; default: from 1 texel per vertex on.
-  std::optional<bool> has_snap;
+  /// Texels sit on the mesh's own vertices and edges where they can (docs/snap.md). Pays from 1 texel per vertex on.
+  bool has_snap = false;
   std::optional<TexelShare> texel_share;  ///< default: area for all-SPD models, triangles otherwise
   /// Called with a stage's name and the share of work done; returning false cancels by throwing Error.
   std::function<bool(const std::string& stage, double done)> progress;
