@@ -32,9 +32,9 @@ struct VertexColour {
 struct PlyAttributes {
   std::span<const VertexColour> vertex_colours;
   std::span<const VertexColour> face_colours;
-  std::span<const Vec3> vertex_normals;  ///< nx, ny, nz
   std::string vertex_property_name;  ///< with vertex_property: a float per vertex, e.g. "distance"
   std::span<const float> vertex_property;
+  std::span<const Vec3> vertex_normals;  ///< nx, ny, nz
 };
 
 /// Writes binary PLY (little endian, float positions) or OBJ by the ending, under a temporary name that is renamed when
