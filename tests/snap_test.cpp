@@ -267,5 +267,4 @@ TEST(Snap, IsOffUnlessAskedFor) {
   EXPECT_FALSE(encode_model(device(), model.mesh, model.skeleton, options).report.snap.has_value());
 }
 
-}  // namespace
 }  // namespace skeletex
