@@ -73,3 +73,12 @@ def fig16_morph(results, folder):
     times = sorted(style.unique(row["parameters"]["t"] for row in rows))
     titles = [f"t = {t:g}" for t in times]
     return [style.sheet(results, "morph", [[f"{pair}-{t}.png" for t in times] for pair in pairs], titles, pairs, folder, "fig16_morph", cell=2.6)]
+
+
+def fig17_transfer(results, folder):
+    rows = style.rows(results, "transfer")
+    if not rows:
+        return []
+    cases = style.unique(row["parameters"]["case"] for row in rows)
+    blends = style.unique(row["parameters"]["blend"] for row in rows)
+    return [style.sheet(results, "transfer", [[f"{case}-{blend}.png" for blend in blends] for case in cases], blends, cases, folder, "fig17_19_transfer", cell=3.2)]

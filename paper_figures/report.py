@@ -30,6 +30,8 @@ SECTIONS = [
     ("Figure 15: input, layout, texture, reconstruction, error", "results", pictures.fig15_results, "Error: distance of the original's vertices, as in the paper; each row has its own scale."),
     ("Figure 16: morph sequences", "morph", pictures.fig16_morph,
      "Texels and skeletons interpolated, bones matched by the skeletons' graphs alone. Every in-between model is closed; the distortion of the map is in the numbers."),
+    ("Figures 17 to 19: transfer", "transfer", pictures.fig17_transfer,
+     "Texels of chosen bones replaced by those of another model, scaled to the target's bones; the target's seams stay. Without blending the seam shows."),
     ("Beyond the paper: iterations of VSM", "iterations", sweeps.draw_iterations,
      "Weights w A (the paper's) get worse with iterations: they even out areas in the texture, not on the surface. Divided by the root of the surface area they get better and stay."),
     ("Beyond the paper: what the recipe's parts bring", "recipe", sweeps.draw_recipe, "The paper's own recipe, the default, and the default with one part taken back."),
