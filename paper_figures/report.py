@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 # SPDX-License-Identifier: MIT
 """Draws every figure whose experiment has been run, and one self-contained page with all of them, the tables and the numbers.
 

@@ -28,6 +28,6 @@ if [ "${1:-}" = --main ]; then
 fi
 status=0
 "$program" run configs/paper.json --resume "${options[@]}" || status=$?
-page=$(python3 paper_figures/report.py)
+page=$(/usr/bin/python3 paper_figures/report.py)  # the interpreter that python3-matplotlib belongs to
 echo "Everything on one page: $page"
 exit "$status"
