@@ -22,7 +22,7 @@ SECTIONS = [
     ("Figures 5 and 6: SPD, VSM, hybrid", "methods", pictures.fig05_06_methods,
      "SPD loses what the rays from the bone do not see (inside of the ears); VSM keeps all of the surface; hybrid takes SPD where it sees enough."),
     ("Figure 10: distance restoration", "distance", pictures.fig10_distance,
-     "Bent without and with the distances to the bones restored: without, the outer side of a bend thins and the inner one swells."),
+     "The same pose, without and with the distances to the bones restored (paper 3.6.1): look at the arms and at the head beside the turned ear."),
     ("Figure 12: skeletons with cycles", "cyclic", pictures.fig12_cyclic, "Genus and closedness are measured on the reconstruction."),
     ("Figure 13: levels of detail", "detail", pictures.fig13_detail, "All from one model of 1024 x 1024 texels; every level is closed."),
     ("Figure 14: error against texture size", "fidelity", fig14_fidelity.draw,
@@ -33,7 +33,7 @@ SECTIONS = [
     ("Figures 17 to 19: transfer", "transfer", pictures.fig17_transfer,
      "Texels of chosen bones replaced by those of another model, scaled to the target's bones; the target's seams stay. Without blending the seam shows."),
     ("Beyond the paper: iterations of VSM", "iterations", sweeps.draw_iterations,
-     "Weights w A (the paper's) get worse with iterations: they even out areas in the texture, not on the surface. Divided by the root of the surface area they get better and stay."),
+     "The paper's weights w A even out areas in the texture; divided by a power of the surface area they even out the texels on the surface."),
     ("Beyond the paper: what the recipe's parts bring", "recipe", sweeps.draw_recipe, "The paper's own recipe, the default, and the default with one part taken back."),
 ]
 

@@ -19,7 +19,7 @@ def draw_iterations(results, folder):
                             color=colour, markersize=4, label=f"w A / A3^{alpha}" if alpha else "w A (paper)")
         axes[0][j].set_title(model)
         axes[0][j].set_xlabel("iterations")
-        axes[0][j].set_ylim(bottom=0)
+        axes[0][j].set_ylim(0, 1.15 * axes[0][j].get_ylim()[1])
     axes[0][0].set_ylabel("symmetric mean / diagonal")
     axes[0][-1].legend(fontsize=8)
     figure.tight_layout()
@@ -45,6 +45,6 @@ def draw_recipe(results, folder):
         axes[0][j].set_title(f"{size} x {size}")
         axes[0][j].grid(axis="x", visible=False)
     axes[0][0].set_ylabel("symmetric mean / diagonal")
-    axes[0][-1].legend(fontsize=8)
+    axes[0][-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
     figure.tight_layout()
     return [style.save(figure, folder, "recipe")]
