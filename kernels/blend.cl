@@ -62,3 +62,27 @@ __kernel void blend_texels(const int row_count, const int source_count, const in
     }
   }
 }
+
+#define END_REACH 0.3f  // of u
+
+// Adds to the texels what rows miss at their ends, fading out along the bone.
+// moves: six planes of column_count floats, columns of all patches: along, around, out at the head, then at the tail
+// NDRange: rows, as above.
+__kernel void move_ends(const int row_count, const int texture_width, const int column_count, __global const int* restrict lattice_rows,
+                        __global const PatchRecord* restrict patches, __global const RowRecord* restrict rows, __global const float* restrict moves,
+                        __global float* restrict along, __global float* restrict around, __global float* restrict out) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  __global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
+  const int row = lattice_rows[4 * k + 1], texel = (patch->y + row) * texture_width + patch->x;
+  const float u = rows[patch->row_begin + row].u;
+  const float to_head = fmax(0.0f, 1.0f - u / END_REACH), to_tail = fmax(0.0f, 1.0f - (1.0f - u) / END_REACH);
+  const float at_head = to_head * to_head * (3.0f - 2.0f * to_head), at_tail = to_tail * to_tail * (3.0f - 2.0f * to_tail);
+  __global const float* restrict head = moves + patch->column_begin;
+  __global const float* restrict tail = head + 3 * column_count;
+  for (int j = get_local_id(0); j < patch->width; j += get_local_size(0)) {
+    along[texel + j] += at_head * head[j] + at_tail * tail[j];
+    around[texel + j] += at_head * head[column_count + j] + at_tail * tail[column_count + j];
+    out[texel + j] += at_head * head[2 * column_count + j] + at_tail * tail[2 * column_count + j];
+  }
+}

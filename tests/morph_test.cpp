@@ -18,6 +18,7 @@
 #include "support/blend_twin.h"
 #include "support/load_model.h"
 #include "support/random_skeleton.h"
+#include "support/seam_gap.h"
 
 namespace skeletex {
 namespace {
@@ -188,6 +189,35 @@ TEST(Morph, IsClosedAtEveryTime) {
   for (const Pair& pair : kPairs) {
     const Morph morph = morph_of(standard(pair.a, pair.method), standard(pair.b, pair.method));
     for (const double t : {0.0, 0.1, 0.25, 0.5, 0.6, 0.9, 1.0}) expect_valid(at(morph, t), 0, std::string(pair.a) + " " + std::to_string(t));
+  }
+}
+
+TEST(Morph, RowsEndOnTheSeamsAsThoseOfTheModelsDo) {
+  // A model's own rows miss its seams by what both leave out between their points.
+  for (const Pair& pair : kPairs) {
+    const SkeletexModel &a = standard(pair.a, pair.method, 256), &b = standard(pair.b, pair.method, 256);
+    const Morph morph = morph_of(a, b);
+    const auto widest = [&](const SkeletexModel& model) {
+      const std::vector<test::SeamGap> gaps = test::seam_gaps(device(), model);
+      return *std::max_element(gaps.begin(), gaps.end(), [](const auto& p, const auto& q) { return p.at_columns < q.at_columns; });
+    };
+    const double own = std::max(widest(a).at_columns, widest(b).at_columns);
+    for (const double t : {0.25, 0.5, 0.75}) {
+      const test::SeamGap gap = widest(at(morph, t));
+      EXPECT_LT(gap.at_columns, 1.5 * own + 1e-3) << pair.a << " " << t << " bone " << a.skeleton.bones[gap.bone].name;
+      EXPECT_LT(gap.row_to_seam, 0.01) << pair.a << " " << t;
+    }
+  }
+}
+
+TEST(Morph, IsSymmetricHalfWay) {
+  for (const Pair& pair : kPairs) {
+    const SkeletexModel &a = standard(pair.a, pair.method), &b = standard(pair.b, pair.method);
+    const TriangleMesh there = reconstruct_mesh(device(), at(morph_of(a, b, {.layout = 0}), 0.5));
+    const TriangleMesh back = reconstruct_mesh(device(), at(morph_of(b, a, {.layout = 1}), 0.5));
+    EXPECT_LT(largest_distance(there, back), 1e-6) << pair.a;
+    const TriangleMesh in_the_other_layout = reconstruct_mesh(device(), at(morph_of(a, b, {.layout = 1}), 0.5));
+    EXPECT_LT(mean_distance(there, in_the_other_layout), 2e-3) << pair.a;
   }
 }
 

@@ -5,21 +5,27 @@
 #include <cmath>
 
 namespace skeletex {
+namespace {
+
+/// A column that is another one's own to the accuracy of seams is that one, so that its texels come out bit by bit.
+double snapped(double column) { return std::abs(column - std::round(column)) < 1e-3 ? std::round(column) : column; }
+
+}  // namespace
 
 void append_columns(const Overlay& overlay, int bone, int width, BlendTables& tables) {
   std::vector<double> head(width), tail(width);
   double twist = 0;
   for (int j = 0; j < width; ++j) {
     const double turn = static_cast<double>(j) / width;
-    head[j] = overlay.model_turn(bone, BoneEnd::kHead, turn);
-    tail[j] = overlay.model_turn(bone, BoneEnd::kTail, turn);
+    head[j] = overlay.model_v(bone, BoneEnd::kHead, turn);
+    tail[j] = overlay.model_v(bone, BoneEnd::kTail, turn);
     twist += (tail[j] - head[j]) / width;
   }
   // Angles have no whole turns: between the ends the shorter way.
   const double whole = std::round(twist), columns = overlay.model().patches[overlay.model_bone(bone)].rectangle.width;
   for (int j = 0; j < width; ++j) {
-    tables.head_columns.push_back(static_cast<float>(columns * head[j]));
-    tables.tail_columns.push_back(static_cast<float>(columns * (tail[j] - whole)));
+    tables.head_columns.push_back(static_cast<float>(snapped(columns * head[j])));
+    tables.tail_columns.push_back(static_cast<float>(snapped(columns * (tail[j] - whole))));
   }
 }
 
@@ -41,6 +47,22 @@ void blend_texels(ClContext& context, const BlendTables& tables, const std::vect
                  static_cast<int>(result.patches.size()), texture_width, static_cast<int>(tables.head_columns.size()), context.upload(rows),
                  context.upload(result.patches), context.upload(result.rows), context.upload(tables.sources), context.upload(tables.rows),
                  context.upload(columns), texels.x, texels.y, texels.z, blended.x, blended.y, blended.z);
+}
+
+void EndMoves::add(BoneEnd end, const Vec3& move) {
+  for (int i = 0; i < 3; ++i) planes[static_cast<int>(end)][i].push_back(static_cast<float>(move[i]));
+  if (!move.isZero(0)) is_empty = false;
+}
+
+void move_ends(ClContext& context, const EndMoves& moves, const std::vector<LatticeRow>& rows, const FrameTables& result, int texture_width,
+               DevicePlanes& texels) {
+  if (moves.is_empty) return;
+  std::vector<float> all;
+  for (const auto& end : moves.planes)
+    for (const std::vector<float>& plane : end) all.insert(all.end(), plane.begin(), plane.end());
+  context.launch({"blend.cl", "move_ends"}, row_range(context, rows.size()), static_cast<int>(rows.size()), texture_width,
+                 static_cast<int>(moves.planes[0][0].size()), context.upload(rows), context.upload(result.patches), context.upload(result.rows),
+                 context.upload(all), texels.x, texels.y, texels.z);
 }
 
 }  // namespace skeletex

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <array>
 #include <vector>
 
 #include "blend_structs.h"
@@ -28,5 +29,14 @@ double u_at_row(const Patch& patch, double row);
 /// Queues the blend. \param texels  of all sources   \param rows  of the result's patches, those to do
 void blend_texels(ClContext& context, const BlendTables& tables, const std::vector<LatticeRow>& rows, const FrameTables& result, int texture_width,
                   const DevicePlanes& texels, DevicePlanes& blended);
+
+/// What is added to the texels of the rows at the ends, and to those inside less and less.
+struct EndMoves {
+  std::array<std::array<std::vector<float>, 3>, 2> planes;  ///< head, tail; along, around, out; the columns of all patches
+  bool is_empty = true;
+  void add(BoneEnd end, const Vec3& move);
+};
+void move_ends(ClContext& context, const EndMoves& moves, const std::vector<LatticeRow>& rows, const FrameTables& result, int texture_width,
+               DevicePlanes& texels);
 
 }  // namespace skeletex

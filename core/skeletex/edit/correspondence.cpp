@@ -10,6 +10,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <optional>
 #include <queue>
 
@@ -17,6 +18,16 @@
 #include "skeletex/model/walls.h"
 
 namespace skeletex {
+
+Correspondence identity_correspondence(const Skeleton& skeleton) {
+  Correspondence result;
+  result.bones.resize(skeleton.bones.size());
+  result.nodes.resize(skeleton.nodes.size());
+  std::iota(result.bones.begin(), result.bones.end(), 0);
+  std::iota(result.nodes.begin(), result.nodes.end(), 0);
+  result.is_reversed.assign(skeleton.bones.size(), false);
+  return result;
+}
 
 Correspondence inverse(const Correspondence& a_to_b) {
   Correspondence result = a_to_b;

@@ -17,6 +17,8 @@ struct Correspondence {
   double cost = 0;                 ///< mean over bones: 0 for equal names, lengths and directions, about 1 for nothing in common
 };
 
+/// From a skeleton to itself.
+Correspondence identity_correspondence(const Skeleton& skeleton);
 /// From B to A.
 Correspondence inverse(const Correspondence& a_to_b);
 /// From A to C by way of B. The costs add up.

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <numeric>
@@ -17,19 +18,13 @@
 #include "skeletex/edit/seam_network.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/reconstruct/seam_strip.h"
 
 namespace skeletex {
 namespace {
 
-Correspondence identity(const Skeleton& skeleton) {
-  Correspondence result;
-  result.bones.resize(skeleton.bones.size());
-  result.nodes.resize(skeleton.nodes.size());
-  std::iota(result.bones.begin(), result.bones.end(), 0);
-  std::iota(result.nodes.begin(), result.nodes.end(), 0);
-  result.is_reversed.assign(skeleton.bones.size(), false);
-  return result;
-}
+constexpr double kNoWidth = 1e-9;  // turns
+constexpr double kNoMove = 1e-6;   // diagonals; seams are stored no more exactly
 
 /// The rotation that turns one set of points about the origin best onto another (Kabsch). Points on a line leave their
 /// turn about it open: there the smallest rotation.
@@ -90,64 +85,137 @@ double turn_from_other_side(const Walls& walls, const SeamArc& arc, BoneEnd end,
   return walls.turn_of(arc.bones[1], walls.spoke(arc.bones[0], turn) + walls.slope(arc.bones[0], end, turn) * basis.o);
 }
 
-/// Fills the network around the mean skeleton with the models' seams.
+/// The seams around the mean skeleton: corners first, then arcs between them, then the ends of the rows. Bones that meet
+/// may read the models at places that differ a little (around slivers); each step takes the mean, and what comes before
+/// holds: what an arc misses at its corners fades out along it.
 class SeamMean {
  public:
-  SeamMean(const Skeleton& skeleton, const Walls& walls, const std::deque<Overlay>& overlays, std::span<const double> weights, const Overlay& layout)
-      : skeleton_(skeleton), walls_(walls), overlays_(overlays), weights_(weights), layout_(layout) {}
+  SeamMean(const SkeletexModel& result, const Walls& walls, const std::deque<Overlay>& overlays, std::span<const double> weights, const Overlay& layout)
+      : skeleton_(result.skeleton), patches_(result.patches), walls_(walls), overlays_(overlays), weights_(weights), layout_(layout) {}
 
-  void fill(SeamNetwork& network) const {
+  void fill(SeamNetwork& network) {
     for (std::size_t c = 0; c < network.corners.size(); ++c) {
       SeamCorner& corner = network.corners[c];
-      for (std::size_t m = 0; m < overlays_.size(); ++m)
-        for (const int bone : corner.bones) {
-          if (weights_[m] == 0) continue;
-          const double distance = overlays_[m].seam_at(bone, end_at(bone, corner.node), walls_.turn_of(bone, network.directions[c])).distance;
-          corner.sample.distance += weights_[m] * distance / static_cast<double>(corner.bones.size());
-        }
+      for (const int bone : corner.bones)
+        corner.sample.distance += mean_at(bone, end_at(bone, corner.node), walls_.turn_of(bone, network.directions[c])).distance / static_cast<double>(corner.bones.size());
     }
     for (SeamArc& arc : network.arcs) fill_arc(network, arc);
+  }
+
+  /// An end's seam as the rows follow it. Empty at a free end. \pre fill
+  std::vector<Overlay::LoopPoint> loop(const SeamNetwork& network, int bone, BoneEnd end) const {
+    std::vector<Overlay::LoopPoint> points;
+    std::vector<Vec3> positions;
+    std::vector<double> angles;
+    const auto add = [&](int owner, const SeamSample& sample, int node, double turn) {
+      positions.push_back(walls_.seam_point(owner, end_at(owner, node), sample.turn, sample.distance));
+      angles.push_back(owner == bone ? sample.turn : walls_.turn_of(bone, positions.back() - skeleton_.nodes[node].position));
+      if (!points.empty()) turn = std::max(points.back().turn, turn - std::floor(turn - points.back().turn + kNoWidth));
+      const double offset = angles.back() - turn;
+      points.push_back({turn, 0, offset - std::round(offset), sample.distance});
+    };
+    for (const ArcUse use : network.ends[bone][static_cast<int>(end)].arcs) {
+      const SeamArc& arc = network.arcs[use.arc];
+      if (!arc.is_closed()) {
+        const int corner = arc.corners[use.is_reversed ? 1 : 0];
+        add(network.corners[corner].bones[0], network.corners[corner].sample, arc.node, walls_.turn_of(bone, network.directions[corner]));
+      }
+      for (std::size_t i = 0; i < arc.samples.size(); ++i) {
+        const std::size_t at = use.is_reversed ? arc.samples.size() - 1 - i : i;
+        const double turn = turns_.at(use.arc)[at];
+        add(arc.bones[0], arc.samples[at], arc.node, arc.bones[0] == bone ? turn : turn_from_other_side(walls_, arc, end_at(arc.bones[0], arc.node), turn));
+      }
+    }
+    if (points.empty()) return points;
+    const std::vector<double> v = seam_turns(positions, angles);
+    double ahead = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) ahead += (points[i].turn - v[i]) / static_cast<double>(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) points[i].v = v[i] + std::round(ahead);
+    return points;
   }
 
  private:
   BoneEnd end_at(int bone, int node) const { return skeleton_.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail; }
 
-  void fill_arc(const SeamNetwork& network, SeamArc& arc) const {
+  Overlay::SeamPoint mean_at(int bone, BoneEnd end, double turn) const {
+    Overlay::SeamPoint mean;
+    for (std::size_t m = 0; m < overlays_.size(); ++m) {
+      if (weights_[m] == 0) continue;
+      const Overlay::SeamPoint read = overlays_[m].seam_at(bone, end, turn);
+      mean.turn_offset += weights_[m] * read.turn_offset;
+      mean.distance += weights_[m] * read.distance;
+    }
+    return mean;
+  }
+
+  void fill_arc(const SeamNetwork& network, SeamArc& arc) {
     const int bone = arc.bones[0];
     const BoneEnd end = end_at(bone, arc.node), other_end = end_at(arc.bones[1], arc.node);
-    std::vector<Overlay::ArcPoint> points{{0.5, {}}};
-    const int layout_arc = layout_.model_arc(arc.node, bone, arc.bones[1]);
-    if (layout_arc >= 0) points = layout_.arc_points(bone, end, layout_arc);
     double begin = 0, width = 1;
     if (!arc.is_closed()) {
       begin = walls_.turn_of(bone, network.directions[arc.corners[0]]);
       width = walls_.turn_of(bone, network.directions[arc.corners[1]]) - begin;
       width -= std::floor(width + 0.25);  // half a turn at most, and rounding
     }
-    for (const Overlay::ArcPoint& point : points) {
-      double turn = begin + width * point.place, offset = 0, distance = 0;
-      const double other_turn = turn_from_other_side(walls_, arc, end, turn);
-      for (std::size_t m = 0; m < overlays_.size(); ++m) {
-        if (weights_[m] == 0) continue;
-        Overlay::SeamPoint read = point.point;
-        if (&overlays_[m] != &layout_ || layout_arc < 0) {
-          read = overlays_[m].seam_at(bone, end, turn);
-          read.distance = (read.distance + overlays_[m].seam_at(arc.bones[1], other_end, other_turn).distance) / 2;
-        }
-        offset += weights_[m] * read.turn_offset;
-        distance += weights_[m] * read.distance;
+    std::vector<double> places;
+    const int layout_arc = layout_.model_arc(arc.node, bone, arc.bones[1]);
+    if (layout_arc >= 0) {
+      places = layout_.arc_places(bone, end, layout_arc);
+    } else {
+      const int intervals = std::max(2, static_cast<int>(std::lround(width * std::max(patches_[bone].rectangle.width, patches_[arc.bones[1]].rectangle.width))));
+      for (int i = 1; i < intervals; ++i) places.push_back(static_cast<double>(i) / intervals);
+    }
+
+    const double sign = end == other_end ? -1 : 1;  // of angles about the other bone
+    const auto both_sides_at = [&](double turn) {
+      const Overlay::SeamPoint here = mean_at(bone, end, turn), there = mean_at(arc.bones[1], other_end, turn_from_other_side(walls_, arc, end, turn));
+      return Overlay::SeamPoint{(here.turn_offset + sign * there.turn_offset) / 2, (here.distance + there.distance) / 2};
+    };
+    std::array<Overlay::SeamPoint, 2> missing;
+    if (!arc.is_closed())
+      for (const int side : {0, 1}) {
+        const Overlay::SeamPoint reached = both_sides_at(begin + side * width);
+        missing[side] = {-reached.turn_offset, network.corners[arc.corners[side]].sample.distance - reached.distance};
       }
-      turn += offset;
-      arc.samples.push_back({turn - std::floor(turn), distance});
+    std::vector<double>& turns = turns_[static_cast<int>(&arc - network.arcs.data())];
+    for (const double place : places) {
+      const double turn = begin + width * place;
+      const Overlay::SeamPoint read = both_sides_at(turn);
+      const double angle = turn + read.turn_offset + (1 - place) * missing[0].turn_offset + place * missing[1].turn_offset;
+      turns.push_back(turn);
+      arc.samples.push_back({angle - std::floor(angle), read.distance + (1 - place) * missing[0].distance + place * missing[1].distance});
     }
   }
 
   const Skeleton& skeleton_;
+  const std::vector<Patch>& patches_;
   const Walls& walls_;
   const std::deque<Overlay>& overlays_;
   std::span<const double> weights_;
   const Overlay& layout_;
+  std::map<int, std::vector<double>> turns_;  ///< per arc and sample, the angle about bones[0] that it is found by
 };
+
+/// What rows miss to end on the seams: texels are averaged as vectors, seams by angle and distance.
+EndMoves end_moves(const SkeletexModel& result, const Walls& walls, const std::deque<Overlay>& overlays, std::span<const double> weights) {
+  EndMoves moves;
+  for (int bone = 0; bone < static_cast<int>(result.patches.size()); ++bone) {
+    const int width = result.patches[bone].rectangle.width;
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
+      for (int j = 0; j < width; ++j) {
+        Vec3 move = Vec3::Zero();
+        if (!result.ends[bone][static_cast<int>(end)].arcs.empty()) {
+          const double v = static_cast<double>(j) / width;
+          move = overlays[0].end_texel_here(result.skeleton, walls, bone, end, v);
+          for (std::size_t m = 0; m < overlays.size(); ++m)
+            if (weights[m] > 0) move -= weights[m] * overlays[m].end_texel(bone, end, v);
+          if (move.norm() < kNoMove * result.diagonal) move.setZero();
+        }
+        moves.add(end, move);
+      }
+  }
+  return moves;
+}
 
 std::vector<double> checked_weights(std::span<const double> weights, std::size_t count) {
   if (weights.size() != count) throw InputError(fmt::format("{} weights for {} models; give one per model", weights.size(), count));
@@ -197,7 +265,7 @@ Morph::Morph(ClContext& context, std::vector<SkeletexModel> models, std::span<co
     throw InputError(fmt::format("{} correspondences for {} models; give one for each but the first", from_first.size(), models_.size()));
   if (layout_ && (*layout_ < 0 || *layout_ >= static_cast<int>(models_.size())))
     throw InputError(fmt::format("there is no model {} whose layout to take; models are numbered from 0 to {}", *layout_, models_.size() - 1));
-  from_first_.push_back(identity(models_[0].skeleton));
+  from_first_.push_back(identity_correspondence(models_[0].skeleton));
   from_first_.insert(from_first_.end(), from_first.begin(), from_first.end());
   int size = options.size;
   for (std::size_t m = 0; m < models_.size(); ++m) {
@@ -249,7 +317,11 @@ SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) 
   for (Overlay& overlay : overlays) overlay.set_seams(walls, network);
 
   result.patches = mean_patches(overlays, weights, layout);
-  SeamMean(result.skeleton, walls, overlays, weights, overlays[layout_index]).fill(network);
+  SeamMean seams(result, walls, overlays, weights, overlays[layout_index]);
+  seams.fill(network);
+  for (int bone = 0; bone < static_cast<int>(result.patches.size()); ++bone)
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
+      for (Overlay& overlay : overlays) overlay.set_loop(bone, end, seams.loop(network, bone, end));
   result.arcs = std::move(network.arcs);
   result.corners = std::move(network.corners);
   result.ends = std::move(network.ends);
@@ -280,7 +352,9 @@ SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) 
     texels = allocate_planes(*context_, area);
     for (ClBuffer<float>* plane : {&texels.x, &texels.y, &texels.z}) context_->fill(*plane, 0);
   }
-  blend_texels(*context_, tables, rows, frame_tables(result.skeleton, walls, result.patches, result.origin), result.texture.width, texels_, texels);
+  const FrameTables frames = frame_tables(result.skeleton, walls, result.patches, result.origin);
+  blend_texels(*context_, tables, rows, frames, result.texture.width, texels_, texels);
+  move_ends(*context_, end_moves(result, walls, overlays, weights), rows, frames, result.texture.width, texels);
 
   nlohmann::json settings = nlohmann::json::parse(result.encoder_settings, nullptr, false);
   if (!settings.is_object()) settings = nlohmann::json::object();

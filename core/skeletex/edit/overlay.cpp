@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 
+#include "skeletex/model/frame.h"
 #include "skeletex/model/loop_turns.h"
 #include "skeletex/model/pose.h"
 
@@ -15,11 +16,6 @@ namespace {
 constexpr double kNoWidth = 1e-9;  // turns
 
 BoneEnd end_at(const Skeleton& skeleton, int bone, int node) { return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail; }
-
-double share_of(const std::vector<double>& grown, std::size_t first, std::size_t last, std::size_t i) {
-  const double begin = grown[first], width = (last < grown.size() ? grown[last] : grown[0] + 1) - begin;
-  return width > kNoWidth ? (grown[i] - begin) / width : static_cast<double>(i - first) / static_cast<double>(last - first);
-}
 
 /// y at x of a map that grows by a turn per turn, linear between its bounds.
 template <class Bound>
@@ -32,6 +28,18 @@ double along_bounds(const std::vector<Bound>& bounds, double Bound::*x_of, doubl
   const double begin = bounds[i].*x_of, width = (is_last ? first + 1 : bounds[i + 1].*x_of) - begin;
   const double y = bounds[i].*y_of, height = (is_last ? bounds.front().*y_of + 1 : bounds[i + 1].*y_of) - y;
   return whole + y + (width > 0 ? (local - begin) / width * height : height / 2);
+}
+
+/// The point of a loop at an angle or at a v.
+Overlay::LoopPoint point_at(const std::vector<Overlay::LoopPoint>& points, double Overlay::LoopPoint::*key, double value) {
+  const double first = points.front().*key, whole = std::floor(value - first), local = std::max(first, value - whole);
+  const auto after = std::upper_bound(points.begin(), points.end(), local, [&](double x, const Overlay::LoopPoint& point) { return x < point.*key; });
+  const Overlay::LoopPoint& p = *(after - 1);
+  Overlay::LoopPoint q = after == points.end() ? points.front() : *after;
+  if (after == points.end()) ++q.turn, ++q.v;
+  const double width = q.*key - p.*key, share = width > 0 ? (local - p.*key) / width : 0;
+  const auto mix = [&](double x, double y) { return (1 - share) * x + share * y; };
+  return {whole + mix(p.turn, q.turn), whole + mix(p.v, q.v), mix(p.turn_offset, q.turn_offset), mix(p.distance, q.distance)};
 }
 
 /// Bounds of equal neighbours of two loops, both in the direction of growing angle. Neighbours that follow each other in
@@ -62,17 +70,19 @@ std::vector<Bound> paired_bounds(const std::vector<Interval>& here, std::vector<
     const bool is_last = i + 1 == model.size();
     const double next_here = is_last ? common[0].begin + 1 : common[i + 1].begin, next_model = is_last ? model[0].begin + 1 : model[i + 1].begin;
     if (i == 0) bounds.push_back({model[0].begin, common[0].begin});
-    if (next_here - common[i].end > kNoWidth) {
-      bounds.push_back({model[i].end, common[i].end});
-      bounds.push_back({next_model, next_here});
-    } else {
-      bounds.push_back({(model[i].end + next_model) / 2, (common[i].end + next_here) / 2});
-    }
+    bounds.push_back({(model[i].end + next_model) / 2, (common[i].end + next_here) / 2});
   }
   // The last bound is the first one, a turn later; the first one's middle is known only now.
   bounds[0] = {bounds.back().turn - 1, bounds.back().here - 1};
   bounds.pop_back();
   return bounds;
+}
+
+/// The texel in an end's row of a point of its seam.
+Vec3 seam_texel(const Skeleton& skeleton, const Walls& walls, int bone, BoneEnd end, const Overlay::LoopPoint& point) {
+  const TangentFrame frame = tangent_frame(skeleton, walls, bone, end == BoneEnd::kHead ? 0 : 1, point.v);
+  return encode_texel(frame, walls.seam_point(bone, end, point.turn + point.turn_offset, point.distance), end_position(skeleton, bone, BoneEnd::kHead),
+                      end_position(skeleton, bone, BoneEnd::kTail));
 }
 
 }  // namespace
@@ -91,7 +101,8 @@ Overlay::Overlay(const SkeletexModel& model, const Skeleton& here, Correspondenc
       walls_(model.skeleton),
       posed_walls_(model, posed_),
       bones_here_(model.skeleton.bones.size(), -1),
-      loops_(here.bones.size()) {
+      loops_(here.bones.size()),
+      loops_here_(here.bones.size()) {
   for (int bone = 0; bone < static_cast<int>(loops_.size()); ++bone) bones_here_[model_bone(bone)] = bone;
   for (int bone = 0; bone < static_cast<int>(loops_.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) trace_seam(bone, end);
@@ -160,7 +171,8 @@ void Overlay::trace_seam(int bone_here, BoneEnd end_here) {
   const auto add = [&](int owner, const SeamSample& sample, int arc) {
     positions.push_back(walls_.seam_point(owner, end_at(model_->skeleton, owner, node), sample.turn, sample.distance));
     turns.push_back(owner == bone ? sample.turn : walls_.turn_of(bone, positions.back() - model_->skeleton.nodes[node].position));
-    loop.points.push_back({0, 0, sample.distance, arc});
+    loop.points.push_back({0, 0, 0, sample.distance});
+    loop.arcs.push_back(arc);
   };
   for (const ArcUse use : uses) {
     const SeamArc& arc = model_->arcs[use.arc];
@@ -182,14 +194,24 @@ void Overlay::trace_seam(int bone_here, BoneEnd end_here) {
   if (std::optional<std::vector<double>> found = loop_turns(positions, turns)) grown = std::move(*found);
   else
     for (int i = 0; i < count; ++i) grown[i] = intervals[0].begin + static_cast<double>(i) / count;
-  for (std::size_t a = 0; a < uses.size(); ++a)
-    for (std::size_t i = arc_begins[a]; i < arc_begins[a + 1]; ++i) {
-      LoopPoint& point = loop.points[i];
-      const double share = share_of(grown, arc_begins[a], arc_begins[a + 1], i);
-      point.turn = model_->arcs[uses[a].arc].is_closed() ? grown[i] : (1 - share) * intervals[a].begin + share * intervals[a].end;
-      const double offset = turns[i] - point.turn;
-      point.turn_offset = point.arc < 0 ? 0 : offset - std::round(offset);
+  for (std::size_t a = 0; a < uses.size(); ++a) {
+    const std::size_t begin = arc_begins[a], end_of_arc = arc_begins[a + 1];
+    std::vector<double> shares;
+    if (!model_->arcs[uses[a].arc].is_closed()) {
+      std::vector<Vec3> arc_positions(positions.begin() + begin, positions.begin() + end_of_arc);
+      std::vector<double> arc_turns(turns.begin() + begin, turns.begin() + end_of_arc);
+      arc_positions.push_back(positions[end_of_arc % count]);
+      arc_turns.push_back(turns[end_of_arc % count]);
+      shares = arc_shares(arc_positions, arc_turns);
     }
+    for (std::size_t i = begin; i < end_of_arc; ++i) {
+      LoopPoint& point = loop.points[i];
+      point.v = grown[i];
+      point.turn = shares.empty() ? grown[i] : (1 - shares[i - begin]) * intervals[a].begin + shares[i - begin] * intervals[a].end;
+      const double offset = turns[i] - point.turn;
+      point.turn_offset = loop.arcs[i] < 0 ? 0 : offset - std::round(offset);
+    }
+  }
 }
 
 double Overlay::model_turn(int bone, BoneEnd end, double turn) const {
@@ -204,38 +226,52 @@ double Overlay::turn_here(int bone, BoneEnd end, double model_turn) const {
 }
 
 Overlay::SeamPoint Overlay::seam_at(int bone, BoneEnd end, double turn) const {
-  const std::vector<LoopPoint>& points = loop(bone, end).points;
-  const double at = model_turn(bone, end, turn), first = points.front().turn;
-  const double local = std::max(first, at - std::floor(at - first));
-  const auto after = std::upper_bound(points.begin(), points.end(), local, [](double value, const LoopPoint& point) { return value < point.turn; });
-  const LoopPoint &p = *(after - 1), &q = after == points.end() ? points.front() : *after;
-  const double width = (after == points.end() ? first + 1 : q.turn) - p.turn, share = width > 0 ? (local - p.turn) / width : 0;
-  const double offset = (1 - share) * p.turn_offset + share * q.turn_offset;
-  return {is_reversed(bone) ? -offset : offset, (1 - share) * p.distance + share * q.distance};
+  const LoopPoint point = point_at(loop(bone, end).points, &LoopPoint::turn, model_turn(bone, end, turn));
+  return {is_reversed(bone) ? -point.turn_offset : point.turn_offset, point.distance};
 }
 
-std::vector<Overlay::ArcPoint> Overlay::arc_points(int bone, BoneEnd end, int arc) const {
-  const std::vector<LoopPoint>& points = loop(bone, end).points;
-  const double sign = is_reversed(bone) ? -1 : 1;
+double Overlay::model_v(int bone, BoneEnd end, double v) const {
+  const std::vector<LoopPoint>& here = loops_here_[bone][static_cast<int>(end)];
+  if (here.empty()) return model_turn(bone, end, v);
+  return point_at(loop(bone, end).points, &LoopPoint::turn, model_turn(bone, end, point_at(here, &LoopPoint::v, v).turn)).v;
+}
+
+Vec3 Overlay::end_texel(int bone, BoneEnd end, double v) const {
+  const std::vector<LoopPoint>& here = loops_here_[bone][static_cast<int>(end)];
+  const LoopPoint point = point_at(loop(bone, end).points, &LoopPoint::turn, model_turn(bone, end, point_at(here, &LoopPoint::v, v).turn));
+  Vec3 texel = seam_texel(model_->skeleton, walls_, model_bone(bone), model_end(bone, end), point);
+  if (is_reversed(bone)) texel.head<2>() = -texel.head<2>();
+  return texel;
+}
+
+Vec3 Overlay::end_texel_here(const Skeleton& here, const Walls& walls, int bone, BoneEnd end, double v) const {
+  return seam_texel(here, walls, bone, end, point_at(loops_here_[bone][static_cast<int>(end)], &LoopPoint::v, v));
+}
+
+std::vector<double> Overlay::arc_places(int bone, BoneEnd end, int arc) const {
+  const Loop& at = loop(bone, end);
+  const int count = static_cast<int>(at.points.size());
+  int first = 0, samples = 0;
+  while (at.arcs[first] != arc) ++first;
+  while (first + samples < count && at.arcs[first + samples] == arc) ++samples;
   const bool is_closed = model_->arcs[arc].is_closed();
-  double begin = 0, width = 1;
-  if (!is_closed) {
-    std::size_t first = 0;
-    while (points[first].arc >= 0 || points[first + 1].arc != arc) ++first;
-    std::size_t last = first + 1;
-    while (last < points.size() && points[last].arc >= 0) ++last;
-    begin = points[first].turn;
-    width = (last < points.size() ? points[last].turn : points[0].turn + 1) - begin;
+  const int last = first + samples;
+  const double begin = is_closed ? 0 : at.points[first - 1].turn, width = is_closed ? 1 : (last < count ? at.points[last].turn : at.points[0].turn + 1) - begin;
+  std::vector<double> places;
+  for (int i = 0; i < samples; ++i) {
+    const double share = width > kNoWidth ? (at.points[first + i].turn - begin) / width : (i + 1.0) / (samples + 1.0);
+    places.push_back(is_closed ? turn_here(bone, end, at.points[first + i].turn) : is_reversed(bone) ? 1 - share : share);
   }
-  std::vector<ArcPoint> result;
-  for (const LoopPoint& point : points) {
-    if (point.arc != arc) continue;
-    const double share = width > 0 ? (point.turn - begin) / width : (static_cast<double>(result.size()) + 1) / (static_cast<double>(model_->arcs[arc].samples.size()) + 1);
-    const double place = is_closed ? turn_here(bone, end, point.turn) : sign > 0 ? share : 1 - share;
-    result.push_back({place, {sign * point.turn_offset, point.distance}});
-  }
-  if (sign < 0) std::reverse(result.begin(), result.end());
-  return result;
+  if (is_reversed(bone)) std::reverse(places.begin(), places.end());
+  return places;
+}
+
+std::vector<double> Overlay::own_turns(int bone, BoneEnd end, int arc) const {
+  const Loop& at = loop(bone, end);
+  std::vector<double> turns;
+  for (std::size_t i = 0; i < at.points.size(); ++i)
+    if (at.arcs[i] == arc) turns.push_back(at.points[i].turn);
+  return turns;
 }
 
 int Overlay::model_arc(int node, int first_bone, int second_bone) const {

@@ -47,15 +47,31 @@ class Overlay {
     double distance = 0;
   };
   SeamPoint seam_at(int bone, BoneEnd end, double turn) const;
-  /// The samples of one of the model's arcs in the direction of growing angles here, each with its share of the way
-  /// between the arc's corners (of a closed arc: its angle here).
-  struct ArcPoint {
-    double place;
-    SeamPoint point;
-  };
-  std::vector<ArcPoint> arc_points(int bone, BoneEnd end, int arc) const;
+  /// The samples of one of the model's arcs in the direction of growing angles here: each one's share of the way between
+  /// the arc's corners (of a closed arc: its angle here).
+  std::vector<double> arc_places(int bone, BoneEnd end, int arc) const;
   /// The model's arc between two bones; -1 when it has none.
   int model_arc(int node, int first_bone, int second_bone) const;
+
+  /// A point of a seam as an end's row follows it.
+  struct LoopPoint {
+    double turn = 0;         ///< the angle that it is found by; growing
+    double v = 0;            ///< of the row (seam_turns); growing
+    double turn_offset = 0;  ///< its angle lies so far from `turn`
+    double distance = 0;
+  };
+  /// Says how the ends' rows here run along their seams. \pre set_seams
+  void set_loop(int bone, BoneEnd end, std::vector<LoopPoint> points) { loops_here_[bone][static_cast<int>(end)] = std::move(points); }
+  /// v of the model's end row where it passes the same point of the seam as the row here at v; without a loop, model_turn.
+  double model_v(int bone, BoneEnd end, double v) const;
+  /// The texel of the model's seam there, in the directions of the bone here.
+  Vec3 end_texel(int bone, BoneEnd end, double v) const;
+  /// The texel of the seam here. \pre set_loop
+  Vec3 end_texel_here(const Skeleton& here, const Walls& walls, int bone, BoneEnd end, double v) const;
+  /// The model's own seam as a loop, and the angles that one of its arcs' samples are found by. \pre the skeleton here is the
+  /// model's
+  const std::vector<LoopPoint>& own_loop(int bone, BoneEnd end) const { return loop(bone, end).points; }
+  std::vector<double> own_turns(int bone, BoneEnd end, int arc) const;
 
  private:
   /// An arc as one end runs through it: the bone beyond, here, and the angles where it begins and ends.
@@ -63,20 +79,14 @@ class Overlay {
     int neighbour;
     double begin, end;
   };
-  /// The seam around an end, by its angle in the model.
-  struct LoopPoint {
-    double turn = 0;  ///< growing
-    double turn_offset = 0;
-    double distance = 0;
-    int arc = -1;  ///< -1: a corner
-  };
   struct Bound {
     double turn = 0;  ///< the model's
     double here = 0;  ///< in the model's direction of turning
   };
   struct Loop {
     std::vector<Bound> bounds;  ///< both growing; one is enough for a rotation
-    std::vector<LoopPoint> points;
+    std::vector<LoopPoint> points;  ///< angles are the model's
+    std::vector<int> arcs;          ///< of the points; -1: a corner
   };
   void trace_seam(int bone, BoneEnd end);
   std::vector<Interval> intervals_here(int bone, BoneEnd end, const Walls& walls, const SeamNetwork& network) const;
@@ -90,6 +100,7 @@ class Overlay {
   PosedWalls posed_walls_;
   std::vector<int> bones_here_;             ///< per bone of the model
   std::vector<std::array<Loop, 2>> loops_;  ///< per bone here
+  std::vector<std::array<std::vector<LoopPoint>, 2>> loops_here_;
 };
 
 /// The skeleton of the model posed to the nodes of another one.

@@ -31,8 +31,12 @@ DevicePlanes all_positions(ClContext& context, const SkeletexModel& model, const
 std::vector<Vec3> map_surface(ClContext& context, const SkeletexModel& from, const SkeletexModel& to, const Correspondence& correspondence) {
   const Lattice lattice = number_lattice(from);
   const Walls walls(from.skeleton), to_walls(to.skeleton);
-  Overlay overlay(to, from.skeleton, correspondence);
-  overlay.set_seams(walls, seam_network(from.skeleton, walls));
+  Overlay overlay(to, from.skeleton, correspondence), own(from, from.skeleton, identity_correspondence(from.skeleton));
+  const SeamNetwork network = seam_network(from.skeleton, walls);
+  overlay.set_seams(walls, network);
+  own.set_seams(walls, network);
+  for (int bone = 0; bone < static_cast<int>(from.patches.size()); ++bone)
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) overlay.set_loop(bone, end, own.own_loop(bone, end));
 
   // Inner rows and poles: positions on `to`, read as a morph reads texels.
   const std::vector<LatticeRow> rows = lattice_rows(from.patches, RowChoice::kAll);
@@ -69,7 +73,7 @@ std::vector<Vec3> map_surface(ClContext& context, const SkeletexModel& from, con
       if (lattice.poles[bone][end] >= 0) positions[lattice.poles[bone][end]] = point_at(bone, end == 0 ? 0 : height - 1, 0);
   }
 
-  // Seams: the point of `to`'s seam at the same angle.
+  // Seams: the point of `to`'s seam that is found by the same angle.
   const auto seam_point = [&](int bone, int node, double turn) {
     const BoneEnd end = end_at(from.skeleton, bone, node);
     const Overlay::SeamPoint point = overlay.seam_at(bone, end, turn);
@@ -77,9 +81,11 @@ std::vector<Vec3> map_surface(ClContext& context, const SkeletexModel& from, con
     return to_walls.seam_point(overlay.model_bone(bone), overlay.model_end(bone, end), overlay.model_turn(bone, end, turn) + sign * point.turn_offset,
                                point.distance);
   };
-  for (std::size_t a = 0; a < from.arcs.size(); ++a)
-    for (std::size_t i = 0; i < from.arcs[a].samples.size(); ++i)
-      positions[lattice.first_sample[a] + static_cast<int>(i)] = seam_point(from.arcs[a].bones[0], from.arcs[a].node, from.arcs[a].samples[i].turn);
+  for (std::size_t a = 0; a < from.arcs.size(); ++a) {
+    const SeamArc& arc = from.arcs[a];
+    const std::vector<double> turns = own.own_turns(arc.bones[0], end_at(from.skeleton, arc.bones[0], arc.node), static_cast<int>(a));
+    for (std::size_t i = 0; i < turns.size(); ++i) positions[lattice.first_sample[a] + static_cast<int>(i)] = seam_point(arc.bones[0], arc.node, turns[i]);
+  }
   for (std::size_t c = 0; c < from.corners.size(); ++c)
     positions[lattice.first_corner + static_cast<int>(c)] = seam_point(from.corners[c].bones[0], from.corners[c].node, from.corners[c].sample.turn);
   return positions;
