@@ -371,6 +371,53 @@ __kernel void precondition_others(const int inner_count, const int components, c
   partials[first_partial + (int)get_global_id(0)] = sum;
 }
 
+// Levels: a lattice of about half of the rows and columns, see edit/coarsen.h. Each of its vertices lies at a vertex of
+// this one (`picks`); a vertex here reads four of its values (`sources`, `shares`), and `readers` lists who reads which.
+
+// to: the field at the coarser lattice's vertices. NDRange: those
+__kernel void pick_vertices(const int coarse_count, const int components, const int count, __global const int* restrict picks,
+                            __global const float* restrict from, __global float* restrict to) {
+  const int v = get_global_id(0);
+  if (v >= coarse_count) return;
+  for (int c = 0; c < components; ++c) to[c * coarse_count + v] = from[c * count + picks[v]];
+}
+
+// The residual there: each vertex takes what its readers have, by their shares. NDRange: the coarser lattice's vertices
+__kernel void restrict_field(const int coarse_count, const int components, const int count, __global const int* restrict reader_begin,
+                             __global const int* restrict readers, __global const float* restrict reader_shares, __global const float* restrict from,
+                             __global float* restrict to) {
+  const int v = get_global_id(0);
+  if (v >= coarse_count) return;
+  const int begin = reader_begin[v], end = reader_begin[v + 1];
+  for (int c = 0; c < components; ++c) {
+    float sum = 0.0f;
+    for (int i = begin; i < end; ++i) sum += reader_shares[i] * from[c * count + readers[i]];
+    to[c * coarse_count + v] = sum;
+  }
+}
+
+// z += is_free times what the coarser lattice has at each vertex, and partial sums of r times that.
+// NDRange: one work-group per VERTEX_CHUNK vertices. out  partials, from `first_partial` on
+__kernel void add_coarse_field(const int components, const int count, const int coarse_count, const int first_partial,
+                               __global const int* restrict sources, __global const float* restrict shares, __global const float* restrict is_free,
+                               __global const float* restrict coarse, __global const float* restrict r, __global float* restrict z,
+                               __global float* restrict partials) {
+  const int begin = get_group_id(0) * VERTEX_CHUNK, end = min(begin + VERTEX_CHUNK, count);
+  float sum = 0.0f;
+  for (int v = begin + (int)get_local_id(0); v < end; v += get_local_size(0)) {
+    const int s0 = sources[4 * v], s1 = sources[4 * v + 1], s2 = sources[4 * v + 2], s3 = sources[4 * v + 3];
+    const float w0 = is_free[v] * shares[4 * v], w1 = is_free[v] * shares[4 * v + 1], w2 = is_free[v] * shares[4 * v + 2];
+    const float w3 = is_free[v] * shares[4 * v + 3];
+    for (int c = 0; c < components; ++c) {
+      __global const float* restrict from = coarse + c * coarse_count;
+      const float value = w0 * from[s0] + w1 * from[s1] + w2 * from[s2] + w3 * from[s3];
+      z[c * count + v] += value;
+      sum += r[c * count + v] * value;
+    }
+  }
+  partials[first_partial + (int)get_global_id(0)] = sum;
+}
+
 // r = is_free b, x = 0, p = 0. NDRange of this and the next two: one work-group per VERTEX_CHUNK values of the fields.
 __kernel void begin_solve(const int values, const int count, __global const float* restrict is_free, __global const float* restrict b,
                           __global float* restrict x, __global float* restrict r, __global float* restrict p) {

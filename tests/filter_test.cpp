@@ -12,6 +12,7 @@
 #include <random>
 #include <set>
 
+#include "skeletex/edit/coarsen.h"
 #include "skeletex/edit/differential.h"
 #include "skeletex/encode/encode_model.h"
 #include "skeletex/measure/metro.h"
@@ -210,6 +211,54 @@ TEST(SurfaceOperator, SolvesDiffusionAsADirectSolverDoes) {
   }
 }
 
+TEST(SurfaceOperator, TakesHardlyMoreStepsAtFourTimesTheSize) {
+  std::map<int, int> steps;
+  for (const int size : {64, 256}) {
+    const SkeletexModel model = SyntheticSurface(cross(5), 0.2).model(std::vector<std::pair<int, int>>(5, {size, size}));
+    const ModelSurface surface = upload_surface(device(), model);
+    const SurfaceOperator laplace = make_surface_operator(device(), surface.neighbours, surface.points);
+    steps[size] = solve_diffusion(device(), laplace, 9e-4f, everywhere(surface), apply_operator(device(), laplace, 0, 1, everywhere(surface), surface.points)).report.steps;
+  }
+  EXPECT_LT(steps[256], 2 * steps[64] + 4) << steps[64] << " steps at a quarter of the size";
+}
+
+TEST(CoarseLattice, ContinuesConstantsExactlyAndSitsAtItsPicks) {
+  for (const SkeletexModel& model : twin_models()) {
+    const Lattice lattice = number_lattice(model);
+    const CoarseLattice coarse = coarsen(model, lattice, lattice_positions(device(), model));
+    ASSERT_EQ(static_cast<int>(coarse.picks.size()), coarse.lattice.vertex_count);
+    EXPECT_EQ(std::set<int>(coarse.picks.begin(), coarse.picks.end()).size(), coarse.picks.size());
+    for (int v = 0; v < lattice.vertex_count; ++v) {
+      float sum = 0;
+      for (int i = 0; i < 4; ++i) {
+        sum += coarse.shares[v][i];
+        EXPECT_GE(coarse.shares[v][i], 0);
+        EXPECT_LT(coarse.sources[v][i], coarse.lattice.vertex_count);
+      }
+      EXPECT_NEAR(sum, 1, 1e-6) << v;
+    }
+    for (int c = 0; c < coarse.lattice.vertex_count; ++c) {
+      EXPECT_EQ(coarse.sources[coarse.picks[c]][0], c);
+      EXPECT_EQ(coarse.shares[coarse.picks[c]][0], 1);
+    }
+  }
+}
+
+TEST(CoarseLattice, ContinuesASmoothFieldOverSeamsAndPoles) {
+  // Bilinear interpolation over steps of two columns and rows: an error of about the second differences.
+  const SkeletexModel model = synthetic(y_branch(), 96, 96, 0.25, 0);
+  const Lattice lattice = number_lattice(model);
+  const std::vector<Vec3> positions = lattice_positions(device(), model);
+  const CoarseLattice coarse = coarsen(model, lattice, positions);
+  double largest = 0;
+  for (int v = 0; v < lattice.vertex_count; ++v) {
+    Vec3 mixed = Vec3::Zero();
+    for (int i = 0; i < 4; ++i) mixed += static_cast<double>(coarse.shares[v][i]) * coarse.positions[coarse.sources[v][i]];
+    largest = std::max(largest, (mixed - positions[v]).norm());
+  }
+  EXPECT_LT(largest, 0.01 * model.diagonal);
+}
+
 TEST(SurfaceOperator, SumsAreaVectorsToTheVolume) {
   for (const SkeletexModel& model : twin_models()) {
     const TwinSurface twin = twin_surface(model);
@@ -316,6 +365,57 @@ TEST(Smooth, TreatsABumpOnASeamAsItTreatsOneAwayFromSeams) {
   EXPECT_GT(top - opposite, 0.2 * height);
   const std::vector<float> distances = closest_distances(device(), b, near_bump);
   EXPECT_LT(*std::max_element(distances.begin(), distances.end()), 0.01 * height);
+}
+
+TEST(Smooth, TreatsABumpOfAnEncodedMeshAlikeOnASeamAndAwayFromSeams) {
+  const double radius = 0.5, height = 0.05, width = 0.12;
+  const auto tube = [](double joint) {
+    Skeleton skeleton;
+    skeleton.nodes = {{"a", Vec3(0, 0, -1.5)}, {"b", Vec3(0, 0, joint)}, {"c", Vec3(0, 0, 1.5)}};
+    skeleton.bones = {{"low", 0, 1, {}}, {"high", 1, 2, {}}};
+    return skeleton;
+  };
+  TriangleMesh mesh = thickened(tube(0), {radius, radius, radius}, 0.05, 0.03);
+  for (Vec3& p : mesh.positions) {
+    const Vec3 out = Vec3(p.x(), p.y(), 0).normalized(), top = Vec3(radius, 0, 0);
+    p += height * std::exp(-(p - top).squaredNorm() / (2 * width * width)) * out;
+  }
+  EncodeOptions encoding;
+  encoding.width = encoding.height = 384;
+  SmoothOptions options;
+  options.scale = 0.03;
+  std::vector<TriangleMesh> smoothed;
+  for (const double joint : {0.0, 0.9}) smoothed.push_back(reconstruct_mesh(device(), smooth_model(device(), encode_model(device(), mesh, tube(joint), encoding).model, options).model));
+  std::vector<Vec3> near_bump;
+  for (const Vec3& p : smoothed[0].positions)
+    if ((p - Vec3(radius, 0, 0)).norm() < 3 * width) near_bump.push_back(p);
+  ASSERT_GT(near_bump.size(), 1000u);
+  double sum = 0;
+  for (const float distance : closest_distances(device(), smoothed[1], near_bump)) sum += static_cast<double>(distance * distance);
+  EXPECT_LT(std::sqrt(sum / static_cast<double>(near_bump.size())), 0.01 * height);
+}
+
+TEST(Smooth, InStepsShrinksASphereAsTheFlowDoes) {
+  // A step of implicit Euler makes R of R / (1 + 2 t / R^2); in ever smaller steps that becomes R^2 - 4 t.
+  const Skeleton skeleton = y_branch();
+  const Vec3 centre = skeleton.nodes[0].position;
+  SkeletexModel model = placed(synthetic(skeleton, 64, 64, 0.25, 0), [&](const Vec3& p) { return Vec3(centre + (p - centre).normalized()); });
+  model.diagonal = 2 * std::numbers::sqrt3;
+  SmoothOptions options;
+  options.scale = 0.06;
+  const double time = std::pow(options.scale * model.diagonal, 2), flow = std::sqrt(1 - 4 * time);
+  double gap = 1;
+  for (const int iterations : {1, 2, 8}) {
+    options.iterations = iterations;
+    double expected = 1;
+    for (int i = 0; i < iterations; ++i) expected /= 1 + 2 * time / iterations / (expected * expected);
+    const FilterResult result = smooth_model(device(), model, options);
+    const double radius = std::cbrt(result.report.volume_after / result.report.volume_before);
+    EXPECT_NEAR(radius, expected, 2e-3) << iterations;
+    EXPECT_LT(std::abs(radius - flow), gap) << iterations;
+    gap = std::abs(radius - flow);
+  }
+  EXPECT_LT(gap, 0.01);
 }
 
 TEST(Smooth, BringsARippleDownAsTheHeatEquationSays) {

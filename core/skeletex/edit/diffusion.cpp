@@ -34,7 +34,8 @@ struct DeviceSums {
 DeviceSums allocate_sums(ClContext& context, const DeviceNeighbours& neighbours) {
   const std::size_t rows = row_range(context, std::max(neighbours.rows.size, neighbours.column_blocks.size)).global[0];
   const std::size_t others = std::max(fan_range(context, neighbours).global[0], other_range(context, neighbours).global[0]);
-  return {context.allocate<float>(rows + others), context.allocate<float>(3)};
+  const std::size_t vertices = row_range(context, chunks(neighbours.vertex_count, kVertexChunk)).global[0];
+  return {context.allocate<float>(rows + others + vertices), context.allocate<float>(3)};
 }
 void sum_partials(ClContext& context, const DeviceSums& sums, std::size_t partials, int slot) {
   const std::size_t group = context.device().type == "cpu" ? 1 : context.work_group_size({kFile, "sum_partials", kFastSums}, 256);
@@ -55,17 +56,90 @@ std::size_t queue_operator(ClContext& context, const SurfaceOperator& surface, f
   return rows.global[0] + fans.global[0];
 }
 
+/// The values of a field at the vertices of the coarser lattice.
+DeviceField pick_vertices(ClContext& context, const DeviceCoarseLattice& coarse, int count, const DeviceField& field) {
+  DeviceField picked{field.components, context.allocate<float>(field.components * coarse.picks.size)};
+  context.launch({kFile, "pick_vertices"}, ClRange(coarse.picks.size), size(coarse.picks), field.components, count, coarse.picks, field.values,
+                 picked.values);
+  return picked;
+}
+
+/// The preconditioner on one lattice and those below it: solves along rows and along columns, and what the next level
+/// makes of the residual, added up. Symmetric and positive, whatever the levels are.
+class Preconditioner {
+ public:
+  Preconditioner(ClContext& context, const SurfaceOperator& surface, float time, const ClBuffer<float>& is_free, int components)
+      : context_(&context), surface_(&surface), is_free_(is_free), time_(time), components_(components), count_(surface.neighbours->vertex_count) {
+    const DeviceNeighbours& n = *surface.neighbours;
+    const auto plane = [&] { return context.allocate<float>(count_); };
+    row_pivots_ = plane(), row_below_ = plane(), row_last_ = plane(), column_pivots_ = plane(), column_below_ = plane();
+    context.launch({kFile, "factor_rows", kFastSums}, rows(), size(n.rows), time, n.rows, surface.weights, surface.mass, surface.stiffness, row_pivots_,
+                   row_below_, row_last_);
+    context.launch({kFile, "factor_columns", kFastSums}, columns(), size(n.column_blocks), count_, time, n.column_blocks, surface.weights, surface.mass,
+                   surface.stiffness, column_pivots_, column_below_);
+    between_ = context.allocate<float>(static_cast<std::size_t>(components) * count_);
+    if (!surface.coarser) return;
+    const DeviceCoarseLattice& coarse = *n.coarser;
+    const DeviceField free_below = pick_vertices(context, coarse, count_, {1, is_free});
+    coarser_ = std::make_unique<Preconditioner>(context, *surface.coarser, time, free_below.values, components);
+    coarse_r_ = context.allocate<float>(static_cast<std::size_t>(components) * coarse.picks.size);
+    coarse_z_ = context.allocate<float>(coarse_r_.size);
+  }
+
+  /// Queues z. \return the number of partial sums of r z
+  std::size_t queue(const ClBuffer<float>& r, const ClBuffer<float>& z, const ClBuffer<float>& partials) const {
+    const DeviceNeighbours& n = *surface_->neighbours;
+    if (coarser_) {
+      const DeviceCoarseLattice& coarse = *n.coarser;
+      context_->launch({kFile, "restrict_field", kFastSums}, ClRange(coarse.picks.size), size(coarse.picks), components_, count_, coarse.reader_begin,
+                       coarse.readers, coarse.reader_shares, r, coarse_r_);
+      coarser_->queue(coarse_r_, coarse_z_, partials);
+    }
+    context_->launch({kFile, "precondition_rows", kFastSums}, rows(), size(n.rows), components_, count_, n.rows, row_pivots_, row_below_, row_last_, r, z);
+    context_->launch({kFile, "precondition_columns", kFastSums}, columns(), size(n.column_blocks), components_, count_, n.column_blocks, column_pivots_,
+                     column_below_, is_free_, r, between_, z, partials);
+    std::size_t sums = columns().global[0];
+    context_->launch({kFile, "precondition_others", kFastSums}, other_range(*context_, n), n.inner_count, components_, count_, static_cast<int>(sums),
+                     time_, surface_->mass, surface_->stiffness, is_free_, r, z, partials);
+    sums += other_range(*context_, n).global[0];
+    if (coarser_) {
+      const DeviceCoarseLattice& coarse = *n.coarser;
+      const ClRange range = row_range(*context_, chunks(count_, kVertexChunk));
+      context_->launch({kFile, "add_coarse_field", kFastSums}, range, components_, count_, size(coarse.picks), static_cast<int>(sums), coarse.sources,
+                       coarse.shares, is_free_, coarse_z_, r, z, partials);
+      sums += range.global[0];
+    }
+    return sums;
+  }
+
+ private:
+  ClRange rows() const { return row_range(*context_, surface_->neighbours->rows.size); }
+  ClRange columns() const { return row_range(*context_, surface_->neighbours->column_blocks.size); }
+
+  ClContext* context_;
+  const SurfaceOperator* surface_;
+  ClBuffer<float> is_free_;
+  float time_;
+  int components_, count_;
+  ClBuffer<float> row_pivots_, row_below_, row_last_, column_pivots_, column_below_, between_;
+  std::unique_ptr<Preconditioner> coarser_;
+  ClBuffer<float> coarse_r_, coarse_z_;
+};
+
 }  // namespace
 
 SurfaceOperator make_surface_operator(ClContext& context, const DeviceNeighbours& neighbours, const DeviceField& points) {
   const std::size_t count = neighbours.vertex_count;
   SurfaceOperator surface{&neighbours, context.allocate<float>(4 * count), context.allocate<float>(2 * neighbours.fans.size),
-                          context.allocate<float>(count), context.allocate<float>(count)};
+                          context.allocate<float>(count), context.allocate<float>(count), nullptr};
   context.launch({kFile, "weigh_rows"}, row_range(context, neighbours.rows.size), size(neighbours.rows), neighbours.vertex_count, neighbours.rows,
                  points.values, surface.weights, surface.mass, surface.stiffness);
   context.launch({kFile, "weigh_fans"}, fan_range(context, neighbours), size(neighbours.fan_vertices), neighbours.inner_count, neighbours.vertex_count,
                  neighbours.fan_vertices, neighbours.fan_begin, neighbours.fans, points.values, surface.weights, surface.fan_weights, surface.mass,
                  surface.stiffness);
+  if (neighbours.coarser)
+    surface.coarser = std::make_shared<const SurfaceOperator>(
+        make_surface_operator(context, neighbours.coarser->neighbours, pick_vertices(context, *neighbours.coarser, neighbours.vertex_count, points)));
   return surface;
 }
 
@@ -87,25 +161,9 @@ SolveResult solve_diffusion(ClContext& context, const SurfaceOperator& surface, 
   SolveResult result{field(), {}};
   const DeviceField r = field(), p = field(), q = field(), z = field();
   const DeviceSums sums = allocate_sums(context, n);
-  const ClRange rows = row_range(context, n.rows.size), columns = row_range(context, n.column_blocks.size), others = other_range(context, n);
   const ClRange range = row_range(context, chunks(b.values.size, kVertexChunk));
-
-  const auto plane = [&] { return context.allocate<float>(count); };
-  const auto row_pivots = plane(), row_below = plane(), row_last = plane(), column_pivots = plane(), column_below = plane();
-  context.launch({kFile, "factor_rows", kFastSums}, rows, size(n.rows), time, n.rows, surface.weights, surface.mass, surface.stiffness, row_pivots,
-                 row_below, row_last);
-  context.launch({kFile, "factor_columns", kFastSums}, columns, size(n.column_blocks), count, time, n.column_blocks, surface.weights, surface.mass,
-                 surface.stiffness, column_pivots, column_below);
-  // q is free between the steps that use it.
-  const auto precondition = [&](int slot) {
-    context.launch({kFile, "precondition_rows", kFastSums}, rows, size(n.rows), b.components, count, n.rows, row_pivots, row_below, row_last, r.values,
-                   z.values);
-    context.launch({kFile, "precondition_columns", kFastSums}, columns, size(n.column_blocks), b.components, count, n.column_blocks, column_pivots,
-                   column_below, is_free, r.values, q.values, z.values, sums.partials);
-    context.launch({kFile, "precondition_others", kFastSums}, others, n.inner_count, b.components, count, static_cast<int>(columns.global[0]), time,
-                   surface.mass, surface.stiffness, is_free, r.values, z.values, sums.partials);
-    sum_partials(context, sums, columns.global[0] + others.global[0], slot);
-  };
+  const Preconditioner preconditioner(context, surface, time, is_free, b.components);
+  const auto precondition = [&](int slot) { sum_partials(context, sums, preconditioner.queue(r.values, z.values, sums.partials), slot); };
   const auto turn_direction = [&](int old_rz, int new_rz) {
     context.launch({kFile, "turn_direction", kFastSums}, range, values, old_rz, new_rz, sums.scalars, z.values, p.values);
   };

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -24,6 +25,7 @@ struct SurfaceOperator {
   ClBuffer<float> weights;      ///< four planes: see weigh_rows in kernels/filter.cl
   ClBuffer<float> fan_weights;  ///< two per triangle of the fans
   ClBuffer<float> mass, stiffness;
+  std::shared_ptr<const SurfaceOperator> coarser;  ///< on the neighbours' coarser lattice, where there is one
 };
 /// \param points  positions, three components
 SurfaceOperator make_surface_operator(ClContext& context, const DeviceNeighbours& neighbours, const DeviceField& points);
@@ -42,8 +44,8 @@ struct SolveResult {
 };
 /// Solves (M + time L) x = b where is_free is 1, with x = 0 elsewhere: by conjugate gradients on the device, in single
 /// precision. With b = M f, x is f diffused over distances of about sqrt(time).
-/// Cost: at 512 some 70 steps where sqrt(time) is 0.005 of the diagonal, in proportion to it and to the resolution. Rows
-/// and columns serve as preconditioners, so the density of rings at poles and of rows beside slanting seams counts little.
+/// Rows and columns of all levels serve as preconditioners: some 50 steps at 512, and half as many again at twice the
+/// size; the time and the density of rings at poles count for little.
 /// \param tolerance  of the residual
 /// \throw InputError when the weights are no finite numbers
 SolveResult solve_diffusion(ClContext& context, const SurfaceOperator& surface, float time, const ClBuffer<float>& is_free, const DeviceField& b,

@@ -4,8 +4,13 @@
 #include <algorithm>
 #include <numeric>
 
+#include "skeletex/edit/coarsen.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+
 namespace skeletex {
 namespace {
+
+constexpr int kSmallestLevel = 200;  // vertices
 
 /// Puts the pairs of one vertex in order: each begins where the one before ends. An open fan begins with the pair that
 /// none leads to, a closed one with the smallest vertex.
@@ -62,7 +67,34 @@ DeviceNeighbours upload_neighbours(ClContext& context, const Neighbours& neighbo
     for (int column = 0; column < width; column += kColumnsPerBlock) blocks.push_back({first + column, std::min(kColumnsPerBlock, width - column), width, rows});
   }
   return {context.upload(neighbours.rows),  context.upload(blocks),  context.upload(neighbours.fan_vertices), context.upload(neighbours.fan_begin),
-          context.upload(neighbours.fans), neighbours.inner_count, neighbours.vertex_count};
+          context.upload(neighbours.fans), neighbours.inner_count, neighbours.vertex_count, nullptr};
+}
+
+std::shared_ptr<const DeviceCoarseLattice> upload_coarser(ClContext& context, const SkeletexModel& model, const Lattice& lattice,
+                                                          const std::vector<Vec3>& positions) {
+  const CoarseLattice coarse = coarsen(model, lattice, positions);
+  const int fine_count = lattice.vertex_count, count = coarse.lattice.vertex_count;
+  if (count > 0.6 * fine_count || count < kSmallestLevel) return nullptr;
+  std::vector<int> begin(count + 1, 0);
+  for (int v = 0; v < fine_count; ++v)
+    for (int i = 0; i < 4; ++i)
+      if (coarse.shares[v][i] > 0) ++begin[coarse.sources[v][i] + 1];
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  std::vector<int> readers(begin.back()), next(begin.begin(), begin.end() - 1);
+  std::vector<float> shares(begin.back());
+  for (int v = 0; v < fine_count; ++v)
+    for (int i = 0; i < 4; ++i)
+      if (coarse.shares[v][i] > 0) {
+        const int at = next[coarse.sources[v][i]]++;
+        readers[at] = v;
+        shares[at] = coarse.shares[v][i];
+      }
+  DeviceNeighbours neighbours =
+      upload_neighbours(context, find_neighbours(coarse.model, coarse.lattice, end_triangles(coarse.model, coarse.lattice, coarse.positions)));
+  neighbours.coarser = upload_coarser(context, coarse.model, coarse.lattice, coarse.positions);
+  return std::make_shared<const DeviceCoarseLattice>(DeviceCoarseLattice{std::move(neighbours), context.upload(coarse.picks), context.upload(coarse.sources),
+                                                                         context.upload(coarse.shares), context.upload(begin), context.upload(readers),
+                                                                         context.upload(shares)});
 }
 
 }  // namespace skeletex

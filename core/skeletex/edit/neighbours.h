@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <array>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -29,6 +30,8 @@ struct Neighbours {
 /// \param end_triangles  those of reconstruct_mesh.h: fans and strips
 Neighbours find_neighbours(const SkeletexModel& model, const Lattice& lattice, std::span<const Triangle> end_triangles);
 
+struct DeviceCoarseLattice;
+
 /// The table on the device; see kernels/filter.cl.
 struct DeviceNeighbours {
   ClBuffer<std::array<int, 4>> rows;
@@ -36,7 +39,23 @@ struct DeviceNeighbours {
   ClBuffer<int> fan_vertices, fan_begin;
   ClBuffer<std::array<int, 2>> fans;
   int inner_count = 0, vertex_count = 0;
+  std::shared_ptr<const DeviceCoarseLattice> coarser;  ///< for solvers; may be missing
 };
+
+/// The next level of a solver's lattice (coarsen.h): its own neighbours, and how values pass between the two.
+struct DeviceCoarseLattice {
+  DeviceNeighbours neighbours;
+  ClBuffer<int> picks;
+  ClBuffer<std::array<int, 4>> sources;
+  ClBuffer<std::array<float, 4>> shares;
+  /// The transpose: per vertex of the coarse lattice the finer ones that read it, with their shares.
+  ClBuffer<int> reader_begin, readers;
+  ClBuffer<float> reader_shares;
+};
+/// Levels from a model's lattice down to some hundred vertices.
+std::shared_ptr<const DeviceCoarseLattice> upload_coarser(ClContext& context, const SkeletexModel& model, const Lattice& lattice,
+                                                          const std::vector<Vec3>& positions);
+
 DeviceNeighbours upload_neighbours(ClContext& context, const Neighbours& neighbours);
 
 }  // namespace skeletex
