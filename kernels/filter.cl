@@ -219,7 +219,7 @@ __kernel void sum_partials(const int partial_count, const int slot, __global con
   result[slot] = sum;
 }
 
-// Conjugate gradients. The preconditioner is 1 / R + 1 / C: R takes the matrix's part along each row, periodic and
+// Conjugate gradients. On one lattice the preconditioner is 1 / R + 1 / C: R takes the matrix's part along each row, periodic and
 // tridiagonal, C that along each column of inner rows, tridiagonal; for the other vertices both take its diagonal. So
 // neither dense rings around a pole nor rows that a slanting seam presses together count, which the diagonal alone would
 // need many steps for. Where a diagonal does not outweigh its neighbours it is raised until it does, so both are positive.
