@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "command.h"
 #include "progress_bar.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/pose_file.h"
+#include "skeletex/model/error.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 
@@ -19,9 +22,21 @@ namespace {
 struct Arguments {
   std::string model, output, pose, device, json;
   int size = 0, level = 0;
-  std::optional<double> time;
+  std::optional<double> time, constant_offset;  ///< the offset in diagonals
+  std::vector<std::string> bones;
   bool is_distance_dropped = false;
 };
+
+std::vector<int> bones_by_name(const SkeletexModel& model, const std::vector<std::string>& names) {
+  std::vector<int> result;
+  for (const std::string& name : names) {
+    const auto& bones = model.skeleton.bones;
+    const auto found = std::find_if(bones.begin(), bones.end(), [&](const Bone& bone) { return bone.name == name; });
+    if (found == bones.end()) throw InputError(fmt::format("the skeleton has no bone \"{}\"; `skeletex inspect` lists them", name));
+    result.push_back(static_cast<int>(found - bones.begin()));
+  }
+  return result;
+}
 
 void run(const Arguments& arguments) {
   check_output(arguments.output);
@@ -46,8 +61,13 @@ void run(const Arguments& arguments) {
     }
     resample_ms = watch.lap_ms();
     bar.show("reconstructing", 0.3);
-    mesh = posed ? reconstruct_mesh(context, model, *posed, arguments.is_distance_dropped ? DistanceRule::kFromFoot : DistanceRule::kFromBone)
-                 : reconstruct_mesh(context, model);
+    const DistanceRule rule = arguments.is_distance_dropped ? DistanceRule::kFromFoot : DistanceRule::kFromBone;
+    if (arguments.constant_offset) {
+      const Skeleton& skeleton = posed ? *posed : model.skeleton;
+      mesh = constant_offset_mesh(context, model, skeleton, bones_by_name(model, arguments.bones), *arguments.constant_offset * model.diagonal, rule);
+    } else {
+      mesh = posed ? reconstruct_mesh(context, model, *posed, rule) : reconstruct_mesh(context, model);
+    }
     reconstruct_ms = watch.lap_ms();
     bar.show("writing", 0.7);
     write_mesh(arguments.output, mesh);
@@ -89,6 +109,13 @@ void add_reconstruct_command(CLI::App& program) {
   CLI::Option* pose = command.add_option("--pose", arguments->pose, "pose or animation: .json")->type_name("FILE");
   command.add_option("--time", arguments->time, "time in the animation (default: its first frame)")->type_name("T")->needs(pose);
   command.add_flag("--no-distance", arguments->is_distance_dropped, "do not restore the distances to the bones in the pose")->needs(pose);
+  CLI::Option* offset = command
+                            .add_option("--constant-offset", arguments->constant_offset,
+                                        "instead of the surface the plane of bone tangent space that lies so far out: a tube around every bone, "
+                                        "in diagonals, above 0 and up to 1")
+                            ->check(CLI::Range(1e-6, 1.0).description(""))
+                            ->type_name("W");
+  command.add_option("--bones", arguments->bones, "the plane around these bones only (names with commas between them)")->delimiter(',')->type_name("NAMES")->needs(offset);
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(
@@ -96,6 +123,7 @@ void add_reconstruct_command(CLI::App& program) {
       "  skeletex reconstruct bear.skx.exr -o bear.ply\n"
       "  skeletex reconstruct bear.skx.exr -o draft.obj --size 64\n"
       "  skeletex reconstruct bear.skx.exr -o waving.ply --pose wave.json --time 0.5\n"
+      "  skeletex reconstruct bear.skx.exr -o tubes.ply --pose wave.json --constant-offset 0.05\n"
       "The mesh is closed, oriented, 2-manifold and of the input's genus at every size and in every pose. Coordinates are in the input mesh's units.");
   command.callback([arguments] { run(*arguments); });
 }

@@ -28,6 +28,16 @@ def fig05_06_methods(results, folder):
     return made
 
 
+def fig07_tangent_space(results, folder):
+    rows = style.rows(results, "tangent_space")
+    if not rows:
+        return []
+    times = sorted(style.unique(row["parameters"]["time"] for row in rows))
+    model = rows[0]["model"]
+    titles = ["bind pose" if time == 0 else f"pose {time:g}" for time in times]
+    return [style.sheet(results, "tangent_space", [[f"{model}-{time}.png" for time in times]], titles, None, folder, "fig07_tangent_space", cell=2.8)]
+
+
 def fig10_distance(results, folder):
     rows = style.rows(results, "distance")
     if not rows:
@@ -82,3 +92,13 @@ def fig17_transfer(results, folder):
     cases = style.unique(row["parameters"]["case"] for row in rows)
     blends = style.unique(row["parameters"]["blend"] for row in rows)
     return [style.sheet(results, "transfer", [[f"{case}-{blend}.png" for blend in blends] for case in cases], blends, cases, folder, "fig17_19_transfer", cell=3.2)]
+
+
+def fig20_animation(results, folder):
+    rows = style.rows(results, "animation")
+    if not rows:
+        return []
+    names = style.unique(row["parameters"]["animation"] for row in rows)
+    times = sorted(style.unique(row["parameters"]["time"] for row in rows))
+    titles = [f"t = {time:g}" for time in times[:-1]] + ["too far"]
+    return [style.sheet(results, "animation", [[f"{name}-{time}.png" for time in times] for name in names], titles, names, folder, "fig20_animation", cell=2.4)]

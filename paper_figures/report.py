@@ -21,6 +21,8 @@ SECTIONS = [
      "Other models than the paper's, whose data were not published. Every texel is used; the paper's textures leave blank patches."),
     ("Figures 5 and 6: SPD, VSM, hybrid", "methods", pictures.fig05_06_methods,
      "SPD loses what the rays from the bone do not see (inside of the ears); VSM keeps all of the surface; hybrid takes SPD where it sees enough."),
+    ("Figure 7: bone tangent space", "tangent_space", pictures.fig07_tangent_space,
+     "The plane of texels (0, 0, w), w = 0.03 of the diagonal, in the bind pose and three others: everywhere as far from the bones, mitred where they meet."),
     ("Figure 10: distance restoration", "distance", pictures.fig10_distance,
      "The same pose, without and with the distances to the bones restored (paper 3.6.1): look at the arms and at the head beside the turned ear."),
     ("Figure 12: skeletons with cycles", "cyclic", pictures.fig12_cyclic, "Genus and closedness are measured on the reconstruction."),
@@ -32,6 +34,9 @@ SECTIONS = [
      "Texels and skeletons interpolated, bones matched by the skeletons' graphs alone. Every in-between model is closed; the distortion of the map is in the numbers."),
     ("Figures 17 to 19: transfer", "transfer", pictures.fig17_transfer,
      "Texels of chosen bones replaced by those of another model, scaled to the target's bones; the target's seams stay. Without blending the seam shows."),
+    ("Figure 20: animation", "animation", pictures.fig20_animation,
+     "Poses interpolated between key frames, and a pose that turns bones by 80 to 120 degrees. Closed in all of them; creases at the seams are those of a C0 surface, "
+     "and folds grow with the thickness of the body (shoulders of the armadillo)."),
     ("Beyond the paper: iterations of VSM", "iterations", sweeps.draw_iterations,
      "The paper's weights w A even out areas in the texture; divided by a power of the surface area they even out the texels on the surface."),
     ("Beyond the paper: what the recipe's parts bring", "recipe", sweeps.draw_recipe, "The paper's own recipe, the default, and the default with one part taken back."),

@@ -236,6 +236,27 @@ TEST_F(Program, ReconstructsInPosesAndAnimations) {
   for (const char* name : {"pose.json", "animation.json", "bind.ply", "posed.ply", "again.ply"}) fs::remove(folder_ / name);
 }
 
+TEST_F(Program, ReconstructsAPlaneOfTangentSpace) {
+  const Skeleton skeleton = read_skeleton(folder_ / "y.skeleton.json");
+  const nlohmann::json whole = json_of({"inspect", "y.skx.exr"});
+  const double diagonal = whole["diagonal"];
+  ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "plane.ply", "--constant-offset", "0.05"}).code, 0);
+  for (const Vec3& p : read_mesh(folder_ / "plane.ply").mesh.positions) {
+    double nearest = 1e300;
+    for (const Bone& bone : skeleton.bones)
+      nearest = std::min(nearest, distance_to_bone(p, skeleton.nodes[bone.head].position, skeleton.nodes[bone.tail].position));
+    ASSERT_LT(nearest, 0.05 * diagonal * (1 + 1e-4));
+  }
+  const std::string bone = skeleton.bones[0].name;
+  ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "one.ply", "--constant-offset", "0.05", "--bones", bone}).code, 0);
+  for (const Vec3& p : read_mesh(folder_ / "one.ply").mesh.positions)
+    ASSERT_NEAR(distance_to_bone(p, skeleton.nodes[skeleton.bones[0].head].position, skeleton.nodes[skeleton.bones[0].tail].position), 0.05 * diagonal, 1e-4 * diagonal);
+  expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--constant-offset", "0.05", "--bones", "nobody"}, {"no bone \"nobody\""});
+  expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--bones", bone}, {"--constant-offset"});
+  expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--constant-offset", "0"}, {"--constant-offset"});
+  for (const char* name : {"plane.ply", "one.ply"}) fs::remove(folder_ / name);
+}
+
 TEST_F(Program, FiltersModelsAndReportsWhatTheContractNames) {
   for (const std::string filter : {"smooth", "enhance", "noise"}) {
     const Outcome outcome = run({"filter", "y.skx.exr", filter, "-o", filter + ".skx.exr", "--bones", y_shape().skeleton.bones[0].name, "--json", "-"});
