@@ -60,6 +60,7 @@ int run(int argc, char** argv) {
   add_segment_command(program);
   add_validate_command(program);
   add_inspect_command(program);
+  add_bench_command(program);
   add_run_command(program);
   add_replay_command(program);
   add_devices_command(program);

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The paper's figures that are pictures: tables of what the experiments rendered, with their numbers."""
+import textwrap
+
 import style
 
 
@@ -102,3 +104,21 @@ def fig20_animation(results, folder):
     times = sorted(style.unique(row["parameters"]["time"] for row in rows))
     titles = [f"t = {time:g}" for time in times[:-1]] + ["too far"]
     return [style.sheet(results, "animation", [[f"{name}-{time}.png" for time in times] for name in names], titles, names, folder, "fig20_animation", cell=2.4)]
+
+
+def fig19_limits(results, folder):
+    rows = style.rows(results, "limits")
+    if not rows:
+        return []
+    messages = ["\n".join(textwrap.wrap(row["columns"]["message"], 60)) for row in rows]
+    return [style.sheet(results, "limits", [[f"{model}.png" for model in _models(rows)]], messages, None, folder, "fig19_limits", cell=4.2)]
+
+
+def fig19_morph_methods(results, folder):
+    rows = style.rows(results, "morph_methods")
+    if not rows:
+        return []
+    pairs = style.unique(row["parameters"]["pair"] for row in rows)
+    methods = style.unique(row["parameters"]["method"] for row in rows)
+    return [style.sheet(results, "morph_methods", [[f"{pair}-{method}.png" for method in methods] for pair in pairs], [method.upper() for method in methods], pairs, folder,
+                        "fig19_morph_methods", cell=3.4)]

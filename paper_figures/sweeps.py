@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Beyond the paper: iterations of VSM and the area exponent against error; the paper's recipe against the default; levels of
-detail (Figure 13) against error."""
+"""Beyond the paper: iterations of VSM and the area exponent against error; the paper's recipe against the default; error
+beside other ways to as many vertices; error against bytes."""
 import style
 from style import plt
 
@@ -48,3 +48,46 @@ def draw_recipe(results, folder):
     axes[0][-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
     figure.tight_layout()
     return [style.save(figure, folder, "recipe")]
+
+
+def draw_simplification(results, folder):
+    rows = style.rows(results, "simplification")
+    if not rows:
+        return []
+    models = style.unique(row["model"] for row in rows)
+    ways = [("", "vertices", "texture"), ("simplified_", "simplified_vertices", "quadric simplification (meshoptimizer)"), ("remeshed_", "remeshed_vertices", "isotropic remesh (CGAL)")]
+    figure, axes = plt.subplots(1, len(models), figsize=(3.4 * len(models) + 1, 3.0), sharey=True, squeeze=False)
+    for j, model in enumerate(models):
+        some = sorted((row["columns"] for row in rows if row["model"] == model), key=lambda columns: columns["vertices"])
+        for k, (prefix, count, label) in enumerate(ways):
+            colour, marker, dash = style.SERIES[k]
+            axes[0][j].loglog([columns[count] for columns in some], [(columns[prefix + "forward_mean"] + columns[prefix + "backward_mean"]) / 2 for columns in some], marker=marker,
+                              linestyle=dash, color=colour, markersize=4, label=label)
+        axes[0][j].set_title(model)
+        axes[0][j].set_xlabel("vertices")
+    axes[0][0].set_ylabel("symmetric mean / diagonal")
+    axes[0][-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+    figure.tight_layout()
+    return [style.save(figure, folder, "simplification")]
+
+
+def draw_bytes(results, folder):
+    rows = style.rows(results, "bytes")
+    if not rows:
+        return []
+    draco = style.rows(results, "draco") or []
+    models = style.unique(row["model"] for row in rows)
+    figure, axes = plt.subplots(1, len(models), figsize=(3.2 * len(models) + 1, 3.0), sharey=True, squeeze=False)
+    for j, model in enumerate(models):
+        series = [(name, [row for row in rows if row["model"] == model and row["parameters"]["format"] == name]) for name in style.unique(row["parameters"]["format"] for row in rows)]
+        series.append(("the mesh itself by Draco, 8 to 16 bits", [row for row in draco if row["model"] == model]))
+        for k, (label, some) in enumerate(series):
+            colour, marker, dash = style.SERIES[k]
+            points = sorted((row["columns"]["bytes"], style.symmetric(row["columns"])) for row in some)
+            axes[0][j].loglog([x for x, _ in points], [y for _, y in points], marker=marker, linestyle=dash, color=colour, markersize=4, label=label)
+        axes[0][j].set_title(model)
+        axes[0][j].set_xlabel("bytes")
+    axes[0][0].set_ylabel("symmetric mean / diagonal")
+    axes[0][-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+    figure.tight_layout()
+    return [style.save(figure, folder, "bytes")]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Table 1: preprocessing times, median and spread of the repeats (the first one, which warms up, is left out), beside the
-paper's."""
+paper's; and frames per second."""
 import statistics
 
 import style
@@ -17,17 +17,32 @@ def paper_table():
 
 
 def table(results):
-    rows = style.rows(results, "times")
+    """Models as they are, then the copies that are decimated to the paper's numbers of vertices."""
+    rows = [(row["model"], row) for row in style.rows(results, "times") or []] + [(row["parameters"]["copy"], row) for row in style.rows(results, "times_decimated") or []]
     if not rows:
         return None
     head = ["model", "vertices", "half edges (t_OM)", "segmentation (t_S)", "parameterization (t_P)", "encoding", "altogether", "repeats"]
     lines = []
-    for model in style.unique(row["model"] for row in rows):
-        some = [row["columns"] for row in rows if row["model"] == model and row["parameters"]["repeat"] > 0]
+    for model in style.unique(name for name, _ in rows):
+        some = [row["columns"] for name, row in rows if name == model and row["parameters"]["repeat"] > 0]
         if not some:
             continue
         cells = [model, str(some[0]["vertices"])]
         for values in [[columns[stage] for columns in some] for stage in STAGES] + [[sum(columns[stage] for stage in STAGES) for columns in some]]:
             cells.append(f"{statistics.median(values):.0f} ms ({min(values):.0f} to {max(values):.0f})")
         lines.append(cells + [str(len(some))])
+    return head, lines
+
+
+def frames_table(results):
+    rows = style.rows(results, "frames")
+    if not rows:
+        return None
+    head = ["models", "stage", "frames per second", "frame", "of it on the device", "a device copy of the same bytes"]
+    lines = []
+    for row in rows:
+        columns = row["columns"]
+        for stage in ("reconstruct", "pose", "morph"):
+            frame = columns[f"{stage}_frame_ms"]
+            lines.append([row["parameters"]["pair"], stage, f"{1000 / frame:.0f}", f"{frame:.1f} ms", f"{columns[f'{stage}_device_ms']:.1f} ms", f"{columns[f'{stage}_copy_ms']:.1f} ms"])
     return head, lines

@@ -13,6 +13,8 @@ packages=(
   libcli11-dev libspdlog-dev                                         # program
   libgtest-dev libembree-dev openexr                                 # tests (metro against Embree, models against exrheader)
   libbenchmark-dev python3 python3-matplotlib                                           # benchmarks, tables of the experiments
+  libmeshoptimizer-dev libcgal-dev draco                                                # what the experiments compare with
+  chromium                                                                              # test: the report in a browser
 )
 
 as_root() {

@@ -545,6 +545,24 @@ TEST_F(Program, MorphsToModelsAndMeshes) {
   for (const char* name : {"half.skx.exr", "half.ply"}) fs::remove(folder_ / name);
 }
 
+TEST_F(Program, TimesFramesAndReportsWhatTheContractNames) {
+  const nlohmann::json one = json_of({"bench", "y.skx.exr", "--repeats", "3"});
+  ASSERT_EQ(one.size(), 2u);
+  const nlohmann::json two = json_of({"bench", "y.skx.exr", "y.skx.exr", "--size", "96", "--repeats", "3"});
+  ASSERT_EQ(two.size(), 3u);
+  const char* stages[] = {"reconstruct", "pose", "morph"};
+  for (int i = 0; i < 3; ++i) {
+    expect_keys(two[i], {"stage", "model", "size", "ms", "reference", "reference_ms", "ratio", "wall_ms", "frames_per_second", "device"});
+    EXPECT_EQ(two[i]["stage"], stages[i]);
+    EXPECT_EQ(two[i]["size"], 96);
+    EXPECT_GT(two[i]["ms"], 0);
+    EXPECT_GE(two[i]["wall_ms"], two[i]["ms"]) << "a frame holds its kernels";
+    EXPECT_NEAR(two[i]["ratio"].get<double>() * two[i]["reference_ms"].get<double>(), two[i]["ms"].get<double>(), 1e-9);
+  }
+  expect_refused(2, {"bench", "y.skx.exr", "y.skx.exr", "y.skx.exr"}, {"one model, or two"});
+  expect_refused(1, {"bench", "y.ply"}, {"y.ply"});
+}
+
 TEST_F(Program, RefusesOutputsThatCannotBeWrittenAndLeavesNothingBehind) {
   expect_refused(1, {"encode", "y.ply", "y.skeleton.json", "-o", "no/such/folder/a.skx.exr"}, {"no/such/folder"});
   expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "."}, {"."});

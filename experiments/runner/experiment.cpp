@@ -16,7 +16,7 @@ namespace skeletex {
 namespace {
 
 const std::vector<std::string> kKeys{"name", "title", "paper", "models", "sweep", "steps", "columns", "quick", "$schema"};
-const std::vector<std::string> kStepKeys{"name", "run", "tool", "file_sizes"};
+const std::vector<std::string> kStepKeys{"name", "run", "tool", "exit_code", "file_sizes"};
 const std::vector<std::string> kValueKeys{"label", "arguments", "values"};
 const std::vector<std::string> kModelKeys{"name", "mesh", "skeleton", "credits", "view"};
 
@@ -172,7 +172,11 @@ Experiment read_experiment(const std::filesystem::path& path, const ExperimentCh
   for (const OrderedJson& entry : json.at("steps")) {
     const std::string place = fmt::format("{}: step {}", where, experiment.steps.size() + 1);
     check_keys(entry, kStepKeys, place);
-    Step step{text_of(entry, "name", place), {}, text_of(entry, "tool", place, ""), {}};
+    Step step{text_of(entry, "name", place), {}, text_of(entry, "tool", place, ""), 0, {}};
+    if (entry.contains("exit_code")) {
+      if (!entry.at("exit_code").is_number_integer()) throw IoError(place + ": \"exit_code\" must be a whole number");
+      step.exit_code = entry.at("exit_code").get<int>();
+    }
     if (!entry.contains("run")) throw IoError(place + ": \"run\" is missing");
     step.run = texts_of(entry.at("run"), place + ": \"run\"");
     if (entry.contains("file_sizes")) step.file_sizes = dictionary_of(entry.at("file_sizes"), place + ": \"file_sizes\"");

@@ -27,7 +27,8 @@ struct SweepParameter {
 struct Step {
   std::string name;
   std::vector<std::string> run;
-  std::string tool;  ///< another program instead of this one; it has no --json
+  std::string tool;   ///< another program instead of this one: beside it, or on the PATH; it gets no --json
+  int exit_code = 0;  ///< with which it is to end
   std::map<std::string, std::string> file_sizes;  ///< result name -> file whose bytes are counted
 };
 

@@ -79,6 +79,12 @@ OrderedJson signature_of(const Experiment& experiment, const Item& item, const s
   return {{"commands", commands}, {"inputs", inputs}};
 }
 
+std::string program_of(const Step& step, const RunOptions& options) {
+  if (step.tool.empty()) return options.program;
+  const fs::path beside = fs::path(options.program).parent_path() / step.tool;
+  return fs::is_regular_file(beside) ? beside.string() : step.tool;
+}
+
 OrderedJson run_item(const Experiment& experiment, const Item& item, const RunOptions& options, const OrderedJson& signature,
                      const std::map<std::string, std::string>& environment) {
   const WorkFolder work;
@@ -107,16 +113,18 @@ OrderedJson run_item(const Experiment& experiment, const Item& item, const RunOp
     ProcessResult process;
     std::string reason;
     try {
-      process = run_process(step.tool.empty() ? options.program : step.tool, arguments, environment, work.path() / "errors.txt");
-      if (process.exit_code != 0)
+      process = run_process(program_of(step, options), arguments, environment, work.path() / "errors.txt");
+      if (process.exit_code != step.exit_code)
         reason = process.exit_code > 128 ? fmt::format("ended by signal {}", process.exit_code - 128) : process.errors.empty() ? fmt::format("exit code {}", process.exit_code) : process.errors;
     } catch (const Error& error) {
       reason = error.what();
     }
     seconds += process.seconds;
     peak = std::max(peak, process.peak_memory_mb);
-    steps[step.name] = read_json_file(report).value_or(OrderedJson::object());
+    OrderedJson reported = read_json_file(report).value_or(OrderedJson::object());
+    steps[step.name] = reported.is_object() ? std::move(reported) : OrderedJson{{"result", std::move(reported)}};
     steps[step.name]["process"] = {{"seconds", process.seconds}, {"peak_memory_mb", process.peak_memory_mb}};
+    if (step.exit_code != 0) steps[step.name]["process"]["errors"] = process.errors;
     if (!reason.empty()) {
       result["status"] = "failed";
       result["failed_step"] = step.name;
@@ -180,7 +188,7 @@ OrderedJson experiment_json(const Experiment& experiment) {
     json["sweep"][parameter.name] = OrderedJson::array();
     for (const SweepValue& value : parameter.values) json["sweep"][parameter.name].push_back({{"label", value.label}, {"arguments", value.arguments}, {"values", value.values}});
   }
-  for (const Step& step : experiment.steps) json["steps"].push_back({{"name", step.name}, {"run", step.run}, {"tool", step.tool}, {"file_sizes", step.file_sizes}});
+  for (const Step& step : experiment.steps) json["steps"].push_back({{"name", step.name}, {"run", step.run}, {"tool", step.tool}, {"exit_code", step.exit_code}, {"file_sizes", step.file_sizes}});
   for (const auto& [column, place] : experiment.columns) json["columns"][column] = place;
   return json;
 }

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+#include "simplify.h"
+#include "skeletex/io/atomic_file.h"
+#include "skeletex/io/mesh_file.h"
+#include "skeletex/measure/manifold.h"
+#include "skeletex/model/error.h"
+
+namespace {
+
+struct Arguments {
+  std::string method, mesh, output, like, json;
+  int vertices = 0;
+};
+
+void run(const Arguments& arguments) {
+  using namespace skeletex;
+  const TriangleMesh mesh = read_mesh(arguments.mesh).mesh;
+  const ManifoldReport report = measure_manifold(mesh);
+  if (!report.is_closed_manifold()) throw InputError(arguments.mesh + ": not a closed manifold; skeletex validate says where");
+  const int present = static_cast<int>(mesh.positions.size());
+  const int wanted = !arguments.like.empty() ? static_cast<int>(read_mesh(arguments.like).mesh.positions.size()) : arguments.vertices > 0 ? arguments.vertices : present;
+  if (arguments.method != "remesh" && wanted > present)
+    throw InputError(fmt::format("{} has {} vertices, {} cannot make {}", arguments.mesh, present, arguments.method, wanted));
+  const auto begin = std::chrono::steady_clock::now();
+  const TriangleMesh result = arguments.method == "decimate"   ? decimate(mesh, wanted)
+                              : arguments.method == "simplify" ? simplify(mesh, wanted)
+                              : arguments.method == "remesh"   ? remesh(mesh, wanted)
+                                                               : mesh;
+  const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  write_mesh(arguments.output, result);
+  const nlohmann::ordered_json json{{"vertices", result.positions.size()}, {"triangles", result.triangles.size()}, {"ms", ms},
+                                    {"closed_manifold", measure_manifold(result).is_closed_manifold()}};
+  if (!arguments.json.empty()) write_text_atomically(arguments.json, json.dump(2) + "\n");
+  fmt::print("{} vertices, {} triangles, {:.0f} ms: {}\n", result.positions.size(), result.triangles.size(), ms, arguments.output);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App program("Meshes with a given number of vertices by other libraries, for comparison with reconstructions.", "peers");
+  Arguments arguments;
+  program.add_option("METHOD", arguments.method, "decimate (OpenMesh, quadrics), simplify (meshoptimizer, quadrics), remesh (CGAL, isotropic) or copy (as it is)")
+      ->required()
+      ->check(CLI::IsMember({"decimate", "simplify", "remesh", "copy"}));
+  program.add_option("MESH", arguments.mesh, "closed triangle mesh")->required();
+  program.add_option("-o,--output", arguments.output, "the result: .ply or .obj")->required();
+  CLI::Option* vertices = program.add_option("--vertices", arguments.vertices, "how many vertices (default: as many as there are)")->check(CLI::Range(4, 100000000));
+  program.add_option("--like", arguments.like, "as many vertices as this mesh has")->excludes(vertices);
+  program.add_option("--json", arguments.json, "write vertices, triangles, ms, closed_manifold to this file");
+  try {
+    program.parse(argc, argv);
+    run(arguments);
+  } catch (const CLI::ParseError& error) {
+    return program.exit(error) == 0 ? 0 : 2;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "error: {}\n", error.what());
+    return 1;
+  }
+}
