@@ -4,8 +4,11 @@
 // in   lattice_rows: the rows to do, four ints each: patch, row, two unused (see reconstruct.cl)
 //      patches, rows: the result's. sources: per source and patch [source * patch_count + patch]
 //      source_rows: per source and row to do [source * row_count + k]
-//      columns: two planes of column_count floats behind each other: the source's column that a column of the result
-//      reads at the bone's head and at its tail, in between linearly by the foot's station; any lift, the patch is periodic
+//      columns: three planes of column_count floats behind each other: the source's column that a column of the result
+//      reads at the bone's head and at its tail, any lift, the patch is periodic; in between along the curve that poses take
+//      (EASED in pose.cl). Then by how much more the source's slope grows from head to tail than the result's: texels are
+//      turned as if that, too, changed along the curve, so that what differs at one end does not break the surface at the other.
+//      result_columns: four floats per column of the result (ColumnRecord)
 //      in_along, in_around, in_out: texels of all sources
 // out  along, around, out: the result's texture, texture_width columns
 // NDRange: one work-group per row, of any size; work-items take columns in turn (see reconstruct.cl). A column of the
@@ -18,6 +21,7 @@ __kernel void blend_texels(const int row_count, const int source_count, const in
                            __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
                            __global const RowRecord* restrict rows, __global const BlendSource* restrict sources,
                            __global const BlendRow* restrict source_rows, __global const float* restrict columns,
+                           __global const ColumnRecord* restrict result_columns,
                            __global const float* restrict in_along, __global const float* restrict in_around,
                            __global const float* restrict in_out, __global float* restrict along, __global float* restrict around,
                            __global float* restrict out) {
@@ -28,6 +32,8 @@ __kernel void blend_texels(const int row_count, const int source_count, const in
   const int width = patch->width;
   const int texel = (patch->y + row) * texture_width + patch->x;
   const float station = rows[patch->row_begin + row].station;
+  const float eased = station * station * (3.0f - 2.0f * station), ahead = station - eased;
+  __global const ColumnRecord* restrict slopes = result_columns + patch->column_begin;
   const int first = get_local_id(0), step = get_local_size(0);
 
   for (int i = 0; i < source_count; ++i) {
@@ -42,9 +48,10 @@ __kernel void blend_texels(const int row_count, const int source_count, const in
     const int begin = source->begin + below * stride;
     __global const float* restrict head_columns = columns + source->column_begin;
     __global const float* restrict tail_columns = head_columns + column_count;
+    __global const float* restrict slope_growths = tail_columns + column_count;
 
     for (int j = first; j < width; j += step) {
-      const float lifted = head_columns[j] + station * (tail_columns[j] - head_columns[j]);
+      const float lifted = head_columns[j] + eased * (tail_columns[j] - head_columns[j]);
       const float column = lifted - period * floor(lifted * frequency);
       const int left_any = (int)column;
       const float right_share = column - (float)left_any;
@@ -53,9 +60,15 @@ __kernel void blend_texels(const int row_count, const int source_count, const in
       const float left_share = 1.0f - right_share;
       const float w00 = w_below * left_share, w01 = w_below * right_share, w10 = w_above * left_share, w11 = w_above * right_share;
       const int a = begin + left, b = begin + right, c = a + stride, d = b + stride;
-      const float read_along = sign * (w00 * in_along[a] + w01 * in_along[b] + w10 * in_along[c] + w11 * in_along[d]);
+      const float a_sum = sign * (w00 * in_along[a] + w01 * in_along[b] + w10 * in_along[c] + w11 * in_along[d]);
       const float read_around = sign * (w00 * in_around[a] + w01 * in_around[b] + w10 * in_around[c] + w11 * in_around[d]);
-      const float read_out = w00 * in_out[a] + w01 * in_out[b] + w10 * in_out[c] + w11 * in_out[d];
+      const float o_sum = w00 * in_out[a] + w01 * in_out[b] + w10 * in_out[c] + w11 * in_out[d];
+      // From the frame of slope k to that of `slope`: the angle between (1, k) and (1, slope).
+      const float slope = slopes[j].slope_head + station * (slopes[j].slope_tail - slopes[j].slope_head);
+      const float change = ahead * slope_growths[j], k = slope + change;
+      const float inverse = 1.0f / sqrt((1.0f + slope * slope) * (1.0f + k * k));
+      const float cosine = change == 0.0f ? 1.0f : (1.0f + slope * k) * inverse, sine = change * inverse;
+      const float read_along = cosine * a_sum + sine * o_sum, read_out = cosine * o_sum - sine * a_sum;
       along[texel + j] = i == 0 ? read_along : along[texel + j] + read_along;
       around[texel + j] = i == 0 ? read_around : around[texel + j] + read_around;
       out[texel + j] = i == 0 ? read_out : out[texel + j] + read_out;

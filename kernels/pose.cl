@@ -24,6 +24,10 @@
     cosine = 1.0f - 2.0f * half_sine * half_sine;                                                                                        \
   }
 
+// Rolls and what a pose changes in slopes go from end to end along this curve, not straight: what changes at one end is felt
+// at the other only to second order, so the surface stays smooth there. Slope: the bind pose's, linear, and the change.
+#define EASED(station) ((station) * (station) * (3.0f - 2.0f * (station)))
+
 // Rows whose capsule is the bone's own. The texel's length is its distance from the bone; see displace for the rest.
 __kernel void displace_posed(const int row_count, const int texture_width, const int column_count, __global const int* restrict lattice_rows,
                              __global const RowRecord* restrict rows, __global const float* restrict bind_columns,
@@ -42,9 +46,12 @@ __kernel void displace_posed(const int row_count, const int texture_width, const
   const float o_x = patch->axis[0], o_y = patch->axis[1], o_z = patch->axis[2];
   __global const RowRecord* restrict record = rows + patch->row_begin + row;
   const float station = record->station, cap_cos = record->cap_cos, cap_sin = record->cap_sin;
+  const float eased = EASED(station), ahead = station - eased;
   const float foot = station * patch->length, foot_to_tail = patch->length - foot;
   __global const float* restrict cosines = bind_columns + patch->column_begin;
   __global const float* restrict sines = cosines + column_count;
+  __global const float* restrict bind_head_slopes = sines + column_count;
+  __global const float* restrict bind_tail_slopes = bind_head_slopes + column_count;
   __global const float* restrict head_rolls = columns + patch->column_begin;
   __global const float* restrict tail_rolls = head_rolls + column_count;
   __global const float* restrict head_slopes = tail_rolls + column_count;
@@ -53,13 +60,14 @@ __kernel void displace_posed(const int row_count, const int texture_width, const
   const int step = get_local_size(0);
   for (int j = get_local_id(0); j < width; j += step) {
     const float a = along[texel + j], c = around[texel + j], w = out[texel + j];
-    const float roll = head_rolls[j] + station * (tail_rolls[j] - head_rolls[j]);
+    const float roll = head_rolls[j] + eased * (tail_rolls[j] - head_rolls[j]);
     float roll_sine, roll_cosine;
     SIN_COS(roll, roll_sine, roll_cosine);
     const float cosine = cosines[j] * roll_cosine - sines[j] * roll_sine;
     const float sine = sines[j] * roll_cosine + cosines[j] * roll_sine;
 
-    const float slope = head_slopes[j] + station * (tail_slopes[j] - head_slopes[j]);
+    const float slope =
+        head_slopes[j] + eased * (tail_slopes[j] - head_slopes[j]) + ahead * (bind_tail_slopes[j] - bind_head_slopes[j]);
     const float f_s = cap_cos;
     const float f_o = cap_cos * slope + cap_sin;
     const float f_inverse = 1.0f / sqrt(f_s * f_s + f_o * f_o);
@@ -112,6 +120,7 @@ __kernel void displace_posed_from_bind(const int row_count, const int texture_wi
   const float o_x = patch->axis[0], o_y = patch->axis[1], o_z = patch->axis[2];
   __global const RowRecord* restrict record = rows + patch->row_begin + row;
   const float station = record->station, cap_cos = record->cap_cos, cap_sin = record->cap_sin;
+  const float eased = EASED(station), ahead = station - eased;
   __global const PosedRowRecord* restrict posed_row = posed_rows + patch->row_begin + row;
   const float bind_length = bind_patches[lattice_rows[4 * k]].length;
   const float bind_foot = station * bind_length, bind_foot_to_tail = bind_length - bind_foot;
@@ -153,7 +162,8 @@ __kernel void displace_posed_from_bind(const int row_count, const int texture_wi
     const float past = fmax(0.0f, fmax(lowest - bind_z, bind_z - highest));
     const float g = (bind_m * bind_m * bind_across2 + past * past) * e2_inverse;
 
-    const float slope = head_slopes[j] + station * (tail_slopes[j] - head_slopes[j]);
+    const float slope =
+        head_slopes[j] + eased * (tail_slopes[j] - head_slopes[j]) + ahead * (bind_tail_slopes[j] - bind_head_slopes[j]);
     const float f_o = cap_cos * slope + cap_sin;
     const float f_inverse = 1.0f / sqrt(cap_cos * cap_cos + f_o * f_o);
     const float q_s = (w * cap_cos - a * f_o) * f_inverse;
@@ -167,7 +177,7 @@ __kernel void displace_posed_from_bind(const int row_count, const int texture_wi
     const float m_any = is_distance_kept ? m_capsule : bind_m;
     const float m = e2 > 0.0f ? m_any : 0.0f;
 
-    const float roll = head_rolls[j] + station * (tail_rolls[j] - head_rolls[j]);
+    const float roll = head_rolls[j] + eased * (tail_rolls[j] - head_rolls[j]);
     float roll_sine, roll_cosine;
     SIN_COS(roll, roll_sine, roll_cosine);
     const float cosine = cosines[j] * roll_cosine - sines[j] * roll_sine;

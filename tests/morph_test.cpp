@@ -349,6 +349,7 @@ TEST(Blend, KernelAndTwinAgreeOnRandomPlacesAndUglyWidths) {
       tables.sources.push_back(source);
       for (int j = 0; j < patch.rectangle.width; ++j) {
         tables.head_columns.push_back(3.0f * static_cast<float>(source.width) * unit(random));
+        tables.slope_growths.push_back(j % 4 == 0 ? 0 : 3 * unit(random));
         tables.tail_columns.push_back(j % 3 == 0 ? static_cast<float>(random() % 90) - 45 : tables.head_columns.back() + unit(random));
       }
     }
@@ -357,7 +358,8 @@ TEST(Blend, KernelAndTwinAgreeOnRandomPlacesAndUglyWidths) {
       tables.rows.push_back({random() % 4 == 0 ? static_cast<float>(height - 1) : static_cast<float>(height - 1) * std::abs(unit(random)), unit(random)});
     }
   }
-  const FrameTables frames = frame_tables(skeleton, Walls(skeleton), patches, Vec3::Zero());
+  FrameTables frames = frame_tables(skeleton, Walls(skeleton), patches, Vec3::Zero());
+  for (ColumnRecord& column : frames.columns) column.slope_head = 2 * unit(random), column.slope_tail = 2 * unit(random);
   const DevicePlanes texels{device().upload(in[0]), device().upload(in[1]), device().upload(in[2])};
   DevicePlanes blended = allocate_planes(device(), static_cast<std::size_t>(texture_width) * y);
   blend_texels(device(), tables, rows, frames, texture_width, texels, blended);
@@ -371,7 +373,10 @@ TEST(Blend, KernelAndTwinAgreeOnRandomPlacesAndUglyWidths) {
       for (int s = 0; s < 3; ++s) {
         const BlendSource& source = tables.sources[s * patches.size() + bone];
         const double head = tables.head_columns[source.column_begin + j], tail = tables.tail_columns[source.column_begin + j];
-        reads.push_back({source, tables.rows[s * rows.size() + k], head + station * (tail - head)});
+        const ColumnRecord& slopes = frames.columns[frames.patches[bone].column_begin + j];
+        const double eased = station * station * (3 - 2 * station), slope = (1 - station) * slopes.slope_head + station * slopes.slope_tail;
+        reads.push_back({source, tables.rows[s * rows.size() + k], head + eased * (tail - head), slope,
+                         (station - eased) * static_cast<double>(tables.slope_growths[source.column_begin + j])});
       }
       const Vec3 expected = twin::blend(reads, in[0], in[1], in[2]);
       const std::size_t texel = static_cast<std::size_t>(rectangle.y + row) * texture_width + rectangle.x + j;

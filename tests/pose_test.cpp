@@ -413,6 +413,24 @@ TEST(Pose, APlaneOfConstantOffsetLiesAtThatDistanceFromItsBones) {
   EXPECT_THROW(constant_offset_mesh(device(), model_of(SyntheticSurface(y_branch(), 0.2)), y_branch(), {}, 0), InputError);
 }
 
+TEST(Pose, WhatChangesAtOneEndOfABoneIsFeltAtTheOtherOnlyToSecondOrder) {
+  const SkeletexModel model = model_of(SyntheticSurface(chain(3), 0.2));
+  Pose pose;
+  pose.rotations.assign(3, Eigen::Quaterniond::Identity());
+  pose.rotations[2] = Eigen::AngleAxisd(0.9, Vec3(1, 2, 3).normalized());
+  const Skeleton posed = apply_pose(model.skeleton, pose);
+  const Walls bind(model.skeleton);
+  const PosedWalls walls(model, posed), still(model, model.skeleton);
+  for (const double turn : {0.05, 0.3, 0.55, 0.8}) {
+    const auto moved = [&](double u) {
+      const Vec3 texel(0.02, -0.03, 0.15);
+      return (posed_point(model, bind, walls, 1, u, turn, texel, DistanceRule::kFromBone) - posed_point(model, bind, still, 1, u, turn, texel, DistanceRule::kFromBone)).norm();
+    };
+    EXPECT_LT(moved(0), 1e-12);
+    EXPECT_LT(moved(0.01), 0.3 * moved(0.02)) << turn;
+  }
+}
+
 TEST(Pose, ATwistIsSharedByTheTwoBonesOfAJoint) {
   Skeleton skeleton;
   for (int i = 0; i < 3; ++i) skeleton.nodes.push_back({"n" + std::to_string(i), Vec3(0, 0, i)});

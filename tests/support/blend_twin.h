@@ -13,6 +13,7 @@ struct BlendRead {
   BlendSource source;
   BlendRow row;
   double column;  ///< any lift
+  double slope = 0, change = 0;  ///< of the result's frame there, and how much more the one has that the texel is turned from
 };
 
 /// Kernel blend_texels, one texel: the weighted sum over its sources.
@@ -27,8 +28,9 @@ inline Vec3 blend(std::span<const BlendRead> reads, const std::vector<float>& al
       const int at = read.source.begin + row * read.source.stride + j;
       return Vec3(read.source.sign * along[at], read.source.sign * around[at], out[at]);
     };
-    sum += double(read.row.weight) * ((1 - y) * ((1 - x) * texel(below, left) + x * texel(below, right)) +
-                                      y * ((1 - x) * texel(below + 1, left) + x * texel(below + 1, right)));
+    const Vec3 value = (1 - y) * ((1 - x) * texel(below, left) + x * texel(below, right)) + y * ((1 - x) * texel(below + 1, left) + x * texel(below + 1, right));
+    const double angle = std::atan(read.slope + read.change) - std::atan(read.slope);
+    sum += double(read.row.weight) * Vec3(std::cos(angle) * value[0] + std::sin(angle) * value[2], value[1], std::cos(angle) * value[2] - std::sin(angle) * value[0]);
   }
   return sum;
 }

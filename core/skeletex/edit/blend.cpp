@@ -29,6 +29,15 @@ void append_columns(const Overlay& overlay, int bone, int width, BlendTables& ta
   }
 }
 
+void append_slope_growths(const Overlay& overlay, const Walls& walls, int bone, int width, BlendTables& tables) {
+  for (int j = 0; j < width; ++j) {
+    const double turn = static_cast<double>(j) / width;
+    const double growth = overlay.slope(bone, BoneEnd::kTail, turn) - overlay.slope(bone, BoneEnd::kHead, turn) -
+                          (walls.slope(bone, BoneEnd::kTail, turn) - walls.slope(bone, BoneEnd::kHead, turn));
+    tables.slope_growths.push_back(std::abs(growth) < 1e-5 ? 0.f : static_cast<float>(growth));
+  }
+}
+
 double row_at_same_share(int row, int height, int source_height, bool is_reversed) {
   const double at = static_cast<double>(row) * (source_height - 1) / (height - 1);
   return is_reversed ? source_height - 1 - at : at;
@@ -43,10 +52,12 @@ void blend_texels(ClContext& context, const BlendTables& tables, const std::vect
                   const DevicePlanes& texels, DevicePlanes& blended) {
   std::vector<float> columns = tables.head_columns;
   columns.insert(columns.end(), tables.tail_columns.begin(), tables.tail_columns.end());
+  columns.insert(columns.end(), tables.slope_growths.begin(), tables.slope_growths.end());
+  columns.resize(3 * tables.head_columns.size(), 0.f);
   context.launch({"blend.cl", "blend_texels"}, row_range(context, rows.size()), static_cast<int>(rows.size()), tables.source_count,
                  static_cast<int>(result.patches.size()), texture_width, static_cast<int>(tables.head_columns.size()), context.upload(rows),
                  context.upload(result.patches), context.upload(result.rows), context.upload(tables.sources), context.upload(tables.rows),
-                 context.upload(columns), texels.x, texels.y, texels.z, blended.x, blended.y, blended.z);
+                 context.upload(columns), context.upload(result.columns), texels.x, texels.y, texels.z, blended.x, blended.y, blended.z);
 }
 
 void EndMoves::add(BoneEnd end, const Vec3& move) {

@@ -15,11 +15,15 @@ struct BlendTables {
   std::vector<BlendSource> sources;   ///< per source and patch of the result
   std::vector<BlendRow> rows;         ///< per source and row to do
   std::vector<float> head_columns, tail_columns;
+  std::vector<float> slope_growths;           ///< see kernels/blend.cl; none: 0
 };
 
 /// Appends the columns that one patch of the result, `width` columns wide, reads in a source.
 /// \param bone  of the result
 void append_columns(const Overlay& overlay, int bone, int width, BlendTables& tables);
+/// Appends how much more the source's walls open from head to tail than the result's, for the same columns; for all
+/// sources or for none. \param walls  of the result
+void append_slope_growths(const Overlay& overlay, const Walls& walls, int bone, int width, BlendTables& tables);
 
 /// Row of a patch of `source_height` rows at the same share of the way as a row of one of `height` rows.
 double row_at_same_share(int row, int height, int source_height, bool is_reversed);

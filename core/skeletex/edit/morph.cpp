@@ -338,6 +338,7 @@ SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) 
       tables.sources.push_back({texel_begins_[m] + from.y * stride + from.x, stride, from.width, from.height,
                                 static_cast<int>(tables.head_columns.size()), overlay.is_reversed(bone) ? -1.0f : 1.0f});
       append_columns(overlay, bone, result.patches[bone].rectangle.width, tables);
+      append_slope_growths(overlay, walls, bone, result.patches[bone].rectangle.width, tables);
     }
     for (const LatticeRow& row : rows) {
       const int source_height = models_[m].patches[overlay.model_bone(row[0])].rectangle.height;

@@ -236,6 +236,11 @@ double Overlay::model_v(int bone, BoneEnd end, double v) const {
   return point_at(loop(bone, end).points, &LoopPoint::turn, model_turn(bone, end, point_at(here, &LoopPoint::v, v).turn)).v;
 }
 
+double Overlay::slope(int bone, BoneEnd end, double v) const {
+  const double slope = walls_.slope(model_bone(bone), model_end(bone, end), model_v(bone, end, v));
+  return is_reversed(bone) ? -slope : slope;
+}
+
 Vec3 Overlay::end_texel(int bone, BoneEnd end, double v) const {
   const std::vector<LoopPoint>& here = loops_here_[bone][static_cast<int>(end)];
   const LoopPoint point = point_at(loop(bone, end).points, &LoopPoint::turn, model_turn(bone, end, point_at(here, &LoopPoint::v, v).turn));

@@ -40,7 +40,9 @@ Vec3 posed_point(const SkeletexModel& model, const Walls& bind, const PosedWalls
   const Vec3 foot = end_position(posed.skeleton(), bone, BoneEnd::kHead) + at.station * length * posed.bases()[bone].o;
   double radius = texel.norm();
   if (!(radius > 0)) return foot;
-  const auto mix = [&](double a, double b) { return (1 - at.station) * a + at.station * b; };
+  const auto mix = [](double a, double b, double share) { return (1 - share) * a + share * b; };
+  // What a pose changes at one end is felt at the other end only to second order: the surface there stays smooth.
+  const double eased = at.station * at.station * (3 - 2 * at.station);
 
   // The texel in the bone's own axes (s', o x s', o), with the frame's opening f = f_s s' + f_o o.
   const auto turned = [&](double slope) {
@@ -48,9 +50,11 @@ Vec3 posed_point(const SkeletexModel& model, const Walls& bind, const PosedWalls
     return Vec3(texel[2] * f[0] - texel[0] * f[1], texel[1], texel[2] * f[1] + texel[0] * f[0]);
   };
   const auto across = [](const Vec3& q) { return std::hypot(q[0], q[1]); };
-  const Vec3 bound = turned(mix(bind.slope(bone, BoneEnd::kHead, turn), bind.slope(bone, BoneEnd::kTail, turn)));
+  const double bind_head = bind.slope(bone, BoneEnd::kHead, turn), bind_tail = bind.slope(bone, BoneEnd::kTail, turn);
+  const double bind_slope = mix(bind_head, bind_tail, at.station);
+  const Vec3 bound = turned(bind_slope);
   const double bound_stretch = leave_capsule(at.station * bind_length, bound[2], across(bound), radius, 0, bind_length);
-  const Vec3 q = turned(mix(head.slope, tail.slope));
+  const Vec3 q = turned(bind_slope + mix(head.slope - bind_head, tail.slope - bind_tail, eased));
   double stretch = bound_stretch;
   if (rule == DistanceRule::kFromBone) {
     const double z = at.station * bind_length + bound_stretch * bound[2];
@@ -58,7 +62,7 @@ Vec3 posed_point(const SkeletexModel& model, const Walls& bind, const PosedWalls
       radius = std::hypot(bound_stretch * across(bound), std::max({0.0, -row.bind_reaches[0] - z, z - bind_length - row.bind_reaches[1]}));
     stretch = leave_capsule(at.station * length, q[2], across(q), radius, -row.reaches[0], length + row.reaches[1]);
   }
-  const double angle = 2 * std::numbers::pi * (turn + mix(head.roll, tail.roll));
+  const double angle = 2 * std::numbers::pi * (turn + mix(head.roll, tail.roll, eased));
   const BoneBasis& basis = posed.bases()[bone];
   const Vec3 spoke = std::cos(angle) * basis.s + std::sin(angle) * basis.b;
   return foot + stretch * (q[0] * spoke + q[1] * basis.o.cross(spoke) + q[2] * basis.o);

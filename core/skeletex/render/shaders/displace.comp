@@ -55,7 +55,9 @@ void main() {
   const float past = max(0.0, max(-reach.x - bind_z, bind_z - bind_length - reach.y));
   const float g = (bind_m * bind_m * bind_across2 + past * past) * e2_inverse;
 
-  const float slope = mix(columns[2 * column_count + column], columns[3 * column_count + column], station);
+  const float eased = station * station * (3.0 - 2.0 * station);  // see pose.cl
+  const float slope = mix(columns[2 * column_count + column], columns[3 * column_count + column], eased) +
+                      (station - eased) * (bind_columns[3 * column_count + column] - bind_columns[2 * column_count + column]);
   const float f_o = cap_cos * slope + cap_sin;
   const float f_inverse = inversesqrt(cap_cos * cap_cos + f_o * f_o);
   const float q_s = (w * cap_cos - a * f_o) * f_inverse;
@@ -67,7 +69,7 @@ void main() {
   const float m_capsule = is_cylinder ? root : rest * abs(q_o) * e2_inverse + root;
   const float m = e2 > 0.0 ? (is_distance_kept != 0 ? m_capsule : bind_m) : 0.0;
 
-  const float roll = mix(columns[column], columns[column_count + column], station);
+  const float roll = mix(columns[column], columns[column_count + column], eased);
   const float bind_cosine = bind_columns[column], bind_sine = bind_columns[column_count + column];
   const float cosine = bind_cosine * cos(roll) - bind_sine * sin(roll), sine = bind_sine * cos(roll) + bind_cosine * sin(roll);
   const vec3 point = vector_at(patch_at) + m * (q_s * cosine - c * sine) * vector_at(patch_at + 7) +
