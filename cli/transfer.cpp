@@ -55,13 +55,16 @@ void run(const Arguments& arguments) {
   if (arguments.is_mirrored) source = mirrored(source);
   ClContext context(arguments.device);
   Json json;
+  std::vector<TransferredPart> parts;
   {
     ProgressBar bar;
     bar.show("transferring", 0.3);
-    json = write_result(context, transfer(context, source, target, pairs, options), arguments.output);
+    json = write_result(context, transfer(context, source, target, pairs, options, &parts), arguments.output);
   }
   Json bones = Json::array();
-  for (const auto& [from, to] : pairs) bones.push_back({{"source", from}, {"target", to}});
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    bones.push_back({{"source", pairs[i].first}, {"target", pairs[i].second}, {"scale", parts[i].scale}, {"length_scale", parts[i].length_scale},
+                     {"skipped", parts[i].skipped}, {"kept", parts[i].kept}});
   json["bones"] = bones;
   json["seconds"] = total.lap_ms() / 1000;
   json["device"] = context.device().name;

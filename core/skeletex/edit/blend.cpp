@@ -12,7 +12,7 @@ double snapped(double column) { return std::abs(column - std::round(column)) < 1
 
 }  // namespace
 
-void append_columns(const Overlay& overlay, int bone, int width, BlendTables& tables) {
+void append_columns(const Overlay& overlay, int bone, int width, std::vector<float>& head_columns, std::vector<float>& tail_columns) {
   std::vector<double> head(width), tail(width);
   double twist = 0;
   for (int j = 0; j < width; ++j) {
@@ -24,8 +24,8 @@ void append_columns(const Overlay& overlay, int bone, int width, BlendTables& ta
   // Angles have no whole turns: between the ends the shorter way.
   const double whole = std::round(twist), columns = overlay.model().patches[overlay.model_bone(bone)].rectangle.width;
   for (int j = 0; j < width; ++j) {
-    tables.head_columns.push_back(static_cast<float>(snapped(columns * head[j])));
-    tables.tail_columns.push_back(static_cast<float>(snapped(columns * (tail[j] - whole))));
+    head_columns.push_back(static_cast<float>(snapped(columns * head[j])));
+    tail_columns.push_back(static_cast<float>(snapped(columns * (tail[j] - whole))));
   }
 }
 

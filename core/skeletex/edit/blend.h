@@ -20,7 +20,7 @@ struct BlendTables {
 
 /// Appends the columns that one patch of the result, `width` columns wide, reads in a source.
 /// \param bone  of the result
-void append_columns(const Overlay& overlay, int bone, int width, BlendTables& tables);
+void append_columns(const Overlay& overlay, int bone, int width, std::vector<float>& head_columns, std::vector<float>& tail_columns);
 /// Appends how much more the source's walls open from head to tail than the result's, for the same columns; for all
 /// sources or for none. \param walls  of the result
 void append_slope_growths(const Overlay& overlay, const Walls& walls, int bone, int width, BlendTables& tables);

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -13,6 +12,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "skeletex/edit/best_rotation.h"
 #include "skeletex/edit/blend.h"
 #include "skeletex/edit/overlay.h"
 #include "skeletex/edit/seam_network.h"
@@ -25,19 +25,6 @@ namespace {
 
 constexpr double kNoWidth = 1e-9;  // turns
 constexpr double kNoMove = 1e-6;   // diagonals; seams are stored no more exactly
-
-/// The rotation that turns one set of points about the origin best onto another (Kabsch). Points on a line leave their
-/// turn about it open: there the smallest rotation.
-Eigen::Quaterniond best_rotation(const std::vector<Vec3>& from, const std::vector<Vec3>& to) {
-  Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
-  for (std::size_t i = 0; i < from.size(); ++i) moment += to[i] * from[i].transpose();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(moment, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  if (svd.singularValues()[1] < 1e-9 * svd.singularValues()[0])
-    return Eigen::Quaterniond::FromTwoVectors(svd.matrixV().col(0), svd.matrixU().col(0));
-  Eigen::Matrix3d flip = Eigen::Matrix3d::Identity();
-  flip(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  return Eigen::Quaterniond(Eigen::Matrix3d(svd.matrixU() * flip * svd.matrixV().transpose()));
-}
 
 /// Each bone's s: the models' own, carried to the mean skeleton, turned about the bone to their mean angle, counted from
 /// that of the layout.
@@ -337,7 +324,7 @@ SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) 
       const int stride = models_[m].texture.width;
       tables.sources.push_back({texel_begins_[m] + from.y * stride + from.x, stride, from.width, from.height,
                                 static_cast<int>(tables.head_columns.size()), overlay.is_reversed(bone) ? -1.0f : 1.0f});
-      append_columns(overlay, bone, result.patches[bone].rectangle.width, tables);
+      append_columns(overlay, bone, result.patches[bone].rectangle.width, tables.head_columns, tables.tail_columns);
       append_slope_growths(overlay, walls, bone, result.patches[bone].rectangle.width, tables);
     }
     for (const LatticeRow& row : rows) {

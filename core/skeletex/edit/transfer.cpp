@@ -3,28 +3,32 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <numbers>
-#include <queue>
 
+#include "skeletex/edit/best_rotation.h"
 #include "skeletex/edit/blend.h"
+#include "skeletex/edit/lay_part.h"
 #include "skeletex/edit/overlay.h"
+#include "skeletex/edit/part.h"
 #include "skeletex/model/error.h"
-#include "skeletex/model/pose.h"
 
 namespace skeletex {
 namespace {
 
-constexpr const char* kRest = "\n";  // name of the bone that stands for the rest of the body: no file's bone has it
-constexpr double kFalloff = 0.3;     // from bone to bone, how much a bone counts for where the rest of the body lies
-
-BoneEnd end_at(const Skeleton& skeleton, int bone, int node) { return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail; }
-BoneEnd opposite(BoneEnd end) { return end == BoneEnd::kHead ? BoneEnd::kTail : BoneEnd::kHead; }
-bool is_free(const SkeletexModel& model, int bone, BoneEnd end) { return model.ends[bone][static_cast<int>(end)].arcs.empty(); }
+constexpr std::array<BoneEnd, 2> kEnds{BoneEnd::kHead, BoneEnd::kTail};
+constexpr double kMostLean = 0.5;
+constexpr double kMostRunBack = 0.5;  // share of the rows behind its cut that a column may leave out, too
+constexpr double kMostCut = 0.85;  // share of a patch's rows that a cut may leave out
+constexpr double kReach = 0.12;    // share of the rows before and behind that a turn is measured over
+// What a cut costs in turns of the surface, in radians, and what it costs to run along the bone as far as around it.
+constexpr double kCutCost = 0.15, kBend = 0.02;
+// What a cut of the source costs that lies off the target's by the target's girth, and how far off counts.
+constexpr double kMisfitCost = 0.15, kMostMisfit = 4;
 
 int bone_by_name(const Skeleton& skeleton, const std::string& name, const char* which) {
   for (std::size_t i = 0; i < skeleton.bones.size(); ++i)
@@ -32,156 +36,45 @@ int bone_by_name(const Skeleton& skeleton, const std::string& name, const char* 
   throw InputError(fmt::format("the {} has no bone \"{}\"", which, name));
 }
 
-/// Steps over bones from a node to every other; -1 where another component lies, or `without` is the only way.
-std::vector<int> steps_from(const Skeleton& skeleton, int start, int without = -1) {
-  const auto at = bones_at_nodes(skeleton);
-  std::vector<int> steps(skeleton.nodes.size(), -1);
-  std::queue<int> queue({start});
-  steps[start] = 0;
-  for (; !queue.empty(); queue.pop())
-    for (const BoneAtNode bone : at[queue.front()]) {
-      const int far = end_node(skeleton, bone.bone, opposite(bone.end));
-      if (bone.bone == without || steps[far] >= 0) continue;
-      steps[far] = steps[queue.front()] + 1;
-      queue.push(far);
+/// A periodic row of values without its waves shorter than about an eighth of a turn.
+void smooth_around(std::vector<double>& values) {
+  const int count = static_cast<int>(values.size()), reach = std::max(1, count / 32);
+  for (int pass = 0; pass < 2; ++pass) {
+    std::vector<double> smooth(count);
+    double sum = 0;
+    for (int i = -reach; i <= reach; ++i) sum += values[(i + count) % count];
+    for (int i = 0; i < count; ++i) {
+      smooth[i] = sum / (2 * reach + 1);
+      sum += values[(i + reach + 1) % count] - values[(i - reach + count) % count];
     }
-  return steps;
-}
-
-/// The end that the rest of the body lies at: the one that is not free, else the one nearer to a root.
-BoneEnd near_end(const SkeletexModel& model, int bone) {
-  const bool is_head_free = is_free(model, bone, BoneEnd::kHead), is_tail_free = is_free(model, bone, BoneEnd::kTail);
-  if (is_head_free != is_tail_free) return is_head_free ? BoneEnd::kTail : BoneEnd::kHead;
-  for (const int root : root_nodes(model.skeleton)) {
-    const std::vector<int> steps = steps_from(model.skeleton, root);
-    const int head = steps[model.skeleton.bones[bone].head], tail = steps[model.skeleton.bones[bone].tail];
-    if (head >= 0) return head <= tail ? BoneEnd::kHead : BoneEnd::kTail;
+    values = std::move(smooth);
   }
-  return BoneEnd::kHead;
 }
 
-/// The bone and all those behind its far end.
-std::vector<int> limb_of(const SkeletexModel& model, int bone) {
-  const Skeleton& skeleton = model.skeleton;
-  const BoneEnd near = near_end(model, bone);
-  const std::vector<int> steps = steps_from(skeleton, end_node(skeleton, bone, opposite(near)), bone);
-  if (steps[end_node(skeleton, bone, near)] >= 0)
-    throw InputError(fmt::format("bone \"{}\" is part of a cycle: no limb hangs on it; transfer its bones one by one", skeleton.bones[bone].name));
-  std::vector<int> limb{bone};
-  for (int other = 0; other < static_cast<int>(skeleton.bones.size()); ++other)
-    if (other != bone && steps[skeleton.bones[other].head] >= 0) limb.push_back(other);
-  return limb;
-}
-
-/// Some bones of a model that hang together, cut out: bone i is bones[i]. One more bone, the last, starts where they
-/// leave the rest of the body and points to it. Seams are kept where all bones of a node are in the part.
-struct Part {
-  std::vector<int> bones;
-  BoneEnd near = BoneEnd::kHead;  ///< of bones[0]
-  SkeletexModel model;            ///< skeleton, patches, ends, arcs, corners; no texels
+/// Points of a lattice's rows in the axes of their bones, on the host.
+struct HostPoints {
+  std::array<std::vector<float>, 3> planes;
+  HostPoints(ClContext& context, const DevicePlanes& points) : planes{context.download(points.x), context.download(points.y), context.download(points.z)} {}
+  Vec3 at(std::size_t i) const { return {planes[0][i], planes[1][i], planes[2][i]}; }
 };
 
-Part cut_out(const SkeletexModel& whole, std::vector<int> bones) {
-  Part part;
-  part.bones = std::move(bones);
-  part.near = near_end(whole, part.bones[0]);
-  const std::vector<BoneBasis> bases = bone_bases(whole.skeleton);
-  const int count = static_cast<int>(part.bones.size());
-  std::vector<int> part_bone(whole.skeleton.bones.size(), -1), part_node(whole.skeleton.nodes.size(), -1);
-  Skeleton& skeleton = part.model.skeleton;
-  for (int i = 0; i < count; ++i) {
-    const int b = part.bones[i];
-    part_bone[b] = i;
-    Bone bone = whole.skeleton.bones[b];
-    for (int* node : {&bone.head, &bone.tail}) {
-      if (part_node[*node] < 0) {
-        part_node[*node] = static_cast<int>(skeleton.nodes.size());
-        skeleton.nodes.push_back(whole.skeleton.nodes[*node]);
-      }
-      *node = part_node[*node];
-    }
-    bone.s = bases[b].s;
-    skeleton.bones.push_back(bone);
-    part.model.patches.push_back(whole.patches[b]);
-  }
-
-  // Where the rest of the body lies, as seen from the near node: near bones first.
-  const int near_node = end_node(whole.skeleton, part.bones[0], part.near);
-  const std::vector<int> steps = steps_from(whole.skeleton, near_node);
-  const Vec3& origin = whole.skeleton.nodes[near_node].position;
-  Vec3 rest = Vec3::Zero();
-  for (int b = 0; b < static_cast<int>(whole.skeleton.bones.size()); ++b) {
-    const Bone& bone = whole.skeleton.bones[b];
-    if (part_bone[b] >= 0 || steps[bone.head] < 0) continue;
-    const Vec3 middle = 0.5 * (whole.skeleton.nodes[bone.head].position + whole.skeleton.nodes[bone.tail].position) - origin;
-    if (middle.norm() > 0) rest += std::pow(kFalloff, std::min(steps[bone.head], steps[bone.tail])) * middle.normalized();
-  }
-  const double length = bone_length(whole.skeleton, part.bones[0]);
-  if (!(rest.norm() > 1e-6)) rest = -direction_from(whole.skeleton, {part.bones[0], part.near});
-  skeleton.nodes.push_back({kRest, origin + length * rest.normalized()});
-  skeleton.bones.push_back({kRest, static_cast<int>(skeleton.nodes.size()) - 1, part_node[near_node], {}});
-  part.model.patches.push_back(part.model.patches[0]);
-
-  const auto at = bones_at_nodes(whole.skeleton);
-  const auto is_inside = [&](int node) { return std::all_of(at[node].begin(), at[node].end(), [&](BoneAtNode bone) { return part_bone[bone.bone] >= 0; }); };
-  std::vector<int> part_arc(whole.arcs.size(), -1), part_corner(whole.corners.size(), -1);
-  for (std::size_t c = 0; c < whole.corners.size(); ++c) {
-    SeamCorner corner = whole.corners[c];
-    if (!is_inside(corner.node)) continue;
-    for (int& bone : corner.bones) bone = part_bone[bone];
-    corner.node = part_node[corner.node];
-    part_corner[c] = static_cast<int>(part.model.corners.size());
-    part.model.corners.push_back(corner);
-  }
-  for (std::size_t a = 0; a < whole.arcs.size(); ++a) {
-    SeamArc arc = whole.arcs[a];
-    if (!is_inside(arc.node)) continue;
-    arc.node = part_node[arc.node];
-    for (const int side : {0, 1}) {
-      arc.bones[side] = part_bone[arc.bones[side]];
-      if (arc.corners[side] >= 0) arc.corners[side] = part_corner[arc.corners[side]];
-    }
-    part_arc[a] = static_cast<int>(part.model.arcs.size());
-    part.model.arcs.push_back(arc);
-  }
-  part.model.ends.resize(skeleton.bones.size());
-  for (int i = 0; i < count; ++i)
-    for (const int end : {0, 1})
-      for (ArcUse use : whole.ends[part.bones[i]][end].arcs)
-        if (part_arc[use.arc] >= 0) part.model.ends[i][end].arcs.push_back({part_arc[use.arc], use.is_reversed});
-  return part;
-}
-
-/// Mean distance of an end's seam from the bone.
-double girth(const SkeletexModel& model, int bone, BoneEnd end) {
-  double sum = 0;
+/// Vertex of row 0, column 0 of every patch in the planes of points_in_bone_axes.
+std::vector<std::size_t> first_points(const std::vector<Patch>& patches) {
+  std::vector<std::size_t> first;
   std::size_t count = 0;
-  for (const ArcUse use : model.ends[bone][static_cast<int>(end)].arcs)
-    for (const SeamSample& sample : model.arcs[use.arc].samples) sum += sample.distance, ++count;
-  return sum / static_cast<double>(std::max<std::size_t>(1, count));
-}
-
-double faded(double rows_from_seam, double width, TransferBlend blend) {
-  if (rows_from_seam <= 0) return 0;
-  if (blend == TransferBlend::kNone || rows_from_seam >= width) return 1;
-  const double share = rows_from_seam / width;
-  return blend == TransferBlend::kLinear ? share : (1 - std::cos(std::numbers::pi * share)) / 2;
-}
-
-/// The row, between rows, at which a patch has this u.
-double row_of_u(const Patch& patch, double u) {
-  const auto after = std::upper_bound(patch.row_u.begin() + 1, patch.row_u.end() - 1, u);
-  const auto below = after - 1;
-  return static_cast<double>(below - patch.row_u.begin()) + std::clamp((u - *below) / (*after - *below), 0.0, 1.0);
+  for (const Patch& patch : patches) {
+    first.push_back(count);
+    count += static_cast<std::size_t>(patch.rectangle.width) * patch.rectangle.height;
+  }
+  return first;
 }
 
 /// One part of the source on one part of the target.
 class PartTransfer {
  public:
   PartTransfer(const SkeletexModel& source, const SkeletexModel& target, Part from, Part to, const TransferOptions& options)
-      : source_(source), target_(target), from_(std::move(from)), to_(std::move(to)), options_(options),
-        overlay_(from_.model, to_.model.skeleton,
-                 find_correspondence(to_.model.skeleton, from_.model.skeleton, {.given = {{kRest, kRest}, {bone_name(to_), bone_name(from_)}}})) {
+      : source_(source), target_(target), from_(faced_alike(std::move(from), to)), to_(std::move(to)), options_(options),
+        overlay_(from_.model, to_.model.skeleton, matched(to_, from_)) {
     const Walls walls(to_.model.skeleton);
     SeamNetwork network{to_.model.arcs, to_.model.corners, {}, to_.model.ends};
     for (const SeamCorner& corner : network.corners)
@@ -190,54 +83,85 @@ class PartTransfer {
                                        .normalized());
     overlay_.set_seams(walls, network);
     for (int i = 0; i < count(); ++i)
-      for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
-        if (is_free(target_, to_.bones[i], end) != is_free(source_, source_bone(i), overlay_.model_end(i, end)))
+      for (const BoneEnd end : kEnds)
+        if (is_free_end(target_, to_.bones[i], end) != is_free_end(source_, source_bone(i), overlay_.model_end(i, end)))
           throw InputError(fmt::format("of the bones \"{}\" and \"{}\" only one ends freely; choose bones that branch alike",
                                        source_.skeleton.bones[source_bone(i)].name, target_.skeleton.bones[to_.bones[i]].name));
-    scale_ = scale_at(0, to_.near);
   }
 
   int count() const { return static_cast<int>(to_.bones.size()); }
   int target_bone(int i) const { return to_.bones[i]; }
   int source_bone(int i) const { return from_.bones[overlay_.model_bone(i)]; }
   const Overlay& overlay() const { return overlay_; }
+  BoneEnd near() const { return to_.near; }
 
-  /// Rows of the result's patch: the source's.
+  /// Is there a seam that the target keeps?
+  bool is_boundary(int i, BoneEnd end) const {
+    return !is_free_end(target_, to_.bones[i], end) && to_.model.ends[i][static_cast<int>(end)].arcs.empty();
+  }
+  bool is_inner_seam(int i, BoneEnd end) const { return !to_.model.ends[i][static_cast<int>(end)].arcs.empty(); }
+
+  double width_in_rows(int i) const {
+    return options_.width_in_texels > 0 ? options_.width_in_texels : options_.width * (target_.patches[to_.bones[i]].rectangle.height - 1);
+  }
+  bool is_between() const { return count() == 1 && is_boundary(0, BoneEnd::kHead) && is_boundary(0, BoneEnd::kTail); }
+  bool is_scaled_by_girth() const { return options_.scale == TransferScale::kGirth || (options_.scale == TransferScale::kAuto && is_between()); }
+
+  /// Length of all bones of the part over the same in the source.
+  double length_ratio() const {
+    double here = 0, there = 0;
+    for (int i = 0; i < count(); ++i) {
+      here += bone_length(target_.skeleton, to_.bones[i]);
+      there += bone_length(source_.skeleton, source_bone(i));
+    }
+    return here / there;
+  }
+
+  /// Where the part begins at an end of its first bone, by column of the target's patch.
+  struct Cut {
+    std::vector<double> kept_rows, skipped_rows;  ///< of the target's patch, of the source's; from that end
+    double kept = 0, skipped = 0;                 ///< mean lengths along the bones
+    double scale = 1;                             ///< of places across the bone
+  };
+  Cut& cut(BoneEnd end) { return cuts_[static_cast<int>(end)]; }
+  const Cut& cut(BoneEnd end) const { return cuts_[static_cast<int>(end)]; }
+  double scale_at(BoneEnd end) const { return cut(end).scale; }
+  /// Of places along a bone. A bone that ends freely goes as far as it does.
+  double length_scale(int i) const {
+    double here = bone_length(target_.skeleton, to_.bones[i]), there = bone_length(source_.skeleton, source_bone(i));
+    for (const BoneEnd end : kEnds)
+      if (i == 0 && !is_free_end(target_, to_.bones[i], opposite(end))) here -= cut(end).kept, there -= cut(end).skipped;
+    return here / there;
+  }
+  /// Where the source's bone begins on the target's.
+  double length_offset(int i) const {
+    if (i > 0) return 0;
+    const double scale = length_scale(i);
+    if (!is_free_end(target_, to_.bones[i], BoneEnd::kHead)) return cut(BoneEnd::kHead).kept - scale * cut(BoneEnd::kHead).skipped;
+    const double here = bone_length(target_.skeleton, to_.bones[i]) - cut(BoneEnd::kTail).kept;
+    return here - scale * (bone_length(source_.skeleton, source_bone(i)) - cut(BoneEnd::kTail).skipped);
+  }
+
+  /// Rows of the result's patch: the source's, unless the target keeps some of its own.
   void set_rows(int i, Patch& patch) const {
+    patch.method = Method::kVsm;
+    for (const BoneEnd end : kEnds)
+      for (const double kept : cut(end).kept_rows)
+        if (i == 0 && kept > 0) return;
     const Patch& from = source_.patches[source_bone(i)];
     const bool is_reversed = overlay_.is_reversed(i);
     for (int r = 1; r + 1 < patch.rectangle.height; ++r) {
       const double u = u_at_row(from, row_at_same_share(r, patch.rectangle.height, from.rectangle.height, is_reversed));
       patch.row_u[r] = is_reversed ? 1 - u : u;
     }
-    if (from.method == Method::kVsm) patch.method = Method::kVsm;
-  }
-
-  /// Share of the source's texels in a row, and what they are scaled by.
-  std::array<double, 2> share_and_scale(int i, int row) const {
-    const int last = target_.patches[to_.bones[i]].rectangle.height - 1;
-    const double width = options_.width_in_texels > 0 ? options_.width_in_texels : options_.width * last;
-    double share = 1;
-    if (is_boundary(i, BoneEnd::kHead)) share *= faded(row, width, options_.blend);
-    if (is_boundary(i, BoneEnd::kTail)) share *= faded(last - row, width, options_.blend);
-    const double along = static_cast<double>(row) / last;
-    return {share, (1 - along) * scale_at(i, BoneEnd::kHead) + along * scale_at(i, BoneEnd::kTail)};
   }
 
   /// The seams inside of the part become the source's.
-  void set_seams(SkeletexModel& result) const {
-    std::vector<int> part_bone(target_.skeleton.bones.size(), -1);
-    for (int i = 0; i < count(); ++i) part_bone[to_.bones[i]] = i;
-    const auto is_inside = [&](int bone, int node) { return part_bone[bone] >= 0 && !is_boundary(part_bone[bone], end_at(target_.skeleton, bone, node)); };
-    const Walls walls(target_.skeleton);
-    const auto distance_at = [&](int bone, int node, const Vec3& direction) {
-      return scale_ * overlay_.seam_at(part_bone[bone], end_at(target_.skeleton, bone, node), walls.turn_of(bone, direction)).distance;
-    };
+  void set_seams(SkeletexModel& result, const Walls& walls) const {
     const auto read = [&](int node, const std::vector<int>& bones, SeamSample& sample) {
       const Vec3 direction =
           walls.seam_point(bones[0], end_at(target_.skeleton, bones[0], node), sample.turn, 1) - target_.skeleton.nodes[node].position;
-      sample.distance = 0;
-      for (const int bone : bones) sample.distance += distance_at(bone, node, direction) / static_cast<double>(bones.size());
+      sample.distance = seam_distance(walls, node, bones, direction);
     };
     for (SeamArc& arc : result.arcs)
       if (is_inside(arc.bones[0], arc.node))
@@ -246,97 +170,441 @@ class PartTransfer {
       if (is_inside(corner.bones[0], corner.node)) read(corner.node, corner.bones, corner.sample);
   }
 
- private:
-  static std::string bone_name(const Part& part) { return part.model.skeleton.bones[0].name; }
-  bool is_boundary(int i, BoneEnd end) const {
-    return !is_free(target_, to_.bones[i], end) && to_.model.ends[i][static_cast<int>(end)].arcs.empty();
+  /// A wall inside of the part as the source has it and as the target does, per turn of the result. Shear: what a point
+  /// at a distance of 1 (in the source's units) moves along the bone. Offset: from where the laid part has the seam to where the result has it, across the bone
+  /// and along it.
+  struct WallChange {
+    double shear;
+    double across, along;
+  };
+  WallChange wall_change(const Walls& source_walls, const Walls& walls, int i, BoneEnd end, double turn) const {
+    const int bone = to_.bones[i];
+    const BoneEnd source_end = overlay_.model_end(i, end);
+    const double source_turn = overlay_.model_turn(i, end, turn);
+    const double own_slope = walls.slope(bone, end, turn);
+    const double source_slope = source_walls.slope(source_bone(i), source_end, source_turn) * (overlay_.is_reversed(i) ? -1 : 1);
+    const double scale = scale_at(end);
+    const auto across = [&](double slope, double distance) { return (end == BoneEnd::kHead ? slope > 0 : slope < 0) ? distance : distance / std::hypot(1, slope); };
+    const double laid = scale * across(source_slope, overlay_.seam_at(i, end, turn).distance);
+    const Vec3 direction = walls.spoke(bone, turn) + own_slope * walls.bases()[bone].o;
+    const double wanted = across(own_slope, seam_distance(walls, end_node(target_.skeleton, bone, end), {bone, walls.neighbour(bone, end, turn)}, direction));
+    return {scale * own_slope - length_scale(i) * source_slope, wanted - laid, (wanted - laid) * own_slope};
   }
-  double scale_at(int i, BoneEnd end) const {
-    if (is_boundary(i, end)) return girth(target_, to_.bones[i], end) / girth(source_, source_bone(i), overlay_.model_end(i, end));
-    return scale_ > 0 ? scale_ : bone_length(target_.skeleton, to_.bones[0]) / bone_length(source_.skeleton, source_bone(0));
+
+ private:
+  static Correspondence matched(const Part& to, const Part& from) {
+    const auto name = [](const Part& part) { return part.model.skeleton.bones[0].name; };
+    return find_correspondence(to.model.skeleton, from.model.skeleton, {.given = {{kRestOfBody, kRestOfBody}, {name(to), name(from)}}});
+  }
+  /// Turned about the node where it begins so that its first bone and the rest of the body point as those of the other,
+  /// as well as they can; then the rest so that posing the one as the other turns nothing about the bone. Angles about bones stay.
+  static Part faced_alike(Part from, const Part& to) {
+    const Vec3 origin = end_position(from.model.skeleton, 0, from.near);
+    const Vec3 direction = direction_from(from.model.skeleton, {0, from.near}), target_direction = direction_from(to.model.skeleton, {0, to.near});
+    const Eigen::Quaterniond turn = best_rotation({direction, from.rest[0], from.rest[1]}, {target_direction, to.rest[0], to.rest[1]});
+    for (Node& node : from.model.skeleton.nodes) node.position = origin + turn * (node.position - origin);
+    for (Bone& bone : from.model.skeleton.bones)
+      if (bone.s) bone.s = turn * *bone.s;
+    const Eigen::Quaterniond bend = Eigen::Quaterniond::FromTwoVectors(target_direction, turn * direction);
+    const Vec3 rest = to.model.skeleton.nodes.back().position - end_position(to.model.skeleton, 0, to.near);
+    from.model.skeleton.nodes.back().position = origin + bone_length(from.model.skeleton, 0) * (bend * rest.normalized());
+    return from;
+  }
+  int index_of(int target_bone) const {
+    const auto found = std::find(to_.bones.begin(), to_.bones.end(), target_bone);
+    return found == to_.bones.end() ? -1 : static_cast<int>(found - to_.bones.begin());
+  }
+  bool is_inside(int target_bone, int node) const {
+    const int i = index_of(target_bone);
+    return i >= 0 && is_inner_seam(i, end_at(target_.skeleton, target_bone, node));
+  }
+  /// The mean of what the bones that meet see.
+  double seam_distance(const Walls& walls, int node, const std::vector<int>& bones, const Vec3& direction) const {
+    double sum = 0;
+    for (const int bone : bones)
+      sum += overlay_.seam_at(index_of(bone), end_at(target_.skeleton, bone, node), walls.turn_of(bone, direction)).distance;
+    return scale_at(BoneEnd::kHead) * sum / static_cast<double>(bones.size());  // the same at both ends where there is such a seam
   }
 
   const SkeletexModel &source_, &target_;
   Part from_, to_;
   TransferOptions options_;
   Overlay overlay_;
-  double scale_ = 0;
+  std::array<Cut, 2> cuts_;
+};
+
+/// All parts at once: one launch serves them.
+class Laying {
+ public:
+  Laying(ClContext& context, const SkeletexModel& source, const SkeletexModel& target, const TransferOptions& options)
+      : context_(context), source_(source), target_(target), options_(options), walls_(target.skeleton), source_walls_(source.skeleton),
+        source_points_(points_in_bone_axes(context, source)), source_host_(context, source_points_), target_host_(context, points_in_bone_axes(context, target)),
+        source_first_(first_points(source.patches)), target_first_(first_points(target.patches)), part_of_(target.patches.size(), {nullptr, 0}) {}
+
+  void add(PartTransfer& part) {
+    for (int i = 0; i < part.count(); ++i) {
+      auto& [owner, index] = part_of_[part.target_bone(i)];
+      if (owner) throw InputError(fmt::format("bone \"{}\" of the target is replaced twice", target_.skeleton.bones[part.target_bone(i)].name));
+      owner = &part;
+      index = i;
+    }
+    for (const BoneEnd end : kEnds) part.cut(end).scale = options_.scale == TransferScale::kFactor ? options_.factor : part.length_ratio();
+    for (const BoneEnd end : kEnds)
+      if (part.is_boundary(0, end)) find_cut(part, end);
+    if (!part.is_between()) {
+      const BoneEnd end = part.is_boundary(0, BoneEnd::kTail) ? BoneEnd::kTail : BoneEnd::kHead;
+      part.cut(opposite(end)).scale = part.cut(end).scale;
+    }
+  }
+
+  SkeletexModel run(std::span<const std::unique_ptr<PartTransfer>> parts) {
+    SkeletexModel result = target_;
+    for (const auto& part : parts) part->set_seams(result, walls_);
+    for (std::size_t b = 0; b < part_of_.size(); ++b)
+      if (part_of_[b].first) part_of_[b].first->set_rows(part_of_[b].second, result.patches[b]);
+    frames_ = frame_tables(result.skeleton, walls_, result.patches, result.origin);
+    fill_tables();
+    skip_what_runs_back(lay());
+    find_lean(lay());
+    find_corrections(lay());
+    const DevicePlanes points = lay_part(context_, tables_, frames_, source_points_, point_count_);
+
+    const DisplacementTexture& t = target_.texture;
+    const DevicePlanes target{context_.upload(t.along), context_.upload(t.around), context_.upload(t.out)};
+    DevicePlanes texels{context_.upload(t.along), context_.upload(t.around), context_.upload(t.out)};
+    const DeviceTables device = upload_tables(context_, frames_);
+    context_.launch({"reconstruct.cl", "enter_tangent_space"}, row_range(context_, tables_.rows.size()), static_cast<int>(tables_.rows.size()), t.width,
+                    device.column_count, context_.upload(tables_.rows), device.patches, device.rows, device.columns, points.x, points.y, points.z, texels.x, texels.y, texels.z);
+    keep_target(context_, tables_, frames_, t.width, target, texels);
+    result.texture.along = context_.download(texels.x);
+    result.texture.around = context_.download(texels.y);
+    result.texture.out = context_.download(texels.z);
+    return result;
+  }
+
+  TransferredPart report(const PartTransfer& part) const {
+    const PartTransfer::Cut& cut = part.cut(part.near());
+    const auto share = [](const std::vector<double>& rows, const Patch& patch) {
+      double sum = 0;
+      for (const double r : rows) sum += r / static_cast<double>(rows.size()) / (patch.rectangle.height - 1);
+      return sum;
+    };
+    return {part.scale_at(part.near()), part.length_scale(0), share(cut.skipped_rows, source_.patches[part.source_bone(0)]),
+            share(cut.kept_rows, target_.patches[part.target_bone(0)])};
+  }
+
+ private:
+  HostPoints lay() { return HostPoints(context_, lay_part(context_, tables_, frames_, source_points_, point_count_)); }
+  /// A point at a column, as its parts along s', o x s' and o.
+  static Vec3 about_bone(const Vec3& point, int column, int width) {
+    const double angle = 2 * std::numbers::pi * column / width, c = std::cos(angle), s = std::sin(angle);
+    return {c * point.x() + s * point.y(), c * point.y() - s * point.x(), point.z()};
+  }
+
+  template <class Visit>
+  void for_each_bone(const Visit& visit) {
+    for (int bone = 0; bone < static_cast<int>(part_of_.size()); ++bone)
+      if (part_of_[bone].first) visit(bone, *part_of_[bone].first, part_of_[bone].second);
+  }
+
+  /// A column of a patch from one end on: by row, its points as parts along s', o x s' and o (from that end's node).
+  static std::vector<Vec3> profile(const HostPoints& points, std::size_t first, const Rectangle& rectangle, int column, BoneEnd end, double length) {
+    std::vector<Vec3> result;
+    for (int r = 0; r < rectangle.height; ++r) {
+      const int row = end == BoneEnd::kHead ? r : rectangle.height - 1 - r;
+      Vec3 p = about_bone(points.at(first + static_cast<std::size_t>(row) * rectangle.width + column), column, rectangle.width);
+      if (end == BoneEnd::kTail) p.z() = length - p.z();
+      result.push_back(p);
+    }
+    return result;
+  }
+
+  /// Where a patch leaves the body and becomes the limb, by column: along the deepest valley around it (the minima rule,
+  /// by which people part shapes). The closed curve of rows with the most concave turn, least length and least left out.
+  /// \param wanted  places that the curve should be near to, across the bone; none if empty
+  static std::vector<double> root_rows(const std::vector<std::vector<Vec3>>& columns, bool is_half, const std::vector<Eigen::Vector2d>& wanted) {
+    const int width = static_cast<int>(columns.size()), last = static_cast<int>(columns[0].size()) - 1;
+    const int column_step = std::max(1, width / 64), around = width / column_step;
+    const double row_step = std::max(1.0, last / 64.0), reach = std::max(1.5, kReach * last);
+    const int levels = static_cast<int>((is_half ? 0.35 : kMostCut) * last / row_step);
+    std::vector<double> costs(static_cast<std::size_t>(around) * levels, 0);
+    double girth2 = 0;
+    for (const Eigen::Vector2d& place : wanted) girth2 += place.squaredNorm() / static_cast<double>(wanted.size());
+    for (int k = 0; k < around; ++k)
+      for (int level = 0; level < levels; ++level) {
+        const std::vector<Vec3>& column = columns[k * column_step];
+        const double row = level * row_step;
+        double& cost = costs[static_cast<std::size_t>(k) * levels + level];
+        if (girth2 > 0) cost += kMisfitCost * std::min(kMostMisfit, (at_row(column, row).head<2>() - wanted[k * column_step]).squaredNorm() / girth2);
+        if (level == 0) continue;
+        const Vec3 before = at_row(column, row) - at_row(column, std::max(0.0, row - reach)), after = at_row(column, row + reach) - at_row(column, row);
+        const double turn = std::atan2(after.z() * -before.x() + after.x() * before.z(), before.x() * after.x() + before.z() * after.z());
+        const double share = std::min(1.0, row / reach);  // near the end there is not much to see
+        cost += kCutCost * (1 + row / last) - share * turn;
+      }
+    // Three times round; the middle one knows no beginning.
+    const int steps = 3 * around;
+    std::vector<double> best(costs.begin(), costs.begin() + levels);
+    std::vector<int> from(static_cast<std::size_t>(steps) * levels, 0);
+    for (int k = 1; k < steps; ++k) {
+      std::vector<double> next(levels);
+      for (int to = 0; to < levels; ++to) {
+        double least = std::numeric_limits<double>::infinity();
+        for (int level = 0; level < levels; ++level) {
+          const double cost = best[level] + kBend * (to - level) * (to - level);
+          if (cost < least) least = cost, from[static_cast<std::size_t>(k) * levels + to] = level;
+        }
+        next[to] = least + costs[static_cast<std::size_t>(k % around) * levels + to];
+      }
+      best = std::move(next);
+    }
+    int level = static_cast<int>(std::min_element(best.begin(), best.end()) - best.begin());
+    std::vector<double> sampled(around);
+    for (int k = steps - 1; k >= around; --k) {
+      if (k < 2 * around) sampled[k - around] = level * row_step;
+      level = from[static_cast<std::size_t>(k) * levels + level];
+    }
+    std::vector<double> rows(width);
+    for (int j = 0; j < width; ++j) {
+      const double at = static_cast<double>(j) / width * around;
+      const int k = static_cast<int>(at);
+      rows[j] = (1 - (at - k)) * sampled[k % around] + (at - k) * sampled[(k + 1) % around];
+    }
+    smooth_around(rows);
+    return rows;
+  }
+
+  static Vec3 at_row(const std::vector<Vec3>& column, double row) {
+    const int below = std::clamp(static_cast<int>(row), 0, static_cast<int>(column.size()) - 2);
+    const double share = std::clamp(row - below, 0.0, 1.0);
+    return (1 - share) * column[below] + share * column[below + 1];
+  }
+
+  /// Where the part leaves the body, on both sides, and what it is scaled by.
+  void find_cut(PartTransfer& part, BoneEnd end) {
+    const int bone = part.target_bone(0), from = part.source_bone(0);
+    const Rectangle &here = target_.patches[bone].rectangle, &there = source_.patches[from].rectangle;
+    const BoneEnd source_end = part.overlay().model_end(0, end);
+    const double length = bone_length(target_.skeleton, bone), source_length = bone_length(source_.skeleton, from);
+    std::vector<std::vector<Vec3>> columns, source_columns;
+    for (int j = 0; j < here.width; ++j) {
+      columns.push_back(profile(target_host_, target_first_[bone], here, j, end, length));
+      const double turn = part.overlay().model_turn(0, end, static_cast<double>(j) / here.width);
+      const int column = static_cast<int>(std::lround((turn - std::floor(turn)) * there.width)) % there.width;
+      source_columns.push_back(profile(source_host_, source_first_[from], there, column, source_end, source_length));
+    }
+    PartTransfer::Cut& cut = part.cut(end);
+    const auto rows = [&](const std::vector<std::vector<Vec3>>& all, double given, int height, const std::vector<Eigen::Vector2d>& wanted) {
+      std::vector<double> result(here.width, std::max(0.0, given) * (height - 1));
+      if (given >= 0 || options_.blend == TransferBlend::kNone) return result;
+      return root_rows(all, part.is_between(), wanted);
+    };
+    cut.kept_rows = rows(columns, options_.keep, here.height, {});
+    std::vector<Eigen::Vector2d> wanted;
+    if (!part.is_scaled_by_girth())
+      for (int j = 0; j < here.width; ++j) wanted.push_back(at_row(columns[j], cut.kept_rows[j]).head<2>() / cut.scale);
+    cut.skipped_rows = rows(source_columns, options_.skip, there.height, wanted);
+    if (getenv("DBG2"))
+      for (const int j : {44, 52, 56, 0, 4})
+        for (int r = 0; r < there.height; r += 3) { const Vec3 p = source_columns[j][r]; fprintf(stderr, "row col %d r %d: %.3f %.3f %.3f\n", j, r, p.x(), p.y(), p.z()); }
+    if (getenv("DBG"))
+      for (int j = 0; j < here.width; j += 4) {
+        const auto show = [&](const std::vector<Vec3>& c, double kept) { const Vec3 p = at_row(c, kept); fprintf(stderr, "  %5.1f of %zu rho %.3f r %.3f z %.3f ", kept, c.size(), p.x(), p.y(), p.z()); };
+        fprintf(stderr, "row %d", j); show(columns[j], cut.kept_rows[j]); show(source_columns[j], cut.skipped_rows[j]); fprintf(stderr, "\n");
+      }
+    const double width = part.width_in_rows(0), source_rows = static_cast<double>(there.height - 1) / (here.height - 1);
+    double girth = 0, source_girth = 0;
+    for (int j = 0; j < here.width; ++j) {
+      // Where nothing is left out, a part goes from node to node.
+      if (cut.kept_rows[j] > 0 || cut.skipped_rows[j] > 0) {
+        cut.kept += at_row(columns[j], cut.kept_rows[j]).z() / here.width;
+        cut.skipped += at_row(source_columns[j], cut.skipped_rows[j]).z() / here.width;
+      }
+      girth += at_row(columns[j], std::min(cut.kept_rows[j] + width, 0.9 * here.height)).head<2>().norm();
+      source_girth += at_row(source_columns[j], std::min(cut.skipped_rows[j] + width * source_rows, 0.9 * there.height)).head<2>().norm();
+    }
+    if (part.is_scaled_by_girth()) cut.scale = girth / source_girth;
+  }
+
+  void fill_tables() {
+    tables_.patches.resize(part_of_.size());
+    result_first_.resize(part_of_.size());
+    for_each_bone([&](int bone, const PartTransfer& part, int i) {
+      const Rectangle& from = source_.patches[part.source_bone(i)].rectangle;
+      const auto [x, y, width, height] = target_.patches[bone].rectangle;
+      LaidPatch& patch = tables_.patches[bone];
+      patch = {static_cast<int>(source_first_[part.source_bone(i)]), from.width, from.height, static_cast<int>(tables_.columns.size()),
+               part.overlay().is_reversed(i) ? -1.0f : 1.0f, static_cast<float>(bone_length(source_.skeleton, part.source_bone(i))),
+               static_cast<float>(part.length_scale(i)), static_cast<float>(part.length_offset(i)), 0, 0, 0, 0, 0, options_.blend == TransferBlend::kLinear};
+      const auto fade_width = [&](BoneEnd end) {
+        if (part.is_inner_seam(i, end)) return 0.5 * (height - 1);
+        return options_.blend == TransferBlend::kNone || !part.is_boundary(i, end) ? 0.0 : part.width_in_rows(i);
+      };
+      patch.head_width = static_cast<float>(fade_width(BoneEnd::kHead));
+      patch.tail_width = static_cast<float>(fade_width(BoneEnd::kTail));
+      std::vector<float> head_columns, tail_columns;
+      append_columns(part.overlay(), i, width, head_columns, tail_columns);
+      for (int j = 0; j < width; ++j) {
+        const auto shear = [&](BoneEnd end) {
+          if (!part.is_inner_seam(i, end)) return 0.0f;
+          return static_cast<float>(part.wall_change(source_walls_, walls_, i, end, static_cast<double>(j) / width).shear);
+        };
+        tables_.columns.push_back({head_columns[j], tail_columns[j], shear(BoneEnd::kHead), shear(BoneEnd::kTail), 0, 0, 0, 0});
+        set_rows(part, i, bone, j);
+      }
+      result_first_[bone] = point_count_;
+      for (int row = 0; row < height; ++row) {
+        tables_.rows.push_back({bone, row, static_cast<int>(point_count_), 0});
+        point_count_ += width;
+        const double share = static_cast<double>(row) / (height - 1);
+        tables_.laid_rows.push_back({frames_.rows[frames_.patches[bone].row_begin + row].station,
+                                     static_cast<float>((1 - share) * part.scale_at(BoneEnd::kHead) + share * part.scale_at(BoneEnd::kTail))});
+      }
+    });
+    tables_.corrections.assign(tables_.correction_size(), 0);
+  }
+
+  /// Rows of one column: the source's from cut to cut.
+  void set_rows(const PartTransfer& part, int i, int bone, int j) {
+    LaidColumn& column = tables_.columns[tables_.patches[bone].column_begin + j];
+    double first = 0, last = target_.patches[bone].rectangle.height - 1, source_first = 0, source_last = tables_.patches[bone].height - 1;
+    if (part.is_boundary(i, BoneEnd::kHead)) first += part.cut(BoneEnd::kHead).kept_rows[j], source_first += part.cut(BoneEnd::kHead).skipped_rows[j];
+    if (part.is_boundary(i, BoneEnd::kTail)) last -= part.cut(BoneEnd::kTail).kept_rows[j], source_last -= part.cut(BoneEnd::kTail).skipped_rows[j];
+    const double step = (source_last - source_first) / (last - first);
+    column.row_begin = static_cast<float>(source_first - step * first);
+    column.row_step = static_cast<float>(step);
+    column.first_row = static_cast<float>(part.is_boundary(i, BoneEnd::kHead) ? first : -1);
+    column.last_row = static_cast<float>(part.is_boundary(i, BoneEnd::kTail) ? last : last + 1);
+  }
+
+  /// Where the target's edge lies further along the bone than the part's, a surface that begins there would have to run
+  /// back. There the part begins later.
+  void skip_what_runs_back(const HostPoints& laid) {
+    if (options_.blend == TransferBlend::kNone || options_.skip >= 0) return;
+    for_each_bone([&](int bone, PartTransfer& part, int i) {
+      const Rectangle& rectangle = target_.patches[bone].rectangle;
+      const double length = bone_length(target_.skeleton, bone);
+      for (const BoneEnd end : kEnds) {
+        if (!part.is_boundary(i, end)) continue;
+        PartTransfer::Cut& cut = part.cut(end);
+        std::vector<double> more(rectangle.width);
+        for (int j = 0; j < rectangle.width; ++j) {
+          const std::vector<Vec3> column = profile(laid, result_first_[bone], rectangle, j, end, length);
+          const double limit = at_row(profile(target_host_, target_first_[bone], rectangle, j, end, length), cut.kept_rows[j]).z() - 1e-5 * target_.diagonal;
+          const double most = cut.kept_rows[j] + kMostRunBack * (rectangle.height - 1 - cut.kept_rows[j]);
+          double row = cut.kept_rows[j];
+          while (row < most && at_row(column, row).z() < limit) row += 0.5;
+          more[j] = std::abs(tables_.columns[tables_.patches[bone].column_begin + j].row_step) * (row - cut.kept_rows[j]);
+        }
+        smooth_around(more);
+        for (int j = 0; j < rectangle.width; ++j) cut.skipped_rows[j] += more[j];
+      }
+      for (int j = 0; j < rectangle.width; ++j) set_rows(part, i, bone, j);
+    });
+  }
+
+  /// Where a part's edge lies beside the target's as a whole, the part leans, so that its far end stays.
+  void find_lean(const HostPoints& laid) {
+    if (options_.blend == TransferBlend::kNone) return;
+    for_each_bone([&](int bone, const PartTransfer& part, int i) {
+      if (part.is_boundary(i, BoneEnd::kHead) == part.is_boundary(i, BoneEnd::kTail)) return;
+      const BoneEnd end = part.is_boundary(i, BoneEnd::kHead) ? BoneEnd::kHead : BoneEnd::kTail;
+      const Rectangle& rectangle = target_.patches[bone].rectangle;
+      Vec3 edge = Vec3::Zero(), target_edge = Vec3::Zero(), far = Vec3::Zero();
+      for (int j = 0; j < rectangle.width; ++j) {
+        const double row = part.cut(end).kept_rows[j];
+        const auto add = [&](Vec3& sum, const HostPoints& points, std::size_t first, double at) {
+          sum += about_bone(at_row(profile(points, first, rectangle, j, end, 0), at), -j, rectangle.width) / rectangle.width;
+        };
+        add(edge, laid, result_first_[bone], row);
+        add(target_edge, target_host_, target_first_[bone], row);
+        add(far, laid, result_first_[bone], rectangle.height - 1);
+      }
+      const double sign = end == BoneEnd::kHead ? 1 : -1;
+      LaidPatch& patch = tables_.patches[bone];
+      patch.lean_end = static_cast<float>(sign * far.z());
+      const Vec3 lean = (target_edge - edge) / (sign * std::max(std::abs(far.z() - edge.z()), 1e-3 * target_.diagonal));
+      const double share = std::min(1.0, kMostLean / std::max(lean.head<2>().norm(), 1e-30));
+      patch.lean_s = static_cast<float>(share * lean.x());
+      patch.lean_b = static_cast<float>(share * lean.y());
+    });
+  }
+
+  void find_corrections(const HostPoints& laid) {
+    for_each_bone([&](int bone, const PartTransfer& part, int i) {
+      const Rectangle& rectangle = target_.patches[bone].rectangle;
+      const int width = rectangle.width;
+      for (const BoneEnd end : kEnds) {
+        std::array<std::vector<double>, 3> offsets, slopes;
+        for (int axis = 0; axis < 3; ++axis) offsets[axis].assign(width, 0), slopes[axis].assign(width, 0);
+        for (int j = 0; j < width; ++j) {
+          if (part.is_boundary(i, end)) {
+            const std::vector<Vec3> to = profile(target_host_, target_first_[bone], rectangle, j, end, 0), from = profile(laid, result_first_[bone], rectangle, j, end, 0);
+            const double kept = part.cut(end).kept_rows[j], reach = std::max(1.0, part.width_in_rows(i) / 6), back = std::min(kept, reach / 2);
+            const auto change = [&](double row) {
+              Vec3 d = at_row(to, row) - at_row(from, row);
+              if (end == BoneEnd::kTail) d.z() = -d.z();
+              return d;
+            };
+            const Vec3 offset = change(kept), slope = (change(kept + reach - back) - change(kept - back)) / reach;
+            for (int axis = 0; axis < 3; ++axis) offsets[axis][j] = offset[axis], slopes[axis][j] = slope[axis];
+          } else if (part.is_inner_seam(i, end)) {
+            const PartTransfer::WallChange change = part.wall_change(source_walls_, walls_, i, end, static_cast<double>(j) / width);
+            offsets[0][j] = change.across;
+            offsets[2][j] = change.along;
+          }
+        }
+        store_corrections(bone, end, offsets, false);
+        store_corrections(bone, end, slopes, true);
+      }
+    });
+  }
+
+  void store_corrections(int bone, BoneEnd end, const std::array<std::vector<double>, 3>& values, bool is_slope) {
+    const int width = static_cast<int>(values[0].size());
+    const std::array bands{wave_bands(values[0]), wave_bands(values[1]), wave_bands(values[2])};
+    for (int band = 0; band < SKELETEX_TRANSFER_BANDS; ++band)
+      for (int j = 0; j < width; ++j) {
+        const Vec3 back = about_bone({bands[0][band][j], bands[1][band][j], bands[2][band][j]}, -j, width);
+        for (int axis = 0; axis < 3; ++axis)
+          tables_.correction(end, band, is_slope, axis, static_cast<std::size_t>(tables_.patches[bone].column_begin + j)) = static_cast<float>(back[axis]);
+      }
+  }
+
+  ClContext& context_;
+  const SkeletexModel &source_, &target_;
+  TransferOptions options_;
+  Walls walls_, source_walls_;
+  DevicePlanes source_points_;
+  HostPoints source_host_, target_host_;
+  std::vector<std::size_t> source_first_, target_first_, result_first_;
+  std::vector<std::pair<PartTransfer*, int>> part_of_;  ///< per bone of the target: who replaces it, and which of its bones it is
+  FrameTables frames_;
+  LaidTables tables_;
+  std::size_t point_count_ = 0;
 };
 
 }  // namespace
 
 SkeletexModel transfer(ClContext& context, const SkeletexModel& source, const SkeletexModel& target,
-                       const std::vector<std::pair<std::string, std::string>>& bones, const TransferOptions& options) {
+                       const std::vector<std::pair<std::string, std::string>>& bones, const TransferOptions& options, std::vector<TransferredPart>* report) {
   if (bones.empty()) throw InputError("there are no bones to transfer");
   if (!(options.width >= 0) || !(options.width_in_texels >= 0)) throw InputError("the width of a blend is 0 or more");
+  if (options.scale == TransferScale::kFactor && !(options.factor > 0)) throw InputError("a scale is above 0");
+  if (options.keep > 0.9 || options.skip > 0.9) throw InputError("the shares of rows that are kept and skipped are 0.9 at most");
   std::vector<std::unique_ptr<PartTransfer>> parts;
-  std::vector<std::pair<const PartTransfer*, int>> part_of(target.patches.size(), {nullptr, 0});
+  Laying laying(context, source, target, options);
   for (const auto& [from, to] : bones) {
     const int a = bone_by_name(source.skeleton, from, "source"), b = bone_by_name(target.skeleton, to, "target");
     const auto chosen = [&](const SkeletexModel& model, int bone) { return options.has_limbs ? limb_of(model, bone) : std::vector<int>{bone}; };
     parts.push_back(std::make_unique<PartTransfer>(source, target, cut_out(source, chosen(source, a)), cut_out(target, chosen(target, b)), options));
-    for (int i = 0; i < parts.back()->count(); ++i) {
-      auto& [part, index] = part_of[parts.back()->target_bone(i)];
-      if (part) throw InputError(fmt::format("bone \"{}\" of the target is replaced twice", target.skeleton.bones[parts.back()->target_bone(i)].name));
-      part = parts.back().get();
-      index = i;
-    }
+    laying.add(*parts.back());
   }
-
-  SkeletexModel result = target;
-  for (const auto& part : parts) part->set_seams(result);
-  for (std::size_t b = 0; b < part_of.size(); ++b)
-    if (part_of[b].first) part_of[b].first->set_rows(part_of[b].second, result.patches[b]);
-
-  // Two sources: the target itself, then the source.
-  BlendTables tables;
-  tables.source_count = 2;
-  std::vector<LatticeRow> rows = lattice_rows(target.patches, RowChoice::kAll);
-  std::erase_if(rows, [&](const LatticeRow& row) { return !part_of[row[0]].first; });
-  for (const Patch& patch : target.patches) {
-    const auto [x, y, width, height] = patch.rectangle;
-    tables.sources.push_back({y * target.texture.width + x, target.texture.width, width, height, static_cast<int>(tables.head_columns.size()), 1.0f});
-    for (int j = 0; j < width; ++j) tables.head_columns.push_back(static_cast<float>(j));
+  SkeletexModel result = laying.run(parts);
+  if (report) {
+    report->clear();
+    for (const auto& part : parts) report->push_back(laying.report(*part));
   }
-  tables.tail_columns = tables.head_columns;
-  const int source_begin = static_cast<int>(target.texture.out.size());
-  for (std::size_t b = 0; b < part_of.size(); ++b) {
-    const auto [part, i] = part_of[b];
-    if (!part) {
-      tables.sources.push_back({});
-      continue;
-    }
-    const auto [x, y, width, height] = source.patches[part->source_bone(i)].rectangle;
-    tables.sources.push_back({source_begin + y * source.texture.width + x, source.texture.width, width, height,
-                              static_cast<int>(tables.head_columns.size()), part->overlay().is_reversed(i) ? -1.0f : 1.0f});
-    append_columns(part->overlay(), i, target.patches[b].rectangle.width, tables);
-  }
-  for (const LatticeRow& row : rows) {
-    const auto [part, i] = part_of[row[0]];
-    tables.rows.push_back({static_cast<float>(row_of_u(target.patches[row[0]], result.patches[row[0]].row_u[row[1]])),
-                           static_cast<float>(1 - part->share_and_scale(i, row[1])[0])});
-  }
-  for (const LatticeRow& row : rows) {
-    const auto [part, i] = part_of[row[0]];
-    const auto [share, scale] = part->share_and_scale(i, row[1]);
-    const double at = row_at_same_share(row[1], target.patches[row[0]].rectangle.height, source.patches[part->source_bone(i)].rectangle.height,
-                                        part->overlay().is_reversed(i));
-    tables.rows.push_back({static_cast<float>(at), static_cast<float>(share * scale)});
-  }
-
-  const auto upload_both = [&](const std::vector<float>& first, const std::vector<float>& second) {
-    std::vector<float> both = first;
-    both.insert(both.end(), second.begin(), second.end());
-    return context.upload(both);
-  };
-  const DisplacementTexture &t = target.texture, &s = source.texture;
-  const DevicePlanes texels{upload_both(t.along, s.along), upload_both(t.around, s.around), upload_both(t.out, s.out)};
-  DevicePlanes blended{context.upload(t.along), context.upload(t.around), context.upload(t.out)};
-  const Walls walls(result.skeleton);
-  blend_texels(context, tables, rows, frame_tables(result.skeleton, walls, result.patches, result.origin), t.width, texels, blended);
-  result.texture.along = context.download(blended.x);
-  result.texture.around = context.download(blended.y);
-  result.texture.out = context.download(blended.z);
   return result;
 }
 

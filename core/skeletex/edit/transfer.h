@@ -9,25 +9,48 @@
 
 namespace skeletex {
 
-/// How a transferred patch fades into the target near the seams that it keeps.
+/// How the correction that carries a part onto the seams that the target keeps fades away from them.
 enum class TransferBlend { kCosine, kLinear, kNone };
+
+/// What a part is scaled by across its bones. Along them its length always follows the target's bones.
+enum class TransferScale {
+  kAuto,    ///< parts that end freely keep their proportions (kLength), parts between two seams their target's girth
+  kLength,  ///< ratio of the lengths of all bones of the part
+  kGirth,   ///< ratio of the girths where the correction ends; linear between two seams
+  kFactor   ///< TransferOptions::factor
+};
 
 struct TransferOptions {
   bool has_limbs = false;  ///< with every bone also those below it: the ones on its far side from the skeleton's root
   TransferBlend blend = TransferBlend::kCosine;
   double width = 0.25;         ///< of the fade: share of the patch's rows
   double width_in_texels = 0;  ///< instead, where it is above 0: rows
+  TransferScale scale = TransferScale::kAuto;
+  double factor = 1;
+  double keep = -1;  ///< share of its rows that the target keeps at its seams; below 0: up to where the two fit best
+  double skip = -1;  ///< share of the source's rows that is left out there; below 0: up to where the two fit best
+};
+
+/// What was done to one pair of bones.
+struct TransferredPart {
+  double scale = 0;         ///< across the bones, at the part's beginning
+  double length_scale = 0;  ///< along the first bone
+  double skipped = 0;       ///< share of the source's rows at its beginning
+  double kept = 0;          ///< share of the target's rows there
 };
 
 /// The target with the surfaces of some bones replaced by those of the source's (paper 5, Figures 17 and 18): inner
 /// segments, leaves, or whole limbs. The target's skeleton stays, and so do its seams with bones that are not replaced and all texels of
-/// these, bit by bit. The source's displacements are scaled by the ratio of the girths where its patch meets the target,
-/// its length follows the target's bone, and its angle is the one that leaves the rest of the body on the same side.
-/// Of limbs, the seams in between are the source's.
+/// these, bit by bit; of limbs, the seams in between are the source's. The part keeps its shape but for an affine map: along the bone to the target's
+/// length, across it scaled, turned about it so that the rest of the body stays on the same side. Near the seams that
+/// the target keeps an offset is added that carries the part's edge onto the seam and turns it into the target's slope,
+/// and fades (see docs/transfers.md).
 /// \param bones  names (source, target)
+/// \param parts  if given, receives one entry per pair of bones
 /// \throw InputError when a bone is unknown, one of a pair ends freely and the other does not, the bones below them
 ///        branch differently, or a limb is part of a cycle, naming the bone
 SkeletexModel transfer(ClContext& context, const SkeletexModel& source, const SkeletexModel& target,
-                       const std::vector<std::pair<std::string, std::string>>& bones, const TransferOptions& options = {});
+                       const std::vector<std::pair<std::string, std::string>>& bones, const TransferOptions& options = {},
+                       std::vector<TransferredPart>* parts = nullptr);
 
 }  // namespace skeletex

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+// The surface of one model's bone around the bone of another (paper 5). NDRange of both kernels: one work-group per row,
+// of any size; work-items take columns in turn (see reconstruct.cl).
+#include "skeletex_structs.h"
+#include "transfer_structs.h"
+
+// 1 at an end of the part, 0 from `width` rows on.
+static float faded(const float rows, const float width, const int is_linear) {
+  const float share = width > 0.0f ? clamp(rows / width, 0.0f, 1.0f) : (rows > 0.0f ? 1.0f : 0.0f);
+  return is_linear ? 1.0f - share : 0.5f + 0.5f * cos(3.14159265f * share);
+}
+
+// The source's points, stretched along the bone, scaled across it, sheared where walls differ, and with corrections at
+// both ends.
+// in   lattice_rows: the rows to do, four ints each: patch, row, number of the row's first vertex in the planes of points, unused
+//      patches: the result's. laid: per patch of the result. laid_rows: per row to do. columns: see LaidColumn
+//      corrections: planes of column_count floats, [((end * bands + band) * 2 + is_slope) * 3 + axis]: offset where the
+//      part begins (LaidColumn's first_row and last_row) and its change per row from there
+//      in_s, in_b, in_o: points of the source's lattice, all rows, in the axes of their own bones from their heads
+// out  s, b, o: points in the axes of the result's bones from their heads
+__kernel void lay_part(const int row_count, const int column_count, __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
+                       __global const LaidPatch* restrict laid, __global const LaidRow* restrict laid_rows, __global const LaidColumn* restrict columns,
+                       __global const float* restrict corrections, __global const float* restrict in_s, __global const float* restrict in_b,
+                       __global const float* restrict in_o, __global float* restrict s, __global float* restrict b, __global float* restrict o) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  const int patch = lattice_rows[4 * k], row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
+  const int width = patches[patch].width;
+  __global const LaidPatch* restrict from = laid + patch;
+  const int source_width = from->width, source_last = from->height - 1;
+  const float sign = from->sign;
+  const float period = (float)source_width, frequency = 1.0f / period, turn = 1.0f / (float)width;
+  const float station = laid_rows[k].station, scale = laid_rows[k].scale;
+
+  for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
+    __global const LaidColumn* restrict here = columns + from->column_begin + j;
+    const float lifted = here->head_column + station * (here->tail_column - here->head_column);
+    const float column = lifted - period * floor(lifted * frequency);
+    const int left_any = (int)column;
+    const float right_share = column - (float)left_any;
+    const int left = left_any >= source_width ? left_any - source_width : left_any;
+    const int right = left + 1 < source_width ? left + 1 : 0;
+
+    const float inside = clamp(here->row_begin + here->row_step * (float)row, 0.0f, (float)source_last);
+    const float at_row = sign < 0.0f ? (float)source_last - inside : inside;
+    const int below = min((int)at_row, source_last - 1);
+    const float above_share = at_row - (float)below;
+
+    const int p = from->begin + below * source_width;
+    const float w00 = (1.0f - above_share) * (1.0f - right_share), w01 = (1.0f - above_share) * right_share;
+    const float w10 = above_share * (1.0f - right_share), w11 = above_share * right_share;
+    const int v00 = p + left, v01 = p + right, v10 = v00 + source_width, v11 = v01 + source_width;
+    const float read_s = w00 * in_s[v00] + w01 * in_s[v01] + w10 * in_s[v10] + w11 * in_s[v11];
+    const float read_b = w00 * in_b[v00] + w01 * in_b[v01] + w10 * in_b[v10] + w11 * in_b[v11];
+    const float read_o = w00 * in_o[v00] + w01 * in_o[v01] + w10 * in_o[v10] + w11 * in_o[v11];
+
+    // From the source's angle to the one here.
+    const float own = 6.28318531f * turn * (float)j;
+    const float angle = own - sign * 6.28318531f * frequency * column;
+    const float cosine = cos(angle), sine = sin(angle);
+    const float turned_s = cosine * read_s - sign * sine * read_b;
+    const float turned_b = sine * read_s + sign * cosine * read_b;
+    const float along = sign < 0.0f ? from->source_length - read_o : read_o;
+    const float across = turned_s * cos(own) + turned_b * sin(own);
+    const float shear = (1.0f - station) * here->head_shear + station * here->tail_shear;
+    float point_o = from->length_offset + from->length_scale * along + shear * across;
+    float point_s = scale * turned_s + from->lean_s * (from->lean_end - point_o), point_b = scale * turned_b + from->lean_b * (from->lean_end - point_o);
+
+    for (int end = 0; end < 2; ++end) {
+      const float rows = fmax(0.0f, end == 0 ? (float)row - here->first_row : here->last_row - (float)row);
+      float fade_width = end == 0 ? from->head_width : from->tail_width;
+      for (int band = 0; band < SKELETEX_TRANSFER_BANDS; ++band, fade_width *= 0.5f) {
+        if (rows > 0.0f && rows >= fade_width) break;
+        const float fade = faded(rows, fade_width, from->is_linear);
+        __global const float* restrict c = corrections + (end * SKELETEX_TRANSFER_BANDS + band) * 6 * column_count + from->column_begin + j;
+        point_s += fade * (c[0] + rows * c[3 * column_count]);
+        point_b += fade * (c[column_count] + rows * c[4 * column_count]);
+        point_o += fade * (c[2 * column_count] + rows * c[5 * column_count]);
+      }
+    }
+    s[vertex + j] = point_s;
+    b[vertex + j] = point_b;
+    o[vertex + j] = point_o;
+  }
+}
+
+// Where the target keeps its surface: its texels, bit by bit.
+// in   as above; in_along, in_around, in_out: the target's texels
+// out  along, around, out: the result's
+__kernel void keep_target(const int row_count, const int texture_width, __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
+                          __global const LaidPatch* restrict laid, __global const LaidColumn* restrict columns, __global const float* restrict in_along,
+                          __global const float* restrict in_around, __global const float* restrict in_out, __global float* restrict along,
+                          __global float* restrict around, __global float* restrict out) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  const int patch = lattice_rows[4 * k], row = lattice_rows[4 * k + 1];
+  const int width = patches[patch].width;
+  const int texel = (patches[patch].y + row) * texture_width + patches[patch].x;
+  __global const LaidColumn* restrict here = columns + laid[patch].column_begin;
+  for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
+    if ((float)row > here[j].first_row && (float)row < here[j].last_row) continue;
+    along[texel + j] = in_along[texel + j];
+    around[texel + j] = in_around[texel + j];
+    out[texel + j] = in_out[texel + j];
+  }
+}
