@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <memory>
+#include <optional>
 
 #include "bone_pairs.h"
 #include "command.h"
@@ -11,29 +13,58 @@
 #include "result_file.h"
 #include "skeletex/edit/mirror.h"
 #include "skeletex/io/model_file.h"
+#include "skeletex/measure/folds.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
 
 namespace skeletex::cli {
 namespace {
 
 struct Arguments {
-  std::string source, target, output, device, json, blend = "cosine", width = "0.25";
+  std::string source, target, output, device, json, blend = "cosine", width = "auto", scale = "auto", keep = "auto", skip = "auto";
   std::vector<std::string> bones;
   bool has_limbs = false, is_mirrored = false;
 };
 
-/// "0.2": share of the bone's rows; "12px": rows.
-void parse_width(const std::string& text, TransferOptions& options) {
-  const bool is_in_texels = text.ends_with("px");
-  const std::string number = is_in_texels ? text.substr(0, text.size() - 2) : text;
-  double value = -1;
+/// A number from the whole text; nothing where it is none.
+std::optional<double> parse_number(const std::string& text) {
+  double value = 0;
   std::size_t used = 0;
   try {
-    value = std::stod(number, &used);
+    value = std::stod(text, &used);
   } catch (const std::exception&) {
+    return {};
   }
-  if (used != number.size() || !(value >= 0) || (is_in_texels ? !(value >= 1 && value <= 16384) : value > 1))
-    throw CLI::ValidationError("--width", fmt::format("\"{}\" is neither a share from 0 to 1 nor a number of texels such as 12px", text));
+  if (used != text.size() || !std::isfinite(value)) return {};
+  return value;
+}
+
+/// "0.2": share of the bone's rows; "12px": rows.
+void parse_width(const std::string& text, TransferOptions& options) {
+  if (text == "auto") return;
+  const bool is_in_texels = text.ends_with("px");
+  const double value = parse_number(is_in_texels ? text.substr(0, text.size() - 2) : text).value_or(-1);
+  if (!(value >= 0) || (is_in_texels ? !(value >= 1 && value <= 16384) : value > 1))
+    throw CLI::ValidationError("--width", fmt::format("\"{}\" is neither auto, a share from 0 to 1 nor a number of texels such as 12px", text));
   (is_in_texels ? options.width_in_texels : options.width) = value;
+}
+
+void parse_scale(const std::string& text, TransferOptions& options) {
+  if (text == "auto" || text == "length" || text == "girth") {
+    options.scale = text == "auto" ? TransferScale::kAuto : text == "length" ? TransferScale::kLength : TransferScale::kGirth;
+    return;
+  }
+  const std::optional<double> factor = parse_number(text);
+  if (!factor || !(*factor > 0)) throw CLI::ValidationError("--scale", fmt::format("\"{}\" is neither auto, length, girth nor a number above 0", text));
+  options.scale = TransferScale::kFactor;
+  options.factor = *factor;
+}
+
+/// auto: -1.
+double parse_share(const char* option, const std::string& text) {
+  if (text == "auto") return -1;
+  const std::optional<double> share = parse_number(text);
+  if (!share || !(*share >= 0 && *share <= 0.9)) throw CLI::ValidationError(option, fmt::format("\"{}\" is neither auto nor a share from 0 to 0.9", text));
+  return *share;
 }
 
 void run(const Arguments& arguments) {
@@ -42,6 +73,9 @@ void run(const Arguments& arguments) {
   options.has_limbs = arguments.has_limbs;
   options.blend = arguments.blend == "cosine" ? TransferBlend::kCosine : arguments.blend == "linear" ? TransferBlend::kLinear : TransferBlend::kNone;
   parse_width(arguments.width, options);
+  parse_scale(arguments.scale, options);
+  options.keep = parse_share("--keep", arguments.keep);
+  options.skip = parse_share("--skip", arguments.skip);
   check_result(arguments.output);
   check_json_target(arguments.json);
 
@@ -59,7 +93,14 @@ void run(const Arguments& arguments) {
   {
     ProgressBar bar;
     bar.show("transferring", 0.3);
-    json = write_result(context, transfer(context, source, target, pairs, options, &parts), arguments.output);
+    const SkeletexModel result = transfer(context, source, target, pairs, options, &parts);
+    json = write_result(context, result, arguments.output);
+    if (!arguments.json.empty()) {
+      bar.show("measuring", 0.8);
+      const auto folded = [&](const SkeletexModel& model) { return measure_folds(reconstruct_mesh(context, model)).folded_edges; };
+      json["folded_edges"] = folded(result);
+      json["folded_edges_of_target"] = folded(target);
+    }
   }
   Json bones = Json::array();
   for (std::size_t i = 0; i < pairs.size(); ++i)
@@ -85,7 +126,11 @@ void add_transfer_command(CLI::App& program) {
   command.add_flag("--limb", arguments->has_limbs, "also all bones below them, which must branch alike");
   command.add_flag("--mirror", arguments->is_mirrored, "take from the source's mirror image: a left arm for a right one");
   take_one_of(*command.add_option("--blend", arguments->blend, "how the two fade near the seams (default: cosine)"), {"cosine", "linear", "none"});
-  command.add_option("--width", arguments->width, "width of the fade: share of the bone's rows, or rows as 12px (default: 0.25)")->type_name("W|Npx");
+  command.add_option("--width", arguments->width, "width of the fade: share of the bone's rows, or rows as 12px (default: auto, 0.25, between two seams 0.5)")->type_name("auto|W|Npx");
+  command.add_option("--scale", arguments->scale, "across the bones: by the ratio of lengths or of girths, or a factor (default: auto, lengths where the part ends freely, else girths)")
+      ->type_name("auto|length|girth|X");
+  command.add_option("--keep", arguments->keep, "share of its rows that the target keeps at its seams (default: auto, up to the limb's root)")->type_name("auto|S");
+  command.add_option("--skip", arguments->skip, "share of the source's rows that is left out there (default: auto, up to the limb's root)")->type_name("auto|S");
   add_result_option(command, arguments->output);
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);

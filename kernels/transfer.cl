@@ -17,11 +17,13 @@ static float faded(const float rows, const float width, const int is_linear) {
 //      corrections: planes of column_count floats, [((end * bands + band) * 2 + is_slope) * 3 + axis]: offset where the
 //      part begins (LaidColumn's first_row and last_row) and its change per row from there
 //      in_s, in_b, in_o: points of the source's lattice, all rows, in the axes of their own bones from their heads
+//      target_s, target_b, target_o: the same of the target's
 // out  s, b, o: points in the axes of the result's bones from their heads
 __kernel void lay_part(const int row_count, const int column_count, __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
                        __global const LaidPatch* restrict laid, __global const LaidRow* restrict laid_rows, __global const LaidColumn* restrict columns,
                        __global const float* restrict corrections, __global const float* restrict in_s, __global const float* restrict in_b,
-                       __global const float* restrict in_o, __global float* restrict s, __global float* restrict b, __global float* restrict o) {
+                       __global const float* restrict in_o, __global const float* restrict target_s, __global const float* restrict target_b,
+                       __global const float* restrict target_o, __global float* restrict s, __global float* restrict b, __global float* restrict o) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   const int patch = lattice_rows[4 * k], row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
@@ -66,10 +68,18 @@ __kernel void lay_part(const int row_count, const int column_count, __global con
     float point_o = from->length_offset + from->length_scale * along + shear * across;
     float point_s = scale * turned_s + from->lean_s * (from->lean_end - point_o), point_b = scale * turned_b + from->lean_b * (from->lean_end - point_o);
 
-    for (int end = 0; end < 2; ++end) {
+    if (from->target_begin >= 0) {
+      const float kept = fmin(1.0f, faded(fmax(0.0f, (float)row - here->first_row), from->head_width, from->is_linear) +
+                                        faded(fmax(0.0f, here->last_row - (float)row), from->tail_width, from->is_linear));
+      const int t = from->target_begin + row * width + j;
+      point_s += kept * (target_s[t] - point_s);
+      point_b += kept * (target_b[t] - point_b);
+      point_o += kept * (target_o[t] - point_o);
+    }
+    for (int end = 0; end < 2 && from->target_begin < 0; ++end) {
       const float rows = fmax(0.0f, end == 0 ? (float)row - here->first_row : here->last_row - (float)row);
       float fade_width = end == 0 ? from->head_width : from->tail_width;
-      for (int band = 0; band < SKELETEX_TRANSFER_BANDS; ++band, fade_width *= 0.5f) {
+      for (int band = 0; band < SKELETEX_TRANSFER_BANDS; ++band, fade_width *= 0.7f) {
         if (rows > 0.0f && rows >= fade_width) break;
         const float fade = faded(rows, fade_width, from->is_linear);
         __global const float* restrict c = corrections + (end * SKELETEX_TRANSFER_BANDS + band) * 6 * column_count + from->column_begin + j;

@@ -30,6 +30,7 @@ typedef struct LaidPatch {
   float head_width;           ///< rows over which the longest waves of the correction at the head fade; 0: none
   float tail_width;
   SKELETEX_INT is_linear;     ///< it fades linearly, else by a cosine
+  SKELETEX_INT target_begin;  ///< of the target's patch in the planes of its points, to be mixed with them by that fade instead; -1: not
 } LaidPatch;
 
 /// One row of the result.
@@ -51,7 +52,7 @@ typedef struct LaidColumn {
 } LaidColumn;
 
 #ifndef __OPENCL_VERSION__
-static_assert(sizeof(LaidPatch) == 56);
+static_assert(sizeof(LaidPatch) == 60);
 static_assert(sizeof(LaidRow) == 8);
 static_assert(sizeof(LaidColumn) == 32);
 }  // namespace skeletex

@@ -57,6 +57,15 @@ void expect_same_outside(const SkeletexModel& a, const SkeletexModel& b, const s
   }
 }
 
+void expect_same_seams(const SkeletexModel& a, const SkeletexModel& b) {
+  for (std::size_t i = 0; i < a.arcs.size(); ++i)
+    for (std::size_t k = 0; k < a.arcs[i].samples.size(); ++k) {
+      ASSERT_EQ(a.arcs[i].samples[k].turn, b.arcs[i].samples[k].turn);
+      ASSERT_EQ(a.arcs[i].samples[k].distance, b.arcs[i].samples[k].distance);
+    }
+  for (std::size_t i = 0; i < a.corners.size(); ++i) ASSERT_EQ(a.corners[i].sample.distance, b.corners[i].sample.distance);
+}
+
 }  // namespace
 
 TEST(Transfer, LeavesEverythingElseBitByBit) {
@@ -66,44 +75,29 @@ TEST(Transfer, LeavesEverythingElseBitByBit) {
     options.blend = blend;
     const SkeletexModel result = transfer(device(), source, target, {{"left_horn", "left_ear"}, {"right_horn", "right_ear"}}, options);
     expect_same_outside(target, result, {"left_ear", "right_ear"});
+    expect_same_seams(target, result);
+    EXPECT_NE(result.texture.out, target.texture.out);
     expect_valid(result, 0);
   }
 }
 
-TEST(Transfer, OfABoneToItselfChangesNothing) {
-  const SkeletexModel& bear = standard("bear");
-  TransferOptions options;
-  options.blend = TransferBlend::kNone;
-  const SkeletexModel result = transfer(device(), bear, bear, {{"left_leg", "left_leg"}}, options);
-  EXPECT_EQ(result.texture.along, bear.texture.along);
-  EXPECT_EQ(result.texture.around, bear.texture.around);
-  EXPECT_EQ(result.texture.out, bear.texture.out);
-}
-
-TEST(Transfer, OfLimbsIsClosedAndKeepsTheRest) {
-  const SkeletexModel &source = standard("man"), &target = standard("armadillo");
-  TransferOptions options;
-  options.has_limbs = true;
-  const SkeletexModel result = transfer(device(), source, target, {{"left_upper_arm", "left_upper_arm"}}, options);
-  expect_same_outside(target, result, {"left_upper_arm", "left_forearm", "left_hand"});
-  EXPECT_NE(result.texture.out, target.texture.out);
-  expect_valid(result, 0);
-}
-
-TEST(Transfer, WithCosineMeetsTheSeamSmoothly) {
-  const SkeletexModel &source = standard("triceratops"), &target = standard("bunny00");
-  const SkeletexModel result = transfer(device(), source, target, {{"left_horn", "left_ear"}});
-  // The first inner row moves by less than the mean edge there.
-  const Lattice lattice = number_lattice(target);
-  const std::vector<Vec3> before = lattice_positions(device(), target), after = lattice_positions(device(), result);
-  const int ear = bone_of(target, "left_ear"), width = target.patches[ear].rectangle.width;
-  double moved = 0, edge = 0;
-  for (int j = 0; j < width; ++j) {
-    const int v = lattice.first_inner[ear] + j;
-    moved = std::max(moved, (after[v] - before[v]).norm());
-    edge += ((before[v + width] - before[v]).norm() + (before[lattice.first_inner[ear] + (j + 1) % width] - before[v]).norm()) / (2 * width);
-  }
-  EXPECT_LT(moved, edge);
+TEST(Transfer, OfAModelToItselfChangesNothing) {
+  const std::vector<std::tuple<std::string, std::string, bool>> cases{
+      {"bear", "left_leg", false}, {"bear", "left_ear", false}, {"bear", "neck", false}, {"bear", "left_shoulder", true}, {"man", "right_thigh", true},
+      {"armadillo", "tail", true}, {"man", "chest", false}};
+  for (const auto& [name, bone, has_limbs] : cases)
+    for (const TransferBlend blend : {TransferBlend::kCosine, TransferBlend::kNone}) {
+      const SkeletexModel& model = standard(name);
+      TransferOptions options;
+      options.has_limbs = has_limbs;
+      options.blend = blend;
+      const SkeletexModel result = transfer(device(), model, model, {{bone, bone}}, options);
+      const std::vector<Vec3> before = lattice_positions(device(), model), after = lattice_positions(device(), result);
+      double worst = 0;
+      for (std::size_t v = 0; v < before.size(); ++v) worst = std::max(worst, (after[v] - before[v]).norm());
+      // Texels go to places and back in single precision, and seams inside of limbs are read between samples.
+      EXPECT_LT(worst, (has_limbs ? 2e-3 : 2e-6) * model.diagonal) << name << " " << bone;
+    }
 }
 
 TEST(Transfer, RefusesWhatDoesNotFit) {

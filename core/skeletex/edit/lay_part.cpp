@@ -24,12 +24,13 @@ DevicePlanes points_in_bone_axes(ClContext& context, const SkeletexModel& model)
   return points;
 }
 
-DevicePlanes lay_part(ClContext& context, const LaidTables& tables, const FrameTables& result, const DevicePlanes& source, std::size_t point_count) {
+DevicePlanes lay_part(ClContext& context, const LaidTables& tables, const FrameTables& result, const DevicePlanes& source, const DevicePlanes& target,
+                      std::size_t point_count) {
   DevicePlanes points = allocate_planes(context, point_count);
   context.launch({"transfer.cl", "lay_part"}, row_range(context, tables.rows.size()), static_cast<int>(tables.rows.size()),
                  static_cast<int>(tables.columns.size()), context.upload(tables.rows), context.upload(result.patches), context.upload(tables.patches),
-                 context.upload(tables.laid_rows), context.upload(tables.columns), context.upload(tables.corrections), source.x, source.y, source.z, points.x,
-                 points.y, points.z);
+                 context.upload(tables.laid_rows), context.upload(tables.columns), context.upload(tables.corrections), source.x, source.y, source.z, target.x,
+                 target.y, target.z, points.x, points.y, points.z);
   return points;
 }
 

@@ -21,7 +21,8 @@ namespace skeletex {
 namespace {
 
 constexpr std::array<BoneEnd, 2> kEnds{BoneEnd::kHead, BoneEnd::kTail};
-constexpr double kMostLean = 0.5;
+constexpr double kMostLean = 0.5;  // a part leans by at most half of its length
+constexpr double kSame = 0.01;     // of the girth
 constexpr double kMostRunBack = 0.5;  // share of the rows behind its cut that a column may leave out, too
 constexpr double kMostCut = 0.85;  // share of a patch's rows that a cut may leave out
 constexpr double kReach = 0.12;    // share of the rows before and behind that a turn is measured over
@@ -38,7 +39,7 @@ int bone_by_name(const Skeleton& skeleton, const std::string& name, const char* 
 
 /// A periodic row of values without its waves shorter than about an eighth of a turn.
 void smooth_around(std::vector<double>& values) {
-  const int count = static_cast<int>(values.size()), reach = std::max(1, count / 32);
+  const int count = static_cast<int>(values.size()), reach = std::max(1, count / 10);
   for (int pass = 0; pass < 2; ++pass) {
     std::vector<double> smooth(count);
     double sum = 0;
@@ -73,7 +74,7 @@ std::vector<std::size_t> first_points(const std::vector<Patch>& patches) {
 class PartTransfer {
  public:
   PartTransfer(const SkeletexModel& source, const SkeletexModel& target, Part from, Part to, const TransferOptions& options)
-      : source_(source), target_(target), from_(faced_alike(std::move(from), to)), to_(std::move(to)), options_(options),
+      : source_(source), target_(target), from_(faced_alike(source, target, std::move(from), to)), to_(std::move(to)), options_(options),
         overlay_(from_.model, to_.model.skeleton, matched(to_, from_)) {
     const Walls walls(to_.model.skeleton);
     SeamNetwork network{to_.model.arcs, to_.model.corners, {}, to_.model.ends};
@@ -102,7 +103,8 @@ class PartTransfer {
   bool is_inner_seam(int i, BoneEnd end) const { return !to_.model.ends[i][static_cast<int>(end)].arcs.empty(); }
 
   double width_in_rows(int i) const {
-    return options_.width_in_texels > 0 ? options_.width_in_texels : options_.width * (target_.patches[to_.bones[i]].rectangle.height - 1);
+    if (options_.width_in_texels > 0) return options_.width_in_texels;
+    return (options_.width >= 0 ? options_.width : is_between() ? 0.5 : 0.25) * (target_.patches[to_.bones[i]].rectangle.height - 1);
   }
   bool is_between() const { return count() == 1 && is_boundary(0, BoneEnd::kHead) && is_boundary(0, BoneEnd::kTail); }
   bool is_scaled_by_girth() const { return options_.scale == TransferScale::kGirth || (options_.scale == TransferScale::kAuto && is_between()); }
@@ -177,6 +179,10 @@ class PartTransfer {
     double shear;
     double across, along;
   };
+  double shear(const Walls& source_walls, const Walls& walls, int i, BoneEnd end, double turn) const {
+    const double source_slope = source_walls.slope(source_bone(i), overlay_.model_end(i, end), overlay_.model_turn(i, end, turn));
+    return scale_at(end) * walls.slope(to_.bones[i], end, turn) - length_scale(i) * source_slope * (overlay_.is_reversed(i) ? -1 : 1);
+  }
   WallChange wall_change(const Walls& source_walls, const Walls& walls, int i, BoneEnd end, double turn) const {
     const int bone = to_.bones[i];
     const BoneEnd source_end = overlay_.model_end(i, end);
@@ -188,7 +194,7 @@ class PartTransfer {
     const double laid = scale * across(source_slope, overlay_.seam_at(i, end, turn).distance);
     const Vec3 direction = walls.spoke(bone, turn) + own_slope * walls.bases()[bone].o;
     const double wanted = across(own_slope, seam_distance(walls, end_node(target_.skeleton, bone, end), {bone, walls.neighbour(bone, end, turn)}, direction));
-    return {scale * own_slope - length_scale(i) * source_slope, wanted - laid, (wanted - laid) * own_slope};
+    return {shear(source_walls, walls, i, end, turn), wanted - laid, (wanted - laid) * own_slope};
   }
 
  private:
@@ -196,12 +202,31 @@ class PartTransfer {
     const auto name = [](const Part& part) { return part.model.skeleton.bones[0].name; };
     return find_correspondence(to.model.skeleton, from.model.skeleton, {.given = {{kRestOfBody, kRestOfBody}, {name(to), name(from)}}});
   }
+  /// Directions from where the two parts begin that shall agree: of the first bone, and of all nodes outside, where the
+  /// whole skeletons correspond, else of what lies nearby and of the body's centre.
+  static std::array<std::vector<Vec3>, 2> directions(const SkeletexModel& source, const SkeletexModel& target, const Part& from, const Part& to) {
+    std::array<std::vector<Vec3>, 2> result{std::vector{direction_from(from.model.skeleton, {0, from.near})}, std::vector{direction_from(to.model.skeleton, {0, to.near})}};
+    try {
+      const Correspondence whole = find_correspondence(
+          target.skeleton, source.skeleton, {.given = {{target.skeleton.bones[to.bones[0]].name, source.skeleton.bones[from.bones[0]].name}}});
+      const Vec3 origin = end_position(from.model.skeleton, 0, from.near), target_origin = end_position(to.model.skeleton, 0, to.near);
+      for (std::size_t n = 0; n < whole.nodes.size(); ++n) {
+        const Vec3 d = source.skeleton.nodes[whole.nodes[n]].position - origin, e = target.skeleton.nodes[n].position - target_origin;
+        if (d.norm() > 0 && e.norm() > 0) result[0].push_back(d.normalized()), result[1].push_back(e.normalized());
+      }
+    } catch (const InputError&) {
+      result[0].insert(result[0].end(), from.rest.begin(), from.rest.end());
+      result[1].insert(result[1].end(), to.rest.begin(), to.rest.end());
+    }
+    return result;
+  }
   /// Turned about the node where it begins so that its first bone and the rest of the body point as those of the other,
   /// as well as they can; then the rest so that posing the one as the other turns nothing about the bone. Angles about bones stay.
-  static Part faced_alike(Part from, const Part& to) {
+  static Part faced_alike(const SkeletexModel& source, const SkeletexModel& target, Part from, const Part& to) {
     const Vec3 origin = end_position(from.model.skeleton, 0, from.near);
-    const Vec3 direction = direction_from(from.model.skeleton, {0, from.near}), target_direction = direction_from(to.model.skeleton, {0, to.near});
-    const Eigen::Quaterniond turn = best_rotation({direction, from.rest[0], from.rest[1]}, {target_direction, to.rest[0], to.rest[1]});
+    const auto [own, wanted] = directions(source, target, from, to);
+    const Vec3 direction = own[0], target_direction = wanted[0];
+    const Eigen::Quaterniond turn = best_rotation(own, wanted);
     for (Node& node : from.model.skeleton.nodes) node.position = origin + turn * (node.position - origin);
     for (Bone& bone : from.model.skeleton.bones)
       if (bone.s) bone.s = turn * *bone.s;
@@ -238,7 +263,7 @@ class Laying {
  public:
   Laying(ClContext& context, const SkeletexModel& source, const SkeletexModel& target, const TransferOptions& options)
       : context_(context), source_(source), target_(target), options_(options), walls_(target.skeleton), source_walls_(source.skeleton),
-        source_points_(points_in_bone_axes(context, source)), source_host_(context, source_points_), target_host_(context, points_in_bone_axes(context, target)),
+        source_points_(points_in_bone_axes(context, source)), target_points_(points_in_bone_axes(context, target)), source_host_(context, source_points_), target_host_(context, target_points_),
         source_first_(first_points(source.patches)), target_first_(first_points(target.patches)), part_of_(target.patches.size(), {nullptr, 0}) {}
 
   void add(PartTransfer& part) {
@@ -267,7 +292,7 @@ class Laying {
     skip_what_runs_back(lay());
     find_lean(lay());
     find_corrections(lay());
-    const DevicePlanes points = lay_part(context_, tables_, frames_, source_points_, point_count_);
+    const DevicePlanes points = lay_part(context_, tables_, frames_, source_points_, target_points_, point_count_);
 
     const DisplacementTexture& t = target_.texture;
     const DevicePlanes target{context_.upload(t.along), context_.upload(t.around), context_.upload(t.out)};
@@ -294,7 +319,7 @@ class Laying {
   }
 
  private:
-  HostPoints lay() { return HostPoints(context_, lay_part(context_, tables_, frames_, source_points_, point_count_)); }
+  HostPoints lay() { return HostPoints(context_, lay_part(context_, tables_, frames_, source_points_, target_points_, point_count_)); }
   /// A point at a column, as its parts along s', o x s' and o.
   static Vec3 about_bone(const Vec3& point, int column, int width) {
     const double angle = 2 * std::numbers::pi * column / width, c = std::cos(angle), s = std::sin(angle);
@@ -322,11 +347,11 @@ class Laying {
   /// Where a patch leaves the body and becomes the limb, by column: along the deepest valley around it (the minima rule,
   /// by which people part shapes). The closed curve of rows with the most concave turn, least length and least left out.
   /// \param wanted  places that the curve should be near to, across the bone; none if empty
-  static std::vector<double> root_rows(const std::vector<std::vector<Vec3>>& columns, bool is_half, const std::vector<Eigen::Vector2d>& wanted) {
+  static std::vector<double> root_rows(const std::vector<std::vector<Vec3>>& columns, const std::vector<Eigen::Vector2d>& wanted) {
     const int width = static_cast<int>(columns.size()), last = static_cast<int>(columns[0].size()) - 1;
     const int column_step = std::max(1, width / 64), around = width / column_step;
     const double row_step = std::max(1.0, last / 64.0), reach = std::max(1.5, kReach * last);
-    const int levels = static_cast<int>((is_half ? 0.35 : kMostCut) * last / row_step);
+    const int levels = static_cast<int>(kMostCut * last / row_step);
     std::vector<double> costs(static_cast<std::size_t>(around) * levels, 0);
     double girth2 = 0;
     for (const Eigen::Vector2d& place : wanted) girth2 += place.squaredNorm() / static_cast<double>(wanted.size());
@@ -396,22 +421,26 @@ class Laying {
     PartTransfer::Cut& cut = part.cut(end);
     const auto rows = [&](const std::vector<std::vector<Vec3>>& all, double given, int height, const std::vector<Eigen::Vector2d>& wanted) {
       std::vector<double> result(here.width, std::max(0.0, given) * (height - 1));
-      if (given >= 0 || options_.blend == TransferBlend::kNone) return result;
-      return root_rows(all, part.is_between(), wanted);
+      if (given >= 0 || options_.blend == TransferBlend::kNone || part.is_between()) return result;
+      return root_rows(all, wanted);
     };
     cut.kept_rows = rows(columns, options_.keep, here.height, {});
     std::vector<Eigen::Vector2d> wanted;
     if (!part.is_scaled_by_girth())
       for (int j = 0; j < here.width; ++j) wanted.push_back(at_row(columns[j], cut.kept_rows[j]).head<2>() / cut.scale);
     cut.skipped_rows = rows(source_columns, options_.skip, there.height, wanted);
-    if (getenv("DBG2"))
-      for (const int j : {44, 52, 56, 0, 4})
-        for (int r = 0; r < there.height; r += 3) { const Vec3 p = source_columns[j][r]; fprintf(stderr, "row col %d r %d: %.3f %.3f %.3f\n", j, r, p.x(), p.y(), p.z()); }
-    if (getenv("DBG"))
-      for (int j = 0; j < here.width; j += 4) {
-        const auto show = [&](const std::vector<Vec3>& c, double kept) { const Vec3 p = at_row(c, kept); fprintf(stderr, "  %5.1f of %zu rho %.3f r %.3f z %.3f ", kept, c.size(), p.x(), p.y(), p.z()); };
-        fprintf(stderr, "row %d", j); show(columns[j], cut.kept_rows[j]); show(source_columns[j], cut.skipped_rows[j]); fprintf(stderr, "\n");
+    // Where the two are the same already, so is the cut.
+    const double source_step = static_cast<double>(there.height - 1) / (here.height - 1);
+    if (options_.skip < 0 && options_.keep < 0) {
+      double gap = 0, size = 0;
+      for (int j = 0; j < here.width; ++j) {
+        const Vec3 p = at_row(columns[j], cut.kept_rows[j]), q = at_row(source_columns[j], source_step * cut.kept_rows[j]);
+        gap += (p - Vec3(cut.scale * q.x(), cut.scale * q.y(), part.length_ratio() * q.z())).norm();
+        size += p.head<2>().norm();
       }
+      if (gap < kSame * size)
+        for (int j = 0; j < here.width; ++j) cut.skipped_rows[j] = source_step * cut.kept_rows[j];
+    }
     const double width = part.width_in_rows(0), source_rows = static_cast<double>(there.height - 1) / (here.height - 1);
     double girth = 0, source_girth = 0;
     for (int j = 0; j < here.width; ++j) {
@@ -435,7 +464,8 @@ class Laying {
       LaidPatch& patch = tables_.patches[bone];
       patch = {static_cast<int>(source_first_[part.source_bone(i)]), from.width, from.height, static_cast<int>(tables_.columns.size()),
                part.overlay().is_reversed(i) ? -1.0f : 1.0f, static_cast<float>(bone_length(source_.skeleton, part.source_bone(i))),
-               static_cast<float>(part.length_scale(i)), static_cast<float>(part.length_offset(i)), 0, 0, 0, 0, 0, options_.blend == TransferBlend::kLinear};
+               static_cast<float>(part.length_scale(i)), static_cast<float>(part.length_offset(i)), 0, 0, 0, 0, 0, options_.blend == TransferBlend::kLinear,
+               part.is_between() && options_.blend != TransferBlend::kNone ? static_cast<int>(target_first_[bone]) : -1};
       const auto fade_width = [&](BoneEnd end) {
         if (part.is_inner_seam(i, end)) return 0.5 * (height - 1);
         return options_.blend == TransferBlend::kNone || !part.is_boundary(i, end) ? 0.0 : part.width_in_rows(i);
@@ -446,8 +476,9 @@ class Laying {
       append_columns(part.overlay(), i, width, head_columns, tail_columns);
       for (int j = 0; j < width; ++j) {
         const auto shear = [&](BoneEnd end) {
-          if (!part.is_inner_seam(i, end)) return 0.0f;
-          return static_cast<float>(part.wall_change(source_walls_, walls_, i, end, static_cast<double>(j) / width).shear);
+          // Between two seams that are kept a part follows their walls, too.
+          if (!part.is_inner_seam(i, end) && !part.is_between()) return 0.0f;
+          return static_cast<float>(part.shear(source_walls_, walls_, i, end, static_cast<double>(j) / width));
         };
         tables_.columns.push_back({head_columns[j], tail_columns[j], shear(BoneEnd::kHead), shear(BoneEnd::kTail), 0, 0, 0, 0});
         set_rows(part, i, bone, j);
@@ -485,7 +516,7 @@ class Laying {
       const Rectangle& rectangle = target_.patches[bone].rectangle;
       const double length = bone_length(target_.skeleton, bone);
       for (const BoneEnd end : kEnds) {
-        if (!part.is_boundary(i, end)) continue;
+        if (!part.is_boundary(i, end) || part.is_between()) continue;
         PartTransfer::Cut& cut = part.cut(end);
         std::vector<double> more(rectangle.width);
         for (int j = 0; j < rectangle.width; ++j) {
@@ -575,7 +606,7 @@ class Laying {
   const SkeletexModel &source_, &target_;
   TransferOptions options_;
   Walls walls_, source_walls_;
-  DevicePlanes source_points_;
+  DevicePlanes source_points_, target_points_;
   HostPoints source_host_, target_host_;
   std::vector<std::size_t> source_first_, target_first_, result_first_;
   std::vector<std::pair<PartTransfer*, int>> part_of_;  ///< per bone of the target: who replaces it, and which of its bones it is
@@ -589,7 +620,7 @@ class Laying {
 SkeletexModel transfer(ClContext& context, const SkeletexModel& source, const SkeletexModel& target,
                        const std::vector<std::pair<std::string, std::string>>& bones, const TransferOptions& options, std::vector<TransferredPart>* report) {
   if (bones.empty()) throw InputError("there are no bones to transfer");
-  if (!(options.width >= 0) || !(options.width_in_texels >= 0)) throw InputError("the width of a blend is 0 or more");
+  if (!std::isfinite(options.width) || !(options.width_in_texels >= 0)) throw InputError("the width of a blend is 0 or more");
   if (options.scale == TransferScale::kFactor && !(options.factor > 0)) throw InputError("a scale is above 0");
   if (options.keep > 0.9 || options.skip > 0.9) throw InputError("the shares of rows that are kept and skipped are 0.9 at most");
   std::vector<std::unique_ptr<PartTransfer>> parts;

@@ -23,7 +23,7 @@ enum class TransferScale {
 struct TransferOptions {
   bool has_limbs = false;  ///< with every bone also those below it: the ones on its far side from the skeleton's root
   TransferBlend blend = TransferBlend::kCosine;
-  double width = 0.25;         ///< of the fade: share of the patch's rows
+  double width = -1;           ///< of the fade: share of the patch's rows; below 0: 0.25, of parts between two seams 0.5
   double width_in_texels = 0;  ///< instead, where it is above 0: rows
   TransferScale scale = TransferScale::kAuto;
   double factor = 1;
