@@ -119,7 +119,7 @@ class Program : public ::testing::Test {
   static inline fs::path folder_;
 };
 
-const std::vector<std::string> kCommands{"encode", "reconstruct", "filter", "lod", "metro", "segment", "validate", "inspect", "devices"};
+const std::vector<std::string> kCommands{"encode", "reconstruct", "filter", "transfer", "lod", "metro", "segment", "validate", "inspect", "devices"};
 
 }  // namespace
 
@@ -282,6 +282,51 @@ TEST_F(Program, RefusesOptionsThatAreAnotherFiltersAndBonesThatAreNone) {
   expect_refused(1, {"filter", "y.skx.exr", "smooth", "-o", "no.ply", "--bones", "nose"}, {"nose"});
   expect_refused(1, {"filter", "y.skx.exr", "curvature", "-o", "no.skx.exr"}, {".ply"});
   expect_refused(1, {"filter", "y.skx.exr", "noise", "-o", "no.stl"}, {".stl", ".ply"});
+}
+
+TEST_F(Program, TransfersBonesAndSaysHow) {
+  const std::string a = y_shape().skeleton.bones[0].name, b = y_shape().skeleton.bones[1].name;
+  for (const std::string blend : {"cosine", "linear", "none"}) {
+    const Outcome outcome = run({"transfer", "y.skx.exr", "y.skx.exr", "--bones", a + "=" + b, "--blend", blend, "--width", "6px", "-o", "t.skx.exr", "--json", "-"});
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    const nlohmann::json json = nlohmann::json::parse(outcome.out), &part = json.at("bones").at(0);
+    EXPECT_EQ(part.at("source"), a);
+    EXPECT_EQ(part.at("target"), b);
+    EXPECT_GT(part.at("scale").get<double>(), 0);
+    EXPECT_EQ(part.at("scale"), part.at("length_scale"));
+    EXPECT_GE(json.at("folded_edges").get<int>(), 0);
+    EXPECT_GE(json.at("folded_edges_of_target").get<int>(), 0);
+    EXPECT_EQ(run({"inspect", "t.skx.exr"}).code, 0);
+  }
+  const Outcome outcome = run({"transfer", "y.skx.exr", "y.skx.exr", "--bones", a + "=" + b, "--scale", "1.5", "--keep", "0.1", "--skip", "0.2", "--limb", "--mirror",
+                               "-o", "t.ply", "--json", "-"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const nlohmann::json part = nlohmann::json::parse(outcome.out).at("bones").at(0);
+  EXPECT_NEAR(part.at("scale").get<double>(), 1.5, 1e-6);
+  EXPECT_NEAR(part.at("kept").get<double>(), 0.1, 1e-6);
+  EXPECT_NEAR(part.at("skipped").get<double>(), 0.2, 1e-6);
+  EXPECT_TRUE(nlohmann::json::parse(run({"inspect", "t.ply", "--json", "-"}).out).at("closed_manifold").get<bool>());
+}
+
+TEST_F(Program, RefusesTransfersThatCannotBe) {
+  const std::string bone = y_shape().skeleton.bones[0].name;
+  const auto refused = [&](int code, const std::vector<std::string>& more, const std::vector<std::string>& words) {
+    std::vector<std::string> arguments{"transfer", "y.skx.exr", "y.skx.exr", "-o", "no.skx.exr"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    expect_refused(code, arguments, words);
+  };
+  const std::string same = bone + "=" + bone;
+  refused(2, {}, {"--bones"});
+  refused(2, {"--bones", same, "--blend", "cosin"}, {"cosin", "cosine"});
+  refused(2, {"--bones", same, "--width", "2"}, {"--width", "12px"});
+  refused(2, {"--bones", same, "--width", "0px"}, {"--width"});
+  refused(2, {"--bones", same, "--scale", "0"}, {"--scale", "girth"});
+  refused(2, {"--bones", same, "--scale", "big"}, {"--scale", "big"});
+  refused(2, {"--bones", same, "--keep", "1"}, {"--keep", "0.9"});
+  refused(2, {"--bones", same, "--skip", "-1"}, {"--skip"});
+  refused(1, {"--bones", "nose=" + bone}, {"nose"});
+  refused(1, {"--bones", same + "," + same}, {bone, "twice"});
+  EXPECT_FALSE(fs::exists(folder_ / "no.skx.exr"));
 }
 
 TEST_F(Program, WritesSmallerModelsAndChainsOfLevels) {

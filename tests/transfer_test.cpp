@@ -1,15 +1,21 @@
 // SPDX-License-Identifier: MIT
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <map>
+#include <random>
 
+#include "skeletex/edit/lay_part.h"
 #include "skeletex/edit/mirror.h"
 #include "skeletex/edit/transfer.h"
 #include "skeletex/encode/encode_model.h"
+#include "skeletex/measure/folds.h"
 #include "skeletex/measure/manifold.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/reconstruct/resample.h"
 #include "support/load_model.h"
+#include "support/transfer_twin.h"
 
 namespace skeletex {
 namespace {
@@ -36,6 +42,8 @@ int bone_of(const SkeletexModel& model, const std::string& name) {
     if (model.skeleton.bones[i].name == name) return static_cast<int>(i);
   return -1;
 }
+
+bool is_near_tail(const SkeletexModel& model, int bone) { return model.ends[bone][0].arcs.empty(); }
 
 void expect_valid(const SkeletexModel& model, int genus) {
   const ManifoldReport report = measure_manifold(reconstruct_mesh(device(), model));
@@ -100,12 +108,272 @@ TEST(Transfer, OfAModelToItselfChangesNothing) {
     }
 }
 
+TEST(Transfer, WithNoneIsTheSourceScaled) {
+  // A model twice as large gives the model; a factor widens it about the bone and leaves places along the bone.
+  const SkeletexModel& bear = standard("bear");
+  SkeletexModel large = bear;
+  for (Node& node : large.skeleton.nodes) node.position *= 2;
+  large.origin *= 2;
+  large.diagonal *= 2;
+  for (std::vector<float>* plane : {&large.texture.along, &large.texture.around, &large.texture.out})
+    for (float& texel : *plane) texel *= 2;
+  for (SeamArc& arc : large.arcs)
+    for (SeamSample& sample : arc.samples) sample.distance *= 2;
+  for (SeamCorner& corner : large.corners) corner.sample.distance *= 2;
+  const int bone = bone_of(bear, "left_ear");
+  const auto [x, y, width, height] = bear.patches[bone].rectangle;
+  const Vec3 head = end_position(bear.skeleton, bone, BoneEnd::kHead), axis = direction_from(bear.skeleton, {bone, BoneEnd::kHead});
+  const Lattice lattice = number_lattice(bear);
+  const std::vector<Vec3> before = lattice_positions(device(), bear);
+  for (const double factor : {0.0, 1.0, 1.7}) {
+    TransferOptions options;
+    options.blend = TransferBlend::kNone;
+    options.scale = factor > 0 ? TransferScale::kFactor : TransferScale::kAuto;
+    options.factor = factor / 2;
+    const std::vector<Vec3> after = lattice_positions(device(), transfer(device(), large, bear, {{"left_ear", "left_ear"}}, options));
+    double worst = 0;
+    for (int i = 0; i < width * (height - 2); ++i) {
+      const int v = lattice.first_inner[bone] + i;
+      const Vec3 offset = before[v] - head, along = axis * axis.dot(offset);
+      worst = std::max(worst, (after[v] - (head + along + (factor > 0 ? factor : 1) * (offset - along))).norm());
+    }
+    EXPECT_LT(worst, 4e-6 * bear.diagonal) << factor;
+  }
+}
+
+TEST(Transfer, DoesNotDependOnWhereTheSourceLiesAndFaces) {
+  const SkeletexModel &source = standard("triceratops"), &target = standard("bunny00");
+  SkeletexModel turned = source;
+  const Eigen::Quaterniond turn = Eigen::Quaterniond(0.3, -0.7, 0.4, 0.2).normalized();
+  const std::vector<BoneBasis> bases = bone_bases(source.skeleton);
+  for (std::size_t b = 0; b < bases.size(); ++b) turned.skeleton.bones[b].s = turn * bases[b].s;
+  for (Node& node : turned.skeleton.nodes) node.position = turn * node.position + Vec3(1, 2, 3);
+  turned.origin = turn * turned.origin + Vec3(1, 2, 3);
+  const std::vector<Vec3> a = lattice_positions(device(), transfer(device(), source, target, {{"left_horn", "left_ear"}}));
+  const std::vector<Vec3> b = lattice_positions(device(), transfer(device(), turned, target, {{"left_horn", "left_ear"}}));
+  double worst = 0;
+  for (std::size_t v = 0; v < a.size(); ++v) worst = std::max(worst, (a[v] - b[v]).norm());
+  EXPECT_LT(worst, 1e-5 * target.diagonal);
+}
+
+TEST(Transfer, MeetsTheSeamWithCosineAndJumpsThereWithNone) {
+  const std::vector<std::array<std::string, 4>> cases{{"triceratops", "left_horn", "bunny00", "left_ear"},
+                                                      {"bear_bis", "left_ear", "bear", "left_ear"},
+                                                      {"man", "left_forearm", "homer", "left_forearm"}};
+  for (const auto& [from, source_bone, to, target_bone] : cases) {
+    const SkeletexModel &source = standard(from), &target = standard(to);
+    const Lattice lattice = number_lattice(target);
+    const std::vector<Vec3> before = lattice_positions(device(), target);
+    const int bone = bone_of(target, target_bone), width = target.patches[bone].rectangle.width;
+    const int row = is_near_tail(target, bone) ? target.patches[bone].rectangle.height - 3 : 0;
+    double edge = 0;
+    // How far the points next to the seam lie from where the target's own surface goes on: mean and worst.
+    const auto moved = [&](TransferBlend blend, double keep) {
+      TransferOptions options;
+      options.blend = blend;
+      options.keep = keep;
+      options.skip = keep;
+      const std::vector<Vec3> after = lattice_positions(device(), transfer(device(), source, target, {{source_bone, target_bone}}, options));
+      double sum = 0, worst = 0;
+      edge = 0;
+      for (int j = 0; j < width; ++j) {
+        const int v = lattice.first_inner[bone] + row * width + j, next = row == 0 ? v + width : v - width;
+        const int beside = lattice.first_inner[bone] + row * width + (j + 1) % width;
+        sum += (after[v] - before[v]).norm() / width;
+        worst = std::max(worst, (after[v] - before[v]).norm());
+        edge += ((before[next] - before[v]).norm() + (before[beside] - before[v]).norm()) / (2 * width);
+      }
+      return std::array{sum, worst};
+    };
+    EXPECT_LT(moved(TransferBlend::kCosine, -1)[1], edge) << to;  // from root to root
+    const double seam = moved(TransferBlend::kCosine, 0)[0];      // from seam to seam
+    EXPECT_LT(seam, edge) << to;
+    EXPECT_GT(moved(TransferBlend::kNone, 0)[0], 2 * seam) << to;
+  }
+}
+
+TEST(Transfer, FoldsNoMoreThanItsTwoModelsDo) {
+  const auto folded = [](const SkeletexModel& model) { return measure_folds(reconstruct_mesh(device(), model)).folded_edges; };
+  const auto check = [&](const std::string& from, const std::string& to, const std::vector<std::pair<std::string, std::string>>& bones, bool has_limbs) {
+    TransferOptions options;
+    options.has_limbs = has_limbs;
+    const SkeletexModel result = transfer(device(), standard(from), standard(to), bones, options);
+    expect_valid(result, 0);
+    EXPECT_LE(folded(result), folded(standard(from)) + folded(standard(to)) + 4) << from << " " << to;
+  };
+  check("triceratops", "bunny00", {{"left_horn", "left_ear"}, {"right_horn", "right_ear"}}, false);
+  check("bear_bis", "bear", {{"left_ear", "left_ear"}, {"right_ear", "right_ear"}}, false);
+  check("bear", "bear_bis", {{"left_ear", "left_ear"}, {"right_ear", "right_ear"}}, false);
+  check("man", "armadillo", {{"left_upper_arm", "left_upper_arm"}}, true);
+  check("man", "homer", {{"chest", "chest"}}, false);
+  check("homer", "man", {{"left_forearm", "left_forearm"}}, false);
+}
+
+TEST(Transfer, OfLimbsTakesTheWholeLimbAndKeepsTheRest) {
+  const SkeletexModel &source = standard("man"), &target = standard("armadillo");
+  TransferOptions options;
+  options.has_limbs = true;
+  const SkeletexModel result = transfer(device(), source, target, {{"left_upper_arm", "left_upper_arm"}}, options);
+  const std::vector<std::string> limb{"left_upper_arm", "left_forearm", "left_hand"};
+  expect_same_outside(target, result, limb);
+  expect_valid(result, 0);
+  for (const std::string& name : limb) {
+    const Rectangle r = target.patches[bone_of(target, name)].rectangle;
+    const std::size_t texel = static_cast<std::size_t>(r.y + r.height / 2) * target.texture.width + r.x;
+    EXPECT_NE(result.texture.out[texel + r.width / 2], target.texture.out[texel + r.width / 2]) << name;
+  }
+  // Seams of other bones than the limb's stay; inner ones are the source's.
+  for (std::size_t a = 0; a < target.arcs.size(); ++a) {
+    const auto is_in = [&](int bone) { return std::find(limb.begin(), limb.end(), target.skeleton.bones[bone].name) != limb.end(); };
+    const bool is_inner = is_in(target.arcs[a].bones[0]) && is_in(target.arcs[a].bones[1]);
+    EXPECT_EQ(result.arcs[a].samples[0].distance == target.arcs[a].samples[0].distance, !is_inner);
+  }
+}
+
+TEST(Transfer, PutsTheMirrorImageOfALimbOnTheOtherSide) {
+  const SkeletexModel& bear = standard("bear");
+  TransferOptions options;
+  options.has_limbs = true;
+  const SkeletexModel result = transfer(device(), mirrored(bear), bear, {{"left_upper_arm", "right_upper_arm"}}, options);
+  expect_same_outside(bear, result, {"right_upper_arm", "right_forearm"});
+  expect_valid(result, 0);
+  // There and back again: the right arm's mirror image is the left one, but for where they were cut.
+  const SkeletexModel image = mirrored(bear);
+  TransferOptions hard = options;
+  hard.blend = TransferBlend::kNone;
+  const SkeletexModel same = transfer(device(), image, image, {{"left_upper_arm", "left_upper_arm"}}, hard);
+  const std::vector<Vec3> a = lattice_positions(device(), same), b = lattice_positions(device(), image);
+  double worst = 0;
+  for (std::size_t v = 0; v < a.size(); ++v) worst = std::max(worst, (a[v] - b[v]).norm());
+  EXPECT_LT(worst, 2e-3 * bear.diagonal);
+}
+
+TEST(Transfer, WorksFrom32To2048) {
+  for (const int size : {32, 2048}) {
+    const SkeletexModel source = resample_model(device(), standard("triceratops"), size), target = resample_model(device(), standard("bunny00"), size);
+    const SkeletexModel result = transfer(device(), source, target, {{"left_horn", "left_ear"}});
+    expect_same_outside(target, result, {"left_ear"});
+    EXPECT_NE(result.texture.out, target.texture.out);
+    if (size == 32) expect_valid(result, 0);
+    for (const float texel : result.texture.out) ASSERT_TRUE(std::isfinite(texel));
+  }
+}
+
+TEST(Transfer, SmallAndLargeSourcesGiveTheSameShape) {
+  const SkeletexModel &source = standard("bear_bis"), &target = standard("bear");
+  const SkeletexModel fine = resample_model(device(), source, 2 * source.texture.width);
+  const std::vector<Vec3> a = lattice_positions(device(), transfer(device(), source, target, {{"left_ear", "left_ear"}}));
+  const std::vector<Vec3> b = lattice_positions(device(), transfer(device(), fine, target, {{"left_ear", "left_ear"}}));
+  double sum = 0;
+  for (std::size_t v = 0; v < a.size(); ++v) sum += (a[v] - b[v]).squaredNorm() / static_cast<double>(a.size());
+  EXPECT_LT(std::sqrt(sum), 5e-3 * target.diagonal);
+}
+
 TEST(Transfer, RefusesWhatDoesNotFit) {
   const SkeletexModel& bear = standard("bear");
   EXPECT_THROW(transfer(device(), bear, bear, {}), InputError);
   EXPECT_THROW(transfer(device(), bear, bear, {{"nope", "left_leg"}}), InputError);
   EXPECT_THROW(transfer(device(), bear, bear, {{"left_hip", "left_leg"}}), InputError);
   EXPECT_THROW(transfer(device(), bear, bear, {{"left_leg", "right_leg"}, {"left_forearm", "right_leg"}}), InputError);
+  TransferOptions options;
+  options.scale = TransferScale::kFactor;
+  options.factor = 0;
+  EXPECT_THROW(transfer(device(), bear, bear, {{"left_leg", "right_leg"}}, options), InputError);
+  options = {};
+  options.keep = 0.95;
+  EXPECT_THROW(transfer(device(), bear, bear, {{"left_leg", "right_leg"}}, options), InputError);
+  options = {};
+  options.has_limbs = true;
+  const SkeletexModel& eight = standard("eight");
+  EXPECT_THROW(transfer(device(), eight, eight, {{eight.skeleton.bones[0].name, eight.skeleton.bones[0].name}}, options), InputError);
+}
+
+TEST(LayPart, KernelAndTwinAgreeOnRandomTables) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> unit(-1, 1);
+  Skeleton skeleton;
+  std::vector<Patch> patches;
+  skeleton.nodes.push_back({"n", Vec3::Zero()});
+  const std::vector<std::pair<int, int>> sizes{{4, 4}, {33, 7}, {129, 40}, {65, 65}};
+  int y = 0;
+  for (const auto& [width, height] : sizes) {
+    const int bone = static_cast<int>(patches.size());
+    skeleton.nodes.push_back({"n", Vec3(bone + 1, 0.3 * (bone % 2), 0)});
+    skeleton.bones.push_back({"b", bone, bone + 1, {}});
+    Patch patch;
+    patch.rectangle = {bone, y, width, height};
+    for (int r = 0; r < height; ++r) patch.row_u.push_back(static_cast<double>(r) / (height - 1));
+    y += height;
+    patches.push_back(patch);
+  }
+  const FrameTables frames = frame_tables(skeleton, Walls(skeleton), patches, Vec3::Zero());
+  std::vector<float> in[3], target[3];
+  for (int i = 0; i < 9000; ++i)
+    for (int c = 0; c < 3; ++c) in[c].push_back(unit(random)), target[c].push_back(unit(random));
+  LaidTables tables;
+  std::size_t points = 0;
+  for (std::size_t p = 0; p < patches.size(); ++p) {
+    const auto [width, height] = sizes[p];
+    const int source_width = 4 + static_cast<int>(random() % 50), source_height = 4 + static_cast<int>(random() % 60);
+    tables.patches.push_back({static_cast<int>(random() % 1000), source_width, source_height, static_cast<int>(tables.columns.size()), p % 2 ? 1.0f : -1.0f, 1.5f,
+                              unit(random), unit(random), unit(random), unit(random), unit(random), 0.4f * static_cast<float>(height),
+                              p == 0 ? 0.0f : 0.3f * static_cast<float>(height), static_cast<int>(p / 2), p == 2 ? 17 : -1});
+    for (int j = 0; j < width; ++j)
+      tables.columns.push_back({3 * static_cast<float>(source_width) * unit(random), 3 * static_cast<float>(source_width) * unit(random), unit(random), unit(random),
+                                10 * unit(random), 1 + unit(random), 3 * unit(random), static_cast<float>(height) + 3 * unit(random)});
+    for (int row = 0; row < height; ++row) {
+      tables.rows.push_back({static_cast<int>(p), row, static_cast<int>(points), 0});
+      tables.laid_rows.push_back({0.5f + 0.5f * unit(random), 1 + unit(random)});
+      points += width;
+    }
+  }
+  for (std::size_t i = 0; i < tables.correction_size(); ++i) tables.corrections.push_back(0.1f * unit(random));
+  const DevicePlanes source_planes{device().upload(in[0]), device().upload(in[1]), device().upload(in[2])};
+  const DevicePlanes target_planes{device().upload(target[0]), device().upload(target[1]), device().upload(target[2])};
+  const DevicePlanes laid = lay_part(device(), tables, frames, source_planes, target_planes, points);
+  const std::vector<float> out[3] = {device().download(laid.x), device().download(laid.y), device().download(laid.z)};
+  for (std::size_t k = 0; k < tables.rows.size(); ++k) {
+    const auto [p, row, vertex, quad] = tables.rows[k];
+    for (int j = 0; j < sizes[p].first; ++j) {
+      const std::size_t column = static_cast<std::size_t>(tables.patches[p].column_begin + j);
+      const Vec3 expected = twin::lay(
+          tables.patches[p], tables.laid_rows[k], tables.columns[column], row, j, sizes[p].first, [&](int i) { return Vec3(in[0][i], in[1][i], in[2][i]); },
+          [&](int i) { return Vec3(target[0][i], target[1][i], target[2][i]); },
+          [&](int end, int band, bool is_slope, int axis) { return tables.correction(end == 0 ? BoneEnd::kHead : BoneEnd::kTail, band, is_slope, axis, column); });
+      // Columns of up to 160 are exact to 2e-5 in single precision and points differ by up to 2 from column to column, rows
+      // of up to 140 alike; both enter up to some ten times (scale, lean, corrections times rows).
+      for (int c = 0; c < 3; ++c) ASSERT_NEAR(out[c][vertex + j], expected[c], 2e-3) << p << " " << row << " " << j;
+    }
+  }
+}
+
+TEST(LayPart, BandsOfWavesSumToTheirRowAndTheFirstHasTheLongest) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (const int count : {4, 7, 64, 301}) {
+    std::vector<double> values(count);
+    for (double& value : values) value = unit(random);
+    const auto bands = wave_bands(values);
+    for (int i = 0; i < count; ++i) {
+      double sum = 0;
+      for (const auto& band : bands) sum += band[i];
+      EXPECT_NEAR(sum, values[i], 1e-12 * count);
+    }
+  }
+  std::vector<double> wave(90);
+  for (int i = 0; i < 90; ++i) wave[i] = 3 + std::cos(2 * std::numbers::pi * 2 * i / 90);
+  const auto bands = wave_bands(wave);
+  for (int i = 0; i < 90; ++i) EXPECT_NEAR(bands[0][i], wave[i], 1e-12);
+}
+
+TEST(Folds, AreCountedWhereASheetLiesBackOnItself) {
+  TriangleMesh sheet;
+  sheet.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
+  sheet.triangles = {{0, 1, 2}, {2, 1, 3}};
+  EXPECT_EQ(measure_folds(sheet).edges, 1);
+  EXPECT_EQ(measure_folds(sheet).folded_edges, 0);
+  sheet.positions[3] = {0.1, 0.1, 0.1};
+  EXPECT_EQ(measure_folds(sheet).folded_edges, 1);
 }
 
 TEST(Mirror, IsTheMirrorImageAndItsOwnInverse) {
