@@ -33,7 +33,7 @@ SECTIONS = [
     ("Figure 16: morph sequences", "morph", pictures.fig16_morph,
      "Texels and skeletons interpolated, bones matched by the skeletons' graphs alone. Every in-between model is closed; the distortion of the map is in the numbers."),
     ("Figures 17 to 19: transfer", "transfer", pictures.fig17_transfer,
-     "Texels of chosen bones replaced by those of another model, scaled to the target's bones; the target's seams stay. Without blending the seam shows."),
+     "Chosen bones or limbs replaced by those of another model, or by the mirror image of its own, scaled to the target's bones; the target's seams stay. Without blending the whole patch is the source's and the seam shows."),
     ("Figure 19, left: what cannot be segmented", "limits", pictures.fig19_limits,
      "Walls that cross inside the body would leave surface behind them. The skeleton is refused, with the place and what to do; the paper leaves the model incomplete."),
     ("Figure 19, middle: SPD and VSM in morphing", "morph_methods", pictures.fig19_morph_methods,
