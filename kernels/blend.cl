@@ -4,12 +4,12 @@
 // in   lattice_rows: the rows to do, four ints each: patch, row, two unused (see reconstruct.cl)
 //      patches, rows: the result's. sources: per source and patch [source * patch_count + patch]
 //      source_rows: per source and row to do [source * row_count + k]
-//      columns: three planes of column_count floats behind each other: the source's column that a column of the result
-//      reads at the bone's head and at its tail, any lift, the patch is periodic; in between along the curve that poses take
-//      (EASED in pose.cl). Then by how much more the source's slope grows from head to tail than the result's: texels are
-//      turned as if that, too, changed along the curve, so that what differs at one end does not break the surface at the other.
-//      result_columns: four floats per column of the result (ColumnRecord)
-//      in_along, in_around, in_out: texels of all sources
+//      columns: per source and column of the result (BlendColumn). Between head and tail what is read and how slopes rise run
+//      along the curve that poses take (EASED in pose.cl), so that what differs at one end does not break the surface at the
+//      other; and what is not even around the bone, at corners, fades out within END_REACH of its end.
+//      source_slopes: pairs per column of a source: the walls' slopes at head and tail, as the result's bone runs. A texel is
+//      turned from the slope that its frame has in the source, with the rise, to that of the result's frame.
+//      result_columns: of the result (ColumnRecord)
 // out  along, around, out: the result's texture, texture_width columns
 // NDRange: one work-group per row, of any size; work-items take columns in turn (see reconstruct.cl). A column of the
 // result is done by one work-item for all sources, so sums need no barrier and have a fixed order.
@@ -17,10 +17,14 @@
 #include "skeletex_structs.h"
 #include "blend_structs.h"
 
-__kernel void blend_texels(const int row_count, const int source_count, const int patch_count, const int texture_width, const int column_count,
+// How far from an end of a bone its corners are felt, as a share of the way to the other end.
+#define END_REACH 0.3f
+
+__kernel void blend_texels(const int row_count, const int source_count, const int patch_count, const int texture_width,
                            __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
                            __global const RowRecord* restrict rows, __global const BlendSource* restrict sources,
-                           __global const BlendRow* restrict source_rows, __global const float* restrict columns,
+                           __global const BlendRow* restrict source_rows, __global const BlendColumn* restrict columns,
+                           __global const float* restrict source_slopes,
                            __global const ColumnRecord* restrict result_columns,
                            __global const float* restrict in_along, __global const float* restrict in_around,
                            __global const float* restrict in_out, __global float* restrict along, __global float* restrict around,
@@ -32,7 +36,10 @@ __kernel void blend_texels(const int row_count, const int source_count, const in
   const int width = patch->width;
   const int texel = (patch->y + row) * texture_width + patch->x;
   const float station = rows[patch->row_begin + row].station;
-  const float eased = station * station * (3.0f - 2.0f * station), ahead = station - eased;
+  const float eased = station * station * (3.0f - 2.0f * station);
+  const float near_head = fmax(0.0f, 1.0f - station / END_REACH), near_tail = fmax(0.0f, 1.0f - (1.0f - station) / END_REACH);
+  const float head_share = (1.0f - eased) * near_head * near_head * (3.0f - 2.0f * near_head), even_head_share = 1.0f - eased - head_share;
+  const float tail_share = eased * near_tail * near_tail * (3.0f - 2.0f * near_tail), even_tail_share = eased - tail_share;
   __global const ColumnRecord* restrict slopes = result_columns + patch->column_begin;
   const int first = get_local_id(0), step = get_local_size(0);
 
@@ -46,12 +53,15 @@ __kernel void blend_texels(const int row_count, const int source_count, const in
     const float sign = source->sign;
     const float period = (float)source_width, frequency = 1.0f / period;
     const int begin = source->begin + below * stride;
-    __global const float* restrict head_columns = columns + source->column_begin;
-    __global const float* restrict tail_columns = head_columns + column_count;
-    __global const float* restrict slope_growths = tail_columns + column_count;
+    __global const BlendColumn* restrict places = columns + source->column_begin;
+    const int turns_texels = source->slope_begin >= 0;
+    __global const float* restrict source_slope = source_slopes + (turns_texels ? 2 * source->slope_begin : 0);
 
     for (int j = first; j < width; j += step) {
-      const float lifted = head_columns[j] + eased * (tail_columns[j] - head_columns[j]);
+      __global const BlendColumn* restrict place = places + j;
+      const float at_head = place->head;
+      const float lifted = at_head + even_head_share * (place->even_head - at_head) + tail_share * (place->tail - at_head) +
+                           even_tail_share * (place->even_tail - at_head);
       const float column = lifted - period * floor(lifted * frequency);
       const int left_any = (int)column;
       const float right_share = column - (float)left_any;
@@ -63,11 +73,17 @@ __kernel void blend_texels(const int row_count, const int source_count, const in
       const float a_sum = sign * (w00 * in_along[a] + w01 * in_along[b] + w10 * in_along[c] + w11 * in_along[d]);
       const float read_around = sign * (w00 * in_around[a] + w01 * in_around[b] + w10 * in_around[c] + w11 * in_around[d]);
       const float o_sum = w00 * in_out[a] + w01 * in_out[b] + w10 * in_out[c] + w11 * in_out[d];
-      // From the frame of slope k to that of `slope`: the angle between (1, k) and (1, slope).
+      // From the frame of slope k to that of `slope`: by the angle between (1, k) and (1, slope), where it is no rounding.
       const float slope = slopes[j].slope_head + station * (slopes[j].slope_tail - slopes[j].slope_head);
-      const float change = ahead * slope_growths[j], k = slope + change;
-      const float inverse = 1.0f / sqrt((1.0f + slope * slope) * (1.0f + k * k));
-      const float cosine = change == 0.0f ? 1.0f : (1.0f + slope * k) * inverse, sine = change * inverse;
+      const int l = turns_texels ? 2 * left : 0, r = turns_texels ? 2 * right : 0;
+      const float own_head = left_share * source_slope[l] + right_share * source_slope[r];
+      const float own_tail = left_share * source_slope[l + 1] + right_share * source_slope[r + 1];
+      const float k = own_head + station * (own_tail - own_head) + head_share * place->head_rise + even_head_share * place->even_head_rise +
+                      tail_share * place->tail_rise + even_tail_share * place->even_tail_rise;
+      const float square = 1.0f + slope * slope;
+      const int is_turned = turns_texels && fabs(k - slope) > 1e-5f * square;
+      const float inverse = 1.0f / sqrt(square * (1.0f + k * k));
+      const float cosine = is_turned ? (1.0f + slope * k) * inverse : 1.0f, sine = is_turned ? (k - slope) * inverse : 0.0f;
       const float read_along = cosine * a_sum + sine * o_sum, read_out = cosine * o_sum - sine * a_sum;
       along[texel + j] = i == 0 ? read_along : along[texel + j] + read_along;
       around[texel + j] = i == 0 ? read_around : around[texel + j] + read_around;
@@ -75,8 +91,6 @@ __kernel void blend_texels(const int row_count, const int source_count, const in
     }
   }
 }
-
-#define END_REACH 0.3f  // of u
 
 // Adds to the texels what rows miss at their ends, fading out along the bone.
 // moves: six planes of column_count floats, columns of all patches: along, around, out at the head, then at the tail

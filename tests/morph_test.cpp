@@ -345,12 +345,16 @@ TEST(Blend, KernelAndTwinAgreeOnRandomPlacesAndUglyWidths) {
   for (int s = 0; s < 3; ++s) {
     for (const Patch& patch : patches) {
       BlendSource source{static_cast<int>(random() % 1000), 50, 4 + static_cast<int>(random() % 40), 4 + static_cast<int>(random() % 60),
-                         static_cast<int>(tables.head_columns.size()), random() % 2 ? 1.0f : -1.0f};
+                         static_cast<int>(tables.columns.size()), -1, random() % 2 ? 1.0f : -1.0f};
+      if (random() % 3 > 0) {
+        source.slope_begin = static_cast<int>(tables.slopes.size() / 2);
+        for (int k = 0; k < 2 * source.width; ++k) tables.slopes.push_back(2 * unit(random));
+      }
       tables.sources.push_back(source);
       for (int j = 0; j < patch.rectangle.width; ++j) {
-        tables.head_columns.push_back(3.0f * static_cast<float>(source.width) * unit(random));
-        tables.slope_growths.push_back(j % 4 == 0 ? 0 : 3 * unit(random));
-        tables.tail_columns.push_back(j % 3 == 0 ? static_cast<float>(random() % 90) - 45 : tables.head_columns.back() + unit(random));
+        const auto place = [&] { return j % 3 == 0 ? static_cast<float>(random() % 90) - 45 : 3.0f * static_cast<float>(source.width) * unit(random); };
+        const float head = place(), even_head = place(), tail = place(), even_tail = place();
+        tables.columns.push_back({head, even_head, tail, even_tail, unit(random), unit(random), unit(random), unit(random)});
       }
     }
     for (const LatticeRow& row : rows) {
@@ -372,13 +376,18 @@ TEST(Blend, KernelAndTwinAgreeOnRandomPlacesAndUglyWidths) {
       std::vector<twin::BlendRead> reads;
       for (int s = 0; s < 3; ++s) {
         const BlendSource& source = tables.sources[s * patches.size() + bone];
-        const double head = tables.head_columns[source.column_begin + j], tail = tables.tail_columns[source.column_begin + j];
+        const BlendColumn& column = tables.columns[source.column_begin + j];
         const ColumnRecord& slopes = frames.columns[frames.patches[bone].column_begin + j];
-        const double eased = station * station * (3 - 2 * station), slope = (1 - station) * slopes.slope_head + station * slopes.slope_tail;
-        reads.push_back({source, tables.rows[s * rows.size() + k], head + eased * (tail - head), slope,
-                         (station - eased) * static_cast<double>(tables.slope_growths[source.column_begin + j])});
+        const auto smooth = [](double x) { return x * x * (3 - 2 * x); };
+        const double eased = smooth(station), near_head = smooth(std::max(0.0, 1 - station / 0.3)), near_tail = smooth(std::max(0.0, 1 - (1 - station) / 0.3));
+        const auto mix = [&](double head, double even_head, double tail, double even_tail) {
+          return (1 - eased) * (near_head * head + (1 - near_head) * even_head) + eased * (near_tail * tail + (1 - near_tail) * even_tail);
+        };
+        reads.push_back({source, tables.rows[s * rows.size() + k], mix(column.head, column.even_head, column.tail, column.even_tail),
+                         (1 - station) * slopes.slope_head + station * slopes.slope_tail,
+                         mix(column.head_rise, column.even_head_rise, column.tail_rise, column.even_tail_rise), station});
       }
-      const Vec3 expected = twin::blend(reads, in[0], in[1], in[2]);
+      const Vec3 expected = twin::blend(reads, tables.slopes, in[0], in[1], in[2]);
       const std::size_t texel = static_cast<std::size_t>(rectangle.y + row) * texture_width + rectangle.x + j;
       // Columns of up to 150 are exact to 1e-5 in single precision, texels differ by up to 2 from column to column.
       for (int c = 0; c < 3; ++c) ASSERT_NEAR(out[c][texel], expected[c], 3 * 3 * 1e-4) << bone << " " << row << " " << j;

@@ -10,31 +10,86 @@ namespace {
 /// A column that is another one's own to the accuracy of seams is that one, so that its texels come out bit by bit.
 double snapped(double column) { return std::abs(column - std::round(column)) < 1e-3 ? std::round(column) : column; }
 
+/// Values around a bone, smoothed.
+std::vector<double> evened(const std::vector<double>& values) {
+  constexpr double kWidth = 0.05;  // turns
+  const int count = static_cast<int>(values.size()), reach = std::min((count - 1) / 2, static_cast<int>(std::ceil(3 * kWidth * count)));
+  std::vector<double> shares;
+  double total = 0;
+  for (int k = -reach; k <= reach; ++k) total += shares.emplace_back(std::exp(-0.5 * std::pow(k / (kWidth * count), 2)));
+  std::vector<double> result(values.size(), 0);
+  for (int j = 0; j < count; ++j)
+    for (int k = -reach; k <= reach; ++k) result[j] += shares[k + reach] / total * values[((j + k) % count + count) % count];
+  return result;
+}
+
+/// The source's v at each column of the result, at head and tail, any lift; the two without whole turns between them.
+std::array<std::vector<double>, 2> places_of_columns(const Overlay& overlay, int bone, int width) {
+  std::array<std::vector<double>, 2> places;
+  double twist = 0;
+  for (int j = 0; j < width; ++j) {
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
+      places[static_cast<int>(end)].push_back(overlay.model_v(bone, end, static_cast<double>(j) / width));
+    twist += (places[1][j] - places[0][j]) / width;
+  }
+  for (double& place : places[1]) place -= std::round(twist);
+  return places;
+}
+
+int source_columns(const Overlay& overlay, int bone) { return overlay.model().patches[overlay.model_bone(bone)].rectangle.width; }
+
 }  // namespace
 
 void append_columns(const Overlay& overlay, int bone, int width, std::vector<float>& head_columns, std::vector<float>& tail_columns) {
-  std::vector<double> head(width), tail(width);
-  double twist = 0;
+  const auto places = places_of_columns(overlay, bone, width);
   for (int j = 0; j < width; ++j) {
-    const double turn = static_cast<double>(j) / width;
-    head[j] = overlay.model_v(bone, BoneEnd::kHead, turn);
-    tail[j] = overlay.model_v(bone, BoneEnd::kTail, turn);
-    twist += (tail[j] - head[j]) / width;
-  }
-  // Angles have no whole turns: between the ends the shorter way.
-  const double whole = std::round(twist), columns = overlay.model().patches[overlay.model_bone(bone)].rectangle.width;
-  for (int j = 0; j < width; ++j) {
-    head_columns.push_back(static_cast<float>(snapped(columns * head[j])));
-    tail_columns.push_back(static_cast<float>(snapped(columns * (tail[j] - whole))));
+    head_columns.push_back(static_cast<float>(snapped(source_columns(overlay, bone) * places[0][j])));
+    tail_columns.push_back(static_cast<float>(snapped(source_columns(overlay, bone) * places[1][j])));
   }
 }
 
-void append_slope_growths(const Overlay& overlay, const Walls& walls, int bone, int width, BlendTables& tables) {
+void append_columns(const Overlay& overlay, int bone, int width, BlendTables& tables) {
+  const auto places = places_of_columns(overlay, bone, width);
+  const double sign = overlay.is_reversed(bone) ? -1 : 1;
+  std::array<std::vector<double>, 2> even;
+  for (const int end : {0, 1}) {
+    std::vector<double> offsets;
+    for (int j = 0; j < width; ++j) offsets.push_back(places[end][j] - sign * j / width);
+    even[end] = evened(offsets);
+  }
+  const auto column = [&](double v) { return static_cast<float>(snapped(source_columns(overlay, bone) * v)); };
   for (int j = 0; j < width; ++j) {
-    const double turn = static_cast<double>(j) / width;
-    const double growth = overlay.slope(bone, BoneEnd::kTail, turn) - overlay.slope(bone, BoneEnd::kHead, turn) -
-                          (walls.slope(bone, BoneEnd::kTail, turn) - walls.slope(bone, BoneEnd::kHead, turn));
-    tables.slope_growths.push_back(std::abs(growth) < 1e-5 ? 0.f : static_cast<float>(growth));
+    const double turn = sign * j / width;
+    tables.columns.push_back({column(places[0][j]), column(even[0][j] + turn), column(places[1][j]), column(even[1][j] + turn), 0, 0, 0, 0});
+  }
+}
+
+void append_turned_columns(const Overlay& overlay, const Walls& walls, int bone, int width, BlendSource& source, BlendTables& tables) {
+  append_columns(overlay, bone, width, tables);
+  source.slope_begin = static_cast<int>(tables.slopes.size() / 2);
+  std::array<std::vector<double>, 2> rises, even, owns;
+  for (const int end : {0, 1}) {
+    const auto at = static_cast<BoneEnd>(end);
+    std::vector<double> own;
+    for (int j = 0; j < source.width; ++j) own.push_back(overlay.slope_at(bone, at, static_cast<double>(j) / source.width));
+    for (int j = 0; j < width; ++j) {
+      // As the kernel reads them, so that the rise leads to the result's slope exactly.
+      const BlendColumn& column = tables.columns[tables.columns.size() - width + j];
+      const double place = end == 0 ? column.head : column.tail, left = std::floor(place);
+      const auto own_at = [&](double x) { return own[static_cast<int>(x - source.width * std::floor(x / source.width)) % source.width]; };
+      rises[end].push_back(walls.slope(bone, at, static_cast<double>(j) / width) - (1 - (place - left)) * own_at(left) - (place - left) * own_at(left + 1));
+    }
+    even[end] = evened(rises[end]);
+    owns[end] = std::move(own);
+  }
+  for (int j = 0; j < source.width; ++j)
+    for (const int end : {0, 1}) tables.slopes.push_back(static_cast<float>(owns[end][j]));
+  BlendColumn* column = tables.columns.data() + tables.columns.size() - width;
+  for (int j = 0; j < width; ++j, ++column) {
+    column->head_rise = static_cast<float>(rises[0][j]);
+    column->even_head_rise = static_cast<float>(even[0][j]);
+    column->tail_rise = static_cast<float>(rises[1][j]);
+    column->even_tail_rise = static_cast<float>(even[1][j]);
   }
 }
 
@@ -50,14 +105,12 @@ double u_at_row(const Patch& patch, double row) {
 
 void blend_texels(ClContext& context, const BlendTables& tables, const std::vector<LatticeRow>& rows, const FrameTables& result, int texture_width,
                   const DevicePlanes& texels, DevicePlanes& blended) {
-  std::vector<float> columns = tables.head_columns;
-  columns.insert(columns.end(), tables.tail_columns.begin(), tables.tail_columns.end());
-  columns.insert(columns.end(), tables.slope_growths.begin(), tables.slope_growths.end());
-  columns.resize(3 * tables.head_columns.size(), 0.f);
+  std::vector<float> slopes = tables.slopes;
+  if (slopes.empty()) slopes.assign(2, 0.f);
   context.launch({"blend.cl", "blend_texels"}, row_range(context, rows.size()), static_cast<int>(rows.size()), tables.source_count,
-                 static_cast<int>(result.patches.size()), texture_width, static_cast<int>(tables.head_columns.size()), context.upload(rows),
-                 context.upload(result.patches), context.upload(result.rows), context.upload(tables.sources), context.upload(tables.rows),
-                 context.upload(columns), context.upload(result.columns), texels.x, texels.y, texels.z, blended.x, blended.y, blended.z);
+                 static_cast<int>(result.patches.size()), texture_width, context.upload(rows), context.upload(result.patches), context.upload(result.rows),
+                 context.upload(tables.sources), context.upload(tables.rows), context.upload(tables.columns), context.upload(slopes),
+                 context.upload(result.columns), texels.x, texels.y, texels.z, blended.x, blended.y, blended.z);
 }
 
 void EndMoves::add(BoneEnd end, const Vec3& move) {

@@ -14,16 +14,18 @@ struct BlendTables {
   int source_count = 0;
   std::vector<BlendSource> sources;   ///< per source and patch of the result
   std::vector<BlendRow> rows;         ///< per source and row to do
-  std::vector<float> head_columns, tail_columns;
-  std::vector<float> slope_growths;           ///< see kernels/blend.cl; none: 0
+  std::vector<BlendColumn> columns;  ///< per source and column of the result
+  std::vector<float> slopes;         ///< pairs; see BlendSource::slope_begin
 };
 
-/// Appends the columns that one patch of the result, `width` columns wide, reads in a source.
+/// Appends the columns that one patch of the result, `width` columns wide, reads in a source at the bone's head and tail.
 /// \param bone  of the result
 void append_columns(const Overlay& overlay, int bone, int width, std::vector<float>& head_columns, std::vector<float>& tail_columns);
-/// Appends how much more the source's walls open from head to tail than the result's, for the same columns; for all
-/// sources or for none. \param walls  of the result
-void append_slope_growths(const Overlay& overlay, const Walls& walls, int bone, int width, BlendTables& tables);
+/// The same for blend_texels, which needs them smoothed as well; texels are not turned.
+void append_columns(const Overlay& overlay, int bone, int width, BlendTables& tables);
+/// The same; texels are turned from the source's frames to those of the result, and `source` is told so.
+/// \param walls  of the result
+void append_turned_columns(const Overlay& overlay, const Walls& walls, int bone, int width, BlendSource& source, BlendTables& tables);
 
 /// Row of a patch of `source_height` rows at the same share of the way as a row of one of `height` rows.
 double row_at_same_share(int row, int height, int source_height, bool is_reversed);

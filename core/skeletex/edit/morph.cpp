@@ -322,10 +322,10 @@ SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) 
     for (int bone = 0; bone < static_cast<int>(result.patches.size()); ++bone) {
       const Rectangle& from = models_[m].patches[overlay.model_bone(bone)].rectangle;
       const int stride = models_[m].texture.width;
-      tables.sources.push_back({texel_begins_[m] + from.y * stride + from.x, stride, from.width, from.height,
-                                static_cast<int>(tables.head_columns.size()), overlay.is_reversed(bone) ? -1.0f : 1.0f});
-      append_columns(overlay, bone, result.patches[bone].rectangle.width, tables.head_columns, tables.tail_columns);
-      append_slope_growths(overlay, walls, bone, result.patches[bone].rectangle.width, tables);
+      BlendSource source{texel_begins_[m] + from.y * stride + from.x, stride, from.width, from.height, static_cast<int>(tables.columns.size()), -1,
+                         overlay.is_reversed(bone) ? -1.0f : 1.0f};
+      append_turned_columns(overlay, walls, bone, result.patches[bone].rectangle.width, source, tables);
+      tables.sources.push_back(source);
     }
     for (const LatticeRow& row : rows) {
       const int source_height = models_[m].patches[overlay.model_bone(row[0])].rectangle.height;

@@ -236,8 +236,8 @@ double Overlay::model_v(int bone, BoneEnd end, double v) const {
   return point_at(loop(bone, end).points, &LoopPoint::turn, model_turn(bone, end, point_at(here, &LoopPoint::v, v).turn)).v;
 }
 
-double Overlay::slope(int bone, BoneEnd end, double v) const {
-  const double slope = walls_.slope(model_bone(bone), model_end(bone, end), model_v(bone, end, v));
+double Overlay::slope_at(int bone, BoneEnd end, double model_turn) const {
+  const double slope = walls_.slope(model_bone(bone), model_end(bone, end), model_turn);
   return is_reversed(bone) ? -slope : slope;
 }
 

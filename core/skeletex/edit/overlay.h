@@ -64,8 +64,8 @@ class Overlay {
   void set_loop(int bone, BoneEnd end, std::vector<LoopPoint> points) { loops_here_[bone][static_cast<int>(end)] = std::move(points); }
   /// v of the model's end row where it passes the same point of the seam as the row here at v; without a loop, model_turn.
   double model_v(int bone, BoneEnd end, double v) const;
-  /// The slope of the model's wall there (Walls::slope), along the bone here.
-  double slope(int bone, BoneEnd end, double v) const;
+  /// The slope of the model's wall at an angle of its own (Walls::slope), along the bone here.
+  double slope_at(int bone, BoneEnd end, double model_turn) const;
   /// The texel of the model's seam there, in the directions of the bone here.
   Vec3 end_texel(int bone, BoneEnd end, double v) const;
   /// The texel of the seam here. \pre set_loop

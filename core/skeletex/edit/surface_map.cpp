@@ -46,8 +46,8 @@ std::vector<Vec3> map_surface(ClContext& context, const SkeletexModel& from, con
   for (const Patch& patch : to.patches) begins.push_back(begins.back() + patch.rectangle.width * patch.rectangle.height);
   for (int bone = 0; bone < static_cast<int>(from.patches.size()); ++bone) {
     const Rectangle& source = to.patches[overlay.model_bone(bone)].rectangle;
-    tables.sources.push_back({begins[overlay.model_bone(bone)], source.width, source.width, source.height, static_cast<int>(tables.head_columns.size()), 1.0f});
-    append_columns(overlay, bone, from.patches[bone].rectangle.width, tables.head_columns, tables.tail_columns);
+    tables.sources.push_back({begins[overlay.model_bone(bone)], source.width, source.width, source.height, static_cast<int>(tables.columns.size()), -1, 1.0f});
+    append_columns(overlay, bone, from.patches[bone].rectangle.width, tables);
   }
   for (const LatticeRow& row : rows) {
     const double at = row_at_same_share(row[1], from.patches[row[0]].rectangle.height, to.patches[overlay.model_bone(row[0])].rectangle.height,
