@@ -22,8 +22,8 @@ struct Arguments {
   std::string mesh, skeleton, output, device, json, size = "512", method = "vsm";
   int iterations = 4;
   double alpha = 0.5, stop_spread = 0, hybrid_threshold = 0.02;
-  std::string rows = "surface", spd_hit = "last", share, compression = "zip";
-  bool has_no_prefilter = false, is_snapped = false, is_paper_recipe = false, is_half = false;
+  std::string rows = "surface", spd_hit = "last", share, diagonals, compression = "zip";
+  bool has_no_prefilter = false, is_snapped = false, is_fitted = false, is_paper_recipe = false, is_half = false;
   std::vector<std::string> bone_methods;
 };
 
@@ -76,6 +76,9 @@ EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command
   if (is_given("--rows")) options.row_spacing = arguments.rows == "uniform" ? RowSpacing::kUniform : RowSpacing::kSurfaceLength;
   if (arguments.has_no_prefilter) options.has_prefilter = false;
   options.has_snap = arguments.is_snapped;
+  options.has_fit = arguments.is_fitted;
+  const bool is_smooth = is_given("--diagonals") ? arguments.diagonals == "smooth" : options.has_snap || options.has_fit;
+  options.diagonals = is_smooth ? DiagonalRule::kSmooth : DiagonalRule::kNearest;
   options.spd_hit = arguments.spd_hit == "first" ? SpdHit::kFirst : SpdHit::kLast;
   if (is_given("--share")) options.texel_share = arguments.share == "area" ? TexelShare::kArea : TexelShare::kTriangles;
   return options;
@@ -129,6 +132,11 @@ Json report_json(const EncodeReport& report, const EncodeOptions& options, doubl
                     {"snapped_edges", report.snap->snapped_edges},
                     {"texels_on_edges", report.snap->texels_on_edges},
                     {"texels_put_back", report.snap->texels_put_back}};
+  if (report.fit) {
+    Json residuals = Json::array();
+    for (const double residual : report.fit->residuals) residuals.push_back(residual / report.diagonal);
+    json["fit"] = {{"residuals", std::move(residuals)}, {"texels_put_back", report.fit->texels_put_back}};
+  }
   return json;
 }
 
@@ -145,11 +153,18 @@ std::string report_text(const EncodeReport& report, const EncodeOptions& options
                                         : fmt::format("snapped to {:.1f} % of {} vertices and {:.1f} % of {} edges; {} texels put back\n",
                                                       percent(report.snap->snapped_vertices, report.snap->vertices), report.snap->vertices,
                                                       percent(report.snap->snapped_edges, report.snap->edges), report.snap->edges, report.snap->texels_put_back);
+  std::string fit;
+  if (report.fit) {
+    fit = "fitted: mean distance / diagonal";
+    for (std::size_t i = 0; i < report.fit->residuals.size(); ++i)
+      fit += fmt::format("{} {:.3e}", i == 0 ? "" : " ->", report.fit->residuals[i] / report.diagonal);
+    fit += fmt::format("; {} texels put back\n", report.fit->texels_put_back);
+  }
   std::error_code ignored;
   return fmt::format(
       "{}\n{} vertices, {} triangles, genus {}; {} x {} texels, {:.1f} % used, on {}\n"
       "{}half edges {:.0f} ms, segmentation {:.0f} ms, parameterization {:.0f} ms, encoding {:.0f} ms\n{} ({:.1f} MiB)\n",
-      table.text(), report.vertices, report.triangles, report.genus, options.width, options.height, 100 * report.used_fraction, report.device, snap,
+      table.text(), report.vertices, report.triangles, report.genus, options.width, options.height, 100 * report.used_fraction, report.device, snap + fit,
       report.half_edge_ms, report.segmentation_ms, report.parameterization_ms, report.encoding_ms, output,
       static_cast<double>(std::filesystem::file_size(output, ignored)) / (1 << 20));
 }
@@ -240,6 +255,13 @@ void add_encode_command(CLI::App& program) {
       .add_flag("--snap", a.is_snapped,
                 "texels sit on the mesh's own vertices and edges where they can; for more than 1 texel per vertex (default: an even lattice)")
       ->group("Texels");
+  command
+      .add_flag("--fit", a.is_fitted, "points move so that the triangles between them are nearer to the mesh; instead of the prefilter (default: not)")
+      ->group("Texels");
+  take_one_of(add("Texels", "--diagonals", a.diagonals,
+                  "how the decoder cuts quads: nearest to the surface that texels around foretell, or smooth, going on best into the quads around; unless "
+                  "given: smooth with --snap or --fit, else nearest"),
+              {"nearest", "smooth"});
   command
       .add_flag("--paper-recipe", a.is_paper_recipe,
                 "as the paper: --rows uniform --alpha 0 --iterations 1 --no-prefilter (rows, alpha and iterations can still be given)")

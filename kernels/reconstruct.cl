@@ -9,6 +9,7 @@
 // A texel lies at (patch.y + row) * texture_width + patch.x + column of its plane. The column table comes as four planes
 // of column_count floats behind each other: cosine, sine, slope_head, slope_tail (see ColumnRecord).
 #include "skeletex_structs.h"
+#include "quad_diagonal.h"
 
 // in   along, around, out: texels
 // out  x, y, z: the points, relative to the origin of the patch records
@@ -77,6 +78,15 @@ __kernel void displace(const int row_count, const int texture_width, const int c
   }
 }
 
+void write_quad(__global int* restrict t, int is_second, int v00, int v01, int v10, int v11) {
+  t[0] = v00;
+  t[1] = v01;
+  t[2] = is_second ? v10 : v11;
+  t[3] = is_second ? v10 : v00;
+  t[4] = is_second ? v01 : v11;
+  t[5] = is_second ? v11 : v10;
+}
+
 // Both triangles of every quad between a row and the next. Of its diagonals the one with the smaller d l^2 is taken: l is
 // its length and d the distance, along the quad's normal, of its midpoint from where a cubic through the 4 x 4 vertices
 // around has the surface. (Against the shorter diagonal: mean error -6 %, maximum up to -20 %.) Where rounding
@@ -121,13 +131,27 @@ __kernel void triangulate_quads(const int row_count, __global const int* restric
     const float blur = 3e-7f * (fabs(cx) + fabs(cy) + fabs(cz)) + 1e-4f * sqrt(first2);
     const int is_second = (second * n_inverse + blur) * second2 < (first * n_inverse + 0.9f * blur) * first2;
 
-    __global int* restrict t = triangles + 6 * (quad + j);
-    t[0] = v00;
-    t[1] = v01;
-    t[2] = is_second ? v10 : v11;
-    t[3] = is_second ? v10 : v00;
-    t[4] = is_second ? v01 : v11;
-    t[5] = is_second ? v11 : v10;
+    write_quad(triangles + 6 * (quad + j), is_second, v00, v01, v10, v11);
+  }
+}
+
+// The same by the other rule, for models whose texels sit on edges of the surface: see quad_diagonal.h.
+__kernel void triangulate_smoothly(const int row_count, __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
+                                   __global const float* restrict x, __global const float* restrict y, __global const float* restrict z,
+                                   __global int* restrict triangles) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  const int width = patches[lattice_rows[4 * k]].width;
+  const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2], quad = lattice_rows[4 * k + 3];
+  const int has_before = row > 1, has_after = row + 2 < patches[lattice_rows[4 * k]].height - 1;
+  const int before = has_before ? vertex - width : vertex, after = has_after ? vertex + 2 * width : vertex + width;
+
+  const int step = get_local_size(0);
+  for (int j = get_local_id(0); j < width; j += step) {
+    const int left = j > 0 ? j - 1 : width - 1, next = j + 1 < width ? j + 1 : 0, right = next + 1 < width ? next + 1 : 0;
+    const QuadRing q = {vertex + j, vertex + next, vertex + j + width, vertex + next + width, before + j, before + next, after + j, after + next,
+                        vertex + left, vertex + left + width, vertex + right, vertex + right + width};
+    write_quad(triangles + 6 * (quad + j), takes_second_smoothly(q, has_before, has_after, x, y, z), q.v00, q.v01, q.v10, q.v11);
   }
 }
 

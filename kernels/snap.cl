@@ -11,6 +11,7 @@
 // Texels of one launch never look at each other's offsets where these may change: claims wait for stronger ones next to
 // them, the other kernels run once per colour (see colour_of). So nothing depends on the order of work-items.
 #include "skeletex_structs.h"
+#include "patch_texels.h"
 
 #define REACH 0.7f         // cells from where a texel is to where it goes
 #define FURTHEST 1.0f      // cells from a texel's own place, along each axis
@@ -20,15 +21,6 @@
 #define LEAST_MOVE 0.01f   // cells: shorter steps of free texels are not worth their test
 #define PLACED 5           // states of a vertex: 0 to 3 the candidate it claims, 4 none is left
 #define NO_EDGE 0x7fffffff
-
-// The texel `columns` to the right and `rows` up from one at (column, row) of its patch; columns wrap round.
-int texel_at(global const PatchRecord* restrict p, int texture_width, int column, int row) {
-  const int wrapped = column < 0 ? column + p->width : column >= p->width ? column - p->width : column;
-  return (p->y + row) * texture_width + p->x + wrapped;
-}
-
-// Colours 0 to 5: texels of one colour are two cells apart or more, also where an odd width wraps round.
-int colour_of(int column, int row, int width) { return 3 * (row & 1) + ((width & 1) && column == width - 1 ? 2 : column & 1); }
 
 // The smallest cross product at the four corners of a quad in the map; 1 in the even lattice.
 float quad_cross(const float x[4], const float y[4]) {
@@ -309,11 +301,13 @@ kernel void find_bad_quads(const int texture_width, const int texture_height, gl
   is_bad[texel] = (first && second) || quad_cross(map_x, map_y) <= 0.0f;
 }
 
-// NDRange (texture width, texture height). Texels of bad quads go back to their place in the even lattice; those on
-// vertices only when `with_vertices` says so.
-kernel void put_back(const int texture_width, const int texture_height, const int with_vertices, global const int* restrict texel_patches, global const PatchRecord* restrict patches,
-                     global const int* restrict is_bad, global const float* restrict even_x, global const float* restrict even_y,
-                     global const float* restrict even_z, global int* restrict anchors, global float* restrict offset_x, global float* restrict offset_y,
+// NDRange (texture width, texture height). Texels of bad quads go back to where they were: with snapping their place in the
+// even lattice, those on vertices only when `with_vertices` says so. Where they read goes back with them when `is_reading`
+// says so.
+// before_x, before_y, before_z: where they were
+kernel void put_back(const int texture_width, const int texture_height, const int with_vertices, const int is_reading, global const int* restrict texel_patches, global const PatchRecord* restrict patches,
+                     global const int* restrict is_bad, global const float* restrict before_x, global const float* restrict before_y,
+                     global const float* restrict before_z, global int* restrict anchors, global float* restrict offset_x, global float* restrict offset_y,
                      global float* restrict x, global float* restrict y, global float* restrict z, global int* restrict is_changed,
                      global int* restrict back_count) {
   const int across = (int)get_global_id(0), line = (int)get_global_id(1);
@@ -328,13 +322,15 @@ kernel void put_back(const int texture_width, const int texture_height, const in
   const int left = texel_at(p, texture_width, column - 1, row);
   if (!is_bad[texel] && !is_bad[left] && !is_bad[texel - texture_width] && !is_bad[left - texture_width]) return;
   if (anchors[texel] > 0 && !with_vertices) return;
-  if (x[texel] == even_x[texel] && y[texel] == even_y[texel] && z[texel] == even_z[texel]) return;
-  x[texel] = even_x[texel];
-  y[texel] = even_y[texel];
-  z[texel] = even_z[texel];
-  offset_x[texel] = 0.0f;
-  offset_y[texel] = 0.0f;
-  anchors[texel] = 0;
+  if (x[texel] == before_x[texel] && y[texel] == before_y[texel] && z[texel] == before_z[texel]) return;
+  x[texel] = before_x[texel];
+  y[texel] = before_y[texel];
+  z[texel] = before_z[texel];
+  if (is_reading) {
+    offset_x[texel] = 0.0f;
+    offset_y[texel] = 0.0f;
+    anchors[texel] = 0;
+  }
   is_changed[texel] = 1;
   atomic_inc(back_count);
 }

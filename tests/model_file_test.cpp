@@ -111,6 +111,7 @@ void expect_same(const SkeletexModel& a, const SkeletexModel& b) {
   expect_same(a.origin, b.origin);
   expect_same(a.diagonal, b.diagonal);
   EXPECT_EQ(a.genus, b.genus);
+  EXPECT_EQ(a.diagonals, b.diagonals);
   EXPECT_EQ(a.encoder_settings, b.encoder_settings);
   ASSERT_EQ(a.patches.size(), b.patches.size());
   for (std::size_t i = 0; i < a.patches.size(); ++i) {

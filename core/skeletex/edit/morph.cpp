@@ -281,6 +281,7 @@ SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) 
   SkeletexModel result;
   result.skeleton = layout.skeleton;
   result.genus = layout.genus;
+  result.diagonals = layout.diagonals;
   result.encoder_settings = layout.encoder_settings;
   std::vector<const Skeleton*> skeletons;
   std::vector<Correspondence> from_layout;

@@ -95,6 +95,7 @@ nlohmann::json settings_json(const EncodeOptions& options, const TexelOptions& t
                       {"rows", options.row_spacing == RowSpacing::kSurfaceLength ? "surface" : "uniform"},
                       {"prefilter", texel_options.has_prefilter},
                       {"snap", texel_options.has_snap},
+                      {"fit", texel_options.has_fit},
                       {"spd_hit", options.spd_hit == SpdHit::kFirst ? "first" : "last"}};
   if (options.method == EncodeMethod::kHybrid) json["hybrid_unseen_threshold"] = options.hybrid_unseen_threshold;
   if (!unseen.empty()) json["unseen_area_fractions"] = unseen;
@@ -185,7 +186,8 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
                                                                     : spread_rows_uniformly(patch.rectangle.height);
     model.patches.push_back(std::move(patch));
   }
-  const TexelOptions texel_options{.has_prefilter = options.has_prefilter, .has_snap = options.has_snap};
+  const TexelOptions texel_options{.has_prefilter = options.has_prefilter, .has_snap = options.has_snap, .has_fit = options.has_fit};
+  model.diagonals = options.diagonals;
   Seams seams = sample_seams(segmentation, skeleton, walls, layout.rectangles, texel_options.has_snap ? SeamSampling::kSnapped : SeamSampling::kEven);
   model.arcs = std::move(seams.arcs);
   model.corners = std::move(seams.corners);
@@ -225,6 +227,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   report.genus = model.genus;
   report.diagonal = model.diagonal;
   report.snap = texels.report.snap;
+  report.fit = texels.report.fit;
   report.device = context.device().name;
   for (int bone = 0; bone < bones; ++bone) {
     const Segment& segment = segmentation.segments[bone];

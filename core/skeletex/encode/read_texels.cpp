@@ -184,10 +184,10 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   }
   place_end_rows(context, sources, texture_width, origin, points);
 
+  const TexelPoints even = points;
   if (options.has_snap && maps.triangle_count > 0) {
     const SnapFeatures features = find_features(sources.charts, sources.patches, options.snap_dihedral);
     snap_positions(context, layout, features, positions);
-    const TexelPoints even = points;
     points = copy_points(context, even);
     context.launch({"encode.cl", "walk_to_positions"}, layout.range(), texture_width, texture_height, maps.triangle_count, layout.texel_patches, maps.corners,
                    maps.turns, maps.poles, maps.across, maps.u_high, maps.u_low, maps.v_high, maps.v_low, layout.patches, maps.row_high, maps.row_low,
@@ -204,7 +204,9 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     }
   }
 
-  if (options.has_prefilter) {
+  if (options.has_fit && maps.triangle_count > 0) {
+    result.report.fit = fit_points(context, layout, maps, covering, even, positions, points);
+  } else if (options.has_prefilter) {
     TexelPoints filtered = allocate_points(context, texels);
     context.launch({"encode.cl", "prefilter_positions"}, layout.range(), texture_width, texture_height, layout.texel_patches, layout.patches,
                    positions.anchors, points.x, points.y, points.z, filtered.x, filtered.y, filtered.z);

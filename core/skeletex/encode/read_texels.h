@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "skeletex/cl/context.h"
+#include "skeletex/encode/fit.h"
 #include "skeletex/encode/snap.h"
 #include "skeletex/model/frame.h"
 #include "skeletex/parameterize/chart.h"
@@ -26,6 +27,7 @@ struct TexelOptions {
   bool has_prefilter = true;
   bool has_snap = false;        ///< texels of VSM patches move to vertices and creased edges
   double snap_dihedral = 0.004;  ///< radians: edges flatter than this are no creases
+  bool has_fit = false;         ///< points of VSM patches are fitted to the mesh, instead of the prefilter
 };
 
 /// What snapping did; of VSM patches.
@@ -40,6 +42,7 @@ struct TexelReport {
   std::vector<double> sampled_triangle_fractions;  ///< per bone: share of the chart's triangles that a texel reads
   std::vector<int> missed_texels;                  ///< per bone: filled from neighbours along the column
   std::optional<SnapReport> snap;
+  std::optional<FitReport> fit;
 };
 
 struct TexelResult {

@@ -167,24 +167,40 @@ void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceM
                  context.upload(vertex_points), context.upload(edge_points), maps.x, maps.y, maps.z, points.x, points.y, points.z);
 }
 
-int put_back_folds(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, ReadingPositions& positions, TexelPoints& points) {
+namespace {
+
+int put_back(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before, bool is_reading, ReadingPositions& positions,
+             TexelPoints& points) {
   auto is_bad = context.allocate<int>(layout.size()), is_changed = context.allocate<int>(layout.size());
   auto back = context.allocate<int>(1);
   context.fill(back, 0);
   int total = 0;
   // First what hangs between vertices, then vertices as well. Texels only ever go back, so this ends.
   for (const int with_vertices : {0, 1}) {
+    if (!is_reading && with_vertices == 0) continue;
     context.fill(is_changed, 1);
-    for (int before = -1; before != total;) {
-      before = total;
+    for (int known = -1; known != total;) {
+      known = total;
       context.launch({"snap.cl", "find_bad_quads"}, layout.range(), layout.width, layout.height, layout.texel_patches, layout.patches, is_changed,
                      positions.x, positions.y, even.x, even.y, even.z, points.x, points.y, points.z, is_bad);
-      context.launch({"snap.cl", "put_back"}, layout.range(), layout.width, layout.height, with_vertices, layout.texel_patches, layout.patches, is_bad,
-                     even.x, even.y, even.z, positions.anchors, positions.x, positions.y, points.x, points.y, points.z, is_changed, back);
+      context.launch({"snap.cl", "put_back"}, layout.range(), layout.width, layout.height, with_vertices, static_cast<int>(is_reading), layout.texel_patches,
+                     layout.patches, is_bad, before.x, before.y, before.z, positions.anchors, positions.x, positions.y, points.x, points.y, points.z,
+                     is_changed, back);
       total = context.download(back)[0];
     }
   }
   return total;
+}
+
+}  // namespace
+
+int put_back_folds(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, ReadingPositions& positions, TexelPoints& points) {
+  return put_back(context, layout, even, even, true, positions, points);
+}
+
+int put_back_folds(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before, ReadingPositions& positions,
+                   TexelPoints& points) {
+  return put_back(context, layout, even, before, false, positions, points);
 }
 
 }  // namespace skeletex

@@ -110,6 +110,7 @@ json model_to_json(const SkeletexModel& model, const std::string& where) {
                  {"patches", std::move(patches)},
                  {"arcs", std::move(arcs)},
                  {"corners", std::move(corners)}};
+  if (model.diagonals == DiagonalRule::kSmooth) result["diagonals"] = "smooth";
   if (!model.encoder_settings.empty()) {
     result["encoder"] = parse_json(model.encoder_settings, where + ": encoder settings");
     if (!result["encoder"].is_object()) throw IoError(where + ": the encoder's settings must be a JSON object");
@@ -132,6 +133,11 @@ SkeletexModel model_from_json(const json& root, const std::string& where) {
   model.origin = {origin[0], origin[1], origin[2]};
   model.diagonal = json_number(member(root, "diagonal", where), where + ": \"diagonal\"");
   model.genus = json_int(member(root, "genus", where), 0, kMaxInt, where + ": \"genus\"");
+  if (root.contains("diagonals")) {
+    const json& rule = root["diagonals"];
+    if (rule != "smooth" && rule != "nearest") throw IoError(where + ": \"diagonals\": \"smooth\" or \"nearest\" is expected");
+    model.diagonals = rule == "smooth" ? DiagonalRule::kSmooth : DiagonalRule::kNearest;
+  }
   const json& texture = member(root, "texture", where);
   model.texture.width = json_int(member(texture, "width", where + ": texture"), 1, kMaxTextureSize, where + ": texture, \"width\"");
   model.texture.height = json_int(member(texture, "height", where + ": texture"), 1, kMaxTextureSize, where + ": texture, \"height\"");

@@ -63,12 +63,19 @@ struct DisplacementTexture {
   std::vector<float> along, around, out;
 };
 
+/// Which diagonal the quads between texels take, see kernels/reconstruct.cl.
+enum class DiagonalRule {
+  kNearest,  ///< the one nearer to a cubic through the texels around: for even lattices
+  kSmooth,   ///< the one whose triangles turn least against those around: for texels on the mesh's own vertices and edges
+};
+
 /// A model: one texture and what is needed to turn it back into a mesh.
 struct SkeletexModel {
   Skeleton skeleton;  ///< bind pose, every bone with its s
   Vec3 origin = Vec3::Zero();  ///< world position that device coordinates are relative to (the input's box centre)
   double diagonal = 0;         ///< of the input mesh's bounding box
   int genus = 0;
+  DiagonalRule diagonals = DiagonalRule::kNearest;
   DisplacementTexture texture;
   std::vector<Patch> patches;  ///< one per bone
   std::vector<std::array<PatchEnd, 2>> ends;  ///< one pair per bone: head, tail

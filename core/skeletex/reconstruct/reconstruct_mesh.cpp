@@ -93,7 +93,7 @@ TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model) {
     const auto patches = context.upload(frame_tables(model.skeleton, walls, model.patches, model.origin).patches);
     // Room for the strips and fans at the end, so that the host's copy need not grow.
     const auto triangles = context.allocate<Triangle>(lattice.triangle_count);
-    context.launch({"reconstruct.cl", "triangulate_quads"}, row_range(context, rows.size()), static_cast<int>(rows.size()), context.upload(rows), patches,
+    context.launch({"reconstruct.cl", model.diagonals == DiagonalRule::kSmooth ? "triangulate_smoothly" : "triangulate_quads"}, row_range(context, rows.size()), static_cast<int>(rows.size()), context.upload(rows), patches,
                    points.x, points.y, points.z, triangles);
     mesh.triangles = context.download(triangles);
     mesh.triangles.resize(2 * static_cast<std::size_t>(lattice.quad_count));

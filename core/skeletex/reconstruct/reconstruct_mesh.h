@@ -11,7 +11,7 @@ namespace skeletex {
 
 /// A mesh from a model, in its bind pose, at the model's own resolution (paper 3.6). Closed, oriented, 2-manifold and
 /// of the input's genus by construction: inner rows are vertices of their own, seams and corners are shared polylines
-/// that both sides fill up to, poles are single vertices. Quads take the diagonal that lies nearer to the surface.
+/// that both sides fill up to, poles are single vertices. Quads take diagonals by the model's rule.
 /// \throw DeviceError
 TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model);
 

@@ -384,6 +384,7 @@ SkeletexModel resample_model(ClContext& context, const SkeletexModel& model, int
   result.texture.width = width;
   result.texture.height = height;
   result.patches = scale_patches(model, width, height);
+  result.diagonals = DiagonalRule::kNearest;  // new texels lie evenly
   resample_texels(context, model, walls, result);
   for (SeamArc& arc : result.arcs) {
     double ratio = 0;

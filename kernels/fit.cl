@@ -1,0 +1,565 @@
+// SPDX-License-Identifier: MIT
+// Points moved in space so that the flat triangles between them are nearer to the mesh: Gauss-Newton on distances.
+//   read_samples      maps -> per quad of the lattice FIT_SAMPLES points of the mesh, and its normals there
+//   choose_diagonals  points -> the decoder's diagonal of every quad
+//   match_samples     samples -> their nearest points of the lattice
+//   match_lattice     the middle of every triangle of the lattice -> its nearest point of the mesh
+//   assemble          both -> per texel its row of the linear system
+//   relax_moves       one sweep of the solver over the texels of a colour
+//   move_points       points a step nearer
+//   count_turned      triangles of the lattice that look against the mesh
+// The quad of a texel lies to the right of it and above it; its corners are numbered 0 (the texel), 1 (right), 2 (right
+// above), 3 (above). Its triangles are 0 1 2 and 0 2 3 with the first diagonal, 0 1 3 and 1 2 3 with the second.
+// A residual is a distance along a normal, linear in the three corners of one triangle: r + n . sum of weight x move. So a
+// texel is coupled to the eight around it by symmetric 3 x 3 blocks w n n^T. Rows 0 and height-1 stay.
+// Planes have the texture's size; several of them lie behind each other in one buffer. Sums are taken per texel over what
+// lies around it, in a fixed order: nothing depends on the order of work-items.
+#include "skeletex_structs.h"
+#include "map_triangle.h"
+#include "patch_texels.h"
+#include "quad_diagonal.h"
+
+#define FIT_SAMPLES 4
+#define SAMPLE_PLANES 7     // x, y, z, normal x, y, z, share of the area; the normal is 0 where there is nothing to fit
+#define LATTICE_PLANES 5    // of a triangle's middle: weight (area), residual, normal x, y, z
+#define SYSTEM_PLANES 33    // 6: own block (xx, xy, xz, yy, yz, zz), 3: right-hand side, 4 x 6: blocks with the texels ahead
+#define LARGEST_STEP 0.25f  // cells
+#define LARGEST_MOVE 1.0f   // cells, of all steps together
+
+typedef struct Point {
+  float x, y, z;
+} Point;
+
+Point point_at(global const float* restrict x, global const float* restrict y, global const float* restrict z, int i) {
+  const Point p = {x[i], y[i], z[i]};
+  return p;
+}
+Point minus(Point a, Point b) {
+  const Point d = {a.x - b.x, a.y - b.y, a.z - b.z};
+  return d;
+}
+float product(Point a, Point b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+Point cross_of(Point a, Point b) {
+  const Point n = {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+  return n;
+}
+Point weighted(const float w[3], Point a, Point b, Point c) {
+  const Point p = {w[0] * a.x + w[1] * b.x + w[2] * c.x, w[0] * a.y + w[1] * b.y + w[2] * c.y, w[0] * a.z + w[1] * b.z + w[2] * c.z};
+  return p;
+}
+
+float ratio_of(float part, float whole) { return whole > 0.0f ? part / whole : 0.0f; }
+
+// The point of a triangle that is nearest to p, as weights of its corners, 0 exactly where it lies on a side. Returns the
+// squared distance.
+float nearest_of_triangle(Point p, Point a, Point b, Point c, float w[3]) {
+  const Point ab = minus(b, a), ac = minus(c, a), ap = minus(p, a), bp = minus(p, b), cp = minus(p, c);
+  const float d1 = product(ab, ap), d2 = product(ac, ap), d3 = product(ab, bp), d4 = product(ac, bp), d5 = product(ab, cp), d6 = product(ac, cp);
+  const float va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2;
+  w[0] = 0.0f, w[1] = 0.0f, w[2] = 0.0f;
+  if (d1 <= 0.0f && d2 <= 0.0f) {
+    w[0] = 1.0f;
+  } else if (d3 >= 0.0f && d4 <= d3) {
+    w[1] = 1.0f;
+  } else if (d6 >= 0.0f && d5 <= d6) {
+    w[2] = 1.0f;
+  } else if (vc <= 0.0f && d1 >= 0.0f && d3 <= 0.0f) {
+    w[1] = ratio_of(d1, d1 - d3);
+    w[0] = 1.0f - w[1];
+  } else if (vb <= 0.0f && d2 >= 0.0f && d6 <= 0.0f) {
+    w[2] = ratio_of(d2, d2 - d6);
+    w[0] = 1.0f - w[2];
+  } else if (va <= 0.0f && d4 >= d3 && d5 >= d6) {
+    w[2] = ratio_of(d4 - d3, (d4 - d3) + (d5 - d6));
+    w[1] = 1.0f - w[2];
+  } else {
+    const float sum = va + vb + vc;
+    w[1] = ratio_of(vb, sum);
+    w[2] = ratio_of(vc, sum);
+    w[0] = 1.0f - w[1] - w[2];
+  }
+  const Point gap = minus(p, weighted(w, a, b, c));
+  return product(gap, gap);
+}
+
+float sample_s(int i) { return i & 1 ? 0.75f : 0.25f; }
+float sample_t(int i) { return i & 2 ? 0.75f : 0.25f; }
+
+// Corner k, 0 to 2, of triangle t of a quad.
+int corner_of(int is_second, int t, int k) { return is_second ? (t == 0 ? (k == 2 ? 3 : k) : k + 1) : (t == 0 ? k : (k == 0 ? 0 : k + 1)); }
+int corner_right(int c) { return c == 1 || c == 2; }
+int corner_up(int c) { return c >= 2; }
+
+void corners_of_quad(global const PatchRecord* restrict p, int texture_width, int column, int row, int at[4]) {
+  at[0] = texel_at(p, texture_width, column, row);
+  at[1] = texel_at(p, texture_width, column + 1, row);
+  at[2] = at[1] + texture_width;
+  at[3] = at[0] + texture_width;
+}
+
+// NDRange (texture width, texture height). A sample has a fixed place in its quad; where that is in the map follows from the
+// reading positions of the quad's corners, and from there a walk leads to the triangle that covers it.
+// out  samples: FIT_SAMPLES x SAMPLE_PLANES planes; sample_triangles: FIT_SAMPLES planes
+kernel void read_samples(const int texture_width, const int texture_height, const int triangle_count, global const int* restrict texel_patches,
+                         global const int* restrict texel_triangles, global const int* restrict corners, global const int* restrict turns,
+                         global const int* restrict poles, global const int* restrict across, global const float* restrict u_high,
+                         global const float* restrict u_low, global const float* restrict v_high, global const float* restrict v_low,
+                         global const float* restrict vertex_x, global const float* restrict vertex_y, global const float* restrict vertex_z,
+                         global const PatchRecord* restrict patches, global const float* restrict row_high, global const float* restrict row_low,
+                         global const float* restrict offset_x, global const float* restrict offset_y, global const float* restrict x,
+                         global const float* restrict y, global const float* restrict z, global float* restrict samples,
+                         global int* restrict sample_triangles) {
+  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (column >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + column, size = texture_width * texture_height;
+  for (int i = 0; i < SAMPLE_PLANES * FIT_SAMPLES; ++i) samples[i * size + texel] = 0.0f;
+  for (int i = 0; i < FIT_SAMPLES; ++i) sample_triangles[i * size + texel] = NO_TRIANGLE;
+  const int patch = texel_patches[texel];
+  if (patch < 0) return;
+  global const PatchRecord* p = patches + patch;
+  const int row = line - p->y, inner = column - p->x;
+  if (row > p->height - 2) return;
+  int at[4];
+  corners_of_quad(p, texture_width, inner, row, at);
+  int t = texel_triangles[row == 0 ? at[3] : texel];
+  if (t == NO_TRIANGLE) return;
+  const Point normal = cross_of(minus(point_at(x, y, z, at[2]), point_at(x, y, z, at[0])), minus(point_at(x, y, z, at[3]), point_at(x, y, z, at[1])));
+  const float share = 0.5f * sqrt(product(normal, normal)) / (float)FIT_SAMPLES;
+  for (int i = 0; i < FIT_SAMPLES; ++i) {
+    const float s = sample_s(i), q = sample_t(i);
+    const float dx = s + (1.0f - q) * ((1.0f - s) * offset_x[at[0]] + s * offset_x[at[1]]) + q * ((1.0f - s) * offset_x[at[3]] + s * offset_x[at[2]]);
+    const float dy = q + (1.0f - q) * ((1.0f - s) * offset_y[at[0]] + s * offset_y[at[1]]) + q * ((1.0f - s) * offset_y[at[3]] + s * offset_y[at[2]]);
+    const int rows_up = clamp((int)floor(dy), -row, p->height - 2 - row);
+    float w1 = 0.0f, w2 = 0.0f;
+    for (int steps = 0; steps < 1000; ++steps) {
+      const MapTriangle m = load_triangle(t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
+      const float u = row_offset(m, row_high, row_low, p->row_begin + row + rows_up, clamp(dy - (float)rows_up, 0.0f, 1.0f));
+      weights_at(m, u, turned_offset(m, inner, dx, p->width), &w1, &w2);
+      const float w0 = 1.0f - w1 - w2;
+      const float least = fmin(w0, fmin(w1, w2));
+      if (!(least < -1e-6f)) break;
+      const int next = across[(least == w0 ? 0 : least == w1 ? 1 : 2) * triangle_count + t];
+      if (next < 0) break;
+      t = next;
+    }
+    w1 = fmax(0.0f, w1), w2 = fmax(0.0f, w2);
+    const float sum = w1 + w2;
+    if (sum > 1.0f) w1 /= sum, w2 /= sum;
+    const Point a = point_at(vertex_x, vertex_y, vertex_z, corners[t]);
+    const Point b = point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + t]);
+    const Point c = point_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + t]);
+    const Point n = cross_of(minus(b, a), minus(c, a));
+    const float length2 = product(n, n);
+    const float inverse = length2 > 0.0f ? rsqrt(length2) : 0.0f;
+    const int plane = SAMPLE_PLANES * i * size + texel;
+    samples[plane] = a.x + w1 * (b.x - a.x) + w2 * (c.x - a.x);
+    samples[plane + size] = a.y + w1 * (b.y - a.y) + w2 * (c.y - a.y);
+    samples[plane + 2 * size] = a.z + w1 * (b.z - a.z) + w2 * (c.z - a.z);
+    samples[plane + 3 * size] = n.x * inverse;
+    samples[plane + 4 * size] = n.y * inverse;
+    samples[plane + 5 * size] = n.z * inverse;
+    samples[plane + 6 * size] = share;
+    sample_triangles[i * size + texel] = t;
+  }
+}
+
+// NDRange (texture width, texture height). The decoder's choice; next to seams and poles, where it makes strips, the shorter
+// diagonal.
+kernel void choose_diagonals(const int texture_width, const int texture_height, global const int* restrict texel_patches,
+                             global const PatchRecord* restrict patches, global const float* restrict x, global const float* restrict y,
+                             global const float* restrict z, global int* restrict diagonals) {
+  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (column >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + column;
+  diagonals[texel] = 0;
+  const int patch = texel_patches[texel];
+  if (patch < 0) return;
+  global const PatchRecord* p = patches + patch;
+  const int row = line - p->y, inner = column - p->x;
+  if (row > p->height - 2) return;
+  int at[4];
+  corners_of_quad(p, texture_width, inner, row, at);
+  if (row == 0 || row == p->height - 2) {
+    const Point first = minus(point_at(x, y, z, at[2]), point_at(x, y, z, at[0])), second = minus(point_at(x, y, z, at[3]), point_at(x, y, z, at[1]));
+    diagonals[texel] = product(second, second) < product(first, first);
+    return;
+  }
+  const int has_before = row > 1, has_after = row + 2 < p->height - 1;
+  const int before = has_before ? -texture_width : 0, after = has_after ? texture_width : 0;
+  const int left = texel_at(p, texture_width, inner - 1, row);
+  const int right = texel_at(p, texture_width, inner + 1 < p->width ? inner + 2 : 1, row);
+  const QuadRing q = {at[0], at[1], at[3], at[2], at[0] + before, at[1] + before, at[3] + after, at[2] + after,
+                      left, left + texture_width, right, right + texture_width};
+  diagonals[texel] = takes_second_smoothly(q, has_before, has_after, x, y, z);
+}
+
+// The point of a quad that is nearest to p: its triangle and weights. Returns the squared distance.
+float nearest_of_quad(Point p, const int at[4], int is_second, global const float* restrict x, global const float* restrict y, global const float* restrict z,
+                      int* triangle, float w[3]) {
+  float best = INFINITY;
+  for (int t = 0; t < 2; ++t) {
+    float own[3];
+    const float distance2 = nearest_of_triangle(p, point_at(x, y, z, at[corner_of(is_second, t, 0)]), point_at(x, y, z, at[corner_of(is_second, t, 1)]),
+                                                point_at(x, y, z, at[corner_of(is_second, t, 2)]), own);
+    if (distance2 < best) {
+      best = distance2;
+      *triangle = t;
+      w[0] = own[0], w[1] = own[1], w[2] = own[2];
+    }
+  }
+  return best;
+}
+
+// NDRange (texture width, texture height). Every sample's nearest point of its own quad, or of those beside it where that
+// lies on a side.
+// out  matches: per sample a plane; -1: none, else (1 + quads to the right) + 3 (1 + quads up) + 9 triangle
+//      weights: per sample two planes, of the triangle's corners 1 and 2; residuals: per sample a plane, along the normal
+//      costs: distance x area, summed over the samples of the quad; areas: the sum of their areas
+kernel void match_samples(const int texture_width, const int texture_height, global const int* restrict texel_patches,
+                          global const PatchRecord* restrict patches, global const float* restrict samples, global const int* restrict diagonals,
+                          global const float* restrict x, global const float* restrict y, global const float* restrict z, global int* restrict matches,
+                          global float* restrict weights, global float* restrict residuals, global float* restrict costs, global float* restrict areas) {
+  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (column >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + column, size = texture_width * texture_height;
+  costs[texel] = 0.0f, areas[texel] = 0.0f;
+  for (int i = 0; i < FIT_SAMPLES; ++i) matches[i * size + texel] = -1;
+  const int patch = texel_patches[texel];
+  if (patch < 0) return;
+  global const PatchRecord* p = patches + patch;
+  const int row = line - p->y, inner = column - p->x;
+  if (row > p->height - 2) return;
+  float cost = 0.0f, area = 0.0f;
+  for (int i = 0; i < FIT_SAMPLES; ++i) {
+    const int plane = SAMPLE_PLANES * i * size + texel;
+    const Point n = {samples[plane + 3 * size], samples[plane + 4 * size], samples[plane + 5 * size]};
+    if (n.x == 0.0f && n.y == 0.0f && n.z == 0.0f) continue;
+    const Point sample = {samples[plane], samples[plane + size], samples[plane + 2 * size]};
+    int at[4], triangle = 0, right = 0, up = 0;
+    float w[3];
+    corners_of_quad(p, texture_width, inner, row, at);
+    int is_second = diagonals[texel];
+    float best = nearest_of_quad(sample, at, is_second, x, y, z, &triangle, w);
+    // The sides that the nearest point lies on.
+    int is_left = 1, is_right = 1, is_below = 1, is_above = 1;
+    for (int k = 0; k < 3; ++k) {
+      const int c = corner_of(is_second, triangle, k);
+      if (w[k] == 0.0f) continue;
+      if (corner_right(c)) is_left = 0;
+      else is_right = 0;
+      if (corner_up(c)) is_below = 0;
+      else is_above = 0;
+    }
+    const int side = is_right - is_left, rise = is_above - is_below;
+    for (int k = 1; k < 4; ++k) {
+      const int dx = k & 1 ? side : 0, dy = k & 2 ? rise : 0;
+      if ((k & 1 && side == 0) || (k & 2 && rise == 0) || row + dy < 0 || row + dy > p->height - 2) continue;
+      const int beside = inner + dx < 0 ? inner + dx + p->width : inner + dx >= p->width ? inner + dx - p->width : inner + dx;
+      int other[4], other_triangle = 0;
+      float other_w[3];
+      corners_of_quad(p, texture_width, beside, row + dy, other);
+      const int other_second = diagonals[other[0]];
+      const float distance2 = nearest_of_quad(sample, other, other_second, x, y, z, &other_triangle, other_w);
+      if (distance2 < best) {
+        best = distance2;
+        right = dx, up = dy, triangle = other_triangle, is_second = other_second;
+        for (int c = 0; c < 4; ++c) at[c] = other[c];
+        for (int c = 0; c < 3; ++c) w[c] = other_w[c];
+      }
+    }
+    const Point nearest = weighted(w, point_at(x, y, z, at[corner_of(is_second, triangle, 0)]), point_at(x, y, z, at[corner_of(is_second, triangle, 1)]),
+                                   point_at(x, y, z, at[corner_of(is_second, triangle, 2)]));
+    matches[i * size + texel] = (1 + right) + 3 * (1 + up) + 9 * triangle;
+    weights[2 * i * size + texel] = w[1];
+    weights[(2 * i + 1) * size + texel] = w[2];
+    residuals[i * size + texel] = product(n, minus(nearest, sample));
+    cost += samples[plane + 6 * size] * sqrt(best);
+    area += samples[plane + 6 * size];
+  }
+  costs[texel] = cost;
+  areas[texel] = area;
+}
+
+// NDRange (texture width, texture height). From the middle of each triangle a walk over the mesh, from a triangle that is
+// read near it, across sides that the nearest point lies on, as long as it comes nearer. It does not leave the patch's map.
+// out  lattice: per triangle LATTICE_PLANES planes; costs, areas: what the triangles add to those of match_samples
+kernel void match_lattice(const int texture_width, const int texture_height, const int triangle_count, global const int* restrict texel_patches,
+                          global const PatchRecord* restrict patches, global const int* restrict sample_triangles, global const int* restrict corners,
+                          global const int* restrict across, global const float* restrict vertex_x, global const float* restrict vertex_y,
+                          global const float* restrict vertex_z, global const int* restrict diagonals, global const float* restrict x,
+                          global const float* restrict y, global const float* restrict z, global float* restrict lattice, global float* restrict costs,
+                          global float* restrict areas) {
+  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (column >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + column, size = texture_width * texture_height;
+  lattice[texel] = 0.0f, lattice[LATTICE_PLANES * size + texel] = 0.0f;
+  const int patch = texel_patches[texel];
+  if (patch < 0) return;
+  global const PatchRecord* p = patches + patch;
+  const int row = line - p->y, inner = column - p->x;
+  if (row > p->height - 2) return;
+  int at[4];
+  corners_of_quad(p, texture_width, inner, row, at);
+  const int is_second = diagonals[texel];
+  for (int i = 0; i < 2; ++i) {
+    int t = sample_triangles[(is_second ? (i == 0 ? 0 : 3) : (i == 0 ? 1 : 2)) * size + texel];
+    if (t == NO_TRIANGLE) continue;
+    const Point a = point_at(x, y, z, at[corner_of(is_second, i, 0)]), b = point_at(x, y, z, at[corner_of(is_second, i, 1)]),
+                c = point_at(x, y, z, at[corner_of(is_second, i, 2)]);
+    const float third[3] = {1.0f / 3.0f, 1.0f / 3.0f, 1.0f / 3.0f};
+    const Point middle = weighted(third, a, b, c);
+    const Point own = cross_of(minus(b, a), minus(c, a));
+    const float area = 0.5f * sqrt(product(own, own));
+    float best = INFINITY, w[3];
+    Point nearest = middle, normal = own;
+    int next = t;
+    for (int steps = 0; steps < 40 && next >= 0; ++steps) {
+      t = next;
+      const Point d = point_at(vertex_x, vertex_y, vertex_z, corners[t]), e = point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + t]),
+                  f = point_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + t]);
+      best = nearest_of_triangle(middle, d, e, f, w);
+      nearest = weighted(w, d, e, f);
+      normal = cross_of(minus(e, d), minus(f, d));
+      next = -1;
+      float nearer = best;
+      for (int k = 0; k < 3; ++k) {
+        if (w[k] != 0.0f) continue;
+        const int other = across[k * triangle_count + t];
+        if (other < 0) continue;
+        float other_w[3];
+        const float distance2 = nearest_of_triangle(middle, point_at(vertex_x, vertex_y, vertex_z, corners[other]),
+                                                    point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + other]),
+                                                    point_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + other]), other_w);
+        if (distance2 < nearer) nearer = distance2, next = other;
+      }
+    }
+    // On a side or at a corner the way to the point is the direction; within a triangle that is its normal.
+    const Point gap = minus(middle, nearest);
+    const float distance = sqrt(best);
+    const int is_inside = w[0] > 0.0f && w[1] > 0.0f && w[2] > 0.0f;
+    const float length2 = product(normal, normal);
+    const float normal_scale = length2 > 0.0f ? rsqrt(length2) : 0.0f;
+    const int takes_gap = !is_inside && best > 1e-6f * area;
+    const float scale = takes_gap ? 1.0f / distance : normal_scale;
+    const Point direction = takes_gap ? gap : normal;
+    const int plane = LATTICE_PLANES * i * size + texel;
+    lattice[plane] = area;
+    lattice[plane + size] = scale * product(direction, gap);
+    lattice[plane + 2 * size] = scale * direction.x;
+    lattice[plane + 3 * size] = scale * direction.y;
+    lattice[plane + 4 * size] = scale * direction.z;
+    costs[texel] += area * distance;
+    areas[texel] += area;
+  }
+}
+
+typedef struct System {
+  float own[6], side[3], ahead[4][6];
+} System;
+
+// What one residual adds to the row of a texel. `own` is the texel's number among the triangle's corners, `quad_x`, `quad_y`
+// where the quad lies from the texel.
+void add_residual(System* s, float weight, float residual, Point n, const float w[3], int is_second, int triangle, int own, int quad_x, int quad_y) {
+  const float block[6] = {n.x * n.x, n.x * n.y, n.x * n.z, n.y * n.y, n.y * n.z, n.z * n.z};
+  const float pull = weight * w[own];
+  for (int i = 0; i < 6; ++i) s->own[i] += pull * w[own] * block[i];
+  s->side[0] -= pull * residual * n.x;
+  s->side[1] -= pull * residual * n.y;
+  s->side[2] -= pull * residual * n.z;
+  for (int k = 0; k < 3; ++k) {
+    const int c = corner_of(is_second, triangle, k);
+    const int dx = quad_x + corner_right(c), dy = quad_y + corner_up(c);
+    const int is_ahead = dy == 1 || (dy == 0 && dx == 1);
+    if (k == own || !is_ahead) continue;
+    const int which = dy == 0 ? 0 : dx + 2;
+    for (int i = 0; i < 6; ++i) s->ahead[which][i] += pull * w[k] * block[i];
+  }
+}
+
+// NDRange (texture width, texture height). Texels ahead are those at (right, up) = (1, 0), (-1, 1), (0, 1), (1, 1).
+// out  system: SYSTEM_PLANES planes
+kernel void assemble(const int texture_width, const int texture_height, const float least_residual, global const int* restrict texel_patches,
+                     global const PatchRecord* restrict patches, global const float* restrict samples, global const int* restrict diagonals,
+                     global const int* restrict matches, global const float* restrict weights, global const float* restrict residuals,
+                     global const float* restrict lattice, global float* restrict system) {
+  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (column >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + column, size = texture_width * texture_height;
+  System s;
+  for (int i = 0; i < 6; ++i) s.own[i] = 0.0f;
+  for (int i = 0; i < 3; ++i) s.side[i] = 0.0f;
+  for (int k = 0; k < 4; ++k)
+    for (int i = 0; i < 6; ++i) s.ahead[k][i] = 0.0f;
+  const int patch = texel_patches[texel];
+  global const PatchRecord* p = patches + max(patch, 0);
+  const int row = line - p->y, inner = column - p->x;
+  if (patch >= 0 && row >= 1 && row <= p->height - 2) {
+    for (int qy = -2; qy <= 1; ++qy) {
+      if (row + qy < 0 || row + qy > p->height - 2) continue;
+      for (int qx = -2; qx <= 1; ++qx) {
+        const int quad = texel_at(p, texture_width, inner + qx, row + qy);
+        for (int i = 0; i < FIT_SAMPLES; ++i) {
+          const int match = matches[i * size + quad];
+          if (match < 0) continue;
+          const int tx = qx + match % 3 - 1, ty = qy + match / 3 % 3 - 1, triangle = match / 9;
+          if (tx < -1 || tx > 0 || ty < -1 || ty > 0) continue;
+          const int is_second = diagonals[texel_at(p, texture_width, inner + tx, row + ty)];
+          const float w1 = weights[2 * i * size + quad], w2 = weights[(2 * i + 1) * size + quad];
+          const float w[3] = {1.0f - w1 - w2, w1, w2};
+          const int corner = ty == 0 ? -tx : tx == 0 ? 3 : 2;
+          for (int k = 0; k < 3; ++k) {
+            if (corner_of(is_second, triangle, k) != corner) continue;
+            const int plane = SAMPLE_PLANES * i * size + quad;
+            const Point n = {samples[plane + 3 * size], samples[plane + 4 * size], samples[plane + 5 * size]};
+            const float residual = residuals[i * size + quad];
+            add_residual(&s, samples[plane + 6 * size] / (fabs(residual) + least_residual), residual, n, w, is_second, triangle, k, tx, ty);
+          }
+        }
+      }
+    }
+    const float third[3] = {1.0f / 3.0f, 1.0f / 3.0f, 1.0f / 3.0f};
+    for (int ty = -1; ty <= 0; ++ty)
+      for (int tx = -1; tx <= 0; ++tx) {
+        const int quad = texel_at(p, texture_width, inner + tx, row + ty);
+        const int is_second = diagonals[quad], corner = ty == 0 ? -tx : tx == 0 ? 3 : 2;
+        for (int triangle = 0; triangle < 2; ++triangle) {
+          const int plane = LATTICE_PLANES * triangle * size + quad;
+          const float area = lattice[plane];
+          if (area == 0.0f) continue;
+          for (int k = 0; k < 3; ++k) {
+            if (corner_of(is_second, triangle, k) != corner) continue;
+            const float residual = lattice[plane + size];
+            const Point n = {lattice[plane + 2 * size], lattice[plane + 3 * size], lattice[plane + 4 * size]};
+            add_residual(&s, area / (fabs(residual) + least_residual), residual, n, third, is_second, triangle, k, tx, ty);
+          }
+        }
+      }
+  }
+  for (int i = 0; i < 6; ++i) system[i * size + texel] = s.own[i];
+  for (int i = 0; i < 3; ++i) system[(6 + i) * size + texel] = s.side[i];
+  for (int k = 0; k < 4; ++k)
+    for (int i = 0; i < 6; ++i) system[(9 + 6 * k + i) * size + texel] = s.ahead[k][i];
+}
+
+// side -= block x move
+void subtract_block(float side[3], global const float* restrict system, int first_plane, int size, int texel, Point move) {
+  float b[6];
+  for (int i = 0; i < 6; ++i) b[i] = system[(first_plane + i) * size + texel];
+  side[0] -= b[0] * move.x + b[1] * move.y + b[2] * move.z;
+  side[1] -= b[1] * move.x + b[3] * move.y + b[4] * move.z;
+  side[2] -= b[2] * move.x + b[4] * move.y + b[5] * move.z;
+}
+
+float mean_entry(global const float* restrict system, int size, int texel) {
+  return (system[texel] + system[3 * size + texel] + system[5 * size + texel]) / 3.0f;
+}
+
+// NDRange (texture width, texture height). Every texel of a colour takes the move that solves its own row, the others
+// standing: block Gauss-Seidel. To its row come damping, and springs between its move and those of its four neighbours.
+kernel void relax_moves(const int texture_width, const int texture_height, const int colour, const float damping, const float springs,
+                        global const int* restrict texel_patches, global const PatchRecord* restrict patches, global const float* restrict system,
+                        global float* restrict move_x, global float* restrict move_y, global float* restrict move_z) {
+  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (column >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + column, size = texture_width * texture_height;
+  const int patch = texel_patches[texel];
+  if (patch < 0) return;
+  global const PatchRecord* p = patches + patch;
+  const int row = line - p->y, inner = column - p->x;
+  if (row < 1 || row > p->height - 2 || colour_of(inner, row, p->width) != colour) return;
+  const float entry = mean_entry(system, size, texel);
+  if (!(entry > 0.0f)) return;
+  float h[6], side[3];
+  for (int i = 0; i < 6; ++i) h[i] = system[i * size + texel];
+  for (int i = 0; i < 3; ++i) side[i] = system[(6 + i) * size + texel];
+  float added = damping * entry;
+  for (int dy = -1; dy <= 1; ++dy)
+    for (int dx = -1; dx <= 1; ++dx) {
+      if (dx == 0 && dy == 0) continue;
+      const int other = texel_at(p, texture_width, inner + dx, row + dy);
+      const Point move = point_at(move_x, move_y, move_z, other);
+      const int is_ahead = dy == 1 || (dy == 0 && dx == 1);
+      const int which = dy == 0 ? 0 : is_ahead ? dx + 2 : 2 - dx;
+      subtract_block(side, system, 9 + 6 * which, size, is_ahead ? texel : other, move);
+      if (dx != 0 && dy != 0) continue;
+      const float spring = 0.5f * springs * (entry + mean_entry(system, size, other));
+      added += spring;
+      side[0] += spring * move.x, side[1] += spring * move.y, side[2] += spring * move.z;
+    }
+  h[0] += added, h[3] += added, h[5] += added;
+  const float c00 = h[3] * h[5] - h[4] * h[4], c01 = h[2] * h[4] - h[1] * h[5], c02 = h[1] * h[4] - h[2] * h[3];
+  const float c11 = h[0] * h[5] - h[2] * h[2], c12 = h[1] * h[2] - h[0] * h[4], c22 = h[0] * h[3] - h[1] * h[1];
+  const float determinant = h[0] * c00 + h[1] * c01 + h[2] * c02;
+  if (!(determinant > 0.0f)) return;
+  move_x[texel] = (c00 * side[0] + c01 * side[1] + c02 * side[2]) / determinant;
+  move_y[texel] = (c01 * side[0] + c11 * side[1] + c12 * side[2]) / determinant;
+  move_z[texel] = (c02 * side[0] + c12 * side[1] + c22 * side[2]) / determinant;
+}
+
+// NDRange (texture width, texture height). Steps and moves are limited to parts of a cell: the root of the mean area of the
+// four quads around, at the start.
+kernel void move_points(const int texture_width, const int texture_height, global const int* restrict texel_patches,
+                        global const PatchRecord* restrict patches, global const float* restrict start_x, global const float* restrict start_y,
+                        global const float* restrict start_z, global const float* restrict x, global const float* restrict y,
+                        global const float* restrict z, global const float* restrict move_x, global const float* restrict move_y,
+                        global const float* restrict move_z, global float* restrict out_x, global float* restrict out_y, global float* restrict out_z) {
+  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (column >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + column;
+  const Point from = point_at(x, y, z, texel);
+  out_x[texel] = from.x, out_y[texel] = from.y, out_z[texel] = from.z;
+  const int patch = texel_patches[texel];
+  if (patch < 0) return;
+  global const PatchRecord* p = patches + patch;
+  const int row = line - p->y, inner = column - p->x;
+  if (row < 1 || row > p->height - 2) return;
+  Point move = point_at(move_x, move_y, move_z, texel);
+  const float step2 = product(move, move);
+  if (!(step2 > 0.0f && step2 < INFINITY)) return;
+  float area = 0.0f;
+  for (int k = 0; k < 4; ++k) {
+    int at[4];
+    const int beside = k & 1 ? (inner > 0 ? inner - 1 : p->width - 1) : inner;
+    corners_of_quad(p, texture_width, beside, row - (k >> 1), at);
+    const Point n = cross_of(minus(point_at(start_x, start_y, start_z, at[2]), point_at(start_x, start_y, start_z, at[0])),
+                             minus(point_at(start_x, start_y, start_z, at[3]), point_at(start_x, start_y, start_z, at[1])));
+    area += 0.125f * sqrt(product(n, n));
+  }
+  const float cell = sqrt(area);
+  const float kept = fmin(1.0f, LARGEST_STEP * cell / sqrt(step2));
+  const Point start = point_at(start_x, start_y, start_z, texel);
+  Point total = {from.x - start.x + kept * move.x, from.y - start.y + kept * move.y, from.z - start.z + kept * move.z};
+  const float length = sqrt(product(total, total));
+  const float limit = length > LARGEST_MOVE * cell ? LARGEST_MOVE * cell / length : 1.0f;
+  out_x[texel] = start.x + limit * total.x;
+  out_y[texel] = start.y + limit * total.y;
+  out_z[texel] = start.z + limit * total.z;
+}
+
+// NDRange (texture width, texture height). How many of a quad's triangles look against the mesh at the sample read nearest
+// to their middle.
+kernel void count_turned(const int texture_width, const int texture_height, global const int* restrict texel_patches,
+                         global const PatchRecord* restrict patches, global const float* restrict samples, global const int* restrict diagonals,
+                         global const float* restrict x, global const float* restrict y, global const float* restrict z, global int* restrict counts) {
+  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (column >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + column, size = texture_width * texture_height;
+  counts[texel] = 0;
+  const int patch = texel_patches[texel];
+  if (patch < 0) return;
+  global const PatchRecord* p = patches + patch;
+  const int row = line - p->y;
+  if (row > p->height - 2) return;
+  int at[4], count = 0;
+  corners_of_quad(p, texture_width, column - p->x, row, at);
+  const int is_second = diagonals[texel];
+  for (int t = 0; t < 2; ++t) {
+    const int plane = SAMPLE_PLANES * (is_second ? (t == 0 ? 0 : 3) : (t == 0 ? 1 : 2)) * size + texel;
+    const Point n = {samples[plane + 3 * size], samples[plane + 4 * size], samples[plane + 5 * size]};
+    const Point a = point_at(x, y, z, at[corner_of(is_second, t, 0)]), b = point_at(x, y, z, at[corner_of(is_second, t, 1)]),
+                c = point_at(x, y, z, at[corner_of(is_second, t, 2)]);
+    // Around a bone and along it is clockwise from outside: a quad's own order is counter-clockwise.
+    count += product(n, cross_of(minus(b, a), minus(c, a))) < 0.0f;
+  }
+  counts[texel] = count;
+}

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+// Triangles of maps, for the kernels that read surfaces. Map coordinates are pairs of floats (high + low): differences of
+// near values keep their relative precision, however small the triangle. A triangle's corner 2 is its pole where it has
+// one; corner 0 is the base of all differences.
+#ifndef MAP_TRIANGLE_H
+#define MAP_TRIANGLE_H
+
+#define NO_TRIANGLE 0x7fffffff
+
+typedef struct MapTriangle {
+  float du1, dv1, du2, dv2;  // corners 1 and 2 from corner 0
+  float u_base_high, u_base_low, v_base_high, v_base_low;
+  int pole;  // 0, -1: head's, +1: tail's at corner 2 (then du2 reaches the pole's row and dv2 is unused)
+} MapTriangle;
+
+MapTriangle load_triangle(int t, int triangle_count, global const int* restrict corners, global const int* restrict turns, global const int* restrict poles,
+                          global const float* restrict u_high, global const float* restrict u_low, global const float* restrict v_high,
+                          global const float* restrict v_low) {
+  const int a = corners[t], b = corners[triangle_count + t], c = corners[2 * triangle_count + t];
+  MapTriangle m;
+  m.u_base_high = u_high[a];
+  m.u_base_low = u_low[a];
+  m.v_base_high = v_high[a] + (float)turns[t];
+  // The turn is exact; what its addition rounds off goes to the low part.
+  m.v_base_low = v_low[a] + (v_high[a] - (m.v_base_high - (float)turns[t]));
+  m.du1 = (u_high[b] - u_high[a]) + (u_low[b] - u_low[a]);
+  m.du2 = (u_high[c] - u_high[a]) + (u_low[c] - u_low[a]);
+  m.dv1 = ((v_high[b] - v_high[a]) + (float)(turns[triangle_count + t] - turns[t])) + (v_low[b] - v_low[a]);
+  m.dv2 = ((v_high[c] - v_high[a]) + (float)(turns[2 * triangle_count + t] - turns[t])) + (v_low[c] - v_low[a]);
+  m.pole = poles[t];
+  return m;
+}
+
+// v of a column from the triangle's base.
+float column_offset(MapTriangle m, int column, int width) {
+  const float high = (float)column / (float)width;
+  const float low = fma(-high, (float)width, (float)column) / (float)width;
+  return (high - m.v_base_high) + (low - m.v_base_low);
+}
+
+// u from the triangle's base of a reading position: a row of the table, and the share of the way to the next one.
+float row_offset(MapTriangle m, global const float* restrict row_high, global const float* restrict row_low, int row, float share) {
+  const int next = share < 0.0f ? row - 1 : share > 0.0f ? row + 1 : row;
+  const float span = (row_high[next] - row_high[row]) + (row_low[next] - row_low[row]);
+  return ((row_high[row] - m.u_base_high) + (row_low[row] - m.u_base_low)) + fabs(share) * span;
+}
+
+// Where a map's triangle has a point at (u, v), both from the triangle's base: the weights of corners 1 and 2. They are
+// negative, or their sum is above 1, outside the triangle.
+void weights_at(MapTriangle m, float u, float v, float* w1, float* w2) {
+  if (m.pole == 0) {
+    // Scaled by the extents, so that products of tiny differences stay in range.
+    const float scale_u = 1.0f / fmax(fmax(fabs(m.du1), fabs(m.du2)), 1e-30f), scale_v = 1.0f / fmax(fmax(fabs(m.dv1), fabs(m.dv2)), 1e-30f);
+    const float a1 = m.du1 * scale_u, b1 = m.dv1 * scale_v, a2 = m.du2 * scale_u, b2 = m.dv2 * scale_v;
+    const float pu = u * scale_u, pv = v * scale_v;
+    const float determinant = a1 * b2 - a2 * b1;
+    const float inverse = determinant == 0.0f ? 0.0f : 1.0f / determinant;
+    *w1 = (pu * b2 - a2 * pv) * inverse;
+    *w2 = (a1 * pv - pu * b1) * inverse;
+  } else {
+    const float lambda = m.dv1 == 0.0f ? 0.0f : v / m.dv1;
+    const float edge = lambda * m.du1;
+    const float rest = m.du2 - edge;
+    const float tau = rest == 0.0f ? 1.0f : (u - edge) / rest;
+    *w1 = (1.0f - tau) * lambda;
+    *w2 = tau;
+  }
+}
+
+// v from the triangle's base of a reading position, at the turn that lies nearest to the triangle's middle.
+float turned_offset(MapTriangle m, int column, float share, int width) {
+  const float middle = m.pole == 0 ? (m.dv1 + m.dv2) / 3.0f : 0.5f * m.dv1;
+  const float beside = share / (float)width;
+  const int lift = (int)rint(middle - (column_offset(m, column, width) + beside));
+  return column_offset(m, column + lift * width, width) + beside;
+}
+
+#endif
