@@ -7,12 +7,15 @@
 //   assemble          both -> per texel its row of the linear system
 //   relax_moves       one sweep of the solver over the texels of a colour
 //   move_points       points a step nearer
+//   measure_vertices, measure_middles, put_far_back
+//                     texels go back where mesh and lattice are too far apart
 //   count_turned      triangles of the lattice that look against the mesh
 // The quad of a texel lies to the right of it and above it; its corners are numbered 0 (the texel), 1 (right), 2 (right
 // above), 3 (above). Its triangles are 0 1 2 and 0 2 3 with the first diagonal, 0 1 3 and 1 2 3 with the second.
 // A residual is a distance along a normal, linear in the three corners of one triangle: r + n . sum of weight x move. So a
 // texel is coupled to the eight around it by symmetric 3 x 3 blocks w n n^T. Rows 0 and height-1 stay.
-// Planes have the texture's size; several of them lie behind each other in one buffer. Sums are taken per texel over what
+// Planes have the texture's size; several of them lie behind each other in one buffer. Only the system's rows hold what
+// belongs to a texel side by side: a sweep reads every fourth of them or so. Sums are taken per texel over what
 // lies around it, in a fixed order: nothing depends on the order of work-items.
 #include "skeletex_structs.h"
 #include "map_triangle.h"
@@ -22,7 +25,7 @@
 #define FIT_SAMPLES 4
 #define SAMPLE_PLANES 7     // x, y, z, normal x, y, z, share of the area; the normal is 0 where there is nothing to fit
 #define LATTICE_PLANES 5    // of a triangle's middle: weight (area), residual, normal x, y, z
-#define SYSTEM_PLANES 33    // 6: own block (xx, xy, xz, yy, yz, zz), 3: right-hand side, 4 x 6: blocks with the texels ahead
+#define SYSTEM_STRIDE 36    // floats of a texel's row: 6 own block (xx, xy, xz, yy, yz, zz), 3 right-hand side, 4 x 6 blocks with the texels ahead
 #define LARGEST_STEP 0.25f  // cells
 #define LARGEST_MOVE 1.0f   // cells, of all steps together
 
@@ -185,12 +188,16 @@ kernel void choose_diagonals(const int texture_width, const int texture_height, 
     return;
   }
   const int has_before = row > 1, has_after = row + 2 < p->height - 1;
-  const int before = has_before ? -texture_width : 0, after = has_after ? texture_width : 0;
-  const int left = texel_at(p, texture_width, inner - 1, row);
-  const int right = texel_at(p, texture_width, inner + 1 < p->width ? inner + 2 : 1, row);
-  const QuadRing q = {at[0], at[1], at[3], at[2], at[0] + before, at[1] + before, at[3] + after, at[2] + after,
-                      left, left + texture_width, right, right + texture_width};
-  diagonals[texel] = takes_second_smoothly(q, has_before, has_after, x, y, z);
+  int around[4][4];
+  for (int i = 0; i < 4; ++i) {
+    const int from = inner + i - 1;
+    const int base = texel_at(p, texture_width, from >= p->width ? from - p->width : from, row);
+    around[0][i] = base - (has_before ? texture_width : 0);
+    around[1][i] = base;
+    around[2][i] = base + texture_width;
+    around[3][i] = base + (has_after ? 2 : 1) * texture_width;
+  }
+  diagonals[texel] = takes_second_if_smoother(around, has_before, has_after, x, y, z);
 }
 
 // The point of a quad that is nearest to p: its triangle and weights. Returns the squared distance.
@@ -212,7 +219,7 @@ float nearest_of_quad(Point p, const int at[4], int is_second, global const floa
 
 // NDRange (texture width, texture height). Every sample's nearest point of its own quad, or of those beside it where that
 // lies on a side.
-// out  matches: per sample a plane; -1: none, else (1 + quads to the right) + 3 (1 + quads up) + 9 triangle
+// out  matches: per sample a plane; -1: none, else (1 + quads to the right) + 4 (1 + quads up) + 16 triangle
 //      weights: per sample two planes, of the triangle's corners 1 and 2; residuals: per sample a plane, along the normal
 //      costs: distance x area, summed over the samples of the quad; areas: the sum of their areas
 kernel void match_samples(const int texture_width, const int texture_height, global const int* restrict texel_patches,
@@ -269,7 +276,7 @@ kernel void match_samples(const int texture_width, const int texture_height, glo
     }
     const Point nearest = weighted(w, point_at(x, y, z, at[corner_of(is_second, triangle, 0)]), point_at(x, y, z, at[corner_of(is_second, triangle, 1)]),
                                    point_at(x, y, z, at[corner_of(is_second, triangle, 2)]));
-    matches[i * size + texel] = (1 + right) + 3 * (1 + up) + 9 * triangle;
+    matches[i * size + texel] = (1 + right) + 4 * (1 + up) + 16 * triangle;
     weights[2 * i * size + texel] = w[1];
     weights[(2 * i + 1) * size + texel] = w[2];
     residuals[i * size + texel] = product(n, minus(nearest, sample));
@@ -280,8 +287,51 @@ kernel void match_samples(const int texture_width, const int texture_height, glo
   areas[texel] = area;
 }
 
+// The point of the mesh near p: a walk from triangle t across sides that the nearest point lies on, as long as it comes
+// nearer. It does not leave the patch's map. Returns the squared distance.
+float walk_over_mesh(Point p, int t, int triangle_count, global const int* restrict corners, global const int* restrict across,
+                     global const float* restrict vertex_x, global const float* restrict vertex_y, global const float* restrict vertex_z, Point* nearest,
+                     Point* normal, float w[3]) {
+  float best = INFINITY;
+  int next = t;
+  for (int steps = 0; steps < 40 && next >= 0; ++steps) {
+    t = next;
+    const Point d = point_at(vertex_x, vertex_y, vertex_z, corners[t]), e = point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + t]),
+                f = point_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + t]);
+    best = nearest_of_triangle(p, d, e, f, w);
+    *nearest = weighted(w, d, e, f);
+    *normal = cross_of(minus(e, d), minus(f, d));
+    next = -1;
+    float nearer = best;
+    for (int k = 0; k < 3; ++k) {
+      if (w[k] != 0.0f) continue;
+      const int other = across[k * triangle_count + t];
+      if (other < 0) continue;
+      float other_w[3];
+      const float distance2 =
+          nearest_of_triangle(p, point_at(vertex_x, vertex_y, vertex_z, corners[other]), point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + other]),
+                              point_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + other]), other_w);
+      if (distance2 < nearer) nearer = distance2, next = other;
+    }
+    // At a corner the way on may lead through any triangle around it.
+    int k = w[0] == 1.0f ? 0 : w[1] == 1.0f ? 1 : w[2] == 1.0f ? 2 : -1;
+    const int vertex = k < 0 ? -1 : corners[k * triangle_count + t];
+    for (int turns = 0, at = t; turns < 16 && next < 0 && k >= 0; ++turns) {
+      at = across[(k == 2 ? 0 : k + 1) * triangle_count + at];
+      if (at < 0 || at == t) break;
+      const int a = corners[at], b = corners[triangle_count + at], c = corners[2 * triangle_count + at];
+      k = a == vertex ? 0 : b == vertex ? 1 : c == vertex ? 2 : -1;
+      float other_w[3];
+      const float distance2 = nearest_of_triangle(p, point_at(vertex_x, vertex_y, vertex_z, a), point_at(vertex_x, vertex_y, vertex_z, b),
+                                                  point_at(vertex_x, vertex_y, vertex_z, c), other_w);
+      if (distance2 < best) next = at;
+    }
+  }
+  return best;
+}
+
 // NDRange (texture width, texture height). From the middle of each triangle a walk over the mesh, from a triangle that is
-// read near it, across sides that the nearest point lies on, as long as it comes nearer. It does not leave the patch's map.
+// read near it.
 // out  lattice: per triangle LATTICE_PLANES planes; costs, areas: what the triangles add to those of match_samples
 kernel void match_lattice(const int texture_width, const int texture_height, const int triangle_count, global const int* restrict texel_patches,
                           global const PatchRecord* restrict patches, global const int* restrict sample_triangles, global const int* restrict corners,
@@ -302,7 +352,7 @@ kernel void match_lattice(const int texture_width, const int texture_height, con
   corners_of_quad(p, texture_width, inner, row, at);
   const int is_second = diagonals[texel];
   for (int i = 0; i < 2; ++i) {
-    int t = sample_triangles[(is_second ? (i == 0 ? 0 : 3) : (i == 0 ? 1 : 2)) * size + texel];
+    const int t = sample_triangles[(is_second ? (i == 0 ? 0 : 3) : (i == 0 ? 1 : 2)) * size + texel];
     if (t == NO_TRIANGLE) continue;
     const Point a = point_at(x, y, z, at[corner_of(is_second, i, 0)]), b = point_at(x, y, z, at[corner_of(is_second, i, 1)]),
                 c = point_at(x, y, z, at[corner_of(is_second, i, 2)]);
@@ -310,29 +360,9 @@ kernel void match_lattice(const int texture_width, const int texture_height, con
     const Point middle = weighted(third, a, b, c);
     const Point own = cross_of(minus(b, a), minus(c, a));
     const float area = 0.5f * sqrt(product(own, own));
-    float best = INFINITY, w[3];
+    float w[3];
     Point nearest = middle, normal = own;
-    int next = t;
-    for (int steps = 0; steps < 40 && next >= 0; ++steps) {
-      t = next;
-      const Point d = point_at(vertex_x, vertex_y, vertex_z, corners[t]), e = point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + t]),
-                  f = point_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + t]);
-      best = nearest_of_triangle(middle, d, e, f, w);
-      nearest = weighted(w, d, e, f);
-      normal = cross_of(minus(e, d), minus(f, d));
-      next = -1;
-      float nearer = best;
-      for (int k = 0; k < 3; ++k) {
-        if (w[k] != 0.0f) continue;
-        const int other = across[k * triangle_count + t];
-        if (other < 0) continue;
-        float other_w[3];
-        const float distance2 = nearest_of_triangle(middle, point_at(vertex_x, vertex_y, vertex_z, corners[other]),
-                                                    point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + other]),
-                                                    point_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + other]), other_w);
-        if (distance2 < nearer) nearer = distance2, next = other;
-      }
-    }
+    const float best = walk_over_mesh(middle, t, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &nearest, &normal, w);
     // On a side or at a corner the way to the point is the direction; within a triangle that is its normal.
     const Point gap = minus(middle, nearest);
     const float distance = sqrt(best);
@@ -377,7 +407,7 @@ void add_residual(System* s, float weight, float residual, Point n, const float 
 }
 
 // NDRange (texture width, texture height). Texels ahead are those at (right, up) = (1, 0), (-1, 1), (0, 1), (1, 1).
-// out  system: SYSTEM_PLANES planes
+// out  system: SYSTEM_STRIDE floats per texel
 kernel void assemble(const int texture_width, const int texture_height, const float least_residual, global const int* restrict texel_patches,
                      global const PatchRecord* restrict patches, global const float* restrict samples, global const int* restrict diagonals,
                      global const int* restrict matches, global const float* restrict weights, global const float* restrict residuals,
@@ -401,7 +431,7 @@ kernel void assemble(const int texture_width, const int texture_height, const fl
         for (int i = 0; i < FIT_SAMPLES; ++i) {
           const int match = matches[i * size + quad];
           if (match < 0) continue;
-          const int tx = qx + match % 3 - 1, ty = qy + match / 3 % 3 - 1, triangle = match / 9;
+          const int tx = qx + (match & 3) - 1, ty = qy + ((match >> 2) & 3) - 1, triangle = match >> 4;
           if (tx < -1 || tx > 0 || ty < -1 || ty > 0) continue;
           const int is_second = diagonals[texel_at(p, texture_width, inner + tx, row + ty)];
           const float w1 = weights[2 * i * size + quad], w2 = weights[(2 * i + 1) * size + quad];
@@ -435,24 +465,21 @@ kernel void assemble(const int texture_width, const int texture_height, const fl
         }
       }
   }
-  for (int i = 0; i < 6; ++i) system[i * size + texel] = s.own[i];
-  for (int i = 0; i < 3; ++i) system[(6 + i) * size + texel] = s.side[i];
+  global float* restrict row_of_texel = system + (size_t)SYSTEM_STRIDE * texel;
+  for (int i = 0; i < 6; ++i) row_of_texel[i] = s.own[i];
+  for (int i = 0; i < 3; ++i) row_of_texel[6 + i] = s.side[i];
   for (int k = 0; k < 4; ++k)
-    for (int i = 0; i < 6; ++i) system[(9 + 6 * k + i) * size + texel] = s.ahead[k][i];
+    for (int i = 0; i < 6; ++i) row_of_texel[9 + 6 * k + i] = s.ahead[k][i];
 }
 
 // side -= block x move
-void subtract_block(float side[3], global const float* restrict system, int first_plane, int size, int texel, Point move) {
-  float b[6];
-  for (int i = 0; i < 6; ++i) b[i] = system[(first_plane + i) * size + texel];
+void subtract_block(float side[3], global const float* restrict b, Point move) {
   side[0] -= b[0] * move.x + b[1] * move.y + b[2] * move.z;
   side[1] -= b[1] * move.x + b[3] * move.y + b[4] * move.z;
   side[2] -= b[2] * move.x + b[4] * move.y + b[5] * move.z;
 }
 
-float mean_entry(global const float* restrict system, int size, int texel) {
-  return (system[texel] + system[3 * size + texel] + system[5 * size + texel]) / 3.0f;
-}
+float mean_entry(global const float* restrict own) { return (own[0] + own[3] + own[5]) / 3.0f; }
 
 // NDRange (texture width, texture height). Every texel of a colour takes the move that solves its own row, the others
 // standing: block Gauss-Seidel. To its row come damping, and springs between its move and those of its four neighbours.
@@ -461,17 +488,18 @@ kernel void relax_moves(const int texture_width, const int texture_height, const
                         global float* restrict move_x, global float* restrict move_y, global float* restrict move_z) {
   const int column = (int)get_global_id(0), line = (int)get_global_id(1);
   if (column >= texture_width || line >= texture_height) return;
-  const int texel = line * texture_width + column, size = texture_width * texture_height;
+  const int texel = line * texture_width + column;
   const int patch = texel_patches[texel];
   if (patch < 0) return;
   global const PatchRecord* p = patches + patch;
   const int row = line - p->y, inner = column - p->x;
   if (row < 1 || row > p->height - 2 || colour_of(inner, row, p->width) != colour) return;
-  const float entry = mean_entry(system, size, texel);
+  global const float* restrict own = system + (size_t)SYSTEM_STRIDE * texel;
+  const float entry = mean_entry(own);
   if (!(entry > 0.0f)) return;
   float h[6], side[3];
-  for (int i = 0; i < 6; ++i) h[i] = system[i * size + texel];
-  for (int i = 0; i < 3; ++i) side[i] = system[(6 + i) * size + texel];
+  for (int i = 0; i < 6; ++i) h[i] = own[i];
+  for (int i = 0; i < 3; ++i) side[i] = own[6 + i];
   float added = damping * entry;
   for (int dy = -1; dy <= 1; ++dy)
     for (int dx = -1; dx <= 1; ++dx) {
@@ -480,9 +508,10 @@ kernel void relax_moves(const int texture_width, const int texture_height, const
       const Point move = point_at(move_x, move_y, move_z, other);
       const int is_ahead = dy == 1 || (dy == 0 && dx == 1);
       const int which = dy == 0 ? 0 : is_ahead ? dx + 2 : 2 - dx;
-      subtract_block(side, system, 9 + 6 * which, size, is_ahead ? texel : other, move);
+      global const float* restrict beside = system + (size_t)SYSTEM_STRIDE * other;
+      subtract_block(side, (is_ahead ? own : beside) + 9 + 6 * which, move);
       if (dx != 0 && dy != 0) continue;
-      const float spring = 0.5f * springs * (entry + mean_entry(system, size, other));
+      const float spring = 0.5f * springs * (entry + mean_entry(beside));
       added += spring;
       side[0] += spring * move.x, side[1] += spring * move.y, side[2] += spring * move.z;
     }
@@ -562,4 +591,90 @@ kernel void count_turned(const int texture_width, const int texture_height, glob
     count += product(n, cross_of(minus(b, a), minus(c, a))) < 0.0f;
   }
   counts[texel] = count;
+}
+
+// NDRange (vertices). The distance from vertices of the mesh to the lattice: to the nearest of 3 x 3 quads around the cell
+// that the vertex lies in.
+// out  furthest: per quad the largest distance, as the bits of a float, which order like those of an int
+kernel void measure_vertices(const int vertex_count, const int texture_width, global const int* restrict vertex_patches,
+                             global const int* restrict vertex_points, global const float* restrict cell_x, global const float* restrict cell_y,
+                             global const PatchRecord* restrict patches, global const float* restrict vertex_x, global const float* restrict vertex_y,
+                             global const float* restrict vertex_z, global const int* restrict diagonals, global const float* restrict x,
+                             global const float* restrict y, global const float* restrict z, global int* restrict furthest) {
+  const int v = (int)get_global_id(0);
+  if (v >= vertex_count) return;
+  global const PatchRecord* p = patches + vertex_patches[v];
+  const int wrapped = (int)floor(cell_x[v]) % p->width;
+  const int column = wrapped < 0 ? wrapped + p->width : wrapped, row = clamp((int)floor(cell_y[v]), 0, p->height - 2);
+  const Point point = point_at(vertex_x, vertex_y, vertex_z, vertex_points[v]);
+  float best = INFINITY;
+  // From the vertex' own quad on; a vertex on the lattice needs no more.
+  for (int k = 0; k < 9 && best > 0.0f; ++k) {
+    const int dx = (k + 1) % 3 - 1, dy = (k / 3 + 1) % 3 - 1;
+    if (row + dy < 0 || row + dy > p->height - 2) continue;
+    const int beside = column + dx < 0 ? column + dx + p->width : column + dx >= p->width ? column + dx - p->width : column + dx;
+    int at[4], triangle;
+    float w[3];
+    corners_of_quad(p, texture_width, beside, row + dy, at);
+    best = fmin(best, nearest_of_quad(point, at, diagonals[at[0]], x, y, z, &triangle, w));
+  }
+  atomic_max(furthest + texel_at(p, texture_width, column, row), as_int(sqrt(best)));
+}
+
+// NDRange (texture width, texture height). The same from the points of the lattice and the middles of its
+// triangles to the mesh.
+// is_on_mesh: whether the lattice's points are known to lie on it; covering: per texel a triangle of the map near it
+kernel void measure_middles(const int texture_width, const int texture_height, const int triangle_count, const int is_on_mesh, global const int* restrict texel_patches,
+                            global const PatchRecord* restrict patches, global const int* restrict covering, global const int* restrict corners,
+                            global const int* restrict across, global const float* restrict vertex_x, global const float* restrict vertex_y,
+                            global const float* restrict vertex_z, global const int* restrict diagonals, global const float* restrict x,
+                            global const float* restrict y, global const float* restrict z, global int* restrict furthest) {
+  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (column >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + column;
+  const int patch = texel_patches[texel];
+  if (patch < 0) return;
+  global const PatchRecord* p = patches + patch;
+  const int row = line - p->y;
+  if (row > p->height - 2) return;
+  int at[4];
+  corners_of_quad(p, texture_width, column - p->x, row, at);
+  const int is_second = diagonals[texel], t = covering[row == 0 ? at[3] : texel];
+  if (t == NO_TRIANGLE) return;
+  Point nearest, normal;
+  float w[3];
+  float most = row == 0 || is_on_mesh ? 0.0f : walk_over_mesh(point_at(x, y, z, texel), t, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &nearest, &normal, w);
+  for (int i = 0; i < 2; ++i) {
+    const float third[3] = {1.0f / 3.0f, 1.0f / 3.0f, 1.0f / 3.0f};
+    const Point middle = weighted(third, point_at(x, y, z, at[corner_of(is_second, i, 0)]), point_at(x, y, z, at[corner_of(is_second, i, 1)]),
+                                  point_at(x, y, z, at[corner_of(is_second, i, 2)]));
+    most = fmax(most, walk_over_mesh(middle, t, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &nearest, &normal, w));
+  }
+  furthest[texel] = max(furthest[texel], as_int(sqrt(most)));
+}
+
+// NDRange (texture width, texture height). Texels around a quad with a distance above the limit, and those next to them, go
+// back to their place in the even lattice and to their point there.
+kernel void put_far_back(const int texture_width, const int texture_height, const float limit, global const int* restrict texel_patches,
+                         global const PatchRecord* restrict patches, global const int* restrict furthest, global const float* restrict even_x,
+                         global const float* restrict even_y, global const float* restrict even_z, global int* restrict anchors,
+                         global float* restrict offset_x, global float* restrict offset_y, global float* restrict x, global float* restrict y,
+                         global float* restrict z, global int* restrict back_count) {
+  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (column >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + column;
+  const int patch = texel_patches[texel];
+  if (patch < 0) return;
+  global const PatchRecord* p = patches + patch;
+  const int row = line - p->y, inner = column - p->x;
+  if (row < 1 || row > p->height - 2 || (x[texel] == even_x[texel] && y[texel] == even_y[texel] && z[texel] == even_z[texel])) return;
+  int is_far = 0;
+  for (int dy = -2; dy <= 1; ++dy)
+    for (int dx = -2; dx <= 1; ++dx)
+      if (row + dy >= 0 && row + dy <= p->height - 2) is_far |= furthest[texel_at(p, texture_width, inner + dx, row + dy)] > as_int(limit);
+  if (!is_far) return;
+  x[texel] = even_x[texel], y[texel] = even_y[texel], z[texel] = even_z[texel];
+  offset_x[texel] = 0.0f, offset_y[texel] = 0.0f;
+  anchors[texel] = 0;
+  atomic_inc(back_count);
 }

@@ -1,14 +1,36 @@
 // SPDX-License-Identifier: MIT
-// The smooth rule for a quad's diagonal. Of its diagonals the one is taken whose triangles go on more smoothly into the
-// quads around: the smaller sum over the four sides of the turn between the quad's triangle there and the better of the two
-// that the neighbour can have. A diagonal whose two triangles face apart comes last. So an edge of the surface that runs
-// through texels is an edge of the mesh as well. Sides next to a seam or a pole do not count.
+// Which diagonal a quad takes. Vertices come as a table at[row][column] of the 4 x 4 around a quad, whose own corners are
+// at[1][1] to at[2][2]. Where the lattice has no row before or after (next to a seam or a pole) the table repeats the quad's
+// own. The first diagonal goes from at[1][1] to at[2][2], the second from at[1][2] to at[2][1].
 
-// The corners of a quad, v<row><column>, and those around that share a side with it: a row before and after, the columns
-// to the left and right.
-typedef struct QuadRing {
-  int v00, v01, v10, v11, before0, before1, after0, after1, left0, left1, right0, right1;
-} QuadRing;
+// The nearer diagonal: the one with the smaller d l^2, where l is its length and d the distance, along the quad's normal, of
+// its midpoint from where a cubic through the 4 x 4 vertices has the surface. (Against the shorter diagonal: mean error -6 %,
+// maximum up to -20 %.) Beyond the first and last row the lattice goes on straight. Where rounding blurs d the shorter one is
+// taken, and of two as good the first.
+int takes_second_if_nearer(const int at[4][4], int has_before, int has_after, __global const float* restrict x, __global const float* restrict y,
+                           __global const float* restrict z) {
+  const float w_rows[4] = {has_before ? -0.0625f : 0.0f, 0.5625f - (has_before ? 0.0f : 0.125f) + (has_after ? 0.0f : 0.0625f),
+                           0.5625f - (has_after ? 0.0f : 0.125f) + (has_before ? 0.0f : 0.0625f), has_after ? -0.0625f : 0.0f};
+  const int v00 = at[1][1], v01 = at[1][2], v10 = at[2][1], v11 = at[2][2];
+  const float fx = x[v11] - x[v00], fy = y[v11] - y[v00], fz = z[v11] - z[v00];
+  const float gx = x[v10] - x[v01], gy = y[v10] - y[v01], gz = z[v10] - z[v01];
+  const float first2 = fx * fx + fy * fy + fz * fz;
+  const float second2 = gx * gx + gy * gy + gz * gz;
+  const float nx = fy * gz - fz * gy, ny = fz * gx - fx * gz, nz = fx * gy - fy * gx;
+  const float n_inverse = 1.0f / sqrt(fmax(nx * nx + ny * ny + nz * nz, 1e-37f));
+  float cx = 0.0f, cy = 0.0f, cz = 0.0f;
+  for (int i = 0; i < 4; ++i) {
+    const float w = i == 0 || i == 3 ? -0.0625f : 0.5625f;
+    const int b = at[0][i], v = at[1][i], u = at[2][i], a = at[3][i];
+    cx += w * (w_rows[0] * x[b] + w_rows[1] * x[v] + w_rows[2] * x[u] + w_rows[3] * x[a]);
+    cy += w * (w_rows[0] * y[b] + w_rows[1] * y[v] + w_rows[2] * y[u] + w_rows[3] * y[a]);
+    cz += w * (w_rows[0] * z[b] + w_rows[1] * z[v] + w_rows[2] * z[u] + w_rows[3] * z[a]);
+  }
+  const float first = fabs((0.5f * (x[v00] + x[v11]) - cx) * nx + (0.5f * (y[v00] + y[v11]) - cy) * ny + (0.5f * (z[v00] + z[v11]) - cz) * nz);
+  const float second = fabs((0.5f * (x[v01] + x[v10]) - cx) * nx + (0.5f * (y[v01] + y[v10]) - cy) * ny + (0.5f * (z[v01] + z[v10]) - cz) * nz);
+  const float blur = 3e-7f * (fabs(cx) + fabs(cy) + fabs(cz)) + 1e-4f * sqrt(first2);
+  return (second * n_inverse + blur) * second2 < (first * n_inverse + 0.9f * blur) * first2;
+}
 
 // Unit normals of triangles, as three numbers.
 typedef struct Normal {
@@ -32,37 +54,46 @@ float turn_between(Normal a, Normal b) {
 
 float least_turn(Normal own, Normal first, Normal second) { return fmin(turn_between(own, first), turn_between(own, second)); }
 
-// Whether the diagonal from (row, column + 1) to (row + 1, column) is taken; of two as good it is the other one.
-int takes_second_smoothly(QuadRing q, int has_before, int has_after, __global const float* restrict x, __global const float* restrict y,
-                          __global const float* restrict z) {
+// The smoother diagonal, for lattices whose texels sit on edges of the surface: the one whose triangles go on more smoothly
+// into the quads around, that is, the smaller sum over the four sides of the turn between the quad's triangle there and the
+// better of the two that the neighbour can have. A diagonal whose two triangles face apart comes last. So an edge that runs
+// through texels is an edge of the mesh as well. Sides next to a seam or a pole do not count. Where neither is much smoother
+// (less than CLEARLY of the other's turns), as where the lattice sits on nothing, it is the nearer one.
+#define CLEARLY 0.8f
+
+int takes_second_if_smoother(const int at[4][4], int has_before, int has_after, __global const float* restrict x, __global const float* restrict y,
+                             __global const float* restrict z) {
   const float w_before = has_before ? 1.0f : 0.0f, w_after = has_after ? 1.0f : 0.0f;
-  const Normal a = normal_of(x, y, z, q.v00, q.v01, q.v11), b = normal_of(x, y, z, q.v00, q.v11, q.v10);
-  const Normal c = normal_of(x, y, z, q.v00, q.v01, q.v10), d = normal_of(x, y, z, q.v01, q.v11, q.v10);
-  const float fx = x[q.v11] - x[q.v00], fy = y[q.v11] - y[q.v00], fz = z[q.v11] - z[q.v00];
+  const int v00 = at[1][1], v01 = at[1][2], v10 = at[2][1], v11 = at[2][2];
+  const Normal a = normal_of(x, y, z, v00, v01, v11), b = normal_of(x, y, z, v00, v11, v10);
+  const Normal c = normal_of(x, y, z, v00, v01, v10), d = normal_of(x, y, z, v01, v11, v10);
   float first = 0.0f, second = 0.0f;
   {
-    const Normal m = normal_of(x, y, z, q.before0, q.v01, q.v00), n = normal_of(x, y, z, q.before1, q.v01, q.v00);
+    const Normal m = normal_of(x, y, z, at[0][1], v01, v00), n = normal_of(x, y, z, at[0][2], v01, v00);
     first += w_before * least_turn(a, m, n);
     second += w_before * least_turn(c, m, n);
   }
   {
-    const Normal m = normal_of(x, y, z, q.v10, q.v11, q.after1), n = normal_of(x, y, z, q.v10, q.v11, q.after0);
+    const Normal m = normal_of(x, y, z, v10, v11, at[3][2]), n = normal_of(x, y, z, v10, v11, at[3][1]);
     first += w_after * least_turn(b, m, n);
     second += w_after * least_turn(d, m, n);
   }
   {
-    const Normal m = normal_of(x, y, z, q.v01, q.right1, q.v11), n = normal_of(x, y, z, q.v01, q.right0, q.v11);
+    const Normal m = normal_of(x, y, z, v01, at[2][3], v11), n = normal_of(x, y, z, v01, at[1][3], v11);
     first += least_turn(a, m, n);
     second += least_turn(d, m, n);
   }
   {
-    const Normal m = normal_of(x, y, z, q.left0, q.v00, q.v10), n = normal_of(x, y, z, q.v00, q.v10, q.left1);
+    const Normal m = normal_of(x, y, z, at[1][0], v00, v10), n = normal_of(x, y, z, v00, v10, at[2][0]);
     first += least_turn(b, m, n);
     second += least_turn(c, m, n);
   }
   first += a.x * b.x + a.y * b.y + a.z * b.z < 0.0f ? 9.0f : 0.0f;
   second += c.x * d.x + c.y * d.y + c.z * d.z < 0.0f ? 9.0f : 0.0f;
   // Rounding of the points turns normals by about this much; where it could decide, the first diagonal is taken.
-  const float blur = 1e-6f * (fabs(x[q.v00]) + fabs(y[q.v00]) + fabs(z[q.v00])) * rsqrt(fmax(fx * fx + fy * fy + fz * fz, 1e-37f));
-  return second < first - blur;
+  const float fx = x[v11] - x[v00], fy = y[v11] - y[v00], fz = z[v11] - z[v00];
+  const float blur = 1e-6f * (fabs(x[v00]) + fabs(y[v00]) + fabs(z[v00])) * rsqrt(fmax(fx * fx + fy * fy + fz * fz, 1e-37f));
+  if (second < CLEARLY * first - blur) return 1;
+  if (first < CLEARLY * second - blur) return 0;
+  return takes_second_if_nearer(at, has_before, has_after, x, y, z);
 }

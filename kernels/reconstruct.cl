@@ -78,19 +78,28 @@ __kernel void displace(const int row_count, const int texture_width, const int c
   }
 }
 
-void write_quad(__global int* restrict t, int is_second, int v00, int v01, int v10, int v11) {
-  t[0] = v00;
-  t[1] = v01;
-  t[2] = is_second ? v10 : v11;
-  t[3] = is_second ? v10 : v00;
-  t[4] = is_second ? v01 : v11;
-  t[5] = is_second ? v11 : v10;
+void write_quad(__global int* restrict t, int is_second, const int at[4][4]) {
+  t[0] = at[1][1];
+  t[1] = at[1][2];
+  t[2] = is_second ? at[2][1] : at[2][2];
+  t[3] = is_second ? at[2][1] : at[1][1];
+  t[4] = is_second ? at[1][2] : at[2][2];
+  t[5] = is_second ? at[2][2] : at[2][1];
 }
 
-// Both triangles of every quad between a row and the next. Of its diagonals the one with the smaller d l^2 is taken: l is
-// its length and d the distance, along the quad's normal, of its midpoint from where a cubic through the 4 x 4 vertices
-// around has the surface. (Against the shorter diagonal: mean error -6 %, maximum up to -20 %.) Where rounding
-// blurs d the shorter one is taken, and of two as good the one from (row, column) to (row + 1, column + 1).
+// The 4 x 4 vertices around a quad, see quad_diagonal.h. Beyond the first and last inner row they repeat the quad's own.
+void vertices_around(int vertex, int width, int column, int has_before, int has_after, int at[4][4]) {
+  const int next = column + 1 < width ? column + 1 : 0;
+  const int columns[4] = {column > 0 ? column - 1 : width - 1, column, next, next + 1 < width ? next + 1 : 0};
+  for (int i = 0; i < 4; ++i) {
+    at[0][i] = vertex + columns[i] - (has_before ? width : 0);
+    at[1][i] = vertex + columns[i];
+    at[2][i] = vertex + columns[i] + width;
+    at[3][i] = vertex + columns[i] + (has_after ? 2 : 1) * width;
+  }
+}
+
+// Both triangles of every quad between a row and the next, by the nearer diagonal.
 // in   x, y, z: the vertices of inner rows; the next row follows its row in them
 // out  triangles: six indices per quad, counter-clockwise from outside (u along, v around is clockwise)
 __kernel void triangulate_quads(const int row_count, __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
@@ -100,42 +109,16 @@ __kernel void triangulate_quads(const int row_count, __global const int* restric
   if (k >= row_count) return;
   const int width = patches[lattice_rows[4 * k]].width;
   const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2], quad = lattice_rows[4 * k + 3];
-  // Rows before, below, above, after the quad. Beyond the first and last inner row the lattice goes on straight.
   const int has_before = row > 1, has_after = row + 2 < patches[lattice_rows[4 * k]].height - 1;
-  const int before = has_before ? vertex - width : vertex, after = has_after ? vertex + 2 * width : vertex + width;
-  const float w_before = has_before ? -0.0625f : 0.0f, w_after = has_after ? -0.0625f : 0.0f;
-  const float w_below = 0.5625f - (has_before ? 0.0f : 0.125f) + (has_after ? 0.0f : 0.0625f);
-  const float w_above = 0.5625f - (has_after ? 0.0f : 0.125f) + (has_before ? 0.0f : 0.0625f);
-
   const int step = get_local_size(0);
   for (int j = get_local_id(0); j < width; j += step) {
-    const int left = j > 0 ? j - 1 : width - 1, next = j + 1 < width ? j + 1 : 0, right = next + 1 < width ? next + 1 : 0;
-    const int v00 = vertex + j, v01 = vertex + next, v10 = v00 + width, v11 = v01 + width;
-    const float fx = x[v11] - x[v00], fy = y[v11] - y[v00], fz = z[v11] - z[v00];
-    const float gx = x[v10] - x[v01], gy = y[v10] - y[v01], gz = z[v10] - z[v01];
-    const float first2 = fx * fx + fy * fy + fz * fz;
-    const float second2 = gx * gx + gy * gy + gz * gz;
-    const float nx = fy * gz - fz * gy, ny = fz * gx - fx * gz, nz = fx * gy - fy * gx;
-    const float n_inverse = 1.0f / sqrt(fmax(nx * nx + ny * ny + nz * nz, 1e-37f));
-    const int columns[4] = {left, j, next, right};
-    float cx = 0.0f, cy = 0.0f, cz = 0.0f;
-    for (int i = 0; i < 4; ++i) {
-      const float w = i == 0 || i == 3 ? -0.0625f : 0.5625f;
-      const int b = before + columns[i], v = vertex + columns[i], a = after + columns[i];
-      cx += w * (w_before * x[b] + w_below * x[v] + w_above * x[v + width] + w_after * x[a]);
-      cy += w * (w_before * y[b] + w_below * y[v] + w_above * y[v + width] + w_after * y[a]);
-      cz += w * (w_before * z[b] + w_below * z[v] + w_above * z[v + width] + w_after * z[a]);
-    }
-    const float first = fabs((0.5f * (x[v00] + x[v11]) - cx) * nx + (0.5f * (y[v00] + y[v11]) - cy) * ny + (0.5f * (z[v00] + z[v11]) - cz) * nz);
-    const float second = fabs((0.5f * (x[v01] + x[v10]) - cx) * nx + (0.5f * (y[v01] + y[v10]) - cy) * ny + (0.5f * (z[v01] + z[v10]) - cz) * nz);
-    const float blur = 3e-7f * (fabs(cx) + fabs(cy) + fabs(cz)) + 1e-4f * sqrt(first2);
-    const int is_second = (second * n_inverse + blur) * second2 < (first * n_inverse + 0.9f * blur) * first2;
-
-    write_quad(triangles + 6 * (quad + j), is_second, v00, v01, v10, v11);
+    int at[4][4];
+    vertices_around(vertex, width, j, has_before, has_after, at);
+    write_quad(triangles + 6 * (quad + j), takes_second_if_nearer(at, has_before, has_after, x, y, z), at);
   }
 }
 
-// The same by the other rule, for models whose texels sit on edges of the surface: see quad_diagonal.h.
+// The same by the smoother diagonal, for models whose texels sit on edges of the surface.
 __kernel void triangulate_smoothly(const int row_count, __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
                                    __global const float* restrict x, __global const float* restrict y, __global const float* restrict z,
                                    __global int* restrict triangles) {
@@ -144,14 +127,11 @@ __kernel void triangulate_smoothly(const int row_count, __global const int* rest
   const int width = patches[lattice_rows[4 * k]].width;
   const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2], quad = lattice_rows[4 * k + 3];
   const int has_before = row > 1, has_after = row + 2 < patches[lattice_rows[4 * k]].height - 1;
-  const int before = has_before ? vertex - width : vertex, after = has_after ? vertex + 2 * width : vertex + width;
-
   const int step = get_local_size(0);
   for (int j = get_local_id(0); j < width; j += step) {
-    const int left = j > 0 ? j - 1 : width - 1, next = j + 1 < width ? j + 1 : 0, right = next + 1 < width ? next + 1 : 0;
-    const QuadRing q = {vertex + j, vertex + next, vertex + j + width, vertex + next + width, before + j, before + next, after + j, after + next,
-                        vertex + left, vertex + left + width, vertex + right, vertex + right + width};
-    write_quad(triangles + 6 * (quad + j), takes_second_smoothly(q, has_before, has_after, x, y, z), q.v00, q.v01, q.v10, q.v11);
+    int at[4][4];
+    vertices_around(vertex, width, j, has_before, has_after, at);
+    write_quad(triangles + 6 * (quad + j), takes_second_if_smoother(at, has_before, has_after, x, y, z), at);
   }
 }
 

@@ -4,7 +4,8 @@
 //   relax_texels                 free texels follow their neighbours half way
 //   offer_edges, place_on_edges  free texels go to the nearest point of a creased edge
 //   place_snapped                positions of texels on vertices and edges
-//   find_bad_quads, put_back     what folds in the map or in space goes back to the even lattice
+//   find_bad_quads, find_bad_around, put_back
+//                                what folds in the map or in space goes back to the even lattice
 // A reading position is an offset from the texel's own place in the lattice, in cells: two planes over the texture, x
 // around, y along. Rows 0 and height-1 stay. `anchors` says what holds a texel: 0 nothing, 1 + i vertex i of the list
 // of vertices, -1 - i edge i. Vertices and edges come with their patch and their place (x, y) in its cells, x unwrapped.
@@ -20,7 +21,7 @@
 #define MARGIN 0.6f        // cells that the rows next to a seam or pole keep from it
 #define LEAST_MOVE 0.01f   // cells: shorter steps of free texels are not worth their test
 #define PLACED 5           // states of a vertex: 0 to 3 the candidate it claims, 4 none is left
-#define NO_EDGE 0x7fffffff
+#define NO_OFFER 0x7fffffff
 
 // The smallest cross product at the four corners of a quad in the map; 1 in the even lattice.
 float quad_cross(const float x[4], const float y[4]) {
@@ -153,12 +154,13 @@ float nearest_on_edge(const float ends[4], float x, float y) {
 }
 
 // NDRange (edges). Offers every free texel within reach a point of the edge. An offer is the distance divided by the
-// edge's weight: pass 0 finds the least of a texel, pass 1 the first edge that makes it.
+// edge's weight, in steps of 1 / offer_scale; the least wins, of two as good the first edge.
 // edge_ends: per edge x, y of its first and of its last point
-kernel void offer_edges(const int edge_count, const int texture_width, const int pass, global const int* restrict edge_patches,
+// out  offers: (offer << edge_bits) + edge
+kernel void offer_edges(const int edge_count, const int texture_width, const int edge_bits, const float offer_scale, global const int* restrict edge_patches,
                         global const float* restrict edge_ends, global const float* restrict edge_weights, global const PatchRecord* restrict patches,
                         global const int* restrict anchors, global const float* restrict offset_x, global const float* restrict offset_y,
-                        global int* restrict least_offers, global int* restrict best_edges) {
+                        global int* restrict offers) {
   const int e = (int)get_global_id(0);
   if (e >= edge_count) return;
   global const PatchRecord* p = patches + edge_patches[e];
@@ -183,24 +185,23 @@ kernel void offer_edges(const int edge_count, const int texture_width, const int
       const float dx = ends[0] + t * (ends[2] - ends[0]) - x, dy = ends[1] + t * (ends[3] - ends[1]) - y;
       const float distance2 = dx * dx + dy * dy;
       if (distance2 > REACH * REACH) continue;
-      // In fixed point, so that both passes see the same number.
-      const int offer = (int)rint(65536.0f * sqrt(distance2) / edge_weights[e]);
-      if (pass == 0) atomic_min(least_offers + texel, offer);
-      else if (offer == least_offers[texel]) atomic_min(best_edges + texel, e);
+      const int offer = min((int)(offer_scale * sqrt(distance2) / edge_weights[e]), (0x7fffffff >> edge_bits) - 1);
+      atomic_min(offers + texel, (offer << edge_bits) + e);
     }
   }
 }
 
 // NDRange (texture width, texture height). Free texels of a colour go to the edge that made the least offer.
 // out  parameters: where on its edge a texel is, 0 to 1
-kernel void place_on_edges(const int texture_width, const int texture_height, const int colour, global const int* restrict texel_patches,
-                           global const PatchRecord* restrict patches, global const float* restrict edge_ends, global const int* restrict best_edges,
+kernel void place_on_edges(const int texture_width, const int texture_height, const int colour, const int edge_bits,
+                           global const int* restrict texel_patches, global const PatchRecord* restrict patches, global const float* restrict edge_ends,
+                           global const int* restrict offers,
                            global int* restrict anchors, global float* restrict parameters, global float* restrict offset_x, global float* restrict offset_y) {
   const int across = (int)get_global_id(0), line = (int)get_global_id(1);
   if (across >= texture_width || line >= texture_height) return;
   const int texel = line * texture_width + across;
-  const int e = best_edges[texel];
-  if (e == NO_EDGE || anchors[texel] != 0) return;
+  if (offers[texel] == NO_OFFER || anchors[texel] != 0) return;
+  const int e = offers[texel] & ((1 << edge_bits) - 1);
   global const PatchRecord* p = patches + texel_patches[texel];
   const int column = across - p->x, row = line - p->y;
   if (colour_of(column, row, p->width) != colour) return;
@@ -260,25 +261,13 @@ int is_turned(const float a[3], const float b[3], const float c[3], const float 
   return dot < LEAST_COSINE * sqrt(lengths2);
 }
 
-// NDRange (texture width, texture height): the quad to the right of and above a texel. It is bad when it folds in the map,
-// or when for both diagonals a triangle is turned from the even lattice's quad where the even lattice's own is not. Quads
-// next to seams and poles take the points of the end rows. Only quads with a texel that is marked as changed are looked at.
-kernel void find_bad_quads(const int texture_width, const int texture_height, global const int* restrict texel_patches,
-                           global const PatchRecord* restrict patches, global const int* restrict is_changed, global const float* restrict offset_x,
-                           global const float* restrict offset_y, global const float* restrict even_x, global const float* restrict even_y,
-                           global const float* restrict even_z, global const float* restrict x, global const float* restrict y,
-                           global const float* restrict z, global int* restrict is_bad) {
-  const int across = (int)get_global_id(0), line = (int)get_global_id(1);
-  if (across >= texture_width || line >= texture_height) return;
-  const int texel = line * texture_width + across;
-  is_bad[texel] = 0;
-  const int patch = texel_patches[texel];
-  if (patch < 0) return;
-  global const PatchRecord* p = patches + patch;
-  const int column = across - p->x, row = line - p->y;
-  if (row > p->height - 2) return;
-  const int at[4] = {texel, texel_at(p, texture_width, column + 1, row), texel_at(p, texture_width, column + 1, row + 1), texel + texture_width};
-  if (!(is_changed[at[0]] | is_changed[at[1]] | is_changed[at[2]] | is_changed[at[3]])) return;
+// Whether the quad to the right of and above a texel folds in the map, or for both its diagonals a triangle is turned from
+// the even lattice's quad where the even lattice's own is not. Quads next to seams and poles take the points of the end rows.
+int is_bad_quad(global const PatchRecord* restrict p, int texture_width, int column, int row, global const float* restrict offset_x,
+                global const float* restrict offset_y, global const float* restrict even_x, global const float* restrict even_y,
+                global const float* restrict even_z, global const float* restrict x, global const float* restrict y, global const float* restrict z) {
+  const int texel = texel_at(p, texture_width, column, row), right = texel_at(p, texture_width, column + 1, row);
+  const int at[4] = {texel, right, right + texture_width, texel + texture_width};
   float map_x[4], map_y[4], even[4][3], now[4][3];
   int is_moved = 0;
   for (int i = 0; i < 4; ++i) {
@@ -288,7 +277,8 @@ kernel void find_bad_quads(const int texture_width, const int texture_height, gl
     now[i][0] = x[t], now[i][1] = y[t], now[i][2] = z[t];
     is_moved |= even[i][0] != now[i][0] || even[i][1] != now[i][1] || even[i][2] != now[i][2];
   }
-  if (!is_moved) return;
+  if (!is_moved) return 0;
+  if (quad_cross(map_x, map_y) <= 0.0f) return 1;
   // The quad's normal: the sum of those of its triangles.
   float normal[3], other[3];
   cross_product(even[0], even[1], even[2], normal);
@@ -296,33 +286,70 @@ kernel void find_bad_quads(const int texture_width, const int texture_height, gl
   for (int i = 0; i < 3; ++i) normal[i] += other[i];
   const int first = (is_turned(now[0], now[1], now[2], normal) && !is_turned(even[0], even[1], even[2], normal)) ||
                     (is_turned(now[0], now[2], now[3], normal) && !is_turned(even[0], even[2], even[3], normal));
-  const int second = (is_turned(now[0], now[1], now[3], normal) && !is_turned(even[0], even[1], even[3], normal)) ||
-                     (is_turned(now[1], now[2], now[3], normal) && !is_turned(even[1], even[2], even[3], normal));
-  is_bad[texel] = (first && second) || quad_cross(map_x, map_y) <= 0.0f;
+  if (!first) return 0;
+  return (is_turned(now[0], now[1], now[3], normal) && !is_turned(even[0], even[1], even[3], normal)) ||
+         (is_turned(now[1], now[2], now[3], normal) && !is_turned(even[1], even[2], even[3], normal));
 }
 
-// NDRange (texture width, texture height). Texels of bad quads go back to where they were: with snapping their place in the
-// even lattice, those on vertices only when `with_vertices` says so. Where they read goes back with them when `is_reading`
-// says so.
-// before_x, before_y, before_z: where they were
-kernel void put_back(const int texture_width, const int texture_height, const int with_vertices, const int is_reading, global const int* restrict texel_patches, global const PatchRecord* restrict patches,
-                     global const int* restrict is_bad, global const float* restrict before_x, global const float* restrict before_y,
-                     global const float* restrict before_z, global int* restrict anchors, global float* restrict offset_x, global float* restrict offset_y,
-                     global float* restrict x, global float* restrict y, global float* restrict z, global int* restrict is_changed,
-                     global int* restrict back_count) {
+// NDRange (texture width, texture height). The list of bad quads; their order is any.
+// out  is_bad: 1 for those of the list; counts[0]: how many they are
+kernel void find_bad_quads(const int texture_width, const int texture_height, global const int* restrict texel_patches,
+                           global const PatchRecord* restrict patches, global const float* restrict offset_x, global const float* restrict offset_y,
+                           global const float* restrict even_x, global const float* restrict even_y, global const float* restrict even_z,
+                           global const float* restrict x, global const float* restrict y, global const float* restrict z, global int* restrict is_bad,
+                           global int* restrict bad, global int* restrict counts) {
   const int across = (int)get_global_id(0), line = (int)get_global_id(1);
   if (across >= texture_width || line >= texture_height) return;
   const int texel = line * texture_width + across;
-  is_changed[texel] = 0;
   const int patch = texel_patches[texel];
   if (patch < 0) return;
   global const PatchRecord* p = patches + patch;
   const int column = across - p->x, row = line - p->y;
+  if (row > p->height - 2 || !is_bad_quad(p, texture_width, column, row, offset_x, offset_y, even_x, even_y, even_z, x, y, z)) return;
+  is_bad[texel] = 1;
+  bad[atomic_inc(counts)] = texel;
+}
+
+// NDRange (4 x changed_count). The same of the four quads at each of a list of texels.
+kernel void find_bad_around(const int changed_count, const int texture_width, global const int* restrict changed, global const int* restrict texel_patches,
+                            global const PatchRecord* restrict patches, global const float* restrict offset_x, global const float* restrict offset_y,
+                            global const float* restrict even_x, global const float* restrict even_y, global const float* restrict even_z,
+                            global const float* restrict x, global const float* restrict y, global const float* restrict z, global int* restrict is_bad,
+                            global int* restrict bad, global int* restrict counts) {
+  const int i = (int)get_global_id(0);
+  if (i >= 4 * changed_count) return;
+  const int texel = changed[i >> 2];
+  global const PatchRecord* p = patches + texel_patches[texel];
+  const int line = texel / texture_width;
+  const int from = texel - line * texture_width - p->x - (i & 1);
+  const int column = from < 0 ? from + p->width : from, row = line - p->y - ((i >> 1) & 1);
+  const int quad = texel_at(p, texture_width, column, row);
+  if (!is_bad_quad(p, texture_width, column, row, offset_x, offset_y, even_x, even_y, even_z, x, y, z)) return;
+  if (atomic_xchg(is_bad + quad, 1) == 0) bad[atomic_inc(counts)] = quad;
+}
+
+// NDRange (4 x quad_count). The texels of bad quads go back to where they were: with snapping their place in the even
+// lattice, those on vertices only when `with_vertices` says so. Where they read goes back with them when `is_reading` says
+// so. What a texel does here does not depend on others, so that their order is any.
+// before_x, before_y, before_z: where they were; is_back: 1 for texels that have gone back
+// out  changed: the list of texels that have gone back now; counts[1]: how many they are; is_bad: 0 again
+kernel void put_back(const int quad_count, const int texture_width, const int with_vertices, const int is_reading, global const int* restrict bad,
+                     global const int* restrict texel_patches, global const PatchRecord* restrict patches, global const float* restrict before_x,
+                     global const float* restrict before_y, global const float* restrict before_z, global int* restrict is_bad,
+                     global int* restrict is_back, global int* restrict anchors, global float* restrict offset_x, global float* restrict offset_y,
+                     global float* restrict x, global float* restrict y, global float* restrict z, global int* restrict changed,
+                     global int* restrict counts) {
+  const int i = (int)get_global_id(0);
+  if (i >= 4 * quad_count) return;
+  const int quad = bad[i >> 2];
+  is_bad[quad] = 0;
+  global const PatchRecord* p = patches + texel_patches[quad];
+  const int line = quad / texture_width, row = line - p->y + ((i >> 1) & 1);
   if (row < 1 || row > p->height - 2) return;
-  const int left = texel_at(p, texture_width, column - 1, row);
-  if (!is_bad[texel] && !is_bad[left] && !is_bad[texel - texture_width] && !is_bad[left - texture_width]) return;
+  const int texel = texel_at(p, texture_width, quad - line * texture_width - p->x + (i & 1), row);
   if (anchors[texel] > 0 && !with_vertices) return;
   if (x[texel] == before_x[texel] && y[texel] == before_y[texel] && z[texel] == before_z[texel]) return;
+  if (atomic_xchg(is_back + texel, 1) != 0) return;
   x[texel] = before_x[texel];
   y[texel] = before_y[texel];
   z[texel] = before_z[texel];
@@ -331,6 +358,5 @@ kernel void put_back(const int texture_width, const int texture_height, const in
     offset_y[texel] = 0.0f;
     anchors[texel] = 0;
   }
-  is_changed[texel] = 1;
-  atomic_inc(back_count);
+  changed[atomic_inc(counts + 1)] = texel;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <span>
 #include <vector>
 
 #include "skeletex/encode/snap.h"
@@ -7,11 +8,11 @@
 namespace skeletex {
 
 struct FitOptions {
-  int steps = 5;            ///< of Gauss-Newton, at most
-  int sweeps = 8;           ///< of the solver, per step
-  float damping = 0.002f;   ///< of a step, share of a texel's mean diagonal entry
-  float springs = 0.004f;   ///< between the steps of neighbouring texels, the same share
-  float floor = 0.3f;       ///< least |residual| that counts in the weights, share of the mean one
+  int steps = 4;            ///< of Gauss-Newton, at most
+  int sweeps = 4;           ///< of the solver, per step
+  float damping = 0.0005f;  ///< of a step, share of a texel's mean diagonal entry
+  float springs = 0.001f;   ///< between the steps of neighbouring texels, the same share
+  float floor = 1;          ///< added to |residual| in the weights, share of the mean one
 };
 
 /// What the fit did.
@@ -28,5 +29,12 @@ struct FitReport {
 /// \param even      the even lattice's points, the guard's measure
 FitReport fit_points(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps, const ClBuffer<int>& covering, const TexelPoints& even,
                      ReadingPositions& positions, TexelPoints& points, const FitOptions& options = {});
+
+/// Texels go back to the even lattice where a vertex of the mesh is further from the lattice, or the middle of one of its
+/// triangles from the mesh, than (nearly) the furthest of the even lattice: so the maximum does not rise.
+/// \param filtered  the even lattice's points as they would be stored
+/// \return how many went back
+int put_back_far(ClContext& context, std::span<const Patch> patches, const DeviceLayout& layout, const DeviceMaps& maps, const ClBuffer<int>& covering, const SnapFeatures& features,
+                 const TexelPoints& even, const TexelPoints& filtered, bool is_fitted, ReadingPositions& positions, TexelPoints& points);
 
 }  // namespace skeletex

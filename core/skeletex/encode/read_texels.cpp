@@ -107,6 +107,17 @@ void place_end_rows(ClContext& context, const TexelSources& sources, int texture
                  context.upload(values[1]), context.upload(values[2]), points.x, points.y, points.z);
 }
 
+/// Per texel whether it lies in a VSM patch.
+std::vector<int> vsm_texels(std::span<const Patch> patches, int texture_width, int texture_height) {
+  std::vector<int> is_vsm(static_cast<std::size_t>(texture_width) * texture_height, 0);
+  for (const Patch& patch : patches) {
+    const Rectangle& r = patch.rectangle;
+    for (int row = 0; row < r.height; ++row)
+      std::fill_n(is_vsm.begin() + (r.y + row) * static_cast<std::size_t>(texture_width) + r.x, r.width, static_cast<int>(patch.method == Method::kVsm));
+  }
+  return is_vsm;
+}
+
 SnapReport report_snap(ClContext& context, const SnapFeatures& features, int put_back, const ReadingPositions& positions) {
   SnapReport report;
   report.vertices = static_cast<int>(features.vertices.size());
@@ -185,16 +196,19 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   place_end_rows(context, sources, texture_width, origin, points);
 
   const TexelPoints even = points;
-  if (options.has_snap && maps.triangle_count > 0) {
-    const SnapFeatures features = find_features(sources.charts, sources.patches, options.snap_dihedral);
+  const bool is_snapped = options.has_snap && maps.triangle_count > 0, is_fitted = options.has_fit && maps.triangle_count > 0;
+  const SnapFeatures features =
+      is_snapped || is_fitted ? find_features(sources.charts, sources.patches, options.snap_dihedral) : SnapFeatures{};
+  if (is_snapped || is_fitted) points = copy_points(context, even);
+  int put_back = 0;
+  if (is_snapped) {
     snap_positions(context, layout, features, positions);
-    points = copy_points(context, even);
     context.launch({"encode.cl", "walk_to_positions"}, layout.range(), texture_width, texture_height, maps.triangle_count, layout.texel_patches, maps.corners,
                    maps.turns, maps.poles, maps.across, maps.u_high, maps.u_low, maps.v_high, maps.v_low, layout.patches, maps.row_high, maps.row_low,
                    positions.x, positions.y, positions.anchors, covering);
     read();
     place_snapped(context, layout, maps, features, positions, points);
-    result.report.snap = report_snap(context, features, put_back_folds(context, layout, even, positions, points), positions);
+    put_back += put_back_folds(context, layout, even, positions, points);
   }
   if (maps.triangle_count > 0) {
     const std::vector<int> marks = context.download(is_read);
@@ -204,14 +218,26 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     }
   }
 
-  if (options.has_fit && maps.triangle_count > 0) {
-    result.report.fit = fit_points(context, layout, maps, covering, even, positions, points);
-  } else if (options.has_prefilter) {
+  const auto prefilter = [&](const TexelPoints& from, const ClBuffer<int>& held) {
     TexelPoints filtered = allocate_points(context, texels);
-    context.launch({"encode.cl", "prefilter_positions"}, layout.range(), texture_width, texture_height, layout.texel_patches, layout.patches,
-                   positions.anchors, points.x, points.y, points.z, filtered.x, filtered.y, filtered.z);
-    points = filtered;
+    context.launch({"encode.cl", "prefilter_positions"}, layout.range(), texture_width, texture_height, layout.texel_patches, layout.patches, held, from.x,
+                   from.y, from.z, filtered.x, filtered.y, filtered.z);
+    return filtered;
+  };
+  if (is_fitted) result.report.fit = fit_points(context, layout, maps, covering, even, positions, points);
+  if (options.has_prefilter && !(is_fitted && !has_spd)) {
+    // What is fitted is not filtered as well: with SPD patches beside it, only these are.
+    points = prefilter(points, is_fitted ? context.upload(vsm_texels(sources.patches, texture_width, texture_height)) : positions.anchors);
   }
+  if (is_snapped || is_fitted) {
+    auto nothing = context.allocate<int>(texels);
+    context.fill(nothing, 0);
+    const TexelPoints filtered = options.has_prefilter ? prefilter(even, nothing) : even;
+    const int far = put_back_far(context, sources.patches, layout, maps, covering, features, even, filtered, is_fitted, positions, points);
+    if (is_fitted) result.report.fit->texels_put_back += far;
+    else put_back += far;
+  }
+  if (is_snapped) result.report.snap = report_snap(context, features, put_back, positions);
   auto along = context.allocate<float>(texels), around = context.allocate<float>(texels), out = context.allocate<float>(texels);
   context.launch({"encode.cl", "encode_texels"}, layout.range(), texture_width, texture_height, layout.texel_patches, layout.patches, rows, columns, points.x,
                  points.y, points.z, along, around, out);

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -18,7 +19,8 @@ constexpr int kEdgeRounds = 2;          // what one round has moved lets texels 
 constexpr double kFlat = 1e-6;          // radians: what rounding may make of a flat edge
 constexpr double kFullDihedral = 0.5;   // radians: edges this sharp attract texels fully
 constexpr int kRoundsBetweenReads = 3;  // of claims, between two looks at how many wait
-constexpr int kNoEdge = std::numeric_limits<int>::max();  // as in snap.cl
+constexpr double kLargestOffer = 8;     // cells: what lies further is rounded down to it
+constexpr int kNoOffer = std::numeric_limits<int>::max();  // as in snap.cl
 
 /// One work-item per vertex or edge, in groups of one size: PoCL compiles a kernel for every size that it meets.
 ClRange over(int count) { return {{static_cast<std::size_t>(count), 1}, {64, 1}}; }
@@ -137,14 +139,15 @@ void snap_to_edges(ClContext& context, const DeviceLayout& layout, const std::ve
   const int count = static_cast<int>(edges.size());
   const auto patch = context.upload(edge_patches);
   const auto device_ends = context.upload(ends), weight = context.upload(weights);
-  auto least = context.allocate<int>(layout.size()), best = context.allocate<int>(layout.size());
-  context.fill(least, kNoEdge), context.fill(best, kNoEdge);
-  for (int pass = 0; pass < 2; ++pass)
-    context.launch({"snap.cl", "offer_edges"}, over(count), count, layout.width, pass, patch, device_ends, weight, layout.patches, positions.anchors,
-                   positions.x, positions.y, least, best);
+  const int bits = std::bit_width(static_cast<unsigned>(count));
+  const auto scale = static_cast<float>((0x7fffffff >> bits) / kLargestOffer);
+  auto offers = context.allocate<int>(layout.size());
+  context.fill(offers, kNoOffer);
+  context.launch({"snap.cl", "offer_edges"}, over(count), count, layout.width, bits, scale, patch, device_ends, weight, layout.patches, positions.anchors,
+                 positions.x, positions.y, offers);
   for (int colour = 0; colour < kColours; ++colour)
-    context.launch({"snap.cl", "place_on_edges"}, layout.range(), layout.width, layout.height, colour, layout.texel_patches, layout.patches, device_ends,
-                   best, positions.anchors, positions.parameters, positions.x, positions.y);
+    context.launch({"snap.cl", "place_on_edges"}, layout.range(), layout.width, layout.height, colour, bits, layout.texel_patches, layout.patches, device_ends,
+                   offers, positions.anchors, positions.parameters, positions.x, positions.y);
 }
 
 }  // namespace
@@ -167,40 +170,40 @@ void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceM
                  context.upload(vertex_points), context.upload(edge_points), maps.x, maps.y, maps.z, points.x, points.y, points.z);
 }
 
-namespace {
+int put_back_folds(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, ReadingPositions& positions, TexelPoints& points) {
+  return put_back_folds(context, layout, even, even, true, positions, points);
+}
 
-int put_back(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before, bool is_reading, ReadingPositions& positions,
-             TexelPoints& points) {
-  auto is_bad = context.allocate<int>(layout.size()), is_changed = context.allocate<int>(layout.size());
-  auto back = context.allocate<int>(1);
-  context.fill(back, 0);
+int put_back_folds(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before, bool is_reading,
+                   ReadingPositions& positions, TexelPoints& points) {
+  const std::size_t size = layout.size();
+  auto is_bad = context.allocate<int>(size), is_back = context.allocate<int>(size);
+  auto bad = context.allocate<int>(size), changed = context.allocate<int>(size);
+  auto counts = context.allocate<int>(2);  // of the two lists
+  context.fill(is_bad, 0), context.fill(is_back, 0);
   int total = 0;
   // First what hangs between vertices, then vertices as well. Texels only ever go back, so this ends.
   for (const int with_vertices : {0, 1}) {
     if (!is_reading && with_vertices == 0) continue;
-    context.fill(is_changed, 1);
-    for (int known = -1; known != total;) {
-      known = total;
-      context.launch({"snap.cl", "find_bad_quads"}, layout.range(), layout.width, layout.height, layout.texel_patches, layout.patches, is_changed,
-                     positions.x, positions.y, even.x, even.y, even.z, points.x, points.y, points.z, is_bad);
-      context.launch({"snap.cl", "put_back"}, layout.range(), layout.width, layout.height, with_vertices, static_cast<int>(is_reading), layout.texel_patches,
-                     layout.patches, is_bad, before.x, before.y, before.z, positions.anchors, positions.x, positions.y, points.x, points.y, points.z,
-                     is_changed, back);
-      total = context.download(back)[0];
+    // All quads, and then those at texels that have just gone back.
+    for (int waiting = -1; waiting != 0;) {
+      context.fill(counts, 0);
+      if (waiting < 0)
+        context.launch({"snap.cl", "find_bad_quads"}, layout.range(), layout.width, layout.height, layout.texel_patches, layout.patches, positions.x,
+                       positions.y, even.x, even.y, even.z, points.x, points.y, points.z, is_bad, bad, counts);
+      else
+        context.launch({"snap.cl", "find_bad_around"}, over(4 * waiting), waiting, layout.width, changed, layout.texel_patches, layout.patches, positions.x,
+                       positions.y, even.x, even.y, even.z, points.x, points.y, points.z, is_bad, bad, counts);
+      const int quads = context.download(counts)[0];
+      if (quads == 0) break;
+      context.launch({"snap.cl", "put_back"}, over(4 * quads), quads, layout.width, with_vertices, static_cast<int>(is_reading), bad, layout.texel_patches,
+                     layout.patches, before.x, before.y, before.z, is_bad, is_back, positions.anchors, positions.x, positions.y, points.x, points.y, points.z,
+                     changed, counts);
+      waiting = context.download(counts)[1];
+      total += waiting;
     }
   }
   return total;
-}
-
-}  // namespace
-
-int put_back_folds(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, ReadingPositions& positions, TexelPoints& points) {
-  return put_back(context, layout, even, even, true, positions, points);
-}
-
-int put_back_folds(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before, ReadingPositions& positions,
-                   TexelPoints& points) {
-  return put_back(context, layout, even, before, false, positions, points);
 }
 
 }  // namespace skeletex

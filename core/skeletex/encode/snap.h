@@ -55,8 +55,9 @@ void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceM
 /// Texels of quads that fold in the map, or in space where the even lattice does not, go back to it, until none does.
 /// \return how many went back
 int put_back_folds(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, ReadingPositions& positions, TexelPoints& points);
-/// The same for points that have left the surface: texels go back to where they were `before`, and go on reading where they read.
-int put_back_folds(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before, ReadingPositions& positions,
-                   TexelPoints& points);
+/// The same for any points: texels go back to where they were `before`, and where they read with them when `is_reading`
+/// says so.
+int put_back_folds(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before, bool is_reading,
+                   ReadingPositions& positions, TexelPoints& points);
 
 }  // namespace skeletex
