@@ -77,8 +77,7 @@ EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command
   if (arguments.has_no_prefilter) options.has_prefilter = false;
   options.has_snap = arguments.is_snapped;
   options.has_fit = arguments.is_fitted;
-  const bool is_smooth = is_given("--diagonals") ? arguments.diagonals == "smooth" : options.has_snap || options.has_fit;
-  options.diagonals = is_smooth ? DiagonalRule::kSmooth : DiagonalRule::kNearest;
+  if (is_given("--diagonals")) options.diagonals = arguments.diagonals == "smooth" ? DiagonalRule::kSmooth : DiagonalRule::kNearest;
   options.spd_hit = arguments.spd_hit == "first" ? SpdHit::kFirst : SpdHit::kLast;
   if (is_given("--share")) options.texel_share = arguments.share == "area" ? TexelShare::kArea : TexelShare::kTriangles;
   return options;
@@ -137,6 +136,7 @@ Json report_json(const EncodeReport& report, const EncodeOptions& options, doubl
     for (const double residual : report.fit->residuals) residuals.push_back(residual / report.diagonal);
     json["fit"] = {{"residuals", std::move(residuals)}, {"texels_put_back", report.fit->texels_put_back}};
   }
+  if (report.snap || report.fit) json["turned_triangles"] = {{"lattice", report.turned_triangles}, {"even", report.even_turned_triangles}};
   return json;
 }
 
@@ -160,6 +160,8 @@ std::string report_text(const EncodeReport& report, const EncodeOptions& options
       fit += fmt::format("{} {:.3e}", i == 0 ? "" : " ->", report.fit->residuals[i] / report.diagonal);
     fit += fmt::format("; {} texels put back\n", report.fit->texels_put_back);
   }
+  if (report.snap || report.fit)
+    fit += fmt::format("{} triangles look against the mesh, {} of the even lattice\n", report.turned_triangles, report.even_turned_triangles);
   std::error_code ignored;
   return fmt::format(
       "{}\n{} vertices, {} triangles, genus {}; {} x {} texels, {:.1f} % used, on {}\n"

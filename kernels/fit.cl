@@ -8,8 +8,7 @@
 //   relax_moves       one sweep of the solver over the texels of a colour
 //   move_points       points a step nearer
 //   measure_vertices, measure_middles, put_far_back
-//                     texels go back where mesh and lattice are too far apart
-//   count_turned      triangles of the lattice that look against the mesh
+//                     texels go back where mesh and lattice are too far apart; triangles that look against the mesh
 // The quad of a texel lies to the right of it and above it; its corners are numbered 0 (the texel), 1 (right), 2 (right
 // above), 3 (above). Its triangles are 0 1 2 and 0 2 3 with the first diagonal, 0 1 3 and 1 2 3 with the second.
 // A residual is a distance along a normal, linear in the three corners of one triangle: r + n . sum of weight x move. So a
@@ -27,7 +26,8 @@
 #define LATTICE_PLANES 5    // of a triangle's middle: weight (area), residual, normal x, y, z
 #define SYSTEM_STRIDE 36    // floats of a texel's row: 6 own block (xx, xy, xz, yy, yz, zz), 3 right-hand side, 4 x 6 blocks with the texels ahead
 #define LARGEST_STEP 0.25f  // cells
-#define LARGEST_MOVE 1.0f   // cells, of all steps together
+#define LARGEST_MOVE 1.0f   // cells, of all steps together, off the lattice
+#define LARGEST_SLIDE 0.5f  // distances to the nearer neighbours, of all steps together, along the lattice
 
 typedef struct Point {
   float x, y, z;
@@ -557,40 +557,22 @@ kernel void move_points(const int texture_width, const int texture_height, globa
   const float cell = sqrt(area);
   const float kept = fmin(1.0f, LARGEST_STEP * cell / sqrt(step2));
   const Point start = point_at(start_x, start_y, start_z, texel);
-  Point total = {from.x - start.x + kept * move.x, from.y - start.y + kept * move.y, from.z - start.z + kept * move.z};
-  const float length = sqrt(product(total, total));
-  const float limit = length > LARGEST_MOVE * cell ? LARGEST_MOVE * cell / length : 1.0f;
-  out_x[texel] = start.x + limit * total.x;
-  out_y[texel] = start.y + limit * total.y;
-  out_z[texel] = start.z + limit * total.z;
-}
-
-// NDRange (texture width, texture height). How many of a quad's triangles look against the mesh at the sample read nearest
-// to their middle.
-kernel void count_turned(const int texture_width, const int texture_height, global const int* restrict texel_patches,
-                         global const PatchRecord* restrict patches, global const float* restrict samples, global const int* restrict diagonals,
-                         global const float* restrict x, global const float* restrict y, global const float* restrict z, global int* restrict counts) {
-  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
-  if (column >= texture_width || line >= texture_height) return;
-  const int texel = line * texture_width + column, size = texture_width * texture_height;
-  counts[texel] = 0;
-  const int patch = texel_patches[texel];
-  if (patch < 0) return;
-  global const PatchRecord* p = patches + patch;
-  const int row = line - p->y;
-  if (row > p->height - 2) return;
-  int at[4], count = 0;
-  corners_of_quad(p, texture_width, column - p->x, row, at);
-  const int is_second = diagonals[texel];
-  for (int t = 0; t < 2; ++t) {
-    const int plane = SAMPLE_PLANES * (is_second ? (t == 0 ? 0 : 3) : (t == 0 ? 1 : 2)) * size + texel;
-    const Point n = {samples[plane + 3 * size], samples[plane + 4 * size], samples[plane + 5 * size]};
-    const Point a = point_at(x, y, z, at[corner_of(is_second, t, 0)]), b = point_at(x, y, z, at[corner_of(is_second, t, 1)]),
-                c = point_at(x, y, z, at[corner_of(is_second, t, 2)]);
-    // Around a bone and along it is clockwise from outside: a quad's own order is counter-clockwise.
-    count += product(n, cross_of(minus(b, a), minus(c, a))) < 0.0f;
-  }
-  counts[texel] = count;
+  const Point total = {from.x - start.x + kept * move.x, from.y - start.y + kept * move.y, from.z - start.z + kept * move.z};
+  // Off the lattice a cell at most, along it less than what would bring neighbours together.
+  const int left = texel_at(p, texture_width, inner - 1, row), right = texel_at(p, texture_width, inner + 1, row);
+  const Point around = minus(point_at(start_x, start_y, start_z, right), point_at(start_x, start_y, start_z, left));
+  const Point along = minus(point_at(start_x, start_y, start_z, texel + texture_width), point_at(start_x, start_y, start_z, texel - texture_width));
+  const Point normal = cross_of(along, around);
+  const float normal2 = product(normal, normal);
+  const float off = normal2 > 0.0f ? product(total, normal) / normal2 : 0.0f;
+  const Point slide = {total.x - off * normal.x, total.y - off * normal.y, total.z - off * normal.z};
+  const float slid = sqrt(product(slide, slide)), most = 0.5f * LARGEST_SLIDE * sqrt(fmin(product(around, around), product(along, along)));
+  const float share = slid > most ? most / slid : 1.0f;
+  const float height = fabs(off) * sqrt(normal2);
+  const float rise = height > LARGEST_MOVE * cell ? off * LARGEST_MOVE * cell / height : off;
+  out_x[texel] = start.x + rise * normal.x + share * slide.x;
+  out_y[texel] = start.y + rise * normal.y + share * slide.y;
+  out_z[texel] = start.z + rise * normal.z + share * slide.z;
 }
 
 // NDRange (vertices). The distance from vertices of the mesh to the lattice: to the nearest of 3 x 3 quads around the cell
@@ -624,11 +606,12 @@ kernel void measure_vertices(const int vertex_count, const int texture_width, gl
 // NDRange (texture width, texture height). The same from the points of the lattice and the middles of its
 // triangles to the mesh.
 // is_on_mesh: whether the lattice's points are known to lie on it; covering: per texel a triangle of the map near it
+// out  turned_count: how many triangles look against the mesh
 kernel void measure_middles(const int texture_width, const int texture_height, const int triangle_count, const int is_on_mesh, global const int* restrict texel_patches,
                             global const PatchRecord* restrict patches, global const int* restrict covering, global const int* restrict corners,
                             global const int* restrict across, global const float* restrict vertex_x, global const float* restrict vertex_y,
                             global const float* restrict vertex_z, global const int* restrict diagonals, global const float* restrict x,
-                            global const float* restrict y, global const float* restrict z, global int* restrict furthest) {
+                            global const float* restrict y, global const float* restrict z, global int* restrict furthest, global int* restrict turned_count) {
   const int column = (int)get_global_id(0), line = (int)get_global_id(1);
   if (column >= texture_width || line >= texture_height) return;
   const int texel = line * texture_width + column;
@@ -646,9 +629,10 @@ kernel void measure_middles(const int texture_width, const int texture_height, c
   float most = row == 0 || is_on_mesh ? 0.0f : walk_over_mesh(point_at(x, y, z, texel), t, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &nearest, &normal, w);
   for (int i = 0; i < 2; ++i) {
     const float third[3] = {1.0f / 3.0f, 1.0f / 3.0f, 1.0f / 3.0f};
-    const Point middle = weighted(third, point_at(x, y, z, at[corner_of(is_second, i, 0)]), point_at(x, y, z, at[corner_of(is_second, i, 1)]),
-                                  point_at(x, y, z, at[corner_of(is_second, i, 2)]));
-    most = fmax(most, walk_over_mesh(middle, t, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &nearest, &normal, w));
+    const Point a = point_at(x, y, z, at[corner_of(is_second, i, 0)]), b = point_at(x, y, z, at[corner_of(is_second, i, 1)]),
+                c = point_at(x, y, z, at[corner_of(is_second, i, 2)]);
+    most = fmax(most, walk_over_mesh(weighted(third, a, b, c), t, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &nearest, &normal, w));
+    if (product(normal, cross_of(minus(b, a), minus(c, a))) < 0.0f) atomic_inc(turned_count);
   }
   furthest[texel] = max(furthest[texel], as_int(sqrt(most)));
 }

@@ -450,7 +450,15 @@ TEST_F(Program, SnapsTexelsAndSaysHowMany) {
   EXPECT_GT(snapped["snap"]["snapped_vertices"], 0);
   EXPECT_LE(snapped["snap"]["snapped_vertices"], snapped["snap"]["vertices"]);
   EXPECT_TRUE(json_of({"inspect", "a.skx.exr"})["encoder"]["snap"]);
-  EXPECT_FALSE(json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64"}).contains("snap"));
+  const nlohmann::json fitted = json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64", "--fit"});
+  EXPECT_GE(fitted["fit"]["residuals"].size(), 2u);
+  EXPECT_LE(fitted["turned_triangles"]["lattice"], 64 * 64);
+  const nlohmann::json header = json_of({"inspect", "a.skx.exr"});
+  EXPECT_EQ(header["diagonals"], "smooth");
+  EXPECT_EQ(header["encoder"]["fitted"]["residuals"], fitted["fit"]["residuals"]);
+  const nlohmann::json plain = json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64"});
+  EXPECT_FALSE(plain.contains("snap") || plain.contains("fit"));
+  EXPECT_FALSE(json_of({"inspect", "a.skx.exr"}).contains("diagonals"));
   EXPECT_EQ(json_of({"inspect", "y.ply", "--self-intersections"})["self_intersections"], 0);
   expect_refused(1, {"inspect", "y.skx.exr", "--self-intersections"}, {"for meshes"});
   fs::remove(folder_ / "a.skx.exr");

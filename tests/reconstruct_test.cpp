@@ -339,26 +339,30 @@ TEST(ReconstructKernels, QuadsAgreeWithTheirTwinOnRandomPoints) {
   for (auto* plane : {&model.texture.along, &model.texture.around, &model.texture.out})
     for (float& value : *plane) value += normal(random);
   const Lattice lattice = number_lattice(model);
-  const TriangleMesh mesh = reconstruct_mesh(device(), model);
-  int quad = 0, unclear = 0;
-  for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
-    const auto [x, y, width, height] = model.patches[bone].rectangle;
-    ASSERT_EQ(lattice.first_quad[bone], quad);
-    for (int r = 1; r + 2 < height; ++r)
-      for (int j = 0; j < width; ++j, ++quad) {
-        const auto number = [&](int row, int column) { return lattice.first_inner[bone] + (row - 1) * width + (column + width) % width; };
-        const auto point = [&](int row, int column) { return Vec3(mesh.positions[number(row, column)] - model.origin); };
-        bool is_clear = false;
-        const bool is_second = twin::takes_second_diagonal(point, r, j, height, is_clear);
-        unclear += !is_clear;
-        if (!is_clear) continue;
-        const int v00 = number(r, j), v01 = number(r, j + 1), v10 = number(r + 1, j), v11 = number(r + 1, j + 1);
-        ASSERT_EQ(mesh.triangles[2 * quad], (is_second ? Triangle{v00, v01, v10} : Triangle{v00, v01, v11}));
-        ASSERT_EQ(mesh.triangles[2 * quad + 1], (is_second ? Triangle{v10, v01, v11} : Triangle{v00, v11, v10}));
-      }
+  for (const DiagonalRule rule : {DiagonalRule::kNearest, DiagonalRule::kSmooth}) {
+    model.diagonals = rule;
+    const TriangleMesh mesh = reconstruct_mesh(device(), model);
+    int quad = 0, unclear = 0;
+    for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
+      const auto [x, y, width, height] = model.patches[bone].rectangle;
+      ASSERT_EQ(lattice.first_quad[bone], quad);
+      for (int r = 1; r + 2 < height; ++r)
+        for (int j = 0; j < width; ++j, ++quad) {
+          const auto number = [&](int row, int column) { return lattice.first_inner[bone] + (row - 1) * width + (column + width) % width; };
+          const auto point = [&](int row, int column) { return Vec3(mesh.positions[number(row, column)] - model.origin); };
+          bool is_clear = false;
+          const bool is_second = rule == DiagonalRule::kSmooth ? twin::takes_smoother_diagonal(point, r, j, height, is_clear)
+                                                               : twin::takes_second_diagonal(point, r, j, height, is_clear);
+          unclear += !is_clear;
+          if (!is_clear) continue;
+          const int v00 = number(r, j), v01 = number(r, j + 1), v10 = number(r + 1, j), v11 = number(r + 1, j + 1);
+          ASSERT_EQ(mesh.triangles[2 * quad], (is_second ? Triangle{v00, v01, v10} : Triangle{v00, v01, v11}));
+          ASSERT_EQ(mesh.triangles[2 * quad + 1], (is_second ? Triangle{v10, v01, v11} : Triangle{v00, v11, v10}));
+        }
+    }
+    EXPECT_EQ(quad, lattice.quad_count);
+    EXPECT_LT(unclear, quad / 50);
   }
-  EXPECT_EQ(quad, lattice.quad_count);
-  EXPECT_LT(unclear, quad / 50);
 }
 
 TEST(ReconstructKernels, QuadsOfASquareLatticeAllTakeTheSameDiagonal) {

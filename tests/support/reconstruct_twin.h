@@ -52,6 +52,37 @@ bool takes_second_diagonal(const Vertices& vertex, int row, int column, int heig
   return second < first;
 }
 
+/// Kernel triangulate_smoothly, likewise.
+template <class Vertices>
+bool takes_smoother_diagonal(const Vertices& vertex, int row, int column, int height, bool& is_clear) {
+  // A quad's two triangles by its diagonal: each holds two of the sides 0 (below), 1 (right), 2 (above), 3 (left).
+  const auto normal_at = [&](int r, int j, int diagonal, int side) {
+    const Vec3 q[4] = {vertex(r, j), vertex(r, j + 1), vertex(r + 1, j + 1), vertex(r + 1, j)};
+    const int begin = side, end = (side + 1) % 4;
+    // The apex: of the other two corners the one on the diagonal.
+    const int apex = (end + 1) % 4 % 2 == diagonal ? (end + 1) % 4 : (end + 2) % 4;
+    return Vec3((q[end] - q[begin]).cross(q[apex] - q[begin]).normalized());
+  };
+  const int neighbours[4][2] = {{row - 1, column}, {row, column + 1}, {row + 1, column}, {row, column - 1}};
+  double costs[2];
+  for (const int diagonal : {0, 1}) {
+    costs[diagonal] = normal_at(row, column, diagonal, 0).dot(normal_at(row, column, diagonal, 2)) < 0 ? 9 : 0;
+    for (int side = 0; side < 4; ++side) {
+      const auto [r, j] = neighbours[side];
+      if (r < 1 || r > height - 3) continue;
+      const Vec3 own = normal_at(row, column, diagonal, side);
+      const Vec3 first = normal_at(r, j, 0, (side + 2) % 4), second = normal_at(r, j, 1, (side + 2) % 4);
+      costs[diagonal] += std::min((own - first).norm(), (own - second).norm());
+    }
+  }
+  const double blur = 1e-6 * vertex(row, column).template lpNorm<1>() / (vertex(row + 1, column + 1) - vertex(row, column)).norm();
+  const double margin = 10 * blur + 1e-5;
+  const bool is_nearer = takes_second_diagonal(vertex, row, column, height, is_clear);
+  const bool is_second = costs[1] < 0.8 * costs[0], is_first = costs[0] < 0.8 * costs[1];
+  is_clear = std::abs(costs[1] - 0.8 * costs[0]) > margin && std::abs(costs[0] - 0.8 * costs[1]) > margin && (is_second || is_first || is_clear);
+  return is_second || (!is_first && is_nearer);
+}
+
 /// Kernels filter_rows and filter_columns, one new sample of one plane: `stride` between old samples.
 inline double filter(const std::array<int, 4>& tap, const std::vector<float>& weights, const std::vector<float>& in, int first, int stride, int count) {
   double sum = 0;

@@ -102,6 +102,21 @@ nlohmann::json settings_json(const EncodeOptions& options, const TexelOptions& t
   return json;
 }
 
+/// What snapping and fit did, for the record.
+void add_results(const TexelReport& report, double diagonal, nlohmann::json& json) {
+  const auto share = [](int part, int whole) { return whole > 0 ? static_cast<double>(part) / whole : 1.0; };
+  if (report.snap)
+    json["snapped"] = {{"vertices", share(report.snap->snapped_vertices, report.snap->vertices)},
+                       {"edges", share(report.snap->snapped_edges, report.snap->edges)},
+                       {"texels_put_back", report.snap->texels_put_back}};
+  if (report.fit) {
+    nlohmann::json residuals = nlohmann::json::array();
+    for (const double residual : report.fit->residuals) residuals.push_back(residual / diagonal);
+    json["fitted"] = {{"residuals", std::move(residuals)}, {"texels_put_back", report.fit->texels_put_back}};
+  }
+  if (report.snap || report.fit) json["turned_triangles"] = {{"lattice", report.turned_triangles}, {"even", report.even_turned_triangles}};
+}
+
 /// Vertices where the pole of a chart's free end lies.
 int pole_of(const Chart& chart, ChartVertex kind) {
   return static_cast<int>(std::find(chart.kinds.begin(), chart.kinds.end(), kind) - chart.kinds.begin());
@@ -187,7 +202,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
     model.patches.push_back(std::move(patch));
   }
   const TexelOptions texel_options{.has_prefilter = options.has_prefilter, .has_snap = options.has_snap, .has_fit = options.has_fit};
-  model.diagonals = options.diagonals;
+  model.diagonals = options.diagonals.value_or(options.has_snap || options.has_fit ? DiagonalRule::kSmooth : DiagonalRule::kNearest);
   Seams seams = sample_seams(segmentation, skeleton, walls, layout.rectangles, texel_options.has_snap ? SeamSampling::kSnapped : SeamSampling::kEven);
   model.arcs = std::move(seams.arcs);
   model.corners = std::move(seams.corners);
@@ -219,7 +234,11 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   TexelResult texels = read_texels(context, skeleton, walls, {charts, model.patches, hits, end_points}, options.width, options.height, model.origin,
                                    texel_options);
   model.texture = std::move(texels.texture);
-  model.encoder_settings = settings_json(options, texel_options, unseen).dump();
+  {
+    nlohmann::json settings = settings_json(options, texel_options, unseen);
+    add_results(texels.report, model.diagonal, settings);
+    model.encoder_settings = settings.dump();
+  }
   report.encoding_ms = watch.lap();
 
   report.vertices = static_cast<int>(mesh.positions.size());
@@ -228,6 +247,8 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   report.diagonal = model.diagonal;
   report.snap = texels.report.snap;
   report.fit = texels.report.fit;
+  report.turned_triangles = texels.report.turned_triangles;
+  report.even_turned_triangles = texels.report.even_turned_triangles;
   report.device = context.device().name;
   for (int bone = 0; bone < bones; ++bone) {
     const Segment& segment = segmentation.segments[bone];

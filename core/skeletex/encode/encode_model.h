@@ -30,11 +30,11 @@ struct EncodeOptions {
   SpdHit spd_hit = SpdHit::kLast;
   RowSpacing row_spacing = RowSpacing::kSurfaceLength;
   bool has_prefilter = true;
-  /// Texels sit on the mesh's own vertices and edges where they can (docs/snap.md). Pays from 1 texel per vertex on.
+  /// Texels sit on the mesh's own vertices and edges where they can (docs/snap.md). Pays from 2 texels per vertex on.
   bool has_snap = false;
   /// Points move so that the flat triangles between them are nearer to the mesh (docs/snap.md). Takes the prefilter's place.
   bool has_fit = false;
-  DiagonalRule diagonals = DiagonalRule::kNearest;
+  std::optional<DiagonalRule> diagonals;  ///< default: smooth with snapping or fit, else nearest
   std::optional<TexelShare> texel_share;  ///< default: area for all-SPD models, triangles otherwise
   /// Called with a stage's name and the share of work done; returning false cancels by throwing Error.
   std::function<bool(const std::string& stage, double done)> progress;
@@ -61,6 +61,7 @@ struct EncodeReport {
   double used_fraction = 0;
   std::optional<SnapReport> snap;  ///< when it was on
   std::optional<FitReport> fit;    ///< when it was on
+  int turned_triangles = 0, even_turned_triangles = 0;  ///< with snapping or fit: see FarReport
   double half_edge_ms = 0, segmentation_ms = 0, parameterization_ms = 0, encoding_ms = 0;
   std::string device;
 };

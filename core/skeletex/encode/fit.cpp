@@ -42,19 +42,22 @@ class FarQuads {
       x.push_back(static_cast<float>(vertex.x)), y.push_back(static_cast<float>(vertex.y));
     }
     patches_ = context.upload(patches), points_ = context.upload(points), x_ = context.upload(x), y_ = context.upload(y);
-    diagonals_ = context.allocate<int>(layout.size()), furthest_ = context.allocate<int>(layout.size());
+    diagonals_ = context.allocate<int>(layout.size()), furthest_ = context.allocate<int>(layout.size()), turned_ = context.allocate<int>(1);
   }
   /// Per quad the largest distance between mesh and lattice, as the bits of a float.
   const ClBuffer<int>& measure(const TexelPoints& points) {
     choose_diagonals(context_, layout_, points, diagonals_);
-    context_.fill(furthest_, 0);
+    context_.fill(furthest_, 0), context_.fill(turned_, 0);
     if (count_ > 0)
       context_.launch({"fit.cl", "measure_vertices"}, ClRange({static_cast<std::size_t>(count_), 1}, {64, 1}), count_, layout_.width, patches_, points_, x_, y_,
                       layout_.patches, maps_.x, maps_.y, maps_.z, diagonals_, points.x, points.y, points.z, furthest_);
     context_.launch({"fit.cl", "measure_middles"}, layout_.range(), layout_.width, layout_.height, maps_.triangle_count,
-                    static_cast<int>(!is_fitted_), layout_.texel_patches, layout_.patches, covering_, maps_.corners, maps_.across, maps_.x, maps_.y, maps_.z, diagonals_, points.x, points.y, points.z, furthest_);
+                    static_cast<int>(!is_fitted_), layout_.texel_patches, layout_.patches, covering_, maps_.corners, maps_.across, maps_.x, maps_.y, maps_.z, diagonals_, points.x, points.y, points.z, furthest_, turned_);
     return furthest_;
   }
+
+  /// Triangles that looked against the mesh when it was last measured.
+  int turned() const { return context_.download(turned_)[0]; }
 
  private:
   ClContext& context_;
@@ -63,16 +66,19 @@ class FarQuads {
   const ClBuffer<int>& covering_;
   int count_;
   bool is_fitted_;
-  ClBuffer<int> patches_, points_, diagonals_, furthest_;
+  ClBuffer<int> patches_, points_, diagonals_, furthest_, turned_;
   ClBuffer<float> x_, y_;
 };
 
 }  // namespace
 
-int put_back_far(ClContext& context, std::span<const Patch> patches, const DeviceLayout& layout, const DeviceMaps& maps, const ClBuffer<int>& covering, const SnapFeatures& features,
-                 const TexelPoints& even, const TexelPoints& filtered, bool is_fitted, ReadingPositions& positions, TexelPoints& points) {
+FarReport put_back_far(ClContext& context, std::span<const Patch> patches, const DeviceLayout& layout, const DeviceMaps& maps, const ClBuffer<int>& covering,
+                       const SnapFeatures& features, const TexelPoints& even, const TexelPoints& filtered, bool is_fitted, ReadingPositions& positions,
+                       TexelPoints& points) {
+  FarReport report;
   FarQuads quads(context, layout, maps, covering, features, is_fitted);
   const std::vector<int> bits = context.download(quads.measure(filtered));
+  report.even_turned_triangles = report.turned_triangles = quads.turned();
   // Next to seams the decoder makes strips, which quads only stand for, and a search that is caught somewhere finds too much:
   // what is furthest is taken from the other rows, without the few largest.
   std::vector<int> inner;
@@ -83,22 +89,20 @@ int put_back_far(ClContext& context, std::span<const Patch> patches, const Devic
       inner.insert(inner.end(), begin, begin + r.width);
     }
   }
-  if (inner.size() <= kOutliers) return 0;
+  if (inner.size() <= kOutliers) return report;
   std::nth_element(inner.begin(), inner.begin() + kOutliers, inner.end(), std::greater());
   const float limit = kShareOfFurthest * std::bit_cast<float>(inner[kOutliers]);
   auto count = context.allocate<int>(1);
-  context.fill(count, 0);
-  int total = 0;
   for (int pass = 0; pass < (is_fitted ? kFarPasses : kFarPassesOfSnapped); ++pass) {
+    context.fill(count, 0);
     context.launch({"fit.cl", "put_far_back"}, layout.range(), layout.width, layout.height, limit, layout.texel_patches, layout.patches,
                    quads.measure(points), filtered.x, filtered.y, filtered.z, positions.anchors, positions.x, positions.y, points.x, points.y, points.z, count);
+    report.turned_triangles = quads.turned();
     const int back = context.download(count)[0];
-    if (back == total) break;
-    total = back;
-    total += put_back_folds(context, layout, even, filtered, true, positions, points);
-    context.write(count, std::vector<int>{total});
+    if (back == 0) break;
+    report.texels_put_back += back + put_back_folds(context, layout, even, filtered, true, positions, points);
   }
-  return total;
+  return report;
 }
 
 FitReport fit_points(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps, const ClBuffer<int>& covering, const TexelPoints& even,

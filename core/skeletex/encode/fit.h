@@ -30,11 +30,18 @@ struct FitReport {
 FitReport fit_points(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps, const ClBuffer<int>& covering, const TexelPoints& even,
                      ReadingPositions& positions, TexelPoints& points, const FitOptions& options = {});
 
+/// What put_back_far did.
+struct FarReport {
+  int texels_put_back = 0;
+  int turned_triangles = 0, even_turned_triangles = 0;  ///< of the lattice, and of the even one: that look against the mesh
+};
+
 /// Texels go back to the even lattice where a vertex of the mesh is further from the lattice, or the middle of one of its
 /// triangles from the mesh, than (nearly) the furthest of the even lattice: so the maximum does not rise.
-/// \param filtered  the even lattice's points as they would be stored
-/// \return how many went back
-int put_back_far(ClContext& context, std::span<const Patch> patches, const DeviceLayout& layout, const DeviceMaps& maps, const ClBuffer<int>& covering, const SnapFeatures& features,
-                 const TexelPoints& even, const TexelPoints& filtered, bool is_fitted, ReadingPositions& positions, TexelPoints& points);
+/// \param even, filtered  the even lattice's points, and these as they would be stored
+/// \param is_fitted       whether points may lie off the mesh
+FarReport put_back_far(ClContext& context, std::span<const Patch> patches, const DeviceLayout& layout, const DeviceMaps& maps, const ClBuffer<int>& covering,
+                       const SnapFeatures& features, const TexelPoints& even, const TexelPoints& filtered, bool is_fitted, ReadingPositions& positions,
+                       TexelPoints& points);
 
 }  // namespace skeletex

@@ -233,9 +233,9 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     auto nothing = context.allocate<int>(texels);
     context.fill(nothing, 0);
     const TexelPoints filtered = options.has_prefilter ? prefilter(even, nothing) : even;
-    const int far = put_back_far(context, sources.patches, layout, maps, covering, features, even, filtered, is_fitted, positions, points);
-    if (is_fitted) result.report.fit->texels_put_back += far;
-    else put_back += far;
+    const FarReport far = put_back_far(context, sources.patches, layout, maps, covering, features, even, filtered, is_fitted, positions, points);
+    result.report.turned_triangles = far.turned_triangles, result.report.even_turned_triangles = far.even_turned_triangles;
+    (is_fitted ? result.report.fit->texels_put_back : put_back) += far.texels_put_back;
   }
   if (is_snapped) result.report.snap = report_snap(context, features, put_back, positions);
   auto along = context.allocate<float>(texels), around = context.allocate<float>(texels), out = context.allocate<float>(texels);

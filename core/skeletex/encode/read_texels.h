@@ -43,6 +43,7 @@ struct TexelReport {
   std::vector<int> missed_texels;                  ///< per bone: filled from neighbours along the column
   std::optional<SnapReport> snap;
   std::optional<FitReport> fit;
+  int turned_triangles = 0, even_turned_triangles = 0;  ///< with snapping or fit: see FarReport
 };
 
 struct TexelResult {

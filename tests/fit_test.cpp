@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: MIT
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "skeletex/encode/encode_model.h"
+#include "skeletex/encode/fit.h"
+#include "skeletex/encode/row_profile.h"
+#include "skeletex/measure/manifold.h"
+#include "skeletex/measure/metro.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "support/fit_twin.h"
+#include "support/load_model.h"
+
+namespace skeletex {
+namespace {
+
+constexpr int kTextureWidth = 40, kTextureHeight = 30;
+
+ClContext& device() {
+  static ClContext context;
+  return context;
+}
+
+/// One patch of a texture, its points a tube with a random surface, and random samples near it.
+struct RandomPatch {
+  Skeleton skeleton{{{"head", Vec3(0, 0, 0)}, {"tail", Vec3(0, 0, 1)}}, {{"bone", 0, 1, Vec3(1, 0, 0)}}};
+  std::vector<Patch> patches;
+  DeviceLayout layout;
+  std::array<std::vector<float>, 3> points;
+  std::vector<float> samples;
+
+  RandomPatch(const Rectangle& r, unsigned seed) {
+    patches.push_back({r, Method::kVsm, SegmentTopology::kSphere, spread_rows_uniformly(r.height)});
+    layout = upload_layout(device(), patches, frame_tables(skeleton, Walls(skeleton), patches, Vec3::Zero()), kTextureWidth, kTextureHeight);
+    std::mt19937 random(seed);
+    std::normal_distribution<float> normal(0, 1);
+    std::uniform_real_distribution<float> unit(0, 1);
+    const std::size_t size = layout.size();
+    for (auto& plane : points) plane.resize(size, 0);
+    const auto place = [&](double column, double row, std::size_t index, float noise) {
+      const double angle = 2 * std::numbers::pi * column / r.width;
+      points[0][index] = static_cast<float>(std::cos(angle)) + noise * normal(random);
+      points[1][index] = static_cast<float>(std::sin(angle)) + noise * normal(random);
+      points[2][index] = static_cast<float>(0.4 * row) + noise * normal(random);
+    };
+    for (int row = 0; row < r.height; ++row)
+      for (int j = 0; j < r.width; ++j) place(j, row, texel(j, row), 0.05f);
+    samples.resize(7 * 4 * size, 0);
+    for (int row = 0; row + 1 < r.height; ++row)
+      for (int j = 0; j < r.width; ++j)
+        for (int i = 0; i < 4; ++i) {
+          const double angle = 2 * std::numbers::pi * (j + 0.25 + 0.5 * (i & 1)) / r.width;
+          const Vec3 direction = Vec3(std::cos(angle) + 0.3 * normal(random), std::sin(angle) + 0.3 * normal(random), 0.3 * normal(random)).normalized();
+          const double values[7] = {std::cos(angle) + 0.1 * normal(random), std::sin(angle) + 0.1 * normal(random),
+                                    0.4 * (row + 0.25 + 0.25 * (i & 2)) + 0.1 * normal(random), direction[0], direction[1], direction[2], 0.5 + unit(random)};
+          for (int k = 0; k < 7; ++k) samples[(7 * i + k) * size + texel(j, row)] = static_cast<float>(values[k]);
+        }
+  }
+  const Rectangle& rectangle() const { return patches[0].rectangle; }
+  std::size_t texel(int column, int row) const {
+    const Rectangle& r = rectangle();
+    return static_cast<std::size_t>(r.y + row) * kTextureWidth + r.x + (column % r.width + r.width) % r.width;
+  }
+  Vec3 point(int column, int row) const {
+    const std::size_t at = texel(column, row);
+    return {points[0][at], points[1][at], points[2][at]};
+  }
+};
+
+/// The kernels from matching to the solved moves, in work-groups of a size.
+struct Solved {
+  std::vector<int> diagonals, matches;
+  std::vector<float> weights, residuals, system;
+  std::array<std::vector<float>, 3> moves;
+};
+Solved solve(const RandomPatch& patch, int sweeps, std::size_t group, float damping, float springs, float least_residual) {
+  ClContext& c = device();
+  const DeviceLayout& layout = patch.layout;
+  const std::size_t size = layout.size();
+  const ClRange range({kTextureWidth, kTextureHeight}, {group, 1});
+  const auto x = c.upload(patch.points[0]), y = c.upload(patch.points[1]), z = c.upload(patch.points[2]), samples = c.upload(patch.samples);
+  auto diagonals = c.allocate<int>(size), matches = c.allocate<int>(4 * size);
+  auto weights = c.allocate<float>(8 * size), residuals = c.allocate<float>(4 * size), costs = c.allocate<float>(size), areas = c.allocate<float>(size);
+  auto lattice = c.allocate<float>(10 * size), system = c.allocate<float>(36 * size);
+  c.fill(lattice, 0.f), c.fill(system, 0.f), c.fill(weights, 0.f), c.fill(residuals, 0.f);
+  c.launch({"fit.cl", "choose_diagonals"}, range, kTextureWidth, kTextureHeight, layout.texel_patches, layout.patches, x, y, z, diagonals);
+  c.launch({"fit.cl", "match_samples"}, range, kTextureWidth, kTextureHeight, layout.texel_patches, layout.patches, samples, diagonals, x, y, z, matches,
+           weights, residuals, costs, areas);
+  c.launch({"fit.cl", "assemble"}, range, kTextureWidth, kTextureHeight, least_residual, layout.texel_patches, layout.patches, samples, diagonals, matches,
+           weights, residuals, lattice, system);
+  auto move_x = c.allocate<float>(size), move_y = c.allocate<float>(size), move_z = c.allocate<float>(size);
+  c.fill(move_x, 0.f), c.fill(move_y, 0.f), c.fill(move_z, 0.f);
+  for (int sweep = 0; sweep < sweeps; ++sweep)
+    for (int colour = 0; colour < 6; ++colour)
+      c.launch({"fit.cl", "relax_moves"}, range, kTextureWidth, kTextureHeight, colour, damping, springs, layout.texel_patches, layout.patches, system, move_x,
+               move_y, move_z);
+  return {c.download(diagonals), c.download(matches), c.download(weights), c.download(residuals), c.download(system),
+          {c.download(move_x), c.download(move_y), c.download(move_z)}};
+}
+
+double symmetric_mean(const MetroReport& report) { return (report.forward.mean + report.backward.mean) / 2; }
+
+}  // namespace
+
+TEST(FitKernels, ASampleIsMatchedWithAPointOfTheLatticeAsNearAsTheTwinFinds) {
+  const RandomPatch patch({3, 2, 23, 17}, 1);
+  const Solved got = solve(patch, 0, 64, 0.01f, 0.01f, 0.01f);
+  const std::size_t size = patch.layout.size();
+  const Rectangle& r = patch.rectangle();
+  const auto point = [&](int j, int row) { return patch.point(j, row); };
+  int nearest = 0, count = 0;
+  for (int row = 0; row + 1 < r.height; ++row)
+    for (int j = 0; j < r.width; ++j)
+      for (int i = 0; i < 4; ++i, ++count) {
+        const std::size_t at = patch.texel(j, row);
+        const auto value = [&](int k) { return static_cast<double>(patch.samples[(7 * i + k) * size + at]); };
+        const Vec3 sample(value(0), value(1), value(2)), normal(value(3), value(4), value(5));
+        const int match = got.matches[i * size + at];
+        ASSERT_GE(match, 0);
+        const int column = j + (match & 3) - 1, up = row + (match >> 2 & 3) - 1;
+        const auto corners = twin::triangle_corners(got.diagonals[patch.texel(column, up)] != 0, match >> 4);
+        const double w1 = got.weights[2 * i * size + at], w2 = got.weights[(2 * i + 1) * size + at];
+        const double w[3] = {1 - w1 - w2, w1, w2};
+        Vec3 matched = Vec3::Zero();
+        for (int k = 0; k < 3; ++k) matched += w[k] * point(column + corners[k][0], up + corners[k][1]);
+        EXPECT_NEAR(got.residuals[i * size + at], normal.dot(matched - sample), 1e-5);
+        // Not further than anything in the sample's own quad; the quads beside it are only searched across the nearest side.
+        const double own = twin::nearest_in_quad(point, j, row, got.diagonals[at] != 0, sample);
+        EXPECT_LE((matched - sample).norm(), own + 1e-5);
+        double best = own;
+        for (int dy = -1; dy <= 1; ++dy)
+          for (int dx = -1; dx <= 1; ++dx)
+            if (row + dy >= 0 && row + dy <= r.height - 2)
+              best = std::min(best, twin::nearest_in_quad(point, j + dx, row + dy, got.diagonals[patch.texel(j + dx, row + dy)] != 0, sample));
+        nearest += (matched - sample).norm() < best + 1e-5;
+      }
+  EXPECT_GT(nearest, 0.9 * count);
+}
+
+TEST(FitKernels, TheSweepsEndAtTheSolutionOfTheTwinsDenseSystem) {
+  constexpr float kDamping = 0.02f, kSprings = 0.05f, kLeast = 0.02f;
+  const RandomPatch patch({5, 4, 9, 8}, 2);
+  const Solved got = solve(patch, 600, 64, kDamping, kSprings, kLeast);
+  const Rectangle& r = patch.rectangle();
+  twin::FitSystem system(r.width, r.height);
+  const std::size_t size = patch.layout.size();
+  for (int row = 0; row + 1 < r.height; ++row)
+    for (int j = 0; j < r.width; ++j)
+      for (int i = 0; i < 4; ++i) {
+        const std::size_t at = patch.texel(j, row);
+        const int match = got.matches[i * size + at], column = j + (match & 3) - 1, up = row + (match >> 2 & 3) - 1;
+        const auto corners = twin::triangle_corners(got.diagonals[patch.texel(column, up)] != 0, match >> 4);
+        const double w1 = got.weights[2 * i * size + at], w2 = got.weights[(2 * i + 1) * size + at];
+        const auto value = [&](int k) { return static_cast<double>(patch.samples[(7 * i + k) * size + at]); };
+        system.add({value(3), value(4), value(5)}, got.residuals[i * size + at], value(6), kLeast, column, up, corners, {1 - w1 - w2, w1, w2});
+      }
+  const Eigen::VectorXd expected = system.solve(kDamping, kSprings);
+  const double largest = expected.cwiseAbs().maxCoeff();
+  ASSERT_GT(largest, 1e-3);
+  for (int row = 0; row < r.height; ++row)
+    for (int j = 0; j < r.width; ++j)
+      for (int k = 0; k < 3; ++k) EXPECT_NEAR(got.moves[k][patch.texel(j, row)], expected[3 * (row * r.width + j) + k], 2e-3 * largest) << row << " " << j;
+}
+
+TEST(FitKernels, TheSizeOfWorkGroupsDoesNotShow) {
+  const RandomPatch patch({1, 0, 31, 30}, 3);
+  const Solved first = solve(patch, 5, 64, 0.001f, 0.002f, 0.01f), second = solve(patch, 5, 8, 0.001f, 0.002f, 0.01f);
+  EXPECT_EQ(first.matches, second.matches);
+  EXPECT_EQ(first.system, second.system);
+  EXPECT_EQ(first.moves, second.moves);
+}
+
+TEST(Fit, LowersTheResidualStepByStepAndTheMeanErrorWithIt) {
+  const TestModel model = load_standard_model("bear");
+  EncodeOptions options;
+  options.width = options.height = 128;
+  const EncodeResult plain = encode_model(device(), model.mesh, model.skeleton, options);
+  options.has_fit = true;
+  const EncodeResult fitted = encode_model(device(), model.mesh, model.skeleton, options);
+  const FitReport& report = fitted.report.fit.value();
+  ASSERT_GE(report.residuals.size(), 3u);
+  for (std::size_t i = 1; i < report.residuals.size(); ++i) EXPECT_LT(report.residuals[i], report.residuals[i - 1]);
+  EXPECT_LT(report.residuals.back(), 0.4 * report.residuals.front());
+  const TriangleMesh plain_mesh = reconstruct_mesh(device(), plain.model), mesh = reconstruct_mesh(device(), fitted.model);
+  const MetroReport before = measure_metro(device(), model.mesh, plain_mesh), after = measure_metro(device(), model.mesh, mesh);
+  EXPECT_LT(symmetric_mean(after), 0.8 * symmetric_mean(before));
+  EXPECT_LT(after.vertex.mean, 0.7 * before.vertex.mean);
+  EXPECT_TRUE(measure_manifold(mesh).is_closed_manifold());
+  EXPECT_EQ(fitted.model.diagonals, DiagonalRule::kSmooth);
+  EXPECT_EQ(plain.model.diagonals, DiagonalRule::kNearest);
+}
+
+TEST(Fit, LeavesSeamsAndPolesBitForBitAndGivesTheSameModelTwice) {
+  const TestModel model = load_standard_model("bear");
+  EncodeOptions options;
+  options.width = options.height = 96;
+  const SkeletexModel plain = encode_model(device(), model.mesh, model.skeleton, options).model;
+  options.has_fit = true;
+  const SkeletexModel fitted = encode_model(device(), model.mesh, model.skeleton, options).model;
+  ASSERT_EQ(plain.arcs.size(), fitted.arcs.size());
+  for (std::size_t a = 0; a < plain.arcs.size(); ++a) {
+    ASSERT_EQ(plain.arcs[a].samples.size(), fitted.arcs[a].samples.size());
+    for (std::size_t i = 0; i < plain.arcs[a].samples.size(); ++i) {
+      EXPECT_EQ(plain.arcs[a].samples[i].turn, fitted.arcs[a].samples[i].turn);
+      EXPECT_EQ(plain.arcs[a].samples[i].distance, fitted.arcs[a].samples[i].distance);
+    }
+  }
+  long moved = 0;
+  for (const Patch& patch : fitted.patches) {
+    const Rectangle& r = patch.rectangle;
+    for (int row = 0; row < r.height; ++row)
+      for (int j = 0; j < r.width; ++j) {
+        const std::size_t at = static_cast<std::size_t>(r.y + row) * fitted.texture.width + r.x + j;
+        const bool is_same = plain.texture.along[at] == fitted.texture.along[at] && plain.texture.around[at] == fitted.texture.around[at] &&
+                             plain.texture.out[at] == fitted.texture.out[at];
+        if (row == 0 || row == r.height - 1) { EXPECT_TRUE(is_same); }
+        else moved += !is_same;
+      }
+  }
+  EXPECT_GT(moved, 96 * 96 / 2);
+  const SkeletexModel again = encode_model(device(), model.mesh, model.skeleton, options).model;
+  EXPECT_EQ(fitted.texture.along, again.texture.along);
+  EXPECT_EQ(fitted.texture.around, again.texture.around);
+  EXPECT_EQ(fitted.texture.out, again.texture.out);
+}
+
+TEST(Fit, LeavesALatticeAloneThatIsTheMesh) {
+  // A tube, square across, whose vertices are the lattice's points.
+  constexpr int kColumns = 16, kRows = 9;
+  Chart chart;
+  chart.bone = 0;
+  chart.topology = SegmentTopology::kAnnulus;
+  for (int row = 0; row < kRows; ++row)
+    for (int j = 0; j < kColumns; ++j) {
+      chart.u.push_back(row / (kRows - 1.0));
+      chart.v.push_back(static_cast<double>(j) / kColumns);
+      const double t = 0.25 * (j % 4) * 2 - 1;  // from corner to corner of a side
+      const Vec3 sides[4] = {{1, t, 0}, {-t, 1, 0}, {-1, -t, 0}, {t, -1, 0}};
+      chart.positions.push_back(sides[j / 4] + Vec3(0, 0, 0.5 * row));
+      chart.kinds.push_back(row == 0 ? ChartVertex::kHeadRow : row == kRows - 1 ? ChartVertex::kTailRow : ChartVertex::kInner);
+    }
+  for (int row = 0; row + 1 < kRows; ++row)
+    for (int j = 0; j < kColumns; ++j) {
+      const int k = (j + 1) % kColumns, a = kColumns * row + j, b = kColumns * row + k;
+      const auto turn = static_cast<std::int8_t>(k == 0);
+      chart.triangles.push_back({a, b, b + kColumns});
+      chart.turns.push_back({0, turn, turn});
+      chart.triangles.push_back({a, b + kColumns, a + kColumns});
+      chart.turns.push_back({0, turn, 0});
+    }
+  const Skeleton skeleton{{{"head", Vec3(0, 0, 0)}, {"tail", Vec3(0, 0, 4)}}, {{"bone", 0, 1, Vec3(1, 0, 0)}}};
+  const std::vector<Patch> patches{{{2, 1, kColumns, kRows}, Method::kVsm, SegmentTopology::kAnnulus, spread_rows_uniformly(kRows)}};
+  std::vector<std::array<std::vector<Vec3>, 2>> ends(1);
+  ends[0][0].assign(chart.positions.begin(), chart.positions.begin() + kColumns);
+  ends[0][1].assign(chart.positions.end() - kColumns, chart.positions.end());
+  const std::vector<Chart> charts{chart};
+  const std::vector<SpdHits> hits(1);
+  const auto read = [&](bool has_fit) {
+    return read_texels(device(), skeleton, Walls(skeleton), {charts, patches, hits, ends}, 24, 12, Vec3::Zero(), {.has_prefilter = false, .has_fit = has_fit});
+  };
+  const TexelResult plain = read(false), fitted = read(true);
+  EXPECT_LT(fitted.report.fit->residuals.front(), 1e-6);
+  EXPECT_EQ(fitted.report.turned_triangles, 0);
+  for (std::size_t i = 0; i < plain.texture.out.size(); ++i) {
+    EXPECT_NEAR(plain.texture.along[i], fitted.texture.along[i], 1e-5);
+    EXPECT_NEAR(plain.texture.around[i], fitted.texture.around[i], 1e-5);
+    EXPECT_NEAR(plain.texture.out[i], fitted.texture.out[i], 1e-5);
+  }
+}
+
+TEST(Fit, PutsBackWhatRaisesTheMaximum) {
+  const TestModel model = load_standard_model("bear");
+  EncodeOptions options;
+  options.width = options.height = 256;
+  const TriangleMesh plain = reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model);
+  options.has_snap = options.has_fit = true;
+  const TriangleMesh mesh = reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model);
+  const MetroReport before = measure_metro(device(), model.mesh, plain), after = measure_metro(device(), model.mesh, mesh);
+  // What is measured are vertices and middles of quads, while the decoder makes strips at seams: a tenth is left to them.
+  EXPECT_LT(std::max(after.forward.max, after.backward.max), 1.1 * std::max(before.forward.max, before.backward.max));
+}
+
+}  // namespace skeletex
