@@ -607,11 +607,13 @@ kernel void measure_vertices(const int vertex_count, const int texture_width, gl
 // triangles to the mesh.
 // is_on_mesh: whether the lattice's points are known to lie on it; covering: per texel a triangle of the map near it
 // out  turned_count: how many triangles look against the mesh
-kernel void measure_middles(const int texture_width, const int texture_height, const int triangle_count, const int is_on_mesh, global const int* restrict texel_patches,
+kernel void measure_middles(const int texture_width, const int texture_height, const int triangle_count, const int is_on_mesh,
+                            global const int* restrict texel_patches,
                             global const PatchRecord* restrict patches, global const int* restrict covering, global const int* restrict corners,
                             global const int* restrict across, global const float* restrict vertex_x, global const float* restrict vertex_y,
                             global const float* restrict vertex_z, global const int* restrict diagonals, global const float* restrict x,
-                            global const float* restrict y, global const float* restrict z, global int* restrict furthest, global int* restrict turned_count) {
+                            global const float* restrict y, global const float* restrict z, global int* restrict furthest,
+                            global int* restrict turned_count) {
   const int column = (int)get_global_id(0), line = (int)get_global_id(1);
   if (column >= texture_width || line >= texture_height) return;
   const int texel = line * texture_width + column;
@@ -626,7 +628,8 @@ kernel void measure_middles(const int texture_width, const int texture_height, c
   if (t == NO_TRIANGLE) return;
   Point nearest, normal;
   float w[3];
-  float most = row == 0 || is_on_mesh ? 0.0f : walk_over_mesh(point_at(x, y, z, texel), t, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &nearest, &normal, w);
+  float most = row == 0 || is_on_mesh ? 0.0f :
+                   walk_over_mesh(point_at(x, y, z, texel), t, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &nearest, &normal, w);
   for (int i = 0; i < 2; ++i) {
     const float third[3] = {1.0f / 3.0f, 1.0f / 3.0f, 1.0f / 3.0f};
     const Point a = point_at(x, y, z, at[corner_of(is_second, i, 0)]), b = point_at(x, y, z, at[corner_of(is_second, i, 1)]),

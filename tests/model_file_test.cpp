@@ -77,6 +77,7 @@ SkeletexModel branch_model(int width = 40, int height = 20) {
 SkeletexModel lone_bone_model() {
   Numbers numbers(kSeed + 1);
   SkeletexModel model;
+  model.diagonals = DiagonalRule::kSmooth;
   model.skeleton = {{{"a", Vec3::Zero()}, {"b", Vec3(0, 0, 1)}}, {{"bone", 0, 1, Vec3(1, 0, 0)}}};
   add_patch(model, {0, 0, 8, 5}, SegmentTopology::kSphere, {}, {}, numbers);
   fill(model, 8, 5, numbers);

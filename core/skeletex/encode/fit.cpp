@@ -10,7 +10,8 @@ namespace {
 
 constexpr std::size_t kSamples = 4, kSamplePlanes = 7, kLatticePlanes = 5, kSystemStride = 36;  // as in fit.cl
 constexpr int kColours = 6;
-constexpr int kFarPasses = 8, kFarPassesOfSnapped = 2, kSeamRows = 2;
+constexpr int kFarPasses = 8, kFarPassesOfSnapped = 2;  // the latter for the sake of time: a second one still finds a few
+constexpr int kSeamRows = 2;
 constexpr std::size_t kOutliers = 10;
 constexpr float kShareOfFurthest = 0.85f;  // what is measured here is not all that there is
 
@@ -29,7 +30,7 @@ void choose_diagonals(ClContext& context, const DeviceLayout& layout, const Texe
                  points.z, diagonals);
 }
 
-/// The mesh's vertices with their cells, and what is measured at them.
+/// How far mesh and lattice are from each other, quad by quad.
 class FarQuads {
  public:
   FarQuads(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps, const ClBuffer<int>& covering, const SnapFeatures& features,
@@ -51,8 +52,9 @@ class FarQuads {
     if (count_ > 0)
       context_.launch({"fit.cl", "measure_vertices"}, ClRange({static_cast<std::size_t>(count_), 1}, {64, 1}), count_, layout_.width, patches_, points_, x_, y_,
                       layout_.patches, maps_.x, maps_.y, maps_.z, diagonals_, points.x, points.y, points.z, furthest_);
-    context_.launch({"fit.cl", "measure_middles"}, layout_.range(), layout_.width, layout_.height, maps_.triangle_count,
-                    static_cast<int>(!is_fitted_), layout_.texel_patches, layout_.patches, covering_, maps_.corners, maps_.across, maps_.x, maps_.y, maps_.z, diagonals_, points.x, points.y, points.z, furthest_, turned_);
+    context_.launch({"fit.cl", "measure_middles"}, layout_.range(), layout_.width, layout_.height, maps_.triangle_count, static_cast<int>(!is_fitted_),
+                    layout_.texel_patches, layout_.patches, covering_, maps_.corners, maps_.across, maps_.x, maps_.y, maps_.z, diagonals_, points.x, points.y,
+                    points.z, furthest_, turned_);
     return furthest_;
   }
 
