@@ -221,6 +221,24 @@ TEST(Morph, IsSymmetricHalfWay) {
   }
 }
 
+TEST(Morph, IsClosedFromTheSmallestSizesToLargeOnes) {
+  const SkeletexModel &a = standard("bear"), &b = standard("bear_bis");
+  for (const int size : {32, 64, 1024}) expect_valid(at(morph_of(a, b, {.layout = {}, .size = size}), 0.5), 0, std::to_string(size));
+}
+
+TEST(Morph, OfSeveralModelsIsClosedWhateverTheWeights) {
+  const SkeletexModel &a = standard("man"), &b = standard("homer"), &c = standard("man", EncodeMethod::kSpd);
+  const Morph morph(device(), {a, b, c}, std::vector{find_correspondence(a.skeleton, b.skeleton), find_correspondence(a.skeleton, c.skeleton)});
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> unit(0, 1);
+  for (int round = 0; round < 5; ++round) {
+    std::vector<double> weights{unit(random), unit(random), unit(random)};
+    const double sum = weights[0] + weights[1] + weights[2];
+    for (double& weight : weights) weight /= sum;
+    expect_valid(morph.at(weights), 0, std::to_string(round));
+  }
+}
+
 TEST(Morph, KeepsTheGenusOfCyclicSkeletons) {
   for (const char* name : {"eight", "knot1"}) {
     const SkeletexModel& a = standard(name);
