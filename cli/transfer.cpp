@@ -127,7 +127,7 @@ void add_transfer_command(CLI::App& program) {
   command.add_flag("--mirror", arguments->is_mirrored, "take from the source's mirror image: a left arm for a right one");
   take_one_of(*command.add_option("--blend", arguments->blend, "how the two fade near the seams (default: cosine)"), {"cosine", "linear", "none"});
   command.add_option("--width", arguments->width, "width of the fade: share of the bone's rows, or rows as 12px (default: auto, 0.25, between two seams 0.5)")->type_name("auto|W|Npx");
-  command.add_option("--scale", arguments->scale, "across the bones: by the ratio of lengths or of girths, or a factor (default: auto, lengths where the part ends freely, else girths)")
+  command.add_option("--scale", arguments->scale, "across the bones: by the ratio of lengths or of girths, or a factor (default: auto, their geometric mean, between two seams girths)")
       ->type_name("auto|length|girth|X");
   command.add_option("--keep", arguments->keep, "share of its rows that the target keeps at its seams (default: auto, up to the limb's root)")->type_name("auto|S");
   command.add_option("--skip", arguments->skip, "share of the source's rows that is left out there (default: auto, up to the limb's root)")->type_name("auto|S");

@@ -293,7 +293,7 @@ TEST_F(Program, TransfersBonesAndSaysHow) {
     EXPECT_EQ(part.at("source"), a);
     EXPECT_EQ(part.at("target"), b);
     EXPECT_GT(part.at("scale").get<double>(), 0);
-    EXPECT_EQ(part.at("scale"), part.at("length_scale"));
+    EXPECT_GT(part.at("length_scale").get<double>(), 0);
     EXPECT_GE(json.at("folded_edges").get<int>(), 0);
     EXPECT_GE(json.at("folded_edges_of_target").get<int>(), 0);
     EXPECT_EQ(run({"inspect", "t.skx.exr"}).code, 0);

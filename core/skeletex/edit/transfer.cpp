@@ -453,6 +453,7 @@ class Laying {
       source_girth += at_row(source_columns[j], std::min(cut.skipped_rows[j] + width * source_rows, 0.9 * there.height)).head<2>().norm();
     }
     if (part.is_scaled_by_girth()) cut.scale = girth / source_girth;
+    else if (options_.scale == TransferScale::kAuto) cut.scale = std::sqrt(cut.scale * girth / source_girth);
   }
 
   void fill_tables() {

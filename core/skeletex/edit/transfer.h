@@ -14,8 +14,8 @@ enum class TransferBlend { kCosine, kLinear, kNone };
 
 /// What a part is scaled by across its bones. Along them its length always follows the target's bones.
 enum class TransferScale {
-  kAuto,    ///< parts that end freely keep their proportions (kLength), parts between two seams their target's girth
-  kLength,  ///< ratio of the lengths of all bones of the part
+  kAuto,    ///< the geometric mean of kLength and kGirth; of parts between two seams kGirth
+  kLength,  ///< ratio of the lengths of all bones of the part: it keeps its proportions
   kGirth,   ///< ratio of the girths where the correction ends; linear between two seams
   kFactor   ///< TransferOptions::factor
 };
