@@ -40,6 +40,15 @@ def fig07_tangent_space(results, folder):
     return [style.sheet(results, "tangent_space", [[f"{model}-{time}.png" for time in times]], titles, None, folder, "fig07_tangent_space", cell=2.8)]
 
 
+def fig09_lattice(results, folder):
+    rows = style.rows(results, "lattice")
+    if not rows:
+        return []
+    kinds = ["layout", "tubes", "surface"]
+    return [style.sheet(results, "lattice", [[f"{model}-{kind}.png" for kind in kinds] for model in _models(rows)], ["a lattice per bone", "one constant displacement", "the texture's"],
+                        _models(rows), folder, "fig09_lattice", cell=3.4)]
+
+
 def fig10_distance(results, folder):
     rows = style.rows(results, "distance")
     if not rows:
