@@ -23,7 +23,7 @@ struct Arguments {
   int iterations = 4;
   double alpha = 0.5, stop_spread = 0, hybrid_threshold = 0.02;
   std::string rows = "surface", spd_hit = "last", share, diagonals, compression = "zip";
-  bool has_no_prefilter = false, is_snapped = false, is_fitted = false, is_paper_recipe = false, is_half = false;
+  bool has_no_prefilter = false, has_no_unfold = false, is_snapped = false, is_fitted = false, is_paper_recipe = false, is_half = false;
   std::vector<std::string> bone_methods;
 };
 
@@ -68,6 +68,7 @@ EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command
     options.vsm = {.iterations = 1, .alpha = 0};
     options.row_spacing = RowSpacing::kUniform;
     options.has_prefilter = false;
+    options.has_unfold = false;
   }
   const auto is_given = [&](const char* name) { return command.count(name) > 0; };
   if (is_given("--iterations")) options.vsm.iterations = arguments.iterations;
@@ -75,6 +76,7 @@ EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command
   options.vsm.stop_spread_change = arguments.stop_spread;
   if (is_given("--rows")) options.row_spacing = arguments.rows == "uniform" ? RowSpacing::kUniform : RowSpacing::kSurfaceLength;
   if (arguments.has_no_prefilter) options.has_prefilter = false;
+  if (arguments.has_no_unfold) options.has_unfold = false;
   options.has_snap = arguments.is_snapped;
   options.has_fit = arguments.is_fitted;
   if (is_given("--diagonals")) options.diagonals = arguments.diagonals == "smooth" ? DiagonalRule::kSmooth : DiagonalRule::kNearest;
@@ -124,6 +126,7 @@ Json report_json(const EncodeReport& report, const EncodeOptions& options, doubl
             {"encoding", report.encoding_ms}}},
           {"seconds", used_seconds},
           {"device", report.device}};
+  json["lattice"] = {{"folded_quads", report.unfold.folded_quads}, {"left", report.unfold.left}};
   if (report.snap)
     json["snap"] = {{"vertices", report.snap->vertices},
                     {"snapped_vertices", report.snap->snapped_vertices},
@@ -251,6 +254,7 @@ void add_encode_command(CLI::App& program) {
   take_one_of(
       add("Texels", "--share", a.share, "what a bone's share of the texels follows; unless given: area with --method spd, triangles otherwise"),
       {"triangles", "area"});
+  command.add_flag("--no-unfold", a.has_no_unfold, "the even lattice as it is, also where it folds in space");
   command.add_flag("--no-prefilter", a.has_no_prefilter, "texels exactly on the mesh, so that flat triangles lie inside its curved parts")
       ->group("Texels");
   command
@@ -266,7 +270,7 @@ void add_encode_command(CLI::App& program) {
               {"nearest", "smooth"});
   command
       .add_flag("--paper-recipe", a.is_paper_recipe,
-                "as the paper: --rows uniform --alpha 0 --iterations 1 --no-prefilter (rows, alpha and iterations can still be given)")
+                "as the paper: --rows uniform --alpha 0 --iterations 1 --no-unfold --no-prefilter (rows, alpha and iterations can still be given)")
       ->group("Texels");
   command.add_flag("--half", a.is_half, "16 bits a channel: half the file, but an error of some 2e-5 of the diagonal; for drafts")->group("File");
   take_one_of(add("File", "--compression", a.compression, "lossless compression of the file"), {"zip", "piz"});

@@ -94,6 +94,7 @@ nlohmann::json settings_json(const EncodeOptions& options, const TexelOptions& t
                       {"vsm", {{"iterations", options.vsm.iterations}, {"alpha", options.vsm.alpha}, {"stop_spread_change", options.vsm.stop_spread_change}}},
                       {"rows", options.row_spacing == RowSpacing::kSurfaceLength ? "surface" : "uniform"},
                       {"prefilter", texel_options.has_prefilter},
+                      {"unfold", texel_options.has_unfold},
                       {"snap", texel_options.has_snap},
                       {"fit", texel_options.has_fit},
                       {"spd_hit", options.spd_hit == SpdHit::kFirst ? "first" : "last"}};
@@ -201,7 +202,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
                                                                     : spread_rows_uniformly(patch.rectangle.height);
     model.patches.push_back(std::move(patch));
   }
-  const TexelOptions texel_options{.has_prefilter = options.has_prefilter, .has_snap = options.has_snap, .has_fit = options.has_fit};
+  const TexelOptions texel_options{.has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_snap = options.has_snap, .has_fit = options.has_fit};
   model.diagonals = options.diagonals.value_or(options.has_snap || options.has_fit ? DiagonalRule::kSmooth : DiagonalRule::kNearest);
   Seams seams = sample_seams(segmentation, skeleton, walls, layout.rectangles, texel_options.has_snap ? SeamSampling::kSnapped : SeamSampling::kEven);
   model.arcs = std::move(seams.arcs);
@@ -245,6 +246,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   report.triangles = static_cast<int>(mesh.triangles.size());
   report.genus = model.genus;
   report.diagonal = model.diagonal;
+  report.unfold = texels.report.unfold;
   report.snap = texels.report.snap;
   report.fit = texels.report.fit;
   report.turned_triangles = texels.report.turned_triangles;

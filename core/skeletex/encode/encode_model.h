@@ -30,6 +30,7 @@ struct EncodeOptions {
   SpdHit spd_hit = SpdHit::kLast;
   RowSpacing row_spacing = RowSpacing::kSurfaceLength;
   bool has_prefilter = true;
+  bool has_unfold = true;  ///< see unfold_lattice; not with has_snap or has_fit, which guard against folds themselves
   /// Texels sit on the mesh's own vertices and edges where they can (docs/snap.md). Pays from 2 texels per vertex on.
   bool has_snap = false;
   /// Points move so that the flat triangles between them are nearer to the mesh (docs/snap.md). Takes the prefilter's place.
@@ -59,6 +60,7 @@ struct EncodeReport {
   double diagonal = 0;
   std::vector<BoneReport> bones;
   double used_fraction = 0;
+  UnfoldReport unfold;
   std::optional<SnapReport> snap;  ///< when it was on
   std::optional<FitReport> fit;    ///< when it was on
   int turned_triangles = 0, even_turned_triangles = 0;  ///< with snapping or fit: see FarReport

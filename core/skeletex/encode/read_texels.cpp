@@ -156,10 +156,15 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   auto covering = context.allocate<int>(texels);
   auto is_read = context.allocate<int>(std::max(1, maps.triangle_count));
   context.fill(is_read, 0);
-  const auto read = [&] {
-    context.launch({"encode.cl", "read_surface"}, layout.range(), texture_width, texture_height, maps.triangle_count, layout.texel_patches, covering,
+  const auto read = [&](const ClBuffer<int>& triangles) {
+    context.launch({"encode.cl", "read_surface"}, layout.range(), texture_width, texture_height, maps.triangle_count, layout.texel_patches, triangles,
                    maps.corners, maps.turns, maps.poles, maps.u_high, maps.u_low, maps.v_high, maps.v_low, maps.x, maps.y, maps.z, layout.patches,
                    maps.row_high, maps.row_low, positions.x, positions.y, points.x, points.y, points.z, is_read);
+  };
+  const auto walk = [&](ClBuffer<int>& triangles) {
+    context.launch({"encode.cl", "walk_to_positions"}, layout.range(), texture_width, texture_height, maps.triangle_count, layout.texel_patches, maps.corners,
+                   maps.turns, maps.poles, maps.across, maps.u_high, maps.u_low, maps.v_high, maps.v_low, layout.patches, maps.row_high, maps.row_low,
+                   positions.x, positions.y, positions.anchors, triangles);
   };
   if (maps.triangle_count > 0) {
     context.fill(covering, kNoTriangle);
@@ -168,7 +173,7 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     std::vector<int> texel_triangles = context.download(covering);
     result.report.missed_texels = fill_uncovered(sources.patches, texture_width, texel_triangles);
     context.write(covering, texel_triangles);
-    read();
+    read(covering);
   }
 
   // Rays.
@@ -195,18 +200,18 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   }
   place_end_rows(context, sources, texture_width, origin, points);
 
-  const TexelPoints even = points;
   const bool is_snapped = options.has_snap && maps.triangle_count > 0, is_fitted = options.has_fit && maps.triangle_count > 0;
+  if (options.has_unfold && !is_snapped && !is_fitted && maps.triangle_count > 0)
+    result.report.unfold = unfold_lattice(context, layout, maps, covering, [&](ClBuffer<int>& walkers) { walk(walkers), read(walkers); }, positions, points);
+  const TexelPoints even = points;
   const SnapFeatures features =
       is_snapped || is_fitted ? find_features(sources.charts, sources.patches, options.snap_dihedral) : SnapFeatures{};
   if (is_snapped || is_fitted) points = copy_points(context, even);
   int put_back = 0;
   if (is_snapped) {
     snap_positions(context, layout, features, positions);
-    context.launch({"encode.cl", "walk_to_positions"}, layout.range(), texture_width, texture_height, maps.triangle_count, layout.texel_patches, maps.corners,
-                   maps.turns, maps.poles, maps.across, maps.u_high, maps.u_low, maps.v_high, maps.v_low, layout.patches, maps.row_high, maps.row_low,
-                   positions.x, positions.y, positions.anchors, covering);
-    read();
+    walk(covering);
+    read(covering);
     place_snapped(context, layout, maps, features, positions, points);
     put_back += put_back_folds(context, layout, even, positions, points);
   }

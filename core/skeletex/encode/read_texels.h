@@ -8,6 +8,7 @@
 #include "skeletex/cl/context.h"
 #include "skeletex/encode/fit.h"
 #include "skeletex/encode/snap.h"
+#include "skeletex/encode/unfold.h"
 #include "skeletex/model/frame.h"
 #include "skeletex/parameterize/chart.h"
 #include "skeletex/parameterize/spd.h"
@@ -25,6 +26,7 @@ struct TexelSources {
 
 struct TexelOptions {
   bool has_prefilter = true;
+  bool has_unfold = true;
   bool has_snap = false;        ///< texels of VSM patches move to vertices and creased edges
   double snap_dihedral = 0.004;  ///< radians: edges flatter than this are no creases
   bool has_fit = false;         ///< points of VSM patches are fitted to the mesh, instead of the prefilter
@@ -42,6 +44,7 @@ struct TexelReport {
   std::vector<double> sampled_triangle_fractions;  ///< per bone: share of the chart's triangles that a texel reads
   std::vector<int> missed_texels;                  ///< per bone: filled from neighbours along the column
   std::optional<SnapReport> snap;
+  UnfoldReport unfold;
   std::optional<FitReport> fit;
   int turned_triangles = 0, even_turned_triangles = 0;  ///< with snapping or fit: see FarReport
 };

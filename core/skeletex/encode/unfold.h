@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <functional>
+
+#include "skeletex/encode/device_maps.h"
+#include "skeletex/encode/snap.h"
+
+namespace skeletex {
+
+struct UnfoldReport {
+  int folded_quads = 0;  ///< of the even lattice
+  int left = 0;          ///< that stay folded
+};
+
+/// Texels of VSM patches around quads that fold in space although the map does not (it turns sharply there, next to seams for the
+/// most part) read nearer to their neighbours' mean. Where that does not unfold them they stay at their own places. Folds at edges
+/// of the surface itself are left alone.
+/// \param triangles  per texel, the map's triangle at its place
+/// \param read       reads the points of the texels that have a triangle in the plane it is given, where `positions` say
+UnfoldReport unfold_lattice(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps, const ClBuffer<int>& triangles,
+                            const std::function<void(ClBuffer<int>& walkers)>& read, ReadingPositions& positions, TexelPoints& points);
+
+}  // namespace skeletex

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/encode/unfold.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "skeletex/encode/encode_model.h"
+#include "skeletex/encode/row_profile.h"
+#include "skeletex/measure/metro.h"
+#include "skeletex/measure/self_intersection.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "support/load_model.h"
+#include "support/unfold_twin.h"
+
+namespace skeletex {
+namespace {
+
+constexpr int kWidth = 40, kHeight = 30, kNone = 0x7fffffff;
+
+ClContext& device() {
+  static ClContext context;
+  return context;
+}
+
+/// A patch that fills its texture, over one triangle of the plane z = 0.
+struct PlanePatch {
+  Skeleton skeleton{{{"head", Vec3(0, 0, 0)}, {"tail", Vec3(0, 0, 1)}}, {{"bone", 0, 1, Vec3(1, 0, 0)}}};
+  std::vector<Patch> patches{{{0, 0, kWidth, kHeight}, Method::kVsm, SegmentTopology::kSphere, spread_rows_uniformly(kHeight)}};
+  DeviceLayout layout = upload_layout(device(), patches, frame_tables(skeleton, Walls(skeleton), patches, Vec3::Zero()), kWidth, kHeight);
+  DeviceMaps maps;
+  ClBuffer<int> triangles = device().upload(std::vector<int>(kWidth * kHeight, 0));
+
+  PlanePatch() {
+    maps.triangle_count = 1;
+    maps.corners = device().upload(std::vector<int>{0, 1, 2});
+    maps.x = device().upload(std::vector<float>{0, 1, 0}), maps.y = device().upload(std::vector<float>{0, 0, 1}), maps.z = device().upload(std::vector<float>{0, 0, 0});
+  }
+};
+
+TexelPoints upload_points(const std::vector<Vec3>& points) {
+  std::array<std::vector<float>, 3> planes;
+  for (const Vec3& p : points)
+    for (int k = 0; k < 3; ++k) planes[k].push_back(static_cast<float>(p[k]));
+  return {device().upload(planes[0]), device().upload(planes[1]), device().upload(planes[2])};
+}
+
+/// A plane that turns about (20, 15) by an angle that falls with the distance: as a map it is one to one, but turns by up to `most` radians.
+Vec3 swirl(double x, double y, double most) {
+  const double dx = x - 20, dy = y - 15, r2 = dx * dx + dy * dy, angle = most * std::exp(-r2 / 4);
+  return {20 + std::cos(angle) * dx - std::sin(angle) * dy, 15 + std::sin(angle) * dx + std::cos(angle) * dy, 0};
+}
+
+}  // namespace
+
+TEST(Unfold, FindsAndMovesWhatItsTwinDoes) {
+  int compared = 0;
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> unit(-1, 1);
+    const PlanePatch patch;
+    std::vector<Vec3> points;
+    for (int r = 0; r < kHeight; ++r)
+      for (int j = 0; j < kWidth; ++j) points.push_back(Vec3(j + 0.15 * seed * unit(random), r + 0.15 * seed * unit(random), 0.1 * unit(random)).cast<float>().cast<double>());
+    const twin::Folds expected = twin::find_folds(points, kWidth, kHeight);
+    if (expected.is_close) continue;
+    ++compared;
+    const TexelPoints on_device = upload_points(points);
+    auto can_move = device().upload(std::vector<int>(points.size(), 1)), marks = device().upload(std::vector<int>(points.size(), 0)), count = device().upload(std::vector<int>{0}),
+         walkers = device().allocate<int>(points.size());
+    device().launch({"unfold.cl", "find_folds"}, patch.layout.range(), kWidth, kHeight, 1, patch.layout.texel_patches, patch.layout.patches, patch.triangles, patch.maps.corners,
+                    patch.maps.x, patch.maps.y, patch.maps.z, on_device.x, on_device.y, on_device.z, can_move, marks, count);
+    EXPECT_EQ(device().download(count)[0], expected.count);
+    EXPECT_GT(expected.count, 0);
+    EXPECT_EQ(device().download(marks), expected.marks);
+
+    std::vector<float> x, y;
+    for (std::size_t i = 0; i < points.size(); ++i) x.push_back(static_cast<float>(unit(random))), y.push_back(static_cast<float>(0.5 * unit(random)));
+    auto offset_x = device().upload(x), offset_y = device().upload(y);
+    device().launch({"unfold.cl", "relax_folds"}, patch.layout.range(), kWidth, kHeight, 0, patch.layout.texel_patches, patch.layout.patches, patch.triangles, on_device.x,
+                    on_device.y, on_device.z, marks, can_move, offset_x, offset_y, walkers, count);
+    const std::vector<float> new_x = device().download(offset_x), new_y = device().download(offset_y);
+    const std::vector<int> walking = device().download(walkers);
+    for (int r = 0; r < kHeight; ++r)
+      for (int j = 0; j < kWidth; ++j) {
+        const std::size_t i = static_cast<std::size_t>(r) * kWidth + j;
+        EXPECT_EQ(walking[i], expected.marks[i] ? 0 : kNone);
+        const Eigen::Vector2d before(x[i], y[i]), wanted = expected.marks[i] ? twin::relaxed(points, kWidth, kHeight, j, r, before) : before;
+        EXPECT_NEAR(new_x[i], wanted.x(), 2e-4);
+        EXPECT_NEAR(new_y[i], wanted.y(), 2e-4);
+      }
+    EXPECT_EQ(device().download(marks), std::vector<int>(points.size(), 0));
+    EXPECT_EQ(device().download(can_move), expected.marks);
+  }
+  EXPECT_GE(compared, 4);
+}
+
+TEST(Unfold, TakesTheFoldsOutOfALatticeOverASwirlAndTouchesNothingElse) {
+  const PlanePatch patch;
+  ReadingPositions positions = even_positions(device(), patch.layout);
+  constexpr double kMost = 5.0;
+  // Columns wrap round, which a plane does not: the outer ones are no part of the map.
+  std::vector<int> triangles(kWidth * kHeight, 0);
+  for (int i = 0; i < kWidth * kHeight; ++i)
+    if (i % kWidth < 3 || i % kWidth >= kWidth - 3) triangles[i] = kNone;
+  std::vector<Vec3> even;
+  for (int r = 0; r < kHeight; ++r)
+    for (int j = 0; j < kWidth; ++j) even.push_back(swirl(j, r, kMost));
+  TexelPoints points = upload_points(even);
+  const auto read = [&](ClBuffer<int>& walkers) {
+    const std::vector<int> walking = device().download(walkers);
+    const std::vector<float> dx = device().download(positions.x), dy = device().download(positions.y);
+    std::vector<float> x = device().download(points.x), y = device().download(points.y);
+    for (std::size_t i = 0; i < walking.size(); ++i) {
+      if (walking[i] == kNone) continue;
+      const Vec3 p = swirl(static_cast<double>(i % kWidth) + dx[i], static_cast<double>(i / kWidth) + dy[i], kMost);
+      x[i] = static_cast<float>(p.x()), y[i] = static_cast<float>(p.y());
+    }
+    device().write(points.x, x), device().write(points.y, y);
+  };
+  const UnfoldReport report = unfold_lattice(device(), patch.layout, patch.maps, device().upload(triangles), read, positions, points);
+  EXPECT_GT(report.folded_quads, 0);
+  EXPECT_EQ(report.left, 0);
+  const std::vector<float> x = device().download(points.x), y = device().download(points.y);
+  std::vector<Vec3> after;
+  for (std::size_t i = 0; i < even.size(); ++i) {
+    after.emplace_back(x[i], y[i], 0);
+    const double distance = std::hypot(static_cast<double>(i % kWidth) - 20, static_cast<double>(i / kWidth) - 15);
+    if (distance > 8) {
+      EXPECT_EQ((after.back() - even[i].cast<float>().cast<double>()).norm(), 0);
+    }
+  }
+  const twin::Folds before_folds = twin::find_folds(even, kWidth, kHeight), after_folds = twin::find_folds(after, kWidth, kHeight);
+  EXPECT_EQ(before_folds.count - report.folded_quads, after_folds.count);
+}
+
+TEST(Unfold, TakesMostSelfIntersectionsFromABearAndStaysOnIt) {
+  const TestModel model = load_standard_model("bear");
+  EncodeOptions options;
+  options.width = options.height = 512;
+  const EncodeResult encoded = encode_model(device(), model.mesh, model.skeleton, options);
+  EXPECT_GT(encoded.report.unfold.folded_quads, 10);
+  EXPECT_LT(4 * encoded.report.unfold.left, encoded.report.unfold.folded_quads);
+  options.has_unfold = false;
+  const auto crossing = count_self_intersections(reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model));
+  EXPECT_GT(crossing, 10);
+  EXPECT_LT(4 * count_self_intersections(reconstruct_mesh(device(), encoded.model)), crossing);
+  // Without the prefilter every vertex is a point of the mesh.
+  options.has_unfold = true;
+  options.has_prefilter = false;
+  const TriangleMesh mesh = reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model);
+  EXPECT_LT(measure_metro(device(), mesh, model.mesh, {.samples = 1000}).vertex.max, 2e-6);
+}
+
+}  // namespace skeletex
