@@ -190,7 +190,7 @@ TEST(RowProfile, OfALongCylinderIsLinearWhateverTheTriangles) {
   // On a cylinder of height 100 and radius 0.1 every meridian is 100 long, however the triangles lie.
   for (std::size_t i = 0; i < chart.u.size(); ++i) chart.positions[i] = 0.1 * walls.spoke(0, chart.v[i]) + 100 * chart.u[i] * walls.bases()[0].o;
   const RowProfile profile = row_profile(chart);
-  EXPECT_NEAR(profile.total_length(), 100, 0.01);
+  EXPECT_NEAR(profile.length, 100, 0.01);
   const std::vector<double> rows = spread_rows_by_length(profile, 33);
   for (int r = 0; r < 33; ++r) EXPECT_NEAR(rows[r], r / 32.0, 1e-4);
 }
@@ -202,6 +202,22 @@ TEST(RowProfile, SpreadsRowsEvenlyOverALatticeOfKnownSpeed) {
   for (int r = 0; r < kRows; ++r) points.push_back(Vec3(0, 0, std::pow(r / (kRows - 1.0), 2)));
   const std::vector<double> rows = spread_rows_by_length(row_profile(points, kRows, 1), 11);
   for (int r = 0; r <= 10; ++r) EXPECT_NEAR(rows[r], std::sqrt(r / 10.0), r <= 1 ? 2e-2 : 1e-3);
+}
+
+TEST(RowProfile, GivesStretchedColumnsMoreThanTheirMean) {
+  // Two columns: one as fast everywhere, the other 8 times as fast in the upper half.
+  constexpr int kRows = 101;
+  std::vector<Vec3> points;
+  for (int r = 0; r < kRows; ++r) {
+    const double u = r / (kRows - 1.0);
+    points.push_back(Vec3(0, 0, u));
+    points.push_back(Vec3(1, 0, u + 7 * std::max(0.0, u - 0.5)));
+  }
+  const RowProfile profile = row_profile(points, kRows, 2);
+  EXPECT_NEAR(profile.length, (1 + 4.5) / 2, 1e-9);
+  const double upper = std::pow((1 + std::pow(8, 1.5)) / 2, 1 / 1.5);
+  EXPECT_NEAR(profile.share[50], 1 / (1 + upper), 1e-4);
+  EXPECT_GT(upper, (1 + 8) / 2.0);
 }
 
 }  // namespace skeletex

@@ -189,7 +189,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   for (int bone = 0; bone < bones; ++bone) {
     profiles.push_back(methods[bone] == Method::kVsm ? row_profile(charts[bone]) : rays[bone]);
     areas.push_back(surface_area(segmentation.segments[bone].mesh));
-    const double length = std::max(profiles[bone].total_length(), 1e-9 * model.diagonal);
+    const double length = std::max(profiles[bone].length, 1e-9 * model.diagonal);
     const double texels = share == TexelShare::kTriangles ? static_cast<double>(segmentation.segments[bone].mesh.triangles.size()) : areas[bone];
     demands.push_back({texels, areas[bone] / (length * length)});
   }

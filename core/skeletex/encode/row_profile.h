@@ -7,15 +7,15 @@
 
 namespace skeletex {
 
-/// How surface length accumulates along a patch: g(u), the mean over v of the meridian's length from u = 0 to u.
+/// How surface length accumulates along a patch. The share g(u) of the rows below u grows with the power mean, exponent 1.5, of
+/// |dP/du| over v: with the mean, but more where some columns are stretched.
 struct RowProfile {
-  std::vector<double> u;       ///< increasing from 0 to 1
-  std::vector<double> length;  ///< g(u), world units, increasing from 0
-  double total_length() const { return length.back(); }
+  std::vector<double> u;      ///< increasing from 0 to 1
+  std::vector<double> share;  ///< g(u), increasing from 0 to 1
+  double length = 0;          ///< of the meridians, their mean over v; world units
 };
 
-/// Profile of a map: every triangle adds |dP/du| times its width in v at each u, exactly, into bins whose borders
-/// follow the vertices. \pre chart.u and chart.v are filled
+/// Profile of a map: every triangle counts with its width in v at each u, exactly, in bins whose borders follow the vertices. \pre chart.u and chart.v are filled
 RowProfile row_profile(const Chart& chart);
 
 /// Profile of points on an even lattice in u: `positions` holds rows x columns points, row-major, row r at
