@@ -30,7 +30,7 @@ struct EncodeOptions {
   SpdHit spd_hit = SpdHit::kLast;
   RowSpacing row_spacing = RowSpacing::kSurfaceLength;
   bool has_prefilter = true;
-  bool has_unfold = true;  ///< see unfold_lattice; not with has_snap or has_fit, which guard against folds themselves
+  bool has_unfold = true;  ///< see unfold_lattice; snapping and fit start from the lattice that it leaves
   /// Texels sit on the mesh's own vertices and edges where they can (docs/snap.md). Pays from 2 texels per vertex on.
   bool has_snap = false;
   /// Points move so that the flat triangles between them are nearer to the mesh (docs/snap.md). Takes the prefilter's place.

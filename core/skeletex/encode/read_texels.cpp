@@ -201,7 +201,7 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   place_end_rows(context, sources, texture_width, origin, points);
 
   const bool is_snapped = options.has_snap && maps.triangle_count > 0, is_fitted = options.has_fit && maps.triangle_count > 0;
-  if (options.has_unfold && !is_snapped && !is_fitted && maps.triangle_count > 0)
+  if (options.has_unfold && maps.triangle_count > 0)
     result.report.unfold = unfold_lattice(context, layout, maps, covering, [&](ClBuffer<int>& walkers) { walk(walkers), read(walkers); }, positions, points);
   const TexelPoints even = points;
   const SnapFeatures features =
