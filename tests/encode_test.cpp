@@ -215,7 +215,7 @@ TEST(RowProfile, GivesStretchedColumnsMoreThanTheirMean) {
   }
   const RowProfile profile = row_profile(points, kRows, 2);
   EXPECT_NEAR(profile.length, (1 + 4.5) / 2, 1e-9);
-  const double upper = std::pow((1 + std::pow(8, 1.5)) / 2, 1 / 1.5);
+  const double upper = std::pow((1 + std::pow(8, 1.25)) / 2, 1 / 1.25);
   EXPECT_NEAR(profile.share[50], 1 / (1 + upper), 1e-4);
   EXPECT_GT(upper, (1 + 8) / 2.0);
 }

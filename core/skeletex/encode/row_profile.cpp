@@ -12,9 +12,9 @@ namespace {
 constexpr double kUniformPart = 1e-4;
 
 /// The mean |dP/du| would be 1, the least error of flat triangles over a square lattice 3 (errors grow with the square of a row's
-/// length, the area that has them with the length). But 3 spends rows on the few most stretched columns; 1.5 keeps the mean error and
+/// length, the area that has them with the length). But 3 spends rows on the few most stretched columns; 1.25 keeps the mean error and
 /// lowers the maximum (docs/encoding.md).
-constexpr double kExponent = 1.5;
+constexpr double kExponent = 1.25;
 
 /// Integral up to u of a width that rises linearly from `low` to `middle`, falls to `high`, and has the total `area`.
 double hat_integral(double u, double low, double middle, double high, double area) {

@@ -7,7 +7,7 @@
 
 namespace skeletex {
 
-/// How surface length accumulates along a patch. The share g(u) of the rows below u grows with the power mean, exponent 1.5, of
+/// How surface length accumulates along a patch. The share g(u) of the rows below u grows with the power mean, exponent 1.25, of
 /// |dP/du| over v: with the mean, but more where some columns are stretched.
 struct RowProfile {
   std::vector<double> u;      ///< increasing from 0 to 1
