@@ -90,10 +90,9 @@ def fig16_morph(results, folder):
     rows = style.rows(results, "morph")
     if not rows:
         return []
-    pairs = style.unique(row["parameters"]["pair"] for row in rows)
-    times = sorted(style.unique(row["parameters"]["t"] for row in rows))
-    titles = [f"t = {t:g}" for t in times]
-    return [style.sheet(results, "morph", [[f"{pair}-{t}.png" for t in times] for pair in pairs], titles, pairs, folder, "fig16_morph", cell=2.6)]
+    frames = [row["parameters"]["frame"].rsplit("-", 1) for row in rows]  # "man-homer-0.5"
+    pairs, times = style.unique(pair for pair, _ in frames), sorted(style.unique(t for _, t in frames), key=float)
+    return [style.sheet(results, "morph", [[f"{pair}-{t}.png" for t in times] for pair in pairs], [f"t = {t}" for t in times], pairs, folder, "fig16_morph", cell=2.6)]
 
 
 def fig17_transfer(results, folder):
