@@ -644,7 +644,8 @@ kernel void measure_middles(const int texture_width, const int texture_height, c
 // back to their place in the even lattice and to their point there.
 kernel void put_far_back(const int texture_width, const int texture_height, const float limit, global const int* restrict texel_patches,
                          global const PatchRecord* restrict patches, global const int* restrict furthest, global const float* restrict even_x,
-                         global const float* restrict even_y, global const float* restrict even_z, global int* restrict anchors,
+                         global const float* restrict even_y, global const float* restrict even_z, global const float* restrict home_x,
+                         global const float* restrict home_y, global int* restrict anchors,
                          global float* restrict offset_x, global float* restrict offset_y, global float* restrict x, global float* restrict y,
                          global float* restrict z, global int* restrict back_count) {
   const int column = (int)get_global_id(0), line = (int)get_global_id(1);
@@ -661,7 +662,7 @@ kernel void put_far_back(const int texture_width, const int texture_height, cons
       if (row + dy >= 0 && row + dy <= p->height - 2) is_far |= furthest[texel_at(p, texture_width, inner + dx, row + dy)] > as_int(limit);
   if (!is_far) return;
   x[texel] = even_x[texel], y[texel] = even_y[texel], z[texel] = even_z[texel];
-  offset_x[texel] = 0.0f, offset_y[texel] = 0.0f;
+  offset_x[texel] = home_x[texel], offset_y[texel] = home_y[texel];
   anchors[texel] = 0;
   atomic_inc(back_count);
 }

@@ -335,7 +335,8 @@ kernel void find_bad_around(const int changed_count, const int texture_width, gl
 // out  changed: the list of texels that have gone back now; counts[1]: how many they are; is_bad: 0 again
 kernel void put_back(const int quad_count, const int texture_width, const int with_vertices, const int is_reading, global const int* restrict bad,
                      global const int* restrict texel_patches, global const PatchRecord* restrict patches, global const float* restrict before_x,
-                     global const float* restrict before_y, global const float* restrict before_z, global int* restrict is_bad,
+                     global const float* restrict before_y, global const float* restrict before_z, global const float* restrict home_x,
+                     global const float* restrict home_y, global int* restrict is_bad,
                      global int* restrict is_back, global int* restrict anchors, global float* restrict offset_x, global float* restrict offset_y,
                      global float* restrict x, global float* restrict y, global float* restrict z, global int* restrict changed,
                      global int* restrict counts) {
@@ -354,8 +355,8 @@ kernel void put_back(const int quad_count, const int texture_width, const int wi
   y[texel] = before_y[texel];
   z[texel] = before_z[texel];
   if (is_reading) {
-    offset_x[texel] = 0.0f;
-    offset_y[texel] = 0.0f;
+    offset_x[texel] = home_x[texel];
+    offset_y[texel] = home_y[texel];
     anchors[texel] = 0;
   }
   changed[atomic_inc(counts + 1)] = texel;

@@ -6,19 +6,14 @@
 // height-1 stay. A texel changes its own offset alone, and looks at its neighbours' points, which change between the passes: nothing
 // depends on the order of work-items.
 #include "skeletex_structs.h"
+#include "map_triangle.h"
+#include "patch_texels.h"
 
-#define NO_TRIANGLE 0x7fffffff
 #define LEAST_COSINE 0.1f      // between a triangle and the surface
 #define LEAST_AGREEMENT 0.8f   // squared length of the mean of the normals around; less is an edge of the surface, no fold of the lattice
 #define FURTHEST 1.0f          // cells from a texel's own place, along each axis
 #define LARGEST_STEP 0.4f      // cells
 #define MARGIN 0.3f            // cells that the rows next to a seam or pole keep from it
-
-// The texel at a column and row of a patch; columns wrap round.
-int texel_at(global const PatchRecord* restrict p, int texture_width, int column, int row) {
-  const int wrapped = column < 0 ? column + p->width : column >= p->width ? column - p->width : column;
-  return (p->y + row) * texture_width + p->x + wrapped;
-}
 
 float3 point_at(global const float* restrict x, global const float* restrict y, global const float* restrict z, int i) { return (float3)(x[i], y[i], z[i]); }
 

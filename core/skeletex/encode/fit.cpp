@@ -98,7 +98,7 @@ FarReport put_back_far(ClContext& context, std::span<const Patch> patches, const
   for (int pass = 0; pass < (is_fitted ? kFarPasses : kFarPassesOfSnapped); ++pass) {
     context.fill(count, 0);
     context.launch({"fit.cl", "put_far_back"}, layout.range(), layout.width, layout.height, limit, layout.texel_patches, layout.patches,
-                   quads.measure(points), filtered.x, filtered.y, filtered.z, positions.anchors, positions.x, positions.y, points.x, points.y, points.z, count);
+                   quads.measure(points), filtered.x, filtered.y, filtered.z, positions.home_x, positions.home_y, positions.anchors, positions.x, positions.y, points.x, points.y, points.z, count);
     report.turned_triangles = quads.turned();
     const int back = context.download(count)[0];
     if (back == 0) break;

@@ -78,12 +78,13 @@ TexelPoints allocate_points(ClContext& context, std::size_t size) {
   return {context.allocate<float>(size), context.allocate<float>(size), context.allocate<float>(size)};
 }
 
+void copy_plane(ClContext& context, const ClBuffer<float>& from, ClBuffer<float>& to) {
+  context.queue().enqueueCopyBuffer(from.memory, to.memory, 0, 0, from.size * sizeof(float));
+}
+
 TexelPoints copy_points(ClContext& context, const TexelPoints& points) {
   TexelPoints copy = allocate_points(context, points.x.size);
-  const auto copy_plane = [&](const ClBuffer<float>& from, ClBuffer<float>& to) {
-    context.queue().enqueueCopyBuffer(from.memory, to.memory, 0, 0, from.size * sizeof(float));
-  };
-  copy_plane(points.x, copy.x), copy_plane(points.y, copy.y), copy_plane(points.z, copy.z);
+  copy_plane(context, points.x, copy.x), copy_plane(context, points.y, copy.y), copy_plane(context, points.z, copy.z);
   return copy;
 }
 
@@ -201,8 +202,10 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   place_end_rows(context, sources, texture_width, origin, points);
 
   const bool is_snapped = options.has_snap && maps.triangle_count > 0, is_fitted = options.has_fit && maps.triangle_count > 0;
-  if (options.has_unfold && maps.triangle_count > 0)
+  if (options.has_unfold && maps.triangle_count > 0) {
     result.report.unfold = unfold_lattice(context, layout, maps, covering, [&](ClBuffer<int>& walkers) { walk(walkers), read(walkers); }, positions, points);
+    copy_plane(context, positions.x, positions.home_x), copy_plane(context, positions.y, positions.home_y);
+  }
   const TexelPoints even = points;
   const SnapFeatures features =
       is_snapped || is_fitted ? find_features(sources.charts, sources.patches, options.snap_dihedral) : SnapFeatures{};

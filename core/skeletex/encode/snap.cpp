@@ -84,8 +84,8 @@ SnapFeatures find_features(std::span<const Chart> charts, std::span<const Patch>
 
 ReadingPositions even_positions(ClContext& context, const DeviceLayout& layout) {
   ReadingPositions positions{context.allocate<float>(layout.size()), context.allocate<float>(layout.size()), context.allocate<int>(layout.size()),
-                             context.allocate<float>(layout.size())};
-  context.fill(positions.x, 0.f), context.fill(positions.y, 0.f);
+                             context.allocate<float>(layout.size()), context.allocate<float>(layout.size()), context.allocate<float>(layout.size())};
+  for (ClBuffer<float>* plane : {&positions.x, &positions.y, &positions.home_x, &positions.home_y}) context.fill(*plane, 0.f);
   context.fill(positions.anchors, 0), context.fill(positions.parameters, 0.f);
   return positions;
 }
@@ -197,7 +197,7 @@ int put_back_folds(ClContext& context, const DeviceLayout& layout, const TexelPo
       const int quads = context.download(counts)[0];
       if (quads == 0) break;
       context.launch({"snap.cl", "put_back"}, over(4 * quads), quads, layout.width, with_vertices, static_cast<int>(is_reading), bad, layout.texel_patches,
-                     layout.patches, before.x, before.y, before.z, is_bad, is_back, positions.anchors, positions.x, positions.y, points.x, points.y, points.z,
+                     layout.patches, before.x, before.y, before.z, positions.home_x, positions.home_y, is_bad, is_back, positions.anchors, positions.x, positions.y, points.x, points.y, points.z,
                      changed, counts);
       waiting = context.download(counts)[1];
       total += waiting;

@@ -36,6 +36,7 @@ struct ReadingPositions {
   ClBuffer<float> x, y;         ///< around, along
   ClBuffer<int> anchors;        ///< 0: nothing; 1 + i: vertex i of the features; -1 - i: edge i
   ClBuffer<float> parameters;   ///< place on the edge, 0 at its first point, 1 at its last
+  ClBuffer<float> home_x, home_y;  ///< the offsets that texels go back to: 0, but where the even lattice is unfolded
 };
 /// The even lattice.
 ReadingPositions even_positions(ClContext& context, const DeviceLayout& layout);
