@@ -126,7 +126,7 @@ Json report_json(const EncodeReport& report, const EncodeOptions& options, doubl
             {"encoding", report.encoding_ms}}},
           {"seconds", used_seconds},
           {"device", report.device}};
-  json["lattice"] = {{"folded_quads", report.unfold.folded_quads}, {"left", report.unfold.left}};
+  if (report.unfold) json["lattice"] = {{"folded_quads", report.unfold->folded_quads}, {"left", report.unfold->left}};
   if (report.snap)
     json["snap"] = {{"vertices", report.snap->vertices},
                     {"snapped_vertices", report.snap->snapped_vertices},

@@ -141,8 +141,9 @@ TEST(Unfold, TakesMostSelfIntersectionsFromABearAndStaysOnIt) {
   EncodeOptions options;
   options.width = options.height = 512;
   const EncodeResult encoded = encode_model(device(), model.mesh, model.skeleton, options);
-  EXPECT_GT(encoded.report.unfold.folded_quads, 10);
-  EXPECT_LT(4 * encoded.report.unfold.left, encoded.report.unfold.folded_quads);
+  const UnfoldReport& report = encoded.report.unfold.value();
+  EXPECT_GT(report.folded_quads, 10);
+  EXPECT_LT(4 * report.left, report.folded_quads);
   options.has_unfold = false;
   const auto crossing = count_self_intersections(reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model));
   EXPECT_GT(crossing, 10);

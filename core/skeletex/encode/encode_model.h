@@ -60,7 +60,7 @@ struct EncodeReport {
   double diagonal = 0;
   std::vector<BoneReport> bones;
   double used_fraction = 0;
-  UnfoldReport unfold;
+  std::optional<UnfoldReport> unfold;  ///< when it was on
   std::optional<SnapReport> snap;  ///< when it was on
   std::optional<FitReport> fit;    ///< when it was on
   int turned_triangles = 0, even_turned_triangles = 0;  ///< with snapping or fit: see FarReport

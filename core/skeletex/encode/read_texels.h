@@ -44,7 +44,7 @@ struct TexelReport {
   std::vector<double> sampled_triangle_fractions;  ///< per bone: share of the chart's triangles that a texel reads
   std::vector<int> missed_texels;                  ///< per bone: filled from neighbours along the column
   std::optional<SnapReport> snap;
-  UnfoldReport unfold;
+  std::optional<UnfoldReport> unfold;
   std::optional<FitReport> fit;
   int turned_triangles = 0, even_turned_triangles = 0;  ///< with snapping or fit: see FarReport
 };
