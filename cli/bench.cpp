@@ -2,18 +2,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
-#include <cmath>
-#include <functional>
+#include <map>
 #include <memory>
-#include <numbers>
 
-#include "bone_pairs.h"
+#include "bench/stages/stages.h"
 #include "command.h"
-#include "skeletex/edit/morph.h"
+#include "program_path.h"
+#include "progress_bar.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/pose_file.h"
-#include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "table.h"
 
@@ -21,127 +18,139 @@ namespace skeletex::cli {
 namespace {
 
 struct Arguments {
-  std::vector<std::string> models;
+  std::vector<std::string> models, stages;
   std::string pose, device, json;
-  int size = 0, repeats = 15;
+  int size = 0, repeats = 0;
 };
 
-double wall_ms(const std::function<void()>& work) {
-  const auto begin = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
-}
+bool is_one_of(const std::string& name, std::initializer_list<const char*> names) { return std::find(names.begin(), names.end(), name) != names.end(); }
+bool needs_mesh(const std::string& stage) { return is_one_of(stage, {"vsm", "spd_rays", "metro", "segment", "encode"}); }
+bool needs_two(const std::string& stage) { return is_one_of(stage, {"morph", "transfer"}); }
+bool is_config(const std::string& path) { return path.ends_with(".json"); }
 
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
+/// What the stages are made from: the models given, or the project's own. Read and encoded when a stage asks for them.
+class Inputs {
+ public:
+  Inputs(ClContext& context, const Arguments& arguments) : context_(context), arguments_(arguments) {}
 
-/// Device and wall time of one frame, and of a copy that moves the same bytes, alternating.
-struct Stage {
-  std::string name;
-  std::vector<double> device_ms, wall_ms, copy_ms;
+  MeshInputPointer mesh(std::size_t number) {
+    const std::string name = name_of(number, "armadillo");
+    MeshInputPointer& input = meshes_[name];
+    if (!input) input = arguments_.models.empty() ? find_mesh_input(name) : read_mesh_input(name);
+    return input;
+  }
+
+  /// \param size  where none is given: of models that are encoded for it; 0: their own
+  TextureInputPointer texture(std::size_t number, const char* own_name, int size) {
+    if (arguments_.size > 0) size = arguments_.size;
+    const std::string name = name_of(number, own_name);
+    TextureInputPointer& input = textures_[{name, size}];
+    if (input) return input;
+    if (arguments_.models.empty()) {
+      input = encode_input(context_, *find_mesh_input(name), size);
+    } else if (is_config(name)) {
+      input = encode_input(context_, *mesh(number), size);
+    } else {
+      SkeletexModel model = read_model(name);
+      if (arguments_.size > 0) model = resample_model(context_, model, size);
+      input = std::make_shared<TextureInput>(TextureInput{name, std::move(model)});
+    }
+    return input;
+  }
+
+ private:
+  std::string name_of(std::size_t number, const char* own_name) const { return arguments_.models.empty() ? own_name : arguments_.models[number]; }
+
+  ClContext& context_;
+  const Arguments& arguments_;
+  std::map<std::string, MeshInputPointer> meshes_;
+  std::map<std::pair<std::string, int>, TextureInputPointer> textures_;
 };
 
-Stage measure(ClContext& context, const std::string& name, std::size_t floats_moved, int repeats, const std::function<void()>& frame) {
-  // A copy reads and writes: half as many floats make the same traffic.
-  const std::size_t size = (floats_moved + 1) / 2;
-  const auto from = context.allocate<float>(size), to = context.allocate<float>(size);
-  Stage stage{name, {}, {}, {}};
-  constexpr int kWarmUps = 2;
-  for (int i = 0; i < kWarmUps + repeats; ++i) {
-    ::cl::Event event;
-    context.queue().enqueueCopyBuffer(from.memory, to.memory, 0, 0, size * sizeof(float), nullptr, &event);
-    event.wait();
-    context.reset_profile();
-    const double wall = wall_ms([&] {
-      frame();
-      context.finish();
-    });
-    if (i < kWarmUps) continue;
-    double device = 0;
-    for (const ClProfileEntry& entry : context.profile()) device += entry.milliseconds;
-    stage.device_ms.push_back(device);
-    stage.wall_ms.push_back(wall);
-    stage.copy_ms.push_back(1e-6 * static_cast<double>(event.getProfilingInfo<CL_PROFILING_COMMAND_END>() - event.getProfilingInfo<CL_PROFILING_COMMAND_START>()));
+Stage make_stage(const std::string& name, ClContext& context, Inputs& inputs, const Arguments& arguments) {
+  // Frames are those of the paper's largest texture; solvers and the command take the size that models have by default.
+  constexpr int kFrameSize = 2048, kModelSize = 512;
+  const int size = arguments.size > 0 ? arguments.size : kModelSize;
+  if (name == "reconstruct") return reconstruct_stage(context, inputs.texture(0, "armadillo", kFrameSize));
+  if (name == "pose") {
+    const TextureInputPointer input = inputs.texture(0, "armadillo", kFrameSize);
+    std::optional<Pose> pose;
+    if (!arguments.pose.empty()) pose = pose_at(input->model.skeleton, read_animation(arguments.pose, input->model.skeleton), 0);
+    return pose_stage(context, input, pose);
   }
-  return stage;
+  if (name == "morph") return morph_stage(context, inputs.texture(0, "bear", kFrameSize), inputs.texture(1, "bear_bis", kFrameSize));
+  if (name == "transfer") return transfer_stage(context, inputs.texture(0, "bear", kFrameSize), inputs.texture(1, "bear_bis", kFrameSize));
+  if (name == "filter") return filter_stage(context, inputs.texture(0, "armadillo", kModelSize));
+  if (name == "vsm") return vsm_stage(context, inputs.mesh(0));
+  if (name == "spd_rays") return spd_rays_stage(context, inputs.mesh(0), size);
+  if (name == "metro") return metro_stage(context, inputs.mesh(0));
+  if (name == "segment") return segment_stage(context, inputs.mesh(0));
+  return encode_stage(inputs.mesh(0), size, program_path(), arguments.device);
 }
 
-/// Where no pose is given: the skeleton bent by 40 degrees over its longest axis.
-Pose bent(const Skeleton& skeleton) {
-  TriangleMesh nodes;
-  for (const auto& node : skeleton.nodes) nodes.positions.push_back(node.position);
-  const BoundingBox box = bounding_box(nodes);
-  const Vec3 extent = box.upper - box.lower;
-  int axis = 0;
-  extent.maxCoeff(&axis);
-  Vec3 about = Vec3::Zero();
-  about[(axis + 1) % 3] = 1;
-  Pose pose;
-  for (const Vec3& p : nodes.positions) {
-    const double angle = extent[axis] > 0 ? std::numbers::pi / 4.5 * (p[axis] - box.lower[axis]) / extent[axis] : 0;
-    pose.nodes.push_back(box.lower + Eigen::AngleAxisd(angle, about) * (p - box.lower));
-  }
-  return pose;
+/// The stages asked for, else all that the models allow, in the order of a report.
+std::vector<std::string> stages_of(const Arguments& arguments) {
+  const auto lacks = [&](const std::string& stage) -> const char* {
+    if (arguments.models.empty()) return nullptr;
+    if (needs_mesh(stage) && !is_config(arguments.models[0])) return "a mesh and its skeleton: a .json as in configs/models";
+    if (needs_two(stage) && arguments.models.size() < 2) return "two models that correspond";
+    return nullptr;
+  };
+  for (const std::string& stage : arguments.stages)
+    if (const char* what = lacks(stage)) throw CLI::ValidationError("--stage", stage + " takes " + what);
+  std::vector<std::string> chosen;
+  for (const std::string& stage : kStageNames)
+    if (arguments.stages.empty() ? !lacks(stage) : std::find(arguments.stages.begin(), arguments.stages.end(), stage) != arguments.stages.end()) chosen.push_back(stage);
+  return chosen;
+}
+
+Json row_json(const Stage& stage, const StageSamples& samples, const std::string& device) {
+  const double wall = samples.median(&StageSample::wall_ms);
+  Json row{{"stage", stage.name},
+           {"model", stage.model},
+           {"size", stage.size},
+           {"ms", samples.median(&StageSample::ms)},
+           {"reference", stage.reference},
+           {"reference_ms", samples.median(&StageSample::reference_ms)},
+           {"ratio", samples.ratio()},
+           {"wall_ms", wall},
+           {"frames_per_second", 1000 / wall},
+           {"ms_min", samples.least(&StageSample::ms)},
+           {"ms_max", samples.most(&StageSample::ms)},
+           {"device_ms", samples.median(&StageSample::device_ms)},
+           {"launches", samples.median(&StageSample::launches)},
+           {"repeats", samples.samples.size()},
+           {"device", device}};
+  if (stage.details)
+    for (const auto& [name, value] : stage.details()) row[name] = value;
+  return row;
 }
 
 void run(const Arguments& arguments) {
   if (arguments.models.size() > 2) throw CLI::ValidationError("one model, or two that correspond");
   check_json_target(arguments.json);
+  const std::vector<std::string> names = stages_of(arguments);
   ClContext context(arguments.device);
-  std::vector<SkeletexModel> models;
-  for (const std::string& path : arguments.models) {
-    SkeletexModel model = read_model(path);
-    models.push_back(arguments.size > 0 ? resample_model(context, model, arguments.size) : std::move(model));
-  }
-  const SkeletexModel& model = models.front();
-  const Walls walls(model.skeleton);
-  const auto upload = [&context](const SkeletexModel& m) {
-    return upload_lattice(context, frame_tables(m.skeleton, Walls(m.skeleton), m.patches, m.origin), m.patches, m.texture, RowChoice::kInner);
-  };
-  const DeviceLattice lattice = upload(model);
-  DevicePlanes points = allocate_planes(context, lattice.vertex_count);
-  constexpr std::size_t kPlanes = 3;
+  Inputs inputs(context, arguments);
+  Repeats repeats;
+  if (arguments.repeats > 0) repeats = {.most = arguments.repeats, .least = arguments.repeats};
 
-  std::vector<Stage> stages;
-  stages.push_back(measure(context, "reconstruct", 2 * kPlanes * lattice.vertex_count, arguments.repeats, [&] { displace(context, lattice, points); }));
-
-  const Pose pose = arguments.pose.empty() ? bent(model.skeleton) : pose_at(model.skeleton, read_animation(arguments.pose, model.skeleton), 0);
-  stages.push_back(measure(context, "pose", 2 * kPlanes * lattice.vertex_count, arguments.repeats, [&] {
-    const Skeleton posed = apply_pose(model.skeleton, pose);
-    displace_posed(context, lattice, upload_pose(context, model, PosedWalls(model, posed), RowChoice::kInner, DistanceRule::kFromBone), points);
-  }));
-
-  if (models.size() == 2) {
-    const Correspondence bones = correspond(arguments.models[0], models[0].skeleton, arguments.models[1], models[1].skeleton, {});
-    MorphOptions options;
-    options.layout = 0;
-    const Morph morph(context, models, std::vector{bones}, options);
-    double t = 0;
-    stages.push_back(measure(context, "morph", 3 * kPlanes * lattice.vertex_count, arguments.repeats, [&] {
-      t = std::fmod(t + 0.37, 1.0);
-      DeviceLattice live;
-      const SkeletexModel between = morph.queue(std::vector{1 - t, t}, live.texels);
-      live.texture_width = between.texture.width;
-      live.vertex_count = lattice.vertex_count;
-      live.tables = upload_tables(context, frame_tables(between.skeleton, Walls(between.skeleton), between.patches, between.origin));
-      live.rows = context.upload(lattice_rows(between.patches, RowChoice::kInner));
-      displace(context, live, points);
-    }));
-  }
-
-  Table table({"stage", "frames/s", "wall ms", "device ms", "min", "max", "copy ms", "ratio"});
+  Table table({"stage", "model", "size", "ms", "min", "max", "wall ms", "reference ms", "ratio", "against"});
   Json json = Json::array();
-  for (const Stage& stage : stages) {
-    const double ms = median(stage.device_ms), wall = median(stage.wall_ms), copy = median(stage.copy_ms);
-    const auto [least, most] = std::minmax_element(stage.device_ms.begin(), stage.device_ms.end());
-    table.add({stage.name, fmt::format("{:.1f}", 1000 / wall), fmt::format("{:.2f}", wall), fmt::format("{:.2f}", ms), fmt::format("{:.2f}", *least), fmt::format("{:.2f}", *most),
-               fmt::format("{:.2f}", copy), fmt::format("{:.2f}", ms / copy)});
-    json.push_back({{"stage", stage.name}, {"model", arguments.models[0]}, {"size", model.texture.width}, {"ms", ms}, {"reference", "device copy of the same bytes"},
-                    {"reference_ms", copy}, {"ratio", ms / copy}, {"wall_ms", wall}, {"frames_per_second", 1000 / wall}, {"device", context.device().name}});
+  {
+    ProgressBar bar;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const auto show = [&](double done) { bar.show(names[i], (static_cast<double>(i) + done) / static_cast<double>(names.size())); };
+      show(0);
+      const Stage stage = make_stage(names[i], context, inputs, arguments);
+      const Json row = row_json(stage, measure(context, stage, repeats, show), context.device().name);
+      const auto cell = [&](const char* key) { return fmt::format("{:.2f}", row.at(key).get<double>()); };
+      table.add({stage.name, stage.model, fmt::format("{}", stage.size), cell("ms"), cell("ms_min"), cell("ms_max"), cell("wall_ms"), cell("reference_ms"), cell("ratio"),
+                 stage.reference});
+      json.push_back(row);
+    }
   }
-  print(arguments.json, table.text() + fmt::format("{} x {} texels, medians of {}; on {}\n", model.texture.width, model.texture.height, arguments.repeats, context.device().name));
+  print(arguments.json, table.text() + fmt::format("medians; on {}\n", context.device().name));
   write_json(arguments.json, json);
   context.save_programs();
 }
@@ -150,20 +159,29 @@ void run(const Arguments& arguments) {
 
 void add_bench_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App& command = *program.add_subcommand("bench", "Time frames of a model: reconstruction, a pose, a morph");
-  command.add_option("MODEL", arguments->models, "model (.skx.exr), and for the morph another one whose skeleton corresponds")->required();
-  command.add_option("--size", arguments->size, "texels along the longer side (default: the model's)")->check(CLI::Range(4, 16384).description(""))->type_name("N");
+  CLI::App& command = *program.add_subcommand("bench", "Time the stages on your device, each beside what it is measured against");
+  command.add_option("MODEL", arguments->models,
+                     "model (.skx.exr), or mesh and skeleton (.json as in configs/models), and for morph and transfer another one whose skeleton corresponds "
+                     "(default: models of the project)");
+  CLI::Option& stages = *command.add_option("--stage", arguments->stages, "these stages only")->delimiter(',');
+  take_one_of(stages, kStageNames);
+  stages.type_name("NAME,..");
+  command.add_option("--size", arguments->size, "texels along the longer side (default: the model's; of others 2048 for frames, else 512)")
+      ->check(CLI::Range(4, 16384).description(""))
+      ->type_name("N");
   command.add_option("--pose", arguments->pose, "pose: .json (default: the skeleton bent by 40 degrees)")->type_name("FILE");
-  command.add_option("--repeats", arguments->repeats, "frames that are timed, after two that are not (default: 15)")
+  command.add_option("--repeats", arguments->repeats, "runs that are timed, after one that is not (default: up to 15, 3 at least, in 2 s)")
       ->check(CLI::Range(1, 10000).description(""))
       ->type_name("N");
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(
-      "Example:\n"
-      "  skeletex bench bear.skx.exr bear_bis.skx.exr --size 2048\n"
-      "A frame ends with all vertices of the lattice on the device. Wall time has the host's part (walls and tables of the pose), device time the\n"
-      "kernels alone; the copy moves as many bytes as they must: texels in, points out.");
+      "Examples:\n"
+      "  skeletex bench\n"
+      "  skeletex bench bear.skx.exr bear_bis.skx.exr --size 2048 --stage pose,morph\n"
+      "  skeletex bench configs/models/bunny00.json --stage vsm,encode\n"
+      "Stages: reconstruct, pose, morph, transfer, filter; of a mesh also vsm, spd_rays, metro, segment, encode. The first five count the kernels' time,\n"
+      "beside a device copy that moves the bytes that they must; the others all time, beside another library's on the same data.");
   command.callback([arguments] { run(*arguments); });
 }
 

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "command.h"
+#include "program_path.h"
 #include "progress_bar.h"
 #include "runner/run_experiment.h"
 #include "skeletex/io/json_file.h"
@@ -30,8 +31,6 @@ struct ReplayArguments {
   double tolerance = 0.02;
   int jobs = 1;
 };
-
-std::string this_program() { return fs::read_symlink("/proc/self/exe").string(); }
 
 std::string duration(double seconds) {
   const long whole = std::lround(seconds);
@@ -59,7 +58,7 @@ std::string rows_text(const Experiment& experiment, const RunSummary& summary) {
 RunSummary run_with_bar(const Experiment& experiment, RunOptions options) {
   ProgressBar bar;
   bar.show(experiment.name, 0);
-  options.program = this_program();
+  options.program = program_path();
   options.progress = [&](int done, int total, const std::string& key, double seconds_left) {
     bar.show(fmt::format("{} {}/{} {}, {} left", experiment.name, done, total, key, duration(seconds_left)), static_cast<double>(done) / total);
   };

@@ -10,8 +10,8 @@ packages=(
   ocl-icd-opencl-dev ocl-icd-libopencl1 opencl-headers opencl-clhpp-headers pocl-opencl-icd  # OpenCL, on the CPU
   libopenmesh-dev libeigen3-dev libopenexr-dev nlohmann-json3-dev libfmt-dev                 # library
   libegl-dev libopengl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libcairo2-dev pkg-config fonts-dejavu-core  # renderer, without a GPU too
-  libcli11-dev libspdlog-dev                                         # program
-  libgtest-dev libembree-dev openexr                                 # tests (metro against Embree, models against exrheader)
+  libcli11-dev libspdlog-dev libembree-dev                           # program (bench compares with Embree)
+  libgtest-dev openexr                                               # tests (models against exrheader)
   libbenchmark-dev python3 python3-matplotlib                                           # benchmarks, tables of the experiments
   libmeshoptimizer-dev libcgal-dev draco                                                # what the experiments compare with
   chromium                                                                              # test: the report in a browser

@@ -598,22 +598,33 @@ TEST_F(Program, MorphsToModelsAndMeshes) {
   for (const char* name : {"half.skx.exr", "half.ply"}) fs::remove(folder_ / name);
 }
 
-TEST_F(Program, TimesFramesAndReportsWhatTheContractNames) {
-  const nlohmann::json one = json_of({"bench", "y.skx.exr", "--repeats", "3"});
-  ASSERT_EQ(one.size(), 2u);
-  const nlohmann::json two = json_of({"bench", "y.skx.exr", "y.skx.exr", "--size", "96", "--repeats", "3"});
-  ASSERT_EQ(two.size(), 3u);
-  const char* stages[] = {"reconstruct", "pose", "morph"};
-  for (int i = 0; i < 3; ++i) {
-    expect_keys(two[i], {"stage", "model", "size", "ms", "reference", "reference_ms", "ratio", "wall_ms", "frames_per_second", "device"});
-    EXPECT_EQ(two[i]["stage"], stages[i]);
-    EXPECT_EQ(two[i]["size"], 96);
-    EXPECT_GT(two[i]["ms"], 0);
-    EXPECT_GE(two[i]["wall_ms"], two[i]["ms"]) << "a frame holds its kernels";
-    EXPECT_NEAR(two[i]["ratio"].get<double>() * two[i]["reference_ms"].get<double>(), two[i]["ms"].get<double>(), 1e-9);
-  }
+TEST_F(Program, TimesStagesBesideTheirReferencesAndReportsWhatTheContractNames) {
+  std::ofstream(folder_ / "y.json") << R"({"name": "Y", "mesh": "y.ply", "skeleton": "y.skeleton.json", "credits": ""})";
+  const auto expect_stages = [](const nlohmann::json& rows, const std::vector<std::string>& stages) {
+    ASSERT_EQ(rows.size(), stages.size());
+    for (std::size_t i = 0; i < stages.size(); ++i) {
+      const nlohmann::json& row = rows[i];
+      expect_keys(row, {"stage", "model", "size", "ms", "reference", "reference_ms", "ratio", "wall_ms", "frames_per_second", "ms_min", "ms_max", "device_ms", "launches",
+                        "repeats", "device"});
+      EXPECT_EQ(row["stage"], stages[i]);
+      EXPECT_EQ(row["repeats"], 2);
+      EXPECT_GT(row["ms"], 0);
+      EXPECT_GE(row["wall_ms"], row["ms"]) << "a frame holds its kernels";
+      EXPECT_NEAR(row["ratio"].get<double>() * row["reference_ms"].get<double>(), row["ms"].get<double>(), 1e-9);
+    }
+  };
+  expect_stages(json_of({"bench", "y.skx.exr", "--repeats", "2"}), {"reconstruct", "pose", "filter"});
+  const nlohmann::json two = json_of({"bench", "y.skx.exr", "y.skx.exr", "--size", "96", "--repeats", "2"});
+  expect_stages(two, {"reconstruct", "pose", "morph", "transfer", "filter"});
+  EXPECT_EQ(two[0]["size"], 96);
+  expect_stages(json_of({"bench", "y.json", "--stage", "encode,vsm,metro,segment,spd_rays", "--size", "64", "--repeats", "2"}), {"vsm", "spd_rays", "metro", "segment", "encode"});
   expect_refused(2, {"bench", "y.skx.exr", "y.skx.exr", "y.skx.exr"}, {"one model, or two"});
+  expect_refused(2, {"bench", "y.skx.exr", "--stage", "morph"}, {"--stage", "morph", "two models"});
+  expect_refused(2, {"bench", "y.skx.exr", "--stage", "vsm"}, {"--stage", "vsm", "skeleton"});
+  expect_refused(2, {"bench", "--stage", "morf"}, {"morf", "morph"});
   expect_refused(1, {"bench", "y.ply"}, {"y.ply"});
+  std::ofstream(folder_ / "gone.json") << R"({"name": "gone", "mesh": "gone.off", "skeleton": "y.skeleton.json", "credits": ""})";
+  expect_refused(1, {"bench", "gone.json"}, {"gone.off", "install-dependencies"});
 }
 
 TEST_F(Program, RefusesOutputsThatCannotBeWrittenAndLeavesNothingBehind) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/measure/metro.h"
 
-#include <embree3/rtcore.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -11,6 +10,7 @@
 #include <random>
 #include <set>
 
+#include "bench/stages/embree_scene.h"
 #include "skeletex/measure/hilbert_order.h"
 #include "skeletex/measure/parallel.h"
 #include "skeletex/measure/point_triangle.h"
@@ -347,54 +347,13 @@ TEST(Metro, TheHilbertCurveVisitsEveryCellFromANeighbour) {
 
 namespace {
 
-struct EmbreeQuery {
-  const TriangleMesh* mesh;
-  Vec3 point;
-  double best;
-};
-
-bool visit_triangle(RTCPointQueryFunctionArguments* arguments) {
-  auto* query = static_cast<EmbreeQuery*>(arguments->userPtr);
-  const auto [a, b, c] = query->mesh->triangles[arguments->primID];
-  const double d =
-      static_cast<double>(twin_distance_to_triangle(query->point, query->mesh->positions[a], query->mesh->positions[b], query->mesh->positions[c]));
-  if (d >= query->best) return false;
-  query->best = d;
-  arguments->query->radius = static_cast<float>(d * (1 + 1e-6) + 1e-12);
-  return true;
-}
+double twin_distance(const Vec3& point, const Vec3& a, const Vec3& b, const Vec3& c) { return static_cast<double>(twin_distance_to_triangle(point, a, b, c)); }
 
 /// Distances by Embree's tree, with the twin at its leaves.
 std::vector<double> embree_distances(const TriangleMesh& mesh, const std::vector<Vec3>& points) {
-  RTCDevice device = rtcNewDevice(nullptr);
-  RTCScene scene = rtcNewScene(device);
-  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh.positions.size()));
-  for (const Vec3& p : mesh.positions)
-    for (int d = 0; d < 3; ++d) *vertices++ = static_cast<float>(p[d]);
-  auto* indices = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, mesh.triangles.size()));
-  for (const Triangle& t : mesh.triangles)
-    for (const int v : t) *indices++ = static_cast<unsigned>(v);
-  rtcSetGeometryPointQueryFunction(geometry, visit_triangle);
-  rtcCommitGeometry(geometry);
-  rtcAttachGeometry(scene, geometry);
-  rtcReleaseGeometry(geometry);
-  rtcCommitScene(scene);
+  const EmbreeScene scene(mesh.positions, mesh.triangles, twin_distance);
   std::vector<double> distances;
-  for (const Vec3& p : points) {
-    EmbreeQuery user{&mesh, p, std::numeric_limits<double>::infinity()};
-    RTCPointQuery query{};
-    query.x = static_cast<float>(p.x());
-    query.y = static_cast<float>(p.y());
-    query.z = static_cast<float>(p.z());
-    query.radius = std::numeric_limits<float>::infinity();
-    RTCPointQueryContext query_context;
-    rtcInitPointQueryContext(&query_context);
-    rtcPointQuery(scene, &query, &query_context, nullptr, &user);
-    distances.push_back(user.best);
-  }
-  rtcReleaseScene(scene);
-  rtcReleaseDevice(device);
+  for (const Vec3& p : points) distances.push_back(scene.closest_distance(p));
   return distances;
 }
 

@@ -2,7 +2,6 @@
 #include "run_experiment.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -19,31 +18,12 @@
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/read_file.h"
 #include "skeletex/model/error.h"
+#include "work_folder.h"
 
 namespace skeletex {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// A folder that goes when the item ends.
-class WorkFolder {
- public:
-  WorkFolder() {
-    std::string pattern = (fs::temp_directory_path() / "skeletex-run-XXXXXX").string();
-    if (!::mkdtemp(pattern.data())) throw IoError(fmt::format("{}: no folder for intermediate files can be made there", fs::temp_directory_path().string()));
-    path_ = pattern;
-  }
-  ~WorkFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  WorkFolder(const WorkFolder&) = delete;
-  WorkFolder& operator=(const WorkFolder&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 void write_json_file(const fs::path& path, const OrderedJson& json) { write_text_atomically(path, json.dump(1, ' ', false, OrderedJson::error_handler_t::replace) + "\n"); }
 

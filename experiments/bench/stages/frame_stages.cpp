@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "skeletex/edit/correspondence.h"
+#include "skeletex/edit/filter.h"
+#include "skeletex/edit/morph.h"
+#include "skeletex/edit/part.h"
+#include "skeletex/edit/transfer.h"
+#include "skeletex/model/error.h"
+#include "skeletex/reconstruct/pose_mesh.h"
+#include "stages.h"
+
+namespace skeletex {
+namespace {
+
+constexpr std::size_t kPlanes = 3;
+constexpr const char* kCopy = "device copy of the same bytes";
+
+/// A model's inner rows on the device, and room for their points.
+struct Frame {
+  explicit Frame(ClContext& context, TextureInputPointer from)
+      : input(std::move(from)),
+        lattice(upload_lattice(context, frame_tables(model().skeleton, Walls(model().skeleton), model().patches, model().origin), model().patches,
+                               model().texture, RowChoice::kInner)),
+        points(allocate_planes(context, lattice.vertex_count)) {}
+  const SkeletexModel& model() const { return input->model; }
+
+  TextureInputPointer input;
+  DeviceLattice lattice;
+  DevicePlanes points;
+};
+
+int longer_side(const SkeletexModel& model) { return std::max(model.texture.width, model.texture.height); }
+std::size_t texels_of(const SkeletexModel& model) { return static_cast<std::size_t>(model.texture.width) * model.texture.height; }
+
+Stage stage_of(const char* name, const TextureInput& input) {
+  Stage stage;
+  stage.name = name;
+  stage.model = input.name;
+  stage.size = longer_side(input.model);
+  stage.reference = kCopy;
+  stage.is_device_time = true;
+  return stage;
+}
+
+Pose bent(const Skeleton& skeleton) {
+  TriangleMesh nodes;
+  for (const auto& node : skeleton.nodes) nodes.positions.push_back(node.position);
+  const BoundingBox box = bounding_box(nodes);
+  const Vec3 extent = box.upper - box.lower;
+  int axis = 0;
+  extent.maxCoeff(&axis);
+  Vec3 about = Vec3::Zero();
+  about[(axis + 1) % 3] = 1;
+  Pose pose;
+  for (const Vec3& p : nodes.positions) {
+    const double angle = extent[axis] > 0 ? std::numbers::pi / 4.5 * (p[axis] - box.lower[axis]) / extent[axis] : 0;
+    pose.nodes.push_back(box.lower + Eigen::AngleAxisd(angle, about) * (p - box.lower));
+  }
+  return pose;
+}
+
+Correspondence correspond(const TextureInput& a, const TextureInput& b) {
+  try {
+    return find_correspondence(a.model.skeleton, b.model.skeleton);
+  } catch (const InputError& error) {
+    throw InputError(a.name + " and " + b.name + ": " + error.what());
+  }
+}
+
+}  // namespace
+
+Stage reconstruct_stage(ClContext& context, TextureInputPointer input) {
+  Stage stage = stage_of("reconstruct", *input);
+  const auto frame = std::make_shared<Frame>(context, std::move(input));
+  stage.run = [&context, frame] { displace(context, frame->lattice, frame->points); };
+  stage.run_reference = device_copy(context, 2 * kPlanes * frame->lattice.vertex_count);
+  return stage;
+}
+
+Stage pose_stage(ClContext& context, TextureInputPointer input, const std::optional<Pose>& given) {
+  Stage stage = stage_of("pose", *input);
+  const Pose pose = given ? *given : bent(input->model.skeleton);
+  const auto frame = std::make_shared<Frame>(context, std::move(input));
+  stage.run = [&context, frame, pose] {
+    const SkeletexModel& model = frame->model();
+    const Skeleton posed = apply_pose(model.skeleton, pose);
+    displace_posed(context, frame->lattice, upload_pose(context, model, PosedWalls(model, posed), RowChoice::kInner, DistanceRule::kFromBone), frame->points);
+  };
+  stage.run_reference = device_copy(context, 2 * kPlanes * frame->lattice.vertex_count);
+  return stage;
+}
+
+Stage morph_stage(ClContext& context, TextureInputPointer first, TextureInputPointer second) {
+  Stage stage = stage_of("morph", *first);
+  stage.model += " to " + second->name;
+  MorphOptions options;
+  options.layout = 0;
+  const auto morph = std::make_shared<const Morph>(context, std::vector{first->model, second->model}, std::vector{correspond(*first, *second)}, options);
+  struct Live {
+    DeviceLattice lattice;
+    DevicePlanes points;
+    double t = 0;
+  };
+  const auto live = std::make_shared<Live>();
+  stage.run = [&context, morph, live] {
+    live->t = std::fmod(live->t + 0.37, 1.0);
+    const SkeletexModel between = morph->queue(std::vector{1 - live->t, live->t}, live->lattice.texels);
+    const std::vector<LatticeRow> rows = lattice_rows(between.patches, RowChoice::kInner);
+    if (live->lattice.vertex_count == 0) {
+      for (const Patch& patch : between.patches) live->lattice.vertex_count += static_cast<std::size_t>(patch.rectangle.width) * (patch.rectangle.height - 2);
+      live->points = allocate_planes(context, live->lattice.vertex_count);
+    }
+    live->lattice.texture_width = between.texture.width;
+    live->lattice.tables = upload_tables(context, frame_tables(between.skeleton, Walls(between.skeleton), between.patches, between.origin));
+    live->lattice.rows = context.upload(rows);
+    displace(context, live->lattice, live->points);
+  };
+  stage.run_reference = device_copy(context, 3 * kPlanes * texels_of(morph->models()[0]));  // two textures in, points out
+  return stage;
+}
+
+Stage transfer_stage(ClContext& context, TextureInputPointer source, TextureInputPointer target) {
+  Stage stage = stage_of("transfer", *target);
+  stage.model = source->name + " to " + stage.model;
+  const Correspondence to_source = correspond(*target, *source);
+  int chosen = -1;
+  const auto texels = [&](int bone) { return target->model.patches[bone].rectangle.width * target->model.patches[bone].rectangle.height; };
+  for (int bone = 0; bone < static_cast<int>(target->model.patches.size()); ++bone)
+    if (is_free_end(target->model, bone, BoneEnd::kHead) != is_free_end(target->model, bone, BoneEnd::kTail) && (chosen < 0 || texels(bone) > texels(chosen)))
+      chosen = bone;
+  if (chosen < 0) throw InputError(target->name + " has no bone with a free end to transfer");
+  const std::vector<std::pair<std::string, std::string>> pairs{
+      {source->model.skeleton.bones[to_source.bones[chosen]].name, target->model.skeleton.bones[chosen].name}};
+  stage.run = [&context, source, target, pairs] { transfer(context, source->model, target->model, pairs); };
+  stage.run_reference = device_copy(context, kPlanes * (texels_of(source->model) + 2 * texels_of(target->model)));  // both in, one out
+  return stage;
+}
+
+Stage filter_stage(ClContext& context, TextureInputPointer input) {
+  Stage stage = stage_of("filter", *input);
+  stage.reference = "device copy of the points, once per step of the solver";
+  const auto steps = std::make_shared<int>(smooth_model(context, input->model).report.solver.steps);
+  const auto copy = device_copy(context, 2 * kPlanes * texels_of(input->model));
+  stage.run = [&context, input, steps] { *steps = smooth_model(context, input->model).report.solver.steps; };
+  stage.run_reference = [copy, steps] {
+    double ms = 0;
+    for (int i = 0; i < *steps; ++i) ms += copy();
+    return ms;
+  };
+  stage.details = [steps] { return std::vector<std::pair<std::string, double>>{{"steps", *steps}}; };
+  return stage;
+}
+
+}  // namespace skeletex
