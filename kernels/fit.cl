@@ -7,8 +7,6 @@
 //   assemble          both -> per texel its row of the linear system
 //   relax_moves       one sweep of the solver over the texels of a colour
 //   move_points       points a step nearer
-//   measure_vertices, measure_middles, put_far_back
-//                     texels go back where mesh and lattice are too far apart; triangles that look against the mesh
 // The quad of a texel lies to the right of it and above it; its corners are numbered 0 (the texel), 1 (right), 2 (right
 // above), 3 (above). Its triangles are 0 1 2 and 0 2 3 with the first diagonal, 0 1 3 and 1 2 3 with the second.
 // A residual is a distance along a normal, linear in the three corners of one triangle: r + n . sum of weight x move. So a
@@ -573,96 +571,4 @@ kernel void move_points(const int texture_width, const int texture_height, globa
   out_x[texel] = start.x + rise * normal.x + share * slide.x;
   out_y[texel] = start.y + rise * normal.y + share * slide.y;
   out_z[texel] = start.z + rise * normal.z + share * slide.z;
-}
-
-// NDRange (vertices). The distance from vertices of the mesh to the lattice: to the nearest of 3 x 3 quads around the cell
-// that the vertex lies in.
-// out  furthest: per quad the largest distance, as the bits of a float, which order like those of an int
-kernel void measure_vertices(const int vertex_count, const int texture_width, global const int* restrict vertex_patches,
-                             global const int* restrict vertex_points, global const float* restrict cell_x, global const float* restrict cell_y,
-                             global const PatchRecord* restrict patches, global const float* restrict vertex_x, global const float* restrict vertex_y,
-                             global const float* restrict vertex_z, global const int* restrict diagonals, global const float* restrict x,
-                             global const float* restrict y, global const float* restrict z, global int* restrict furthest) {
-  const int v = (int)get_global_id(0);
-  if (v >= vertex_count) return;
-  global const PatchRecord* p = patches + vertex_patches[v];
-  const int wrapped = (int)floor(cell_x[v]) % p->width;
-  const int column = wrapped < 0 ? wrapped + p->width : wrapped, row = clamp((int)floor(cell_y[v]), 0, p->height - 2);
-  const Point point = point_at(vertex_x, vertex_y, vertex_z, vertex_points[v]);
-  float best = INFINITY;
-  // From the vertex' own quad on; a vertex on the lattice needs no more.
-  for (int k = 0; k < 9 && best > 0.0f; ++k) {
-    const int dx = (k + 1) % 3 - 1, dy = (k / 3 + 1) % 3 - 1;
-    if (row + dy < 0 || row + dy > p->height - 2) continue;
-    const int beside = column + dx < 0 ? column + dx + p->width : column + dx >= p->width ? column + dx - p->width : column + dx;
-    int at[4], triangle;
-    float w[3];
-    corners_of_quad(p, texture_width, beside, row + dy, at);
-    best = fmin(best, nearest_of_quad(point, at, diagonals[at[0]], x, y, z, &triangle, w));
-  }
-  atomic_max(furthest + texel_at(p, texture_width, column, row), as_int(sqrt(best)));
-}
-
-// NDRange (texture width, texture height). The same from the points of the lattice and the middles of its
-// triangles to the mesh.
-// is_on_mesh: whether the lattice's points are known to lie on it; covering: per texel a triangle of the map near it
-// out  turned_count: how many triangles look against the mesh
-kernel void measure_middles(const int texture_width, const int texture_height, const int triangle_count, const int is_on_mesh,
-                            global const int* restrict texel_patches,
-                            global const PatchRecord* restrict patches, global const int* restrict covering, global const int* restrict corners,
-                            global const int* restrict across, global const float* restrict vertex_x, global const float* restrict vertex_y,
-                            global const float* restrict vertex_z, global const int* restrict diagonals, global const float* restrict x,
-                            global const float* restrict y, global const float* restrict z, global int* restrict furthest,
-                            global int* restrict turned_count) {
-  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
-  if (column >= texture_width || line >= texture_height) return;
-  const int texel = line * texture_width + column;
-  const int patch = texel_patches[texel];
-  if (patch < 0) return;
-  global const PatchRecord* p = patches + patch;
-  const int row = line - p->y;
-  if (row > p->height - 2) return;
-  int at[4];
-  corners_of_quad(p, texture_width, column - p->x, row, at);
-  const int is_second = diagonals[texel], t = covering[row == 0 ? at[3] : texel];
-  if (t == NO_TRIANGLE) return;
-  Point nearest, normal;
-  float w[3];
-  float most = row == 0 || is_on_mesh ? 0.0f :
-                   walk_over_mesh(point_at(x, y, z, texel), t, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &nearest, &normal, w);
-  for (int i = 0; i < 2; ++i) {
-    const float third[3] = {1.0f / 3.0f, 1.0f / 3.0f, 1.0f / 3.0f};
-    const Point a = point_at(x, y, z, at[corner_of(is_second, i, 0)]), b = point_at(x, y, z, at[corner_of(is_second, i, 1)]),
-                c = point_at(x, y, z, at[corner_of(is_second, i, 2)]);
-    most = fmax(most, walk_over_mesh(weighted(third, a, b, c), t, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &nearest, &normal, w));
-    if (product(normal, cross_of(minus(b, a), minus(c, a))) < 0.0f) atomic_inc(turned_count);
-  }
-  furthest[texel] = max(furthest[texel], as_int(sqrt(most)));
-}
-
-// NDRange (texture width, texture height). Texels around a quad with a distance above the limit, and those next to them, go
-// back to their place in the even lattice and to their point there.
-kernel void put_far_back(const int texture_width, const int texture_height, const float limit, global const int* restrict texel_patches,
-                         global const PatchRecord* restrict patches, global const int* restrict furthest, global const float* restrict even_x,
-                         global const float* restrict even_y, global const float* restrict even_z, global const float* restrict home_x,
-                         global const float* restrict home_y, global int* restrict anchors,
-                         global float* restrict offset_x, global float* restrict offset_y, global float* restrict x, global float* restrict y,
-                         global float* restrict z, global int* restrict back_count) {
-  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
-  if (column >= texture_width || line >= texture_height) return;
-  const int texel = line * texture_width + column;
-  const int patch = texel_patches[texel];
-  if (patch < 0) return;
-  global const PatchRecord* p = patches + patch;
-  const int row = line - p->y, inner = column - p->x;
-  if (row < 1 || row > p->height - 2 || (x[texel] == even_x[texel] && y[texel] == even_y[texel] && z[texel] == even_z[texel])) return;
-  int is_far = 0;
-  for (int dy = -2; dy <= 1; ++dy)
-    for (int dx = -2; dx <= 1; ++dx)
-      if (row + dy >= 0 && row + dy <= p->height - 2) is_far |= furthest[texel_at(p, texture_width, inner + dx, row + dy)] > as_int(limit);
-  if (!is_far) return;
-  x[texel] = even_x[texel], y[texel] = even_y[texel], z[texel] = even_z[texel];
-  offset_x[texel] = home_x[texel], offset_y[texel] = home_y[texel];
-  anchors[texel] = 0;
-  atomic_inc(back_count);
 }

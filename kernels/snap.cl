@@ -4,8 +4,8 @@
 //   relax_texels                 free texels follow their neighbours half way
 //   offer_edges, place_on_edges  free texels go to the nearest point of a creased edge
 //   place_snapped                positions of texels on vertices and edges
-//   find_bad_quads, find_bad_around, put_back
-//                                what folds in the map or in space goes back to the even lattice
+//   put_marked_back, find_bad_around, put_back
+//                                texels with a mark, and what then folds in the map or in space, go back to the even lattice
 // A reading position is an offset from the texel's own place in the lattice, in cells: two planes over the texture, x
 // around, y along. Rows 0 and height-1 stay. `anchors` says what holds a texel: 0 nothing, 1 + i vertex i of the list
 // of vertices, -1 - i edge i. Vertices and edges come with their patch and their place (x, y) in its cells, x unwrapped.
@@ -17,7 +17,7 @@
 #define REACH 0.7f         // cells from where a texel is to where it goes
 #define FURTHEST 1.0f      // cells from a texel's own place, along each axis
 #define LEAST_CROSS 0.05f  // cells squared: twice the area that the triangles around a texel keep in the map
-#define LEAST_COSINE 0.5f  // between a triangle and the even lattice's quad in space
+#define LEAST_COSINE 0.2f  // between a triangle and the even lattice's quad in space
 #define MARGIN 0.6f        // cells that the rows next to a seam or pole keep from it
 #define LEAST_MOVE 0.01f   // cells: shorter steps of free texels are not worth their test
 #define PLACED 5           // states of a vertex: 0 to 3 the candidate it claims, 4 none is left
@@ -291,26 +291,8 @@ int is_bad_quad(global const PatchRecord* restrict p, int texture_width, int col
          (is_turned(now[1], now[2], now[3], normal) && !is_turned(even[1], even[2], even[3], normal));
 }
 
-// NDRange (texture width, texture height). The list of bad quads; their order is any.
+// NDRange (4 x changed_count). The list of bad quads among the four at each of a list of texels; their order is any.
 // out  is_bad: 1 for those of the list; counts[0]: how many they are
-kernel void find_bad_quads(const int texture_width, const int texture_height, global const int* restrict texel_patches,
-                           global const PatchRecord* restrict patches, global const float* restrict offset_x, global const float* restrict offset_y,
-                           global const float* restrict even_x, global const float* restrict even_y, global const float* restrict even_z,
-                           global const float* restrict x, global const float* restrict y, global const float* restrict z, global int* restrict is_bad,
-                           global int* restrict bad, global int* restrict counts) {
-  const int across = (int)get_global_id(0), line = (int)get_global_id(1);
-  if (across >= texture_width || line >= texture_height) return;
-  const int texel = line * texture_width + across;
-  const int patch = texel_patches[texel];
-  if (patch < 0) return;
-  global const PatchRecord* p = patches + patch;
-  const int column = across - p->x, row = line - p->y;
-  if (row > p->height - 2 || !is_bad_quad(p, texture_width, column, row, offset_x, offset_y, even_x, even_y, even_z, x, y, z)) return;
-  is_bad[texel] = 1;
-  bad[atomic_inc(counts)] = texel;
-}
-
-// NDRange (4 x changed_count). The same of the four quads at each of a list of texels.
 kernel void find_bad_around(const int changed_count, const int texture_width, global const int* restrict changed, global const int* restrict texel_patches,
                             global const PatchRecord* restrict patches, global const float* restrict offset_x, global const float* restrict offset_y,
                             global const float* restrict even_x, global const float* restrict even_y, global const float* restrict even_z,
@@ -328,14 +310,12 @@ kernel void find_bad_around(const int changed_count, const int texture_width, gl
   if (atomic_xchg(is_bad + quad, 1) == 0) bad[atomic_inc(counts)] = quad;
 }
 
-// NDRange (4 x quad_count). The texels of bad quads go back to where they were: with snapping their place in the even
-// lattice, those on vertices only when `with_vertices` says so. Where they read goes back with them when `is_reading` says
-// so. What a texel does here does not depend on others, so that their order is any.
+// NDRange (4 x quad_count). The texels of bad quads go back as well. What a texel does here does not depend on others, so
+// that their order is any.
 // before_x, before_y, before_z: where they were; is_back: 1 for texels that have gone back
 // out  changed: the list of texels that have gone back now; counts[1]: how many they are; is_bad: 0 again
-kernel void put_back(const int quad_count, const int texture_width, const int with_vertices, const int is_reading, global const int* restrict bad,
-                     global const int* restrict texel_patches, global const PatchRecord* restrict patches, global const float* restrict before_x,
-                     global const float* restrict before_y, global const float* restrict before_z, global const float* restrict home_x,
+kernel void put_back(const int quad_count, const int texture_width, global const int* restrict bad, global const int* restrict texel_patches,
+                     global const PatchRecord* restrict patches, global const float* restrict before_x, global const float* restrict before_y, global const float* restrict before_z, global const float* restrict home_x,
                      global const float* restrict home_y, global int* restrict is_bad,
                      global int* restrict is_back, global int* restrict anchors, global float* restrict offset_x, global float* restrict offset_y,
                      global float* restrict x, global float* restrict y, global float* restrict z, global int* restrict changed,
@@ -348,16 +328,36 @@ kernel void put_back(const int quad_count, const int texture_width, const int wi
   const int line = quad / texture_width, row = line - p->y + ((i >> 1) & 1);
   if (row < 1 || row > p->height - 2) return;
   const int texel = texel_at(p, texture_width, quad - line * texture_width - p->x + (i & 1), row);
-  if (anchors[texel] > 0 && !with_vertices) return;
   if (x[texel] == before_x[texel] && y[texel] == before_y[texel] && z[texel] == before_z[texel]) return;
   if (atomic_xchg(is_back + texel, 1) != 0) return;
   x[texel] = before_x[texel];
   y[texel] = before_y[texel];
   z[texel] = before_z[texel];
-  if (is_reading) {
-    offset_x[texel] = home_x[texel];
-    offset_y[texel] = home_y[texel];
-    anchors[texel] = 0;
-  }
+  offset_x[texel] = home_x[texel];
+  offset_y[texel] = home_y[texel];
+  anchors[texel] = 0;
+  changed[atomic_inc(counts + 1)] = texel;
+}
+
+// NDRange (texture width, texture height). Texels with a mark go back, those on vertices only when `with_vertices` says so.
+kernel void put_marked_back(const int texture_width, const int texture_height, const int with_vertices, global const int* restrict marks,
+                            global const int* restrict texel_patches,
+                            global const PatchRecord* restrict patches, global const float* restrict before_x, global const float* restrict before_y,
+                            global const float* restrict before_z, global const float* restrict home_x, global const float* restrict home_y,
+                            global int* restrict is_back, global int* restrict anchors, global float* restrict offset_x, global float* restrict offset_y,
+                            global float* restrict x, global float* restrict y, global float* restrict z, global int* restrict changed,
+                            global int* restrict counts) {
+  const int across = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (across >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + across;
+  const int patch = texel_patches[texel];
+  if (patch < 0 || !marks[texel] || (anchors[texel] > 0 && !with_vertices)) return;
+  const int row = line - patches[patch].y;
+  if (row < 1 || row > patches[patch].height - 2) return;
+  if (x[texel] == before_x[texel] && y[texel] == before_y[texel] && z[texel] == before_z[texel]) return;
+  is_back[texel] = 1;
+  x[texel] = before_x[texel], y[texel] = before_y[texel], z[texel] = before_z[texel];
+  offset_x[texel] = home_x[texel], offset_y[texel] = home_y[texel];
+  anchors[texel] = 0;
   changed[atomic_inc(counts + 1)] = texel;
 }

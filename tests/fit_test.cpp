@@ -11,6 +11,7 @@
 #include "skeletex/encode/row_profile.h"
 #include "skeletex/measure/manifold.h"
 #include "skeletex/measure/metro.h"
+#include "skeletex/measure/self_intersection.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "support/fit_twin.h"
 #include "support/load_model.h"
@@ -264,7 +265,6 @@ TEST(Fit, LeavesALatticeAloneThatIsTheMesh) {
   };
   const TexelResult plain = read(false), fitted = read(true);
   EXPECT_LT(fitted.report.fit->residuals.front(), 1e-6);
-  EXPECT_EQ(fitted.report.turned_triangles, 0);
   for (std::size_t i = 0; i < plain.texture.out.size(); ++i) {
     EXPECT_NEAR(plain.texture.along[i], fitted.texture.along[i], 1e-5);
     EXPECT_NEAR(plain.texture.around[i], fitted.texture.around[i], 1e-5);
@@ -272,16 +272,31 @@ TEST(Fit, LeavesALatticeAloneThatIsTheMesh) {
   }
 }
 
-TEST(Fit, PutsBackWhatRaisesTheMaximum) {
+TEST(Guard, NeitherTheMaximumNorFoldsAreAboveThoseOfTheEvenLattice) {
   const TestModel model = load_standard_model("bear");
+  // The furthest of middles of triangles and sides, and of the mesh's vertices.
+  const auto furthest = [&](const TriangleMesh& mesh) {
+    std::vector<Vec3> points;
+    for (const auto& [a, b, c] : mesh.triangles) {
+      const Vec3 &p = mesh.positions[a], &q = mesh.positions[b], &r = mesh.positions[c];
+      for (const Vec3& point : {Vec3((p + q + r) / 3), Vec3((p + q) / 2), Vec3((q + r) / 2), Vec3((r + p) / 2)}) points.push_back(point);
+    }
+    float most = 0;
+    for (const float distance : closest_distances(device(), model.mesh, points)) most = std::max(most, distance);
+    for (const float distance : closest_distances(device(), mesh, model.mesh.positions)) most = std::max(most, distance);
+    return most;
+  };
   EncodeOptions options;
-  options.width = options.height = 256;
+  options.width = options.height = 192;
   const TriangleMesh plain = reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model);
   options.has_snap = options.has_fit = true;
-  const TriangleMesh mesh = reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model);
-  const MetroReport before = measure_metro(device(), model.mesh, plain), after = measure_metro(device(), model.mesh, mesh);
-  // What is measured are vertices and middles of quads, while the decoder makes strips at seams: a tenth is left to them.
-  EXPECT_LT(std::max(after.forward.max, after.backward.max), 1.1 * std::max(before.forward.max, before.backward.max));
+  const EncodeResult encoded = encode_model(device(), model.mesh, model.skeleton, options);
+  const TriangleMesh mesh = reconstruct_mesh(device(), encoded.model);
+  EXPECT_GT(encoded.report.fit->texels_put_back, 0);
+  // Quads of the even lattice may have their other diagonal beside moved ones.
+  EXPECT_LT(furthest(mesh), 1.02f * furthest(plain));
+  EXPECT_LE(static_cast<double>(count_self_intersections(mesh)), 1.2 * static_cast<double>(count_self_intersections(plain)) + 10);
+  EXPECT_LE(encoded.report.turned_triangles, 1.2 * encoded.report.even_turned_triangles + 10);
 }
 
 }  // namespace skeletex

@@ -232,7 +232,9 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
         points = points_on_loop(segmentation.segments[bone], skeleton, walls, end, model.patches[bone].rectangle.width);
     }
   progress("encoding", 0.8);
-  TexelResult texels = read_texels(context, skeleton, walls, {charts, model.patches, hits, end_points}, options.width, options.height, model.origin,
+  model.texture.width = options.width, model.texture.height = options.height;
+  const GuardSources guard{model, mesh};
+  TexelResult texels = read_texels(context, skeleton, walls, {charts, model.patches, hits, end_points, &guard}, options.width, options.height, model.origin,
                                    texel_options);
   model.texture = std::move(texels.texture);
   {

@@ -63,7 +63,7 @@ struct EncodeReport {
   std::optional<UnfoldReport> unfold;  ///< when it was on
   std::optional<SnapReport> snap;  ///< when it was on
   std::optional<FitReport> fit;    ///< when it was on
-  int turned_triangles = 0, even_turned_triangles = 0;  ///< with snapping or fit: see FarReport
+  int turned_triangles = 0, even_turned_triangles = 0;  ///< with snapping or fit: see GuardReport
   double half_edge_ms = 0, segmentation_ms = 0, parameterization_ms = 0, encoding_ms = 0;
   std::string device;
 };

@@ -207,8 +207,7 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     copy_plane(context, positions.x, positions.home_x), copy_plane(context, positions.y, positions.home_y);
   }
   const TexelPoints even = points;
-  const SnapFeatures features =
-      is_snapped || is_fitted ? find_features(sources.charts, sources.patches, options.snap_dihedral) : SnapFeatures{};
+  const SnapFeatures features = is_snapped ? find_features(sources.charts, sources.patches, options.snap_dihedral) : SnapFeatures{};
   if (is_snapped || is_fitted) points = copy_points(context, even);
   int put_back = 0;
   if (is_snapped) {
@@ -216,7 +215,6 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     walk(covering);
     read(covering);
     place_snapped(context, layout, maps, features, positions, points);
-    put_back += put_back_folds(context, layout, even, positions, points);
   }
   if (maps.triangle_count > 0) {
     const std::vector<int> marks = context.download(is_read);
@@ -232,18 +230,18 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
                    from.y, from.z, filtered.x, filtered.y, filtered.z);
     return filtered;
   };
-  if (is_fitted) result.report.fit = fit_points(context, layout, maps, covering, even, positions, points);
+  if (is_fitted) result.report.fit = fit_points(context, layout, maps, covering, positions, points);
   if (options.has_prefilter && !(is_fitted && !has_spd)) {
     // What is fitted is not filtered as well: with SPD patches beside it, only these are.
     points = prefilter(points, is_fitted ? context.upload(vsm_texels(sources.patches, texture_width, texture_height)) : positions.anchors);
   }
-  if (is_snapped || is_fitted) {
+  if ((is_snapped || is_fitted) && sources.guard) {
     auto nothing = context.allocate<int>(texels);
     context.fill(nothing, 0);
     const TexelPoints filtered = options.has_prefilter ? prefilter(even, nothing) : even;
-    const FarReport far = put_back_far(context, sources.patches, layout, maps, covering, features, even, filtered, is_fitted, positions, points);
-    result.report.turned_triangles = far.turned_triangles, result.report.even_turned_triangles = far.even_turned_triangles;
-    (is_fitted ? result.report.fit->texels_put_back : put_back) += far.texels_put_back;
+    const GuardReport guard = put_back_faults(context, *sources.guard, layout, even, filtered, positions, points);
+    result.report.turned_triangles = guard.turned_triangles, result.report.even_turned_triangles = guard.even_turned_triangles;
+    (is_fitted ? result.report.fit->texels_put_back : put_back) += guard.texels_put_back;
   }
   if (is_snapped) result.report.snap = report_snap(context, features, put_back, positions);
   auto along = context.allocate<float>(texels), around = context.allocate<float>(texels), out = context.allocate<float>(texels);

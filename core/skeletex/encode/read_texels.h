@@ -7,6 +7,7 @@
 
 #include "skeletex/cl/context.h"
 #include "skeletex/encode/fit.h"
+#include "skeletex/encode/guard.h"
 #include "skeletex/encode/snap.h"
 #include "skeletex/encode/unfold.h"
 #include "skeletex/model/frame.h"
@@ -22,6 +23,8 @@ struct TexelSources {
   std::span<const SpdHits> spd_hits;  ///< per bone; of VSM patches empty
   /// Per bone and end, the points of row 0 and of the last row: `width` points on a seam, or one point for a pole.
   std::span<const std::array<std::vector<Vec3>, 2>> end_points;
+  /// With snapping or fit, what the finished lattice is compared with; without it there is no such guard.
+  const GuardSources* guard = nullptr;
 };
 
 struct TexelOptions {
@@ -46,7 +49,7 @@ struct TexelReport {
   std::optional<SnapReport> snap;
   std::optional<UnfoldReport> unfold;
   std::optional<FitReport> fit;
-  int turned_triangles = 0, even_turned_triangles = 0;  ///< with snapping or fit: see FarReport
+  int turned_triangles = 0, even_turned_triangles = 0;  ///< with snapping or fit: see GuardReport
 };
 
 struct TexelResult {

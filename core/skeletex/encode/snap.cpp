@@ -170,38 +170,27 @@ void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceM
                  context.upload(vertex_points), context.upload(edge_points), maps.x, maps.y, maps.z, points.x, points.y, points.z);
 }
 
-int put_back_folds(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, ReadingPositions& positions, TexelPoints& points) {
-  return put_back_folds(context, layout, even, even, true, positions, points);
-}
-
-int put_back_folds(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before, bool is_reading,
-                   ReadingPositions& positions, TexelPoints& points) {
-  const std::size_t size = layout.size();
-  auto is_bad = context.allocate<int>(size), is_back = context.allocate<int>(size);
-  auto bad = context.allocate<int>(size), changed = context.allocate<int>(size);
-  auto counts = context.allocate<int>(2);  // of the two lists
-  context.fill(is_bad, 0), context.fill(is_back, 0);
+int put_back_marked(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before, const ClBuffer<int>& marks,
+                    bool with_vertices, ReadingPositions& positions, TexelPoints& points) {
+  auto is_bad = context.allocate<int>(layout.size()), is_back = context.allocate<int>(layout.size());
+  auto bad = context.allocate<int>(layout.size()), changed = context.allocate<int>(layout.size());
+  auto counts = context.allocate<int>(2);  // of the lists of bad quads and of changed texels
+  context.fill(is_bad, 0), context.fill(is_back, 0), context.fill(counts, 0);
+  context.launch({"snap.cl", "put_marked_back"}, layout.range(), layout.width, layout.height, static_cast<int>(with_vertices), marks, layout.texel_patches,
+                 layout.patches, before.x, before.y, before.z, positions.home_x, positions.home_y, is_back, positions.anchors, positions.x, positions.y,
+                 points.x, points.y, points.z, changed, counts);
   int total = 0;
-  // First what hangs between vertices, then vertices as well. Texels only ever go back, so this ends.
-  for (const int with_vertices : {0, 1}) {
-    if (!is_reading && with_vertices == 0) continue;
-    // All quads, and then those at texels that have just gone back.
-    for (int waiting = -1; waiting != 0;) {
-      context.fill(counts, 0);
-      if (waiting < 0)
-        context.launch({"snap.cl", "find_bad_quads"}, layout.range(), layout.width, layout.height, layout.texel_patches, layout.patches, positions.x,
-                       positions.y, even.x, even.y, even.z, points.x, points.y, points.z, is_bad, bad, counts);
-      else
-        context.launch({"snap.cl", "find_bad_around"}, over(4 * waiting), waiting, layout.width, changed, layout.texel_patches, layout.patches, positions.x,
-                       positions.y, even.x, even.y, even.z, points.x, points.y, points.z, is_bad, bad, counts);
-      const int quads = context.download(counts)[0];
-      if (quads == 0) break;
-      context.launch({"snap.cl", "put_back"}, over(4 * quads), quads, layout.width, with_vertices, static_cast<int>(is_reading), bad, layout.texel_patches,
-                     layout.patches, before.x, before.y, before.z, positions.home_x, positions.home_y, is_bad, is_back, positions.anchors, positions.x, positions.y, points.x, points.y, points.z,
-                     changed, counts);
-      waiting = context.download(counts)[1];
-      total += waiting;
-    }
+  // Texels only ever go back, so this ends.
+  for (int waiting = context.download(counts)[1]; waiting > 0; waiting = context.download(counts)[1]) {
+    total += waiting;
+    context.fill(counts, 0);
+    context.launch({"snap.cl", "find_bad_around"}, over(4 * waiting), waiting, layout.width, changed, layout.texel_patches, layout.patches, positions.x,
+                   positions.y, even.x, even.y, even.z, points.x, points.y, points.z, is_bad, bad, counts);
+    const int quads = context.download(counts)[0];
+    if (quads == 0) break;
+    context.launch({"snap.cl", "put_back"}, over(4 * quads), quads, layout.width, bad, layout.texel_patches, layout.patches, before.x, before.y, before.z,
+                   positions.home_x, positions.home_y, is_bad, is_back, positions.anchors, positions.x, positions.y, points.x, points.y, points.z, changed,
+                   counts);
   }
   return total;
 }

@@ -53,12 +53,12 @@ struct TexelPoints {
 void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps, const SnapFeatures& features,
                    const ReadingPositions& positions, TexelPoints& points);
 
-/// Texels of quads that fold in the map, or in space where the even lattice does not, go back to it, until none does.
+/// Texels with a mark go back to the even lattice, those on vertices only `with_vertices`; and with them the texels of quads at
+/// them that then fold in the map, or in space where the even lattice does not.
+/// \param even    the even lattice's points, the measure of folds
+/// \param before  what texels go back to: these as they would be stored
 /// \return how many went back
-int put_back_folds(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, ReadingPositions& positions, TexelPoints& points);
-/// The same for any points: texels go back to where they were `before`, and where they read with them when `is_reading`
-/// says so.
-int put_back_folds(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before, bool is_reading,
-                   ReadingPositions& positions, TexelPoints& points);
+int put_back_marked(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before, const ClBuffer<int>& marks,
+                    bool with_vertices, ReadingPositions& positions, TexelPoints& points);
 
 }  // namespace skeletex

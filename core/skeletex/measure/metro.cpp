@@ -10,9 +10,9 @@
 #include <cstdint>
 
 #include "skeletex/measure/hilbert_order.h"
+#include "skeletex/measure/nearest_search.h"
 #include "skeletex/measure/parallel.h"
 #include "skeletex/measure/point_triangle.h"
-#include "skeletex/measure/triangle_tree.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
@@ -20,7 +20,6 @@ namespace {
 
 constexpr std::size_t kPointsAtOnce = std::size_t{1} << 20;
 constexpr std::size_t kBlock = 1 << 13;
-constexpr ClKernelName kFindNearest{"metro.cl", "find_nearest_triangles"};
 
 void check_mesh(const TriangleMesh& mesh, const char* which) {
   if (mesh.triangles.empty()) throw InputError(fmt::format("{} has no triangles; nothing can be measured", which));
@@ -32,60 +31,29 @@ void check_mesh(const TriangleMesh& mesh, const char* which) {
     if (!mesh.positions[v].allFinite()) throw InputError(fmt::format("{}: the position of vertex {} is not finite", which, v));
 }
 
-/// A mesh and its tree on the device.
-class NearestSearch {
+/// Distances from points that follow each other in space. The device finds the triangles; the distances are then
+/// computed in double, because those between a mesh and its reconstruction come down to float32's resolution.
+class DistanceSearch {
  public:
-  NearestSearch(ClContext& context, const TriangleMesh& mesh, TriangleTree tree) : context_(context), mesh_(mesh), tree_(std::move(tree)) {
-    boxes_ = context.upload(tree_.boxes);
-    blocks_ = context.upload(tree_.blocks);
-    level_begin_ = context.upload(tree_.level_begin);
-    tree_.boxes = std::vector<float>();
-    tree_.blocks = std::vector<float>();
-  }
+  DistanceSearch(ClContext& context, const TriangleMesh& mesh) : mesh_(mesh), search_(context, build_triangle_tree(mesh)) {}
   /// Places along the curve -> triangles.
-  const std::vector<int>& order() const { return tree_.order; }
+  const std::vector<int>& order() const { return search_.order(); }
 
-  /// Distances from points that follow each other in space. The device finds the triangles; the distances are then
-  /// computed in double, because those between a mesh and its reconstruction come down to float32's resolution.
   void find(std::span<const Vec3> points, std::span<double> distances) {
-    const std::size_t count = points.size();
-    if (count == 0) return;
-    for (std::vector<float>* plane : {&x_, &y_, &z_}) plane->resize(count);
-    for_each_block(count, kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
+    nearest_.resize(points.size());
+    search_.find(points, nearest_);
+    for_each_block(points.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        const Vec3 p = (points[i] - tree_.origin) / tree_.scale;
-        x_[i] = static_cast<float>(p.x());
-        y_[i] = static_cast<float>(p.y());
-        z_[i] = static_cast<float>(p.z());
-      }
-    });
-    if (px_.size < count) {
-      for (ClBuffer<float>* plane : {&px_, &py_, &pz_, &nearest_squared_}) *plane = context_.allocate<float>(count);
-      nearest_ = context_.allocate<int>(count);
-    }
-    context_.write(px_, x_);
-    context_.write(py_, y_);
-    context_.write(pz_, z_);
-    constexpr int kRun = 16;
-    const std::size_t items = block_count(count, kRun);
-    context_.launch(kFindNearest, ClRange({items, 1}, {context_.work_group_size(kFindNearest, 32), 1}), px_, py_, pz_, static_cast<int>(count), kRun,
-                    boxes_, blocks_, level_begin_, tree_.top_level(), nearest_, nearest_squared_);
-    const std::vector<int> nearest = context_.download(nearest_);
-    for_each_block(count, kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        const Triangle& t = mesh_.triangles[tree_.order[nearest[i]]];
+        const Triangle& t = mesh_.triangles[nearest_[i]];
         distances[i] = offset_from_triangle(points[i], mesh_.positions[t[0]], mesh_.positions[t[1]], mesh_.positions[t[2]]).norm();
       }
     });
   }
 
  private:
-  ClContext& context_;
   const TriangleMesh& mesh_;
-  TriangleTree tree_;  // boxes and blocks live on the device only
-  ClBuffer<float> boxes_, blocks_, px_, py_, pz_, nearest_squared_;
-  ClBuffer<int> level_begin_, nearest_;
-  std::vector<float> x_, y_, z_;
+  NearestSearch search_;
+  std::vector<int> nearest_;
 };
 
 class Accumulator {
@@ -152,7 +120,7 @@ class SurfaceSamples {
   std::vector<std::int64_t> begin_;  // first sample of each triangle of the order
 };
 
-DistanceStatistics measure_surface(NearestSearch& search, const SurfaceSamples& samples, double unit) {
+DistanceStatistics measure_surface(DistanceSearch& search, const SurfaceSamples& samples, double unit) {
   Accumulator accumulator;
   std::vector<Vec3> points;
   std::vector<double> distances;
@@ -167,7 +135,7 @@ DistanceStatistics measure_surface(NearestSearch& search, const SurfaceSamples& 
 }
 
 /// Distances from points in any order; they are visited along a Hilbert curve.
-std::vector<double> distances_in_order(NearestSearch& search, std::span<const Vec3> points) {
+std::vector<double> distances_in_order(DistanceSearch& search, std::span<const Vec3> points) {
   const std::vector<int> order = hilbert_order(points);
   std::vector<double> distances(points.size()), some_distances;
   std::vector<Vec3> some;
@@ -194,8 +162,8 @@ MetroReport measure_metro(ClContext& context, const TriangleMesh& a, const Trian
   report.diagonal = bounding_box(a).diagonal();
   if (!(report.diagonal > 0)) throw InputError("the first mesh is a single point; its diagonal, the unit of the result, is 0");
 
-  NearestSearch search_a(context, a, build_triangle_tree(a));
-  NearestSearch search_b(context, b, build_triangle_tree(b));
+  DistanceSearch search_a(context, a);
+  DistanceSearch search_b(context, b);
   report.forward = measure_surface(search_b, SurfaceSamples(a, search_a.order(), count, "the first mesh"), report.diagonal);
   report.backward = measure_surface(search_a, SurfaceSamples(b, search_b.order(), count, "the second mesh"), report.diagonal);
   const std::vector<double> distances = distances_in_order(search_b, a.positions);
@@ -211,7 +179,7 @@ std::vector<float> closest_distances(ClContext& context, const TriangleMesh& mes
   check_mesh(mesh, "the mesh");
   for (std::size_t i = 0; i < points.size(); ++i)
     if (!points[i].allFinite()) throw InputError(fmt::format("point {} is not finite", i));
-  NearestSearch search(context, mesh, build_triangle_tree(mesh));
+  DistanceSearch search(context, mesh);
   const std::vector<double> distances = distances_in_order(search, points);
   return {distances.begin(), distances.end()};
 }

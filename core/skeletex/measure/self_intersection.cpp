@@ -55,12 +55,12 @@ bool does_segment_meet(const Vec3& p, const Vec3& q, const Corners& t, int plane
 }
 
 bool do_disjoint_triangles_meet(const Corners& s, const Corners& t) {
-  const int plane_s = drawing_plane(s), plane_t = drawing_plane(t);
   const auto is_off = [](const Corners& plane, const Corners& points) {
     const int side = orientation(plane[0], plane[1], plane[2], points[0]);
     return side != 0 && side == orientation(plane[0], plane[1], plane[2], points[1]) && side == orientation(plane[0], plane[1], plane[2], points[2]);
   };
-  if ((plane_s >= 0 && is_off(s, t)) || (plane_t >= 0 && is_off(t, s))) return false;
+  if (is_off(s, t) || is_off(t, s)) return false;
+  const int plane_s = drawing_plane(s), plane_t = drawing_plane(t);
   for (int k = 0; k < 3; ++k) {
     if (plane_t >= 0 && does_segment_meet(s[k], s[(k + 1) % 3], t, plane_t)) return true;
     if (plane_s >= 0 && does_segment_meet(t[k], t[(k + 1) % 3], s, plane_s)) return true;
@@ -70,14 +70,18 @@ bool do_disjoint_triangles_meet(const Corners& s, const Corners& t) {
 
 /// Two triangles with their shared vertex first.
 bool do_triangles_at_vertex_meet(const Corners& s, const Corners& t) {
+  // The rest of one on one side of the other's plane: for most pairs all that needs to be known.
+  if (orientation(t[0], t[1], t[2], s[1]) * orientation(t[0], t[1], t[2], s[2]) > 0) return false;
+  if (orientation(s[0], s[1], s[2], t[1]) * orientation(s[0], s[1], s[2], t[2]) > 0) return false;
   const int plane_s = drawing_plane(s), plane_t = drawing_plane(t);
   return (plane_t >= 0 && does_segment_meet(s[1], s[2], t, plane_t)) || (plane_s >= 0 && does_segment_meet(t[1], t[2], s, plane_s));
 }
 
 /// Two triangles that share the edge from a to b.
 bool do_triangles_at_edge_meet(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  if (orientation(a, b, c, d) != 0) return false;
   const int plane = drawing_plane({a, b, c});
-  if (plane < 0 || orientation(a, b, c, d) != 0) return false;
+  if (plane < 0) return false;
   return orientation(drawn(a, plane), drawn(b, plane), drawn(c, plane)) * orientation(drawn(a, plane), drawn(b, plane), drawn(d, plane)) > 0;
 }
 
@@ -107,9 +111,11 @@ bool do_triangles_intersect(const TriangleMesh& mesh, int first, int second) {
 }
 
 std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh) {
-  if (mesh.triangles.empty()) return {};
+  return mesh.triangles.empty() ? std::vector<std::array<int, 2>>{} : find_self_intersections(mesh, build_triangle_tree(mesh));
+}
+
+std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh, const TriangleTree& tree, std::span<const char> is_asked) {
   constexpr int kWidth = TriangleTree::kWidth;
-  const TriangleTree tree = build_triangle_tree(mesh);
   const std::size_t count = tree.order.size();
   // Boxes of the triangles as the tree has them for its blocks: by place, six planes of eight per block.
   std::vector<float> triangle_boxes(block_count(count, kWidth) * 6 * kWidth);
@@ -127,39 +133,62 @@ std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh
     }
   });
 
-  constexpr std::size_t kBlock = 1024;
-  std::vector<std::vector<std::array<int, 2>>> found(block_count(count, kBlock));
-  for_each_block(count, kBlock, [&](std::size_t part, std::size_t begin, std::size_t end) {
+  // Blocks of the tree are asked as wholes, then their triangles one by one.
+  constexpr std::size_t kAtOnce = 128;
+  const std::size_t blocks = block_count(count, kWidth);
+  std::vector<std::vector<std::array<int, 2>>> found(block_count(blocks, kAtOnce));
+  for_each_block(blocks, kAtOnce, [&](std::size_t part, std::size_t first_block, std::size_t end_block) {
     struct Entry {
       int level;
       std::size_t index;
     };
     std::vector<Entry> stack;
-    std::array<float, 6> box;
-    const auto overlapping = [&box](const float* planes) {
+    const auto overlapping = [](const float* planes, const std::array<float, 6>& box) {
       std::array<bool, kWidth> hits;
       for (int k = 0; k < kWidth; ++k)
         hits[k] = (planes[k] <= box[3]) & (planes[kWidth + k] <= box[4]) & (planes[2 * kWidth + k] <= box[5]) & (planes[3 * kWidth + k] >= box[0]) &
                   (planes[4 * kWidth + k] >= box[1]) & (planes[5 * kWidth + k] >= box[2]);
       return hits;
     };
-    for (std::size_t place = begin; place < end; ++place) {
-      const float* own = triangle_boxes.data() + place / kWidth * 6 * kWidth + place % kWidth;
-      for (int d = 0; d < 6; ++d) box[d] = own[d * kWidth];
+    const auto is_of_interest = [&](std::size_t place) { return is_asked.empty() || is_asked[tree.order[place]]; };
+    for (std::size_t block = first_block; block < end_block; ++block) {
+      const std::size_t begin = block * kWidth, end = std::min(count, begin + kWidth);
+      const float* own = triangle_boxes.data() + block * 6 * kWidth;
+      std::array<std::array<float, 6>, kWidth> boxes;
+      std::array<float, 6> box;
+      bool is_empty = true;
+      for (std::size_t place = begin; place < end; ++place) {
+        if (!is_of_interest(place)) continue;
+        std::array<float, 6>& mine = boxes[place - begin];
+        for (int d = 0; d < 6; ++d) mine[d] = own[d * kWidth + (place - begin)];
+        for (int d = 0; d < 3; ++d) {
+          box[d] = is_empty ? mine[d] : std::min(box[d], mine[d]);
+          box[3 + d] = is_empty ? mine[3 + d] : std::max(box[3 + d], mine[3 + d]);
+        }
+        is_empty = false;
+      }
+      if (is_empty) continue;
       stack.push_back({tree.top_level(), 0});
       while (!stack.empty()) {
         const auto [level, index] = stack.back();
         stack.pop_back();
-        const float* planes = level > 0 ? tree.boxes.data() + (tree.level_begin[level] + index) * 6 * kWidth : triangle_boxes.data() + index * 6 * kWidth;
-        const auto hits = overlapping(planes);
-        for (int k = 0; k < kWidth; ++k) {
-          if (!hits[k]) continue;
-          const std::size_t child = kWidth * index + k;
-          if (level > 0) {
-            // Every pair once: with the triangles that come later. A node of this level covers 8^level places.
-            if ((child + 1) << (3 * level) > place + 1) stack.push_back({level - 1, child});
-          } else if (child > place && child < count) {
-            const int first = std::min(tree.order[place], tree.order[child]), second = std::max(tree.order[place], tree.order[child]);
+        if (level > 0) {
+          const auto hits = overlapping(tree.boxes.data() + (tree.level_begin[level] + index) * 6 * kWidth, box);
+          for (int k = 0; k < kWidth; ++k) {
+            const std::size_t child = kWidth * index + k;
+            // Every pair once: with the blocks that come later, when all are asked. A child of this level covers 8^(level - 1) blocks.
+            if (hits[k] && (!is_asked.empty() || (child + 1) << (3 * (level - 1)) > block)) stack.push_back({level - 1, child});
+          }
+          continue;
+        }
+        const float* planes = triangle_boxes.data() + index * 6 * kWidth;
+        for (std::size_t place = begin; place < end; ++place) {
+          if (!is_of_interest(place)) continue;
+          const auto hits = overlapping(planes, boxes[place - begin]);
+          for (int k = 0; k < kWidth; ++k) {
+            const std::size_t other = kWidth * index + k;
+            if (!hits[k] || other >= count || other == place || (other < place && is_of_interest(other))) continue;
+            const int first = std::min(tree.order[place], tree.order[other]), second = std::max(tree.order[place], tree.order[other]);
             if (do_triangles_intersect(mesh, first, second)) found[part].push_back({first, second});
           }
         }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <array>
 #include <vector>
 
 #include "skeletex/cl/context.h"
@@ -14,6 +15,10 @@ namespace skeletex {
 /// that both sides fill up to, poles are single vertices. Quads take diagonals by the model's rule.
 /// \throw DeviceError
 TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model);
+
+/// The mesh that a model would reconstruct to whose texels decode to given points; its own texture is not looked at.
+/// \param planes  x, y, z per texel of the texture, relative to the model's origin; of rows 0 and height-1 only poles count
+TriangleMesh mesh_of_points(ClContext& context, const SkeletexModel& model, const std::array<std::vector<float>, 3>& planes);
 
 /// The vertices of that mesh alone, in the order of lattice.h. \throw DeviceError
 std::vector<Vec3> lattice_positions(ClContext& context, const SkeletexModel& model);

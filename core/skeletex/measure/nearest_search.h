@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <span>
+#include <vector>
+
+#include "skeletex/cl/context.h"
+#include "skeletex/measure/triangle_tree.h"
+#include "skeletex/model/mesh.h"
+
+namespace skeletex {
+
+/// The triangles of a mesh on the device, for nearest points. The tree's boxes and blocks live there alone.
+class NearestSearch {
+ public:
+  NearestSearch(ClContext& context, TriangleTree tree);
+  /// Places along the curve -> triangles.
+  const std::vector<int>& order() const { return tree_.order; }
+
+  /// Per point the nearest triangle, found in single precision. Points that follow each other in space are found fastest.
+  /// \param distances  when given, those of the device: float32's resolution of the mesh's extent; world units
+  void find(std::span<const Vec3> points, std::span<int> triangles, std::span<float> distances = {});
+
+ private:
+  ClContext& context_;
+  TriangleTree tree_;
+  ClBuffer<float> boxes_, blocks_, px_, py_, pz_, nearest_squared_;
+  ClBuffer<int> level_begin_, nearest_;
+  std::vector<float> x_, y_, z_;
+};
+
+}  // namespace skeletex
