@@ -25,6 +25,7 @@ struct Arguments {
   std::vector<double> times, weights;
   std::string output, device, json;
   int frames = 0, layout = 0, size = 0;
+  bool has_creases = false;
 };
 
 /// out.skx.exr -> out_007.skx.exr
@@ -81,6 +82,7 @@ void run(const Arguments& arguments) {
   MorphOptions options;
   if (arguments.layout > 0) options.layout = arguments.layout - 1;
   options.size = arguments.size;
+  options.is_smooth = !arguments.has_creases;
   const Morph morph(context, std::move(models), from_first, options);
 
   Json json{{"maps", Json::array()}, {"results", Json::array()}};
@@ -138,6 +140,7 @@ void add_morph_command(CLI::App& program) {
   command.add_option("--size", arguments->size, "texels along the longer side (default: the largest model's)")
       ->check(CLI::Range(4, 16384).description(""))
       ->type_name("N");
+  command.add_flag("--creases", arguments->has_creases, "leave creases where bones of different turns meet: the texels' means alone, as at frame rates");
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(

@@ -6,20 +6,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "skeletex/edit/differential.h"
+#include "skeletex/edit/move_surface.h"
 #include "skeletex/model/error.h"
-#include "skeletex/reconstruct/store_positions.h"
 
 namespace skeletex {
 namespace {
 
 void check_length(double value, const char* what, double least, double most) {
   if (!(value >= least && value <= most)) throw InputError(fmt::format("{} is {}; give {} to {} diagonals", what, value, least, most));
-}
-
-void add_to_report(const SolveReport& solve, SolveReport& all) {
-  all.steps += solve.steps;
-  all.residual = std::max(all.residual, solve.residual);
 }
 
 /// Everything a filter needs of the model it works on.
@@ -29,7 +23,7 @@ struct FilterJob {
   ModelSurface surface;
   SurfaceOperator laplace;
   std::vector<float> weights;  ///< of the region, per vertex
-  FilterReport report;
+  SolveReport solver;
 
   FilterJob(ClContext& on, const SkeletexModel& of, const FilterRegion& region);
   double unit() const { return model.diagonal; }
@@ -68,7 +62,7 @@ std::vector<float> weigh_region(ClContext& context, const SurfaceOperator& lapla
   if (std::find(inside.begin(), inside.end(), 0.f) == inside.end() || falloff == 0) return inside;
   const DeviceField masses{1, context.upload(context.download(laplace.mass))};
   SolveResult solved = solve_diffusion(context, laplace, static_cast<float>(falloff * falloff), context.upload(inside), masses);
-  add_to_report(solved.report, report);
+  add_solve(solved.report, report);
   std::vector<float> weights = context.download(solved.x.values);
   for (std::size_t i = 0; i < weights.size(); ++i) {
     const float w = std::clamp(weights[i], 0.f, 1.f);
@@ -80,21 +74,7 @@ std::vector<float> weigh_region(ClContext& context, const SurfaceOperator& lapla
 FilterJob::FilterJob(ClContext& on, const SkeletexModel& of, const FilterRegion& region)
     : context(on), model(of), surface(upload_surface(on, of)), laplace(make_surface_operator(on, surface.neighbours, surface.points)) {
   check_length(region.falloff, "the fall-off at the region's boundary", 0, 1);
-  weights = weigh_region(context, laplace, inside_region(model, surface.lattice, region), region.falloff, report.solver);
-}
-
-/// Third parts of the area vectors at given positions, world units squared.
-std::vector<Vec3> area_vectors_at(const FilterJob& job, const std::vector<Vec3>& positions) {
-  std::vector<Vec3> vectors =
-      download_vectors(job.context, area_vectors(job.context, job.surface.neighbours, upload_points(job.context, positions, job.model.origin, job.unit())));
-  for (Vec3& vector : vectors) vector *= job.unit() * job.unit();
-  return vectors;
-}
-
-double enclosed_volume(const FilterJob& job, const std::vector<Vec3>& positions, const std::vector<Vec3>& vectors) {
-  double volume = 0;
-  for (std::size_t i = 0; i < positions.size(); ++i) volume += (positions[i] - job.model.origin).dot(vectors[i]) / 3;
-  return volume;
+  weights = weigh_region(context, laplace, inside_region(model, surface.lattice, region), region.falloff, solver);
 }
 
 /// How far a surface of some points moves when it diffuses, world units: (M + time L) d = -time L x.
@@ -103,62 +83,18 @@ std::vector<Vec3> diffusion_moves(FilterJob& job, const DeviceField& points, con
   const auto everywhere = job.context.upload(std::vector<float>(job.weights.size(), 1.f));
   const DeviceField b = apply_operator(job.context, laplace, 0, -time, everywhere, points);
   const SolveResult solved = solve_diffusion(job.context, laplace, time, everywhere, b);
-  add_to_report(solved.report, job.report.solver);
+  add_solve(solved.report, job.solver);
   std::vector<Vec3> moves = download_vectors(job.context, solved.x);
   for (Vec3& move : moves) move *= job.unit();
   return moves;
 }
 
-/// Lets the surface follow seams that slide over it, so that rows beside a seam keep their distance from it: the slides
-/// fade out over some of their length, in the tangent planes.
-void spread_slides(FilterJob& job, const std::vector<Vec3>& normals, const std::vector<Vec3>& slides, std::vector<Vec3>& positions) {
-  const int first_seam = job.surface.lattice.first_sample.empty() ? job.surface.lattice.vertex_count : job.surface.lattice.first_sample[0];
-  const double reach = std::max(4 * job.report.largest_slide, 2 * mean_spacing(job.context, job.laplace));
-  const auto time = static_cast<float>(reach * reach);
-  std::vector<float> is_free(job.weights.size());
-  for (int i = 0; i < static_cast<int>(is_free.size()); ++i) is_free[i] = i < first_seam && job.weights[i] > 0;
-  const auto device_free = job.context.upload(is_free);
-  const DeviceField given = upload_points(job.context, slides, Vec3::Zero(), -job.unit());
-  const SolveResult solved = solve_diffusion(job.context, job.laplace, time, device_free, apply_operator(job.context, job.laplace, 1, time, device_free, given), 1e-3);
-  add_to_report({solved.report.steps, 0}, job.report.solver);
-  const std::vector<Vec3> spread = download_vectors(job.context, solved.x);
-  for (int i = 0; i < first_seam; ++i) {
-    const Vec3 slide = job.unit() * spread[i];
-    positions[i] += slide - normals[i].dot(slide) * normals[i];
-  }
-}
-
 /// The model with its surface moved, where and as far as the region allows.
-FilterResult finish(FilterJob& job, const std::vector<Vec3>& moves, double volume_before) {
-  const std::vector<Vec3>& before = job.surface.positions;
-  std::vector<Vec3> moved = before;
-  for (std::size_t i = 0; i < moved.size(); ++i)
-    if (job.weights[i] > 0) moved[i] += static_cast<double>(job.weights[i]) * moves[i];
-  std::vector<Vec3> normals = area_vectors_at(job, moved);
-  job.report.volume_before = volume_before;
-  job.report.volume_after = enclosed_volume(job, moved, normals);
-  for (Vec3& normal : normals) normal.normalize();
-
-  std::vector<Vec3> after = moved;
-  slide_to_walls(job.model, normals, after);
-  std::vector<Vec3> slides(after.size(), Vec3::Zero());
-  for (std::size_t i = 0; i < after.size(); ++i) {
-    if (moved[i] == before[i]) after[i] = before[i];  // its place in the wall is only as exact as its stored angle
-    slides[i] = after[i] - moved[i];
-    job.report.largest_slide = std::max(job.report.largest_slide, slides[i].norm() / job.unit());
-  }
-  if (job.report.largest_slide > 0) spread_slides(job, normals, slides, after);
-
-  const std::vector<float> areas = job.context.download(job.laplace.mass);
-  double area = 0;
-  for (std::size_t i = 0; i < after.size(); ++i) {
-    const double move = (moved[i] - before[i]).norm() / job.unit();
-    job.report.largest_move = std::max(job.report.largest_move, move);
-    job.report.mean_move += static_cast<double>(areas[i]) * move;
-    area += static_cast<double>(areas[i]);
-  }
-  job.report.mean_move /= area;
-  return {store_positions(job.context, job.model, after), job.report};
+FilterResult finish(FilterJob& job, std::vector<Vec3> moves, double volume_before) {
+  for (std::size_t i = 0; i < moves.size(); ++i) moves[i] *= static_cast<double>(job.weights[i]);
+  MovedModel moved = move_surface(job.context, job.model, job.surface, job.laplace, moves);
+  add_solve(job.solver, moved.report.solver);
+  return {std::move(moved.model), {moved.report, volume_before}};
 }
 
 /// Adds to the moves what brings the volume back, along the normals: Newton's method, whose slope is the area.
@@ -166,11 +102,11 @@ void restore_volume(const FilterJob& job, double volume, std::vector<Vec3>& move
   for (int round = 0; round < 4; ++round) {
     std::vector<Vec3> positions = job.surface.positions;
     for (std::size_t i = 0; i < positions.size(); ++i) positions[i] += static_cast<double>(job.weights[i]) * moves[i];
-    const std::vector<Vec3> vectors = area_vectors_at(job, positions);
+    const std::vector<Vec3> vectors = area_vectors_at(job.context, job.model, job.surface, positions);
     double area = 0;
     for (std::size_t i = 0; i < vectors.size(); ++i) area += static_cast<double>(job.weights[i]) * vectors[i].norm();
     if (!(area > 0)) return;
-    const double offset = (volume - enclosed_volume(job, positions, vectors)) / area;
+    const double offset = (volume - enclosed_volume(job.model, positions, vectors)) / area;
     for (std::size_t i = 0; i < moves.size(); ++i) moves[i] += offset * vectors[i].normalized();
   }
 }
@@ -185,7 +121,7 @@ FilterResult smooth_model(ClContext& context, const SkeletexModel& model, const 
   check_length(options.scale, "the scale of smoothing", 0, 1);
   if (options.iterations < 1 || options.iterations > 1000) throw InputError(fmt::format("{} iterations of smoothing; give 1 to 1000", options.iterations));
   FilterJob job(context, model, region);
-  const double volume = enclosed_volume(job, job.surface.positions, area_vectors_at(job, job.surface.positions));
+  const double volume = enclosed_volume(job.model, job.surface.positions, area_vectors_at(job.context, job.model, job.surface, job.surface.positions));
   const double scale = options.scale / std::sqrt(options.iterations);
   std::vector<Vec3> moves = diffusion_moves(job, job.surface.points, job.laplace, scale);
   for (int iteration = 1; iteration < options.iterations; ++iteration) {
@@ -203,7 +139,7 @@ FilterResult enhance_model(ClContext& context, const SkeletexModel& model, const
   check_length(options.scale, "the scale of detail", 0, 1);
   if (!(options.gain >= -1 && options.gain <= 100)) throw InputError(fmt::format("a gain of {}; give -1 (no detail) to 100", options.gain));
   FilterJob job(context, model, region);
-  const double volume = enclosed_volume(job, job.surface.positions, area_vectors_at(job, job.surface.positions));
+  const double volume = enclosed_volume(job.model, job.surface.positions, area_vectors_at(job.context, job.model, job.surface, job.surface.positions));
   std::vector<Vec3> moves = diffusion_moves(job, job.surface.points, job.laplace, options.scale);
   for (Vec3& move : moves) move *= -options.gain;
   return finish(job, moves, volume);
@@ -214,8 +150,8 @@ FilterResult add_noise(ClContext& context, const SkeletexModel& model, const Noi
   check_length(options.wavelength, "the noise's wavelength", 1e-5, 100);
   if (options.octaves < 1 || options.octaves > 16) throw InputError(fmt::format("{} octaves of noise; give 1 to 16", options.octaves));
   FilterJob job(context, model, region);
-  std::vector<Vec3> moves = area_vectors_at(job, job.surface.positions);
-  const double volume = enclosed_volume(job, job.surface.positions, moves);
+  std::vector<Vec3> moves = area_vectors_at(job.context, job.model, job.surface, job.surface.positions);
+  const double volume = enclosed_volume(job.model, job.surface.positions, moves);
   const auto heights = context.allocate<float>(moves.size());
   context.launch({"filter.cl", "noise_at_points"}, ClRange(moves.size()), static_cast<int>(moves.size()), static_cast<float>(1 / options.wavelength),
                  options.octaves, static_cast<unsigned>(options.seed), job.surface.points.values, heights);

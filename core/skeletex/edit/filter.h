@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "skeletex/cl/context.h"
-#include "skeletex/edit/diffusion.h"
+#include "skeletex/edit/move_surface.h"
 #include "skeletex/model/texture.h"
 
 namespace skeletex {
@@ -21,11 +21,8 @@ struct FilterRegion {
   double falloff = 0.02;
 };
 
-struct FilterReport {
-  double largest_move = 0, mean_move = 0;  ///< diagonals; the mean over the area
-  double largest_slide = 0;                ///< diagonals: how far a seam had to slide over the surface to stay in its wall
-  double volume_before = 0, volume_after = 0;  ///< world units cubed
-  SolveReport solver;                      ///< steps of all solves together; the largest residual
+struct FilterReport : MoveReport {
+  double volume_before = 0;  ///< world units cubed
 };
 struct FilterResult {
   SkeletexModel model;

@@ -14,8 +14,10 @@
 
 #include "skeletex/edit/best_rotation.h"
 #include "skeletex/edit/blend.h"
+#include "skeletex/edit/orientation.h"
 #include "skeletex/edit/overlay.h"
 #include "skeletex/edit/seam_network.h"
+#include "skeletex/edit/surface_map.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/seam_strip.h"
@@ -246,7 +248,7 @@ std::vector<Vec3> mean_nodes(std::span<const Skeleton* const> skeletons, std::sp
 }
 
 Morph::Morph(ClContext& context, std::vector<SkeletexModel> models, std::span<const Correspondence> from_first, const MorphOptions& options)
-    : context_(&context), models_(std::move(models)), layout_(options.layout) {
+    : context_(&context), models_(std::move(models)), layout_(options.layout), is_smooth_(options.is_smooth) {
   if (models_.size() < 2) throw InputError("a morph needs two models or more");
   if (from_first.size() + 1 != models_.size())
     throw InputError(fmt::format("{} correspondences for {} models; give one for each but the first", from_first.size(), models_.size()));
@@ -275,8 +277,8 @@ Correspondence Morph::correspondence(int from, int to) const { return composed(i
 
 SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) const {
   const std::vector<double> weights = checked_weights(given, models_.size());
-  const int layout_index = layout_.value_or(static_cast<int>(std::max_element(weights.begin(), weights.end()) - weights.begin()));
-  const SkeletexModel& layout = models_[layout_index];
+  const int layout_number = layout_index(weights);
+  const SkeletexModel& layout = models_[layout_number];
 
   SkeletexModel result;
   result.skeleton = layout.skeleton;
@@ -287,11 +289,11 @@ SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) 
   std::vector<Correspondence> from_layout;
   for (std::size_t m = 0; m < models_.size(); ++m) {
     skeletons.push_back(&models_[m].skeleton);
-    from_layout.push_back(correspondence(layout_index, static_cast<int>(m)));
+    from_layout.push_back(correspondence(layout_number, static_cast<int>(m)));
     result.origin += weights[m] * models_[m].origin;
     result.diagonal += weights[m] * models_[m].diagonal;
   }
-  const std::vector<Vec3> nodes = mean_nodes(skeletons, from_layout, weights, layout_index);
+  const std::vector<Vec3> nodes = mean_nodes(skeletons, from_layout, weights, layout_number);
   for (std::size_t n = 0; n < nodes.size(); ++n) result.skeleton.nodes[n].position = nodes[n];
   for (int bone = 0; bone < static_cast<int>(result.skeleton.bones.size()); ++bone)
     if (!(bone_length(result.skeleton, bone) > 0))
@@ -299,13 +301,13 @@ SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) 
 
   std::deque<Overlay> overlays;
   for (std::size_t m = 0; m < models_.size(); ++m) overlays.emplace_back(models_[m], result.skeleton, from_layout[m]);
-  set_mean_s(result.skeleton, overlays, weights, overlays[layout_index]);
+  set_mean_s(result.skeleton, overlays, weights, overlays[layout_number]);
   const Walls walls(result.skeleton);
   SeamNetwork network = seam_network(result.skeleton, walls);
   for (Overlay& overlay : overlays) overlay.set_seams(walls, network);
 
   result.patches = mean_patches(overlays, weights, layout);
-  SeamMean seams(result, walls, overlays, weights, overlays[layout_index]);
+  SeamMean seams(result, walls, overlays, weights, overlays[layout_number]);
   seams.fill(network);
   for (int bone = 0; bone < static_cast<int>(result.patches.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
@@ -352,13 +354,23 @@ SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) 
   return result;
 }
 
-SkeletexModel Morph::at(std::span<const double> weights) const {
+int Morph::layout_index(std::span<const double> weights) const {
+  return layout_.value_or(static_cast<int>(std::max_element(weights.begin(), weights.end()) - weights.begin()));
+}
+
+SkeletexModel Morph::at(std::span<const double> given) const {
   DevicePlanes texels;
-  SkeletexModel model = queue(weights, texels);
+  SkeletexModel model = queue(given, texels);
   model.texture.along = context_->download(texels.x);
   model.texture.around = context_->download(texels.y);
   model.texture.out = context_->download(texels.z);
-  return model;
+  const std::vector<double> weights = checked_weights(given, models_.size());
+  if (!is_smooth_ || std::find(weights.begin(), weights.end(), 1.0) != weights.end()) return model;
+  const int layout = layout_index(weights);
+  std::vector<std::vector<Vec3>> sources(models_.size());
+  for (std::size_t m = 0; m < models_.size(); ++m)
+    if (weights[m] > 0) sources[m] = map_surface(*context_, model, models_[m], correspondence(layout, static_cast<int>(m)));
+  return blend_orientations(*context_, model, sources, weights).model;
 }
 
 }  // namespace skeletex

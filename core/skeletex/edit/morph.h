@@ -15,6 +15,7 @@ struct MorphOptions {
   /// that of the largest weight, so that a morph that ends at a model ends at its very texels; of several the first.
   std::optional<int> layout;
   int size = 0;  ///< longer side of the result's texture; 0: the largest of the models'
+  bool is_smooth = true;  ///< at(): without creases where bones of different turns meet (orientation.h)
 };
 
 /// In-between models of two or more (paper 5). Texels, distances of seams and corners, and the positions of rows along
@@ -33,17 +34,20 @@ class Morph {
 
   /// The model at weights that sum to 1, one per model, none negative. \throw InputError otherwise
   SkeletexModel at(std::span<const double> weights) const;
-  /// The same for live use: texels stay on the device, in planes of the result's size; the texture of the returned model
+  /// The same for live use, its creases left: texels stay on the device, in planes of the result's size; the texture of the returned model
   /// has a size and no texels.
   SkeletexModel queue(std::span<const double> weights, DevicePlanes& texels) const;
 
  private:
+  int layout_index(std::span<const double> weights) const;
+
   ClContext* context_;
   std::vector<SkeletexModel> models_;
   std::vector<Correspondence> from_first_;  ///< per model
   std::vector<int> texel_begins_;           ///< per model: of its texture in texels_
   DevicePlanes texels_;                     ///< of all models
   std::optional<int> layout_;
+  bool is_smooth_;
 };
 
 /// The mean of skeletons of one branching, in the bones of skeletons[layout]: node positions linearly, after the models
