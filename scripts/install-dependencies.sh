@@ -11,7 +11,7 @@ packages=(
   libopenmesh-dev libeigen3-dev libopenexr-dev nlohmann-json3-dev libfmt-dev                 # library
   libegl-dev libopengl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libcairo2-dev pkg-config fonts-dejavu-core  # renderer, without a GPU too
   libcli11-dev libspdlog-dev libembree-dev                           # program (bench compares with Embree)
-  libgtest-dev openexr                                               # tests (models against exrheader)
+  libgtest-dev openexr oclgrind                                      # tests (models against exrheader, kernels under Oclgrind)
   libbenchmark-dev python3 python3-matplotlib                                           # benchmarks, tables of the experiments
   libmeshoptimizer-dev libcgal-dev draco                                                # what the experiments compare with
   chromium                                                                              # test: the report in a browser
