@@ -42,7 +42,7 @@ def frames_table(results):
     lines = []
     for row in rows:
         columns = row["columns"]
-        for stage in ("reconstruct", "pose", "morph"):
+        for stage in ("reconstruct", "pose", "morph", "transfer"):
             frame = columns[f"{stage}_frame_ms"]
-            lines.append([row["parameters"]["pair"], stage, f"{1000 / frame:.0f}", f"{frame:.1f} ms", f"{columns[f'{stage}_device_ms']:.1f} ms", f"{columns[f'{stage}_copy_ms']:.1f} ms"])
+            lines.append([row["parameters"]["pair"], stage, f"{1000 / frame:.3g}", f"{frame:.1f} ms", f"{columns[f'{stage}_device_ms']:.1f} ms", f"{columns[f'{stage}_copy_ms']:.1f} ms"])
     return head, lines
