@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/edit/blend.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -17,9 +18,14 @@ std::vector<double> evened(const std::vector<double>& values) {
   std::vector<double> shares;
   double total = 0;
   for (int k = -reach; k <= reach; ++k) total += shares.emplace_back(std::exp(-0.5 * std::pow(k / (kWidth * count), 2)));
-  std::vector<double> result(values.size(), 0);
-  for (int j = 0; j < count; ++j)
-    for (int k = -reach; k <= reach; ++k) result[j] += shares[k + reach] / total * values[((j + k) % count + count) % count];
+  // Once round and `reach` more on either side, so that every value is one scalar product of plain arrays: a live morph does this for all
+  // columns of all bones in every frame.
+  std::vector<double> around(values.end() - reach, values.end());
+  around.insert(around.end(), values.begin(), values.end());
+  around.insert(around.end(), values.begin(), values.begin() + reach);
+  const Eigen::Map<const Eigen::VectorXd> share(shares.data(), 2 * reach + 1);
+  std::vector<double> result;
+  for (int j = 0; j < count; ++j) result.push_back(share.dot(Eigen::Map<const Eigen::VectorXd>(around.data() + j, 2 * reach + 1)) / total);
   return result;
 }
 
