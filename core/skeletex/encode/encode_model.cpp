@@ -13,6 +13,7 @@
 
 #include "skeletex/encode/row_profile.h"
 #include "skeletex/encode/sample_seams.h"
+#include "skeletex/measure/parallel.h"
 #include "skeletex/model/error.h"
 #include "skeletex/pack/pack_atlas.h"
 #include "skeletex/segment/segment_mesh.h"
@@ -158,8 +159,8 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   report.segmentation_ms = watch.lap();
 
   progress("parameterization", 0.2);
-  std::vector<Chart> charts;
-  for (const Segment& segment : segmentation.segments) charts.push_back(make_chart(segment, skeleton, walls));
+  std::vector<Chart> charts(bones);
+  for_each_block(charts.size(), 1, [&](std::size_t i, std::size_t, std::size_t) { charts[i] = make_chart(segmentation.segments[i], skeleton, walls); });
   const std::vector<double> unseen = unseen_area_fractions(context, skeleton, walls, charts);
   const std::vector<Method> methods = choose_methods(options, skeleton, unseen);
   std::vector<VsmReport> vsm_reports(bones);
@@ -183,11 +184,11 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
                                            : spd_profiles(context, skeleton, walls, charts, options.spd_hit);
   const bool is_all_spd = std::find(methods.begin(), methods.end(), Method::kVsm) == methods.end();
   const TexelShare share = options.texel_share.value_or(is_all_spd ? TexelShare::kArea : TexelShare::kTriangles);
-  std::vector<RowProfile> profiles;
+  std::vector<RowProfile> profiles(bones);
+  for_each_block(profiles.size(), 1, [&](std::size_t i, std::size_t, std::size_t) { profiles[i] = methods[i] == Method::kVsm ? row_profile(charts[i]) : rays[i]; });
   std::vector<PatchDemand> demands;
   std::vector<double> areas;
   for (int bone = 0; bone < bones; ++bone) {
-    profiles.push_back(methods[bone] == Method::kVsm ? row_profile(charts[bone]) : rays[bone]);
     areas.push_back(surface_area(segmentation.segments[bone].mesh));
     const double length = std::max(profiles[bone].length, 1e-9 * model.diagonal);
     const double texels = share == TexelShare::kTriangles ? static_cast<double>(segmentation.segments[bone].mesh.triangles.size()) : areas[bone];

@@ -31,9 +31,10 @@ struct Bins {
 
   explicit Bins(std::vector<double> bin_borders)
       : borders(std::move(bin_borders)), length(borders.size() - 1, 0), power(borders.size() - 1, 0) {}
-  void add(std::size_t bin, double measure, double density) {
+  /// \param density_power  density ^ kExponent; a triangle lies in many bins
+  void add(std::size_t bin, double measure, double density, double density_power) {
     length[bin] += density * measure;
-    power[bin] += std::pow(density, kExponent) * measure;
+    power[bin] += density_power * measure;
   }
 };
 
@@ -81,10 +82,11 @@ RowProfile row_profile(const Chart& chart) {
     if (!(high > low) || !(area > 0) || !std::isfinite(density)) return;
     std::size_t bin = std::upper_bound(bins.borders.begin(), bins.borders.end(), low) - bins.borders.begin();
     bin = bin == 0 ? 0 : bin - 1;
+    const double density_power = std::pow(density, kExponent);
     double before = hat_integral(bins.borders[bin], low, middle, high, area);
     for (; bin < bins.length.size() && bins.borders[bin] < high; ++bin) {
       const double after = hat_integral(bins.borders[bin + 1], low, middle, high, area);
-      bins.add(bin, after - before, density);
+      bins.add(bin, after - before, density, density_power);
       before = after;
     }
   };
@@ -129,8 +131,10 @@ RowProfile row_profile(std::span<const Vec3> positions, int rows, int columns) {
   for (int r = 0; r < rows; ++r) u[r] = static_cast<double>(r) / (rows - 1);
   Bins bins(std::move(u));
   for (int r = 0; r + 1 < rows; ++r)
-    for (int j = 0; j < columns; ++j)
-      bins.add(r, 1.0 / ((rows - 1) * columns), (positions[(r + 1) * columns + j] - positions[r * columns + j]).norm() * (rows - 1));
+    for (int j = 0; j < columns; ++j) {
+      const double density = (positions[(r + 1) * columns + j] - positions[r * columns + j]).norm() * (rows - 1);
+      bins.add(r, 1.0 / ((rows - 1) * columns), density, std::pow(density, kExponent));
+    }
   return finish(std::move(bins));
 }
 
