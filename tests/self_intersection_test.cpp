@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
 #include <random>
 
 #include "skeletex/measure/manifold.h"
@@ -134,6 +136,31 @@ TEST(SelfIntersection, TheTreeFindsThePairsOfBruteForce) {
       for (int j = i + 1; j < 700; ++j)
         if (do_triangles_intersect(mesh, i, j)) expected.push_back({i, j});
     EXPECT_GT(expected.size(), 10u);
+    EXPECT_EQ(find_self_intersections(mesh), expected) << "seed " << seed;
+  }
+}
+
+TEST(SelfIntersection, OfACrumpledTorusTheTreeFindsThePairsOfBruteForce) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal(0, 1);
+    // From a few corners that fold over to a heap.
+    TriangleMesh mesh;
+    constexpr int kAround = 24, kAlong = 14;
+    for (int i = 0; i < kAround; ++i)
+      for (int j = 0; j < kAlong; ++j) {
+        const double a = 2 * std::numbers::pi * i / kAround, b = 2 * std::numbers::pi * j / kAlong, r = 1 + 0.4 * std::cos(b);
+        mesh.positions.push_back(Vec3(r * std::cos(a), r * std::sin(a), 0.4 * std::sin(b)) + (0.02 + 0.03 * seed) * Vec3(normal(random), normal(random), normal(random)));
+        const int right = (i + 1) % kAround, up = (j + 1) % kAlong;
+        mesh.triangles.push_back({kAlong * i + j, kAlong * right + j, kAlong * right + up});
+        mesh.triangles.push_back({kAlong * i + j, kAlong * right + up, kAlong * i + up});
+      }
+    std::vector<std::array<int, 2>> expected;
+    const int count = static_cast<int>(mesh.triangles.size());
+    for (int i = 0; i < count; ++i)
+      for (int j = i + 1; j < count; ++j)
+        if (do_triangles_intersect(mesh, i, j)) expected.push_back({i, j});
+    EXPECT_GT(expected.size(), 1u);
     EXPECT_EQ(find_self_intersections(mesh), expected) << "seed " << seed;
   }
 }

@@ -11,7 +11,8 @@
 namespace skeletex {
 namespace {
 
-constexpr int kPasses = 7;                // it takes some four
+constexpr int kPasses = 7;                // it takes some three
+constexpr int kFew = 20;                  // texels: after so few another pass is not worth its time
 constexpr int kReach = 1;                 // columns and rows around a triangle that is too far that go back with it
 constexpr float kShareOfFurthest = 0.9f;  // what is measured is not all that there is
 constexpr float kWorthALook = 0.4f;
@@ -164,12 +165,13 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
                             ReadingPositions& positions, TexelPoints& points) {
   GuardReport report;
   Distances distances(context, sources.mesh);
-  const TriangleMesh even_mesh = mesh_of_points(context, sources.model, download(context, filtered));
+  const TriangleMesh even_mesh = mesh_of_points(context, sources.model, DiagonalRule::kNearest, download(context, filtered));
   distances.measure_triangles(even_mesh, std::vector<char>(even_mesh.triangles.size(), 1), 0);
   report.even_turned_triangles = distances.turned();
   const float limit = kShareOfFurthest * *std::max_element(distances.of_triangles().begin(), distances.of_triangles().end());
 
   TriangleMesh mesh;
+  std::vector<int> order;
   TexelSet marks(sources.model);
   // Where the even lattice is at fault itself there is nothing to go back to, as long as it is not much worse.
   TexelSet even_faults = marks;
@@ -179,10 +181,11 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
   const auto is_pair_near_even_fault = [&](const std::array<int, 2>& pair) { return is_near_even_fault(pair[0]) && is_near_even_fault(pair[1]); };
   bool tolerates_crossing = false, tolerates_turning = false;
   for (int pass = 0; pass < kPasses; ++pass) {
-    TriangleMesh now = mesh_of_points(context, sources.model, download(context, points));
+    TriangleMesh now = mesh_of_points(context, sources.model, sources.model.diagonals, download(context, points));
     const std::vector<char> is_changed = changed_triangles(mesh, now);
     mesh = std::move(now);
-    TriangleTree tree = build_triangle_tree(mesh);
+    TriangleTree tree = order.empty() ? build_triangle_tree(mesh) : build_triangle_tree(mesh, order);
+    order = tree.order;
     marks.clear();
 
     const auto pairs = find_self_intersections(mesh, tree, pass == 0 ? std::span<const char>() : is_changed);
@@ -217,7 +220,7 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
     const bool with_vertices = pass > 0;
     const int back = put_back_marked(context, layout, even, filtered, context.upload(marks.plane()), with_vertices, positions, points);
     report.texels_put_back += back;
-    if (back == 0 && with_vertices) break;
+    if (back <= kFew && with_vertices) break;
   }
   return report;
 }

@@ -85,6 +85,56 @@ bool do_triangles_at_edge_meet(const Vec3& a, const Vec3& b, const Vec3& c, cons
   return orientation(drawn(a, plane), drawn(b, plane), drawn(c, plane)) * orientation(drawn(a, plane), drawn(b, plane), drawn(d, plane)) > 0;
 }
 
+/// Vertices whose triangles go once around them, all facing one way: seen from there their corners lie side by side, so no two of
+/// them meet but where they touch. Most are such, and most pairs of boxes that overlap are of triangles at such a vertex.
+std::vector<char> find_plain_vertices(const TriangleMesh& mesh) {
+  constexpr int kMostTriangles = 24;
+  constexpr double kLeastCosine = 0.1;
+  const std::size_t count = mesh.positions.size();
+  std::vector<int> begin(count + 1, 0);
+  for (const Triangle& t : mesh.triangles)
+    for (const int vertex : t) ++begin[vertex + 1];
+  for (std::size_t v = 0; v < count; ++v) begin[v + 1] += begin[v];
+  std::vector<int> corners(3 * mesh.triangles.size()), next(begin.begin(), begin.end() - 1);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (int k = 0; k < 3; ++k) corners[next[mesh.triangles[t][k]]++] = static_cast<int>(3 * t) + k;
+  std::vector<char> is_plain(count, 0);
+  for_each_block(count, 1 << 12, [&](std::size_t, std::size_t first, std::size_t last) {
+    std::array<std::array<int, 2>, kMostTriangles> sides;
+    std::array<Vec3, kMostTriangles> normals;
+    for (std::size_t v = first; v < last; ++v) {
+      const int n = begin[v + 1] - begin[v];
+      if (n < 3 || n > kMostTriangles) continue;
+      const Vec3& p = mesh.positions[v];
+      Vec3 mean = Vec3::Zero();
+      for (int i = 0; i < n; ++i) {
+        const int corner = corners[begin[v] + i];
+        const Triangle& t = mesh.triangles[corner / 3];
+        sides[i] = {t[(corner % 3 + 1) % 3], t[(corner % 3 + 2) % 3]};
+        normals[i] = (mesh.positions[sides[i][0]] - p).cross(mesh.positions[sides[i][1]] - p).normalized();
+        mean += normals[i];
+      }
+      const double least = kLeastCosine * mean.norm();
+      bool is_one_way = true;
+      for (int i = 0; i < n; ++i) {
+        is_one_way &= normals[i].dot(mean) > least;
+        int followers = 0;
+        for (int j = 0; j < n; ++j) followers += sides[j][0] == sides[i][1];
+        is_one_way &= followers == 1;
+      }
+      if (!is_one_way) continue;
+      // How often they go around: how often they pass one direction.
+      Eigen::Index axis;
+      mean.cwiseAbs().minCoeff(&axis);
+      const Vec3 across = mean.cross(Vec3::Unit(axis));
+      int turns = 0;
+      for (int i = 0; i < n; ++i) turns += (mesh.positions[sides[i][0]] - p).dot(across) <= 0 && (mesh.positions[sides[i][1]] - p).dot(across) > 0;
+      is_plain[v] = turns == 1;
+    }
+  });
+  return is_plain;
+}
+
 }  // namespace
 
 bool do_triangles_intersect(const TriangleMesh& mesh, int first, int second) {
@@ -133,6 +183,12 @@ std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh
     }
   });
 
+  const std::vector<char> is_plain = is_asked.empty() ? find_plain_vertices(mesh) : std::vector<char>(mesh.positions.size(), 0);
+  const auto do_share_plain_vertex = [&](const Triangle& a, const Triangle& b) {
+    for (const int v : a)
+      if ((v == b[0] || v == b[1] || v == b[2]) && is_plain[v]) return true;
+    return false;
+  };
   // Blocks of the tree are asked as wholes, then their triangles one by one.
   constexpr std::size_t kAtOnce = 128;
   const std::size_t blocks = block_count(count, kWidth);
@@ -143,12 +199,14 @@ std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh
       std::size_t index;
     };
     std::vector<Entry> stack;
-    const auto overlapping = [](const float* planes, const std::array<float, 6>& box) {
-      std::array<bool, kWidth> hits;
-      for (int k = 0; k < kWidth; ++k)
-        hits[k] = (planes[k] <= box[3]) & (planes[kWidth + k] <= box[4]) & (planes[2 * kWidth + k] <= box[5]) & (planes[3 * kWidth + k] >= box[0]) &
-                  (planes[4 * kWidth + k] >= box[1]) & (planes[5 * kWidth + k] >= box[2]);
-      return hits;
+    // By how much each of eight boxes is apart from one: at most 0 where they overlap. (Without branches: the compiler takes lanes.)
+    const auto gaps_to = [](const float* planes, const std::array<float, 6>& box) {
+      std::array<float, kWidth> gaps;
+      for (int k = 0; k < kWidth; ++k) {
+        const float x = std::max(planes[k] - box[3], box[0] - planes[3 * kWidth + k]), y = std::max(planes[kWidth + k] - box[4], box[1] - planes[4 * kWidth + k]);
+        gaps[k] = std::max(std::max(x, y), std::max(planes[2 * kWidth + k] - box[5], box[2] - planes[5 * kWidth + k]));
+      }
+      return gaps;
     };
     const auto is_of_interest = [&](std::size_t place) { return is_asked.empty() || is_asked[tree.order[place]]; };
     for (std::size_t block = first_block; block < end_block; ++block) {
@@ -173,22 +231,23 @@ std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh
         const auto [level, index] = stack.back();
         stack.pop_back();
         if (level > 0) {
-          const auto hits = overlapping(tree.boxes.data() + (tree.level_begin[level] + index) * 6 * kWidth, box);
+          const auto gaps = gaps_to(tree.boxes.data() + (tree.level_begin[level] + index) * 6 * kWidth, box);
           for (int k = 0; k < kWidth; ++k) {
             const std::size_t child = kWidth * index + k;
             // Every pair once: with the blocks that come later, when all are asked. A child of this level covers 8^(level - 1) blocks.
-            if (hits[k] && (!is_asked.empty() || (child + 1) << (3 * (level - 1)) > block)) stack.push_back({level - 1, child});
+            if (gaps[k] <= 0 && (!is_asked.empty() || (child + 1) << (3 * (level - 1)) > block)) stack.push_back({level - 1, child});
           }
           continue;
         }
         const float* planes = triangle_boxes.data() + index * 6 * kWidth;
         for (std::size_t place = begin; place < end; ++place) {
           if (!is_of_interest(place)) continue;
-          const auto hits = overlapping(planes, boxes[place - begin]);
+          const auto gaps = gaps_to(planes, boxes[place - begin]);
           for (int k = 0; k < kWidth; ++k) {
             const std::size_t other = kWidth * index + k;
-            if (!hits[k] || other >= count || other == place || (other < place && is_of_interest(other))) continue;
+            if (gaps[k] > 0 || other >= count || other == place || (other < place && is_of_interest(other))) continue;
             const int first = std::min(tree.order[place], tree.order[other]), second = std::max(tree.order[place], tree.order[other]);
+            if (do_share_plain_vertex(mesh.triangles[first], mesh.triangles[second])) continue;
             if (do_triangles_intersect(mesh, first, second)) found[part].push_back({first, second});
           }
         }

@@ -29,18 +29,20 @@ Box joined(const Box& a, const Box& b) {
 }  // namespace
 
 TriangleTree build_triangle_tree(const TriangleMesh& mesh) {
+  std::vector<Vec3> centres(mesh.triangles.size());
+  for_each_block(centres.size(), 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const auto [a, b, c] = mesh.triangles[t];
+      centres[t] = (mesh.positions[a] + mesh.positions[b] + mesh.positions[c]) / 3;
+    }
+  });
+  return build_triangle_tree(mesh, hilbert_order(centres));
+}
+
+TriangleTree build_triangle_tree(const TriangleMesh& mesh, std::vector<int> order) {
   TriangleTree tree;
   const std::size_t count = mesh.triangles.size();
-  {
-    std::vector<Vec3> centres(count);
-    for_each_block(count, 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
-      for (std::size_t t = begin; t < end; ++t) {
-        const auto [a, b, c] = mesh.triangles[t];
-        centres[t] = (mesh.positions[a] + mesh.positions[b] + mesh.positions[c]) / 3;
-      }
-    });
-    tree.order = hilbert_order(centres);
-  }
+  tree.order = std::move(order);
   const BoundingBox box = bounding_box(mesh);
   tree.origin = box.centre();
   tree.scale = box.diagonal() > 0 ? box.diagonal() : 1;

@@ -95,14 +95,14 @@ std::vector<Triangle> end_triangles(const SkeletexModel& model, const Lattice& l
 
 namespace {
 
-std::vector<Triangle> triangulate(ClContext& context, const SkeletexModel& model, const Walls& walls, const Lattice& lattice, const DevicePlanes& inner,
-                                  const std::vector<Vec3>& positions) {
+std::vector<Triangle> triangulate(ClContext& context, const SkeletexModel& model, DiagonalRule rule, const Walls& walls, const Lattice& lattice,
+                                  const DevicePlanes& inner, const std::vector<Vec3>& positions) {
   std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kInner);
   std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == model.patches[row[0]].rectangle.height - 2; });
   const auto patches = context.upload(frame_tables(model.skeleton, walls, model.patches, model.origin).patches);
   // Room for the strips and fans at the end, so that the host's copy need not grow.
   const auto device_triangles = context.allocate<Triangle>(lattice.triangle_count);
-  context.launch({"reconstruct.cl", model.diagonals == DiagonalRule::kSmooth ? "triangulate_smoothly" : "triangulate_quads"}, row_range(context, rows.size()),
+  context.launch({"reconstruct.cl", rule == DiagonalRule::kSmooth ? "triangulate_smoothly" : "triangulate_quads"}, row_range(context, rows.size()),
                  static_cast<int>(rows.size()), context.upload(rows), patches, inner.x, inner.y, inner.z, device_triangles);
   std::vector<Triangle> triangles = context.download(device_triangles);
   triangles.resize(2 * static_cast<std::size_t>(lattice.quad_count));
@@ -118,11 +118,11 @@ TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model) {
   const DevicePlanes points = displace_inner(context, model, walls, lattice);
   TriangleMesh mesh;
   mesh.positions = place_vertices(context, model, walls, lattice, points);
-  mesh.triangles = triangulate(context, model, walls, lattice, points, mesh.positions);
+  mesh.triangles = triangulate(context, model, model.diagonals, walls, lattice, points, mesh.positions);
   return mesh;
 }
 
-TriangleMesh mesh_of_points(ClContext& context, const SkeletexModel& model, const std::array<std::vector<float>, 3>& planes) {
+TriangleMesh mesh_of_points(ClContext& context, const SkeletexModel& model, DiagonalRule rule, const std::array<std::vector<float>, 3>& planes) {
   const Lattice lattice = number_lattice(model);
   const Walls walls(model.skeleton);
   TriangleMesh mesh;
@@ -143,7 +143,7 @@ TriangleMesh mesh_of_points(ClContext& context, const SkeletexModel& model, cons
     inner[axis] = context.upload(values);
   }
   place_seams(model, walls, lattice, mesh.positions);
-  mesh.triangles = triangulate(context, model, walls, lattice, {inner[0], inner[1], inner[2]}, mesh.positions);
+  mesh.triangles = triangulate(context, model, rule, walls, lattice, {inner[0], inner[1], inner[2]}, mesh.positions);
   return mesh;
 }
 

@@ -17,8 +17,9 @@ namespace skeletex {
 TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model);
 
 /// The mesh that a model would reconstruct to whose texels decode to given points; its own texture is not looked at.
+/// \param rule    of its diagonals, in place of the model's
 /// \param planes  x, y, z per texel of the texture, relative to the model's origin; of rows 0 and height-1 only poles count
-TriangleMesh mesh_of_points(ClContext& context, const SkeletexModel& model, const std::array<std::vector<float>, 3>& planes);
+TriangleMesh mesh_of_points(ClContext& context, const SkeletexModel& model, DiagonalRule rule, const std::array<std::vector<float>, 3>& planes);
 
 /// The vertices of that mesh alone, in the order of lattice.h. \throw DeviceError
 std::vector<Vec3> lattice_positions(ClContext& context, const SkeletexModel& model);
