@@ -58,6 +58,16 @@ TEST_P(StandardModel, ComesBackClosedByEveryMethod) {
   }
 }
 
+TEST_P(StandardModel, ComesBackClosedWithTexelsThatAreSnappedAndFitted) {
+  ClContext context;
+  const TestModel model = load_standard_model(GetParam());
+  EncodeOptions options;
+  options.width = options.height = 96;
+  options.has_snap = options.has_fit = true;
+  const EncodeResult encoded = encode_model(context, model.mesh, model.skeleton, options);
+  expect_watertight(reconstruct_mesh(context, encoded.model), encoded.report.genus, model.name);
+}
+
 INSTANTIATE_TEST_SUITE_P(All, StandardModel, testing::ValuesIn(kStandardModels), [](const auto& parameter) { return std::string(parameter.param); });
 
 TEST(Pipeline, ErrorFallsAsTheTextureGrowsAndStaysBelowTheIssuesFigures) {

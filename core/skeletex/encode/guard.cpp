@@ -11,11 +11,10 @@
 namespace skeletex {
 namespace {
 
-constexpr int kPasses = 7;                // it takes some three
-constexpr int kFew = 20;                  // texels: after so few another pass is not worth its time
+constexpr int kPasses = 7;                // it takes some four
 constexpr int kReach = 1;                 // columns and rows around a triangle that is too far that go back with it
 constexpr float kShareOfFurthest = 0.9f;  // what is measured is not all that there is
-constexpr float kWorthALook = 0.4f;
+constexpr float kWorthALook = 0.15f;    // of the limit, at the middle of a triangle: then it is measured more densely
 constexpr std::size_t kManyPairs = 50;    // from here on it is looked at whether the even lattice intersects itself as well
 constexpr int kTolerance = 2;             // columns and rows around a fault of the even lattice
 constexpr double kMuchWorse = 1.1;        // the number of faults there, against the even lattice's
@@ -220,7 +219,7 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
     const bool with_vertices = pass > 0;
     const int back = put_back_marked(context, layout, even, filtered, context.upload(marks.plane()), with_vertices, positions, points);
     report.texels_put_back += back;
-    if (back <= kFew && with_vertices) break;
+    if (back == 0 && with_vertices) break;
   }
   return report;
 }
