@@ -125,9 +125,9 @@ __kernel void row_normals(const int row_count, const int count, __global const i
 }
 
 // Turns of the inner vertices from their sums: of unit length, none beyond LAST_COSINE, and as much of them as their row has.
-// Turns the normals, too. NDRange: rows. in  shares: per row     in and out  turns, normals
+// NDRange: rows. in  shares: per row     in and out  turns
 __kernel void settle_turns(const int row_count, const int count, __global const int* restrict rows, __global const float* restrict shares,
-                           __global float* restrict turns, __global float* restrict normals) {
+                           __global float* restrict turns) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   const int here = rows[4 * k], end = here + rows[4 * k + 1];
@@ -140,8 +140,39 @@ __kernel void settle_turns(const int row_count, const int count, __global const 
     q[0] = 1.0f - share + share * q[0] / length;
     for (int i = 1; i < 4; ++i) q[i] *= share / length;
     const float scale = 1.0f / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    for (int i = 0; i < 4; ++i) turns[i * count + v] = q[i] *= scale;
-    float n[3], turned[3];
+    for (int i = 0; i < 4; ++i) turns[i * count + v] = scale * q[i];
+  }
+}
+
+// The means of the turns of each vertex and those next to it in the rows: where a map folds they change from vertex to vertex,
+// which would tear single ones out of the surface. NDRange: rows.
+__kernel void smooth_turns(const int row_count, const int count, __global const int* restrict rows, __global const float* restrict turns,
+                           __global float* restrict smoothed) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  const int here = rows[4 * k], width = rows[4 * k + 1], has_before = rows[4 * k + 2], has_after = rows[4 * k + 3];
+  for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
+    const int left = j > 0 ? j - 1 : width - 1, right = j + 1 < width ? j + 1 : 0;
+    float sum[4] = {0.0f, 0.0f, 0.0f, 0.0f};
+    for (int row = -has_before; row <= has_after; ++row)
+      for (int i = 0; i < 4; ++i) {
+        __global const float* restrict q = turns + i * count + here + row * width;
+        sum[i] += q[left] + q[j] + q[right];
+      }
+    const float scale = 1.0f / sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2] + sum[3] * sum[3]);
+    for (int i = 0; i < 4; ++i) smoothed[i * count + here + j] = scale * sum[i];
+  }
+}
+
+// Turns the normals of the inner vertices. NDRange: rows. in  turns     in and out  normals
+__kernel void turn_normals(const int row_count, const int count, __global const int* restrict rows, __global const float* restrict turns,
+                           __global float* restrict normals) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  const int here = rows[4 * k], end = here + rows[4 * k + 1];
+  for (int v = here + (int)get_local_id(0); v < end; v += get_local_size(0)) {
+    float q[4], n[3], turned[3];
+    for (int i = 0; i < 4; ++i) q[i] = turns[i * count + v];
     for (int i = 0; i < 3; ++i) n[i] = normals[i * count + v];
     turn_vector(q, n, turned);
     for (int i = 0; i < 3; ++i) normals[i * count + v] = turned[i];

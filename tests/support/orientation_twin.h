@@ -105,9 +105,22 @@ inline OrientationPull pull_orientations(const SkeletexModel& model, const Latti
         const double degrees50 = std::cos(25 * M_PI / 180), degrees100 = std::cos(50 * M_PI / 180);
         const double share = step((0.9 - from_seam) / 0.5) * step((mean.w() - degrees100) / (degrees50 - degrees100));
         pull.turns[v].coeffs() = ((1 - share) * Eigen::Quaterniond::Identity().coeffs() + share * mean.coeffs()).normalized();
-        pull.normals[v] = pull.turns[v] * pull.normals[v];
       }
   }
+  for (int pass = 0; pass < 2; ++pass) {
+    const std::vector<Eigen::Quaterniond> before = pull.turns;
+    for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
+      const auto [x, y, width, height] = model.patches[bone].rectangle;
+      for (int row = 1; row + 1 < height; ++row)
+        for (int j = 0; j < width; ++j) {
+          Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+          for (int r = std::max(1, row - 1); r <= std::min(height - 2, row + 1); ++r)
+            for (const int c : {j + width - 1, j, j + 1}) sum += before[lattice.first_inner[bone] + (r - 1) * width + c % width].coeffs();
+          pull.turns[lattice.first_inner[bone] + (row - 1) * width + j].coeffs() = sum.normalized();
+        }
+    }
+  }
+  for (int v = 0; v < inner; ++v) pull.normals[v] = pull.turns[v] * pull.normals[v];
   for (int v = inner; v < count; ++v) {
     Eigen::Vector4d sum = Eigen::Vector4d::Zero();
     for (const int other : inner_neighbours[v]) sum += pull.turns[other].coeffs();

@@ -14,6 +14,7 @@ namespace {
 constexpr const char* kFile = "orientation.cl";
 constexpr int kFanChunk = 64;  // FAN_CHUNK of the kernels
 constexpr double kScale = 0.1;
+constexpr int kTurnPasses = 2;
 constexpr double kTolerance = 1e-6;  // so that a morph is the same from either side
 // Tips keep the orientation of their texels: what one source has there the other may have none of. Shares of the bone, from
 // the nearest seam, where turns begin to fade and have faded.
@@ -91,8 +92,13 @@ OrientationPull pull_orientations(ClContext& context, const SkeletexModel& model
     context.launch({kFile, "add_turns"}, rows, row_count, n.vertex_count, weight, n.rows, surface.points.values, source.values, pull.turns.values);
     context.launch({kFile, "add_slopes"}, fans, fan_count, n.vertex_count, weight, n.fan_vertices, n.fan_begin, n.fans, source.values, normals.values, slopes);
   }
-  context.launch({kFile, "settle_turns"}, rows, row_count, n.vertex_count, n.rows, context.upload(row_shares(model, surface.lattice)), pull.turns.values,
-                 pull.normals.values);
+  context.launch({kFile, "settle_turns"}, rows, row_count, n.vertex_count, n.rows, context.upload(row_shares(model, surface.lattice)), pull.turns.values);
+  DeviceField smoothed{4, zeros(4 * count)};
+  for (int pass = 0; pass < kTurnPasses; ++pass) {
+    context.launch({kFile, "smooth_turns"}, rows, row_count, n.vertex_count, n.rows, pull.turns.values, smoothed.values);
+    std::swap(pull.turns, smoothed);
+  }
+  context.launch({kFile, "turn_normals"}, rows, row_count, n.vertex_count, n.rows, pull.turns.values, pull.normals.values);
   mean_at_ends(pull.turns);
   mean_at_ends(pull.normals);
   context.launch({kFile, "pull_rows"}, rows, row_count, n.vertex_count, time, n.rows, laplace.weights, pull.turns.values, surface.points.values,
