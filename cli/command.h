@@ -58,9 +58,9 @@ void check_json_target(const std::string& target);
 
 /// Reads a mesh, and says on standard error what the reader did to it (polygons split, vertices welded).
 TriangleMesh load_mesh(const std::filesystem::path& path);
-/// Checks that mesh and skeleton fit (validate_input, which turns a mesh that is inside out) and prints every finding to
+/// Checks that mesh and skeleton fit (validate_before_segmentation, which turns a mesh that is inside out) and prints every finding to
 /// standard error. \throw CLI::RuntimeError(kExitBad) when one is an error
-void require_valid(ClContext& context, TriangleMesh& mesh, const Skeleton& skeleton);
+void require_valid(TriangleMesh& mesh, const Skeleton& skeleton);
 
 /// Milliseconds since it was made or last read.
 class Stopwatch {

@@ -187,7 +187,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
   {
     ProgressBar bar;
     bar.show("checking the input", 0);
-    require_valid(context, mesh, skeleton);
+    require_valid(mesh, skeleton);
     context.reset_profile();
     options.progress = [&](const std::string& stage, double done) {
       bar.show(stage, done);

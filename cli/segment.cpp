@@ -33,7 +33,7 @@ void run(const Arguments& arguments) {
   {
     ProgressBar bar;
     bar.show("checking the input", 0);
-    require_valid(context, mesh, skeleton);
+    require_valid(mesh, skeleton);
     context.reset_profile();
     bar.show("segmenting", 0.5);
     Stopwatch watch;

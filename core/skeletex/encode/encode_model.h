@@ -74,7 +74,7 @@ struct EncodeResult {
 };
 
 /// Turns a closed mesh and its skeleton into a model (paper 3.1-3.4): half edges, segments, maps, atlas, texels.
-/// \pre validate_input reports no error      \throw TopologyError, InputError, DeviceError
+/// \pre validate_before_segmentation reports no error      \throw TopologyError, InputError, DeviceError
 EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& skeleton, const EncodeOptions& options = {});
 
 }  // namespace skeletex

@@ -51,10 +51,15 @@ NearestPoint SurfaceProbe::nearest(const Vec3& point) const {
   };
   std::vector<Best> best(block_count(count, kBlock));
   for_each_block(count, kBlock, [&](std::size_t block, std::size_t begin, std::size_t end) {
+    Best& nearest = best[block];
     for (std::size_t t = begin; t < end; ++t) {
-      const auto& [a, b, c] = mesh_.triangles[t];
-      const Vec3 offset = offset_from_triangle(point, mesh_.positions[a], mesh_.positions[b], mesh_.positions[c]);
-      if (offset.squaredNorm() < best[block].squared) best[block] = {offset.squaredNorm(), offset, t};
+      const auto& [i, j, k] = mesh_.triangles[t];
+      const Vec3 &a = mesh_.positions[i], &b = mesh_.positions[j], &c = mesh_.positions[k];
+      // No point of a triangle is further from one of its corners than the longer edge there; most triangles end here.
+      const double reach = 1.000001 * std::sqrt(std::max((b - a).squaredNorm(), (c - a).squaredNorm())), limit = reach + std::sqrt(nearest.squared);
+      if ((a - point).squaredNorm() > limit * limit) continue;
+      const Vec3 offset = offset_from_triangle(point, a, b, c);
+      if (offset.squaredNorm() < nearest.squared) nearest = {offset.squaredNorm(), offset, t};
     }
   });
   const Best& winner = *std::min_element(best.begin(), best.end(), [](const Best& a, const Best& b) { return a.squared < b.squared; });

@@ -25,7 +25,7 @@ Finding finding_of(const Error& error) {
 
 }  // namespace
 
-std::vector<Finding> validate_input(ClContext& context, TriangleMesh& mesh, const Skeleton& skeleton) {
+std::vector<Finding> validate_before_segmentation(TriangleMesh& mesh, const Skeleton& skeleton) {
   std::vector<Finding> findings;
   const ManifoldReport report = measure_manifold(mesh);
   find_in_mesh(mesh, report, findings);
@@ -67,6 +67,11 @@ std::vector<Finding> validate_input(ClContext& context, TriangleMesh& mesh, cons
                               : fmt::format("open {} ring{} of bones: only a hole in the body has one around it", cycles - report.genus,
                                             cycles - report.genus == 1 ? "" : "s")});
   }
+  return findings;
+}
+
+std::vector<Finding> validate_input(ClContext& context, TriangleMesh& mesh, const Skeleton& skeleton) {
+  std::vector<Finding> findings = validate_before_segmentation(mesh, skeleton);
   if (has_errors(findings)) return findings;
   try {
     segment_mesh(context, build_half_edges(mesh), skeleton);

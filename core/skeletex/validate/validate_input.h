@@ -27,6 +27,8 @@ struct Finding {
 /// with the count. When all else is right the segmentation is tried, so that walls that cross inside the body are found
 /// too. Accepts any input, NaN and bad indices included.
 std::vector<Finding> validate_input(ClContext& context, TriangleMesh& mesh, const Skeleton& skeleton);
+/// The same without that trial, for callers that segment next anyway (and catch what it throws).
+std::vector<Finding> validate_before_segmentation(TriangleMesh& mesh, const Skeleton& skeleton);
 bool has_errors(const std::vector<Finding>& findings);
 
 }  // namespace skeletex
