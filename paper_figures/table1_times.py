@@ -43,6 +43,8 @@ def frames_table(results):
     for row in rows:
         columns = row["columns"]
         for stage in ("reconstruct", "pose", "morph", "transfer"):
+            if f"{stage}_frame_ms" not in columns:  # of a run before this stage was measured
+                continue
             frame = columns[f"{stage}_frame_ms"]
             lines.append([row["parameters"]["pair"], stage, f"{1000 / frame:.3g}", f"{frame:.1f} ms", f"{columns[f'{stage}_device_ms']:.1f} ms", f"{columns[f'{stage}_copy_ms']:.1f} ms"])
     return head, lines
