@@ -11,6 +11,7 @@
 #include "command.h"
 #include "progress_bar.h"
 #include "result_file.h"
+#include "skeletex/edit/live.h"
 #include "skeletex/edit/mirror.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/measure/folds.h"
@@ -22,6 +23,7 @@ namespace {
 struct Arguments {
   std::string source, target, output, device, json, blend = "cosine", width = "auto", scale = "auto", keep = "auto", skip = "auto";
   std::vector<std::string> bones;
+  double share = 1;
   bool has_limbs = false, is_mirrored = false;
 };
 
@@ -93,7 +95,8 @@ void run(const Arguments& arguments) {
   {
     ProgressBar bar;
     bar.show("transferring", 0.3);
-    const SkeletexModel result = transfer(context, source, target, pairs, options, &parts);
+    SkeletexModel result = transfer(context, source, target, pairs, options, &parts);
+    if (arguments.share != 1) result = LiveBlend(context, target, result).at(arguments.share);
     json = write_result(context, result, arguments.output);
     if (!arguments.json.empty()) {
       bar.show("measuring", 0.8);
@@ -131,6 +134,7 @@ void add_transfer_command(CLI::App& program) {
       ->type_name("auto|length|girth|X");
   command.add_option("--keep", arguments->keep, "share of its rows that the target keeps at its seams (default: auto, up to the limb's root)")->type_name("auto|S");
   command.add_option("--skip", arguments->skip, "share of the source's rows that is left out there (default: auto, up to the limb's root)")->type_name("auto|S");
+  command.add_option("--share", arguments->share, "how far the target goes towards that, texel by texel (default: 1)")->check(CLI::Range(0.0, 1.0).description(""));
   add_result_option(command, arguments->output);
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);

@@ -113,3 +113,26 @@ __kernel void move_ends(const int row_count, const int texture_width, const int 
     out[texel + j] += at_head * head[2 * column_count + j] + at_tail * tail[2 * column_count + j];
   }
 }
+
+// Texels between those of two textures of one layout, at the same place. At shares of 0 and 1 they are those of the one texture
+// bit by bit, the sign of zeros included.
+// NDRange: one work-group per row of the texture, of any size.
+static float mixed(const float first, const float second, const float share) {
+  const float between = (1.0f - share) * first + share * second;
+  return share == 0.0f ? first : share == 1.0f ? second : between;
+}
+
+__kernel void mix_texels(const int height, const int width, const float share, __global const float* restrict first_along,
+                         __global const float* restrict first_around, __global const float* restrict first_out,
+                         __global const float* restrict second_along, __global const float* restrict second_around,
+                         __global const float* restrict second_out, __global float* restrict along, __global float* restrict around,
+                         __global float* restrict out) {
+  const int row = get_group_id(0);
+  if (row >= height) return;
+  const int begin = row * width, end = begin + width, step = get_local_size(0);
+  for (int i = begin + (int)get_local_id(0); i < end; i += step) {
+    along[i] = mixed(first_along[i], second_along[i], share);
+    around[i] = mixed(first_around[i], second_around[i], share);
+    out[i] = mixed(first_out[i], second_out[i], share);
+  }
+}

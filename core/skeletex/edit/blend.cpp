@@ -119,6 +119,19 @@ void blend_texels(ClContext& context, const BlendTables& tables, const std::vect
                  context.upload(result.columns), texels.x, texels.y, texels.z, blended.x, blended.y, blended.z);
 }
 
+void mix_texels(ClContext& context, const DevicePlanes& first, const DevicePlanes& second, double share, int texture_width, DevicePlanes& mixed) {
+  if (mixed.x.size != first.x.size) mixed = allocate_planes(context, first.x.size);
+  const int height = static_cast<int>(first.x.size / texture_width);
+  context.launch({"blend.cl", "mix_texels"}, row_range(context, height), height, texture_width, static_cast<float>(share), first.x, first.y, first.z, second.x,
+                 second.y, second.z, mixed.x, mixed.y, mixed.z);
+}
+
+void download_texels(ClContext& context, const DevicePlanes& texels, DisplacementTexture& texture) {
+  texture.along = context.download(texels.x);
+  texture.around = context.download(texels.y);
+  texture.out = context.download(texels.z);
+}
+
 void EndMoves::add(BoneEnd end, const Vec3& move) {
   for (int i = 0; i < 3; ++i) planes[static_cast<int>(end)][i].push_back(static_cast<float>(move[i]));
   if (!move.isZero(0)) is_empty = false;

@@ -36,6 +36,12 @@ double u_at_row(const Patch& patch, double row);
 void blend_texels(ClContext& context, const BlendTables& tables, const std::vector<LatticeRow>& rows, const FrameTables& result, int texture_width,
                   const DevicePlanes& texels, DevicePlanes& blended);
 
+/// Queues (1 - share) first + share second, texel by texel; shares of 0 and 1 give the very bits of first and second.
+void mix_texels(ClContext& context, const DevicePlanes& first, const DevicePlanes& second, double share, int texture_width, DevicePlanes& mixed);
+
+/// Waits for texels on the device and copies them to a texture of their size.
+void download_texels(ClContext& context, const DevicePlanes& texels, DisplacementTexture& texture);
+
 /// What is added to the texels of the rows at the ends, and to those inside less and less.
 struct EndMoves {
   std::array<std::array<std::vector<float>, 3>, 2> planes;  ///< head, tail; along, around, out; the columns of all patches

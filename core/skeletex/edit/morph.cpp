@@ -15,7 +15,6 @@
 #include "skeletex/edit/best_rotation.h"
 #include "skeletex/edit/blend.h"
 #include "skeletex/edit/orientation.h"
-#include "skeletex/edit/overlay.h"
 #include "skeletex/edit/seam_network.h"
 #include "skeletex/edit/surface_map.h"
 #include "skeletex/model/error.h"
@@ -265,6 +264,7 @@ Morph::Morph(ClContext& context, std::vector<SkeletexModel> models, std::span<co
   DisplacementTexture all;
   for (SkeletexModel& model : models_) {
     model = resample_model(context, model, size);
+    traced_seams_.push_back(trace_seams(model));
     texel_begins_.push_back(static_cast<int>(all.out.size()));
     all.along.insert(all.along.end(), model.texture.along.begin(), model.texture.along.end());
     all.around.insert(all.around.end(), model.texture.around.begin(), model.texture.around.end());
@@ -275,12 +275,21 @@ Morph::Morph(ClContext& context, std::vector<SkeletexModel> models, std::span<co
 
 Correspondence Morph::correspondence(int from, int to) const { return composed(inverse(from_first_[from]), from_first_[to]); }
 
-SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) const {
-  const std::vector<double> weights = checked_weights(given, models_.size());
+/// A model on the way without its texels, and the models laid over its skeleton.
+struct Morph::Between {
+  std::vector<double> weights;
+  SkeletexModel model;
+  std::deque<Overlay> overlays;
+  std::optional<Walls> walls;  // reads model.skeleton
+};
+
+std::unique_ptr<Morph::Between> Morph::between(std::span<const double> given, bool has_loops) const {
+  auto between = std::make_unique<Between>();
+  auto& [weights, result, overlays, walls_here] = *between;
+  weights = checked_weights(given, models_.size());
   const int layout_number = layout_index(weights);
   const SkeletexModel& layout = models_[layout_number];
 
-  SkeletexModel result;
   result.skeleton = layout.skeleton;
   result.genus = layout.genus;
   result.diagonals = layout.diagonals;
@@ -299,23 +308,39 @@ SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) 
     if (!(bone_length(result.skeleton, bone) > 0))
       throw InputError(fmt::format("bone \"{}\" shrinks to nothing between the models", result.skeleton.bones[bone].name));
 
-  std::deque<Overlay> overlays;
-  for (std::size_t m = 0; m < models_.size(); ++m) overlays.emplace_back(models_[m], result.skeleton, from_layout[m]);
+  for (std::size_t m = 0; m < models_.size(); ++m) overlays.emplace_back(models_[m], result.skeleton, from_layout[m], traced_seams_[m]);
   set_mean_s(result.skeleton, overlays, weights, overlays[layout_number]);
-  const Walls walls(result.skeleton);
+  const Walls& walls = walls_here.emplace(result.skeleton);
   SeamNetwork network = seam_network(result.skeleton, walls);
   for (Overlay& overlay : overlays) overlay.set_seams(walls, network);
 
   result.patches = mean_patches(overlays, weights, layout);
   SeamMean seams(result, walls, overlays, weights, overlays[layout_number]);
   seams.fill(network);
-  for (int bone = 0; bone < static_cast<int>(result.patches.size()); ++bone)
-    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
-      for (Overlay& overlay : overlays) overlay.set_loop(bone, end, seams.loop(network, bone, end));
+  for (int bone = 0; has_loops && bone < static_cast<int>(result.patches.size()); ++bone)
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
+      const std::vector<Overlay::LoopPoint> loop = seams.loop(network, bone, end);
+      for (Overlay& overlay : overlays) overlay.set_loop(bone, end, loop);
+    }
   result.arcs = std::move(network.arcs);
   result.corners = std::move(network.corners);
   result.ends = std::move(network.ends);
 
+  result.texture.width = layout.texture.width;
+  result.texture.height = layout.texture.height;
+  nlohmann::json settings = nlohmann::json::parse(result.encoder_settings, nullptr, false);
+  if (!settings.is_object()) settings = nlohmann::json::object();
+  settings["morphed"] = weights;
+  result.encoder_settings = settings.dump();
+  return between;
+}
+
+SkeletexModel Morph::without_texels(std::span<const double> weights) const { return std::move(between(weights, false)->model); }
+
+SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) const {
+  const std::unique_ptr<Between> between = this->between(given, true);
+  const auto& [weights, result, overlays, walls_here] = *between;
+  const Walls& walls = *walls_here;
   BlendTables tables;
   const std::vector<LatticeRow> rows = lattice_rows(result.patches, RowChoice::kAll);
   for (std::size_t m = 0; m < models_.size(); ++m) {
@@ -336,8 +361,6 @@ SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) 
       tables.rows.push_back({static_cast<float>(at), static_cast<float>(weights[m])});
     }
   }
-  result.texture.width = layout.texture.width;
-  result.texture.height = layout.texture.height;
   const std::size_t area = static_cast<std::size_t>(result.texture.width) * result.texture.height;
   if (texels.x.size != area) {
     texels = allocate_planes(*context_, area);
@@ -346,12 +369,7 @@ SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) 
   const FrameTables frames = frame_tables(result.skeleton, walls, result.patches, result.origin);
   blend_texels(*context_, tables, rows, frames, result.texture.width, texels_, texels);
   move_ends(*context_, end_moves(result, walls, overlays, weights), rows, frames, result.texture.width, texels);
-
-  nlohmann::json settings = nlohmann::json::parse(result.encoder_settings, nullptr, false);
-  if (!settings.is_object()) settings = nlohmann::json::object();
-  settings["morphed"] = weights;
-  result.encoder_settings = settings.dump();
-  return result;
+  return std::move(between->model);
 }
 
 int Morph::layout_index(std::span<const double> weights) const {
@@ -361,9 +379,7 @@ int Morph::layout_index(std::span<const double> weights) const {
 SkeletexModel Morph::at(std::span<const double> given) const {
   DevicePlanes texels;
   SkeletexModel model = queue(given, texels);
-  model.texture.along = context_->download(texels.x);
-  model.texture.around = context_->download(texels.y);
-  model.texture.out = context_->download(texels.z);
+  download_texels(*context_, texels, model.texture);
   const std::vector<double> weights = checked_weights(given, models_.size());
   if (!is_smooth_ || std::find(weights.begin(), weights.end(), 1.0) != weights.end()) return model;
   const int layout = layout_index(weights);

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
-#include "skeletex/edit/correspondence.h"
+#include "skeletex/edit/overlay.h"
 #include "skeletex/model/texture.h"
 #include "skeletex/reconstruct/displace.h"
 
@@ -29,21 +30,28 @@ class Morph {
   Morph(ClContext& context, std::vector<SkeletexModel> models, std::span<const Correspondence> from_first, const MorphOptions& options = {});
 
   const std::vector<SkeletexModel>& models() const { return models_; }
+  /// See MorphOptions::layout.
+  std::optional<int> layout() const { return layout_; }
   /// From the bones of one model to those of another.
   Correspondence correspondence(int from, int to) const;
 
   /// The model at weights that sum to 1, one per model, none negative. \throw InputError otherwise
   SkeletexModel at(std::span<const double> weights) const;
-  /// The same for live use, its creases left: texels stay on the device, in planes of the result's size; the texture of the returned model
-  /// has a size and no texels.
+  /// The same on the device, its creases left: texels stay there, in planes of the result's size; the texture of the returned model
+  /// has a size and no texels. For frames see LiveMorph (live.h).
   SkeletexModel queue(std::span<const double> weights, DevicePlanes& texels) const;
+  /// What queue returns, and no work per texel.
+  SkeletexModel without_texels(std::span<const double> weights) const;
 
  private:
+  struct Between;
+  std::unique_ptr<Between> between(std::span<const double> weights, bool has_loops) const;
   int layout_index(std::span<const double> weights) const;
 
   ClContext* context_;
   std::vector<SkeletexModel> models_;
   std::vector<Correspondence> from_first_;  ///< per model
+  std::vector<TracedSeams> traced_seams_;   ///< per model
   std::vector<int> texel_begins_;           ///< per model: of its texture in texels_
   DevicePlanes texels_;                     ///< of all models
   std::optional<int> layout_;

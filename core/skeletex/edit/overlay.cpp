@@ -94,7 +94,53 @@ Skeleton posed_to(const Skeleton& model, const Skeleton& here, const Corresponde
   return apply_pose(model, pose);
 }
 
-Overlay::Overlay(const SkeletexModel& model, const Skeleton& here, Correspondence to_model)
+TracedSeams trace_seams(const SkeletexModel& model) {
+  const Walls walls(model.skeleton);
+  TracedSeams traced;
+  traced.ends.resize(model.patches.size());
+  for (int bone = 0; bone < static_cast<int>(traced.ends.size()); ++bone)
+    for (const BoneEnd at : {BoneEnd::kHead, BoneEnd::kTail}) {
+      TracedSeams::End& end = traced.ends[bone][static_cast<int>(at)];
+      const std::vector<ArcUse>& uses = model.ends[bone][static_cast<int>(at)].arcs;
+      if (uses.empty()) continue;
+      const int node = end_node(model.skeleton, bone, at);
+      std::vector<Vec3> positions;
+      const auto add = [&](int owner, const SeamSample& sample, int arc) {
+        positions.push_back(walls.seam_point(owner, end_at(model.skeleton, owner, node), sample.turn, sample.distance));
+        end.turns.push_back(owner == bone ? sample.turn : walls.turn_of(bone, positions.back() - model.skeleton.nodes[node].position));
+        end.distances.push_back(sample.distance);
+        end.arcs.push_back(arc);
+      };
+      for (const ArcUse use : uses) {
+        const SeamArc& arc = model.arcs[use.arc];
+        end.arc_begins.push_back(static_cast<int>(positions.size()));
+        if (!arc.is_closed()) {
+          const SeamCorner& corner = model.corners[arc.corners[use.is_reversed ? 1 : 0]];
+          add(corner.bones[0], corner.sample, -1);
+        }
+        for (std::size_t i = 0; i < arc.samples.size(); ++i)
+          add(arc.bones[0], arc.samples[use.is_reversed ? arc.samples.size() - 1 - i : i], use.arc);
+      }
+      const int count = static_cast<int>(positions.size());
+      end.arc_begins.push_back(count);
+      // Angles are made to grow where the seam turns back about its bone; corners belong where the walls meet, so that each
+      // arc fills its interval.
+      if (std::optional<std::vector<double>> found = loop_turns(positions, end.turns)) end.v = std::move(*found);
+      if (model.arcs[uses[0].arc].is_closed()) continue;
+      for (std::size_t a = 0; a < uses.size(); ++a) {
+        const int begin = end.arc_begins[a], end_of_arc = end.arc_begins[a + 1];
+        std::vector<Vec3> arc_positions(positions.begin() + begin, positions.begin() + end_of_arc);
+        std::vector<double> arc_turns(end.turns.begin() + begin, end.turns.begin() + end_of_arc);
+        arc_positions.push_back(positions[end_of_arc % count]);
+        arc_turns.push_back(end.turns[end_of_arc % count]);
+        const std::vector<double> shares = arc_shares(arc_positions, arc_turns);
+        end.shares.insert(end.shares.end(), shares.begin(), shares.begin() + (end_of_arc - begin));
+      }
+    }
+  return traced;
+}
+
+Overlay::Overlay(const SkeletexModel& model, const Skeleton& here, Correspondence to_model, const TracedSeams& traced)
     : model_(&model),
       to_model_(std::move(to_model)),
       posed_(posed_to(model.skeleton, here, to_model_)),
@@ -105,7 +151,7 @@ Overlay::Overlay(const SkeletexModel& model, const Skeleton& here, Correspondenc
       loops_here_(here.bones.size()) {
   for (int bone = 0; bone < static_cast<int>(loops_.size()); ++bone) bones_here_[model_bone(bone)] = bone;
   for (int bone = 0; bone < static_cast<int>(loops_.size()); ++bone)
-    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) trace_seam(bone, end);
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) place_points(bone, end, traced.ends[model_bone(bone)][static_cast<int>(model_end(bone, end))]);
 }
 
 std::vector<Overlay::Interval> Overlay::intervals_here(int bone, BoneEnd end, const Walls& walls, const SeamNetwork& network) const {
@@ -158,60 +204,20 @@ void Overlay::set_seams(const Walls& walls, const SeamNetwork& network) {
     }
 }
 
-void Overlay::trace_seam(int bone_here, BoneEnd end_here) {
-  Loop& loop = loops_[bone_here][static_cast<int>(end_here)];
-  const int bone = model_bone(bone_here);
-  const BoneEnd end = model_end(bone_here, end_here);
-  const std::vector<ArcUse>& uses = model_->ends[bone][static_cast<int>(end)].arcs;
-  if (uses.empty()) return;
-  const int node = end_node(model_->skeleton, bone, end);
-  std::vector<Vec3> positions;
-  std::vector<double> turns;
-  std::vector<std::size_t> arc_begins;
-  const auto add = [&](int owner, const SeamSample& sample, int arc) {
-    positions.push_back(walls_.seam_point(owner, end_at(model_->skeleton, owner, node), sample.turn, sample.distance));
-    turns.push_back(owner == bone ? sample.turn : walls_.turn_of(bone, positions.back() - model_->skeleton.nodes[node].position));
-    loop.points.push_back({0, 0, 0, sample.distance});
-    loop.arcs.push_back(arc);
-  };
-  for (const ArcUse use : uses) {
-    const SeamArc& arc = model_->arcs[use.arc];
-    arc_begins.push_back(positions.size());
-    if (!arc.is_closed()) {
-      const SeamCorner& corner = model_->corners[arc.corners[use.is_reversed ? 1 : 0]];
-      add(corner.bones[0], corner.sample, -1);
+void Overlay::place_points(int bone, BoneEnd end, const TracedSeams::End& traced) {
+  if (traced.turns.empty()) return;
+  Loop& loop = loops_[bone][static_cast<int>(end)];
+  const std::vector<Interval> intervals = intervals_of_model(bone, end);
+  const int count = static_cast<int>(traced.turns.size());
+  loop.arcs = traced.arcs;
+  for (std::size_t a = 0; a + 1 < traced.arc_begins.size(); ++a)
+    for (int i = traced.arc_begins[a]; i < traced.arc_begins[a + 1]; ++i) {
+      LoopPoint point{0, traced.v.empty() ? intervals[0].begin + static_cast<double>(i) / count : traced.v[i], 0, traced.distances[i]};
+      point.turn = traced.shares.empty() ? point.v : (1 - traced.shares[i]) * intervals[a].begin + traced.shares[i] * intervals[a].end;
+      const double offset = traced.turns[i] - point.turn;
+      point.turn_offset = traced.arcs[i] < 0 ? 0 : offset - std::round(offset);
+      loop.points.push_back(point);
     }
-    for (std::size_t i = 0; i < arc.samples.size(); ++i)
-      add(arc.bones[0], arc.samples[use.is_reversed ? arc.samples.size() - 1 - i : i], use.arc);
-  }
-  arc_begins.push_back(positions.size());
-
-  // Angles are made to grow where the seam turns back about its bone; corners belong where the walls meet, so that each
-  // arc fills its interval.
-  const std::vector<Interval> intervals = intervals_of_model(bone_here, end_here);
-  const int count = static_cast<int>(positions.size());
-  std::vector<double> grown(count);
-  if (std::optional<std::vector<double>> found = loop_turns(positions, turns)) grown = std::move(*found);
-  else
-    for (int i = 0; i < count; ++i) grown[i] = intervals[0].begin + static_cast<double>(i) / count;
-  for (std::size_t a = 0; a < uses.size(); ++a) {
-    const std::size_t begin = arc_begins[a], end_of_arc = arc_begins[a + 1];
-    std::vector<double> shares;
-    if (!model_->arcs[uses[a].arc].is_closed()) {
-      std::vector<Vec3> arc_positions(positions.begin() + begin, positions.begin() + end_of_arc);
-      std::vector<double> arc_turns(turns.begin() + begin, turns.begin() + end_of_arc);
-      arc_positions.push_back(positions[end_of_arc % count]);
-      arc_turns.push_back(turns[end_of_arc % count]);
-      shares = arc_shares(arc_positions, arc_turns);
-    }
-    for (std::size_t i = begin; i < end_of_arc; ++i) {
-      LoopPoint& point = loop.points[i];
-      point.v = grown[i];
-      point.turn = shares.empty() ? grown[i] : (1 - shares[i - begin]) * intervals[a].begin + shares[i - begin] * intervals[a].end;
-      const double offset = turns[i] - point.turn;
-      point.turn_offset = loop.arcs[i] < 0 ? 0 : offset - std::round(offset);
-    }
-  }
 }
 
 double Overlay::model_turn(int bone, BoneEnd end, double turn) const {

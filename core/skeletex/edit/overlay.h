@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <array>
+#include <utility>
 #include <vector>
 
 #include "skeletex/edit/correspondence.h"
@@ -8,6 +9,21 @@
 #include "skeletex/model/posed_walls.h"
 
 namespace skeletex {
+
+/// A model's seams as its ends' rows run through them: what all overlays of the model share.
+struct TracedSeams {
+  /// Per point, corners included, in the direction of growing angle. \see Overlay
+  struct End {
+    std::vector<double> turns;      ///< angles about the bone
+    std::vector<double> v;          ///< made to grow; empty where that cannot be
+    std::vector<double> distances;
+    std::vector<int> arcs;          ///< -1: a corner
+    std::vector<double> shares;     ///< of the way through the arc, by angle; of closed arcs no entry
+    std::vector<int> arc_begins;    ///< per arc of the end, and the number of points
+  };
+  std::vector<std::array<End, 2>> ends;  ///< per bone
+};
+TracedSeams trace_seams(const SkeletexModel& model);
 
 /// A model laid over another skeleton of the same branching: the roll correction of morphs and transfers (paper 5). Angles
 /// about a bone of the one become angles about a bone of the other: where bones meet, linearly between the bounds of
@@ -21,7 +37,9 @@ class Overlay {
   /// \param model  its texels are not looked at. Must outlive this
   /// \param here   s is not looked at (see set_seams)
   /// \param to_model  from the bones here to those of the model
-  Overlay(const SkeletexModel& model, const Skeleton& here, Correspondence to_model);
+  /// \param traced  trace_seams(model)
+  Overlay(const SkeletexModel& model, const Skeleton& here, Correspondence to_model, const TracedSeams& traced);
+  Overlay(const SkeletexModel& model, const Skeleton& here, Correspondence to_model) : Overlay(model, here, std::move(to_model), trace_seams(model)) {}
   Overlay(const Overlay&) = delete;
   Overlay& operator=(const Overlay&) = delete;
 
@@ -90,7 +108,7 @@ class Overlay {
     std::vector<LoopPoint> points;  ///< angles are the model's
     std::vector<int> arcs;          ///< of the points; -1: a corner
   };
-  void trace_seam(int bone, BoneEnd end);
+  void place_points(int bone, BoneEnd end, const TracedSeams::End& traced);
   std::vector<Interval> intervals_here(int bone, BoneEnd end, const Walls& walls, const SeamNetwork& network) const;
   std::vector<Interval> intervals_of_model(int bone, BoneEnd end) const;
   const Loop& loop(int bone, BoneEnd end) const { return loops_[bone][static_cast<int>(end)]; }

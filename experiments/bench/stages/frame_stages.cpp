@@ -5,7 +5,7 @@
 
 #include "skeletex/edit/correspondence.h"
 #include "skeletex/edit/filter.h"
-#include "skeletex/edit/morph.h"
+#include "skeletex/edit/live.h"
 #include "skeletex/edit/part.h"
 #include "skeletex/edit/transfer.h"
 #include "skeletex/model/error.h"
@@ -93,32 +93,52 @@ Stage pose_stage(ClContext& context, TextureInputPointer input, const std::optio
   return stage;
 }
 
+namespace {
+
+/// Reconstruction of a model whose texels come from a live edit.
+struct LiveFrame {
+  DeviceLattice lattice;
+  DevicePlanes points;
+
+  void reconstruct(ClContext& context, const SkeletexModel& model) {
+    if (lattice.vertex_count == 0) {
+      const std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kInner);
+      for (const LatticeRow& row : rows) lattice.vertex_count += model.patches[row[0]].rectangle.width;
+      lattice.texture_width = model.texture.width;
+      lattice.rows = context.upload(rows);
+      points = allocate_planes(context, lattice.vertex_count);
+    }
+    lattice.tables = upload_tables(context, frame_tables(model.skeleton, Walls(model.skeleton), model.patches, model.origin));
+    displace(context, lattice, points);
+  }
+};
+
+/// Frames of a live edit, each at another place of its way, against a copy of two textures in and one lattice of points out.
+/// \param queue  (share, texels) -> model
+template <class Queue>
+void set_live(Stage& stage, ClContext& context, const Queue& queue, std::size_t texels, double prepare_ms) {
+  stage.run = [&context, queue, frame = std::make_shared<LiveFrame>(), t = 0.0]() mutable {
+    t = std::fmod(t + 0.37, 1.0);
+    frame->reconstruct(context, queue(t, frame->lattice.texels));
+  };
+  stage.run_reference = device_copy(context, 3 * kPlanes * texels);
+  stage.details = [prepare_ms] { return std::vector<std::pair<std::string, double>>{{"prepare_ms", prepare_ms}}; };
+}
+
+}  // namespace
+
 Stage morph_stage(ClContext& context, TextureInputPointer first, TextureInputPointer second) {
   Stage stage = stage_of("morph", *first);
   stage.model += " to " + second->name;
   MorphOptions options;
   options.layout = 0;
   const auto morph = std::make_shared<const Morph>(context, std::vector{first->model, second->model}, std::vector{correspond(*first, *second)}, options);
-  struct Live {
-    DeviceLattice lattice;
-    DevicePlanes points;
-    double t = 0;
-  };
-  const auto live = std::make_shared<Live>();
-  stage.run = [&context, morph, live] {
-    live->t = std::fmod(live->t + 0.37, 1.0);
-    const SkeletexModel between = morph->queue(std::vector{1 - live->t, live->t}, live->lattice.texels);
-    const std::vector<LatticeRow> rows = lattice_rows(between.patches, RowChoice::kInner);
-    if (live->lattice.vertex_count == 0) {
-      for (const Patch& patch : between.patches) live->lattice.vertex_count += static_cast<std::size_t>(patch.rectangle.width) * (patch.rectangle.height - 2);
-      live->points = allocate_planes(context, live->lattice.vertex_count);
-    }
-    live->lattice.texture_width = between.texture.width;
-    live->lattice.tables = upload_tables(context, frame_tables(between.skeleton, Walls(between.skeleton), between.patches, between.origin));
-    live->lattice.rows = context.upload(rows);
-    displace(context, live->lattice, live->points);
-  };
-  stage.run_reference = device_copy(context, 3 * kPlanes * texels_of(morph->models()[0]));  // two textures in, points out
+  std::shared_ptr<const LiveMorph> live;
+  const double prepare_ms = wall_ms([&] {
+    live = std::make_shared<const LiveMorph>(context, *morph, std::vector<std::vector<double>>{{1, 0}, {0, 1}});
+    context.finish();
+  });
+  set_live(stage, context, [morph, live](double t, DevicePlanes& texels) { return live->queue(t, texels); }, texels_of(morph->models()[0]), prepare_ms);
   return stage;
 }
 
@@ -134,8 +154,12 @@ Stage transfer_stage(ClContext& context, TextureInputPointer source, TextureInpu
   if (chosen < 0) throw InputError(target->name + " has no bone with a free end to transfer");
   const std::vector<std::pair<std::string, std::string>> pairs{
       {source->model.skeleton.bones[to_source.bones[chosen]].name, target->model.skeleton.bones[chosen].name}};
-  stage.run = [&context, source, target, pairs] { transfer(context, source->model, target->model, pairs); };
-  stage.run_reference = device_copy(context, kPlanes * (texels_of(source->model) + 2 * texels_of(target->model)));  // both in, one out
+  std::shared_ptr<const LiveBlend> live;
+  const double prepare_ms = wall_ms([&] {
+    live = std::make_shared<const LiveBlend>(context, target->model, transfer(context, source->model, target->model, pairs));
+    context.finish();
+  });
+  set_live(stage, context, [live](double share, DevicePlanes& planes) { return live->queue(share, planes); }, texels_of(target->model), prepare_ms);
   return stage;
 }
 
