@@ -3,6 +3,7 @@
 
 #include <charconv>
 #include <filesystem>
+#include <future>
 #include <map>
 #include <memory>
 
@@ -179,21 +180,27 @@ void run(const Arguments& arguments, const CLI::App& command) {
   Stopwatch watch;
   check_output(arguments.output);
   check_json_target(arguments.json);
+  // Drivers take as long to load as the mesh.
+  auto loading = std::async(std::launch::async, [&] {
+    auto context = std::make_unique<ClContext>(arguments.device);
+    prepare_encoding(*context, options);
+    return context;
+  });
   TriangleMesh mesh = load_mesh(arguments.mesh);
   const Skeleton skeleton = read_skeleton(arguments.skeleton);
   check_bone_names(arguments, options, skeleton);
-  ClContext context(arguments.device);
+  std::unique_ptr<ClContext> loaded;
   EncodeResult result;
   {
     ProgressBar bar;
     bar.show("checking the input", 0);
     require_valid(mesh, skeleton);
-    context.reset_profile();
+    loaded = loading.get();
     options.progress = [&](const std::string& stage, double done) {
       bar.show(stage, done);
       return true;
     };
-    result = encode_model(context, mesh, skeleton, options);
+    result = encode_model(*loaded, mesh, skeleton, options);
     bar.show("writing", 1);
     write_model(arguments.output, result.model,
                 {.format = arguments.is_half ? TexelFormat::kHalf : TexelFormat::kFloat,
@@ -205,6 +212,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
       warn(fmt::format("bone \"{}\": SPD does not see {:.1f} % of its surface; --method hybrid or vsm does", bone.name,
                        100 * bone.unseen_area_fraction));
   }
+  ClContext& context = *loaded;
   Json json = report_json(result.report, options, watch.lap_ms() / 1000);
   json["kernels"] = profile_json(context);
   print(arguments.json, report_text(result.report, options, arguments.output));

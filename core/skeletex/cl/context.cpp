@@ -259,7 +259,7 @@ void ClContext::check_fits(std::size_t values, std::size_t room) {
 }
 
 void ClContext::check_argument(cl_int code, const ClKernelName& name, unsigned index) {
-  check(code, fmt::format("{}: kernel {}, argument {}", name.file, name.kernel, index));
+  if (code != CL_SUCCESS) check(code, fmt::format("{}: kernel {}, argument {}", name.file, name.kernel, index));
 }
 
 void ClContext::enqueue(const ::cl::Kernel& kernel, const ClKernelName& name, const ClRange& range) {

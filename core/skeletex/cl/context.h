@@ -138,6 +138,9 @@ class ClContext {
   }
   void finish();
 
+  /// Builds or loads the program of a kernel before its first launch.
+  void prepare(const ClKernelName& name) { get_kernel(name); }
+
   /// Puts the programs that this context built from source into the cache on disk. Costs about as much as building them
   /// did (PoCL compiles each kernel again, for any work-group size); the next start saves the parsing. Tools call it
   /// last, when the user has his results.

@@ -126,6 +126,14 @@ int pole_of(const Chart& chart, ChartVertex kind) {
 
 }  // namespace
 
+void prepare_encoding(ClContext& context, const EncodeOptions& options) {
+  context.prepare({"segment.cl", "classify_points"});
+  context.prepare({"spd.cl", "find_hidden"});
+  if (options.method != EncodeMethod::kSpd) context.prepare(vsm_kernel(context, options.vsm));
+  context.prepare({"encode.cl", "encode_texels"});
+  if (options.method != EncodeMethod::kSpd && options.has_unfold) context.prepare({"unfold.cl", "find_folds"});
+}
+
 EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& input_skeleton, const EncodeOptions& options) {
   check_options(options, input_skeleton);
   const auto progress = [&](const char* stage, double done) {

@@ -73,6 +73,9 @@ struct EncodeResult {
   EncodeReport report;
 };
 
+/// Loads or compiles the programs of encode_model, so that this can happen beside the reading and checking of the input.
+void prepare_encoding(ClContext& context, const EncodeOptions& options = {});
+
 /// Turns a closed mesh and its skeleton into a model (paper 3.1-3.4): half edges, segments, maps, atlas, texels.
 /// \pre validate_before_segmentation reports no error      \throw TopologyError, InputError, DeviceError
 EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& skeleton, const EncodeOptions& options = {});

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "skeletex/measure/parallel.h"
 #include "spd_structs.h"
 
 namespace skeletex {
@@ -49,7 +50,8 @@ LocalTriangles localize(const Skeleton& skeleton, const Walls& walls, std::span<
     turns.clear();
     for (const Vec3& position : chart.positions) {
       const Vec3 offset = position - head;
-      positions.push_back({static_cast<float>(offset.dot(basis.s)), static_cast<float>(offset.dot(basis.b)), static_cast<float>(offset.dot(basis.o))});
+      positions.push_back(
+          {static_cast<float>(offset.dot(basis.s)), static_cast<float>(offset.dot(basis.b)), static_cast<float>(offset.dot(basis.o))});
       // Of the rounded coordinates: the device must find the same half-planes.
       turns.push_back(std::atan2(static_cast<double>(positions.back()[1]), static_cast<double>(positions.back()[0])) / (2 * std::numbers::pi));
       local.extent = std::max(local.extent, offset.norm());
@@ -145,8 +147,8 @@ std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton,
     const bool is_head_free = walls.is_free(bone, BoneEnd::kHead), is_tail_free = walls.is_free(bone, BoneEnd::kTail);
     // Cuts lie off the walls by the segmentation's perturbation and by rounding; both are relative to the model's size.
     const float tolerance = static_cast<float>(4e-6 * local.extent);
-    records.push_back({static_cast<float>(bone_length(skeleton, bone)), tolerance, is_head_free ? 0 : tolerance, is_tail_free ? 0 : tolerance, width, height,
-                       static_cast<int>(rows.size()), static_cast<int>(columns.size()), texels, is_head_free, is_tail_free,
+    records.push_back({static_cast<float>(bone_length(skeleton, bone)), tolerance, is_head_free ? 0 : tolerance, is_tail_free ? 0 : tolerance, width,
+                       height, static_cast<int>(rows.size()), static_cast<int>(columns.size()), texels, is_head_free, is_tail_free,
                        static_cast<int>(row_guesses.size()), 0, 0});
     tallest = std::max(tallest, height);
     texels += width * height;
@@ -176,8 +178,9 @@ std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton,
   auto hit_distances = context.allocate<float>(texels);
   const ClKernelName kernel{"spd.cl", "cast_rays"};
   context.launch(kernel, ClRange({columns.size(), tiles}, {context.work_group_size(kernel, kWorkGroup), 1}), column_count, tile_rows,
-                 which == SpdHit::kLast ? 1 : 0, context.upload(records), context.upload(column_patches), context.upload(rows), context.upload(row_guesses),
-                 context.upload(columns), context.upload(lists.begins), context.upload(lists.triangles), context.upload(local.points), hit_triangles, hit_distances);
+                 which == SpdHit::kLast ? 1 : 0, context.upload(records), context.upload(column_patches), context.upload(rows),
+                 context.upload(row_guesses), context.upload(columns), context.upload(lists.begins), context.upload(lists.triangles),
+                 context.upload(local.points), hit_triangles, hit_distances);
   const std::vector<int> found = context.download(hit_triangles);
   const std::vector<float> distances = context.download(hit_distances);
 
@@ -219,47 +222,47 @@ std::vector<double> unseen_area_fractions(ClContext& context, const Skeleton& sk
         });
       }
   });
-  std::vector<SpdSightLine> lines;
-  lines.reserve(local.count());
+  std::vector<SpdSightLine> lines(local.count());
+  std::vector<float> spheres(4 * static_cast<std::size_t>(local.count()));
+  const float radius_slack = static_cast<float>(1e-6 * local.extent);
   for (std::size_t i = 0; i < charts.size(); ++i) {
     const Chart& chart = charts[i];
     const BoneBasis& basis = walls.bases()[chart.bone];
     const Vec3& head = end_position(skeleton, chart.bone, BoneEnd::kHead);
     const double length = bone_length(skeleton, chart.bone);
     const bool is_head_free = walls.is_free(chart.bone, BoneEnd::kHead), is_tail_free = walls.is_free(chart.bone, BoneEnd::kTail);
-    for (const Triangle& triangle : chart.triangles) {
-      const Vec3 centre = (chart.positions[triangle[0]] + chart.positions[triangle[1]] + chart.positions[triangle[2]]) / 3;
-      const SpdCoordinates at = spd_coordinates(skeleton, walls, chart.bone, centre);
-      const Vec3 offset = centre - head;
-      const double x = offset.dot(basis.s), y = offset.dot(basis.b), r = std::hypot(x, y);
-      SpdSightLine line{};
-      line.distance = -1;
-      if (at.u >= 0 && at.u <= 1 && r > 0) {
-        const double foot = station_of(at.u, is_head_free, is_tail_free).station * length;
-        const double z = offset.dot(basis.o) - foot, distance = std::hypot(r, z);
-        const double slack = 1e-6 * (std::abs(foot) + std::abs(z) + distance);
-        const int sector = std::min(kSightSectors - 1, static_cast<int>(at.turn * kSightSectors));
-        const int list = (static_cast<int>(i) * kSightSectors + sector) * kSightSlabs;
-        line = {static_cast<float>(x / r),
-                static_cast<float>(y / r),
-                static_cast<float>(foot),
-                static_cast<float>(r / distance),
-                static_cast<float>(z / distance),
-                static_cast<float>(distance),
-                list + slab_of(i, static_cast<float>(foot + std::min(z, 0.0) - slack)),
-                list + slab_of(i, static_cast<float>(foot + std::max(z, 0.0) + slack))};
+    for_each_block(chart.triangles.size(), 1024, [&](std::size_t, std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k) {
+        const Triangle& triangle = chart.triangles[k];
+        const Vec3 centre = (chart.positions[triangle[0]] + chart.positions[triangle[1]] + chart.positions[triangle[2]]) / 3;
+        const SpdCoordinates at = spd_coordinates(skeleton, walls, chart.bone, centre);
+        const Vec3 offset = centre - head;
+        const double x = offset.dot(basis.s), y = offset.dot(basis.b), r = std::hypot(x, y);
+        SpdSightLine line{};
+        line.distance = -1;
+        if (at.u >= 0 && at.u <= 1 && r > 0) {
+          const double foot = station_of(at.u, is_head_free, is_tail_free).station * length;
+          const double z = offset.dot(basis.o) - foot, distance = std::hypot(r, z);
+          const double slack = 1e-6 * (std::abs(foot) + std::abs(z) + distance);
+          const int sector = std::min(kSightSectors - 1, static_cast<int>(at.turn * kSightSectors));
+          const int list = (static_cast<int>(i) * kSightSectors + sector) * kSightSlabs;
+          line = {static_cast<float>(x / r),
+                  static_cast<float>(y / r),
+                  static_cast<float>(foot),
+                  static_cast<float>(r / distance),
+                  static_cast<float>(z / distance),
+                  static_cast<float>(distance),
+                  list + slab_of(i, static_cast<float>(foot + std::min(z, 0.0) - slack)),
+                  list + slab_of(i, static_cast<float>(foot + std::max(z, 0.0) + slack))};
+        }
+        const std::size_t t = static_cast<std::size_t>(local.begins[i]) + k;
+        lines[t] = line;
+        const Eigen::Map<const Eigen::Matrix3f> corners(&local.points[9 * t]);
+        const Eigen::Vector3f middle = corners.rowwise().mean();
+        const float radius = std::sqrt((corners.colwise() - middle).colwise().squaredNorm().maxCoeff());
+        Eigen::Map<Eigen::Vector4f>(&spheres[4 * t]) << middle, radius + radius_slack;
       }
-      lines.push_back(line);
-    }
-  }
-
-  std::vector<float> spheres(4 * static_cast<std::size_t>(local.count()));
-  const float slack = static_cast<float>(1e-6 * local.extent);
-  for (int t = 0; t < local.count(); ++t) {
-    const Eigen::Map<const Eigen::Matrix3f> corners(&local.points[9 * static_cast<std::size_t>(t)]);
-    const Eigen::Vector3f centre = corners.rowwise().mean();
-    const float radius = std::sqrt((corners.colwise() - centre).colwise().squaredNorm().maxCoeff());
-    Eigen::Map<Eigen::Vector4f>(&spheres[4 * static_cast<std::size_t>(t)]) << centre, radius + slack;
+    });
   }
 
   auto is_hidden = context.allocate<int>(lines.size());

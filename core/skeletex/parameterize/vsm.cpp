@@ -11,6 +11,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "skeletex/measure/parallel.h"
 #include "skeletex/parameterize/half_edge_table.h"
 
 namespace skeletex {
@@ -329,7 +330,15 @@ void solve_directly(Chart& chart, const VsmOptions& options, int iterations) {
   }
 }
 
+std::size_t group_size(const ClContext& context, const VsmOptions& options) {
+  return options.work_group_size > 0 ? options.work_group_size : context.device().type == "cpu" ? 1 : 1024;
+}
+
 }  // namespace
+
+ClKernelName vsm_kernel(const ClContext& context, const VsmOptions& options) {
+  return {"vsm.cl", "solve_charts", group_size(context, options) == 1 ? "-DVSM_SINGLE" : ""};
+}
 
 std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, const VsmOptions& options) {
   std::vector<VsmReport> reports(charts.size());
@@ -364,8 +373,8 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
 
   // On a CPU one work-item runs a plain loop over the rows; elsewhere a group is as large as the device allows. One program
   // holds all kernels: each is compiled once.
-  const std::size_t wanted = options.work_group_size > 0 ? options.work_group_size : context.device().type == "cpu" ? 1 : 1024;
-  const auto kernel = [&](std::string_view name) { return ClKernelName{"vsm.cl", name, wanted == 1 ? "-DVSM_SINGLE" : ""}; };
+  const std::size_t wanted = group_size(context, options);
+  const auto kernel = [&](std::string_view name) { return ClKernelName{"vsm.cl", name, vsm_kernel(context, options).options}; };
   const std::size_t group = context.work_group_size(kernel("invert_coarse"), context.work_group_size(kernel("solve_charts"), wanted));
   // More groups than charts do no harm, and drivers that hand groups to threads in blocks then use every thread.
   const std::size_t groups = std::max<std::size_t>(charts.size(), 64);
@@ -416,7 +425,7 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
   const auto final_hi = context.download(hi), final_lo = context.download(lo);
   const auto final_steps = context.download(steps);
   const auto final_ratios = context.download(ratios);
-  for (std::size_t k = 0; k < charts.size(); ++k) {
+  for_each_block(charts.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
     Chart& chart = charts[k];
     VsmReport& report = reports[k];
     const std::vector<double> guess = chart.v;
@@ -432,7 +441,7 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
     }
     if (chart.topology == SegmentTopology::kSphere) settle_rotation(chart, guess);
     report.spread = spread_of(texture_areas(chart));
-  }
+  });
   return reports;
 }
 

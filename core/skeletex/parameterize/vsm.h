@@ -35,6 +35,9 @@ struct VsmReport {
   bool used_direct_solver = false;  ///< the device's solution was not good enough and a sparse factorization replaced it
 };
 
+/// The kernel of solve_vsm that its others share a program with. \see ClContext::prepare
+ClKernelName vsm_kernel(const ClContext& context, const VsmOptions& options = {});
+
 /// Vertex-sampling-maximizing maps (paper 3.2.2) of all charts together: weights, then one conjugate-gradient solve per
 /// iteration in single precision on the device, u and v with a common matrix, a work-group per chart. Fills u and v of
 /// every inner vertex. A chart with flipped triangles is solved again by a sparse factorization on the host.
