@@ -18,7 +18,7 @@ struct SharedTriangle {
   double share = 1;
 };
 
-/// What the kernels of filter.cl take for the surface, as one list: both triangulations of every quad between inner rows,
+/// What the kernels of filter.cl and diffusion.cl take for the surface, as one list: both triangulations of every quad between inner rows,
 /// half each, and the triangles at the ends.
 inline std::vector<SharedTriangle> surface_triangles(const SkeletexModel& model, const Lattice& lattice, std::span<const Triangle> end_triangles) {
   std::vector<SharedTriangle> triangles;

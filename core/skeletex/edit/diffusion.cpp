@@ -10,7 +10,7 @@
 namespace skeletex {
 namespace {
 
-constexpr const char* kFile = "filter.cl";
+constexpr const char *kFile = "filter.cl", *kSolverFile = "diffusion.cl";
 // Sums may be taken in any order that the compiler likes: their loops become vector instructions.
 constexpr const char* kFastSums = "-cl-unsafe-math-optimizations";
 constexpr int kFanChunk = 64, kVertexChunk = 4096;  // FAN_CHUNK, VERTEX_CHUNK of the kernels
@@ -38,8 +38,8 @@ DeviceSums allocate_sums(ClContext& context, const DeviceNeighbours& neighbours)
   return {context.allocate<float>(rows + others + vertices), context.allocate<float>(3)};
 }
 void sum_partials(ClContext& context, const DeviceSums& sums, std::size_t partials, int slot) {
-  const std::size_t group = context.device().type == "cpu" ? 1 : context.work_group_size({kFile, "sum_partials", kFastSums}, 256);
-  context.launch({kFile, "sum_partials", kFastSums}, ClRange({group, 1}, {group, 1}), static_cast<int>(partials), slot, sums.partials,
+  const std::size_t group = context.device().type == "cpu" ? 1 : context.work_group_size({kSolverFile, "sum_partials", kFastSums}, 256);
+  context.launch({kSolverFile, "sum_partials", kFastSums}, ClRange({group, 1}, {group, 1}), static_cast<int>(partials), slot, sums.partials,
                  ClLocal{group * sizeof(float)}, sums.scalars);
 }
 
@@ -48,9 +48,9 @@ std::size_t queue_operator(ClContext& context, const SurfaceOperator& surface, f
                            const DeviceField& p, const DeviceField& q, const ClBuffer<float>& partials) {
   const DeviceNeighbours& n = *surface.neighbours;
   const ClRange rows = row_range(context, n.rows.size), fans = fan_range(context, n);
-  context.launch({kFile, "apply_rows", kFastSums}, rows, size(n.rows), p.components, n.vertex_count, mass_share, time, n.rows, surface.weights,
+  context.launch({kSolverFile, "apply_rows", kFastSums}, rows, size(n.rows), p.components, n.vertex_count, mass_share, time, n.rows, surface.weights,
                  surface.mass, is_free, p.values, q.values, partials);
-  context.launch({kFile, "apply_fans", kFastSums}, fans, size(n.fan_vertices), n.inner_count, p.components, n.vertex_count,
+  context.launch({kSolverFile, "apply_fans", kFastSums}, fans, size(n.fan_vertices), n.inner_count, p.components, n.vertex_count,
                  static_cast<int>(rows.global[0]), mass_share, time, n.fan_vertices, n.fan_begin, n.fans, surface.fan_weights, surface.mass, is_free,
                  p.values, q.values, partials);
   return rows.global[0] + fans.global[0];
@@ -73,9 +73,9 @@ class Preconditioner {
     const DeviceNeighbours& n = *surface.neighbours;
     const auto plane = [&] { return context.allocate<float>(count_); };
     row_pivots_ = plane(), row_below_ = plane(), row_last_ = plane(), column_pivots_ = plane(), column_below_ = plane();
-    context.launch({kFile, "factor_rows", kFastSums}, rows(), size(n.rows), time, n.rows, surface.weights, surface.mass, surface.stiffness, row_pivots_,
+    context.launch({kSolverFile, "factor_rows", kFastSums}, rows(), size(n.rows), time, n.rows, surface.weights, surface.mass, surface.stiffness, row_pivots_,
                    row_below_, row_last_);
-    context.launch({kFile, "factor_columns", kFastSums}, columns(), size(n.column_blocks), count_, time, n.column_blocks, surface.weights, surface.mass,
+    context.launch({kSolverFile, "factor_columns", kFastSums}, columns(), size(n.column_blocks), count_, time, n.column_blocks, surface.weights, surface.mass,
                    surface.stiffness, column_pivots_, column_below_);
     between_ = context.allocate<float>(static_cast<std::size_t>(components) * count_);
     if (!surface.coarser) return;
@@ -91,21 +91,21 @@ class Preconditioner {
     const DeviceNeighbours& n = *surface_->neighbours;
     if (coarser_) {
       const DeviceCoarseLattice& coarse = *n.coarser;
-      context_->launch({kFile, "restrict_field", kFastSums}, ClRange(coarse.picks.size), size(coarse.picks), components_, count_, coarse.reader_begin,
+      context_->launch({kSolverFile, "restrict_field", kFastSums}, ClRange(coarse.picks.size), size(coarse.picks), components_, count_, coarse.reader_begin,
                        coarse.readers, coarse.reader_shares, r, coarse_r_);
       coarser_->queue(coarse_r_, coarse_z_, partials);
     }
-    context_->launch({kFile, "precondition_rows", kFastSums}, rows(), size(n.rows), components_, count_, n.rows, row_pivots_, row_below_, row_last_, r, z);
-    context_->launch({kFile, "precondition_columns", kFastSums}, columns(), size(n.column_blocks), components_, count_, n.column_blocks, column_pivots_,
+    context_->launch({kSolverFile, "precondition_rows", kFastSums}, rows(), size(n.rows), components_, count_, n.rows, row_pivots_, row_below_, row_last_, r, z);
+    context_->launch({kSolverFile, "precondition_columns", kFastSums}, columns(), size(n.column_blocks), components_, count_, n.column_blocks, column_pivots_,
                      column_below_, is_free_, r, between_, z, partials);
     std::size_t sums = columns().global[0];
-    context_->launch({kFile, "precondition_others", kFastSums}, other_range(*context_, n), n.inner_count, components_, count_, static_cast<int>(sums),
+    context_->launch({kSolverFile, "precondition_others", kFastSums}, other_range(*context_, n), n.inner_count, components_, count_, static_cast<int>(sums),
                      time_, surface_->mass, surface_->stiffness, is_free_, r, z, partials);
     sums += other_range(*context_, n).global[0];
     if (coarser_) {
       const DeviceCoarseLattice& coarse = *n.coarser;
       const ClRange range = row_range(*context_, chunks(count_, kVertexChunk));
-      context_->launch({kFile, "add_coarse_field", kFastSums}, range, components_, count_, size(coarse.picks), static_cast<int>(sums), coarse.sources,
+      context_->launch({kSolverFile, "add_coarse_field", kFastSums}, range, components_, count_, size(coarse.picks), static_cast<int>(sums), coarse.sources,
                        coarse.shares, is_free_, coarse_z_, r, z, partials);
       sums += range.global[0];
     }
@@ -165,10 +165,10 @@ SolveResult solve_diffusion(ClContext& context, const SurfaceOperator& surface, 
   const Preconditioner preconditioner(context, surface, time, is_free, b.components);
   const auto precondition = [&](int slot) { sum_partials(context, sums, preconditioner.queue(r.values, z.values, sums.partials), slot); };
   const auto turn_direction = [&](int old_rz, int new_rz) {
-    context.launch({kFile, "turn_direction", kFastSums}, range, values, old_rz, new_rz, sums.scalars, z.values, p.values);
+    context.launch({kSolverFile, "turn_direction", kFastSums}, range, values, old_rz, new_rz, sums.scalars, z.values, p.values);
   };
 
-  context.launch({kFile, "begin_solve", kFastSums}, range, values, count, is_free, b.values, result.x.values, r.values, p.values);
+  context.launch({kSolverFile, "begin_solve", kFastSums}, range, values, count, is_free, b.values, result.x.values, r.values, p.values);
   precondition(0);
   turn_direction(0, 0);
   const double first = context.download(sums.scalars)[0];
@@ -177,7 +177,7 @@ SolveResult solve_diffusion(ClContext& context, const SurfaceOperator& surface, 
   for (int step = 0; step < most_steps && result.report.residual > tolerance; ++step) {
     const int old_rz = step % 2, new_rz = 1 - old_rz;
     sum_partials(context, sums, queue_operator(context, surface, 1.0f, time, is_free, p, q, sums.partials), kPq);
-    context.launch({kFile, "take_step", kFastSums}, range, values, old_rz, kPq, sums.scalars, p.values, q.values, result.x.values, r.values);
+    context.launch({kSolverFile, "take_step", kFastSums}, range, values, old_rz, kPq, sums.scalars, p.values, q.values, result.x.values, r.values);
     precondition(new_rz);
     turn_direction(old_rz, new_rz);
     result.report.steps = step + 1;
