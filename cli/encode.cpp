@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <exception>
 #include <filesystem>
 #include <future>
 #include <map>
@@ -180,27 +181,31 @@ void run(const Arguments& arguments, const CLI::App& command) {
   Stopwatch watch;
   check_output(arguments.output);
   check_json_target(arguments.json);
-  // Drivers take as long to load as the mesh.
-  auto loading = std::async(std::launch::async, [&] {
-    auto context = std::make_unique<ClContext>(arguments.device);
-    prepare_encoding(*context, options);
-    return context;
-  });
-  TriangleMesh mesh = load_mesh(arguments.mesh);
+  // A driver takes as long to load as the mesh. It stays on this thread, as some keep state per thread.
+  auto reading = std::async(std::launch::async, [&] { return load_mesh(arguments.mesh); });
+  std::unique_ptr<ClContext> loaded;
+  std::exception_ptr no_device;
+  try {
+    loaded = std::make_unique<ClContext>(arguments.device);
+    prepare_encoding(*loaded, options);
+  } catch (...) {
+    no_device = std::current_exception();
+  }
+  TriangleMesh mesh = reading.get();
   const Skeleton skeleton = read_skeleton(arguments.skeleton);
   check_bone_names(arguments, options, skeleton);
-  std::unique_ptr<ClContext> loaded;
+  if (no_device) std::rethrow_exception(no_device);
+  ClContext& context = *loaded;
   EncodeResult result;
   {
     ProgressBar bar;
     bar.show("checking the input", 0);
     require_valid(mesh, skeleton);
-    loaded = loading.get();
     options.progress = [&](const std::string& stage, double done) {
       bar.show(stage, done);
       return true;
     };
-    result = encode_model(*loaded, mesh, skeleton, options);
+    result = encode_model(context, mesh, skeleton, options);
     bar.show("writing", 1);
     write_model(arguments.output, result.model,
                 {.format = arguments.is_half ? TexelFormat::kHalf : TexelFormat::kFloat,
@@ -212,7 +217,6 @@ void run(const Arguments& arguments, const CLI::App& command) {
       warn(fmt::format("bone \"{}\": SPD does not see {:.1f} % of its surface; --method hybrid or vsm does", bone.name,
                        100 * bone.unseen_area_fraction));
   }
-  ClContext& context = *loaded;
   Json json = report_json(result.report, options, watch.lap_ms() / 1000);
   json["kernels"] = profile_json(context);
   print(arguments.json, report_text(result.report, options, arguments.output));
