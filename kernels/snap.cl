@@ -21,6 +21,8 @@
 #define MARGIN 0.6f        // cells that the rows next to a seam or pole keep from it
 #define LEAST_MOVE 0.01f   // cells: shorter steps of free texels are not worth their test
 #define PLACED 5           // states of a vertex: 0 to 3 the candidate it claims, 4 none is left
+#define TAKEN 1            // by one of the work-items that would put a texel back
+#define BACK 2
 #define NO_OFFER 0x7fffffff
 
 // The smallest cross product at the four corners of a quad in the map; 1 in the even lattice.
@@ -34,27 +36,37 @@ float quad_cross(const float x[4], const float y[4]) {
   return least;
 }
 
-// The smallest cross product of the four quads around a texel, if its offset were (dx, dy); 0 when it would come too near
-// to a seam, whose own samples are not at the columns.
-float cross_around(global const PatchRecord* restrict p, int texture_width, int column, int row, float dx, float dy,
-                   global const float* restrict offset_x, global const float* restrict offset_y) {
-  if ((float)row + dy < MARGIN || (float)row + dy > (float)(p->height - 1) - MARGIN) return 0.0f;
-  float x[3][3], y[3][3];
-  for (int i = -1; i <= 1; ++i)
-    for (int j = -1; j <= 1; ++j) {
-      const int texel = texel_at(p, texture_width, column + j, row + i);
-      const int is_own = i == 0 && j == 0;
-      x[i + 1][j + 1] = (float)j + (is_own ? dx : offset_x[texel]);
-      y[i + 1][j + 1] = (float)i + (is_own ? dy : offset_y[texel]);
-    }
-  float least = INFINITY;
-  for (int i = 0; i < 2; ++i)
-    for (int j = 0; j < 2; ++j) {
-      const float qx[4] = {x[i][j], x[i][j + 1], x[i + 1][j + 1], x[i + 1][j]};
-      const float qy[4] = {y[i][j], y[i][j + 1], y[i + 1][j + 1], y[i + 1][j]};
-      least = fmin(least, quad_cross(qx, qy));
-    }
-  return least;
+// A texel and its eight neighbours.
+typedef struct Neighbours {
+  int own, left, right;  // those below and above them are a line of the texture away
+} Neighbours;
+
+Neighbours neighbours_of(global const PatchRecord* restrict p, int texture_width, int column, int row) {
+  const int own = (p->y + row) * texture_width + p->x + column;
+  const Neighbours n = {own, column > 0 ? own - 1 : own + p->width - 1, column + 1 < p->width ? own + 1 : own + 1 - p->width};
+  return n;
+}
+
+// The three corners of the quad (0, 0), a, b, c, counter-clockwise, whose cross product depends on (0, 0).
+float least_cross(float ax, float ay, float bx, float by, float cx, float cy) {
+  const float own = ax * cy - ay * cx, at_a = (ax - bx) * ay - (ay - by) * ax, at_c = cx * (cy - by) - cy * (cx - bx);
+  return fmin(own, fmin(at_a, at_c));
+}
+
+// The smallest cross product at the corners of the four quads around a texel that depend on its offset, if that were (dx, dy); 0 when it
+// would come too near to a seam, whose own samples are not at the columns.
+float cross_around(Neighbours n, int height, int texture_width, int row, float dx, float dy, global const float* restrict offset_x,
+                   global const float* restrict offset_y) {
+  const float rx = 1.0f + offset_x[n.right] - dx, ry = offset_y[n.right] - dy, lx = -1.0f + offset_x[n.left] - dx, ly = offset_y[n.left] - dy;
+  const int above = texture_width, below = -texture_width;
+  const float ax = offset_x[n.own + above] - dx, ay = 1.0f + offset_y[n.own + above] - dy;
+  const float bx = offset_x[n.own + below] - dx, by = -1.0f + offset_y[n.own + below] - dy;
+  const float right_above = least_cross(rx, ry, 1.0f + offset_x[n.right + above] - dx, 1.0f + offset_y[n.right + above] - dy, ax, ay);
+  const float left_above = least_cross(ax, ay, -1.0f + offset_x[n.left + above] - dx, 1.0f + offset_y[n.left + above] - dy, lx, ly);
+  const float left_below = least_cross(lx, ly, -1.0f + offset_x[n.left + below] - dx, -1.0f + offset_y[n.left + below] - dy, bx, by);
+  const float right_below = least_cross(bx, by, 1.0f + offset_x[n.right + below] - dx, -1.0f + offset_y[n.right + below] - dy, rx, ry);
+  const int is_near_end = (float)row + dy < MARGIN || (float)row + dy > (float)(height - 1) - MARGIN;
+  return is_near_end ? 0.0f : fmin(fmin(right_above, left_above), fmin(left_below, right_below));
 }
 
 // The candidate of a vertex: the k-th nearest corner of its cell, and the vertex' offset from it.
@@ -111,37 +123,36 @@ kernel void decide_claims(const int vertex_count, const int texture_width, globa
     atomic_inc(open_count);
     return;
   }
-  if (cross_around(p, texture_width, column, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) {
+  const Neighbours n = neighbours_of(p, texture_width, column, row);
+  if (cross_around(n, p->height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) {
     states[v] += 1;
     if (states[v] < 4) atomic_inc(open_count);
     return;
   }
-  const int texel = texel_at(p, texture_width, column, row);
-  offset_x[texel] = dx;
-  offset_y[texel] = dy;
-  anchors[texel] = 1 + v;
+  offset_x[n.own] = dx;
+  offset_y[n.own] = dy;
+  anchors[n.own] = 1 + v;
   states[v] = PLACED;
 }
 
-// NDRange (texture width, texture height). Free texels of a colour go half way to the mean of their four neighbours.
-kernel void relax_texels(const int texture_width, const int texture_height, const int colour, global const int* restrict texel_patches,
-                         global const PatchRecord* restrict patches, global const int* restrict anchors, global float* restrict offset_x,
-                         global float* restrict offset_y) {
-  const int across = (int)get_global_id(0), line = (int)get_global_id(1);
-  if (across >= texture_width || line >= texture_height) return;
-  const int texel = line * texture_width + across;
-  const int patch = texel_patches[texel];
-  if (patch < 0 || anchors[texel] != 0) return;
-  global const PatchRecord* p = patches + patch;
-  const int column = across - p->x, row = line - p->y;
-  if (row < 1 || row > p->height - 2 || colour_of(column, row, p->width) != colour) return;
-  const int left = texel_at(p, texture_width, column - 1, row), right = texel_at(p, texture_width, column + 1, row);
+// NDRange (count). Free texels of a colour go half way to the mean of their four neighbours.
+// in   texels: the inner ones of VSM patches, by colour; the colour's are `count` from `first` on
+kernel void relax_texels(const int first, const int count, const int texture_width, global const int* restrict texels,
+                         global const int* restrict texel_patches, global const PatchRecord* restrict patches, global const int* restrict anchors,
+                         global float* restrict offset_x, global float* restrict offset_y) {
+  const int i = (int)get_global_id(0);
+  if (i >= count) return;
+  const int texel = texels[first + i];
+  if (anchors[texel] != 0) return;
+  global const PatchRecord* p = patches + texel_patches[texel];
+  const int line = texel / texture_width, row = line - p->y;
+  const Neighbours n = neighbours_of(p, texture_width, texel - line * texture_width - p->x, row);
   const int below = texel - texture_width, above = texel + texture_width;
-  const float mean_x = 0.25f * (offset_x[left] + offset_x[right] + offset_x[below] + offset_x[above]);
-  const float mean_y = 0.25f * (offset_y[left] + offset_y[right] + offset_y[below] + offset_y[above]);
+  const float mean_x = 0.25f * (offset_x[n.left] + offset_x[n.right] + offset_x[below] + offset_x[above]);
+  const float mean_y = 0.25f * (offset_y[n.left] + offset_y[n.right] + offset_y[below] + offset_y[above]);
   const float dx = 0.5f * (offset_x[texel] + mean_x), dy = 0.5f * (offset_y[texel] + mean_y);
   if (fabs(dx - offset_x[texel]) + fabs(dy - offset_y[texel]) < LEAST_MOVE) return;
-  if (cross_around(p, texture_width, column, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) return;
+  if (cross_around(n, p->height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) return;
   offset_x[texel] = dx;
   offset_y[texel] = dy;
 }
@@ -165,6 +176,7 @@ kernel void offer_edges(const int edge_count, const int texture_width, const int
   if (e >= edge_count) return;
   global const PatchRecord* p = patches + edge_patches[e];
   const float ends[4] = {edge_ends[4 * e], edge_ends[4 * e + 1], edge_ends[4 * e + 2], edge_ends[4 * e + 3]};
+  const float ex = ends[2] - ends[0], ey = ends[3] - ends[1], length2 = ex * ex + ey * ey, inverse = length2 > 0.0f ? 1.0f / length2 : 0.0f;
   const float margin = REACH + FURTHEST;
   const float slope = ends[3] == ends[1] ? 0.0f : (ends[2] - ends[0]) / (ends[3] - ends[1]);
   const int first_row = max(1, (int)ceil(fmin(ends[1], ends[3]) - margin)), last_row = min(p->height - 2, (int)floor(fmax(ends[1], ends[3]) + margin));
@@ -179,48 +191,47 @@ kernel void offer_edges(const int edge_count, const int texture_width, const int
     for (int column = first; column <= last; ++column) {
       const int texel = (p->y + row) * texture_width + p->x + wrapped;
       wrapped = wrapped + 1 < p->width ? wrapped + 1 : 0;
-      if (anchors[texel] != 0) continue;
-      const float x = (float)column + offset_x[texel], y = (float)row + offset_y[texel];
-      const float t = nearest_on_edge(ends, x, y);
-      const float dx = ends[0] + t * (ends[2] - ends[0]) - x, dy = ends[1] + t * (ends[3] - ends[1]) - y;
+      const float x = ends[0] - (float)column - offset_x[texel], y = ends[1] - (float)row - offset_y[texel];
+      const float t = clamp(-(x * ex + y * ey) * inverse, 0.0f, 1.0f);
+      const float dx = x + t * ex, dy = y + t * ey;
       const float distance2 = dx * dx + dy * dy;
-      if (distance2 > REACH * REACH) continue;
+      // One test, not two: each alone is as good as a coin.
+      if ((distance2 > REACH * REACH) | (anchors[texel] != 0)) continue;
       const int offer = min((int)(offer_scale * sqrt(distance2) / edge_weights[e]), (0x7fffffff >> edge_bits) - 1);
       atomic_min(offers + texel, (offer << edge_bits) + e);
     }
   }
 }
 
-// NDRange (texture width, texture height). Free texels of a colour go to the edge that made the least offer.
+// NDRange (count). Free texels of a colour go to the edge that made the least offer. Texels as for relax_texels.
 // out  parameters: where on its edge a texel is, 0 to 1
-kernel void place_on_edges(const int texture_width, const int texture_height, const int colour, const int edge_bits,
+kernel void place_on_edges(const int first, const int count, const int texture_width, const int edge_bits, global const int* restrict texels,
                            global const int* restrict texel_patches, global const PatchRecord* restrict patches, global const float* restrict edge_ends,
-                           global const int* restrict offers,
-                           global int* restrict anchors, global float* restrict parameters, global float* restrict offset_x, global float* restrict offset_y) {
-  const int across = (int)get_global_id(0), line = (int)get_global_id(1);
-  if (across >= texture_width || line >= texture_height) return;
-  const int texel = line * texture_width + across;
+                           global const int* restrict offers, global int* restrict anchors, global float* restrict parameters,
+                           global float* restrict offset_x, global float* restrict offset_y) {
+  const int i = (int)get_global_id(0);
+  if (i >= count) return;
+  const int texel = texels[first + i];
   if (offers[texel] == NO_OFFER || anchors[texel] != 0) return;
   const int e = offers[texel] & ((1 << edge_bits) - 1);
   global const PatchRecord* p = patches + texel_patches[texel];
-  const int column = across - p->x, row = line - p->y;
-  if (colour_of(column, row, p->width) != colour) return;
+  const int line = texel / texture_width, row = line - p->y, column = texel - line * texture_width - p->x;
   const float ends[4] = {edge_ends[4 * e], edge_ends[4 * e + 1], edge_ends[4 * e + 2], edge_ends[4 * e + 3]};
-  // The turn of v at which the edge lies next to the texel.
+  // The turn of v at which the edge lies next to the texel: for short edges that of its middle.
   const float y = (float)row + offset_y[texel];
-  float x = (float)column + offset_x[texel];
+  const float x = (float)column + offset_x[texel];
   const float width = (float)p->width;
-  const float middle = 0.5f * (ends[0] + ends[2]);
   float best = INFINITY, t = 0.0f, dx = 0.0f, dy = 0.0f;
-  const int turn = (int)rint((middle - x) / width);
-  for (int k = turn - 1; k <= turn + 1; ++k) {
+  const int turn = (int)rint((0.5f * (ends[0] + ends[2]) - x) / width);
+  const int beside = width < 16.0f || fabs(ends[2] - ends[0]) > 0.25f * width;
+  for (int k = turn - beside; k <= turn + beside; ++k) {
     const float lifted = x + (float)k * width;
     const float at = nearest_on_edge(ends, lifted, y);
     const float ex = ends[0] + at * (ends[2] - ends[0]) - lifted, ey = ends[1] + at * (ends[3] - ends[1]) - y;
     if (ex * ex + ey * ey < best) best = ex * ex + ey * ey, t = at, dx = ex + offset_x[texel], dy = ey + offset_y[texel];
   }
   if (fabs(dx) > FURTHEST || fabs(dy) > FURTHEST) return;
-  if (cross_around(p, texture_width, column, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) return;
+  if (cross_around(neighbours_of(p, texture_width, column, row), p->height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) return;
   offset_x[texel] = dx;
   offset_y[texel] = dy;
   parameters[texel] = t;
@@ -312,7 +323,7 @@ kernel void find_bad_around(const int changed_count, const int texture_width, gl
 
 // NDRange (4 x quad_count). The texels of bad quads go back as well. What a texel does here does not depend on others, so
 // that their order is any.
-// before_x, before_y, before_z: where they were; is_back: 1 for texels that have gone back
+// before_x, before_y, before_z: where they were; is_back: BACK for texels that have gone back, TAKEN for those that were there
 // out  changed: the list of texels that have gone back now; counts[1]: how many they are; is_bad: 0 again
 kernel void put_back(const int quad_count, const int texture_width, global const int* restrict bad, global const int* restrict texel_patches,
                      global const PatchRecord* restrict patches, global const float* restrict before_x, global const float* restrict before_y, global const float* restrict before_z, global const float* restrict home_x,
@@ -328,14 +339,15 @@ kernel void put_back(const int quad_count, const int texture_width, global const
   const int line = quad / texture_width, row = line - p->y + ((i >> 1) & 1);
   if (row < 1 || row > p->height - 2) return;
   const int texel = texel_at(p, texture_width, quad - line * texture_width - p->x + (i & 1), row);
+  if (atomic_cmpxchg(is_back + texel, 0, TAKEN) != 0) return;
   if (x[texel] == before_x[texel] && y[texel] == before_y[texel] && z[texel] == before_z[texel]) return;
-  if (atomic_xchg(is_back + texel, 1) != 0) return;
   x[texel] = before_x[texel];
   y[texel] = before_y[texel];
   z[texel] = before_z[texel];
   offset_x[texel] = home_x[texel];
   offset_y[texel] = home_y[texel];
   anchors[texel] = 0;
+  atomic_xchg(is_back + texel, BACK);
   changed[atomic_inc(counts + 1)] = texel;
 }
 
@@ -355,7 +367,7 @@ kernel void put_marked_back(const int texture_width, const int texture_height, c
   const int row = line - patches[patch].y;
   if (row < 1 || row > patches[patch].height - 2) return;
   if (x[texel] == before_x[texel] && y[texel] == before_y[texel] && z[texel] == before_z[texel]) return;
-  is_back[texel] = 1;
+  is_back[texel] = BACK;
   x[texel] = before_x[texel], y[texel] = before_y[texel], z[texel] = before_z[texel];
   offset_x[texel] = home_x[texel], offset_y[texel] = home_y[texel];
   anchors[texel] = 0;

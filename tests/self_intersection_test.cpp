@@ -165,25 +165,6 @@ TEST(SelfIntersection, OfACrumpledTorusTheTreeFindsThePairsOfBruteForce) {
   }
 }
 
-TEST(SelfIntersection, AskedForSomeTrianglesItFindsThePairsThatTheyArePartOf) {
-  for (unsigned seed = 1; seed <= 4; ++seed) {
-    std::mt19937 random(seed);
-    std::uniform_real_distribution<double> unit(0, 1);
-    TriangleMesh mesh;
-    for (int t = 0; t < 300; ++t) {
-      const Vec3 base(unit(random), unit(random), unit(random));
-      for (int k = 0; k < 3; ++k) mesh.positions.push_back(base + 0.2 * Vec3(unit(random), unit(random), unit(random)));
-      mesh.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
-    }
-    std::vector<char> is_asked(300);
-    for (char& asked : is_asked) asked = static_cast<char>(random() % 5 == 0);
-    auto expected = find_self_intersections(mesh);
-    std::erase_if(expected, [&](const auto& pair) { return !is_asked[pair[0]] && !is_asked[pair[1]]; });
-    ASSERT_GT(expected.size(), 10u);
-    EXPECT_EQ(find_self_intersections(mesh, build_triangle_tree(mesh), is_asked), expected) << "seed " << seed;
-  }
-}
-
 TEST(SelfIntersection, OrientationsKnowWhatRoundingHides) {
   EXPECT_EQ(orientation(Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)), 1);
   EXPECT_EQ(orientation(Vec2(0, 0), Vec2(0, 1), Vec2(1, 0)), -1);

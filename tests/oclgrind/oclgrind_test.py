@@ -22,11 +22,12 @@ import sys
 
 PROGRAM, SOURCE, WORK, OCLGRIND, SHIM = (pathlib.Path(argument) for argument in sys.argv[1:6])
 FREXP = "-Dfrexp(x,e)=((x)==0.0f?(*(e)=0,0.0f):(*(e)=ilogb(x)+1,ldexp((x),-ilogb(x)-1)))"
-# What would take longer than all the rest: searches and fits, and lattices large enough for a second level.
-LEFT_OUT = ("snap.cl:", "fit.cl:", "filter.cl:pick_vertices", "diffusion.cl:restrict_field", "diffusion.cl:add_coarse_field")
+# What would take longer than all the rest: lattices large enough for a second level.
+LEFT_OUT = ("filter.cl:pick_vertices", "diffusion.cl:restrict_field", "diffusion.cl:add_coarse_field")
 
 MODELS = [("spd", "encode c.off c.skeleton.json -o s.skx.exr --size 12 --method spd"),
           ("vsm", "encode rough.off c.skeleton.json -o v.skx.exr --size 12 --iterations 1 --diagonals smooth"),
+          ("snap", "encode rough.off c.skeleton.json -o n.skx.exr --size 9 --iterations 1 --snap --fit"),
           ("metro", "metro c.off rough.off --samples 300")]
 RESULTS = [("smooth", "filter s.skx.exr smooth -o f.ply --scale 0.00001"),
            ("noise", "filter v.skx.exr noise -o n.ply"),

@@ -78,8 +78,9 @@ TexelPoints allocate_points(ClContext& context, std::size_t size) {
   return {context.allocate<float>(size), context.allocate<float>(size), context.allocate<float>(size)};
 }
 
-void copy_plane(ClContext& context, const ClBuffer<float>& from, ClBuffer<float>& to) {
-  context.queue().enqueueCopyBuffer(from.memory, to.memory, 0, 0, from.size * sizeof(float));
+template <class T>
+void copy_plane(ClContext& context, const ClBuffer<T>& from, ClBuffer<T>& to) {
+  context.queue().enqueueCopyBuffer(from.memory, to.memory, 0, 0, from.size * sizeof(T));
 }
 
 TexelPoints copy_points(ClContext& context, const TexelPoints& points) {
@@ -208,10 +209,13 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   }
   const TexelPoints even = points;
   const SnapFeatures features = is_snapped ? find_features(sources.charts, sources.patches, options.snap_dihedral) : SnapFeatures{};
+  ClBuffer<int> even_covering = covering;
   if (is_snapped || is_fitted) points = copy_points(context, even);
   int put_back = 0;
   if (is_snapped) {
     snap_positions(context, layout, features, positions);
+    even_covering = context.allocate<int>(texels);
+    copy_plane(context, covering, even_covering);
     walk(covering);
     read(covering);
     place_snapped(context, layout, maps, features, positions, points);
@@ -239,7 +243,7 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     auto nothing = context.allocate<int>(texels);
     context.fill(nothing, 0);
     const TexelPoints filtered = options.has_prefilter ? prefilter(even, nothing) : even;
-    const GuardReport guard = put_back_faults(context, *sources.guard, layout, even, filtered, positions, points);
+    const GuardReport guard = put_back_faults(context, *sources.guard, layout, maps, features, even_covering, covering, even, filtered, positions, points);
     result.report.turned_triangles = guard.turned_triangles, result.report.even_turned_triangles = guard.even_turned_triangles;
     (is_fitted ? result.report.fit->texels_put_back : put_back) += guard.texels_put_back;
   }

@@ -8,6 +8,7 @@
 #include <limits>
 #include <numeric>
 
+#include "skeletex/measure/parallel.h"
 #include "skeletex/parameterize/half_edge_table.h"
 
 namespace skeletex {
@@ -21,18 +22,12 @@ constexpr double kFullDihedral = 0.5;   // radians: edges this sharp attract tex
 constexpr int kRoundsBetweenReads = 3;  // of claims, between two looks at how many wait
 constexpr double kLargestOffer = 8;     // cells: what lies further is rounded down to it
 constexpr int kNoOffer = std::numeric_limits<int>::max();  // as in snap.cl
+constexpr int kBack = 2;
 
 /// One work-item per vertex or edge, in groups of one size: PoCL compiles a kernel for every size that it meets.
 ClRange over(int count) { return {{static_cast<std::size_t>(count), 1}, {64, 1}}; }
 
 bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind == ChartVertex::kTailPole; }
-
-/// The row, with fractions, that reads at u.
-double row_of(const std::vector<double>& row_u, double u) {
-  const auto above = std::upper_bound(row_u.begin() + 1, row_u.end() - 1, u);
-  const double low = *(above - 1), high = *above;
-  return static_cast<double>(above - 1 - row_u.begin()) + (high > low ? (u - low) / (high - low) : 0);
-}
 
 /// Angle between unit normals, precise for small ones too.
 double angle_between(const Vec3& a, const Vec3& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
@@ -69,15 +64,39 @@ void add_features(const Chart& chart, const Patch& patch, int bone, int first_po
       features.vertices.push_back({bone, first_point + i, chart.v[i] * patch.rectangle.width, rows[i], strengths[i]});
 }
 
+/// Edges that are near each other in the texture one after the other: the kernels read less of it at a time.
+void append_by_row(const std::vector<SnapFeatures::Edge>& edges, int height, std::vector<SnapFeatures::Edge>& sorted) {
+  const auto row = [&](const SnapFeatures::Edge& edge) { return std::clamp(static_cast<int>(edge.y[0]), 0, height - 1); };
+  std::vector<std::size_t> next(height + 1, 0);
+  for (const SnapFeatures::Edge& edge : edges) ++next[row(edge) + 1];
+  std::partial_sum(next.begin(), next.end(), next.begin());
+  const std::size_t begin = sorted.size();
+  sorted.resize(begin + edges.size());
+  for (const SnapFeatures::Edge& edge : edges) sorted[begin + next[row(edge)]++] = edge;
+}
+
 }  // namespace
 
+double row_of(const std::vector<double>& row_u, double u) {
+  const auto above = std::upper_bound(row_u.begin() + 1, row_u.end() - 1, u);
+  const double low = *(above - 1), high = *above;
+  return static_cast<double>(above - 1 - row_u.begin()) + (high > low ? (u - low) / (high - low) : 0);
+}
+
 SnapFeatures find_features(std::span<const Chart> charts, std::span<const Patch> patches, double least_dihedral) {
+  std::vector<SnapFeatures> parts(charts.size());
+  std::vector<int> first_points(charts.size());
+  for (std::size_t bone = 0, points = 0; bone < charts.size(); ++bone) {
+    first_points[bone] = static_cast<int>(points);
+    if (patches[bone].method == Method::kVsm) points += charts[bone].positions.size();
+  }
+  for_each_block(charts.size(), 1, [&](std::size_t bone, std::size_t, std::size_t) {
+    if (patches[bone].method == Method::kVsm) add_features(charts[bone], patches[bone], static_cast<int>(bone), first_points[bone], least_dihedral, parts[bone]);
+  });
   SnapFeatures features;
-  int first_point = 0;
   for (std::size_t bone = 0; bone < charts.size(); ++bone) {
-    if (patches[bone].method != Method::kVsm) continue;
-    add_features(charts[bone], patches[bone], static_cast<int>(bone), first_point, least_dihedral, features);
-    first_point += static_cast<int>(charts[bone].positions.size());
+    features.vertices.insert(features.vertices.end(), parts[bone].vertices.begin(), parts[bone].vertices.end());
+    append_by_row(parts[bone].edges, patches[bone].rectangle.height, features.edges);
   }
   return features;
 }
@@ -120,45 +139,90 @@ void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const std:
     }
 }
 
-void relax(ClContext& context, const DeviceLayout& layout, int passes, ReadingPositions& positions) {
-  for (int pass = 0; pass < passes; ++pass)
-    for (int colour = 0; colour < kColours; ++colour)
-      context.launch({"snap.cl", "relax_texels"}, layout.range(), layout.width, layout.height, colour, layout.texel_patches, layout.patches,
-                     positions.anchors, positions.x, positions.y);
+/// The inner texels of all patches, by colour.
+struct ColouredTexels {
+  ClBuffer<int> texels;
+  std::array<int, kColours + 1> begin{};
+};
+ColouredTexels colour_texels(ClContext& context, const DeviceLayout& layout) {
+  const std::vector<PatchRecord> patches = context.download(layout.patches);
+  ColouredTexels coloured;
+  std::vector<int> texels;
+  for (int colour = 0; colour < kColours; ++colour) {
+    coloured.begin[colour] = static_cast<int>(texels.size());
+    for (const PatchRecord& p : patches)
+      for (int row = 1 + (colour / 3 == 0); row + 1 < p.height; row += 2) {
+        // As colour_of: even and odd columns, and where the width is odd the last.
+        const int last = p.width % 2 == 1 ? p.width - 1 : p.width;
+        const int line = (p.y + row) * layout.width + p.x;
+        if (colour % 3 < 2)
+          for (int column = colour % 3; column < last; column += 2) texels.push_back(line + column);
+        else if (last < p.width)
+          texels.push_back(line + last);
+      }
+  }
+  coloured.begin[kColours] = static_cast<int>(texels.size());
+  coloured.texels = context.upload(texels);
+  return coloured;
 }
 
-void snap_to_edges(ClContext& context, const DeviceLayout& layout, const std::vector<SnapFeatures::Edge>& edges, ReadingPositions& positions) {
-  if (edges.empty()) return;
-  std::vector<int> edge_patches;
-  std::vector<float> ends, weights;
-  for (const SnapFeatures::Edge& edge : edges) {
-    edge_patches.push_back(edge.patch);
-    for (const int i : {0, 1}) ends.push_back(static_cast<float>(edge.x[i])), ends.push_back(static_cast<float>(edge.y[i]));
-    weights.push_back(static_cast<float>(std::sqrt(std::min(1.0, edge.dihedral / kFullDihedral))));
+/// Calls launch(first, count) for every colour.
+template <class Launch>
+void for_each_colour(const ColouredTexels& texels, const Launch& launch) {
+  for (int colour = 0; colour < kColours; ++colour)
+    if (const int count = texels.begin[colour + 1] - texels.begin[colour]; count > 0) launch(texels.begin[colour], count);
+}
+
+void relax(ClContext& context, const DeviceLayout& layout, const ColouredTexels& texels, int passes, ReadingPositions& positions) {
+  for (int pass = 0; pass < passes; ++pass)
+    for_each_colour(texels, [&](int first, int count) {
+      context.launch({"snap.cl", "relax_texels"}, over(count), first, count, layout.width, texels.texels, layout.texel_patches, layout.patches,
+                     positions.anchors, positions.x, positions.y);
+    });
+}
+
+struct DeviceEdges {
+  int count = 0;
+  ClBuffer<int> patches;
+  ClBuffer<float> ends, weights;
+};
+DeviceEdges upload_edges(ClContext& context, const std::vector<SnapFeatures::Edge>& edges) {
+  std::vector<int> patches(edges.size());
+  std::vector<float> ends(4 * edges.size()), weights(edges.size());
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const SnapFeatures::Edge& edge = edges[i];
+    patches[i] = edge.patch;
+    for (const int k : {0, 1}) ends[4 * i + 2 * k] = static_cast<float>(edge.x[k]), ends[4 * i + 2 * k + 1] = static_cast<float>(edge.y[k]);
+    weights[i] = static_cast<float>(std::sqrt(std::min(1.0, edge.dihedral / kFullDihedral)));
   }
-  const int count = static_cast<int>(edges.size());
-  const auto patch = context.upload(edge_patches);
-  const auto device_ends = context.upload(ends), weight = context.upload(weights);
-  const int bits = std::bit_width(static_cast<unsigned>(count));
+  return {static_cast<int>(edges.size()), context.upload(patches), context.upload(ends), context.upload(weights)};
+}
+
+void snap_to_edges(ClContext& context, const DeviceLayout& layout, const ColouredTexels& texels, const DeviceEdges& edges, ReadingPositions& positions) {
+  if (edges.count == 0) return;
+  const int bits = std::bit_width(static_cast<unsigned>(edges.count));
   const auto scale = static_cast<float>((0x7fffffff >> bits) / kLargestOffer);
   auto offers = context.allocate<int>(layout.size());
   context.fill(offers, kNoOffer);
-  context.launch({"snap.cl", "offer_edges"}, over(count), count, layout.width, bits, scale, patch, device_ends, weight, layout.patches, positions.anchors,
-                 positions.x, positions.y, offers);
-  for (int colour = 0; colour < kColours; ++colour)
-    context.launch({"snap.cl", "place_on_edges"}, layout.range(), layout.width, layout.height, colour, bits, layout.texel_patches, layout.patches, device_ends,
-                   offers, positions.anchors, positions.parameters, positions.x, positions.y);
+  context.launch({"snap.cl", "offer_edges"}, over(edges.count), edges.count, layout.width, bits, scale, edges.patches, edges.ends, edges.weights,
+                 layout.patches, positions.anchors, positions.x, positions.y, offers);
+  for_each_colour(texels, [&](int first, int count) {
+    context.launch({"snap.cl", "place_on_edges"}, over(count), first, count, layout.width, bits, texels.texels, layout.texel_patches, layout.patches,
+                   edges.ends, offers, positions.anchors, positions.parameters, positions.x, positions.y);
+  });
 }
 
 }  // namespace
 
 void snap_positions(ClContext& context, const DeviceLayout& layout, const SnapFeatures& features, ReadingPositions& positions) {
   snap_to_vertices(context, layout, features.vertices, positions);
+  const ColouredTexels texels = colour_texels(context, layout);
+  const DeviceEdges edges = upload_edges(context, features.edges);
   for (int round = 0; round < kEdgeRounds; ++round) {
-    relax(context, layout, round == 0 ? kFirstRelaxPasses : kRelaxPasses, positions);
-    snap_to_edges(context, layout, features.edges, positions);
+    relax(context, layout, texels, round == 0 ? kFirstRelaxPasses : kRelaxPasses, positions);
+    snap_to_edges(context, layout, texels, edges, positions);
   }
-  relax(context, layout, kRelaxPasses, positions);
+  relax(context, layout, texels, kRelaxPasses, positions);
 }
 
 void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps, const SnapFeatures& features,
@@ -170,7 +234,7 @@ void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceM
                  context.upload(vertex_points), context.upload(edge_points), maps.x, maps.y, maps.z, points.x, points.y, points.z);
 }
 
-int put_back_marked(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before, const ClBuffer<int>& marks,
+std::vector<int> put_back_marked(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before, const ClBuffer<int>& marks,
                     bool with_vertices, ReadingPositions& positions, TexelPoints& points) {
   auto is_bad = context.allocate<int>(layout.size()), is_back = context.allocate<int>(layout.size());
   auto bad = context.allocate<int>(layout.size()), changed = context.allocate<int>(layout.size());
@@ -179,10 +243,8 @@ int put_back_marked(ClContext& context, const DeviceLayout& layout, const TexelP
   context.launch({"snap.cl", "put_marked_back"}, layout.range(), layout.width, layout.height, static_cast<int>(with_vertices), marks, layout.texel_patches,
                  layout.patches, before.x, before.y, before.z, positions.home_x, positions.home_y, is_back, positions.anchors, positions.x, positions.y,
                  points.x, points.y, points.z, changed, counts);
-  int total = 0;
   // Texels only ever go back, so this ends.
   for (int waiting = context.download(counts)[1]; waiting > 0; waiting = context.download(counts)[1]) {
-    total += waiting;
     context.fill(counts, 0);
     context.launch({"snap.cl", "find_bad_around"}, over(4 * waiting), waiting, layout.width, changed, layout.texel_patches, layout.patches, positions.x,
                    positions.y, even.x, even.y, even.z, points.x, points.y, points.z, is_bad, bad, counts);
@@ -192,7 +254,11 @@ int put_back_marked(ClContext& context, const DeviceLayout& layout, const TexelP
                    positions.home_x, positions.home_y, is_bad, is_back, positions.anchors, positions.x, positions.y, points.x, points.y, points.z, changed,
                    counts);
   }
-  return total;
+  std::vector<int> back;
+  const std::vector<int> marked = context.download(is_back);
+  for (std::size_t i = 0; i < marked.size(); ++i)
+    if (marked[i] == kBack) back.push_back(static_cast<int>(i));
+  return back;
 }
 
 }  // namespace skeletex

@@ -26,6 +26,9 @@ struct SnapFeatures {
   std::vector<Edge> edges;       ///< inner ones whose dihedral angle is above the least
 };
 
+/// The row, with fractions, that reads at u.
+double row_of(const std::vector<double>& row_u, double u);
+
 /// The features of all VSM patches.
 /// \param least_dihedral  radians; flatter edges are left out
 SnapFeatures find_features(std::span<const Chart> charts, std::span<const Patch> patches, double least_dihedral);
@@ -57,8 +60,8 @@ void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceM
 /// them that then fold in the map, or in space where the even lattice does not.
 /// \param even    the even lattice's points, the measure of folds
 /// \param before  what texels go back to: these as they would be stored
-/// \return how many went back
-int put_back_marked(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before, const ClBuffer<int>& marks,
+/// \return the texels that went back, in order
+std::vector<int> put_back_marked(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before, const ClBuffer<int>& marks,
                     bool with_vertices, ReadingPositions& positions, TexelPoints& points);
 
 }  // namespace skeletex

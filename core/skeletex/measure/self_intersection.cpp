@@ -161,10 +161,8 @@ bool do_triangles_intersect(const TriangleMesh& mesh, int first, int second) {
 }
 
 std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh) {
-  return mesh.triangles.empty() ? std::vector<std::array<int, 2>>{} : find_self_intersections(mesh, build_triangle_tree(mesh));
-}
-
-std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh, const TriangleTree& tree, std::span<const char> is_asked) {
+  if (mesh.triangles.empty()) return {};
+  const TriangleTree tree = build_triangle_tree(mesh);
   constexpr int kWidth = TriangleTree::kWidth;
   const std::size_t count = tree.order.size();
   // Boxes of the triangles as the tree has them for its blocks: by place, six planes of eight per block.
@@ -183,7 +181,7 @@ std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh
     }
   });
 
-  const std::vector<char> is_plain = is_asked.empty() ? find_plain_vertices(mesh) : std::vector<char>(mesh.positions.size(), 0);
+  const std::vector<char> is_plain = find_plain_vertices(mesh);
   const auto do_share_plain_vertex = [&](const Triangle& a, const Triangle& b) {
     for (const int v : a)
       if ((v == b[0] || v == b[1] || v == b[2]) && is_plain[v]) return true;
@@ -208,24 +206,19 @@ std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh
       }
       return gaps;
     };
-    const auto is_of_interest = [&](std::size_t place) { return is_asked.empty() || is_asked[tree.order[place]]; };
     for (std::size_t block = first_block; block < end_block; ++block) {
       const std::size_t begin = block * kWidth, end = std::min(count, begin + kWidth);
       const float* own = triangle_boxes.data() + block * 6 * kWidth;
       std::array<std::array<float, 6>, kWidth> boxes;
       std::array<float, 6> box;
-      bool is_empty = true;
       for (std::size_t place = begin; place < end; ++place) {
-        if (!is_of_interest(place)) continue;
         std::array<float, 6>& mine = boxes[place - begin];
         for (int d = 0; d < 6; ++d) mine[d] = own[d * kWidth + (place - begin)];
         for (int d = 0; d < 3; ++d) {
-          box[d] = is_empty ? mine[d] : std::min(box[d], mine[d]);
-          box[3 + d] = is_empty ? mine[3 + d] : std::max(box[3 + d], mine[3 + d]);
+          box[d] = place == begin ? mine[d] : std::min(box[d], mine[d]);
+          box[3 + d] = place == begin ? mine[3 + d] : std::max(box[3 + d], mine[3 + d]);
         }
-        is_empty = false;
       }
-      if (is_empty) continue;
       stack.push_back({tree.top_level(), 0});
       while (!stack.empty()) {
         const auto [level, index] = stack.back();
@@ -234,18 +227,17 @@ std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh
           const auto gaps = gaps_to(tree.boxes.data() + (tree.level_begin[level] + index) * 6 * kWidth, box);
           for (int k = 0; k < kWidth; ++k) {
             const std::size_t child = kWidth * index + k;
-            // Every pair once: with the blocks that come later, when all are asked. A child of this level covers 8^(level - 1) blocks.
-            if (gaps[k] <= 0 && (!is_asked.empty() || (child + 1) << (3 * (level - 1)) > block)) stack.push_back({level - 1, child});
+            // Every pair once: with the blocks that come later. A child of this level covers 8^(level - 1) blocks.
+            if (gaps[k] <= 0 && (child + 1) << (3 * (level - 1)) > block) stack.push_back({level - 1, child});
           }
           continue;
         }
         const float* planes = triangle_boxes.data() + index * 6 * kWidth;
         for (std::size_t place = begin; place < end; ++place) {
-          if (!is_of_interest(place)) continue;
           const auto gaps = gaps_to(planes, boxes[place - begin]);
           for (int k = 0; k < kWidth; ++k) {
             const std::size_t other = kWidth * index + k;
-            if (gaps[k] > 0 || other >= count || other == place || (other < place && is_of_interest(other))) continue;
+            if (gaps[k] > 0 || other >= count || other <= place) continue;
             const int first = std::min(tree.order[place], tree.order[other]), second = std::max(tree.order[place], tree.order[other]);
             if (do_share_plain_vertex(mesh.triangles[first], mesh.triangles[second])) continue;
             if (do_triangles_intersect(mesh, first, second)) found[part].push_back({first, second});

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <array>
-#include <span>
 #include <vector>
 
-#include "skeletex/measure/triangle_tree.h"
 #include "skeletex/model/mesh.h"
 
 namespace skeletex {
@@ -19,9 +17,6 @@ bool do_triangles_intersect(const TriangleMesh& mesh, int first, int second);
 /// \pre indices in range, coordinates finite
 /// Cost: all processors; well below a second for 70 000 triangles.
 std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh);
-/// The same with the mesh's tree at hand.
-/// \param is_asked  when not empty, per triangle: only pairs with one that is asked for
-std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh, const TriangleTree& tree, std::span<const char> is_asked = {});
 /// How many there are.
 long count_self_intersections(const TriangleMesh& mesh);
 

@@ -36,13 +36,9 @@ TriangleTree build_triangle_tree(const TriangleMesh& mesh) {
       centres[t] = (mesh.positions[a] + mesh.positions[b] + mesh.positions[c]) / 3;
     }
   });
-  return build_triangle_tree(mesh, hilbert_order(centres));
-}
-
-TriangleTree build_triangle_tree(const TriangleMesh& mesh, std::vector<int> order) {
   TriangleTree tree;
   const std::size_t count = mesh.triangles.size();
-  tree.order = std::move(order);
+  tree.order = hilbert_order(centres);
   const BoundingBox box = bounding_box(mesh);
   tree.origin = box.centre();
   tree.scale = box.diagonal() > 0 ? box.diagonal() : 1;

@@ -29,7 +29,5 @@ struct TriangleTree {
 /// Cost: O(triangles), about 0.3 s per million.
 /// \pre at least one triangle; indices in range, coordinates finite
 TriangleTree build_triangle_tree(const TriangleMesh& mesh);
-/// The same with the triangles in a given order, as that of the tree before some of them moved a little.
-TriangleTree build_triangle_tree(const TriangleMesh& mesh, std::vector<int> order);
 
 }  // namespace skeletex

@@ -18,7 +18,8 @@ Vec3 sample_point(const Skeleton& skeleton, const Walls& walls, int node, int bo
   return walls.seam_point(bone, end_at(skeleton, bone, node), sample.turn, sample.distance);
 }
 
-/// Seam samples and corners: few, and shared by several patches, so they are made on the host in double.
+}  // namespace
+
 void place_seams(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, std::vector<Vec3>& positions) {
   for (std::size_t a = 0; a < model.arcs.size(); ++a)
     for (std::size_t i = 0; i < model.arcs[a].samples.size(); ++i)
@@ -27,9 +28,7 @@ void place_seams(const SkeletexModel& model, const Walls& walls, const Lattice& 
     positions[lattice.first_corner + i] = sample_point(model.skeleton, walls, model.corners[i].node, model.corners[i].bones[0], model.corners[i].sample);
 }
 
-/// Calls place(vertex, bone, end, texel) for every pole.
-template <class Place>
-void for_each_pole(const SkeletexModel& model, const Lattice& lattice, const Place& place) {
+void for_each_pole(const SkeletexModel& model, const Lattice& lattice, const std::function<void(int vertex, int bone, int end, std::size_t texel)>& place) {
   for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
     for (int end = 0; end < 2; ++end) {
       if (lattice.poles[bone][end] < 0) continue;
@@ -37,6 +36,8 @@ void for_each_pole(const SkeletexModel& model, const Lattice& lattice, const Pla
       place(lattice.poles[bone][end], bone, end, static_cast<std::size_t>(r.y + (end == 0 ? 0 : r.height - 1)) * model.texture.width + r.x);
     }
 }
+
+namespace {
 
 void place_shared_vertices(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, std::vector<Vec3>& positions) {
   const DisplacementTexture& texture = model.texture;
@@ -64,21 +65,6 @@ std::vector<Vec3> place_vertices(ClContext& context, const SkeletexModel& model,
   return positions;
 }
 
-void append_end_triangles(const SkeletexModel& model, const Lattice& lattice, const std::vector<Vec3>& positions, std::vector<Triangle>& triangles) {
-  const Walls walls(model.skeleton);
-  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
-    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
-      if (lattice.poles[bone][static_cast<int>(end)] >= 0) {
-        append_pole_fan(model, lattice, bone, end, triangles);
-        continue;
-      }
-      Ring seam{end_loop(model, lattice, bone, end), {}}, row{end_row(model, lattice, bone, end), {}};
-      for (const int vertex : seam.vertices) seam.turns.push_back(walls.turn_of(bone, positions[vertex] - end_position(model.skeleton, bone, end)));
-      for (std::size_t j = 0; j < row.vertices.size(); ++j) row.turns.push_back(static_cast<double>(j) / static_cast<double>(row.vertices.size()));
-      append_seam_strip(positions, seam, row, end, triangles);
-    }
-}
-
 }  // namespace
 
 std::vector<Vec3> lattice_positions(ClContext& context, const SkeletexModel& model) {
@@ -88,29 +74,38 @@ std::vector<Vec3> lattice_positions(ClContext& context, const SkeletexModel& mod
 }
 
 std::vector<Triangle> end_triangles(const SkeletexModel& model, const Lattice& lattice, const std::vector<Vec3>& positions) {
+  const Walls walls(model.skeleton);
   std::vector<Triangle> triangles;
-  append_end_triangles(model, lattice, positions, triangles);
+  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
+    for (const BoneEnd which : {BoneEnd::kHead, BoneEnd::kTail}) append_end_triangles(model, walls, lattice, positions, bone, which, triangles);
   return triangles;
 }
 
-namespace {
+void append_end_triangles(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, const std::vector<Vec3>& positions, int bone, BoneEnd end,
+                          std::vector<Triangle>& triangles) {
+  if (lattice.poles[bone][static_cast<int>(end)] >= 0) {
+    append_pole_fan(model, lattice, bone, end, triangles);
+    return;
+  }
+  Ring seam{end_loop(model, lattice, bone, end), {}}, row{end_row(model, lattice, bone, end), {}};
+  for (const int vertex : seam.vertices) seam.turns.push_back(walls.turn_of(bone, positions[vertex] - end_position(model.skeleton, bone, end)));
+  for (std::size_t j = 0; j < row.vertices.size(); ++j) row.turns.push_back(static_cast<double>(j) / static_cast<double>(row.vertices.size()));
+  append_seam_strip(positions, seam, row, end, triangles);
+}
 
-std::vector<Triangle> triangulate(ClContext& context, const SkeletexModel& model, DiagonalRule rule, const Walls& walls, const Lattice& lattice,
-                                  const DevicePlanes& inner, const std::vector<Vec3>& positions) {
+DeviceQuads upload_quads(ClContext& context, const SkeletexModel& model, const Walls& walls) {
   std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kInner);
   std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == model.patches[row[0]].rectangle.height - 2; });
-  const auto patches = context.upload(frame_tables(model.skeleton, walls, model.patches, model.origin).patches);
-  // Room for the strips and fans at the end, so that the host's copy need not grow.
-  const auto device_triangles = context.allocate<Triangle>(lattice.triangle_count);
-  context.launch({"reconstruct.cl", rule == DiagonalRule::kSmooth ? "triangulate_smoothly" : "triangulate_quads"}, row_range(context, rows.size()),
-                 static_cast<int>(rows.size()), context.upload(rows), patches, inner.x, inner.y, inner.z, device_triangles);
-  std::vector<Triangle> triangles = context.download(device_triangles);
-  triangles.resize(2 * static_cast<std::size_t>(lattice.quad_count));
-  append_end_triangles(model, lattice, positions, triangles);
-  return triangles;
+  return {context.upload(rows), context.upload(frame_tables(model.skeleton, walls, model.patches, model.origin).patches)};
 }
 
-}  // namespace
+ClBuffer<Triangle> triangulate(ClContext& context, DiagonalRule rule, const DeviceQuads& quads, const Lattice& lattice, const DevicePlanes& inner) {
+  // Room for the strips and fans at the end, so that the host's copy need not grow.
+  auto triangles = context.allocate<Triangle>(lattice.triangle_count);
+  context.launch({"reconstruct.cl", rule == DiagonalRule::kSmooth ? "triangulate_smoothly" : "triangulate_quads"}, row_range(context, quads.rows.size),
+                 static_cast<int>(quads.rows.size), quads.rows, quads.patches, inner.x, inner.y, inner.z, triangles);
+  return triangles;
+}
 
 TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model) {
   const Lattice lattice = number_lattice(model);
@@ -118,32 +113,10 @@ TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model) {
   const DevicePlanes points = displace_inner(context, model, walls, lattice);
   TriangleMesh mesh;
   mesh.positions = place_vertices(context, model, walls, lattice, points);
-  mesh.triangles = triangulate(context, model, model.diagonals, walls, lattice, points, mesh.positions);
-  return mesh;
-}
-
-TriangleMesh mesh_of_points(ClContext& context, const SkeletexModel& model, DiagonalRule rule, const std::array<std::vector<float>, 3>& planes) {
-  const Lattice lattice = number_lattice(model);
-  const Walls walls(model.skeleton);
-  TriangleMesh mesh;
-  mesh.positions.resize(lattice.vertex_count);
-  std::array<ClBuffer<float>, 3> inner;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::vector<float> values(lattice.inner_count);
-    for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
-      const Rectangle& r = model.patches[bone].rectangle;
-      for (int row = 1; row + 1 < r.height; ++row)
-        std::copy_n(planes[axis].begin() + (r.y + row) * static_cast<std::ptrdiff_t>(model.texture.width) + r.x, r.width,
-                    values.begin() + lattice.first_inner[bone] + (row - 1) * static_cast<std::ptrdiff_t>(r.width));
-    }
-    for (int i = 0; i < lattice.inner_count; ++i) mesh.positions[i][axis] = model.origin[axis] + static_cast<double>(values[i]);
-    for_each_pole(model, lattice, [&](int vertex, int, int, std::size_t texel) {
-      mesh.positions[vertex][axis] = model.origin[axis] + static_cast<double>(planes[axis][texel]);
-    });
-    inner[axis] = context.upload(values);
-  }
-  place_seams(model, walls, lattice, mesh.positions);
-  mesh.triangles = triangulate(context, model, rule, walls, lattice, {inner[0], inner[1], inner[2]}, mesh.positions);
+  mesh.triangles = context.download(triangulate(context, model.diagonals, upload_quads(context, model, walls), lattice, points));
+  mesh.triangles.resize(2 * static_cast<std::size_t>(lattice.quad_count));
+  const std::vector<Triangle> ends = end_triangles(model, lattice, mesh.positions);
+  mesh.triangles.insert(mesh.triangles.end(), ends.begin(), ends.end());
   return mesh;
 }
 

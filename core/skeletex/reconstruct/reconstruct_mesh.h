@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <array>
+#include <functional>
 #include <vector>
 
 #include "skeletex/cl/context.h"
 #include "skeletex/model/mesh.h"
 #include "skeletex/model/texture.h"
+#include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/lattice.h"
 
 namespace skeletex {
@@ -16,15 +18,27 @@ namespace skeletex {
 /// \throw DeviceError
 TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model);
 
-/// The mesh that a model would reconstruct to whose texels decode to given points; its own texture is not looked at.
-/// \param rule    of its diagonals, in place of the model's
-/// \param planes  x, y, z per texel of the texture, relative to the model's origin; of rows 0 and height-1 only poles count
-TriangleMesh mesh_of_points(ClContext& context, const SkeletexModel& model, DiagonalRule rule, const std::array<std::vector<float>, 3>& planes);
-
 /// The vertices of that mesh alone, in the order of lattice.h. \throw DeviceError
 std::vector<Vec3> lattice_positions(ClContext& context, const SkeletexModel& model);
 /// Its triangles that touch a pole or a seam: fans and strips. \param positions  of all vertices of the lattice
 std::vector<Triangle> end_triangles(const SkeletexModel& model, const Lattice& lattice, const std::vector<Vec3>& positions);
+
+/// Those of one end, appended.
+void append_end_triangles(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, const std::vector<Vec3>& positions, int bone, BoneEnd end,
+                          std::vector<Triangle>& triangles);
+/// Seam samples and corners: few, and shared by several patches, so they are made on the host in double.
+void place_seams(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, std::vector<Vec3>& positions);
+/// Every pole, and the texel that holds it.
+void for_each_pole(const SkeletexModel& model, const Lattice& lattice, const std::function<void(int vertex, int bone, int end, std::size_t texel)>& place);
+
+/// The quads between inner rows on the device: their rows, and the patches.
+struct DeviceQuads {
+  ClBuffer<LatticeRow> rows;  ///< those that quads begin at
+  ClBuffer<PatchRecord> patches;
+};
+DeviceQuads upload_quads(ClContext& context, const SkeletexModel& model, const Walls& walls);
+/// Queues their triangles (one launch), behind which there is room for those at the ends.
+ClBuffer<Triangle> triangulate(ClContext& context, DiagonalRule rule, const DeviceQuads& quads, const Lattice& lattice, const DevicePlanes& inner);
 
 /// The same model with rectangles scaled to another texture size (longer side `size`, at least 4 x 4 each): texels are
 /// resampled as bind-pose positions, averaged where the lattice gets coarser, seams are kept and resampled.

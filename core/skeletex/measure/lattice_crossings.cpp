@@ -1,0 +1,338 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/measure/lattice_crossings.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "skeletex/measure/parallel.h"
+#include "skeletex/measure/self_intersection.h"
+
+namespace skeletex {
+namespace {
+
+constexpr int kSide = 4;  // quads along a side of a square
+constexpr int kPieceTriangles = 8;
+constexpr int kPiece = 2;             // quads along a side of a piece of a square
+constexpr int kNear = 8;              // quads: up to here a part of the lattice is looked at as a whole
+constexpr float kLeastCosine = 0.2f;  // between a part's normals and their middle
+constexpr std::size_t kWidth = 8;
+constexpr std::size_t kAtOnce = 128;
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+/// Bits of a number, one place apart.
+std::uint64_t spread(std::uint32_t value) {
+  std::uint64_t spread = 0;
+  for (int bit = 0; bit < 16; ++bit) spread |= static_cast<std::uint64_t>(value >> bit & 1u) << (2 * bit);
+  return spread;
+}
+
+template <class Box>
+Box no_box() {
+  return {{kInfinity, kInfinity, kInfinity, 0}, {-kInfinity, -kInfinity, -kInfinity, 0}};
+}
+template <class Box>
+void add(const Box& other, Box& box) {
+  box.least = box.least.min(other.least);
+  box.greatest = box.greatest.max(other.greatest);
+}
+/// (Without branches: which of the sides decides is chance.)
+template <class Box>
+bool do_overlap(const Box& a, const Box& b) {
+  return (a.least - b.greatest).max(b.least - a.greatest).maxCoeff() <= 0;
+}
+
+}  // namespace
+
+LatticeCrossings::LatticeCrossings(const SkeletexModel& model, const Lattice& lattice)
+    : origin_(model.origin),
+      margin_(static_cast<float>(4e-7 * model.diagonal)),
+      first_quad_(lattice.first_quad),
+      part_of_(lattice.triangle_count),
+      normals_(2 * static_cast<std::size_t>(lattice.quad_count)) {
+  struct Square {
+    std::uint64_t key;
+    int patch, column, row;
+  };
+  std::vector<Square> squares;
+  int places = 0;
+  for (int patch = 0; patch < static_cast<int>(model.patches.size()); ++patch) {
+    const Rectangle& r = model.patches[patch].rectangle;
+    const int columns = (r.width + kSide - 1) / kSide, rows = (r.height - 3 + kSide - 1) / kSide;
+    rectangles_.push_back(r);
+    squares_.push_back({columns, rows});
+    first_square_.push_back(places);
+    places += columns * rows;
+    for (int row = 0; row < rows; ++row)
+      for (int column = 0; column < columns; ++column)
+        squares.push_back(
+            {static_cast<std::uint64_t>(patch) << 40 | spread(static_cast<std::uint32_t>(row)) << 1 | spread(static_cast<std::uint32_t>(column)),
+             patch, column, row});
+  }
+  std::sort(squares.begin(), squares.end(), [](const Square& a, const Square& b) { return a.key < b.key; });
+  places_.resize(places);
+  triangles_.reserve(lattice.triangle_count);
+  for (const Square& square : squares) {
+    const Rectangle& r = model.patches[square.patch].rectangle;
+    places_[first_square_[square.patch] + square.row * squares_[square.patch][0] + square.column] = static_cast<int>(parts_.size());
+    parts_.push_back({square.patch, square.column, square.row, static_cast<int>(pieces_.size()), 0});
+    const Piece whole = quads_of(parts_.back());
+    for (int row = 0; row < whole.rows; row += kPiece)
+      for (int column = 0; column < whole.columns; column += kPiece) {
+        Piece piece{square.patch,
+                    whole.column + column,
+                    std::min(kPiece, whole.columns - column),
+                    whole.row + row,
+                    std::min(kPiece, whole.rows - row),
+                    static_cast<int>(triangles_.size()),
+                    0};
+        for (int i = 0; i < piece.rows; ++i)
+          for (int j = 0; j < piece.columns; ++j)
+            for (const int side : {0, 1})
+              triangles_.push_back(2 * (lattice.first_quad[square.patch] + (piece.row + i) * r.width + piece.column + j) + side);
+        piece.count = static_cast<int>(triangles_.size()) - piece.begin;
+        pieces_.push_back(piece);
+        ++parts_.back().count;
+      }
+  }
+  for (int begin = 2 * lattice.quad_count; begin < lattice.triangle_count; begin += kPieceTriangles) {
+    const int count = std::min(kPieceTriangles, lattice.triangle_count - begin);
+    parts_.push_back({-1, 0, 0, static_cast<int>(pieces_.size()), 1});
+    pieces_.push_back({-1, 0, 0, 0, 0, static_cast<int>(triangles_.size()), count});
+    for (int i = 0; i < count; ++i) triangles_.push_back(begin + i);
+  }
+  for (std::size_t part = 0; part < parts_.size(); ++part)
+    for (int i = parts_[part].begin; i < parts_[part].begin + parts_[part].count; ++i)
+      for (int k = pieces_[i].begin; k < pieces_[i].begin + pieces_[i].count; ++k) part_of_[triangles_[k]] = static_cast<int>(part);
+  piece_boxes_.resize(pieces_.size());
+  normal_boxes_.resize(parts_.size());
+  for (std::size_t size = parts_.size();; size = block_count(size, kWidth)) {
+    boxes_.emplace_back(size);
+    if (size <= kWidth) break;
+  }
+}
+
+void LatticeCrossings::round(const TriangleMesh& mesh) {
+  points_.resize(mesh.positions.size());
+  for_each_block(points_.size(), 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Eigen::Vector3f p = (mesh.positions[i] - origin_).cast<float>();
+      points_[i] = {p[0], p[1], p[2], 0};
+    }
+  });
+}
+
+LatticeCrossings::Box LatticeCrossings::box_of(const TriangleMesh& mesh, int triangle) const {
+  const auto [a, b, c] = mesh.triangles[triangle];
+  const Eigen::Array4f margin(margin_, margin_, margin_, 0);
+  return {points_[a].min(points_[b]).min(points_[c]) - margin, points_[a].max(points_[b]).max(points_[c]) + margin};
+}
+
+void LatticeCrossings::measure(const TriangleMesh& mesh, int part) {
+  Box around = no_box<Box>(), normals = no_box<Box>();
+  for (int i = parts_[part].begin; i < parts_[part].begin + parts_[part].count; ++i) {
+    Box box = no_box<Box>();
+    for (int k = pieces_[i].begin; k < pieces_[i].begin + pieces_[i].count; ++k) {
+      const int triangle = triangles_[k];
+      add(box_of(mesh, triangle), box);
+      if (pieces_[i].patch < 0) continue;
+      const auto [a, b, c] = mesh.triangles[triangle];
+      const Eigen::Array4f u = points_[b] - points_[a], v = points_[c] - points_[a];
+      const float x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2], z = u[0] * v[1] - u[1] * v[0];
+      // One without area may look anywhere.
+      const float length2 = x * x + y * y + z * z, inverse = length2 > 0 ? 1 / std::sqrt(length2) : 0;
+      normals_[triangle] = {x * inverse, y * inverse, z * inverse, 0};
+      add({normals_[triangle], normals_[triangle]}, normals);
+    }
+    piece_boxes_[i] = box;
+    add(box, around);
+  }
+  boxes_[0][part] = around;
+  normal_boxes_[part] = normals;
+}
+
+void LatticeCrossings::join_boxes() {
+  for (std::size_t level = 1; level < boxes_.size(); ++level)
+    for (std::size_t i = 0; i < boxes_[level].size(); ++i) {
+      boxes_[level][i] = no_box<Box>();
+      for (std::size_t child = kWidth * i; child < std::min(boxes_[level - 1].size(), kWidth * (i + 1)); ++child)
+        add(boxes_[level - 1][child], boxes_[level][i]);
+    }
+}
+
+/// All quads of a square.
+LatticeCrossings::Piece LatticeCrossings::quads_of(const Part& part) const {
+  const Rectangle& r = rectangles_[part.patch];
+  const int column = kSide * part.column, row = kSide * part.row;
+  return {part.patch, column, std::min(kSide, r.width - column), row, std::min(kSide, r.height - 3 - row), 0, 0};
+}
+
+/// Whether the lattice around two bends so little that nothing in it can meet.
+bool LatticeCrossings::is_smooth(const Piece& a, const Piece& b) const {
+  if (a.patch < 0 || a.patch != b.patch) return false;
+  const int width = rectangles_[a.patch].width;
+  if (std::abs(a.row - b.row) > kNear) return false;
+  const int ahead = (b.column - a.column + width) % width, behind = (width - ahead) % width;
+  if (std::min(ahead, behind) > kNear) return false;
+  const int column = ahead <= behind ? a.column : b.column;
+  const int columns =
+      std::min(width, std::min(ahead, behind) + (ahead <= behind ? std::max(b.columns, a.columns - ahead) : std::max(a.columns, b.columns - behind)));
+  const int row = std::min(a.row, b.row), end = std::max(a.row + a.rows, b.row + b.rows);
+  const auto for_each_normal = [&](const auto& act) {
+    for (int r = row; r < end; ++r)
+      for (int j = 0; j < columns; ++j) {
+        const std::size_t quad = static_cast<std::size_t>(first_quad_[a.patch]) + r * width + (column + j < width ? column + j : column + j - width);
+        act(normals_[2 * quad]), act(normals_[2 * quad + 1]);
+      }
+  };
+  Eigen::Array4f middle = Eigen::Array4f::Zero();
+  for_each_normal([&](const Eigen::Array4f& normal) { middle += normal; });
+  float least = std::numeric_limits<float>::infinity();
+  for_each_normal([&](const Eigen::Array4f& normal) { least = std::min(least, (normal * middle).sum()); });
+  return least > kLeastCosine * middle.matrix().norm();
+}
+
+bool LatticeCrossings::is_smooth(const Part& a, const Part& b) const {
+  if (a.patch < 0 || a.patch != b.patch || std::abs(a.row - b.row) * kSide > kNear) return false;
+  const int columns = squares_[a.patch][0];
+  const int ahead = (b.column - a.column + columns) % columns, behind = columns - ahead;
+  const int steps = std::min(ahead, behind), first = ahead <= behind ? a.column : b.column;
+  if (steps * kSide > kNear) return false;
+  // By boxes of normals; one by one where these are not enough.
+  Box normals = no_box<Box>();
+  for (int row = std::min(a.row, b.row); row <= std::max(a.row, b.row); ++row)
+    for (int step = 0; step <= steps; ++step) add(normal_boxes_[places_[first_square_[a.patch] + row * columns + (first + step) % columns]], normals);
+  const Eigen::Array4f middle = 0.5f * (normals.least + normals.greatest);
+  const float least = (middle * normals.least).min(middle * normals.greatest).sum();
+  return least > kLeastCosine * middle.matrix().norm() || is_smooth(quads_of(a), quads_of(b));
+}
+
+void LatticeCrossings::find_between(const TriangleMesh& mesh, int a, int b, const std::vector<char>& is_asked,
+                                    std::vector<std::array<int, 2>>& pairs) const {
+  struct Boxes {
+    int piece = -1;
+    std::array<Box, kPieceTriangles> of;
+  };
+  const auto boxes_of = [&](int piece, Boxes& boxes) {
+    if (boxes.piece == piece) return;
+    boxes.piece = piece;
+    for (int k = 0; k < pieces_[piece].count; ++k) boxes.of[k] = box_of(mesh, triangles_[pieces_[piece].begin + k]);
+  };
+  // The quad of a piece's triangle.
+  const auto quad_at = [](const Piece& piece, int triangle) {
+    if (piece.patch < 0) return piece;
+    const int quad = triangle / 2;
+    return Piece{piece.patch, piece.column + quad % piece.columns, 1, piece.row + quad / piece.columns, 1, 0, 0};
+  };
+  Boxes ones, others;
+  for (int i = parts_[a].begin; i < parts_[a].begin + parts_[a].count; ++i) {
+    if (!do_overlap(piece_boxes_[i], boxes_[0][b])) continue;
+    for (int j = a == b ? i : parts_[b].begin; j < parts_[b].begin + parts_[b].count; ++j) {
+      if (!do_overlap(piece_boxes_[i], piece_boxes_[j])) continue;
+      const Piece &one = pieces_[i], &other = pieces_[j];
+      if (is_smooth(one, other)) continue;
+      boxes_of(i, ones), boxes_of(j, others);
+      for (int k = 0; k < one.count; ++k) {
+        if (!do_overlap(ones.of[k], piece_boxes_[j])) continue;
+        for (int l = i == j ? k + 1 : 0; l < other.count; ++l) {
+          if (!do_overlap(ones.of[k], others.of[l])) continue;
+          const int s = triangles_[one.begin + k], t = triangles_[other.begin + l];
+          if (!is_asked.empty() && !is_asked[s] && !is_asked[t]) continue;
+          if (is_smooth(quad_at(one, k), quad_at(other, l))) continue;
+          if (do_triangles_intersect(mesh, std::min(s, t), std::max(s, t))) pairs.push_back({std::min(s, t), std::max(s, t)});
+        }
+      }
+    }
+  }
+}
+
+/// \param parts  all, or some in order: then pairs with one of these, when both are it is the first that finds them
+std::vector<std::array<int, 2>> LatticeCrossings::find_from(const TriangleMesh& mesh, std::span<const int> parts,
+                                                            const std::vector<char>& is_asked) const {
+  const bool are_all = parts.empty();
+  const std::size_t count = are_all ? parts_.size() : parts.size();
+  std::vector<std::vector<std::array<int, 2>>> found(block_count(count, kAtOnce));
+  for_each_block(count, kAtOnce, [&](std::size_t block, std::size_t begin, std::size_t end) {
+    std::vector<std::pair<int, int>> stack;  // level, node
+    for (std::size_t i = begin; i < end; ++i) {
+      const int part = are_all ? static_cast<int>(i) : parts[i];
+      const Box& box = boxes_[0][part];
+      const int top = static_cast<int>(boxes_.size()) - 1;
+      for (int node = 0; node < static_cast<int>(boxes_[top].size()); ++node) stack.push_back({top, node});
+      while (!stack.empty()) {
+        const auto [level, node] = stack.back();
+        stack.pop_back();
+        // With all of them every pair is found from its first part.
+        if (are_all && (static_cast<std::int64_t>(node) + 1) << (3 * level) <= part) continue;
+        if (!do_overlap(box, boxes_[level][node])) continue;
+        if (level > 0) {
+          for (int child = 8 * node; child < std::min(static_cast<int>(boxes_[level - 1].size()), 8 * (node + 1)); ++child)
+            stack.push_back({level - 1, child});
+          continue;
+        }
+        if (!are_all && node < part && std::binary_search(parts.begin(), parts.end(), node)) continue;
+        if (!is_smooth(parts_[part], parts_[node])) find_between(mesh, part, node, is_asked, found[block]);
+      }
+    }
+  });
+  std::vector<std::array<int, 2>> pairs;
+  for (const auto& some : found) pairs.insert(pairs.end(), some.begin(), some.end());
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
+}
+
+std::vector<std::array<int, 2>> LatticeCrossings::find(const TriangleMesh& mesh) {
+  round(mesh);
+  for_each_block(parts_.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t part = begin; part < end; ++part) measure(mesh, static_cast<int>(part));
+  });
+  join_boxes();
+  return find_from(mesh, {}, {});
+}
+
+std::vector<std::array<int, 2>> LatticeCrossings::find(const TriangleMesh& mesh, std::span<const int> changed) {
+  if (changed.empty()) return {};
+  std::vector<char> is_asked(part_of_.size(), 0);
+  std::vector<int> parts;
+  for (const int triangle : changed) {
+    is_asked[triangle] = 1;
+    parts.push_back(part_of_[triangle]);
+  }
+  std::sort(parts.begin(), parts.end());
+  parts.erase(std::unique(parts.begin(), parts.end()), parts.end());
+  round(mesh);
+  for (const int part : parts) measure(mesh, part);
+  join_boxes();
+  return find_from(mesh, parts, is_asked);
+}
+
+std::vector<std::array<int, 2>> LatticeCrossings::find_around(std::span<const std::array<int, 2>> pairs, const TriangleMesh& mesh) const {
+  std::vector<int> parts;
+  for (const auto& pair : pairs)
+    for (const int triangle : pair) {
+      const Part& part = parts_[part_of_[triangle]];
+      if (part.patch < 0) {
+        parts.push_back(part_of_[triangle]);
+        continue;
+      }
+      const auto [columns, rows] = squares_[part.patch];
+      for (int row = std::max(0, part.row - 1); row <= std::min(rows - 1, part.row + 1); ++row)
+        for (int step = -1; step <= 1; ++step)
+          parts.push_back(places_[first_square_[part.patch] + row * columns + (part.column + step + columns) % columns]);
+    }
+  std::sort(parts.begin(), parts.end());
+  parts.erase(std::unique(parts.begin(), parts.end()), parts.end());
+  LatticeCrossings other = *this;
+  other.round(mesh);
+  std::fill(other.boxes_[0].begin(), other.boxes_[0].end(), no_box<Box>());
+  for_each_block(parts.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) other.measure(mesh, parts[i]);
+  });
+  other.join_boxes();
+  return other.find_from(mesh, parts, {});
+}
+
+}  // namespace skeletex

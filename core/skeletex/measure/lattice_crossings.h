@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <array>
+#include <span>
+#include <vector>
+
+#include "skeletex/model/texture.h"
+#include "skeletex/reconstruct/lattice.h"
+
+namespace skeletex {
+
+/// Finds where a lattice's mesh intersects itself, as find_self_intersections does, but knows that triangles which are neighbours in
+/// the lattice are so in space: where a part of it bends by less than a quarter turn all in all, no two of its triangles meet. Nearly all of a
+/// lattice is such, and only other parts that lie near each other are looked at.
+class LatticeCrossings {
+ public:
+  LatticeCrossings(const SkeletexModel& model, const Lattice& lattice);
+
+  /// All pairs of triangles that intersect, the smaller index first, sorted. Cost: some 10 ns per triangle, all processors.
+  std::vector<std::array<int, 2>> find(const TriangleMesh& mesh);
+  /// Of the same mesh with some triangles changed: the pairs with one of these.
+  std::vector<std::array<int, 2>> find(const TriangleMesh& mesh, std::span<const int> changed);
+
+  /// Pairs of another mesh of this lattice that lie where given ones do, or next to it.
+  std::vector<std::array<int, 2>> find_around(std::span<const std::array<int, 2>> pairs, const TriangleMesh& mesh) const;
+
+ private:
+  /// Least and greatest coordinates, rounded outwards; the fourth is 0.
+  struct Box {
+    Eigen::Array4f least, greatest;
+  };
+  /// Up to eight neighbouring triangles: of 2 x 2 quads, or one after the other in a strip or fan.
+  struct Piece {
+    int patch = -1;                                  ///< -1: of a strip or fan
+    int column = 0, columns = 0, row = 0, rows = 0;  ///< its quads
+    int begin = 0, count = 0;                        ///< its triangles in triangles_
+  };
+  /// Up to four pieces: of 4 x 4 quads, or of a strip or fan.
+  struct Part {
+    int patch = -1;
+    int column = 0, row = 0;   ///< of squares, in squares
+    int begin = 0, count = 0;  ///< its pieces
+  };
+  void measure(const TriangleMesh& mesh, int part);
+  void join_boxes();
+  void round(const TriangleMesh& mesh);
+  Box box_of(const TriangleMesh& mesh, int triangle) const;
+  Piece quads_of(const Part& part) const;
+  bool is_smooth(const Part& a, const Part& b) const;
+  bool is_smooth(const Piece& a, const Piece& b) const;
+  void find_between(const TriangleMesh& mesh, int a, int b, const std::vector<char>& is_asked, std::vector<std::array<int, 2>>& pairs) const;
+  std::vector<std::array<int, 2>> find_from(const TriangleMesh& mesh, std::span<const int> parts, const std::vector<char>& is_asked) const;
+
+  Vec3 origin_;
+  float margin_;
+  std::vector<Rectangle> rectangles_;  // per patch
+  std::vector<int> first_quad_;
+  std::vector<std::array<int, 2>> squares_;  // per patch, how many columns and rows of them
+  std::vector<int> first_square_;            // per patch, in places_
+  std::vector<int> places_;                  // per square, by rows of a patch, its part
+  std::vector<Part> parts_;                  // squares along a curve, then strips
+  std::vector<Piece> pieces_;
+  std::vector<int> triangles_, part_of_;  // of the pieces; per triangle
+  std::vector<Eigen::Array4f> points_;    // of the mesh, from the origin
+  std::vector<Eigen::Array4f> normals_;   // per triangle between inner rows
+  std::vector<Box> normal_boxes_;         // per part
+  std::vector<Box> piece_boxes_;
+  std::vector<std::vector<Box>> boxes_;  // per level: of parts, of every eight of them, and so on
+};
+
+}  // namespace skeletex

@@ -1,0 +1,338 @@
+// SPDX-License-Identifier: MIT
+// What the guard of the finished lattice stands on: lattices whose points move, their crossings, and distances found from nearby.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <random>
+#include <set>
+
+#include "skeletex/encode/device_maps.h"
+#include "skeletex/encode/encode_model.h"
+#include "skeletex/encode/row_profile.h"
+#include "skeletex/measure/lattice_crossings.h"
+#include "skeletex/measure/point_triangle.h"
+#include "skeletex/measure/self_intersection.h"
+#include "skeletex/reconstruct/lattice_mesh.h"
+#include "support/load_model.h"
+
+namespace skeletex {
+namespace {
+
+ClContext& device() {
+  static ClContext context;
+  return context;
+}
+
+SkeletexModel encoded(const char* name, int size) {
+  const TestModel model = load_standard_model(name);
+  EncodeOptions options;
+  options.width = options.height = size;
+  return encode_model(device(), model.mesh, model.skeleton, options).model;
+}
+
+/// Its points per texel, moved at random by up to `noise` diagonals.
+LatticeMesh::Planes points_of(const SkeletexModel& model, double noise, std::mt19937& random) {
+  std::uniform_real_distribution<double> unit(-1, 1);
+  const Lattice lattice = number_lattice(model);
+  const std::vector<Vec3> positions = lattice_positions(device(), model);
+  LatticeMesh::Planes planes;
+  for (auto& plane : planes) plane.assign(static_cast<std::size_t>(model.texture.width) * model.texture.height, 0);
+  for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
+    const Rectangle& r = model.patches[bone].rectangle;
+    for (int row = 0; row < r.height; ++row)
+      for (int j = 0; j < r.width; ++j) {
+        const int pole = lattice.poles[bone][row == 0 ? 0 : 1];
+        const bool is_end = row == 0 || row == r.height - 1;
+        if (is_end && pole < 0) continue;
+        const Vec3& p = positions[is_end ? pole : lattice.first_inner[bone] + (row - 1) * r.width + j];
+        for (int axis = 0; axis < 3; ++axis)
+          planes[axis][(r.y + row) * static_cast<std::size_t>(model.texture.width) + r.x + j] =
+              static_cast<float>(p[axis] - model.origin[axis] + (is_end ? 0 : noise * model.diagonal * unit(random)));
+      }
+  }
+  return planes;
+}
+
+using Pairs = std::vector<std::array<int, 2>>;
+Pairs without_shared_vertices(const TriangleMesh& mesh, Pairs pairs) {
+  std::erase_if(pairs, [&](const auto& pair) {
+    const Triangle &a = mesh.triangles[pair[0]], &b = mesh.triangles[pair[1]];
+    return std::any_of(a.begin(), a.end(), [&](int v) { return std::find(b.begin(), b.end(), v) != b.end(); });
+  });
+  return pairs;
+}
+
+TEST(LatticeMesh, IsTheModelsAndWithMovedPointsWhatTheyWouldMake) {
+  std::mt19937 random(3);
+  for (const DiagonalRule rule : {DiagonalRule::kNearest, DiagonalRule::kSmooth}) {
+    SkeletexModel model = encoded("bear", 48);
+    model.diagonals = rule;
+    const LatticeMesh::Planes planes = points_of(model, 0, random), other = points_of(model, 2e-3, random);
+    LatticeMesh lattice(device(), model, rule, planes);
+    const TriangleMesh before = lattice.mesh(), expected = reconstruct_mesh(device(), model);
+    EXPECT_EQ(before.triangles, expected.triangles);
+    for (std::size_t i = 0; i < expected.positions.size(); ++i)
+      EXPECT_LT((before.positions[i] - expected.positions[i]).norm(), 1e-6 * model.diagonal);
+
+    LatticeMesh::Planes mixed = planes;
+    std::vector<int> moved;
+    for (std::size_t i = 0; i < lattice.texels().size(); ++i) {
+      if (random() % 20 != 0) continue;
+      moved.push_back(static_cast<int>(i));
+      for (int axis = 0; axis < 3; ++axis) mixed[axis][lattice.texels()[i]] = other[axis][lattice.texels()[i]];
+    }
+    const std::vector<int> changed = lattice.move(moved, mixed);
+    const TriangleMesh& now = lattice.mesh();
+    const LatticeMesh made(device(), model, rule, mixed);
+    EXPECT_EQ(now.positions, made.mesh().positions);
+    EXPECT_EQ(now.triangles, made.mesh().triangles);
+    const auto inner = static_cast<std::ptrdiff_t>(2 * lattice.lattice().quad_count);
+    std::vector<Triangle> on_device = device().download(lattice.device_triangles());
+    EXPECT_TRUE(std::equal(on_device.begin(), on_device.begin() + inner, now.triangles.begin()));
+    std::vector<int> differing;
+    for (std::size_t t = 0; t < now.triangles.size(); ++t) {
+      const Triangle& triangle = now.triangles[t];
+      if (triangle != before.triangles[t] ||
+          std::any_of(triangle.begin(), triangle.end(), [&](int v) { return now.positions[v] != before.positions[v]; }))
+        differing.push_back(static_cast<int>(t));
+    }
+    EXPECT_EQ(changed, differing);
+  }
+}
+
+TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
+  std::mt19937 random(5);
+  struct Case {
+    const char* name;
+    int size;
+    double noise;
+  };
+  for (const Case& each : {Case{"man", 128, 0}, Case{"man", 96, 1e-3}, Case{"eight", 64, 5e-3}, Case{"bear", 40, 0.1}, Case{"armadillo", 160, 0}}) {
+    const SkeletexModel model = encoded(each.name, each.size);
+    LatticeMesh lattice(device(), model, DiagonalRule::kNearest, points_of(model, each.noise, random));
+    LatticeCrossings crossings(model, lattice.lattice());
+    const Pairs found = crossings.find(lattice.mesh()), expected = find_self_intersections(lattice.mesh());
+    ASSERT_GT(expected.size(), 10u) << each.name;
+    const Pairs apart = without_shared_vertices(lattice.mesh(), found), expected_apart = without_shared_vertices(lattice.mesh(), expected);
+    // Shaken by a tenth of its size a lattice is no surface any more: what bends little can cross itself there.
+    if (each.noise < 0.05) {
+      EXPECT_EQ(apart, expected_apart) << each.name;
+    }
+    EXPECT_TRUE(std::includes(expected_apart.begin(), expected_apart.end(), apart.begin(), apart.end())) << each.name;
+    EXPECT_GE(static_cast<double>(apart.size()), 0.99 * static_cast<double>(expected_apart.size())) << each.name;
+    // At a vertex that they share, contact in the last digits of single precision counts, or not.
+    EXPECT_NEAR(static_cast<double>(found.size()), static_cast<double>(expected.size()), 2 + 0.05 * static_cast<double>(expected.size()))
+        << each.name;
+
+    const LatticeMesh::Planes other = points_of(model, each.noise + 2e-3, random);
+    std::vector<int> moved;
+    for (std::size_t i = 0; i < lattice.texels().size(); i += 50) moved.push_back(static_cast<int>(i));
+    const std::vector<int> changed = lattice.move(moved, other);
+    const Pairs found_of_changed = crossings.find(lattice.mesh(), changed);
+    Pairs all = LatticeCrossings(model, lattice.lattice()).find(lattice.mesh());
+    EXPECT_EQ(LatticeCrossings(model, lattice.lattice()).find_around(all, lattice.mesh()), all) << each.name;
+    const std::set<int> is_changed(changed.begin(), changed.end());
+    std::erase_if(all, [&](const auto& pair) { return !is_changed.contains(pair[0]) && !is_changed.contains(pair[1]); });
+    EXPECT_EQ(found_of_changed, all) << each.name;
+  }
+}
+
+/// A tube whose vertices are moved at random, with a vertex or two on top of others, and a lattice beside it.
+struct TubeAndLattice {
+  static constexpr int kAround = 9, kRings = 7, kWidth = 15, kHeight = 12;
+  Chart chart;
+  std::vector<Patch> patches{{{2, 1, kWidth, kHeight}, Method::kVsm, SegmentTopology::kAnnulus, spread_rows_uniformly(kHeight)}};
+  Skeleton skeleton{{{"head", Vec3(0, 0, 0)}, {"tail", Vec3(0, 0, 4)}}, {{"bone", 0, 1, Vec3(1, 0, 0)}}};
+  DeviceLayout layout;
+  DeviceMaps maps;
+  TriangleMesh lattice;  // of the rows 1 to height-2
+  ClBuffer<int> triangles, vertex_texels, texel_triangles;
+  std::array<ClBuffer<float>, 3> points;
+  std::vector<int> seeds;  // per texel
+
+  static Vec3 on_tube(double u, double v) { return {std::cos(2 * M_PI * v), std::sin(2 * M_PI * v), 4 * u}; }
+  explicit TubeAndLattice(std::mt19937& random, double noise) {
+    std::uniform_real_distribution<double> unit(-1, 1);
+    const auto shaken = [&](const Vec3& p) { return Vec3(p + noise * Vec3(unit(random), unit(random), unit(random))); };
+    chart.bone = 0, chart.topology = SegmentTopology::kAnnulus;
+    for (int ring = 0; ring < kRings; ++ring)
+      for (int k = 0; k < kAround; ++k) {
+        chart.u.push_back(ring / (kRings - 1.0)), chart.v.push_back(static_cast<double>(k) / kAround);
+        chart.positions.push_back(shaken(on_tube(chart.u.back(), chart.v.back())));
+        chart.kinds.push_back(ring == 0 ? ChartVertex::kHeadRow : ring == kRings - 1 ? ChartVertex::kTailRow : ChartVertex::kInner);
+      }
+    if (noise > 0) chart.positions[2 * kAround + 3] = chart.positions[2 * kAround + 4];
+    for (int ring = 0; ring + 1 < kRings; ++ring)
+      for (int k = 0; k < kAround; ++k) {
+        const int l = (k + 1) % kAround, a = ring * kAround + k, b = ring * kAround + l;
+        const auto turn = static_cast<std::int8_t>(l == 0);
+        chart.triangles.push_back({a, b, b + kAround});
+        chart.turns.push_back({0, turn, turn});
+        chart.triangles.push_back({a, b + kAround, a + kAround});
+        chart.turns.push_back({0, turn, 0});
+      }
+    layout = upload_layout(device(), patches, frame_tables(skeleton, Walls(skeleton), patches, Vec3::Zero()), 20, 14);
+    maps = upload_maps(device(), {&chart, 1}, patches, Vec3::Zero());
+    seeds.assign(layout.size(), 0x7fffffff);
+    std::vector<int> texels;
+    for (int row = 1; row + 1 < kHeight; ++row)
+      for (int j = 0; j < kWidth; ++j) {
+        lattice.positions.push_back(shaken(on_tube(row / (kHeight - 1.0), static_cast<double>(j) / kWidth)));
+        texels.push_back((1 + row) * 20 + 2 + j);
+        seeds[texels.back()] = static_cast<int>(2 * (row * (kRings - 1) / kHeight * kAround + j * kAround / kWidth));
+      }
+    for (int row = 0; row + 3 < kHeight; ++row)
+      for (int j = 0; j < kWidth; ++j) {
+        const int k = (j + 1) % kWidth, a = row * kWidth + j, b = row * kWidth + k;
+        lattice.triangles.push_back({a, b, b + kWidth}), lattice.triangles.push_back({a, b + kWidth, a + kWidth});
+      }
+    lattice.positions[20] = lattice.positions[21];
+    std::vector<int> corners;
+    for (const Triangle& t : lattice.triangles) corners.insert(corners.end(), t.begin(), t.end());
+    triangles = device().upload(corners), vertex_texels = device().upload(texels), texel_triangles = device().upload(seeds);
+    for (int axis = 0; axis < 3; ++axis) {
+      std::vector<float> plane;
+      for (const Vec3& p : lattice.positions) plane.push_back(static_cast<float>(p[axis]));
+      points[axis] = device().upload(plane);
+    }
+  }
+  double distance(const Vec3& p, const Triangle& t, const std::vector<Vec3>& positions) const {
+    return offset_from_triangle(p, positions[t[0]], positions[t[1]], positions[t[2]]).norm();
+  }
+  Vec3 normal(const Triangle& t, const std::vector<Vec3>& positions) const {
+    return (positions[t[1]] - positions[t[0]]).cross(positions[t[2]] - positions[t[0]]);
+  }
+};
+
+TEST(GuardKernels, AWalkIsNeverNearerThanTheMeshAndOnASmoothOneAsFar) {
+  std::mt19937 random(7);
+  for (const double noise : {0.0, 0.02, 0.3}) {
+    const TubeAndLattice tube(random, noise);
+    const int count = static_cast<int>(tube.lattice.triangles.size());
+    std::vector<int> listed(count);
+    for (int i = 0; i < count; ++i) listed[i] = (7 * i) % count;
+    for (const float worth : {0.0f, 1e9f}) {
+      auto distances = device().allocate<float>(count);
+      auto turned = device().allocate<int>(count);
+      device().launch({"guard.cl", "measure_triangles"}, ClRange(count), count, worth, tube.maps.triangle_count, device().upload(listed),
+                      tube.triangles, tube.vertex_texels, tube.texel_triangles, tube.maps.corners, tube.maps.across, tube.maps.x, tube.maps.y,
+                      tube.maps.z, tube.points[0], tube.points[1], tube.points[2], distances, turned);
+      const std::vector<float> found2 = device().download(distances);
+      const std::vector<int> is_turned = device().download(turned);
+      int further = 0, differently_turned = 0;
+      for (int i = 0; i < count; ++i) {
+        const Triangle& t = tube.lattice.triangles[listed[i]];
+        const Vec3 &a = tube.lattice.positions[t[0]], ab = tube.lattice.positions[t[1]] - a, ac = tube.lattice.positions[t[2]] - a;
+        std::vector<std::array<double, 2>> places{{1 / 3.0, 1 / 3.0}};
+        if (worth == 0)
+          places.insert(places.end(), {{0, 0},
+                                       {1, 0},
+                                       {0, 1},
+                                       {0.25, 0},
+                                       {0.5, 0},
+                                       {0.75, 0},
+                                       {0, 0.25},
+                                       {0, 0.5},
+                                       {0, 0.75},
+                                       {0.75, 0.25},
+                                       {0.5, 0.5},
+                                       {0.25, 0.75},
+                                       {0.6, 0.2},
+                                       {0.2, 0.6},
+                                       {0.2, 0.2}});
+        double expected = 0;
+        bool is_against = false;
+        for (const auto& place : places) {
+          double least = 1e9;
+          for (const Triangle& m : tube.chart.triangles) {
+            const double distance = tube.distance(a + place[0] * ab + place[1] * ac, m, tube.chart.positions);
+            if (distance >= least) continue;
+            least = distance;
+            if (&place == &places[0]) is_against = ab.cross(ac).dot(tube.normal(m, tube.chart.positions)) < 0;
+          }
+          expected = std::max(expected, least);
+        }
+        const double found = std::sqrt(found2[i]);
+        EXPECT_GT(found, expected - 1e-4);
+        further += found > expected + 1e-4;
+        if (noise == 0) {
+          EXPECT_LT(found, expected + 0.03);
+        }
+        differently_turned += is_against != (is_turned[i] != 0);
+      }
+      // With coincident vertices, and shaken by a third of its radius, the tube has places to get stuck in.
+      // Without them a point under an edge may be led to the side that is a little further.
+      if (noise > 0) continue;
+      EXPECT_LE(further, 0.1 * count);
+      EXPECT_LE(differently_turned, 0.02 * count);
+    }
+  }
+}
+
+TEST(GuardKernels, AVertexIsMeasuredToTheQuadsAroundItsPlace) {
+  std::mt19937 random(8);
+  const TubeAndLattice tube(random, 0.05);
+  std::vector<int> vertices, patches;
+  std::vector<float> places;
+  for (int i = 0; i < static_cast<int>(tube.chart.positions.size()); ++i) {
+    vertices.push_back(i), patches.push_back(0);
+    places.push_back(static_cast<float>(tube.chart.v[i] * TubeAndLattice::kWidth + (i % 3 - 1) * TubeAndLattice::kWidth));
+    places.push_back(static_cast<float>(tube.chart.u[i] * (TubeAndLattice::kHeight - 1)));
+  }
+  const int count = static_cast<int>(vertices.size());
+  auto distances = device().allocate<float>(count);
+  auto nearest = device().allocate<int>(count);
+  device().launch({"guard.cl", "measure_vertices"}, ClRange(count), count, 0.0f, device().upload(vertices), device().upload(patches),
+                  device().upload(places), tube.layout.patches, device().upload(std::vector<int>{0}), tube.triangles, tube.maps.x, tube.maps.y,
+                  tube.maps.z, tube.points[0], tube.points[1], tube.points[2], distances, nearest);
+  const std::vector<float> found2 = device().download(distances);
+  const std::vector<int> found = device().download(nearest);
+  for (int i = 0; i < count; ++i) {
+    double expected = 1e9;
+    for (const Triangle& t : tube.lattice.triangles) expected = std::min(expected, tube.distance(tube.chart.positions[i], t, tube.lattice.positions));
+    EXPECT_NEAR(std::sqrt(found2[i]), expected, 1e-4) << i;
+    EXPECT_NEAR(tube.distance(tube.chart.positions[i], tube.lattice.triangles[found[i]], tube.lattice.positions), expected, 1e-4) << i;
+  }
+}
+
+TEST(GuardKernels, SuspicionsGrowWithSizeAndTheAngleToTheMesh) {
+  std::mt19937 random(9);
+  const TubeAndLattice tube(random, 0.1);
+  const int quads = static_cast<int>(tube.lattice.triangles.size()) / 2, triangle_count = tube.maps.triangle_count;
+  auto normals = device().allocate<float>(3 * static_cast<std::size_t>(triangle_count)), suspicions = device().allocate<float>(quads);
+  device().launch({"guard.cl", "find_normals"}, ClRange(triangle_count), triangle_count, tube.maps.corners, tube.maps.x, tube.maps.y, tube.maps.z,
+                  normals);
+  device().launch({"guard.cl", "suspect_quads"}, ClRange(quads), quads, triangle_count, tube.triangles, tube.vertex_texels, tube.texel_triangles,
+                  normals, tube.points[0], tube.points[1], tube.points[2], suspicions);
+  const std::vector<float> found2 = device().download(suspicions);
+  const std::vector<int> texels = device().download(tube.vertex_texels);
+  int against = 0;
+  for (int quad = 0; quad < quads; ++quad) {
+    double expected = 0;
+    bool is_against = false, is_unsure = false;
+    for (const int side : {0, 1}) {
+      const Triangle& t = tube.lattice.triangles[2 * quad + side];
+      const Vec3 own = tube.normal(t, tube.lattice.positions);
+      double longest = 0;
+      for (int k = 0; k < 3; ++k) longest = std::max(longest, (tube.lattice.positions[t[k]] - tube.lattice.positions[t[(k + 1) % 3]]).norm());
+      for (const int vertex : t) {
+        const Vec3 n = tube.normal(tube.chart.triangles[tube.seeds[texels[vertex]]], tube.chart.positions);
+        const double sine = own.norm() > 1e-6 && n.norm() > 1e-6 ? own.cross(n).norm() / (own.norm() * n.norm()) : 1;
+        is_against = is_against || own.dot(n) < -1e-4;
+        is_unsure = is_unsure || std::abs(own.dot(n)) <= 1e-4;
+        expected = std::max(expected, 0.5 * longest * sine);
+      }
+    }
+    if (is_unsure) continue;
+    against += is_against;
+    if (is_against)
+      EXPECT_TRUE(std::isinf(found2[quad])) << quad;
+    else
+      EXPECT_NEAR(std::sqrt(found2[quad]), expected, 2e-3) << quad;
+  }
+  EXPECT_LT(against, quads / 2);
+}
+
+}  // namespace
+}  // namespace skeletex
