@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <future>
 #include <limits>
 
 #include "skeletex/measure/lattice_crossings.h"
@@ -18,8 +19,8 @@ constexpr int kPasses = 7;                // it takes some four
 constexpr int kReach = 1;                 // columns and rows around a triangle that is too far that go back with it
 constexpr float kShareOfFurthest = 0.9f;  // what is measured is not all that there is
 constexpr float kWorthALook = 0.15f;      // of the limit, at the middle of a triangle: then it is measured more densely
-constexpr double kShareOfEven = 0.05;     // of the even lattice's quads, the most suspicious: among them is its furthest
-constexpr float kWorthAWalk = 0.5f;       // of the limit: how far a quad could be
+constexpr double kShareOfEven = 0.02;     // of the even lattice's quads, the most suspicious: among them is its furthest
+constexpr float kWorthAWalk = 0.75f;      // of the limit: how far a quad could be
 constexpr float kEvenWorthALook = 0.5f;   // of the furthest middle, in the even lattice
 constexpr std::size_t kManyPairs = 50;    // from here on it is looked at whether the even lattice intersects itself as well
 constexpr int kTolerance = 2;             // columns and rows around a fault of the even lattice
@@ -73,12 +74,12 @@ std::vector<PlacedVertex> place_vertices(std::span<const Chart> charts, std::spa
 /// (guard.cl) can be too far; what looks too far is looked at again by a tree.
 class Distances {
  public:
-  Distances(ClContext& context, const GuardSources& sources, const DeviceLayout& layout, const DeviceMaps& maps)
+  Distances(ClContext& context, const GuardSources& sources, const DeviceLayout& layout, const DeviceMaps& maps, TriangleTree tree)
       : context_(context),
         sources_(sources),
         layout_(layout),
         maps_(maps),
-        search_(context, build_triangle_tree(sources.mesh)),
+        search_(context, std::move(tree)),
         placed_(place_vertices(sources.charts, sources.model.patches, maps)),
         first_quads_(context.upload(number_lattice(sources.model).first_quad)) {}
 
@@ -199,11 +200,11 @@ class Distances {
                     texel_triangles, normals_, lattice.device_points().x, lattice.device_points().y, lattice.device_points().z, suspicions2);
     return context_.download(suspicions2);
   }
-  /// Those of quads that are more suspicious than that, and all at ends.
+  /// Those of quads that are more suspicious than that or look against the mesh, and all at ends.
   static std::vector<int> triangles_above(const LatticeMesh& lattice, const std::vector<float>& suspicions2, float least) {
     std::vector<int> triangles;
     for (int quad = 0; quad < static_cast<int>(suspicions2.size()); ++quad)
-      if (suspicions2[quad] > least) triangles.push_back(2 * quad), triangles.push_back(2 * quad + 1);
+      if (suspicions2[quad] > least || std::isinf(suspicions2[quad])) triangles.push_back(2 * quad), triangles.push_back(2 * quad + 1);
     for (int i = 2 * static_cast<int>(suspicions2.size()); i < static_cast<int>(lattice.mesh().triangles.size()); ++i) triangles.push_back(i);
     return triangles;
   }
@@ -322,9 +323,10 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
                             const TexelPoints& even, const TexelPoints& filtered, ReadingPositions& positions, TexelPoints& points) {
   GuardReport report;
   const SkeletexModel& model = sources.model;
+  auto tree = std::async(std::launch::async, [&] { return build_triangle_tree(sources.mesh); });
   const LatticeMesh::Planes home = download(context, filtered);
   const LatticeMesh even_lattice(context, model, DiagonalRule::kNearest, home);
-  Distances distances(context, sources, layout, maps);
+  Distances distances(context, sources, layout, maps, tree.get());
   const float limit = kShareOfFurthest * distances.measure_even(even_lattice, even_triangles);
   report.even_turned_triangles = distances.turned();
 

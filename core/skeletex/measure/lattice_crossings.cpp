@@ -42,7 +42,9 @@ void add(const Box& other, Box& box) {
 /// (Without branches: which of the sides decides is chance.)
 template <class Box>
 bool do_overlap(const Box& a, const Box& b) {
-  return (a.least - b.greatest).max(b.least - a.greatest).maxCoeff() <= 0;
+  return (static_cast<int>(a.least[0] <= b.greatest[0]) & static_cast<int>(b.least[0] <= a.greatest[0]) &
+          static_cast<int>(a.least[1] <= b.greatest[1]) & static_cast<int>(b.least[1] <= a.greatest[1]) &
+          static_cast<int>(a.least[2] <= b.greatest[2]) & static_cast<int>(b.least[2] <= a.greatest[2])) != 0;
 }
 
 }  // namespace
@@ -115,13 +117,15 @@ LatticeCrossings::LatticeCrossings(const SkeletexModel& model, const Lattice& la
   }
 }
 
+Eigen::Array4f LatticeCrossings::rounded(const Vec3& position) const {
+  const Eigen::Vector3f p = (position - origin_).cast<float>();
+  return {p[0], p[1], p[2], 0};
+}
+
 void LatticeCrossings::round(const TriangleMesh& mesh) {
   points_.resize(mesh.positions.size());
   for_each_block(points_.size(), 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const Eigen::Vector3f p = (mesh.positions[i] - origin_).cast<float>();
-      points_[i] = {p[0], p[1], p[2], 0};
-    }
+    for (std::size_t i = begin; i < end; ++i) points_[i] = rounded(mesh.positions[i]);
   });
 }
 
@@ -257,24 +261,35 @@ std::vector<std::array<int, 2>> LatticeCrossings::find_from(const TriangleMesh& 
   std::vector<std::vector<std::array<int, 2>>> found(block_count(count, kAtOnce));
   for_each_block(count, kAtOnce, [&](std::size_t block, std::size_t begin, std::size_t end) {
     std::vector<std::pair<int, int>> stack;  // level, node
-    for (std::size_t i = begin; i < end; ++i) {
-      const int part = are_all ? static_cast<int>(i) : parts[i];
-      const Box& box = boxes_[0][part];
-      const int top = static_cast<int>(boxes_.size()) - 1;
+    std::vector<int> near;
+    const int top = static_cast<int>(boxes_.size()) - 1;
+    // The tree is asked once for several parts that lie beside each other.
+    for (std::size_t first = begin; first < end; first += kWidth) {
+      const std::size_t last = std::min(end, first + kWidth);
+      const auto part_at = [&](std::size_t i) { return are_all ? static_cast<int>(i) : parts[i]; };
+      Box around = no_box<Box>();
+      for (std::size_t i = first; i < last; ++i) add(boxes_[0][part_at(i)], around);
+      near.clear();
       for (int node = 0; node < static_cast<int>(boxes_[top].size()); ++node) stack.push_back({top, node});
       while (!stack.empty()) {
         const auto [level, node] = stack.back();
         stack.pop_back();
         // With all of them every pair is found from its first part.
-        if (are_all && (static_cast<std::int64_t>(node) + 1) << (3 * level) <= part) continue;
-        if (!do_overlap(box, boxes_[level][node])) continue;
-        if (level > 0) {
+        if (are_all && (static_cast<std::int64_t>(node) + 1) << (3 * level) <= part_at(first)) continue;
+        if (!do_overlap(around, boxes_[level][node])) continue;
+        if (level == 0)
+          near.push_back(node);
+        else
           for (int child = 8 * node; child < std::min(static_cast<int>(boxes_[level - 1].size()), 8 * (node + 1)); ++child)
             stack.push_back({level - 1, child});
-          continue;
+      }
+      for (std::size_t i = first; i < last; ++i) {
+        const int part = part_at(i);
+        for (const int other : near) {
+          if (!do_overlap(boxes_[0][part], boxes_[0][other])) continue;
+          if (other < part && (are_all || std::binary_search(parts.begin(), parts.end(), other))) continue;
+          if (!is_smooth(parts_[part], parts_[other])) find_between(mesh, part, other, is_asked, found[block]);
         }
-        if (!are_all && node < part && std::binary_search(parts.begin(), parts.end(), node)) continue;
-        if (!is_smooth(parts_[part], parts_[node])) find_between(mesh, part, node, is_asked, found[block]);
       }
     }
   });
@@ -300,10 +315,10 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const TriangleMesh& mesh,
   for (const int triangle : changed) {
     is_asked[triangle] = 1;
     parts.push_back(part_of_[triangle]);
+    for (const int vertex : mesh.triangles[triangle]) points_[vertex] = rounded(mesh.positions[vertex]);
   }
   std::sort(parts.begin(), parts.end());
   parts.erase(std::unique(parts.begin(), parts.end()), parts.end());
-  round(mesh);
   for (const int part : parts) measure(mesh, part);
   join_boxes();
   return find_from(mesh, parts, is_asked);

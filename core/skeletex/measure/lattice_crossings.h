@@ -43,6 +43,7 @@ class LatticeCrossings {
   };
   void measure(const TriangleMesh& mesh, int part);
   void join_boxes();
+  Eigen::Array4f rounded(const Vec3& position) const;
   void round(const TriangleMesh& mesh);
   Box box_of(const TriangleMesh& mesh, int triangle) const;
   Piece quads_of(const Part& part) const;

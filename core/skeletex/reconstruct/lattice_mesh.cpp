@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "skeletex/measure/parallel.h"
+
 namespace skeletex {
 
 LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, const Planes& planes)
@@ -12,30 +14,34 @@ LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, Diagona
       walls_(model.skeleton),
       lattice_(number_lattice(model)),
       quads_(upload_quads(context, model, walls_)) {
-  int rows = 0;
-  texels_.reserve(lattice_.inner_count);
+  std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kInner);
+  int quad_rows = 0;
   for (const Patch& patch : model.patches) {
-    const Rectangle& r = patch.rectangle;
-    first_row_.push_back(rows);
-    rows += r.height - 3;
-    for (int row = 1; row + 1 < r.height; ++row)
-      for (int j = 0; j < r.width; ++j) texels_.push_back((r.y + row) * model.texture.width + r.x + j);
+    first_row_.push_back(quad_rows);
+    quad_rows += patch.rectangle.height - 3;
   }
+  texels_.resize(lattice_.inner_count);
   mesh_.positions.resize(lattice_.vertex_count);
-  std::array<ClBuffer<float>, 3> inner;
-  for (int axis = 0; axis < 3; ++axis) {
-    points_[axis].resize(texels_.size());
-    for (std::size_t i = 0; i < texels_.size(); ++i) {
-      points_[axis][i] = planes[axis][texels_[i]];
-      mesh_.positions[i][axis] = model.origin[axis] + static_cast<double>(points_[axis][i]);
+  for (auto& plane : points_) plane.resize(texels_.size());
+  for_each_block(rows.size(), 32, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      const auto [patch, row, vertex, quad] = rows[k];
+      const Rectangle& r = model.patches[patch].rectangle;
+      const int texel = (r.y + row) * model.texture.width + r.x;
+      for (int j = 0; j < r.width; ++j) {
+        texels_[vertex + j] = texel + j;
+        for (int axis = 0; axis < 3; ++axis) {
+          points_[axis][vertex + j] = planes[axis][texel + j];
+          mesh_.positions[vertex + j][axis] = model.origin[axis] + static_cast<double>(planes[axis][texel + j]);
+        }
+      }
     }
-    inner[axis] = context.upload(points_[axis]);
-  }
+  });
+  device_points_ = {context.upload(points_[0]), context.upload(points_[1]), context.upload(points_[2])};
   for_each_pole(model, lattice_, [&](int vertex, int, int, std::size_t texel) {
     for (int axis = 0; axis < 3; ++axis) mesh_.positions[vertex][axis] = model.origin[axis] + static_cast<double>(planes[axis][texel]);
   });
   place_seams(model, walls_, lattice_, mesh_.positions);
-  device_points_ = {inner[0], inner[1], inner[2]};
   device_triangles_ = triangulate(context, rule, quads_, lattice_, device_points_);
   mesh_.triangles = context.download(device_triangles_);
   mesh_.triangles.resize(2 * static_cast<std::size_t>(lattice_.quad_count));
