@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <memory>
 #include <new>
 
@@ -102,8 +101,6 @@ int run(int argc, char** argv) {
 }  // namespace skeletex::cli
 
 int main(int argc, char** argv) {
-  // Else PoCL compiles a kernel for the work-group size of its first launch, and once more for any size when its program is saved.
-  ::setenv("POCL_WORK_GROUP_SPECIALIZATION", "0", 0);
   auto log = spdlog::stderr_color_st("skeletex");
   log->set_pattern("%^%l:%$ %v");
   spdlog::set_default_logger(log);
