@@ -12,6 +12,7 @@ import sys
 
 import fig14_fidelity
 import pictures
+import scale
 import style
 import sweeps
 import table1_times
@@ -49,6 +50,8 @@ SECTIONS = [
      "A texture is about as good as a uniform remesh. A simplification puts its vertices where the surface bends, which an even lattice cannot."),
     ("Beyond the paper: error against bytes", "bytes", sweeps.draw_bytes,
      "Draco codes the input mesh alone and needs far fewer bytes. The texture pays for being editable: every texel is a displacement that can be posed, morphed and filtered."),
+    ("Beyond the paper: time and memory against the number of triangles", "scale", scale.draw,
+     "encode as a whole command, files included, at 512 x 512: the armadillo remeshed or decimated, and subdivided. The dotted line is n log n through the fewest triangles beyond 100 000."),
 ]
 
 STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:72rem;margin:2rem auto;padding:0 1rem;color:#222}

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
+#include "bench/stages/subdivide.h"
 #include "simplify.h"
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/mesh_file.h"
@@ -18,6 +19,11 @@ struct Arguments {
   int vertices = 0;
 };
 
+skeletex::TriangleMesh subdivided_to(skeletex::TriangleMesh mesh, int vertices) {
+  while (static_cast<int>(mesh.positions.size()) < vertices) mesh = skeletex::subdivided(mesh);
+  return mesh;
+}
+
 void run(const Arguments& arguments) {
   using namespace skeletex;
   const TriangleMesh mesh = read_mesh(arguments.mesh).mesh;
@@ -25,12 +31,14 @@ void run(const Arguments& arguments) {
   if (!report.is_closed_manifold()) throw InputError(arguments.mesh + ": not a closed manifold; skeletex validate says where");
   const int present = static_cast<int>(mesh.positions.size());
   const int wanted = !arguments.like.empty() ? static_cast<int>(read_mesh(arguments.like).mesh.positions.size()) : arguments.vertices > 0 ? arguments.vertices : present;
-  if (arguments.method != "remesh" && wanted > present)
+  const bool can_grow = arguments.method == "remesh" || arguments.method == "subdivide";
+  if (!can_grow && wanted > present)
     throw InputError(fmt::format("{} has {} vertices, {} cannot make {}", arguments.mesh, present, arguments.method, wanted));
   const auto begin = std::chrono::steady_clock::now();
   const TriangleMesh result = arguments.method == "decimate"   ? decimate(mesh, wanted)
                               : arguments.method == "simplify" ? simplify(mesh, wanted)
                               : arguments.method == "remesh"   ? remesh(mesh, wanted)
+                              : arguments.method == "subdivide" ? subdivided_to(mesh, wanted)
                                                                : mesh;
   const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
   write_mesh(arguments.output, result);
@@ -45,9 +53,9 @@ void run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   CLI::App program("Meshes with a given number of vertices by other libraries, for comparison with reconstructions.", "peers");
   Arguments arguments;
-  program.add_option("METHOD", arguments.method, "decimate (OpenMesh, quadrics), simplify (meshoptimizer, quadrics), remesh (CGAL, isotropic) or copy (as it is)")
+  program.add_option("METHOD", arguments.method, "decimate (OpenMesh, quadrics), simplify (meshoptimizer, quadrics), remesh (CGAL, isotropic), subdivide (every triangle into four, at least as many as wanted) or copy (as it is)")
       ->required()
-      ->check(CLI::IsMember({"decimate", "simplify", "remesh", "copy"}));
+      ->check(CLI::IsMember({"decimate", "simplify", "remesh", "subdivide", "copy"}));
   program.add_option("MESH", arguments.mesh, "closed triangle mesh")->required();
   program.add_option("-o,--output", arguments.output, "the result: .ply or .obj")->required();
   CLI::Option* vertices = program.add_option("--vertices", arguments.vertices, "how many vertices (default: as many as there are)")->check(CLI::Range(4, 100000000));

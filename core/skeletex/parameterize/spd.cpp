@@ -21,6 +21,7 @@ constexpr double kPoleCosine = 1e-6;
 // Lists of triangles for sight lines: per turn, and along the bone.
 constexpr int kSightSectors = 128;
 constexpr int kSightSlabs = 64;
+constexpr double kSightTriangles = 4096;  // of a chart, up to which so many sectors and slabs will do
 
 /// The triangles of all charts in the coordinates of their bones.
 struct LocalTriangles {
@@ -197,7 +198,14 @@ std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton,
 
 std::vector<double> unseen_area_fractions(ClContext& context, const Skeleton& skeleton, const Walls& walls, std::span<const Chart> charts) {
   const LocalTriangles local = localize(skeleton, walls, charts);
-  // The height of each chart along its bone, cut into slabs.
+  // Each chart cut into sectors about its bone and slabs along it: as many as leave lists as long as in small charts, however fine the mesh.
+  std::vector<int> sectors, slabs, first_lists{0};
+  for (const Chart& chart : charts) {
+    const double finer = std::max(1.0, std::sqrt(static_cast<double>(chart.triangles.size()) / kSightTriangles));
+    sectors.push_back(static_cast<int>(finer * kSightSectors));
+    slabs.push_back(static_cast<int>(finer * kSightSlabs));
+    first_lists.push_back(first_lists.back() + sectors.back() * slabs.back());
+  }
   std::vector<float> lowest(charts.size(), 0), slabs_per_height(charts.size(), 0);
   for (std::size_t i = 0; i < charts.size(); ++i) {
     const auto [first, last] = std::pair{3 * local.begins[i], 3 * local.begins[i + 1]};
@@ -207,18 +215,18 @@ std::vector<double> unseen_area_fractions(ClContext& context, const Skeleton& sk
       high = std::max(high, local.points[3 * static_cast<std::size_t>(p) + 2]);
     }
     lowest[i] = low;
-    slabs_per_height[i] = high > low ? kSightSlabs / (high - low) : 0;
+    slabs_per_height[i] = high > low ? static_cast<float>(slabs[i]) / (high - low) : 0;
   }
   const auto slab_of = [&](std::size_t chart, float z) {
-    return std::clamp(static_cast<int>((z - lowest[chart]) * slabs_per_height[chart]), 0, kSightSlabs - 1);
+    return std::clamp(static_cast<int>((z - lowest[chart]) * slabs_per_height[chart]), 0, slabs[chart] - 1);
   };
-  const Lists lists = fill_lists(static_cast<int>(charts.size()) * kSightSectors * kSightSlabs, [&](auto&& visit) {
+  const Lists lists = fill_lists(first_lists.back(), [&](auto&& visit) {
     for (std::size_t i = 0; i < charts.size(); ++i)
       for (int t = local.begins[i]; t < local.begins[i + 1]; ++t) {
         const float* p = &local.points[9 * static_cast<std::size_t>(t)];
         const int first = slab_of(i, std::min({p[2], p[5], p[8]})), last = slab_of(i, std::max({p[2], p[5], p[8]}));
-        for_each_angle(local, t, kSightSectors, AngleCell::kSector, [&](int sector) {
-          for (int slab = first; slab <= last; ++slab) visit((static_cast<int>(i) * kSightSectors + sector) * kSightSlabs + slab, t);
+        for_each_angle(local, t, sectors[i], AngleCell::kSector, [&](int sector) {
+          for (int slab = first; slab <= last; ++slab) visit(first_lists[i] + sector * slabs[i] + slab, t);
         });
       }
   });
@@ -244,8 +252,8 @@ std::vector<double> unseen_area_fractions(ClContext& context, const Skeleton& sk
           const double foot = station_of(at.u, is_head_free, is_tail_free).station * length;
           const double z = offset.dot(basis.o) - foot, distance = std::hypot(r, z);
           const double slack = 1e-6 * (std::abs(foot) + std::abs(z) + distance);
-          const int sector = std::min(kSightSectors - 1, static_cast<int>(at.turn * kSightSectors));
-          const int list = (static_cast<int>(i) * kSightSectors + sector) * kSightSlabs;
+          const int sector = std::min(sectors[i] - 1, static_cast<int>(at.turn * sectors[i]));
+          const int list = first_lists[i] + sector * slabs[i];
           line = {static_cast<float>(x / r),
                   static_cast<float>(y / r),
                   static_cast<float>(foot),

@@ -3,34 +3,18 @@
 
 #include <fmt/format.h>
 
-#include <map>
-#include <utility>
 
 #include "skeletex/encode/encode_model.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_config.h"
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/model/error.h"
+#include "subdivide.h"
 
 namespace skeletex {
 namespace {
 
 namespace fs = std::filesystem;
-
-TriangleMesh subdivided(const TriangleMesh& mesh) {
-  TriangleMesh fine{mesh.positions, {}};
-  std::map<std::pair<int, int>, int> middles;
-  const auto middle = [&](int a, int b) {
-    const auto [it, is_new] = middles.try_emplace(std::minmax(a, b), static_cast<int>(fine.positions.size()));
-    if (is_new) fine.positions.push_back(0.5 * (mesh.positions[a] + mesh.positions[b]));
-    return it->second;
-  };
-  for (const auto& [a, b, c] : mesh.triangles) {
-    const int ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
-    fine.triangles.insert(fine.triangles.end(), {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
-  }
-  return fine;
-}
 
 }  // namespace
 

@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include "skeletex/model/mesh.h"
+
+namespace skeletex {
+
+/// Every triangle becomes four; the surface stays.
+TriangleMesh subdivided(const TriangleMesh& mesh);
+
+}  // namespace skeletex
