@@ -23,7 +23,7 @@ namespace {
 struct Arguments {
   std::string mesh, skeleton, output, device, json, size = "512", method = "vsm";
   int iterations = 4;
-  double alpha = 0.5, stop_spread = 0, hybrid_threshold = 0.02;
+  double alpha = 0.5, stop_spread = 0, hybrid_threshold = EncodeOptions{}.hybrid_unseen_threshold;
   std::string rows = "surface", spd_hit = "last", share, diagonals, compression = "zip";
   bool has_no_prefilter = false, has_no_unfold = false, is_snapped = false, is_fitted = false, is_paper_recipe = false, is_half = false;
   std::vector<std::string> bone_methods;
@@ -213,7 +213,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
   }
   for (const BoneReport& bone : result.report.bones) {
     if (bone.flipped_triangles > 0) warn(fmt::format("bone \"{}\": {} triangles are flipped in its map", bone.name, bone.flipped_triangles));
-    if (bone.method == Method::kSpd && bone.unseen_area_fraction > 0.02)
+    if (bone.method == Method::kSpd && bone.unseen_area_fraction > EncodeOptions{}.hybrid_unseen_threshold)
       warn(fmt::format("bone \"{}\": SPD does not see {:.1f} % of its surface; --method hybrid or vsm does", bone.name,
                        100 * bone.unseen_area_fraction));
   }

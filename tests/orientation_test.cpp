@@ -92,22 +92,22 @@ TEST(Orientation, EqualsItsTwinOnAMorphAndOnNoise) {
     const twin::SurfaceMatrices matrices = twin::surface_matrices(twin::surface_triangles(given.model, surface.lattice, ends), points);
     const twin::OrientationPull expected = twin::pull_orientations(given.model, surface.lattice, points, ends, matrices, given.sources, weights, 0.1);
 
-    const std::vector<float> turns = device().download(pull.turns.values);
+    const std::vector<float> rotations = device().download(pull.rotations.values);
     const std::vector<Vec3> normals = download_vectors(device(), pull.normals), b = download_vectors(device(), pull.b);
     const std::size_t count = points.size();
     // A vertex whose sources are (nearly) upside down may take either side of the rule that leaves such out.
-    std::size_t other_turns = 0, other_normals = 0, other_b = 0;
+    std::size_t other_rotations = 0, other_normals = 0, other_b = 0;
     for (std::size_t i = 0; i < count; ++i) {
-      const Eigen::Vector4d q(turns[count + i], turns[2 * count + i], turns[3 * count + i], turns[i]);
-      other_turns += !((q - expected.turns[i].coeffs()).norm() < 1e-3);
+      const Eigen::Vector4d q(rotations[count + i], rotations[2 * count + i], rotations[3 * count + i], rotations[i]);
+      other_rotations += !((q - expected.rotations[i].coeffs()).norm() < 1e-3);
       other_normals += !((normals[i] - expected.normals[i]).norm() < 1e-3);
-      // Sums of weights times edges, whose weights and edges are exact to 1e-6 of what they are, and turns to 1e-3.
+      // Sums of weights times edges, whose weights and edges are exact to 1e-6 of what they are, and rotations to 1e-3.
       double size = 0;
       for (Eigen::SparseMatrix<double>::InnerIterator entry(matrices.laplace, static_cast<int>(i)); entry; ++entry)
         size += std::abs(entry.value()) * (points[entry.row()] - points[i]).norm();
       other_b += !((b[i] - expected.b[i]).norm() < 2e-3 * 0.01 * size);
     }
-    EXPECT_LT(other_turns, count / 1000) << "noise " << noise;
+    EXPECT_LT(other_rotations, count / 1000) << "noise " << noise;
     EXPECT_LT(other_normals, count / 1000) << "noise " << noise;
     EXPECT_LT(other_b, count / 200) << "noise " << noise;
   }
@@ -117,8 +117,8 @@ TEST(Orientation, OfMovedCopiesMovesNothing) {
   const SkeletexModel& model = standard("bear", 64);
   const std::vector<Vec3> positions = lattice_positions(device(), model);
   std::vector<std::vector<Vec3>> sources(2, positions);
-  const Eigen::Quaterniond turn(Eigen::AngleAxisd(2.5, Vec3(1, 2, -1).normalized()));
-  for (Vec3& p : sources[1]) p = turn * p + Vec3(0.3, -2, 1);
+  const Eigen::Quaterniond rotation(Eigen::AngleAxisd(2.5, Vec3(1, 2, -1).normalized()));
+  for (Vec3& p : sources[1]) p = rotation * p + Vec3(0.3, -2, 1);
   const MovedModel moved = blend_orientations(device(), model, sources, std::vector{0.5, 0.5});
   EXPECT_LT(moved.report.largest_move, 1e-5);
 }

@@ -85,6 +85,20 @@ TEST(Pipeline, ErrorFallsAsTheTextureGrowsAndStaysBelowTheIssuesFigures) {
   }
 }
 
+TEST(Hybrid, StaysWithinHalfAsMuchAgainOfVsmWhereSpdLosesMost) {
+  ClContext context;
+  for (const char* const name : {"bunny00", "armadillo"}) {
+    const TestModel model = load_standard_model(name);
+    const auto mean_error = [&](EncodeMethod method) {
+      EncodeOptions options;
+      options.method = method;
+      options.width = options.height = 1024;
+      return symmetric_mean(measure_metro(context, model.mesh, reconstruct_mesh(context, encode_model(context, model.mesh, model.skeleton, options).model)));
+    };
+    EXPECT_LE(mean_error(EncodeMethod::kHybrid), 1.5 * mean_error(EncodeMethod::kVsm)) << name;
+  }
+}
+
 TEST(Pipeline, ASecondEncodeGivesTheSameBytes) {
   ClContext context;
   const TestModel model = load_standard_model("eight");

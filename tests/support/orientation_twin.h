@@ -11,7 +11,7 @@
 namespace skeletex::twin {
 
 struct OrientationPull {
-  std::vector<Eigen::Quaterniond> turns;
+  std::vector<Eigen::Quaterniond> rotations;
   std::vector<Vec3> normals, b;
 };
 
@@ -33,8 +33,8 @@ inline OrientationPull pull_orientations(const SkeletexModel& model, const Latti
       from.push_back(std::sqrt(matrices.mass[i]) * (source[i] - there));
       to.push_back(std::sqrt(matrices.mass[i]) * (points[i] - here));
     }
-    const Eigen::Quaterniond turn = best_rotation(from, to);
-    for (Vec3& p : source) p = turn * p;
+    const Eigen::Quaterniond rotation = best_rotation(from, to);
+    for (Vec3& p : source) p = rotation * p;
   }
 
   struct Directions {
@@ -104,11 +104,11 @@ inline OrientationPull pull_orientations(const SkeletexModel& model, const Latti
         const Eigen::Quaterniond mean(Eigen::Vector4d(sum.normalized()));
         const double degrees50 = std::cos(25 * M_PI / 180), degrees100 = std::cos(50 * M_PI / 180);
         const double share = step((0.9 - from_seam) / 0.5) * step((mean.w() - degrees100) / (degrees50 - degrees100));
-        pull.turns[v].coeffs() = ((1 - share) * Eigen::Quaterniond::Identity().coeffs() + share * mean.coeffs()).normalized();
+        pull.rotations[v].coeffs() = ((1 - share) * Eigen::Quaterniond::Identity().coeffs() + share * mean.coeffs()).normalized();
       }
   }
   for (int pass = 0; pass < 2; ++pass) {
-    const std::vector<Eigen::Quaterniond> before = pull.turns;
+    const std::vector<Eigen::Quaterniond> before = pull.rotations;
     for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
       const auto [x, y, width, height] = model.patches[bone].rectangle;
       for (int row = 1; row + 1 < height; ++row)
@@ -116,15 +116,15 @@ inline OrientationPull pull_orientations(const SkeletexModel& model, const Latti
           Eigen::Vector4d sum = Eigen::Vector4d::Zero();
           for (int r = std::max(1, row - 1); r <= std::min(height - 2, row + 1); ++r)
             for (const int c : {j + width - 1, j, j + 1}) sum += before[lattice.first_inner[bone] + (r - 1) * width + c % width].coeffs();
-          pull.turns[lattice.first_inner[bone] + (row - 1) * width + j].coeffs() = sum.normalized();
+          pull.rotations[lattice.first_inner[bone] + (row - 1) * width + j].coeffs() = sum.normalized();
         }
     }
   }
-  for (int v = 0; v < inner; ++v) pull.normals[v] = pull.turns[v] * pull.normals[v];
+  for (int v = 0; v < inner; ++v) pull.normals[v] = pull.rotations[v] * pull.normals[v];
   for (int v = inner; v < count; ++v) {
     Eigen::Vector4d sum = Eigen::Vector4d::Zero();
-    for (const int other : inner_neighbours[v]) sum += pull.turns[other].coeffs();
-    if (sum.norm() > 1e-6) pull.turns[v].coeffs() = sum.normalized();
+    for (const int other : inner_neighbours[v]) sum += pull.rotations[other].coeffs();
+    if (sum.norm() > 1e-6) pull.rotations[v].coeffs() = sum.normalized();
   }
   add_ends(pull.normals);
   std::vector<std::vector<Vec3>> source_normals;
@@ -139,7 +139,7 @@ inline OrientationPull pull_orientations(const SkeletexModel& model, const Latti
       const int v = static_cast<int>(entry.row());
       if (v == column) continue;
       const Vec3 edge = points[v] - points[column];
-      Vec3 turned = 0.5 * (pull.turns[v] * edge + pull.turns[column] * edge);
+      Vec3 rotated = 0.5 * (pull.rotations[v] * edge + pull.rotations[column] * edge);
       if (std::max(v, column) >= first_seam) {
         double slope = 0;
         for (std::size_t m = 0; m < sources.size(); ++m) {
@@ -147,9 +147,9 @@ inline OrientationPull pull_orientations(const SkeletexModel& model, const Latti
           if (e.norm() > 0) slope += weights[m] * mean_normal(source_normals[m], v, column).dot(e) / e.norm();
         }
         const Vec3 n = mean_normal(pull.normals, v, column);
-        turned -= (n.dot(turned) - slope * turned.norm()) * n;
+        rotated -= (n.dot(rotated) - slope * rotated.norm()) * n;
       }
-      pull.b[v] -= scale * scale * entry.value() * (turned - edge);
+      pull.b[v] -= scale * scale * entry.value() * (rotated - edge);
     }
   return pull;
 }

@@ -14,10 +14,10 @@ namespace {
 constexpr const char* kFile = "orientation.cl";
 constexpr int kFanChunk = 64;  // FAN_CHUNK of the kernels
 constexpr double kScale = 0.1;
-constexpr int kTurnPasses = 2;
+constexpr int kRotationPasses = 2;
 constexpr double kTolerance = 1e-6;  // so that a morph is the same from either side
 // Tips keep the orientation of their texels: what one source has there the other may have none of. Shares of the bone, from
-// the nearest seam, where turns begin to fade and have faded.
+// the nearest seam, where rotations begin to fade and have faded.
 constexpr double kFadeBegin = 0.4, kFadeEnd = 0.9;
 
 std::vector<float> row_shares(const SkeletexModel& model, const Lattice& lattice) {
@@ -35,7 +35,7 @@ std::vector<float> row_shares(const SkeletexModel& model, const Lattice& lattice
   return shares;
 }
 
-/// A source turned to face as the surface does, as a whole, in diagonals about its middle.
+/// A source rotated to face as the surface does, as a whole, in diagonals about its middle.
 DeviceField upload_source(ClContext& context, const std::vector<Vec3>& points, const std::vector<float>& masses, const std::vector<Vec3>& source, double unit) {
   Vec3 centre = Vec3::Zero(), source_centre = Vec3::Zero();
   double area = 0;
@@ -53,10 +53,10 @@ DeviceField upload_source(ClContext& context, const std::vector<Vec3>& points, c
     from.push_back(weight * (source[i] - source_centre));
     to.push_back(weight * (points[i] - centre));
   }
-  const Eigen::Quaterniond turn = best_rotation(from, to);
-  std::vector<Vec3> turned;
-  for (const Vec3& p : source) turned.push_back(turn * (p - source_centre));
-  return upload_points(context, turned, Vec3::Zero(), unit);
+  const Eigen::Quaterniond rotation = best_rotation(from, to);
+  std::vector<Vec3> rotated;
+  for (const Vec3& p : source) rotated.push_back(rotation * (p - source_centre));
+  return upload_points(context, rotated, Vec3::Zero(), unit);
 }
 
 }  // namespace
@@ -89,22 +89,22 @@ OrientationPull pull_orientations(ClContext& context, const SkeletexModel& model
     const auto weight = static_cast<float>(weights[m]);
     const DeviceField source = upload_source(context, surface.positions, masses, sources[m], model.diagonal), normals = row_normals(source);
     mean_at_ends(normals);
-    context.launch({kFile, "add_turns"}, rows, row_count, n.vertex_count, weight, n.rows, surface.points.values, source.values, pull.turns.values);
+    context.launch({kFile, "add_rotations"}, rows, row_count, n.vertex_count, weight, n.rows, surface.points.values, source.values, pull.rotations.values);
     context.launch({kFile, "add_slopes"}, fans, fan_count, n.vertex_count, weight, n.fan_vertices, n.fan_begin, n.fans, source.values, normals.values, slopes);
   }
-  context.launch({kFile, "settle_turns"}, rows, row_count, n.vertex_count, n.rows, context.upload(row_shares(model, surface.lattice)), pull.turns.values);
+  context.launch({kFile, "settle_rotations"}, rows, row_count, n.vertex_count, n.rows, context.upload(row_shares(model, surface.lattice)), pull.rotations.values);
   DeviceField smoothed{4, zeros(4 * count)};
-  for (int pass = 0; pass < kTurnPasses; ++pass) {
-    context.launch({kFile, "smooth_turns"}, rows, row_count, n.vertex_count, n.rows, pull.turns.values, smoothed.values);
-    std::swap(pull.turns, smoothed);
+  for (int pass = 0; pass < kRotationPasses; ++pass) {
+    context.launch({kFile, "smooth_rotations"}, rows, row_count, n.vertex_count, n.rows, pull.rotations.values, smoothed.values);
+    std::swap(pull.rotations, smoothed);
   }
-  context.launch({kFile, "turn_normals"}, rows, row_count, n.vertex_count, n.rows, pull.turns.values, pull.normals.values);
-  mean_at_ends(pull.turns);
+  context.launch({kFile, "rotate_normals"}, rows, row_count, n.vertex_count, n.rows, pull.rotations.values, pull.normals.values);
+  mean_at_ends(pull.rotations);
   mean_at_ends(pull.normals);
-  context.launch({kFile, "pull_rows"}, rows, row_count, n.vertex_count, time, n.rows, laplace.weights, pull.turns.values, surface.points.values,
+  context.launch({kFile, "pull_rows"}, rows, row_count, n.vertex_count, time, n.rows, laplace.weights, pull.rotations.values, surface.points.values,
                  pull.b.values);
   context.launch({kFile, "pull_fans"}, fans, fan_count, n.inner_count, first_seam, n.vertex_count, time, n.fan_vertices, n.fan_begin, n.fans,
-                 laplace.fan_weights, slopes, pull.turns.values, pull.normals.values, surface.points.values, pull.b.values);
+                 laplace.fan_weights, slopes, pull.rotations.values, pull.normals.values, surface.points.values, pull.b.values);
   return pull;
 }
 

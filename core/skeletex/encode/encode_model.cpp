@@ -39,7 +39,7 @@ void check_options(const EncodeOptions& options, const Skeleton& skeleton) {
   if (options.vsm.iterations < 0 || options.vsm.iterations > 100)
     throw InputError(fmt::format("{} VSM iterations; give 0 to 100", options.vsm.iterations));
   if (!(options.vsm.alpha >= 0 && options.vsm.alpha <= 1)) throw InputError(fmt::format("VSM alpha is {}; give 0 to 1", options.vsm.alpha));
-  if (!(options.hybrid_unseen_threshold >= 0)) throw InputError("the hybrid threshold is negative; give a share of area, such as 0.02");
+  if (!(options.hybrid_unseen_threshold >= 0)) throw InputError("the hybrid threshold is negative; give a share of area, such as 0.01");
   for (const auto& [name, method] : options.hybrid_overrides)
     if (std::none_of(skeleton.bones.begin(), skeleton.bones.end(), [&](const Bone& b) { return b.name == name; }))
       throw InputError(fmt::format("a method is given for bone \"{}\", which the skeleton does not have", name));

@@ -22,8 +22,8 @@ enum class TexelShare { kTriangles, kArea };
 struct EncodeOptions {
   int width = 512, height = 512;
   EncodeMethod method = EncodeMethod::kVsm;
-  /// Hybrid: bones whose unseen share of area is above this take VSM, the others SPD.
-  double hybrid_unseen_threshold = 0.02;
+  /// Hybrid: bones whose unseen share of area is above this take VSM, the others SPD (docs/spd.md).
+  double hybrid_unseen_threshold = 0.01;
   /// Hybrid: bones by name whose method the user chose.
   std::vector<std::pair<std::string, Method>> hybrid_overrides;
   VsmOptions vsm;
