@@ -24,7 +24,7 @@ struct Arguments {
   std::string source, target, output, device, json, blend = "cosine", width = "auto", scale = "auto", keep = "auto", skip = "auto";
   std::vector<std::string> bones;
   double share = 1;
-  bool has_limbs = false, is_mirrored = false;
+  bool has_limbs = false, is_mirrored = false, has_creases = false;
 };
 
 /// A number from the whole text; nothing where it is none.
@@ -74,6 +74,7 @@ void run(const Arguments& arguments) {
   TransferOptions options;
   options.has_limbs = arguments.has_limbs;
   options.blend = arguments.blend == "cosine" ? TransferBlend::kCosine : arguments.blend == "linear" ? TransferBlend::kLinear : TransferBlend::kNone;
+  options.is_smooth = !arguments.has_creases;
   parse_width(arguments.width, options);
   parse_scale(arguments.scale, options);
   options.keep = parse_share("--keep", arguments.keep);
@@ -134,6 +135,7 @@ void add_transfer_command(CLI::App& program) {
       ->type_name("auto|length|girth|X");
   command.add_option("--keep", arguments->keep, "share of its rows that the target keeps at its seams (default: auto, up to the limb's root)")->type_name("auto|S");
   command.add_option("--skip", arguments->skip, "share of the source's rows that is left out there (default: auto, up to the limb's root)")->type_name("auto|S");
+  command.add_flag("--creases", arguments->has_creases, "join each column by itself, within the first bone, which may leave creases");
   command.add_option("--share", arguments->share, "how far the target goes towards that, texel by texel (default: 1)")->check(CLI::Range(0.0, 1.0).description(""));
   add_result_option(command, arguments->output);
   add_device_option(command, arguments->device);

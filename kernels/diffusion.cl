@@ -99,7 +99,7 @@ __kernel void sum_partials(const int partial_count, const int slot, __global con
 // Conjugate gradients. On one lattice the preconditioner is 1 / R + 1 / C: R takes the matrix's part along each row, periodic and
 // tridiagonal, C that along each column of inner rows, tridiagonal; for the other vertices both take its diagonal. So
 // neither dense rings around a pole nor rows that a slanting seam presses together count, which the diagonal alone would
-// need many steps for. Where a diagonal does not outweigh its neighbours it is raised until it does, so both are positive.
+// need many steps for. Vertices whose value is given are cut off from those that are free. Where a diagonal does not outweigh its neighbours it is raised until it does, so both are positive.
 // R = L D L^T, with L's entries next to the diagonal in `below` and those of its last row in `last`; C alike, no last.
 
 float raised_diagonal(const float mass, const float stiffness, const float one, const float other, const float time) {
@@ -108,15 +108,15 @@ float raised_diagonal(const float mass, const float stiffness, const float one, 
 
 // NDRange: rows; one work-item each does it. out  inverse_pivots (1 / D), below, last: one plane each
 __kernel void factor_rows(const int row_count, const float time, __global const int* restrict rows, __global const float* restrict weights,
-                          __global const float* restrict mass, __global const float* restrict stiffness, __global float* restrict inverse_pivots,
-                          __global float* restrict below, __global float* restrict last) {
+                          __global const float* restrict mass, __global const float* restrict stiffness, __global const float* restrict is_free,
+                          __global float* restrict inverse_pivots, __global float* restrict below, __global float* restrict last) {
   const int k = get_group_id(0);
   if (k >= row_count || get_local_id(0) > 0) return;
   const int here = rows[4 * k], end = here + rows[4 * k + 1] - 1;
   float before = weights[end];  // of the edge from the vertex before
-  float pivot_change = 0.0f, fill = -time * weights[end], end_change = 0.0f;
+  float pivot_change = 0.0f, fill = -time * weights[end] * is_free[here] * is_free[end], end_change = 0.0f;
   for (int v = here; v < end; ++v) {
-    const float coupling = -time * weights[v];
+    const float coupling = -time * weights[v] * is_free[v] * is_free[v + 1];
     const float diagonal = raised_diagonal(mass[v], stiffness[v], before, weights[v], time);
     const float inverse = 1.0f / fmax(diagonal + pivot_change, 1e-6f * diagonal);
     if (v + 1 == end) fill += coupling;
@@ -137,7 +137,7 @@ __kernel void factor_rows(const int row_count, const float time, __global const 
 // out  inverse_pivots, below: one plane each
 __kernel void factor_columns(const int block_count, const int count, const float time, __global const int* restrict blocks,
                              __global const float* restrict weights, __global const float* restrict mass, __global const float* restrict stiffness,
-                             __global float* restrict inverse_pivots, __global float* restrict below) {
+                             __global const float* restrict is_free, __global float* restrict inverse_pivots, __global float* restrict below) {
   const int k = get_group_id(0);
   if (k >= block_count) return;
   const int first = blocks[4 * k], columns = blocks[4 * k + 1], stride = blocks[4 * k + 2], rows = blocks[4 * k + 3];
@@ -146,11 +146,12 @@ __kernel void factor_columns(const int block_count, const int count, const float
   for (int row = 0; row < rows; ++row) {
     const int here = first + row * stride, back = row > 0 ? stride : 0;
     for (int v = here + begin; v < here + columns; v += step) {
-      const float before = back > 0 ? ahead[v - back] : 0.0f, eliminated = back > 0 ? time * before * below[v - back] : 0.0f;
+      const float before = back > 0 ? ahead[v - back] : 0.0f;
+      const float eliminated = back > 0 ? time * before * is_free[v - back] * is_free[v] * below[v - back] : 0.0f;
       const float diagonal = raised_diagonal(mass[v], stiffness[v], before, ahead[v], time);
       const float inverse = 1.0f / fmax(diagonal + eliminated, 1e-6f * diagonal);
       inverse_pivots[v] = inverse;
-      below[v] = -time * ahead[v] * inverse;
+      below[v] = row + 1 < rows ? -time * ahead[v] * is_free[v] * is_free[v + stride] * inverse : 0.0f;
     }
   }
 }

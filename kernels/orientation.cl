@@ -87,21 +87,29 @@ void rotation_between(const float* restrict along, const float* restrict around,
   multiply_rotations(roll, tilt, q);
 }
 
-// Adds the rotations from a surface to a source's, times the source's weight. NDRange: rows.
-// in  points, source: fields of three     in and out  sums: four planes
-__kernel void add_rotations(const int row_count, const int count, const float weight, __global const int* restrict rows, __global const float* restrict points,
-                        __global const float* restrict source, __global float* restrict sums) {
+// Adds the rotations from a surface to a source's, times the source's weights. NDRange: rows.
+// in  facing: per row a rotation, by which the source is to be rotated first; weights: per vertex; points, source: fields of three
+// in and out  sums: four planes
+__kernel void add_rotations(const int row_count, const int count, __global const int* restrict rows, __global const float* restrict facing,
+                            __global const float* restrict weights, __global const float* restrict points, __global const float* restrict source,
+                            __global float* restrict sums) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   const int here = rows[4 * k], width = rows[4 * k + 1];
   const int before = rows[4 * k + 2] ? here - width : here, after = rows[4 * k + 3] ? here + width : here;
+  float first[4];
+  for (int i = 0; i < 4; ++i) first[i] = facing[4 * k + i];
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
+    const float weight = weights[here + j];
+    if (weight == 0.0f) continue;
     const int left = here + (j > 0 ? j - 1 : width - 1), right = here + (j + 1 < width ? j + 1 : 0);
-    float along[3], around[3], to_along[3], to_around[3], q[4];
+    float along[3], around[3], source_along[3], source_around[3], to_along[3], to_around[3], q[4];
     vector_between(points, count, before + j, after + j, along);
     vector_between(points, count, left, right, around);
-    vector_between(source, count, before + j, after + j, to_along);
-    vector_between(source, count, left, right, to_around);
+    vector_between(source, count, before + j, after + j, source_along);
+    vector_between(source, count, left, right, source_around);
+    rotate_vector(first, source_along, to_along);
+    rotate_vector(first, source_around, to_around);
     rotation_between(along, around, to_along, to_around, q);
     const float signed_weight = q[0] < 0.0f ? -weight : weight;
     for (int i = 0; i < 4; ++i) sums[i * count + here + j] += signed_weight * q[i];
@@ -205,10 +213,10 @@ float height_of(const int count, __global const float* restrict normals, const i
   return dot_product(n, e);
 }
 
-// Adds the slopes of a source's edges in the fans, times the source's weight. NDRange: fans.
-// in  source; normals: of the source     in and out  slopes: two per triangle of the fans, heights over lengths
-__kernel void add_slopes(const int fan_count, const int count, const float weight, __global const int* restrict fan_vertices,
-                         __global const int* restrict fan_begin, __global const int* restrict fans, __global const float* restrict source,
+// Adds the slopes of a source's edges in the fans, times the source's weights at their ends. NDRange: fans.
+// in  weights: per vertex; source; normals: of the source     in and out  slopes: two per triangle of the fans, heights over lengths
+__kernel void add_slopes(const int fan_count, const int count, __global const int* restrict fan_vertices, __global const int* restrict fan_begin,
+                         __global const int* restrict fans, __global const float* restrict weights, __global const float* restrict source,
                          __global const float* restrict normals, __global float* restrict slopes) {
   const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, fan_count);
   for (int k = begin + (int)get_local_id(0); k < end; k += get_local_size(0)) {
@@ -217,7 +225,7 @@ __kernel void add_slopes(const int fan_count, const int count, const float weigh
       float e[3], n[3];
       vector_between(source, count, fans[i], v, e);
       const float height = height_of(count, normals, v, fans[i], e, n), length = sqrt(dot_product(e, e));
-      if (length > 0.0f) slopes[i] += weight * height / length;
+      if (length > 0.0f) slopes[i] += 0.5f * (weights[v] + weights[fans[i]]) * height / length;
     }
   }
 }

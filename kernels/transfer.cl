@@ -10,6 +10,45 @@ static float faded(const float rows, const float width, const int is_linear) {
   return is_linear ? 1.0f - share : 0.5f + 0.5f * cos(3.14159265f * share);
 }
 
+// Where a texel of the result lies between four points of the source's lattice.
+typedef struct {
+  int v00, v01, v10, v11;
+  float w00, w01, w10, w11;
+} Place;
+
+// column: of the source, fractions and all
+static Place place_on_source(__global const LaidPatch* restrict from, __global const LaidColumn* restrict here, const float station, const int row,
+                             float* restrict column) {
+  const float period = (float)from->width, frequency = 1.0f / period;
+  const int source_last = from->height - 1;
+  const float lifted = here->head_column + station * (here->tail_column - here->head_column);
+  *column = lifted - period * floor(lifted * frequency);
+  const int left_any = (int)*column;
+  const float right_share = *column - (float)left_any;
+  const int left = left_any >= from->width ? left_any - from->width : left_any;
+  const int right = left + 1 < from->width ? left + 1 : 0;
+
+  const float inside = clamp(here->row_begin + here->row_step * (float)row, 0.0f, (float)source_last);
+  const float at_row = from->sign < 0.0f ? (float)source_last - inside : inside;
+  const int below = min((int)at_row, source_last - 1);
+  const float above_share = at_row - (float)below;
+
+  const int p = from->begin + below * from->width;
+  const Place place = {p + left,
+                       p + right,
+                       p + left + from->width,
+                       p + right + from->width,
+                       (1.0f - above_share) * (1.0f - right_share),
+                       (1.0f - above_share) * right_share,
+                       above_share * (1.0f - right_share),
+                       above_share * right_share};
+  return place;
+}
+
+static float read_at(const Place* restrict p, __global const float* restrict plane) {
+  return p->w00 * plane[p->v00] + p->w01 * plane[p->v01] + p->w10 * plane[p->v10] + p->w11 * plane[p->v11];
+}
+
 // The source's points, stretched along the bone, scaled across it, sheared where walls differ, and with corrections at
 // both ends.
 // in   lattice_rows: the rows to do, four ints each: patch, row, number of the row's first vertex in the planes of points, unused
@@ -29,32 +68,15 @@ __kernel void lay_part(const int row_count, const int column_count, __global con
   const int patch = lattice_rows[4 * k], row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
   const int width = patches[patch].width;
   __global const LaidPatch* restrict from = laid + patch;
-  const int source_width = from->width, source_last = from->height - 1;
   const float sign = from->sign;
-  const float period = (float)source_width, frequency = 1.0f / period, turn = 1.0f / (float)width;
+  const float frequency = 1.0f / (float)from->width, turn = 1.0f / (float)width;
   const float station = laid_rows[k].station, scale = laid_rows[k].scale;
 
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
     __global const LaidColumn* restrict here = columns + from->column_begin + j;
-    const float lifted = here->head_column + station * (here->tail_column - here->head_column);
-    const float column = lifted - period * floor(lifted * frequency);
-    const int left_any = (int)column;
-    const float right_share = column - (float)left_any;
-    const int left = left_any >= source_width ? left_any - source_width : left_any;
-    const int right = left + 1 < source_width ? left + 1 : 0;
-
-    const float inside = clamp(here->row_begin + here->row_step * (float)row, 0.0f, (float)source_last);
-    const float at_row = sign < 0.0f ? (float)source_last - inside : inside;
-    const int below = min((int)at_row, source_last - 1);
-    const float above_share = at_row - (float)below;
-
-    const int p = from->begin + below * source_width;
-    const float w00 = (1.0f - above_share) * (1.0f - right_share), w01 = (1.0f - above_share) * right_share;
-    const float w10 = above_share * (1.0f - right_share), w11 = above_share * right_share;
-    const int v00 = p + left, v01 = p + right, v10 = v00 + source_width, v11 = v01 + source_width;
-    const float read_s = w00 * in_s[v00] + w01 * in_s[v01] + w10 * in_s[v10] + w11 * in_s[v11];
-    const float read_b = w00 * in_b[v00] + w01 * in_b[v01] + w10 * in_b[v10] + w11 * in_b[v11];
-    const float read_o = w00 * in_o[v00] + w01 * in_o[v01] + w10 * in_o[v10] + w11 * in_o[v11];
+    float column;
+    const Place place = place_on_source(from, here, station, row, &column);
+    const float read_s = read_at(&place, in_s), read_b = read_at(&place, in_b), read_o = read_at(&place, in_o);
 
     // From the source's angle to the one here.
     const float own = 6.28318531f * turn * (float)j;
@@ -91,6 +113,25 @@ __kernel void lay_part(const int row_count, const int column_count, __global con
     s[vertex + j] = point_s;
     b[vertex + j] = point_b;
     o[vertex + j] = point_o;
+  }
+}
+
+// Where the points of lay_part come from: any points of the source's lattice, read at the same places.
+// in   as above; in_x, in_y, in_z: the points     out  x, y, z
+__kernel void read_part(const int row_count, __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
+                        __global const LaidPatch* restrict laid, __global const LaidRow* restrict laid_rows, __global const LaidColumn* restrict columns,
+                        __global const float* restrict in_x, __global const float* restrict in_y, __global const float* restrict in_z,
+                        __global float* restrict x, __global float* restrict y, __global float* restrict z) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  const int patch = lattice_rows[4 * k], row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
+  const float station = laid_rows[k].station;
+  for (int j = get_local_id(0); j < patches[patch].width; j += get_local_size(0)) {
+    float column;
+    const Place place = place_on_source(laid + patch, columns + laid[patch].column_begin + j, station, row, &column);
+    x[vertex + j] = read_at(&place, in_x);
+    y[vertex + j] = read_at(&place, in_y);
+    z[vertex + j] = read_at(&place, in_z);
   }
 }
 

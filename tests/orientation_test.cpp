@@ -14,6 +14,7 @@
 #include "skeletex/encode/encode_model.h"
 #include "skeletex/measure/manifold.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "support/creases.h"
 #include "support/load_model.h"
 #include "support/orientation_twin.h"
 
@@ -54,27 +55,6 @@ InBetween in_between(const std::string& a, const std::string& b, int size, doubl
   return result;
 }
 
-/// Mean over the seams' length of the angle between the two triangles at each of their edges, degrees.
-double mean_crease(const SkeletexModel& model) {
-  const TriangleMesh mesh = reconstruct_mesh(device(), model);
-  const Lattice lattice = number_lattice(model);
-  std::map<std::pair<int, int>, Vec3> normals;
-  for (const Triangle& t : mesh.triangles) {
-    const Vec3 normal = (mesh.positions[t[1]] - mesh.positions[t[0]]).cross(mesh.positions[t[2]] - mesh.positions[t[0]]);
-    for (int i = 0; i < 3; ++i) normals[{t[i], t[(i + 1) % 3]}] = normal;
-  }
-  double sum = 0, length = 0;
-  for (std::size_t a = 0; a < model.arcs.size(); ++a)
-    for (std::size_t i = 0; i + 1 < model.arcs[a].samples.size(); ++i) {
-      const int from = lattice.first_sample[a] + static_cast<int>(i);
-      const Vec3 &one = normals.at({from, from + 1}), &other = normals.at({from + 1, from});
-      const double edge = (mesh.positions[from + 1] - mesh.positions[from]).norm();
-      sum += edge * std::atan2(one.cross(other).norm(), one.dot(other));
-      length += edge;
-    }
-  return sum / length * 180 / std::numbers::pi;
-}
-
 TEST(Orientation, EqualsItsTwinOnAMorphAndOnNoise) {
   for (const double noise : {0.0, 0.02}) {
     InBetween given = in_between("bear", "bear_bis", 64, 0.4);
@@ -85,7 +65,9 @@ TEST(Orientation, EqualsItsTwinOnAMorphAndOnNoise) {
     const ModelSurface surface = upload_surface(device(), given.model);
     const SurfaceOperator laplace = make_surface_operator(device(), surface.neighbours, surface.points);
     const std::vector<double> weights{0.6, 0.4};
-    const OrientationPull pull = pull_orientations(device(), given.model, surface, laplace, given.sources, weights, 0.1);
+    std::vector<OrientationSource> sources;
+    for (const int m : {0, 1}) sources.push_back(whole_source(device(), given.model, surface, laplace, given.sources[m], weights[m]));
+    const OrientationPull pull = pull_orientations(device(), surface, laplace, sources, shares_without_tips(given.model, surface.lattice), 0.1);
 
     const std::vector<Vec3> points = download_vectors(device(), surface.points);
     const std::vector<Triangle> ends = end_triangles(given.model, surface.lattice, surface.positions);
@@ -134,8 +116,8 @@ TEST(Orientation, AtAWeightOfOneEveryTexelStaysBitByBit) {
 TEST(Orientation, TakesMostOfTheCreasesOffSeamsThatAreSmoothInBothModels) {
   for (const auto& [a, b] : {std::pair("bear", "bear_bis"), std::pair("bull", "camel")}) {
     const std::vector<double> half{0.5, 0.5};
-    const double creased = mean_crease(morph_of(a, b, 128, false).at(half)), smooth = mean_crease(morph_of(a, b, 128, true).at(half));
-    const double own = 0.5 * (mean_crease(standard(a, 128)) + mean_crease(standard(b, 128)));
+    const double creased = mean_crease(device(), morph_of(a, b, 128, false).at(half)), smooth = mean_crease(device(), morph_of(a, b, 128, true).at(half));
+    const double own = 0.5 * (mean_crease(device(), standard(a, 128)) + mean_crease(device(), standard(b, 128)));
     EXPECT_LT(smooth - own, 0.6 * (creased - own)) << a << ": own " << own << ", creased " << creased << ", smooth " << smooth;
     RecordProperty(a, std::to_string(own) + " " + std::to_string(creased) + " " + std::to_string(smooth));
     const ManifoldReport report = measure_manifold(reconstruct_mesh(device(), morph_of(a, b, 128, true).at(half)));

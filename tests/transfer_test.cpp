@@ -14,6 +14,7 @@
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/resample.h"
+#include "support/creases.h"
 #include "support/load_model.h"
 #include "support/transfer_twin.h"
 
@@ -248,6 +249,33 @@ TEST(Transfer, PutsTheMirrorImageOfALimbOnTheOtherSide) {
   EXPECT_LT(worst, 2e-3 * bear.diagonal);
 }
 
+TEST(Transfer, JoinsALimbWithoutARootAsSmoothlyAsTheModelsAre) {
+  const SkeletexModel &bear = standard("bear"), &bis = standard("bear_bis");
+  struct Case {
+    const SkeletexModel source, &target;
+    const char *from, *to, *below;
+    TransferScale scale;
+  };
+  for (const Case& c : {Case{mirrored(bear), bear, "left_upper_arm", "right_upper_arm", "right_forearm", TransferScale::kGirth},
+                        Case{bis, bear, "left_upper_arm", "left_upper_arm", "left_forearm", TransferScale::kAuto}}) {
+    TransferOptions options;
+    options.has_limbs = true;
+    options.scale = c.scale;
+    const std::vector<std::pair<std::string, std::string>> bones{{c.from, c.to}};
+    const auto is_of_limb = [&](const SeamArc& arc) {
+      return std::any_of(arc.bones.begin(), arc.bones.end(), [&](int bone) { return bone == bone_of(c.target, c.to) || bone == bone_of(c.target, c.below); });
+    };
+    const SkeletexModel smooth = transfer(device(), c.source, c.target, bones, options);
+    options.is_smooth = false;
+    const double creased = mean_crease(device(), transfer(device(), c.source, c.target, bones, options), is_of_limb);
+    const double joined = mean_crease(device(), smooth, is_of_limb), own = mean_crease(device(), c.target, is_of_limb);
+    RecordProperty(c.to, std::to_string(own) + " " + std::to_string(creased) + " " + std::to_string(joined));
+    EXPECT_LT(joined - own, 0.5 * (creased - own)) << c.to << ": own " << own << ", creased " << creased << ", joined " << joined;
+    expect_same_outside(c.target, smooth, {c.to, c.below});
+    expect_valid(smooth, 0);
+  }
+}
+
 TEST(Transfer, WorksFrom32To2048) {
   for (const int size : {32, 2048}) {
     const SkeletexModel source = resample_model(device(), standard("triceratops"), size), target = resample_model(device(), standard("bunny00"), size);
@@ -332,6 +360,8 @@ TEST(LayPart, KernelAndTwinAgreeOnRandomTables) {
   const DevicePlanes target_planes{device().upload(target[0]), device().upload(target[1]), device().upload(target[2])};
   const DevicePlanes laid = lay_part(device(), tables, frames, source_planes, target_planes, points);
   const std::vector<float> out[3] = {device().download(laid.x), device().download(laid.y), device().download(laid.z)};
+  const DevicePlanes read = read_part(device(), tables, frames, source_planes, points);
+  const std::vector<float> read_out[3] = {device().download(read.x), device().download(read.y), device().download(read.z)};
   for (std::size_t k = 0; k < tables.rows.size(); ++k) {
     const auto [p, row, vertex, quad] = tables.rows[k];
     for (int j = 0; j < sizes[p].first; ++j) {
@@ -342,7 +372,12 @@ TEST(LayPart, KernelAndTwinAgreeOnRandomTables) {
           [&](int end, int band, bool is_slope, int axis) { return tables.correction(end == 0 ? BoneEnd::kHead : BoneEnd::kTail, band, is_slope, axis, column); });
       // Columns of up to 160 are exact to 2e-5 in single precision and points differ by up to 2 from column to column, rows
       // of up to 140 alike; both enter up to some ten times (scale, lean, corrections times rows).
-      for (int c = 0; c < 3; ++c) ASSERT_NEAR(out[c][vertex + j], expected[c], 2e-3) << p << " " << row << " " << j;
+      double at = 0;
+      const Vec3 place = twin::read(tables.patches[p], tables.laid_rows[k], tables.columns[column], row, [&](int i) { return Vec3(in[0][i], in[1][i], in[2][i]); }, at);
+      for (int c = 0; c < 3; ++c) {
+        ASSERT_NEAR(out[c][vertex + j], expected[c], 2e-3) << p << " " << row << " " << j;
+        ASSERT_NEAR(read_out[c][vertex + j], place[c], 2e-4) << p << " " << row << " " << j;
+      }
     }
   }
 }

@@ -16,18 +16,23 @@ inline double faded(double rows, double width, bool is_linear) {
   return is_linear ? 1 - rows / width : std::pow(std::cos(std::numbers::pi / 2 * rows / width), 2);
 }
 
-/// Kernel lay_part, one point. \param source, target  points by vertex
-inline Vec3 lay(const LaidPatch& patch, const LaidRow& row, const LaidColumn& column, int r, int j, int width, const std::function<Vec3(int)>& source,
-                const std::function<Vec3(int)>& target,
-                const std::function<double(int, int, bool, int)>& correction) {
+/// Kernel read_part, one point. \param source  points by vertex   \param at  receives the source's column
+inline Vec3 read(const LaidPatch& patch, const LaidRow& row, const LaidColumn& column, int r, const std::function<Vec3(int)>& source, double& at) {
   const double lifted = column.head_column + row.station * (column.tail_column - column.head_column);
-  const double at = lifted - patch.width * std::floor(lifted / patch.width);
+  at = lifted - patch.width * std::floor(lifted / patch.width);
   double from = std::clamp<double>(column.row_begin + column.row_step * double(r), 0.0, patch.height - 1.0);
   if (patch.sign < 0) from = patch.height - 1 - from;
   const int left = int(at) % patch.width, right = (left + 1) % patch.width, below = std::min(int(from), patch.height - 2);
   const double x = at - std::floor(at), y = from - below;
   const auto point = [&](int i, int k) { return source(patch.begin + i * patch.width + k); };
-  Vec3 p = (1 - y) * ((1 - x) * point(below, left) + x * point(below, right)) + y * ((1 - x) * point(below + 1, left) + x * point(below + 1, right));
+  return (1 - y) * ((1 - x) * point(below, left) + x * point(below, right)) + y * ((1 - x) * point(below + 1, left) + x * point(below + 1, right));
+}
+
+/// Kernel lay_part, one point. \param source, target  points by vertex
+inline Vec3 lay(const LaidPatch& patch, const LaidRow& row, const LaidColumn& column, int r, int j, int width, const std::function<Vec3(int)>& source,
+                const std::function<Vec3(int)>& target, const std::function<double(int, int, bool, int)>& correction) {
+  double at = 0;
+  Vec3 p = read(patch, row, column, r, source, at);
 
   // Polar: the angle counts from the source's and goes on from the own one, the other way round where the bone is reversed.
   const double own = 2 * std::numbers::pi * j / width, read = 2 * std::numbers::pi * at / patch.width;

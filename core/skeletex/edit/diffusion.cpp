@@ -73,10 +73,10 @@ class Preconditioner {
     const DeviceNeighbours& n = *surface.neighbours;
     const auto plane = [&] { return context.allocate<float>(count_); };
     row_pivots_ = plane(), row_below_ = plane(), row_last_ = plane(), column_pivots_ = plane(), column_below_ = plane();
-    context.launch({kSolverFile, "factor_rows", kFastSums}, rows(), size(n.rows), time, n.rows, surface.weights, surface.mass, surface.stiffness, row_pivots_,
+    context.launch({kSolverFile, "factor_rows", kFastSums}, rows(), size(n.rows), time, n.rows, surface.weights, surface.mass, surface.stiffness, is_free_, row_pivots_,
                    row_below_, row_last_);
     context.launch({kSolverFile, "factor_columns", kFastSums}, columns(), size(n.column_blocks), count_, time, n.column_blocks, surface.weights, surface.mass,
-                   surface.stiffness, column_pivots_, column_below_);
+                   surface.stiffness, is_free_, column_pivots_, column_below_);
     between_ = context.allocate<float>(static_cast<std::size_t>(components) * count_);
     if (!surface.coarser) return;
     const DeviceCoarseLattice& coarse = *n.coarser;

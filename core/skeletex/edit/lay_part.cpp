@@ -34,6 +34,14 @@ DevicePlanes lay_part(ClContext& context, const LaidTables& tables, const FrameT
   return points;
 }
 
+DevicePlanes read_part(ClContext& context, const LaidTables& tables, const FrameTables& result, const DevicePlanes& points, std::size_t point_count) {
+  DevicePlanes read = allocate_planes(context, point_count);
+  context.launch({"transfer.cl", "read_part"}, row_range(context, tables.rows.size()), static_cast<int>(tables.rows.size()), context.upload(tables.rows),
+                 context.upload(result.patches), context.upload(tables.patches), context.upload(tables.laid_rows), context.upload(tables.columns), points.x,
+                 points.y, points.z, read.x, read.y, read.z);
+  return read;
+}
+
 void keep_target(ClContext& context, const LaidTables& tables, const FrameTables& result, int texture_width, const DevicePlanes& target, DevicePlanes& texels) {
   context.launch({"transfer.cl", "keep_target"}, row_range(context, tables.rows.size()), static_cast<int>(tables.rows.size()), texture_width,
                  context.upload(tables.rows), context.upload(result.patches), context.upload(tables.patches), context.upload(tables.columns), target.x,

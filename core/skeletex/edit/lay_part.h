@@ -29,6 +29,9 @@ DevicePlanes points_in_bone_axes(ClContext& context, const SkeletexModel& model)
 DevicePlanes lay_part(ClContext& context, const LaidTables& tables, const FrameTables& result, const DevicePlanes& source, const DevicePlanes& target,
                       std::size_t point_count);
 
+/// Queues the kernel. \param points  of the source's rows   \return what lay_part would lay, where `points` have it
+DevicePlanes read_part(ClContext& context, const LaidTables& tables, const FrameTables& result, const DevicePlanes& points, std::size_t point_count);
+
 /// Queues what gives the target's texels back where its surface is kept.
 void keep_target(ClContext& context, const LaidTables& tables, const FrameTables& result, int texture_width, const DevicePlanes& target, DevicePlanes& texels);
 

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "skeletex/edit/best_rotation.h"
@@ -20,7 +21,9 @@ constexpr double kTolerance = 1e-6;  // so that a morph is the same from either 
 // the nearest seam, where rotations begin to fade and have faded.
 constexpr double kFadeBegin = 0.4, kFadeEnd = 0.9;
 
-std::vector<float> row_shares(const SkeletexModel& model, const Lattice& lattice) {
+}  // namespace
+
+std::vector<float> shares_without_tips(const SkeletexModel& model, const Lattice& lattice) {
   std::vector<float> shares;
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
     const Patch& patch = model.patches[bone];
@@ -35,8 +38,10 @@ std::vector<float> row_shares(const SkeletexModel& model, const Lattice& lattice
   return shares;
 }
 
-/// A source rotated to face as the surface does, as a whole, in diagonals about its middle.
-DeviceField upload_source(ClContext& context, const std::vector<Vec3>& points, const std::vector<float>& masses, const std::vector<Vec3>& source, double unit) {
+OrientationSource whole_source(ClContext& context, const SkeletexModel& model, const ModelSurface& surface, const SurfaceOperator& laplace,
+                               const std::vector<Vec3>& source, double weight) {
+  const std::vector<float> masses = context.download(laplace.mass);
+  const std::vector<Vec3>& points = surface.positions;
   Vec3 centre = Vec3::Zero(), source_centre = Vec3::Zero();
   double area = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -49,20 +54,17 @@ DeviceField upload_source(ClContext& context, const std::vector<Vec3>& points, c
   source_centre /= area;
   std::vector<Vec3> from, to;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const double weight = std::sqrt(static_cast<double>(masses[i]));
-    from.push_back(weight * (source[i] - source_centre));
-    to.push_back(weight * (points[i] - centre));
+    const double root = std::sqrt(static_cast<double>(masses[i]));
+    from.push_back(root * (source[i] - source_centre));
+    to.push_back(root * (points[i] - centre));
   }
-  const Eigen::Quaterniond rotation = best_rotation(from, to);
-  std::vector<Vec3> rotated;
-  for (const Vec3& p : source) rotated.push_back(rotation * (p - source_centre));
-  return upload_points(context, rotated, Vec3::Zero(), unit);
+  const Eigen::Quaternionf rotation = best_rotation(from, to).cast<float>();
+  return {upload_points(context, source, source_centre, model.diagonal), std::vector<float>(points.size(), static_cast<float>(weight)),
+          std::vector<Eigen::Quaternionf>(surface.neighbours.rows.size, rotation)};
 }
 
-}  // namespace
-
-OrientationPull pull_orientations(ClContext& context, const SkeletexModel& model, const ModelSurface& surface, const SurfaceOperator& laplace,
-                                  std::span<const std::vector<Vec3>> sources, std::span<const double> weights, double scale) {
+OrientationPull pull_orientations(ClContext& context, const ModelSurface& surface, const SurfaceOperator& laplace,
+                                  std::span<const OrientationSource> sources, const std::vector<float>& row_shares, double scale) {
   const DeviceNeighbours& n = surface.neighbours;
   const std::size_t count = surface.positions.size();
   const auto row_count = static_cast<int>(n.rows.size), fan_count = static_cast<int>(n.fan_vertices.size);
@@ -73,7 +75,8 @@ OrientationPull pull_orientations(ClContext& context, const SkeletexModel& model
   const auto field = [&](int components) { return DeviceField{components, context.allocate<float>(components * count)}; };
   const auto zeros = [&](std::size_t size) { return context.upload(std::vector<float>(size, 0.f)); };
   const auto mean_at_ends = [&](const DeviceField& of) {
-    context.launch({kFile, "mean_at_ends"}, fans, fan_count, n.inner_count, n.vertex_count, of.components, n.fan_vertices, n.fan_begin, n.fans, of.values);
+    context.launch({kFile, "mean_at_ends"}, fans, fan_count, n.inner_count, n.vertex_count, of.components, n.fan_vertices, n.fan_begin, n.fans,
+                   of.values);
   };
   const auto row_normals = [&](const DeviceField& points) {
     DeviceField normals = field(3);
@@ -83,16 +86,18 @@ OrientationPull pull_orientations(ClContext& context, const SkeletexModel& model
 
   OrientationPull pull{{4, zeros(4 * count)}, row_normals(surface.points), field(3)};
   const auto slopes = zeros(2 * n.fans.size);
-  const std::vector<float> masses = context.download(laplace.mass);
-  for (std::size_t m = 0; m < sources.size(); ++m) {
-    if (weights[m] == 0) continue;
-    const auto weight = static_cast<float>(weights[m]);
-    const DeviceField source = upload_source(context, surface.positions, masses, sources[m], model.diagonal), normals = row_normals(source);
+  for (const OrientationSource& source : sources) {
+    const DeviceField normals = row_normals(source.points);
     mean_at_ends(normals);
-    context.launch({kFile, "add_rotations"}, rows, row_count, n.vertex_count, weight, n.rows, surface.points.values, source.values, pull.rotations.values);
-    context.launch({kFile, "add_slopes"}, fans, fan_count, n.vertex_count, weight, n.fan_vertices, n.fan_begin, n.fans, source.values, normals.values, slopes);
+    std::vector<std::array<float, 4>> facing;
+    for (const Eigen::Quaternionf& q : source.rotations) facing.push_back({q.w(), q.x(), q.y(), q.z()});
+    const auto weights = context.upload(source.weights);
+    context.launch({kFile, "add_rotations"}, rows, row_count, n.vertex_count, n.rows, context.upload(facing), weights, surface.points.values,
+                   source.points.values, pull.rotations.values);
+    context.launch({kFile, "add_slopes"}, fans, fan_count, n.vertex_count, n.fan_vertices, n.fan_begin, n.fans, weights, source.points.values,
+                   normals.values, slopes);
   }
-  context.launch({kFile, "settle_rotations"}, rows, row_count, n.vertex_count, n.rows, context.upload(row_shares(model, surface.lattice)), pull.rotations.values);
+  context.launch({kFile, "settle_rotations"}, rows, row_count, n.vertex_count, n.rows, context.upload(row_shares), pull.rotations.values);
   DeviceField smoothed{4, zeros(4 * count)};
   for (int pass = 0; pass < kRotationPasses; ++pass) {
     context.launch({kFile, "smooth_rotations"}, rows, row_count, n.vertex_count, n.rows, pull.rotations.values, smoothed.values);
@@ -108,11 +113,15 @@ OrientationPull pull_orientations(ClContext& context, const SkeletexModel& model
   return pull;
 }
 
-MovedModel blend_orientations(ClContext& context, const SkeletexModel& model, std::span<const std::vector<Vec3>> sources, std::span<const double> weights) {
+MovedModel blend_orientations(ClContext& context, const SkeletexModel& model, std::span<const std::vector<Vec3>> sources,
+                              std::span<const double> weights) {
   if (std::find(weights.begin(), weights.end(), 1.0) != weights.end()) return {model, {}};
   const ModelSurface surface = upload_surface(context, model);
   const SurfaceOperator laplace = make_surface_operator(context, surface.neighbours, surface.points);
-  const OrientationPull pull = pull_orientations(context, model, surface, laplace, sources, weights, kScale);
+  std::vector<OrientationSource> oriented;
+  for (std::size_t m = 0; m < sources.size(); ++m)
+    if (weights[m] != 0) oriented.push_back(whole_source(context, model, surface, laplace, sources[m], weights[m]));
+  const OrientationPull pull = pull_orientations(context, surface, laplace, oriented, shares_without_tips(model, surface.lattice), kScale);
   const auto everywhere = context.upload(std::vector<float>(surface.positions.size(), 1.f));
   const SolveResult solved = solve_diffusion(context, laplace, static_cast<float>(kScale * kScale), everywhere, pull.b, kTolerance);
   std::vector<Vec3> moves = download_vectors(context, solved.x);

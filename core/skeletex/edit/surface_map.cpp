@@ -17,15 +17,6 @@ namespace {
 
 BoneEnd end_at(const Skeleton& skeleton, int bone, int node) { return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail; }
 
-/// Positions of the rows of all patches of a model; patch by patch, relative to its origin.
-DevicePlanes all_positions(ClContext& context, const SkeletexModel& model, const Walls& walls) {
-  const DeviceLattice lattice =
-      upload_lattice(context, frame_tables(model.skeleton, walls, model.patches, model.origin), model.patches, model.texture, RowChoice::kAll);
-  DevicePlanes points = allocate_planes(context, lattice.vertex_count);
-  displace(context, lattice, points);
-  return points;
-}
-
 }  // namespace
 
 std::vector<Vec3> map_surface(ClContext& context, const SkeletexModel& from, const SkeletexModel& to, const Correspondence& correspondence) {
@@ -57,7 +48,7 @@ std::vector<Vec3> map_surface(ClContext& context, const SkeletexModel& from, con
   const std::size_t area = static_cast<std::size_t>(from.texture.width) * from.texture.height;
   DevicePlanes read = allocate_planes(context, area);
   blend_texels(context, tables, rows, frame_tables(from.skeleton, walls, from.patches, from.origin), from.texture.width,
-               all_positions(context, to, to_walls), read);
+               row_points(context, to, to_walls), read);
   const std::array<std::vector<float>, 3> planes{context.download(read.x), context.download(read.y), context.download(read.z)};
   const auto point_at = [&](int bone, int row, int column) {
     const Rectangle& rectangle = from.patches[bone].rectangle;

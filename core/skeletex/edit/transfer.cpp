@@ -12,6 +12,7 @@
 
 #include "skeletex/edit/best_rotation.h"
 #include "skeletex/edit/blend.h"
+#include "skeletex/edit/join_surface.h"
 #include "skeletex/edit/lay_part.h"
 #include "skeletex/edit/overlay.h"
 #include "skeletex/edit/part.h"
@@ -23,6 +24,8 @@ namespace {
 constexpr std::array<BoneEnd, 2> kEnds{BoneEnd::kHead, BoneEnd::kTail};
 constexpr double kMostLean = 0.5;  // a part leans by at most half of its length
 constexpr double kSame = 0.01;     // of the girth
+constexpr double kRootShare = 0.05;  // of a patch's rows that the target keeps where its limb has a root there
+constexpr double kJoinRadii = 1.0;  // of where a part begins: over so much of the surface it joins the body at least
 constexpr double kMostRunBack = 0.5;  // share of the rows behind its cut that a column may leave out, too
 constexpr double kMostCut = 0.85;  // share of a patch's rows that a cut may leave out
 constexpr double kReach = 0.12;    // share of the rows before and behind that a turn is measured over
@@ -106,6 +109,13 @@ class PartTransfer {
     if (options_.width_in_texels > 0) return options_.width_in_texels;
     return (options_.width >= 0 ? options_.width : is_between() ? 0.5 : 0.25) * (target_.patches[to_.bones[i]].rectangle.height - 1);
   }
+  /// World units over the surface.
+  double join_distance() const {
+    const Rectangle& rectangle = target_.patches[to_.bones[0]].rectangle;
+    const double width = width_in_rows(0) / (rectangle.height - 1) * bone_length(target_.skeleton, to_.bones[0]);
+    const bool is_default = options_.width < 0 && !(options_.width_in_texels > 0);
+    return is_default ? std::max(width, kJoinRadii * std::max(cut(BoneEnd::kHead).radius, cut(BoneEnd::kTail).radius)) : width;
+  }
   bool is_between() const { return count() == 1 && is_boundary(0, BoneEnd::kHead) && is_boundary(0, BoneEnd::kTail); }
   bool is_scaled_by_girth() const { return options_.scale == TransferScale::kGirth || (options_.scale == TransferScale::kAuto && is_between()); }
 
@@ -124,6 +134,7 @@ class PartTransfer {
     std::vector<double> kept_rows, skipped_rows;  ///< of the target's patch, of the source's; from that end
     double kept = 0, skipped = 0;                 ///< mean lengths along the bones
     double scale = 1;                             ///< of places across the bone
+    double radius = 0;                            ///< of the target, there
   };
   Cut& cut(BoneEnd end) { return cuts_[static_cast<int>(end)]; }
   const Cut& cut(BoneEnd end) const { return cuts_[static_cast<int>(end)]; }
@@ -264,7 +275,7 @@ class Laying {
   Laying(ClContext& context, const SkeletexModel& source, const SkeletexModel& target, const TransferOptions& options)
       : context_(context), source_(source), target_(target), options_(options), walls_(target.skeleton), source_walls_(source.skeleton),
         source_points_(points_in_bone_axes(context, source)), target_points_(points_in_bone_axes(context, target)), source_host_(context, source_points_), target_host_(context, target_points_),
-        source_first_(first_points(source.patches)), target_first_(first_points(target.patches)), part_of_(target.patches.size(), {nullptr, 0}) {}
+        source_first_(first_points(source.patches)), target_first_(first_points(target.patches)), part_of_(target.patches.size(), {nullptr, 0}), gaps_(target.patches.size()) {}
 
   void add(PartTransfer& part) {
     for (int i = 0; i < part.count(); ++i) {
@@ -291,7 +302,8 @@ class Laying {
     fill_tables();
     skip_what_runs_back(lay());
     find_lean(lay());
-    find_corrections(lay());
+    const HostPoints laid = lay();
+    find_corrections(laid);
     const DevicePlanes points = lay_part(context_, tables_, frames_, source_points_, target_points_, point_count_);
 
     const DisplacementTexture& t = target_.texture;
@@ -304,6 +316,11 @@ class Laying {
     result.texture.along = context_.download(texels.x);
     result.texture.around = context_.download(texels.y);
     result.texture.out = context_.download(texels.z);
+    if (options_.blend != TransferBlend::kCosine || !options_.is_smooth) return result;
+    if (std::none_of(parts.begin(), parts.end(), [&](const auto& part) { return needs_join(*part); })) return result;
+    const HostPoints read(context_, read_part(context_, tables_, frames_, row_points(context_, source_, source_walls_), point_count_));
+    for (const auto& part : parts)
+      if (needs_join(*part)) result = join_surface(context_, target_, result, placed_patches(*part, laid, read), part->join_distance() / target_.diagonal);
     return result;
   }
 
@@ -319,6 +336,32 @@ class Laying {
   }
 
  private:
+  /// Where a root lies in the first patch, the rows behind it are enough for the correction.
+  bool needs_join(const PartTransfer& part) const { return !part.is_between() && report(part).kept <= kRootShare; }
+
+  std::vector<PlacedPatch> placed_patches(const PartTransfer& part, const HostPoints& laid, const HostPoints& read) const {
+    std::vector<PlacedPatch> patches(part.count());
+    for (int i = 0; i < part.count(); ++i) {
+      PlacedPatch& patch = patches[i];
+      patch.bone = part.target_bone(i);
+      const auto [x, y, width, height] = target_.patches[patch.bone].rectangle;
+      const BoneBasis& basis = walls_.bases()[patch.bone];
+      const auto in_world = [&](const Vec3& p) { return Vec3(p.x() * basis.s + p.y() * basis.b + p.z() * basis.o); };
+      const Vec3 head = end_position(target_.skeleton, patch.bone, BoneEnd::kHead);
+      for (std::size_t k = 0; k < static_cast<std::size_t>(width) * height; ++k) {
+        patch.placed.push_back(head + in_world(laid.at(result_first_[patch.bone] + k)));
+        patch.source.push_back(read.at(result_first_[patch.bone] + k));
+      }
+      for (int j = 0; j < width; ++j) {
+        const LaidColumn& column = tables_.columns[tables_.patches[patch.bone].column_begin + j];
+        patch.rows.push_back({std::max(1, static_cast<int>(std::floor(column.first_row)) + 1), std::min(height - 2, static_cast<int>(std::ceil(column.last_row)) - 1)});
+      }
+      for (const BoneEnd end : kEnds)
+        for (const Vec3& gap : gaps_[patch.bone][static_cast<int>(end)]) patch.gaps[static_cast<int>(end)].push_back(in_world(gap));
+    }
+    return patches;
+  }
+
   HostPoints lay() { return HostPoints(context_, lay_part(context_, tables_, frames_, source_points_, target_points_, point_count_)); }
   /// A point at a column, as its parts along s', o x s' and o.
   static Vec3 about_bone(const Vec3& point, int column, int width) {
@@ -449,6 +492,7 @@ class Laying {
         cut.kept += at_row(columns[j], cut.kept_rows[j]).z() / here.width;
         cut.skipped += at_row(source_columns[j], cut.skipped_rows[j]).z() / here.width;
       }
+      cut.radius += at_row(columns[j], cut.kept_rows[j]).head<2>().norm() / here.width;
       girth += at_row(columns[j], std::min(cut.kept_rows[j] + width, 0.9 * here.height)).head<2>().norm();
       source_girth += at_row(source_columns[j], std::min(cut.skipped_rows[j] + width * source_rows, 0.9 * there.height)).head<2>().norm();
     }
@@ -586,6 +630,9 @@ class Laying {
             offsets[2][j] = change.along;
           }
         }
+        if (part.is_boundary(i, end))
+          for (int j = 0; j < width; ++j)
+            gaps_[bone][static_cast<int>(end)].push_back(about_bone({offsets[0][j], offsets[1][j], offsets[2][j]}, -j, width));
         store_corrections(bone, end, offsets, false);
         store_corrections(bone, end, slopes, true);
       }
@@ -611,6 +658,7 @@ class Laying {
   HostPoints source_host_, target_host_;
   std::vector<std::size_t> source_first_, target_first_, result_first_;
   std::vector<std::pair<PartTransfer*, int>> part_of_;  ///< per bone of the target: who replaces it, and which of its bones it is
+  std::vector<std::array<std::vector<Vec3>, 2>> gaps_;  ///< per bone of the target and end, by column: what its part misses there, in bone axes
   FrameTables frames_;
   LaidTables tables_;
   std::size_t point_count_ = 0;

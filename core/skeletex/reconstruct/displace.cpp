@@ -59,4 +59,12 @@ void displace(ClContext& context, const DeviceLattice& lattice, DevicePlanes& po
                  lattice.texels.y, lattice.texels.z, points.x, points.y, points.z);
 }
 
+DevicePlanes row_points(ClContext& context, const SkeletexModel& model, const Walls& walls) {
+  const DeviceLattice lattice =
+      upload_lattice(context, frame_tables(model.skeleton, walls, model.patches, model.origin), model.patches, model.texture, RowChoice::kAll);
+  DevicePlanes points = allocate_planes(context, lattice.vertex_count);
+  displace(context, lattice, points);
+  return points;
+}
+
 }  // namespace skeletex

@@ -49,4 +49,7 @@ DeviceLattice upload_lattice(ClContext& context, const FrameTables& tables, cons
 /// Queues the points of all rows (one launch), relative to the origin of the tables.
 void displace(ClContext& context, const DeviceLattice& lattice, DevicePlanes& points);
 
+/// The points of all rows of a model in its bind pose, relative to its origin.
+DevicePlanes row_points(ClContext& context, const SkeletexModel& model, const Walls& walls);
+
 }  // namespace skeletex
