@@ -16,7 +16,9 @@
 #include "skeletex/edit/lay_part.h"
 #include "skeletex/edit/overlay.h"
 #include "skeletex/edit/part.h"
+#include "skeletex/measure/folds.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
 
 namespace skeletex {
 namespace {
@@ -25,6 +27,7 @@ constexpr std::array<BoneEnd, 2> kEnds{BoneEnd::kHead, BoneEnd::kTail};
 constexpr double kMostLean = 0.5;  // a part leans by at most half of its length
 constexpr double kSame = 0.01;     // of the girth
 constexpr double kRootShare = 0.05;  // of a patch's rows that the target keeps where its limb has a root there
+constexpr double kMostFolds = 2, kMoreFolds = 2e-3;  // times those without the join, and share of the part's points
 constexpr double kJoinRadii = 1.0;  // of where a part begins: over so much of the surface it joins the body at least
 constexpr double kMostRunBack = 0.5;  // share of the rows behind its cut that a column may leave out, too
 constexpr double kMostCut = 0.85;  // share of a patch's rows that a cut may leave out
@@ -319,8 +322,12 @@ class Laying {
     if (options_.blend != TransferBlend::kCosine || !options_.is_smooth) return result;
     if (std::none_of(parts.begin(), parts.end(), [&](const auto& part) { return needs_join(*part); })) return result;
     const HostPoints read(context_, read_part(context_, tables_, frames_, row_points(context_, source_, source_walls_), point_count_));
-    for (const auto& part : parts)
-      if (needs_join(*part)) result = join_surface(context_, target_, result, placed_patches(*part, laid, read), part->join_distance() / target_.diagonal);
+    for (const auto& part : parts) {
+      if (!needs_join(*part)) continue;
+      SkeletexModel joined = join_surface(context_, target_, result, placed_patches(*part, laid, read), part->join_distance() / target_.diagonal);
+      // Parts that bring a good deal of their body along may be too far from where they shall be to be bent there.
+      if (folded_edges(joined) <= kMostFolds * folded_edges(result) + kMoreFolds * static_cast<double>(point_count_)) result = std::move(joined);
+    }
     return result;
   }
 
@@ -336,6 +343,7 @@ class Laying {
   }
 
  private:
+  double folded_edges(const SkeletexModel& model) const { return static_cast<double>(measure_folds(reconstruct_mesh(context_, model)).folded_edges); }
   /// Where a root lies in the first patch, the rows behind it are enough for the correction.
   bool needs_join(const PartTransfer& part) const { return !part.is_between() && report(part).kept <= kRootShare; }
 
