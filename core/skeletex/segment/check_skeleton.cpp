@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "skeletex/measure/parallel.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
@@ -46,11 +47,11 @@ namespace {
 std::string text_of(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x(), p.y(), p.z()); }
 
 /// Where a bone first meets the surface on its way from head to tail: its parameter, or infinity.
-double first_crossing(const CutMesh& mesh, const Vec3& head, const Vec3& tail, std::vector<std::uint8_t>& codes) {
+double first_crossing(const CutMesh& mesh, const Vec3& head, const Vec3& tail) {
   // Coordinates along the bone and across it; a triangle all on one side of a plane is out.
   const Vec3 axis = tail - head, e = axis.unitOrthogonal(), f = axis.cross(e).normalized();
   const double length_squared = axis.squaredNorm();
-  codes.resize(mesh.positions.size());
+  std::vector<std::uint8_t> codes(mesh.positions.size());
   for (std::size_t v = 0; v < codes.size(); ++v) {
     const Vec3 p = mesh.positions[v] - head;
     const double x = p.dot(e), y = p.dot(f), z = p.dot(axis);
@@ -91,9 +92,13 @@ void check_skeleton_inside(const CutMesh& mesh, const Skeleton& skeleton) {
 
   std::vector<bool> is_used(skeleton.nodes.size(), false);
   for (const Bone& bone : skeleton.bones) is_used[bone.head] = is_used[bone.tail] = true;
+  std::vector<int> windings(skeleton.nodes.size(), 1);
+  for_each_block(windings.size(), 1, [&](std::size_t n, std::size_t, std::size_t) {
+    if (is_used[n]) windings[n] = winding_number(mesh, skeleton.nodes[n].position);
+  });
   for (std::size_t n = 0; n < skeleton.nodes.size(); ++n) {
     const Node& node = skeleton.nodes[n];
-    const int winding = is_used[n] ? winding_number(mesh, node.position) : 1;
+    const int winding = windings[n];
     if (winding > 0) continue;
     if (winding < 0)
       throw TopologyError(fmt::format("the mesh is turned inside out around node \"{}\" at {}; reverse the order of every triangle's vertices", node.name,
@@ -111,10 +116,14 @@ void check_skeleton_inside(const CutMesh& mesh, const Skeleton& skeleton) {
     throw TopologyError(fmt::format("node \"{}\" (bone {}) lies outside the mesh at {}; move it into the body, whose nearest vertex is at {}",
                                     node.name, bones, text_of(node.position), text_of(vertex)));
   }
-  std::vector<std::uint8_t> codes;
+  std::vector<double> crossings(skeleton.bones.size());
+  for_each_block(crossings.size(), 1, [&](std::size_t b, std::size_t, std::size_t) {
+    const int bone = static_cast<int>(b);
+    crossings[b] = first_crossing(mesh, end_position(skeleton, bone, BoneEnd::kHead), end_position(skeleton, bone, BoneEnd::kTail));
+  });
   for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b) {
     const Vec3 &head = end_position(skeleton, b, BoneEnd::kHead), &tail = end_position(skeleton, b, BoneEnd::kTail);
-    const double t = first_crossing(mesh, head, tail, codes);
+    const double t = crossings[b];
     if (t > 1) continue;
     const Bone& bone = skeleton.bones[b];
     throw TopologyError(fmt::format("bone \"{}\" leaves the mesh at {}, {:.0f} % of the way from node \"{}\" to node \"{}\"; move one of them, or "
