@@ -53,6 +53,7 @@ LatticeCrossings::LatticeCrossings(const SkeletexModel& model, const Lattice& la
     : origin_(model.origin),
       margin_(static_cast<float>(4e-7 * model.diagonal)),
       first_quad_(lattice.first_quad),
+      first_inner_(lattice.first_inner),
       part_of_(lattice.triangle_count),
       normals_(2 * static_cast<std::size_t>(lattice.quad_count)) {
   struct Square {
@@ -138,18 +139,30 @@ LatticeCrossings::Box LatticeCrossings::box_of(const TriangleMesh& mesh, int tri
 void LatticeCrossings::measure(const TriangleMesh& mesh, int part) {
   Box around = no_box<Box>(), normals = no_box<Box>();
   for (int i = parts_[part].begin; i < parts_[part].begin + parts_[part].count; ++i) {
+    const Piece& piece = pieces_[i];
     Box box = no_box<Box>();
-    for (int k = pieces_[i].begin; k < pieces_[i].begin + pieces_[i].count; ++k) {
-      const int triangle = triangles_[k];
-      add(box_of(mesh, triangle), box);
-      if (pieces_[i].patch < 0) continue;
-      const auto [a, b, c] = mesh.triangles[triangle];
-      const Eigen::Array4f u = points_[b] - points_[a], v = points_[c] - points_[a];
-      const float x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2], z = u[0] * v[1] - u[1] * v[0];
-      // One without area may look anywhere.
-      const float length2 = x * x + y * y + z * z, inverse = length2 > 0 ? 1 / std::sqrt(length2) : 0;
-      normals_[triangle] = {x * inverse, y * inverse, z * inverse, 0};
-      add({normals_[triangle], normals_[triangle]}, normals);
+    if (piece.patch < 0) {
+      for (int k = piece.begin; k < piece.begin + piece.count; ++k) add(box_of(mesh, triangles_[k]), box);
+    } else {
+      // Each vertex once.
+      const int width = rectangles_[piece.patch].width;
+      for (int row = piece.row; row <= piece.row + piece.rows; ++row)
+        for (int column = piece.column; column <= piece.column + piece.columns; ++column) {
+          const Eigen::Array4f& point = points_[first_inner_[piece.patch] + row * width + (column < width ? column : column - width)];
+          add({point, point}, box);
+        }
+      const Eigen::Array4f margin(margin_, margin_, margin_, 0);
+      box = {box.least - margin, box.greatest + margin};
+      for (int k = piece.begin; k < piece.begin + piece.count; ++k) {
+        const auto [a, b, c] = mesh.triangles[triangles_[k]];
+        const Eigen::Array4f u = points_[b] - points_[a], v = points_[c] - points_[a];
+        const float x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2], z = u[0] * v[1] - u[1] * v[0];
+        // One without area may look anywhere.
+        const float length2 = x * x + y * y + z * z, inverse = length2 > 0 ? 1 / std::sqrt(length2) : 0;
+        const Eigen::Array4f normal(x * inverse, y * inverse, z * inverse, 0);
+        normals_[triangles_[k]] = normal;
+        add({normal, normal}, normals);
+      }
     }
     piece_boxes_[i] = box;
     add(box, around);

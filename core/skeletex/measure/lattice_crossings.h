@@ -55,7 +55,7 @@ class LatticeCrossings {
   Vec3 origin_;
   float margin_;
   std::vector<Rectangle> rectangles_;  // per patch
-  std::vector<int> first_quad_;
+  std::vector<int> first_quad_, first_inner_;
   std::vector<std::array<int, 2>> squares_;  // per patch, how many columns and rows of them
   std::vector<int> first_square_;            // per patch, in places_
   std::vector<int> places_;                  // per square, by rows of a patch, its part
