@@ -35,7 +35,7 @@ RESULTS = [("smooth", "filter s.skx.exr smooth -o f.ply --scale 0.00001"),
            ("pose", "reconstruct v.skx.exr -o p.ply --pose p.json"),
            ("direction", "reconstruct v.skx.exr -o d.ply --pose p.json --no-distance"),
            ("morph", "morph v.skx.exr s.skx.exr --t 0.3 -o m.ply"),
-           ("transfer", "transfer s.skx.exr v.skx.exr --bones bc=bc --share 0.5 -o t.ply")]
+           ("transfer", "transfer s.skx.exr v.skx.exr --bones bc=bc --keep 0 --share 0.5 -o t.ply")]
 
 
 def capsule(path, noise):
