@@ -22,7 +22,6 @@ def draw(results, folder):
     times.plot(triangles, [scale * n * math.log(n) for n in triangles], linestyle=":", color="#999999", label="n log n")
     times.set_ylabel("seconds")
     times.legend(fontsize=7, loc="upper left")
-    times.set_ylim(top=200)
     memory.plot(triangles, [1024 * row["peak_memory_mb"] / row["triangles"] for row in rows], marker="o", color=style.SERIES[0][0], markersize=4)
     memory.axhline(1, linestyle=":", color="#999999")
     memory.set_ylabel("peak memory, KB per triangle")
@@ -30,5 +29,8 @@ def draw(results, folder):
         axis.set_xscale("log")
         axis.set_yscale("log")
         axis.set_xlabel("triangles")
+    # Room for the legend above the lines.
+    low, high = times.get_ylim()
+    times.set_ylim(low, high * (high / low) ** 0.45)
     figure.tight_layout()
     return [style.save(figure, folder, "scale")]
