@@ -87,6 +87,32 @@ TEST(LiveMorph, IsTheMorphAtItsKeysBitByBitAndNearItInBetween) {
   }
 }
 
+TEST(LiveMorph, ComesNearerTheMorphTheMoreKeysThereAre) {
+  for (const auto& [first, second] : {std::pair{"bear", "bear_bis"}, {"man", "homer"}, {"bull", "camel"}}) {
+    const Morph morph = morph_of(encoded(first, 96), encoded(second, 96));
+    std::vector<double> errors;
+    std::string figures;
+    for (const int steps : {2, 4, 8, 16, 32}) {
+      const LiveMorph live(device(), morph, {{1, 0}, {0, 1}}, steps);
+      double worst = 0;
+      for (const double place : {0.2, 0.5, 0.8}) {
+        const double t = (std::floor(place * steps) + 0.5) / steps;  // half-way between keys
+        const SkeletexModel exact = with_texels([&](DevicePlanes& texels) { return morph.queue(std::vector{1 - t, t}, texels); });
+        const SkeletexModel between = with_texels([&](DevicePlanes& texels) { return live.queue(t, texels); });
+        const std::vector<Vec3> wanted = lattice_positions(device(), exact), found = lattice_positions(device(), between);
+        double sum = 0;
+        for (std::size_t i = 0; i < wanted.size(); ++i) sum += (wanted[i] - found[i]).norm();
+        worst = std::max(worst, sum / static_cast<double>(wanted.size()) / exact.diagonal);
+      }
+      errors.push_back(worst);
+      figures += std::to_string(1e6 * worst) + " ";
+    }
+    RecordProperty(first, figures);
+    EXPECT_LT(errors[2], 2e-3) << first << ": " << figures;
+    EXPECT_LT(errors[4], 0.05 * errors[0]) << first << ": " << figures;
+  }
+}
+
 TEST(LiveMorph, GoesAlongAPathAndStopsAtItsEnds) {
   const SkeletexModel a = encoded("bear", 48);
   SkeletexModel b = a, c = a;

@@ -12,10 +12,10 @@
 
 #include "bench/stages/embree_scene.h"
 #include "skeletex/measure/hilbert_order.h"
-#include "skeletex/measure/parallel.h"
 #include "skeletex/measure/point_triangle.h"
 #include "skeletex/measure/triangle_tree.h"
 #include "skeletex/model/error.h"
+#include "skeletex/model/parallel.h"
 #include "support/load_model.h"
 #include "support/metro_twin.h"
 #include "support/shapes.h"

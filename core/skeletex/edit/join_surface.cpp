@@ -15,20 +15,21 @@ namespace skeletex {
 namespace {
 
 constexpr double kTolerance = 1e-5, kFillTolerance = 1e-3;
-constexpr int kPasses = 3;  // rotations are found on a surface that is still to move
-constexpr double kLeast = 1e-6;                             // of a value that falls by e over a third of the distance
-constexpr double kSeamReach = 0.5;                          // share of a bone over which its rotation goes over into that of a seam
+constexpr int kPasses = 3;          // rotations are found on a surface that is still to move
+constexpr double kLeast = 1e-6;     // of a value that falls by e over a third of the distance
+constexpr double kSeamReach = 0.5;  // share of a bone over which its rotation goes over into that of a seam
 
 double smooth_step(double x) {
   x = std::clamp(x, 0.0, 1.0);
   return x * x * (3 - 2 * x);
 }
 
-/// Solves (M + time L) x = 0 where is_free is 1 and x is given elsewhere.
-DeviceField fill_in(ClContext& context, const SurfaceOperator& laplace, double time, const std::vector<float>& is_free, DeviceField given) {
+/// Solves (M + time L) x = 0 where is_free is 1, with x given elsewhere.
+/// \param negated  -x where it is given, 0 where it is free   \return x where it is free, 0 elsewhere
+DeviceField fill_in(ClContext& context, const SurfaceOperator& laplace, double time, const std::vector<float>& is_free, const DeviceField& negated) {
   const auto device_free = context.upload(is_free);
   const SolveResult solved = solve_diffusion(context, laplace, static_cast<float>(time), device_free,
-                                             apply_operator(context, laplace, 1, static_cast<float>(time), device_free, given), kFillTolerance);
+                                             apply_operator(context, laplace, 1, static_cast<float>(time), device_free, negated), kFillTolerance);
   return solved.x;
 }
 

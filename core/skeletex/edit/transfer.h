@@ -29,8 +29,8 @@ struct TransferOptions {
   double factor = 1;
   double keep = -1;  ///< share of its rows that the target keeps at its seams; below 0: up to where the two fit best
   double skip = -1;  ///< share of the source's rows that is left out there; below 0: up to where the two fit best
-  /// With kCosine, parts that end freely meet the target and hang together as smoothly as on the source (join_surface.h). Without it the
-  /// correction alone carries each column onto the seam, within the first bone: for live use.
+  /// With kCosine, a part that ends freely and has no root in its first bone is joined over the surface, so that it meets the target and
+  /// hangs together as smoothly as on the source (join_surface.h). Without it the correction alone carries each column onto the seam.
   bool is_smooth = true;
 };
 

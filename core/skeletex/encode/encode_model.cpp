@@ -13,8 +13,8 @@
 
 #include "skeletex/encode/row_profile.h"
 #include "skeletex/encode/sample_seams.h"
-#include "skeletex/measure/parallel.h"
 #include "skeletex/model/error.h"
+#include "skeletex/model/parallel.h"
 #include "skeletex/pack/pack_atlas.h"
 #include "skeletex/segment/segment_mesh.h"
 

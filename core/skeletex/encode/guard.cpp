@@ -9,7 +9,7 @@
 
 #include "skeletex/measure/lattice_crossings.h"
 #include "skeletex/measure/nearest_search.h"
-#include "skeletex/measure/parallel.h"
+#include "skeletex/model/parallel.h"
 #include "skeletex/reconstruct/lattice_mesh.h"
 
 namespace skeletex {

@@ -8,7 +8,7 @@
 #include <limits>
 #include <numeric>
 
-#include "skeletex/measure/parallel.h"
+#include "skeletex/model/parallel.h"
 #include "skeletex/parameterize/half_edge_table.h"
 
 namespace skeletex {

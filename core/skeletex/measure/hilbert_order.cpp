@@ -5,7 +5,7 @@
 #include <array>
 #include <cstddef>
 
-#include "skeletex/measure/parallel.h"
+#include "skeletex/model/parallel.h"
 
 namespace skeletex {
 namespace {

@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <limits>
 
-#include "skeletex/measure/parallel.h"
 #include "skeletex/measure/self_intersection.h"
+#include "skeletex/model/parallel.h"
 
 namespace skeletex {
 namespace {

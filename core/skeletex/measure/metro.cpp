@@ -11,9 +11,9 @@
 
 #include "skeletex/measure/hilbert_order.h"
 #include "skeletex/measure/nearest_search.h"
-#include "skeletex/measure/parallel.h"
 #include "skeletex/measure/point_triangle.h"
 #include "skeletex/model/error.h"
+#include "skeletex/model/parallel.h"
 
 namespace skeletex {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "skeletex/measure/parallel.h"
+#include "skeletex/model/parallel.h"
 
 namespace skeletex {
 namespace {

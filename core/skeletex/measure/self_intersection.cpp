@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstddef>
 
-#include "skeletex/measure/parallel.h"
 #include "skeletex/measure/predicates.h"
 #include "skeletex/measure/triangle_tree.h"
+#include "skeletex/model/parallel.h"
 
 namespace skeletex {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstddef>
 
 #include "skeletex/measure/hilbert_order.h"
-#include "skeletex/measure/parallel.h"
+#include "skeletex/model/parallel.h"
 
 namespace skeletex {
 namespace {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <numbers>
 
-#include "skeletex/measure/parallel.h"
+#include "skeletex/model/parallel.h"
 #include "spd_structs.h"
 
 namespace skeletex {

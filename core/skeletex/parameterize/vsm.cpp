@@ -11,7 +11,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "skeletex/measure/parallel.h"
+#include "skeletex/model/parallel.h"
 #include "skeletex/parameterize/half_edge_table.h"
 
 namespace skeletex {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "skeletex/measure/parallel.h"
+#include "skeletex/model/parallel.h"
 
 namespace skeletex {
 

@@ -8,8 +8,8 @@
 #include <cstdint>
 #include <limits>
 
-#include "skeletex/measure/parallel.h"
 #include "skeletex/model/error.h"
+#include "skeletex/model/parallel.h"
 
 namespace skeletex {
 

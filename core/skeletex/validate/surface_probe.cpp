@@ -8,8 +8,8 @@
 #include <limits>
 #include <numbers>
 
-#include "skeletex/measure/parallel.h"
 #include "skeletex/measure/point_triangle.h"
+#include "skeletex/model/parallel.h"
 
 namespace skeletex {
 namespace {

@@ -4,8 +4,8 @@
 #include "embree_scene.h"
 #include "skeletex/measure/hilbert_order.h"
 #include "skeletex/measure/metro.h"
-#include "skeletex/measure/parallel.h"
 #include "skeletex/measure/point_triangle.h"
+#include "skeletex/model/parallel.h"
 #include "stages.h"
 
 namespace skeletex {

@@ -5,7 +5,7 @@
 
 #include "charts.h"
 #include "embree_scene.h"
-#include "skeletex/measure/parallel.h"
+#include "skeletex/model/parallel.h"
 #include "skeletex/pack/pack_atlas.h"
 #include "skeletex/parameterize/spd.h"
 #include "stages.h"

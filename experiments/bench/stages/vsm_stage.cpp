@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "charts.h"
-#include "skeletex/measure/parallel.h"
+#include "skeletex/model/parallel.h"
 #include "skeletex/parameterize/vsm.h"
 #include "stages.h"
 

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace skeletex {
+
+/// Calls act(block, begin, end) for consecutive blocks of [0, size) on all processors. Blocks depend on the sizes
+/// alone, so results kept per block and combined in their order are the same whatever the number of threads.
+/// The first exception that a block throws is thrown again here.
+template <class Act>
+void for_each_block(std::size_t size, std::size_t block_size, const Act& act) {
+  const std::size_t blocks = (size + block_size - 1) / block_size;
+  const std::size_t threads = std::min<std::size_t>(blocks, std::max(1u, std::thread::hardware_concurrency()));
+  std::atomic<std::size_t> next{0};
+  std::exception_ptr failure;
+  std::mutex failure_mutex;
+  const auto work = [&] {
+    try {
+      for (std::size_t block = next++; block < blocks; block = next++) act(block, block * block_size, std::min(size, (block + 1) * block_size));
+    } catch (...) {
+      const std::lock_guard lock(failure_mutex);
+      if (!failure) failure = std::current_exception();
+      next = blocks;
+    }
+  };
+  std::vector<std::jthread> others;
+  for (std::size_t i = 1; i < threads; ++i) others.emplace_back(work);
+  work();
+  others.clear();
+  if (failure) std::rethrow_exception(failure);
+}
+
+/// Number of blocks that for_each_block makes.
+inline std::size_t block_count(std::size_t size, std::size_t block_size) { return (size + block_size - 1) / block_size; }
+
+}  // namespace skeletex
