@@ -71,6 +71,8 @@ EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command
     options.row_spacing = RowSpacing::kUniform;
     options.has_prefilter = false;
     options.has_unfold = false;
+    options.has_snap = false;
+    options.has_fit = false;
   }
   const auto is_given = [&](const char* name) { return command.count(name) > 0; };
   if (is_given("--iterations")) options.vsm.iterations = arguments.iterations;
@@ -79,8 +81,8 @@ EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command
   if (is_given("--rows")) options.row_spacing = arguments.rows == "uniform" ? RowSpacing::kUniform : RowSpacing::kSurfaceLength;
   if (arguments.has_no_prefilter) options.has_prefilter = false;
   if (arguments.has_no_unfold) options.has_unfold = false;
-  options.has_snap = arguments.is_snapped;
-  options.has_fit = arguments.is_fitted;
+  if (is_given("--snap")) options.has_snap = arguments.is_snapped;
+  if (is_given("--fit")) options.has_fit = arguments.is_fitted;
   if (is_given("--diagonals")) options.diagonals = arguments.diagonals == "smooth" ? DiagonalRule::kSmooth : DiagonalRule::kNearest;
   options.spd_hit = arguments.spd_hit == "first" ? SpdHit::kFirst : SpdHit::kLast;
   if (is_given("--share")) options.texel_share = arguments.share == "area" ? TexelShare::kArea : TexelShare::kTriangles;
@@ -270,19 +272,20 @@ void add_encode_command(CLI::App& program) {
   command.add_flag("--no-prefilter", a.has_no_prefilter, "texels exactly on the mesh, so that flat triangles lie inside its curved parts")
       ->group("Texels");
   command
-      .add_flag("--snap", a.is_snapped,
-                "texels sit on the mesh's own vertices and edges where they can; for more than 1 texel per vertex (default: an even lattice)")
+      .add_flag("--snap,!--no-snap", a.is_snapped,
+                "texels of VSM patches sit on the mesh's own vertices and edges where they can (default: from 2 texels per vertex on)")
       ->group("Texels");
   command
-      .add_flag("--fit", a.is_fitted, "points move so that the triangles between them are nearer to the mesh; instead of the prefilter (default: not)")
+      .add_flag("--fit,!--no-fit", a.is_fitted,
+                "their points move so that the triangles between them are nearer to the mesh; instead of the prefilter (default: up to 256 x 256 texels)")
       ->group("Texels");
   take_one_of(add("Texels", "--diagonals", a.diagonals,
                   "how the decoder cuts quads: nearest to the surface that texels around foretell, or smooth, going on best into the quads around; unless "
-                  "given: smooth with --snap or --fit, else nearest"),
+                  "given: smooth where texels are snapped or fitted, else nearest"),
               {"nearest", "smooth"});
   command
       .add_flag("--paper-recipe", a.is_paper_recipe,
-                "as the paper: --rows uniform --alpha 0 --iterations 1 --no-unfold --no-prefilter (rows, alpha and iterations can still be given)")
+                "as the paper: --rows uniform --alpha 0 --iterations 1 --no-unfold --no-prefilter --no-snap --no-fit (unfold and prefilter stay off, the others can still be given)")
       ->group("Texels");
   command.add_flag("--half", a.is_half, "16 bits a channel: half the file, but an error of some 2e-5 of the diagonal; for drafts")->group("File");
   take_one_of(add("File", "--compression", a.compression, "lossless compression of the file"), {"zip", "piz"});

@@ -85,7 +85,7 @@ void run(const Arguments& arguments) {
   add("B's surface to A", report.backward);
   add("A's vertices to B", report.vertex);
   std::string text = table.text() + fmt::format("symmetric surface mean {:.3e}, maximum {:.3e}; diagonal of A {:.6g}; {:.2f} s on {}\n",
-                                                (report.forward.mean + report.backward.mean) / 2, std::max(report.forward.max, report.backward.max),
+                                                symmetric_mean(report), std::max(report.forward.max, report.backward.max),
                                                 report.diagonal, report.seconds, context.device().name);
   if (!arguments.csv.empty()) text += fmt::format("{}: distances of A's vertices, in its units\n", arguments.csv);
   if (!arguments.ply.empty())

@@ -9,6 +9,7 @@
 //   encode_texels       positions                 -> texels in bone tangent space (along, around, out)
 #include "skeletex_structs.h"
 #include "map_triangle.h"
+#include "prefilter.h"
 
 // v at which the edge from (ua, va) to (ub, vb) crosses u; the caller has checked that it does.
 float crossing(float ua, float va, float ub, float vb, float u) {
@@ -195,37 +196,23 @@ kernel void place_points(const int count, global const int* restrict texels, glo
   z[texel] = from_z[i];
 }
 
-// NDRange (texture width, texture height). Inner rows that nothing holds move by -1/16 of their second differences in both lattice
-// directions, along the lattice normal; end rows stay.
+// NDRange (texture width, texture height). The prefilter, of inner rows that nothing holds; end rows stay.
 kernel void prefilter_positions(const int texture_width, const int texture_height, global const int* restrict texel_patches,
                                 global const PatchRecord* restrict patches, global const int* restrict anchors, global const float* restrict x, global const float* restrict y,
                                 global const float* restrict z, global float* restrict out_x, global float* restrict out_y, global float* restrict out_z) {
   const int column = (int)get_global_id(0), line = (int)get_global_id(1);
   if (column >= texture_width || line >= texture_height) return;
   const int texel = line * texture_width + column;
-  const float px = x[texel], py = y[texel], pz = z[texel];
-  float move = 0.0f, nx = 0.0f, ny = 0.0f, nz = 0.0f;
+  float px = x[texel], py = y[texel], pz = z[texel];
   const int patch = texel_patches[texel];
   if (patch >= 0) {
     global const PatchRecord* p = patches + patch;
     const int row = line - p->y, inner = column - p->x;
-    if (row > 0 && row < p->height - 1 && anchors[texel] == 0) {
-      const int left = texel - inner + (inner == 0 ? p->width - 1 : inner - 1);
-      const int right = texel - inner + (inner == p->width - 1 ? 0 : inner + 1);
-      const int below = texel - texture_width, above = texel + texture_width;
-      const float ux = x[above] - x[below], uy = y[above] - y[below], uz = z[above] - z[below];
-      const float vx = x[right] - x[left], vy = y[right] - y[left], vz = z[right] - z[left];
-      nx = vy * uz - vz * uy, ny = vz * ux - vx * uz, nz = vx * uy - vy * ux;
-      const float length2 = nx * nx + ny * ny + nz * nz;
-      const float dx = (x[above] - px) + (x[below] - px) + (x[right] - px) + (x[left] - px);
-      const float dy = (y[above] - py) + (y[below] - py) + (y[right] - py) + (y[left] - py);
-      const float dz = (z[above] - pz) + (z[below] - pz) + (z[right] - pz) + (z[left] - pz);
-      move = length2 > 0.0f ? -0.0625f * (dx * nx + dy * ny + dz * nz) / length2 : 0.0f;
-    }
+    if (row > 0 && row < p->height - 1 && anchors[texel] == 0)
+      prefilter_point(x, y, z, texel, texel - inner + (inner == 0 ? p->width - 1 : inner - 1), texel - inner + (inner == p->width - 1 ? 0 : inner + 1),
+                      texel - texture_width, texel + texture_width, &px, &py, &pz);
   }
-  out_x[texel] = px + move * nx;
-  out_y[texel] = py + move * ny;
-  out_z[texel] = pz + move * nz;
+  out_x[texel] = px, out_y[texel] = py, out_z[texel] = pz;
 }
 
 // NDRange (texture width, texture height).

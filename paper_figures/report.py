@@ -45,13 +45,13 @@ SECTIONS = [
      "and folds grow with the thickness of the body (shoulders of the armadillo)."),
     ("Beyond the paper: iterations of VSM", "iterations", sweeps.draw_iterations,
      "The paper's weights w A even out areas in the texture; divided by a power of the surface area they even out the texels on the surface."),
-    ("Beyond the paper: what the recipe's parts bring", "recipe", sweeps.draw_recipe, "The paper's own recipe, the default, and the default with one part taken back."),
+    ("Beyond the paper: what the recipe's parts bring", "recipe", sweeps.draw_recipe, "The paper's own recipe, the default, the default on an even lattice, and that with one part taken back."),
     ("Beyond the paper: other ways to as many vertices", "simplification", sweeps.draw_simplification,
      "A texture is about as good as a uniform remesh. A simplification puts its vertices where the surface bends, which an even lattice cannot."),
     ("Beyond the paper: error against bytes", "bytes", sweeps.draw_bytes,
      "Draco codes the input mesh alone and needs far fewer bytes. The texture pays for being editable: every texel is a displacement that can be posed, morphed and filtered."),
     ("Beyond the paper: time and memory against the number of triangles", "scale", scale.draw,
-     "encode as a whole command, files included, at 512 x 512: the armadillo remeshed or decimated, and subdivided. The dotted line is n log n through the fewest triangles beyond 100 000."),
+     "encode as a whole command, files included, at 512 x 512, even lattice: the armadillo remeshed or decimated, and subdivided. The dotted line is n log n through the fewest triangles beyond 100 000."),
 ]
 
 STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:72rem;margin:2rem auto;padding:0 1rem;color:#222}

@@ -446,7 +446,8 @@ TEST_F(Program, TakesThePapersRecipeAndItsPartsAlike) {
 }
 
 TEST_F(Program, SnapsTexelsAndSaysHowMany) {
-  const nlohmann::json snapped = json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64", "--snap"});
+  const nlohmann::json snapped = json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64", "--snap", "--no-fit"});
+  EXPECT_FALSE(snapped.contains("fit"));
   EXPECT_GT(snapped["snap"]["snapped_vertices"], 0);
   EXPECT_LE(snapped["snap"]["snapped_vertices"], snapped["snap"]["vertices"]);
   EXPECT_TRUE(json_of({"inspect", "a.skx.exr"})["encoder"]["snap"]);
@@ -456,7 +457,9 @@ TEST_F(Program, SnapsTexelsAndSaysHowMany) {
   const nlohmann::json header = json_of({"inspect", "a.skx.exr"});
   EXPECT_EQ(header["diagonals"], "smooth");
   EXPECT_EQ(header["encoder"]["fitted"]["residuals"], fitted["fit"]["residuals"]);
-  const nlohmann::json plain = json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64"});
+  const nlohmann::json chosen = json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64"});
+  EXPECT_TRUE(chosen.contains("fit"));
+  const nlohmann::json plain = json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64", "--no-snap", "--no-fit"});
   EXPECT_FALSE(plain.contains("snap") || plain.contains("fit"));
   EXPECT_FALSE(json_of({"inspect", "a.skx.exr"}).contains("diagonals"));
   EXPECT_EQ(json_of({"inspect", "y.ply", "--self-intersections"})["self_intersections"], 0);

@@ -103,8 +103,6 @@ Solved solve(const RandomPatch& patch, int sweeps, std::size_t group, float damp
           {c.download(move_x), c.download(move_y), c.download(move_z)}};
 }
 
-double symmetric_mean(const MetroReport& report) { return (report.forward.mean + report.backward.mean) / 2; }
-
 }  // namespace
 
 TEST(FitKernels, ASampleIsMatchedWithAPointOfTheLatticeAsNearAsTheTwinFinds) {
@@ -179,6 +177,7 @@ TEST(Fit, LowersTheResidualStepByStepAndTheMeanErrorWithIt) {
   const TestModel model = load_standard_model("bear");
   EncodeOptions options;
   options.width = options.height = 128;
+  options.has_snap = options.has_fit = false;
   const EncodeResult plain = encode_model(device(), model.mesh, model.skeleton, options);
   options.has_fit = true;
   const EncodeResult fitted = encode_model(device(), model.mesh, model.skeleton, options);
@@ -199,6 +198,7 @@ TEST(Fit, LeavesSeamsAndPolesBitForBitAndGivesTheSameModelTwice) {
   const TestModel model = load_standard_model("bear");
   EncodeOptions options;
   options.width = options.height = 96;
+  options.has_snap = options.has_fit = false;
   const SkeletexModel plain = encode_model(device(), model.mesh, model.skeleton, options).model;
   options.has_fit = true;
   const SkeletexModel fitted = encode_model(device(), model.mesh, model.skeleton, options).model;

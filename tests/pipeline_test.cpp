@@ -31,8 +31,6 @@ void expect_watertight(const TriangleMesh& mesh, int genus, const std::string& w
   EXPECT_GT(signed_volume(mesh), 0) << what;
 }
 
-double symmetric_mean(const MetroReport& report) { return (report.forward.mean + report.backward.mean) / 2; }
-
 }  // namespace
 
 class StandardModel : public testing::TestWithParam<const char*> {};
@@ -70,11 +68,11 @@ TEST_P(StandardModel, ComesBackClosedWithTexelsThatAreSnappedAndFitted) {
 
 INSTANTIATE_TEST_SUITE_P(All, StandardModel, testing::ValuesIn(kStandardModels), [](const auto& parameter) { return std::string(parameter.param); });
 
-TEST(Pipeline, ErrorFallsAsTheTextureGrowsAndStaysBelowTheIssuesFigures) {
+TEST(Pipeline, ErrorFallsAsTheTextureGrows) {
   ClContext context;
   const TestModel model = load_standard_model("bear");
   double last = 1;
-  for (const auto& [size, limit] : {std::pair{128, 1.5e-4}, std::pair{512, 1.15e-5}}) {
+  for (const auto& [size, limit] : {std::pair{128, 7e-5}, std::pair{512, 1e-6}}) {
     EncodeOptions options;
     options.width = options.height = size;
     const EncodeResult encoded = encode_model(context, model.mesh, model.skeleton, options);
@@ -93,6 +91,7 @@ TEST(Hybrid, StaysWithinHalfAsMuchAgainOfVsmWhereSpdLosesMost) {
       EncodeOptions options;
       options.method = method;
       options.width = options.height = 1024;
+      options.has_snap = false;  // which SPD cannot do
       return symmetric_mean(measure_metro(context, model.mesh, reconstruct_mesh(context, encode_model(context, model.mesh, model.skeleton, options).model)));
     };
     const double ratio = mean_error(EncodeMethod::kHybrid) / mean_error(EncodeMethod::kVsm);

@@ -95,8 +95,6 @@ Chart square_tube(int rows) {
   return chart;
 }
 
-double symmetric_mean(const MetroReport& report) { return (report.forward.mean + report.backward.mean) / 2; }
-
 }  // namespace
 
 TEST(SnapFeatures, OfASquareTubeAreItsFourEdgesAndTheVerticesOnThem) {
@@ -248,7 +246,7 @@ TEST(Snap, BringsABearToAThirdOfTheErrorWithoutFoldingIt) {
   const TestModel model = load_standard_model("bear");
   EncodeOptions options;
   options.width = options.height = 256;
-  options.has_snap = false;
+  options.has_snap = options.has_fit = false;
   const TriangleMesh plain = reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model);
   options.has_snap = true;
   const EncodeResult encoded = encode_model(device(), model.mesh, model.skeleton, options);
@@ -271,11 +269,24 @@ TEST(Snap, BringsABearToAThirdOfTheErrorWithoutFoldingIt) {
   EXPECT_EQ(encoded.model.texture.around, again.model.texture.around);
 }
 
-TEST(Snap, IsOffUnlessAskedFor) {
+TEST(Snap, AndFitAreOnWhereTheyPayUnlessToldOtherwise) {
   const TestModel model = load_standard_model("bear");
-  EncodeOptions options;
-  options.width = options.height = 128;
-  EXPECT_FALSE(encode_model(device(), model.mesh, model.skeleton, options).report.snap.has_value());
+  const auto reported = [&](int width, int height, const auto& change) {
+    EncodeOptions options;
+    options.width = width, options.height = height;
+    change(options);
+    const EncodeReport report = encode_model(device(), model.mesh, model.skeleton, options).report;
+    return std::pair{report.snap.has_value(), report.fit.has_value()};
+  };
+  const auto nothing = [](EncodeOptions&) {};
+  const int vertices = static_cast<int>(model.mesh.positions.size()), few = (2 * vertices - 1) / 128, enough = (2 * vertices + 127) / 128;
+  EXPECT_EQ(reported(128, few, nothing), std::pair(false, true));
+  EXPECT_EQ(reported(128, enough, nothing), std::pair(true, true));
+  EXPECT_EQ(reported(256, 257, nothing), std::pair(true, false));
+  EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.has_snap = false; }), std::pair(false, true));
+  EXPECT_EQ(reported(128, few, [](EncodeOptions& o) { o.has_snap = true, o.has_fit = false; }), std::pair(true, false));
+  EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.has_prefilter = false; }), std::pair(true, false));  // texels on the mesh were asked for
+  EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.method = EncodeMethod::kSpd; }), std::pair(false, false));
 }
 
 }  // namespace skeletex

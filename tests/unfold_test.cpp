@@ -140,6 +140,7 @@ TEST(Unfold, TakesMostSelfIntersectionsFromABearAndStaysOnIt) {
   const TestModel model = load_standard_model("bear");
   EncodeOptions options;
   options.width = options.height = 512;
+  options.has_snap = false;
   const EncodeResult encoded = encode_model(device(), model.mesh, model.skeleton, options);
   const UnfoldReport& report = encoded.report.unfold.value();
   EXPECT_GT(report.folded_quads, 10);

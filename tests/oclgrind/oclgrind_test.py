@@ -26,7 +26,7 @@ FREXP = "-Dfrexp(x,e)=((x)==0.0f?(*(e)=0,0.0f):(*(e)=ilogb(x)+1,ldexp((x),-ilogb
 LEFT_OUT = ("filter.cl:pick_vertices", "diffusion.cl:restrict_field", "diffusion.cl:add_coarse_field")
 
 MODELS = [("spd", "encode c.off c.skeleton.json -o s.skx.exr --size 12 --method spd"),
-          ("vsm", "encode rough.off c.skeleton.json -o v.skx.exr --size 12 --iterations 1 --diagonals smooth"),
+          ("vsm", "encode rough.off c.skeleton.json -o v.skx.exr --size 12 --iterations 1 --no-snap --no-fit --diagonals smooth"),
           ("snap", "encode rough.off c.skeleton.json -o n.skx.exr --size 9 --iterations 1 --snap --fit"),
           ("metro", "metro c.off rough.off --samples 300")]
 RESULTS = [("smooth", "filter s.skx.exr smooth -o f.ply --scale 0.00001"),
@@ -34,7 +34,7 @@ RESULTS = [("smooth", "filter s.skx.exr smooth -o f.ply --scale 0.00001"),
            ("larger", "lod s.skx.exr --size 18 -o l.skx.exr"),
            ("pose", "reconstruct v.skx.exr -o p.ply --pose p.json"),
            ("direction", "reconstruct v.skx.exr -o d.ply --pose p.json --no-distance"),
-           ("morph", "morph v.skx.exr s.skx.exr --t 0.3 -o m.ply"),
+           ("morph", "morph n.skx.exr s.skx.exr --t 0.3 -o m.ply"),
            ("transfer", "transfer s.skx.exr v.skx.exr --bones bc=bc --keep 0 --share 0.5 -o t.ply")]
 
 

@@ -17,7 +17,9 @@
 #include "skeletex/edit/orientation.h"
 #include "skeletex/edit/seam_network.h"
 #include "skeletex/edit/surface_map.h"
+#include "skeletex/model/encoder_settings.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/even_lattice.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/seam_strip.h"
 
@@ -263,7 +265,7 @@ Morph::Morph(ClContext& context, std::vector<SkeletexModel> models, std::span<co
   }
   DisplacementTexture all;
   for (SkeletexModel& model : models_) {
-    model = resample_model(context, model, size);
+    model = resample_model(context, even_lattice(context, model), size);
     traced_seams_.push_back(trace_seams(model));
     texel_begins_.push_back(static_cast<int>(all.out.size()));
     all.along.insert(all.along.end(), model.texture.along.begin(), model.texture.along.end());
@@ -328,8 +330,7 @@ std::unique_ptr<Morph::Between> Morph::between(std::span<const double> given, bo
 
   result.texture.width = layout.texture.width;
   result.texture.height = layout.texture.height;
-  nlohmann::json settings = nlohmann::json::parse(result.encoder_settings, nullptr, false);
-  if (!settings.is_object()) settings = nlohmann::json::object();
+  nlohmann::json settings = parsed_encoder_settings(result);
   settings["morphed"] = weights;
   result.encoder_settings = settings.dump();
   return between;

@@ -13,7 +13,8 @@ namespace skeletex {
 
 struct MorphOptions {
   /// Number of the model whose bones (names, order, directions), rectangles and seam samples the result takes. Default:
-  /// that of the largest weight, so that a morph that ends at a model ends at its very texels; of several the first.
+  /// that of the largest weight, so that a morph that ends at a model ends at its very texels (of a snapped one: see
+  /// even_lattice); of several the first.
   std::optional<int> layout;
   int size = 0;  ///< longer side of the result's texture; 0: the largest of the models'
   bool is_smooth = true;  ///< at(): without creases where bones of different turns meet (orientation.h)

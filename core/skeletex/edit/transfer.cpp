@@ -18,6 +18,7 @@
 #include "skeletex/edit/part.h"
 #include "skeletex/measure/folds.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/even_lattice.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 
 namespace skeletex {
@@ -277,7 +278,9 @@ class Laying {
  public:
   Laying(ClContext& context, const SkeletexModel& source, const SkeletexModel& target, const TransferOptions& options)
       : context_(context), source_(source), target_(target), options_(options), walls_(target.skeleton), source_walls_(source.skeleton),
-        source_points_(points_in_bone_axes(context, source)), target_points_(points_in_bone_axes(context, target)), source_host_(context, source_points_), target_host_(context, target_points_),
+        even_source_(even_lattice(context, source)), even_target_(even_lattice(context, target)),
+        source_points_(points_in_bone_axes(context, even_source_)), target_points_(points_in_bone_axes(context, even_target_)),
+        source_host_(context, source_points_), target_host_(context, target_points_),
         source_first_(first_points(source.patches)), target_first_(first_points(target.patches)), part_of_(target.patches.size(), {nullptr, 0}), gaps_(target.patches.size()) {}
 
   void add(PartTransfer& part) {
@@ -321,10 +324,10 @@ class Laying {
     result.texture.out = context_.download(texels.z);
     if (options_.blend != TransferBlend::kCosine || !options_.is_smooth) return result;
     if (std::none_of(parts.begin(), parts.end(), [&](const auto& part) { return needs_join(*part); })) return result;
-    const HostPoints read(context_, read_part(context_, tables_, frames_, row_points(context_, source_, source_walls_), point_count_));
+    const HostPoints read(context_, read_part(context_, tables_, frames_, row_points(context_, even_source_, source_walls_), point_count_));
     for (const auto& part : parts) {
       if (!needs_join(*part)) continue;
-      SkeletexModel joined = join_surface(context_, target_, result, placed_patches(*part, laid, read), part->join_distance() / target_.diagonal);
+      SkeletexModel joined = join_surface(context_, even_target_, result, placed_patches(*part, laid, read), part->join_distance() / target_.diagonal);
       // Parts that bring a good deal of their body along may be too far from where they shall be to be bent there.
       if (folded_edges(joined) <= kMostFolds * folded_edges(result) + kMoreFolds * static_cast<double>(point_count_)) result = std::move(joined);
     }
@@ -662,6 +665,7 @@ class Laying {
   const SkeletexModel &source_, &target_;
   TransferOptions options_;
   Walls walls_, source_walls_;
+  SkeletexModel even_source_, even_target_;  ///< what is mixed: see even_lattice
   DevicePlanes source_points_, target_points_;
   HostPoints source_host_, target_host_;
   std::vector<std::size_t> source_first_, target_first_, result_first_;

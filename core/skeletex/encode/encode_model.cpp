@@ -21,6 +21,9 @@
 namespace skeletex {
 namespace {
 
+constexpr std::size_t kSnapTexelsPerVertex = 2;     // with fewer, vertices pull texels about without making edges between them
+constexpr std::size_t kMostFitTexels = 256 * 256;  // beyond that the fit gains little, and takes longest
+
 class Stopwatch {
  public:
   /// Milliseconds since construction or the last call.
@@ -54,6 +57,14 @@ std::vector<Method> choose_methods(const EncodeOptions& options, const Skeleton&
     for (std::size_t bone = 0; bone < methods.size(); ++bone)
       if (skeleton.bones[bone].name == name) methods[bone] = method;
   return methods;
+}
+
+/// SPD patches are neither snapped nor fitted.
+TexelOptions choose_texel_options(const EncodeOptions& options, const TriangleMesh& mesh, bool is_all_spd) {
+  const auto texels = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  const bool has_snap = !is_all_spd && options.has_snap.value_or(texels >= kSnapTexelsPerVertex * mesh.positions.size());
+  const bool has_fit = !is_all_spd && options.has_fit.value_or(options.has_prefilter && texels <= kMostFitTexels);
+  return {.has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_snap = has_snap, .has_fit = has_fit};
 }
 
 /// The rays' own points on an even lattice in u: how surface length grows along an SPD patch.
@@ -211,8 +222,8 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
                                                                     : spread_rows_uniformly(patch.rectangle.height);
     model.patches.push_back(std::move(patch));
   }
-  const TexelOptions texel_options{.has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_snap = options.has_snap, .has_fit = options.has_fit};
-  model.diagonals = options.diagonals.value_or(options.has_snap || options.has_fit ? DiagonalRule::kSmooth : DiagonalRule::kNearest);
+  const TexelOptions texel_options = choose_texel_options(options, mesh, is_all_spd);
+  model.diagonals = options.diagonals.value_or(texel_options.has_snap || texel_options.has_fit ? DiagonalRule::kSmooth : DiagonalRule::kNearest);
   Seams seams = sample_seams(segmentation, skeleton, walls, layout.rectangles, texel_options.has_snap ? SeamSampling::kSnapped : SeamSampling::kEven);
   model.arcs = std::move(seams.arcs);
   model.corners = std::move(seams.corners);

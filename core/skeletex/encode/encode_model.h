@@ -31,10 +31,11 @@ struct EncodeOptions {
   RowSpacing row_spacing = RowSpacing::kSurfaceLength;
   bool has_prefilter = true;
   bool has_unfold = true;  ///< see unfold_lattice; snapping and fit start from the lattice that it leaves
-  /// Texels sit on the mesh's own vertices and edges where they can (docs/snap.md). Pays from 2 texels per vertex on.
-  bool has_snap = false;
-  /// Points move so that the flat triangles between them are nearer to the mesh (docs/snap.md). Takes the prefilter's place.
-  bool has_fit = false;
+  /// Texels of VSM patches sit on the mesh's own vertices and edges where they can (docs/snap.md). Default: from 2 texels per vertex on.
+  std::optional<bool> has_snap;
+  /// Their points move so that the flat triangles between them are nearer to the mesh (docs/snap.md). Takes the prefilter's place.
+  /// Default: with the prefilter, up to 256 x 256 texels.
+  std::optional<bool> has_fit;
   std::optional<DiagonalRule> diagonals;  ///< default: smooth with snapping or fit, else nearest
   std::optional<TexelShare> texel_share;  ///< default: area for all-SPD models, triangles otherwise
   /// Called with a stage's name and the share of work done; returning false cancels by throwing Error.

@@ -27,6 +27,8 @@ struct MetroReport {
   std::vector<float> vertex_distances;  ///< per vertex of A, world units
   double seconds = 0;
 };
+/// The mean of both directions, as resolution studies plot it.
+inline double symmetric_mean(const MetroReport& report) { return (report.forward.mean + report.backward.mean) / 2; }
 
 /// Distances between two surfaces as the metro tool (Cignoni et al. 1998) and the paper measure them, on the device.
 /// Deterministic: the points are a low-discrepancy set over each triangle, in numbers that follow its area.

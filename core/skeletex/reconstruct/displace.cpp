@@ -41,6 +41,17 @@ DeviceTables upload_tables(ClContext& context, const FrameTables& tables) {
   return {context.upload(tables.patches), context.upload(tables.rows), context.upload(columns), static_cast<int>(count)};
 }
 
+FrameTables in_bone_axes(FrameTables tables) {
+  for (PatchRecord& record : tables.patches)
+    for (int i = 0; i < 3; ++i) {
+      record.head[i] = 0;
+      record.s[i] = i == 0;
+      record.b[i] = i == 1;
+      record.axis[i] = i == 2;
+    }
+  return tables;
+}
+
 DeviceLattice upload_lattice(ClContext& context, const FrameTables& tables, const std::vector<Patch>& patches, const DisplacementTexture& texture,
                              RowChoice choice) {
   DeviceLattice lattice;

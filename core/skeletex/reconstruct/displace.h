@@ -35,6 +35,10 @@ struct DeviceTables {
 };
 DeviceTables upload_tables(ClContext& context, const FrameTables& tables);
 
+/// Tables whose points come out in each bone's own axes (from H along s, b, o): there filters and the way back into
+/// tangent space need no world coordinates, and rounding is relative to the bone.
+FrameTables in_bone_axes(FrameTables tables);
+
 /// What the device needs to turn texels into points: texels, tables and the rows to do.
 struct DeviceLattice {
   int texture_width = 0;

@@ -5,8 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include <nlohmann/json.hpp>
-
+#include "skeletex/model/encoder_settings.h"
 #include "skeletex/model/frame.h"
 #include "skeletex/pack/pack_atlas.h"
 #include "skeletex/reconstruct/displace.h"
@@ -210,12 +209,6 @@ constexpr float kLargestFit = 0.25f;
 /// The encoder's prefilter moves texels by -1/16 of their second differences.
 constexpr double kPrefilter = 1.0 / 16;
 
-/// The encoder's record of what it did; empty where it left none.
-nlohmann::json settings_of(const SkeletexModel& model) {
-  nlohmann::json settings = nlohmann::json::parse(model.encoder_settings, nullptr, false);
-  return settings.is_object() ? settings : nlohmann::json::object();
-}
-
 /// Rows of the new rectangle at the same share of the way between the old ones.
 std::vector<double> scale_row_u(const std::vector<double>& row_u, int height) {
   const int last = static_cast<int>(row_u.size()) - 1;
@@ -247,19 +240,6 @@ std::vector<Patch> scale_patches(const SkeletexModel& model, int width, int heig
   return patches;
 }
 
-/// Tables whose points come out in each bone's own axes (from H along s, b, o): there filters and the way back into
-/// tangent space need no world coordinates, and rounding is relative to the bone.
-FrameTables in_bone_axes(FrameTables tables) {
-  for (PatchRecord& record : tables.patches)
-    for (int i = 0; i < 3; ++i) {
-      record.head[i] = 0;
-      record.s[i] = i == 0;
-      record.b[i] = i == 1;
-      record.axis[i] = i == 2;
-    }
-  return tables;
-}
-
 /// The taps of one axis for all patches behind each other.
 void append_taps(const FilterTaps& more, FilterTaps& taps) {
   for (std::array<int, 4> tap : more.taps) {
@@ -274,7 +254,7 @@ struct LatticeTaps {
   FilterTaps rows, columns;
 };
 LatticeTaps lattice_taps(const SkeletexModel& model, const std::vector<Patch>& patches, ResampleFilter filter) {
-  const double softness = settings_of(model).value("prefilter", false) ? kPrefilter : 0;
+  const double softness = parsed_encoder_settings(model)["prefilter"] == true ? kPrefilter : 0;
   LatticeTaps taps;
   for (std::size_t bone = 0; bone < patches.size(); ++bone) {
     const Rectangle &from = model.patches[bone].rectangle, &to = patches[bone].rectangle;
@@ -394,8 +374,9 @@ SkeletexModel resample_model(ClContext& context, const SkeletexModel& model, int
     arc = resample_arc(model, walls, arc, std::max(arc.is_closed() ? 3 : 2, static_cast<int>(std::lround(old_cells * ratio))));
   }
   // For the record, and because a fit straddles the surface as prefiltered texels do.
-  nlohmann::json settings = settings_of(model);
+  nlohmann::json settings = parsed_encoder_settings(model);
   settings["prefilter"] = true;
+  settings["snap"] = settings["fit"] = false;
   settings["resampled_from"] = {model.texture.width, model.texture.height};
   result.encoder_settings = settings.dump();
   return result;

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <nlohmann/json.hpp>
+
+#include "skeletex/model/texture.h"
+
+namespace skeletex {
+
+/// SkeletexModel::encoder_settings, parsed; an empty object where it is none.
+inline nlohmann::json parsed_encoder_settings(const SkeletexModel& model) {
+  nlohmann::json settings = nlohmann::json::parse(model.encoder_settings, nullptr, false);
+  return settings.is_object() ? settings : nlohmann::json::object();
+}
+
+}  // namespace skeletex
