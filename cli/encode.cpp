@@ -7,6 +7,7 @@
 #include <future>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include "command.h"
 #include "progress_bar.h"
@@ -178,13 +179,27 @@ std::string report_text(const EncodeReport& report, const EncodeOptions& options
       static_cast<double>(std::filesystem::file_size(output, ignored)) / (1 << 20));
 }
 
+struct Input {
+  TriangleMesh mesh;
+  Skeleton skeleton;
+};
+
+Input read_input(const Arguments& arguments, const EncodeOptions& options) {
+  Input input{load_mesh(arguments.mesh), read_skeleton(arguments.skeleton)};
+  check_bone_names(arguments, options, input.skeleton);
+  require_valid(input.mesh, input.skeleton);
+  return input;
+}
+
 void run(const Arguments& arguments, const CLI::App& command) {
   EncodeOptions options = encode_options(arguments, command);
   Stopwatch watch;
   check_output(arguments.output);
   check_json_target(arguments.json);
-  // A driver takes as long to load as the mesh. It stays on this thread, as some keep state per thread.
-  auto reading = std::async(std::launch::async, [&] { return load_mesh(arguments.mesh); });
+  std::optional<ProgressBar> bar(std::in_place);
+  bar->show("reading and checking the input", 0);
+  // A driver takes as long to load as the input. It stays on this thread, as some keep state per thread.
+  auto reading = std::async(std::launch::async, [&] { return read_input(arguments, options); });
   std::unique_ptr<ClContext> loaded;
   std::exception_ptr no_device;
   try {
@@ -193,26 +208,19 @@ void run(const Arguments& arguments, const CLI::App& command) {
   } catch (...) {
     no_device = std::current_exception();
   }
-  TriangleMesh mesh = reading.get();
-  const Skeleton skeleton = read_skeleton(arguments.skeleton);
-  check_bone_names(arguments, options, skeleton);
+  const Input input = reading.get();
   if (no_device) std::rethrow_exception(no_device);
   ClContext& context = *loaded;
-  EncodeResult result;
-  {
-    ProgressBar bar;
-    bar.show("checking the input", 0);
-    require_valid(mesh, skeleton);
-    options.progress = [&](const std::string& stage, double done) {
-      bar.show(stage, done);
-      return true;
-    };
-    result = encode_model(context, mesh, skeleton, options);
-    bar.show("writing", 1);
-    write_model(arguments.output, result.model,
-                {.format = arguments.is_half ? TexelFormat::kHalf : TexelFormat::kFloat,
-                 .compression = arguments.compression == "piz" ? ExrCompression::kPiz : ExrCompression::kZip});
-  }
+  options.progress = [&](const std::string& stage, double done) {
+    bar->show(stage, done);
+    return true;
+  };
+  const EncodeResult result = encode_model(context, input.mesh, input.skeleton, options);
+  bar->show("writing", 1);
+  write_model(arguments.output, result.model,
+              {.format = arguments.is_half ? TexelFormat::kHalf : TexelFormat::kFloat,
+               .compression = arguments.compression == "piz" ? ExrCompression::kPiz : ExrCompression::kZip});
+  bar.reset();
   for (const BoneReport& bone : result.report.bones) {
     if (bone.flipped_triangles > 0) warn(fmt::format("bone \"{}\": {} triangles are flipped in its map", bone.name, bone.flipped_triangles));
     if (bone.method == Method::kSpd && bone.unseen_area_fraction > EncodeOptions{}.hybrid_unseen_threshold)
