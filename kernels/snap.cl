@@ -302,63 +302,63 @@ int is_bad_quad(global const PatchRecord* restrict p, int texture_width, int col
          (is_turned(now[1], now[2], now[3], normal) && !is_turned(even[1], even[2], even[3], normal));
 }
 
-// NDRange (4 x changed_count). The list of bad quads among the four at each of a list of texels; their order is any.
-// out  is_bad: 1 for those of the list; counts[0]: how many they are
-kernel void find_bad_around(const int changed_count, const int texture_width, global const int* restrict changed, global const int* restrict texel_patches,
+// Both kernels take the length of their list from the device, so that a launch need not wait for the one before: NDRange any.
+// The list of bad quads among the four at each of a list of texels; their order is any.
+// in   counts[in]: how many texels there are
+// out  is_bad: 1 for those of the list; counts[in + 1]: how many they are, 0 before
+kernel void find_bad_around(const int in, const int texture_width, global const int* restrict changed, global const int* restrict texel_patches,
                             global const PatchRecord* restrict patches, global const float* restrict offset_x, global const float* restrict offset_y,
                             global const float* restrict even_x, global const float* restrict even_y, global const float* restrict even_z,
                             global const float* restrict x, global const float* restrict y, global const float* restrict z, global int* restrict is_bad,
                             global int* restrict bad, global int* restrict counts) {
-  const int i = (int)get_global_id(0);
-  if (i >= 4 * changed_count) return;
-  const int texel = changed[i >> 2];
-  global const PatchRecord* p = patches + texel_patches[texel];
-  const int line = texel / texture_width;
-  const int from = texel - line * texture_width - p->x - (i & 1);
-  const int column = from < 0 ? from + p->width : from, row = line - p->y - ((i >> 1) & 1);
-  const int quad = texel_at(p, texture_width, column, row);
-  if (!is_bad_quad(p, texture_width, column, row, offset_x, offset_y, even_x, even_y, even_z, x, y, z)) return;
-  if (atomic_xchg(is_bad + quad, 1) == 0) bad[atomic_inc(counts)] = quad;
+  for (int i = (int)get_global_id(0), count = 4 * counts[in]; i < count; i += (int)get_global_size(0)) {
+    const int texel = changed[i >> 2];
+    global const PatchRecord* p = patches + texel_patches[texel];
+    const int line = texel / texture_width;
+    const int from = texel - line * texture_width - p->x - (i & 1);
+    const int column = from < 0 ? from + p->width : from, row = line - p->y - ((i >> 1) & 1);
+    const int quad = texel_at(p, texture_width, column, row);
+    if (is_bad_quad(p, texture_width, column, row, offset_x, offset_y, even_x, even_y, even_z, x, y, z) && atomic_xchg(is_bad + quad, 1) == 0)
+      bad[atomic_inc(counts + in + 1)] = quad;
+  }
 }
 
-// NDRange (4 x quad_count). The texels of bad quads go back as well. What a texel does here does not depend on others, so
+// The texels of bad quads go back as well. What a texel does here does not depend on others, so
 // that their order is any.
-// before_x, before_y, before_z: where they were; is_back: BACK for texels that have gone back, TAKEN for those that were there
-// out  changed: the list of texels that have gone back now; counts[1]: how many they are; is_bad: 0 again
-kernel void put_back(const int quad_count, const int texture_width, global const int* restrict bad, global const int* restrict texel_patches,
-                     global const PatchRecord* restrict patches, global const float* restrict before_x, global const float* restrict before_y, global const float* restrict before_z, global const float* restrict home_x,
-                     global const float* restrict home_y, global int* restrict is_bad,
-                     global int* restrict is_back, global int* restrict anchors, global float* restrict offset_x, global float* restrict offset_y,
-                     global float* restrict x, global float* restrict y, global float* restrict z, global int* restrict changed,
-                     global int* restrict counts) {
-  const int i = (int)get_global_id(0);
-  if (i >= 4 * quad_count) return;
-  const int quad = bad[i >> 2];
-  is_bad[quad] = 0;
-  global const PatchRecord* p = patches + texel_patches[quad];
-  const int line = quad / texture_width, row = line - p->y + ((i >> 1) & 1);
-  if (row < 1 || row > p->height - 2) return;
-  const int texel = texel_at(p, texture_width, quad - line * texture_width - p->x + (i & 1), row);
-  if (atomic_cmpxchg(is_back + texel, 0, TAKEN) != 0) return;
-  if (x[texel] == before_x[texel] && y[texel] == before_y[texel] && z[texel] == before_z[texel]) return;
-  x[texel] = before_x[texel];
-  y[texel] = before_y[texel];
-  z[texel] = before_z[texel];
-  offset_x[texel] = home_x[texel];
-  offset_y[texel] = home_y[texel];
-  anchors[texel] = 0;
-  atomic_xchg(is_back + texel, BACK);
-  changed[atomic_inc(counts + 1)] = texel;
+// in   counts[in]: how many quads there are; before_x, before_y, before_z: where they were; is_back: BACK for texels that have gone back, TAKEN for those that were there
+// out  changed: the list of texels that have gone back now; counts[in + 1]: how many they are, 0 before; is_bad: 0 again
+kernel void put_back(const int in, const int texture_width, global const int* restrict bad, global const int* restrict texel_patches,
+                     global const PatchRecord* restrict patches, global const float* restrict before_x, global const float* restrict before_y,
+                     global const float* restrict before_z, global const float* restrict home_x, global const float* restrict home_y,
+                     global int* restrict is_bad, global int* restrict is_back, global int* restrict anchors, global float* restrict offset_x,
+                     global float* restrict offset_y, global float* restrict x, global float* restrict y, global float* restrict z,
+                     global int* restrict changed, global int* restrict counts) {
+  for (int i = (int)get_global_id(0), count = 4 * counts[in]; i < count; i += (int)get_global_size(0)) {
+    const int quad = bad[i >> 2];
+    is_bad[quad] = 0;
+    global const PatchRecord* p = patches + texel_patches[quad];
+    const int line = quad / texture_width, row = line - p->y + ((i >> 1) & 1);
+    if (row < 1 || row > p->height - 2) continue;
+    const int texel = texel_at(p, texture_width, quad - line * texture_width - p->x + (i & 1), row);
+    if (atomic_cmpxchg(is_back + texel, 0, TAKEN) != 0) continue;
+    if (x[texel] == before_x[texel] && y[texel] == before_y[texel] && z[texel] == before_z[texel]) continue;
+    x[texel] = before_x[texel], y[texel] = before_y[texel], z[texel] = before_z[texel];
+    offset_x[texel] = home_x[texel], offset_y[texel] = home_y[texel];
+    anchors[texel] = 0;
+    atomic_xchg(is_back + texel, BACK);
+    changed[atomic_inc(counts + in + 1)] = texel;
+  }
 }
 
 // NDRange (texture width, texture height). Texels with a mark go back, those on vertices only when `with_vertices` says so.
+// out  changed: their list; count: how many they are, 0 before
 kernel void put_marked_back(const int texture_width, const int texture_height, const int with_vertices, global const int* restrict marks,
                             global const int* restrict texel_patches,
                             global const PatchRecord* restrict patches, global const float* restrict before_x, global const float* restrict before_y,
                             global const float* restrict before_z, global const float* restrict home_x, global const float* restrict home_y,
                             global int* restrict is_back, global int* restrict anchors, global float* restrict offset_x, global float* restrict offset_y,
                             global float* restrict x, global float* restrict y, global float* restrict z, global int* restrict changed,
-                            global int* restrict counts) {
+                            global int* restrict count) {
   const int across = (int)get_global_id(0), line = (int)get_global_id(1);
   if (across >= texture_width || line >= texture_height) return;
   const int texel = line * texture_width + across;
@@ -371,5 +371,5 @@ kernel void put_marked_back(const int texture_width, const int texture_height, c
   x[texel] = before_x[texel], y[texel] = before_y[texel], z[texel] = before_z[texel];
   offset_x[texel] = home_x[texel], offset_y[texel] = home_y[texel];
   anchors[texel] = 0;
-  changed[atomic_inc(counts + 1)] = texel;
+  changed[atomic_inc(count)] = texel;
 }

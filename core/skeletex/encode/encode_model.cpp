@@ -143,6 +143,13 @@ void prepare_encoding(ClContext& context, const EncodeOptions& options) {
   if (options.method != EncodeMethod::kSpd) context.prepare(vsm_kernel(context, options.vsm));
   context.prepare({"encode.cl", "encode_texels"});
   if (options.method != EncodeMethod::kSpd && options.has_unfold) context.prepare({"unfold.cl", "find_folds"});
+  if (options.has_snap || options.has_fit) {
+    context.prepare({"snap.cl", "place_snapped"});
+    context.prepare({"reconstruct.cl", "triangulate_smoothly"});
+    context.prepare({"guard.cl", "suspect_quads"});
+    context.prepare({"metro.cl", "find_nearest_triangles"});
+    if (options.has_fit) context.prepare({"fit.cl", "read_samples"});
+  }
 }
 
 EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& input_skeleton, const EncodeOptions& options) {

@@ -140,16 +140,12 @@ class Distances {
     std::vector<char> is_held(maps_.x.size, 0);
     for (const int anchor : anchors)
       if (anchor > 0) is_held[features.vertices[anchor - 1].point] = 1;
-    std::vector<int> points, patches;
+    std::vector<int> points, patches, asked;  // asked: of placed_
     std::vector<float> places;
-    std::vector<std::size_t> at_ends;
-    std::vector<Vec3> end_points;
-    for (const PlacedVertex& vertex : placed_) {
+    for (std::size_t i = 0; i < placed_.size(); ++i) {
+      const PlacedVertex& vertex = placed_[i];
       if (is_held[vertex.point]) continue;
-      if (vertex.y < 2 || vertex.y > static_cast<float>(sources_.model.patches[vertex.patch].rectangle.height - 3)) {
-        at_ends.push_back(points.size());
-        end_points.push_back(sources_.charts[vertex.patch].positions[vertex.point - maps_.first_vertex[vertex.patch]]);
-      }
+      asked.push_back(static_cast<int>(i));
       points.push_back(vertex.point), patches.push_back(vertex.patch);
       places.push_back(vertex.x), places.push_back(vertex.y);
     }
@@ -159,29 +155,39 @@ class Distances {
     context_.launch({"guard.cl", "measure_vertices"}, over(points.size()), static_cast<int>(points.size()), limit * limit, context_.upload(points),
                     context_.upload(patches), context_.upload(places), layout_.patches, first_quads_, lattice.device_triangles(), maps_.x, maps_.y,
                     maps_.z, lattice.device_points().x, lattice.device_points().y, lattice.device_points().z, device_distances, device_nearest);
-    std::vector<float> distances2 = context_.download(device_distances);
-    std::vector<int> nearest = context_.download(device_nearest);
-    if (!at_ends.empty()) {
-      // Strips at seams, and fans.
-      const TriangleMesh& mesh = lattice.mesh();
-      TriangleMesh ends;
-      const int first = 2 * lattice.lattice().quad_count;
-      for (std::size_t i = static_cast<std::size_t>(first); i < mesh.triangles.size(); ++i) {
-        const int corner = static_cast<int>(ends.positions.size());
-        for (const int vertex : mesh.triangles[i]) ends.positions.push_back(mesh.positions[vertex]);
-        ends.triangles.push_back({corner, corner + 1, corner + 2});
-      }
-      NearestSearch search(context_, build_triangle_tree(ends));
-      std::vector<int> triangles(end_points.size());
-      std::vector<float> distances(end_points.size());
-      search.find(end_points, triangles, distances);
-      for (std::size_t k = 0; k < at_ends.size(); ++k)
-        if (distances[k] * distances[k] < distances2[at_ends[k]])
-          distances2[at_ends[k]] = distances[k] * distances[k], nearest[at_ends[k]] = first + triangles[k];
-    }
+    const std::vector<float> distances2 = context_.download(device_distances);
+    const std::vector<int> nearest = context_.download(device_nearest);
     std::vector<int> far;
-    for (std::size_t i = 0; i < nearest.size(); ++i)
-      if (distances2[i] > limit * limit) far.push_back(nearest[i]);
+    std::vector<std::size_t> at_ends;
+    std::vector<Vec3> end_points;
+    for (std::size_t i = 0; i < nearest.size(); ++i) {
+      if (distances2[i] <= limit * limit) continue;
+      const PlacedVertex& vertex = placed_[asked[i]];
+      if (vertex.y < 2 || vertex.y > static_cast<float>(sources_.model.patches[vertex.patch].rectangle.height - 3)) {
+        at_ends.push_back(i);
+        end_points.push_back(sources_.charts[vertex.patch].positions[vertex.point - maps_.first_vertex[vertex.patch]]);
+      } else {
+        far.push_back(nearest[i]);
+      }
+    }
+    if (at_ends.empty()) return far;
+    // Strips at seams, and fans, can be nearer.
+    const TriangleMesh& mesh = lattice.mesh();
+    const int first = 2 * lattice.lattice().quad_count;
+    TriangleMesh ends;
+    for (std::size_t i = static_cast<std::size_t>(first); i < mesh.triangles.size(); ++i) {
+      const int corner = static_cast<int>(ends.positions.size());
+      for (const int vertex : mesh.triangles[i]) ends.positions.push_back(mesh.positions[vertex]);
+      ends.triangles.push_back({corner, corner + 1, corner + 2});
+    }
+    NearestSearch search(context_, build_triangle_tree(ends));
+    std::vector<int> triangles(end_points.size());
+    std::vector<float> distances(end_points.size());
+    search.find(end_points, triangles, distances);
+    for (std::size_t k = 0; k < at_ends.size(); ++k) {
+      const bool is_nearer = distances[k] * distances[k] < distances2[at_ends[k]];
+      if (!is_nearer || distances[k] > limit) far.push_back(is_nearer ? first + triangles[k] : nearest[at_ends[k]]);
+    }
     return far;
   }
 
@@ -348,7 +354,7 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
     marks.clear();
     const auto pairs = pass == 0 ? crossings.find(mesh) : crossings.find(mesh, changed);
     if (pass == 0 && pairs.size() > kManyPairs) {
-      const auto even_pairs = crossings.find_around(pairs, even_lattice.mesh());
+      const auto even_pairs = crossings.find_around(pairs, mesh, even_lattice.mesh());
       for (const auto& pair : even_pairs)
         for (const int triangle : pair) even_faults.add(even_lattice.mesh().triangles[triangle], kTolerance);
       const auto near = std::count_if(pairs.begin(), pairs.end(), is_pair_near_even_fault);

@@ -2,6 +2,7 @@
 #include "skeletex/encode/read_texels.h"
 
 #include <algorithm>
+#include <future>
 #include <limits>
 
 namespace skeletex {
@@ -155,6 +156,9 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   ReadingPositions positions = even_positions(context, layout);
 
   const DeviceMaps maps = upload_maps(context, sources.charts, sources.patches, origin);
+  const bool is_snapped = options.has_snap && maps.triangle_count > 0, is_fitted = options.has_fit && maps.triangle_count > 0;
+  std::future<SnapFeatures> finding_features;
+  if (is_snapped) finding_features = std::async(std::launch::async, [&] { return find_features(sources.charts, sources.patches, options.snap_dihedral); });
   auto covering = context.allocate<int>(texels);
   auto is_read = context.allocate<int>(std::max(1, maps.triangle_count));
   context.fill(is_read, 0);
@@ -202,13 +206,12 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   }
   place_end_rows(context, sources, texture_width, origin, points);
 
-  const bool is_snapped = options.has_snap && maps.triangle_count > 0, is_fitted = options.has_fit && maps.triangle_count > 0;
   if (options.has_unfold && maps.triangle_count > 0) {
     result.report.unfold = unfold_lattice(context, layout, maps, covering, [&](ClBuffer<int>& walkers) { walk(walkers), read(walkers); }, positions, points);
     copy_plane(context, positions.x, positions.home_x), copy_plane(context, positions.y, positions.home_y);
   }
   const TexelPoints even = points;
-  const SnapFeatures features = is_snapped ? find_features(sources.charts, sources.patches, options.snap_dihedral) : SnapFeatures{};
+  const SnapFeatures features = finding_features.valid() ? finding_features.get() : SnapFeatures{};
   ClBuffer<int> even_covering = covering;
   if (is_snapped || is_fitted) points = copy_points(context, even);
   int put_back = 0;

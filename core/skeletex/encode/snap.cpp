@@ -20,6 +20,8 @@ constexpr int kEdgeRounds = 2;          // what one round has moved lets texels 
 constexpr double kFlat = 1e-6;          // radians: what rounding may make of a flat edge
 constexpr double kFullDihedral = 0.5;   // radians: edges this sharp attract texels fully
 constexpr int kRoundsBetweenReads = 3;  // of claims, between two looks at how many wait
+constexpr int kRoundsBetweenLooks = 6;  // of quads that fold, between two looks at whether there are any
+constexpr int kAtOnce = 1024;           // work-items for these
 constexpr double kLargestOffer = 8;     // cells: what lies further is rounded down to it
 constexpr int kNoOffer = std::numeric_limits<int>::max();  // as in snap.cl
 constexpr int kBack = 2;
@@ -238,22 +240,26 @@ std::vector<int> put_back_marked(ClContext& context, const DeviceLayout& layout,
                     bool with_vertices, ReadingPositions& positions, TexelPoints& points) {
   auto is_bad = context.allocate<int>(layout.size()), is_back = context.allocate<int>(layout.size());
   auto bad = context.allocate<int>(layout.size()), changed = context.allocate<int>(layout.size());
-  auto counts = context.allocate<int>(2);  // of the lists of bad quads and of changed texels
-  context.fill(is_bad, 0), context.fill(is_back, 0), context.fill(counts, 0);
+  // How many texels have gone back, quads at them are bad, texels of these have gone back, and so on.
+  std::vector<int> counts(2 * kRoundsBetweenLooks + 1, 0);
+  auto device_counts = context.upload(counts);
+  context.fill(is_bad, 0), context.fill(is_back, 0);
   context.launch({"snap.cl", "put_marked_back"}, layout.range(), layout.width, layout.height, static_cast<int>(with_vertices), marks, layout.texel_patches,
                  layout.patches, before.x, before.y, before.z, positions.home_x, positions.home_y, is_back, positions.anchors, positions.x, positions.y,
-                 points.x, points.y, points.z, changed, counts);
+                 points.x, points.y, points.z, changed, device_counts);
   // Texels only ever go back, so this ends.
-  for (int waiting = context.download(counts)[1]; waiting > 0; waiting = context.download(counts)[1]) {
-    context.fill(counts, 0);
-    context.launch({"snap.cl", "find_bad_around"}, over(4 * waiting), waiting, layout.width, changed, layout.texel_patches, layout.patches, positions.x,
-                   positions.y, even.x, even.y, even.z, points.x, points.y, points.z, is_bad, bad, counts);
-    const int quads = context.download(counts)[0];
-    if (quads == 0) break;
-    context.launch({"snap.cl", "put_back"}, over(4 * quads), quads, layout.width, bad, layout.texel_patches, layout.patches, before.x, before.y, before.z,
-                   positions.home_x, positions.home_y, is_bad, is_back, positions.anchors, positions.x, positions.y, points.x, points.y, points.z, changed,
-                   counts);
-  }
+  do {
+    for (int round = 0; round < kRoundsBetweenLooks; ++round) {
+      context.launch({"snap.cl", "find_bad_around"}, over(kAtOnce), 2 * round, layout.width, changed, layout.texel_patches, layout.patches, positions.x,
+                     positions.y, even.x, even.y, even.z, points.x, points.y, points.z, is_bad, bad, device_counts);
+      context.launch({"snap.cl", "put_back"}, over(kAtOnce), 2 * round + 1, layout.width, bad, layout.texel_patches, layout.patches, before.x, before.y,
+                     before.z, positions.home_x, positions.home_y, is_bad, is_back, positions.anchors, positions.x, positions.y, points.x, points.y,
+                     points.z, changed, device_counts);
+    }
+    counts = {context.download(device_counts).back()};
+    counts.resize(device_counts.size, 0);
+    context.write(device_counts, counts);
+  } while (counts[0] > 0);
   std::vector<int> back;
   const std::vector<int> marked = context.download(is_back);
   for (std::size_t i = 0; i < marked.size(); ++i)

@@ -42,9 +42,7 @@ void add(const Box& other, Box& box) {
 /// (Without branches: which of the sides decides is chance.)
 template <class Box>
 bool do_overlap(const Box& a, const Box& b) {
-  return (static_cast<int>(a.least[0] <= b.greatest[0]) & static_cast<int>(b.least[0] <= a.greatest[0]) &
-          static_cast<int>(a.least[1] <= b.greatest[1]) & static_cast<int>(b.least[1] <= a.greatest[1]) &
-          static_cast<int>(a.least[2] <= b.greatest[2]) & static_cast<int>(b.least[2] <= a.greatest[2])) != 0;
+  return (a.least - b.greatest).max(b.least - a.greatest).maxCoeff() <= 0;
 }
 
 }  // namespace
@@ -266,9 +264,10 @@ void LatticeCrossings::find_between(const TriangleMesh& mesh, int a, int b, cons
   }
 }
 
-/// \param parts  all, or some in order: then pairs with one of these, when both are it is the first that finds them
+/// \param parts       all, or some in order: then pairs with one of these, when both are it is the first that finds them
+/// \param are_alone  pairs within `parts` only
 std::vector<std::array<int, 2>> LatticeCrossings::find_from(const TriangleMesh& mesh, std::span<const int> parts,
-                                                            const std::vector<char>& is_asked) const {
+                                                            const std::vector<char>& is_asked, bool are_alone) const {
   const bool are_all = parts.empty();
   const std::size_t count = are_all ? parts_.size() : parts.size();
   std::vector<std::vector<std::array<int, 2>>> found(block_count(count, kAtOnce));
@@ -279,6 +278,7 @@ std::vector<std::array<int, 2>> LatticeCrossings::find_from(const TriangleMesh& 
     // The tree is asked once for several parts that lie beside each other.
     for (std::size_t first = begin; first < end; first += kWidth) {
       const std::size_t last = std::min(end, first + kWidth);
+      const auto is_listed = [&](int part) { return std::binary_search(parts.begin(), parts.end(), part); };
       const auto part_at = [&](std::size_t i) { return are_all ? static_cast<int>(i) : parts[i]; };
       Box around = no_box<Box>();
       for (std::size_t i = first; i < last; ++i) add(boxes_[0][part_at(i)], around);
@@ -300,7 +300,7 @@ std::vector<std::array<int, 2>> LatticeCrossings::find_from(const TriangleMesh& 
         const int part = part_at(i);
         for (const int other : near) {
           if (!do_overlap(boxes_[0][part], boxes_[0][other])) continue;
-          if (other < part && (are_all || std::binary_search(parts.begin(), parts.end(), other))) continue;
+          if (are_all ? other < part : is_listed(other) ? other < part : are_alone) continue;
           if (!is_smooth(parts_[part], parts_[other])) find_between(mesh, part, other, is_asked, found[block]);
         }
       }
@@ -328,16 +328,26 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const TriangleMesh& mesh,
   for (const int triangle : changed) {
     is_asked[triangle] = 1;
     parts.push_back(part_of_[triangle]);
-    for (const int vertex : mesh.triangles[triangle]) points_[vertex] = rounded(mesh.positions[vertex]);
   }
-  std::sort(parts.begin(), parts.end());
-  parts.erase(std::unique(parts.begin(), parts.end()), parts.end());
-  for (const int part : parts) measure(mesh, part);
-  join_boxes();
+  measure_again(mesh, parts);
   return find_from(mesh, parts, is_asked);
 }
 
-std::vector<std::array<int, 2>> LatticeCrossings::find_around(std::span<const std::array<int, 2>> pairs, const TriangleMesh& mesh) const {
+/// \param parts  sorted here
+void LatticeCrossings::measure_again(const TriangleMesh& mesh, std::vector<int>& parts) {
+  std::sort(parts.begin(), parts.end());
+  parts.erase(std::unique(parts.begin(), parts.end()), parts.end());
+  for (const int part : parts)
+    for (int i = parts_[part].begin; i < parts_[part].begin + parts_[part].count; ++i)
+      for (int k = pieces_[i].begin; k < pieces_[i].begin + pieces_[i].count; ++k)
+        for (const int vertex : mesh.triangles[triangles_[k]]) points_[vertex] = rounded(mesh.positions[vertex]);
+  for_each_block(parts.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) measure(mesh, parts[i]);
+  });
+  join_boxes();
+}
+
+std::vector<std::array<int, 2>> LatticeCrossings::find_around(std::span<const std::array<int, 2>> pairs, const TriangleMesh& mesh, const TriangleMesh& other) {
   std::vector<int> parts;
   for (const auto& pair : pairs)
     for (const int triangle : pair) {
@@ -351,16 +361,10 @@ std::vector<std::array<int, 2>> LatticeCrossings::find_around(std::span<const st
         for (int step = -1; step <= 1; ++step)
           parts.push_back(places_[first_square_[part.patch] + row * columns + (part.column + step + columns) % columns]);
     }
-  std::sort(parts.begin(), parts.end());
-  parts.erase(std::unique(parts.begin(), parts.end()), parts.end());
-  LatticeCrossings other = *this;
-  other.round(mesh);
-  std::fill(other.boxes_[0].begin(), other.boxes_[0].end(), no_box<Box>());
-  for_each_block(parts.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) other.measure(mesh, parts[i]);
-  });
-  other.join_boxes();
-  return other.find_from(mesh, parts, {});
+  measure_again(other, parts);
+  const auto found = find_from(other, parts, {}, true);
+  measure_again(mesh, parts);
+  return found;
 }
 
 }  // namespace skeletex

@@ -21,8 +21,8 @@ class LatticeCrossings {
   /// Of the same mesh with some triangles changed: the pairs with one of these.
   std::vector<std::array<int, 2>> find(const TriangleMesh& mesh, std::span<const int> changed);
 
-  /// Pairs of another mesh of this lattice that lie where given ones do, or next to it.
-  std::vector<std::array<int, 2>> find_around(std::span<const std::array<int, 2>> pairs, const TriangleMesh& mesh) const;
+  /// Of another mesh of this lattice: the pairs that lie where given ones of this mesh do, or next to it.
+  std::vector<std::array<int, 2>> find_around(std::span<const std::array<int, 2>> pairs, const TriangleMesh& mesh, const TriangleMesh& other);
 
  private:
   /// Least and greatest coordinates, rounded outwards; the fourth is 0.
@@ -43,6 +43,7 @@ class LatticeCrossings {
   };
   void measure(const TriangleMesh& mesh, int part);
   void join_boxes();
+  void measure_again(const TriangleMesh& mesh, std::vector<int>& parts);
   Eigen::Array4f rounded(const Vec3& position) const;
   void round(const TriangleMesh& mesh);
   Box box_of(const TriangleMesh& mesh, int triangle) const;
@@ -50,7 +51,8 @@ class LatticeCrossings {
   bool is_smooth(const Part& a, const Part& b) const;
   bool is_smooth(const Piece& a, const Piece& b) const;
   void find_between(const TriangleMesh& mesh, int a, int b, const std::vector<char>& is_asked, std::vector<std::array<int, 2>>& pairs) const;
-  std::vector<std::array<int, 2>> find_from(const TriangleMesh& mesh, std::span<const int> parts, const std::vector<char>& is_asked) const;
+  std::vector<std::array<int, 2>> find_from(const TriangleMesh& mesh, std::span<const int> parts, const std::vector<char>& is_asked,
+                                            bool are_alone = false) const;
 
   Vec3 origin_;
   float margin_;
