@@ -4,11 +4,12 @@
 //   suspect_quads      quads of the lattice -> how far they could be from the mesh, as these differ from the mesh's at their corners
 //   measure_triangles  triangles of the lattice -> the mesh, by a walk over it
 //   measure_vertices   vertices of the mesh -> the lattice, among the quads around their place in the map
-// The last two can only find too large a distance, where the nearest point lies elsewhere. Vertices of the lattice are numbered as in
-// core/skeletex/reconstruct/lattice.h; triangles 2 q and 2 q + 1 are those of its quad q.
+// The last two can only find too large a distance, where the nearest point lies elsewhere. Vertices of the lattice are texels; triangles
+// 2 t and 2 t + 1 are those of the quad to the right of and above texel t, by the diagonals that lattice.cl chooses.
 #include "skeletex_structs.h"
 #include "map_triangle.h"
 #include "mesh_walk.h"
+#include "patch_texels.h"
 
 #define PLACES 15  // of a triangle, beside its middle
 
@@ -28,51 +29,82 @@ kernel void find_normals(const int triangle_count, global const int* restrict co
   normals[t] = n.x * inverse, normals[triangle_count + t] = n.y * inverse, normals[2 * triangle_count + t] = n.z * inverse;
 }
 
-// NDRange (quad_count). A triangle whose corners lie on the mesh leaves it by about half its longest side times the sine of the angle to the mesh
-// at its corners: a chord over a crease.
-// in   triangles, vertex_texels, texel_triangles: as below
-// out  suspicions2: that distance, squared, the larger of both triangles'; infinite where one looks against the mesh at a corner,
-//                   0 where nothing is known
-kernel void suspect_quads(const int quad_count, const int triangle_count, global const int* restrict triangles, global const int* restrict vertex_texels,
-                          global const int* restrict texel_triangles, global const float* restrict normals, global const float* restrict x,
-                          global const float* restrict y, global const float* restrict z, global float* restrict suspicions2) {
-  const int quad = (int)get_global_id(0);
-  if (quad >= quad_count) return;
-  float most = 0.0f;
-  for (int i = 6 * quad; i < 6 * quad + 6; i += 3) {
-    const Point a = point_at(x, y, z, triangles[i]), b = point_at(x, y, z, triangles[i + 1]), c = point_at(x, y, z, triangles[i + 2]);
-    const Point ab = minus(b, a), ac = minus(c, a), bc = minus(c, b);
-    const Point own = cross_of(ab, ac);
-    const float area2 = product(own, own), side2 = fmax(product(ab, ab), fmax(product(ac, ac), product(bc, bc)));
-    for (int k = 0; k < 3; ++k) {
-      const int t = texel_triangles[vertex_texels[triangles[i + k]]];
-      if (t == NO_TRIANGLE) continue;
-      const Point n = {normals[t], normals[triangle_count + t], normals[2 * triangle_count + t]};
-      const float along = product(own, n);
-      const float sine2 = area2 > 0.0f ? fmax(0.0f, 1.0f - along * along / area2) : 1.0f;
-      most = fmax(most, along < 0.0f ? INFINITY : 0.25f * side2 * sine2);
-    }
-  }
-  suspicions2[quad] = most;
+Point either(int is_first, Point p, Point q) {
+  const Point r = {is_first ? p.x : q.x, is_first ? p.y : q.y, is_first ? p.z : q.z};
+  return r;
+}
+
+// The square of how far a triangle could be, at a corner where the mesh has a normal; infinite where it looks against that.
+float suspicion2_at(Point own, float area2, float side2, Point normal) {
+  const float along = product(own, normal);
+  const float sine2 = area2 > 0.0f ? fmax(0.0f, 1.0f - along * along / area2) : 1.0f;
+  return along < 0.0f ? INFINITY : 0.25f * side2 * sine2;
+}
+
+float suspicion2_of(Point a, Point b, Point c, Point at_a, Point at_b, Point at_c) {
+  const Point ab = minus(b, a), ac = minus(c, a), bc = minus(c, b);
+  const Point own = cross_of(ab, ac);
+  const float area2 = product(own, own), side2 = fmax(product(ab, ab), fmax(product(ac, ac), product(bc, bc)));
+  return fmax(suspicion2_at(own, area2, side2, at_a), fmax(suspicion2_at(own, area2, side2, at_b), suspicion2_at(own, area2, side2, at_c)));
+}
+
+Point normal_at(int texel, int triangle_count, global const int* restrict texel_triangles, global const float* restrict normals) {
+  const int t = min(texel_triangles[texel], triangle_count - 1);
+  const Point n = {normals[t], normals[triangle_count + t], normals[2 * triangle_count + t]};
+  return n;
+}
+
+float suspicion2_of_quad(int texel, int right, int texture_width, int triangle_count, int is_second, global const int* restrict texel_triangles,
+                         global const float* restrict normals, global const float* restrict x, global const float* restrict y,
+                         global const float* restrict z) {
+  const int above = texel + texture_width, beyond = right + texture_width;
+  const Point a = point_at(x, y, z, texel), b = point_at(x, y, z, right), c = point_at(x, y, z, beyond), d = point_at(x, y, z, above);
+  const Point at_a = normal_at(texel, triangle_count, texel_triangles, normals), at_b = normal_at(right, triangle_count, texel_triangles, normals);
+  const Point at_c = normal_at(beyond, triangle_count, texel_triangles, normals), at_d = normal_at(above, triangle_count, texel_triangles, normals);
+  return fmax(suspicion2_of(a, b, either(is_second, d, c), at_a, at_b, either(is_second, at_d, at_c)),
+              suspicion2_of(either(is_second, b, a), c, d, either(is_second, at_b, at_a), at_c, at_d));
+}
+
+// NDRange: one work-group per row, of any size, as in reconstruct.cl. A triangle whose corners lie on the mesh leaves it by about half its
+// longest side times the sine of the angle to the mesh at its corners: a chord over a crease.
+// in   lattice_rows: those that quads begin at; texel_triangles: per texel a triangle of the mesh there, of all texels of a patch or of none
+// out  suspicions2: per quad that distance, squared, the larger of both triangles'; infinite where one looks against the mesh at a
+//                   corner. Nothing is written where nothing is known
+kernel void suspect_quads(const int row_count, const int texture_width, const int triangle_count, global const int* restrict lattice_rows,
+                          global const PatchRecord* restrict patches, global const int* restrict diagonals, global const int* restrict texel_triangles,
+                          global const float* restrict normals, global const float* restrict x, global const float* restrict y,
+                          global const float* restrict z, global float* restrict suspicions2) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
+  const int width = patch->width, step = get_local_size(0);
+  const int texel = (patch->y + lattice_rows[4 * k + 1]) * texture_width + patch->x;
+  if (texel_triangles[texel] == NO_TRIANGLE) return;
+  // Without the last column, which wraps round, the loop becomes vector instructions.
+  for (int j = get_local_id(0); j < width - 1; j += step)
+    suspicions2[texel + j] =
+        suspicion2_of_quad(texel + j, texel + j + 1, texture_width, triangle_count, diagonals[texel + j], texel_triangles, normals, x, y, z);
+  if (get_local_id(0) == 0)
+    suspicions2[texel + width - 1] =
+        suspicion2_of_quad(texel + width - 1, texel, texture_width, triangle_count, diagonals[texel + width - 1], texel_triangles, normals, x, y, z);
 }
 
 // NDRange (count). Triangles of a list, from the mesh: at their middles, and at the other places too where the middle is further
 // than the root of `worth_a_look2`.
-// in   triangles: of the lattice; vertex_texels: per vertex of it its texel; texel_triangles: where walks begin
+// in   listed: their corners, three texels each; texel_triangles: where walks begin
 // out  distances2: the furthest of the places, squared, 0 where no walk can begin; is_turned: whether it looks against the mesh
 kernel void measure_triangles(const int count, const float worth_a_look2, const int triangle_count, global const int* restrict listed,
-                              global const int* restrict triangles, global const int* restrict vertex_texels, global const int* restrict texel_triangles,
-                              global const int* restrict corners, global const int* restrict across, global const float* restrict vertex_x,
-                              global const float* restrict vertex_y, global const float* restrict vertex_z, global const float* restrict x,
-                              global const float* restrict y, global const float* restrict z, global float* restrict distances2,
-                              global int* restrict is_turned) {
+                              global const int* restrict texel_triangles, global const int* restrict corners, global const int* restrict across,
+                              global const float* restrict vertex_x, global const float* restrict vertex_y, global const float* restrict vertex_z,
+                              global const float* restrict x, global const float* restrict y, global const float* restrict z,
+                              global float* restrict distances2, global int* restrict is_turned) {
   const int i = (int)get_global_id(0);
   if (i >= count) return;
   distances2[i] = 0.0f;
   is_turned[i] = 0;
-  global const int* restrict lattice_corners = triangles + 3 * listed[i];
+  global const int* restrict lattice_corners = listed + 3 * i;
   int from = NO_TRIANGLE;
-  for (int k = 0; k < 3 && from == NO_TRIANGLE; ++k) from = texel_triangles[vertex_texels[lattice_corners[k]]];
+  for (int k = 0; k < 3 && from == NO_TRIANGLE; ++k) from = texel_triangles[lattice_corners[k]];
   if (from == NO_TRIANGLE) return;
   const Point a = point_at(x, y, z, lattice_corners[0]), b = point_at(x, y, z, lattice_corners[1]), c = point_at(x, y, z, lattice_corners[2]);
   const Point ab = minus(b, a), ac = minus(c, a);
@@ -91,41 +123,43 @@ kernel void measure_triangles(const int count, const float worth_a_look2, const 
   distances2[i] = furthest2;
 }
 
-// The nearest triangle of the quads up to `reach` columns and rows from one. Rows of quads are those between inner rows.
-void nearest_around(Point p, global const PatchRecord* restrict patch, int first_quad, int column, int row, int reach, global const int* restrict triangles,
-                    global const float* restrict x, global const float* restrict y, global const float* restrict z, float* best, int* nearest) {
-  const int rows = patch->height - 3;
-  for (int r = max(0, row - reach); r <= min(rows - 1, row + reach); ++r)
+// The nearest triangle of the quads up to `reach` columns and rows from one.
+void nearest_around(Point p, global const PatchRecord* restrict patch, int texture_width, int column, int row, int reach,
+                    global const int* restrict diagonals, global const float* restrict x, global const float* restrict y, global const float* restrict z,
+                    float* best, int* nearest) {
+  for (int r = max(1, row - reach); r <= min(patch->height - 3, row + reach); ++r)
     for (int c = column - reach; c <= column + reach; ++c) {
-      const int quad = first_quad + r * patch->width + (c % patch->width + patch->width) % patch->width;
-      for (int t = 2 * quad; t < 2 * quad + 2; ++t) {
+      const int wrapped = (c % patch->width + patch->width) % patch->width;
+      const int texel = texel_at(patch, texture_width, wrapped, r), right = texel_at(patch, texture_width, wrapped + 1, r);
+      const int above = texel + texture_width, beyond = right + texture_width, is_second = diagonals[texel];
+      const int corners[2][3] = {{texel, right, is_second ? above : beyond}, {is_second ? right : texel, beyond, above}};
+      for (int t = 0; t < 2; ++t) {
         float w[3];
-        const float distance2 = nearest_of_triangle(p, point_at(x, y, z, triangles[3 * t]), point_at(x, y, z, triangles[3 * t + 1]),
-                                                    point_at(x, y, z, triangles[3 * t + 2]), w);
-        if (distance2 < *best) *best = distance2, *nearest = t;
+        const float distance2 =
+            nearest_of_triangle(p, point_at(x, y, z, corners[t][0]), point_at(x, y, z, corners[t][1]), point_at(x, y, z, corners[t][2]), w);
+        if (distance2 < *best) *best = distance2, *nearest = 2 * texel + t;
       }
     }
 }
 
 // NDRange (count). Vertices of the mesh: the nearest triangle of the quads around, further around where that is further than the
 // root of `limit2`.
-// in   vertices: their numbers; places: where they are in the cells of their patches, x and y; first_quads: per patch
+// in   vertices: their numbers; places: where they are in the cells of their patches, x and y
 // out  distances2, squared; nearest: triangles of the lattice
-kernel void measure_vertices(const int count, const float limit2, global const int* restrict vertices, global const int* restrict vertex_patches,
-                             global const float* restrict places, global const PatchRecord* restrict patches, global const int* restrict first_quads,
-                             global const int* restrict triangles, global const float* restrict vertex_x, global const float* restrict vertex_y,
+kernel void measure_vertices(const int count, const int texture_width, const float limit2, global const int* restrict vertices,
+                             global const int* restrict vertex_patches, global const float* restrict places, global const PatchRecord* restrict patches,
+                             global const int* restrict diagonals, global const float* restrict vertex_x, global const float* restrict vertex_y,
                              global const float* restrict vertex_z, global const float* restrict x, global const float* restrict y,
                              global const float* restrict z, global float* restrict distances2, global int* restrict nearest) {
   const int i = (int)get_global_id(0);
   if (i >= count) return;
-  const int patch = vertex_patches[i];
-  global const PatchRecord* restrict p = patches + patch;
-  const int column = (int)floor(places[2 * i]), row = clamp((int)floor(places[2 * i + 1]) - 1, 0, p->height - 4);
+  global const PatchRecord* restrict p = patches + vertex_patches[i];
+  const int column = (int)floor(places[2 * i]), row = clamp((int)floor(places[2 * i + 1]), 1, p->height - 3);
   const Point point = point_at(vertex_x, vertex_y, vertex_z, vertices[i]);
   float best = INFINITY;
   int found = 0;
-  nearest_around(point, p, first_quads[patch], column, row, 1, triangles, x, y, z, &best, &found);
-  if (best > limit2) nearest_around(point, p, first_quads[patch], column, row, 3, triangles, x, y, z, &best, &found);
+  nearest_around(point, p, texture_width, column, row, 1, diagonals, x, y, z, &best, &found);
+  if (best > limit2) nearest_around(point, p, texture_width, column, row, 3, diagonals, x, y, z, &best, &found);
   distances2[i] = best;
   nearest[i] = found;
 }

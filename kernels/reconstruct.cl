@@ -135,25 +135,6 @@ __kernel void triangulate_smoothly(const int row_count, __global const int* rest
   }
 }
 
-// The same for a list of quads, by one rule or the other.
-// in   listed: per quad its row's entry in lattice_rows, and its column
-// out  triangles, at their places; listed_triangles: the same one after the other
-__kernel void triangulate_listed(const int count, const int is_smooth, __global const int* restrict listed, __global const int* restrict lattice_rows,
-                                 __global const PatchRecord* restrict patches, __global const float* restrict x, __global const float* restrict y,
-                                 __global const float* restrict z, __global int* restrict triangles, __global int* restrict listed_triangles) {
-  const int i = (int)get_global_id(0);
-  if (i >= count) return;
-  __global const int* restrict entry = lattice_rows + 4 * listed[2 * i];
-  const int column = listed[2 * i + 1], row = entry[1];
-  __global const PatchRecord* restrict patch = patches + entry[0];
-  const int has_before = row > 1, has_after = row + 2 < patch->height - 1;
-  int at[4][4];
-  vertices_around(entry[2], patch->width, column, has_before, has_after, at);
-  const int is_second = is_smooth ? takes_second_if_smoother(at, has_before, has_after, x, y, z) : takes_second_if_nearer(at, has_before, has_after, x, y, z);
-  write_quad(triangles + 6 * (entry[3] + column), is_second, at);
-  write_quad(listed_triangles + 6 * i, is_second, at);
-}
-
 // One axis of a resampling: out at (new row, column) = sum of weights times in at old rows of the same column.
 // in   taps: per new row of all patches, in the order of the row table, four ints: (first old row, count, first weight,
 //      unused); patches: the new ones; widths, first_in: per patch the row length of `in` and where the patch begins in it

@@ -4,8 +4,8 @@
 //   relax_texels                 free texels follow their neighbours half way
 //   offer_edges, place_on_edges  free texels go to the nearest point of a creased edge
 //   place_snapped                positions of texels on vertices and edges
-//   put_marked_back, find_bad_around, put_back
-//                                texels with a mark, and what then folds in the map or in space, go back to the even lattice
+//   put_listed_back, find_bad_around, put_back
+//                                texels of a list, and what then folds in the map or in space, go back to the even lattice
 // A reading position is an offset from the texel's own place in the lattice, in cells: two planes over the texture, x
 // around, y along. Rows 0 and height-1 stay. `anchors` says what holds a texel: 0 nothing, 1 + i vertex i of the list
 // of vertices, -1 - i edge i. Vertices and edges come with their patch and their place (x, y) in its cells, x unwrapped.
@@ -350,26 +350,21 @@ kernel void put_back(const int in, const int texture_width, global const int* re
   }
 }
 
-// NDRange (texture width, texture height). Texels with a mark go back, those on vertices only when `with_vertices` says so.
-// out  changed: their list; count: how many they are, 0 before
-kernel void put_marked_back(const int texture_width, const int texture_height, const int with_vertices, global const int* restrict marks,
-                            global const int* restrict texel_patches,
-                            global const PatchRecord* restrict patches, global const float* restrict before_x, global const float* restrict before_y,
-                            global const float* restrict before_z, global const float* restrict home_x, global const float* restrict home_y,
-                            global int* restrict is_back, global int* restrict anchors, global float* restrict offset_x, global float* restrict offset_y,
-                            global float* restrict x, global float* restrict y, global float* restrict z, global int* restrict changed,
-                            global int* restrict count) {
-  const int across = (int)get_global_id(0), line = (int)get_global_id(1);
-  if (across >= texture_width || line >= texture_height) return;
-  const int texel = line * texture_width + across;
-  const int patch = texel_patches[texel];
-  if (patch < 0 || !marks[texel] || (anchors[texel] > 0 && !with_vertices)) return;
-  const int row = line - patches[patch].y;
-  if (row < 1 || row > patches[patch].height - 2) return;
+// NDRange (count). Texels of a list go back, those on vertices only when `with_vertices` says so.
+// out  changed: those that have; changed_count: how many they are, 0 before
+kernel void put_listed_back(const int count, const int with_vertices, global const int* restrict listed,
+                            global const float* restrict before_x, global const float* restrict before_y, global const float* restrict before_z,
+                            global const float* restrict home_x, global const float* restrict home_y, global int* restrict is_back,
+                            global int* restrict anchors, global float* restrict offset_x, global float* restrict offset_y, global float* restrict x,
+                            global float* restrict y, global float* restrict z, global int* restrict changed, global int* restrict changed_count) {
+  const int i = (int)get_global_id(0);
+  if (i >= count) return;
+  const int texel = listed[i];
+  if (anchors[texel] > 0 && !with_vertices) return;
   if (x[texel] == before_x[texel] && y[texel] == before_y[texel] && z[texel] == before_z[texel]) return;
   is_back[texel] = BACK;
   x[texel] = before_x[texel], y[texel] = before_y[texel], z[texel] = before_z[texel];
   offset_x[texel] = home_x[texel], offset_y[texel] = home_y[texel];
   anchors[texel] = 0;
-  changed[atomic_inc(count)] = texel;
+  changed[atomic_inc(changed_count)] = texel;
 }

@@ -31,27 +31,74 @@ SkeletexModel encoded(const char* name, int size) {
   return encode_model(device(), model.mesh, model.skeleton, options).model;
 }
 
-/// Its points per texel, moved at random by up to `noise` diagonals.
-LatticeMesh::Planes points_of(const SkeletexModel& model, double noise, std::mt19937& random) {
-  std::uniform_real_distribution<double> unit(-1, 1);
-  const Lattice lattice = number_lattice(model);
-  const std::vector<Vec3> positions = lattice_positions(device(), model);
-  LatticeMesh::Planes planes;
-  for (auto& plane : planes) plane.assign(static_cast<std::size_t>(model.texture.width) * model.texture.height, 0);
-  for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
-    const Rectangle& r = model.patches[bone].rectangle;
-    for (int row = 0; row < r.height; ++row)
-      for (int j = 0; j < r.width; ++j) {
-        const int pole = lattice.poles[bone][row == 0 ? 0 : 1];
-        const bool is_end = row == 0 || row == r.height - 1;
-        if (is_end && pole < 0) continue;
-        const Vec3& p = positions[is_end ? pole : lattice.first_inner[bone] + (row - 1) * r.width + j];
-        for (int axis = 0; axis < 3; ++axis)
-          planes[axis][(r.y + row) * static_cast<std::size_t>(model.texture.width) + r.x + j] =
-              static_cast<float>(p[axis] - model.origin[axis] + (is_end ? 0 : noise * model.diagonal * unit(random)));
-      }
+/// A model's points per texel, moved at random by up to `noise` diagonals, on the device.
+struct Points {
+  ClBuffer<PatchRecord> patches;
+  std::array<std::vector<float>, 3> planes;
+  DevicePlanes on_device;
+  Points(const SkeletexModel& model, double noise, std::mt19937& random)
+      : patches(device().upload(frame_tables(model.skeleton, Walls(model.skeleton), model.patches, model.origin).patches)) {
+    std::uniform_real_distribution<double> unit(-1, 1);
+    const Lattice lattice = number_lattice(model);
+    const std::vector<Vec3> positions = lattice_positions(device(), model);
+    for (auto& plane : planes) plane.assign(static_cast<std::size_t>(model.texture.width) * model.texture.height, 0);
+    for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
+      const Rectangle& r = model.patches[bone].rectangle;
+      for (int row = 0; row < r.height; ++row)
+        for (int j = 0; j < r.width; ++j) {
+          const int pole = lattice.poles[bone][row == 0 ? 0 : 1];
+          const bool is_end = row == 0 || row == r.height - 1;
+          if (is_end && pole < 0) continue;
+          const Vec3& p = positions[is_end ? pole : lattice.first_inner[bone] + (row - 1) * r.width + j];
+          for (int axis = 0; axis < 3; ++axis)
+            planes[axis][(r.y + row) * static_cast<std::size_t>(model.texture.width) + r.x + j] =
+                static_cast<float>(p[axis] - model.origin[axis] + (is_end ? 0 : noise * model.diagonal * unit(random)));
+        }
+    }
+    upload();
   }
-  return planes;
+  void upload() { on_device = {device().upload(planes[0]), device().upload(planes[1]), device().upload(planes[2])}; }
+  LatticeMesh lattice(const SkeletexModel& model, DiagonalRule rule) const { return {device(), model, rule, patches, on_device}; }
+  /// Every `step`-th texel of inner rows takes its point from others. \return those
+  std::vector<int> take(const SkeletexModel& model, const Points& others, int step) {
+    std::vector<int> taken;
+    int count = 0;
+    for (const Patch& patch : model.patches)
+      for (int row = 1; row + 1 < patch.rectangle.height; ++row)
+        for (int j = 0; j < patch.rectangle.width; ++j)
+          if (count++ % step == 0) taken.push_back((patch.rectangle.y + row) * model.texture.width + patch.rectangle.x + j);
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const int texel : taken) planes[axis][texel] = others.planes[axis][texel];
+      device().write(axis == 0 ? on_device.x : axis == 1 ? on_device.y : on_device.z, planes[axis]);
+    }
+    return taken;
+  }
+};
+
+/// All of a lattice, in the order of the decoder's mesh; with the numbers that its triangles have in the lattice.
+TriangleMesh whole(const LatticeMesh& lattice, std::vector<int>& numbers) {
+  const SkeletexModel& model = lattice.model();
+  TriangleMesh mesh;
+  numbers.clear();
+  std::vector<int> vertices(lattice.vertex_count(), -1);
+  const auto add_vertex = [&](int vertex) {
+    vertices[vertex] = static_cast<int>(mesh.positions.size());
+    mesh.positions.push_back(lattice.position(vertex));
+  };
+  for (const Patch& patch : model.patches)
+    for (int row = 1; row + 1 < patch.rectangle.height; ++row)
+      for (int j = 0; j < patch.rectangle.width; ++j) {
+        const int texel = (patch.rectangle.y + row) * model.texture.width + patch.rectangle.x + j;
+        add_vertex(texel);
+        if (row + 2 < patch.rectangle.height) numbers.push_back(2 * texel), numbers.push_back(2 * texel + 1);
+      }
+  for (int vertex = lattice.texel_count(); vertex < lattice.vertex_count(); ++vertex) add_vertex(vertex);
+  for (int i = lattice.first_end_triangle(); i < lattice.triangle_count(); ++i) numbers.push_back(i);
+  for (const int i : numbers) {
+    const Triangle t = lattice.triangle(i);
+    mesh.triangles.push_back({vertices[t[0]], vertices[t[1]], vertices[t[2]]});
+  }
+  return mesh;
 }
 
 using Pairs = std::vector<std::array<int, 2>>;
@@ -68,35 +115,34 @@ TEST(LatticeMesh, IsTheModelsAndWithMovedPointsWhatTheyWouldMake) {
   for (const DiagonalRule rule : {DiagonalRule::kNearest, DiagonalRule::kSmooth}) {
     SkeletexModel model = encoded("bear", 48);
     model.diagonals = rule;
-    const LatticeMesh::Planes planes = points_of(model, 0, random), other = points_of(model, 2e-3, random);
-    LatticeMesh lattice(device(), model, rule, planes);
-    const TriangleMesh before = lattice.mesh(), expected = reconstruct_mesh(device(), model);
+    Points points(model, 0, random);
+    const Points others(model, 2e-3, random);
+    LatticeMesh lattice = points.lattice(model, rule);
+    std::vector<int> numbers;
+    const TriangleMesh before = whole(lattice, numbers), expected = reconstruct_mesh(device(), model);
     EXPECT_EQ(before.triangles, expected.triangles);
+    ASSERT_EQ(before.positions.size(), expected.positions.size());
     for (std::size_t i = 0; i < expected.positions.size(); ++i)
       EXPECT_LT((before.positions[i] - expected.positions[i]).norm(), 1e-6 * model.diagonal);
 
-    LatticeMesh::Planes mixed = planes;
-    std::vector<int> moved;
-    for (std::size_t i = 0; i < lattice.texels().size(); ++i) {
-      if (random() % 20 != 0) continue;
-      moved.push_back(static_cast<int>(i));
-      for (int axis = 0; axis < 3; ++axis) mixed[axis][lattice.texels()[i]] = other[axis][lattice.texels()[i]];
-    }
-    const std::vector<int> changed = lattice.move(moved, mixed);
-    const TriangleMesh& now = lattice.mesh();
-    const LatticeMesh made(device(), model, rule, mixed);
-    EXPECT_EQ(now.positions, made.mesh().positions);
-    EXPECT_EQ(now.triangles, made.mesh().triangles);
-    const auto inner = static_cast<std::ptrdiff_t>(2 * lattice.lattice().quad_count);
-    std::vector<Triangle> on_device = device().download(lattice.device_triangles());
-    EXPECT_TRUE(std::equal(on_device.begin(), on_device.begin() + inner, now.triangles.begin()));
+    const std::vector<int> moved = points.take(model, others, 20);
+    const std::vector<int> changed = lattice.move(moved, others.lattice(model, rule));
+    const LatticeMesh made = points.lattice(model, rule);
+    const TriangleMesh now = whole(lattice, numbers), remade = whole(made, numbers);
+    EXPECT_EQ(now.positions, remade.positions);
+    EXPECT_EQ(now.triangles, remade.triangles);
+    const std::vector<int> diagonals = device().download(lattice.device_diagonals());
     std::vector<int> differing;
     for (std::size_t t = 0; t < now.triangles.size(); ++t) {
       const Triangle& triangle = now.triangles[t];
+      if (numbers[t] < lattice.first_end_triangle()) {
+        EXPECT_EQ(diagonals[numbers[t] / 2] != 0, lattice.takes_second(numbers[t] / 2));
+      }
       if (triangle != before.triangles[t] ||
           std::any_of(triangle.begin(), triangle.end(), [&](int v) { return now.positions[v] != before.positions[v]; }))
-        differing.push_back(static_cast<int>(t));
+        differing.push_back(numbers[t]);
     }
+    std::sort(differing.begin(), differing.end());
     EXPECT_EQ(changed, differing);
   }
 }
@@ -110,11 +156,23 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
   };
   for (const Case& each : {Case{"man", 128, 0}, Case{"man", 96, 1e-3}, Case{"eight", 64, 5e-3}, Case{"bear", 40, 0.1}, Case{"armadillo", 160, 0}}) {
     const SkeletexModel model = encoded(each.name, each.size);
-    LatticeMesh lattice(device(), model, DiagonalRule::kNearest, points_of(model, each.noise, random));
-    LatticeCrossings crossings(model, lattice.lattice());
-    const Pairs found = crossings.find(lattice.mesh()), expected = find_self_intersections(lattice.mesh());
+    Points points(model, each.noise, random);
+    const Points others(model, each.noise + 2e-3, random);
+    const LatticeMesh other_lattice = others.lattice(model, DiagonalRule::kNearest);
+    LatticeMesh lattice = points.lattice(model, DiagonalRule::kNearest);
+    LatticeCrossings crossings(lattice);
+    std::vector<int> numbers;
+    const TriangleMesh mesh = whole(lattice, numbers);
+    // Pairs of the lattice as pairs of the mesh, and sorted as these.
+    std::vector<int> places(lattice.triangle_count());
+    for (std::size_t i = 0; i < numbers.size(); ++i) places[numbers[i]] = static_cast<int>(i);
+    Pairs found = crossings.find(lattice);
+    EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
+    for (auto& pair : found) pair = {std::min(places[pair[0]], places[pair[1]]), std::max(places[pair[0]], places[pair[1]])};
+    std::sort(found.begin(), found.end());
+    const Pairs expected = find_self_intersections(mesh);
     ASSERT_GT(expected.size(), 10u) << each.name;
-    const Pairs apart = without_shared_vertices(lattice.mesh(), found), expected_apart = without_shared_vertices(lattice.mesh(), expected);
+    const Pairs apart = without_shared_vertices(mesh, found), expected_apart = without_shared_vertices(mesh, expected);
     // Shaken by a tenth of its size a lattice is no surface any more: what bends little can cross itself there.
     if (each.noise < 0.05) {
       EXPECT_EQ(apart, expected_apart) << each.name;
@@ -125,15 +183,11 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
     EXPECT_NEAR(static_cast<double>(found.size()), static_cast<double>(expected.size()), 2 + 0.05 * static_cast<double>(expected.size()))
         << each.name;
 
-    const LatticeMesh::Planes other = points_of(model, each.noise + 2e-3, random);
-    std::vector<int> moved;
-    for (std::size_t i = 0; i < lattice.texels().size(); i += 50) moved.push_back(static_cast<int>(i));
-    const std::vector<int> changed = lattice.move(moved, other);
-    const Pairs found_of_changed = crossings.find(lattice.mesh(), changed);
-    Pairs all = LatticeCrossings(model, lattice.lattice()).find(lattice.mesh());
-    const LatticeMesh before(device(), model, DiagonalRule::kNearest, points_of(model, each.noise, random));
-    EXPECT_FALSE(crossings.find_around(all, lattice.mesh(), before.mesh()).empty()) << each.name;
-    EXPECT_EQ(crossings.find_around(all, lattice.mesh(), lattice.mesh()), all) << each.name;
+    const std::vector<int> changed = lattice.move(points.take(model, others, 50), other_lattice);
+    const Pairs found_of_changed = crossings.find(lattice, changed);
+    Pairs all = LatticeCrossings(lattice).find(lattice);
+    EXPECT_FALSE(crossings.find_around(all, lattice, other_lattice).empty()) << each.name;
+    EXPECT_EQ(crossings.find_around(all, lattice, lattice), all) << each.name;
     const std::set<int> is_changed(changed.begin(), changed.end());
     std::erase_if(all, [&](const auto& pair) { return !is_changed.contains(pair[0]) && !is_changed.contains(pair[1]); });
     EXPECT_EQ(found_of_changed, all) << each.name;
@@ -148,8 +202,10 @@ struct TubeAndLattice {
   Skeleton skeleton{{{"head", Vec3(0, 0, 0)}, {"tail", Vec3(0, 0, 4)}}, {{"bone", 0, 1, Vec3(1, 0, 0)}}};
   DeviceLayout layout;
   DeviceMaps maps;
-  TriangleMesh lattice;  // of the rows 1 to height-2
-  ClBuffer<int> triangles, vertex_texels, texel_triangles;
+  TriangleMesh lattice;         // vertices are texels
+  std::vector<int> numbers;     // of its triangles: of texel t 2 t and 2 t + 1
+  std::vector<int> diagonals;   // per texel
+  ClBuffer<int> texel_triangles;
   std::array<ClBuffer<float>, 3> points;
   std::vector<int> seeds;  // per texel
 
@@ -177,22 +233,24 @@ struct TubeAndLattice {
     layout = upload_layout(device(), patches, frame_tables(skeleton, Walls(skeleton), patches, Vec3::Zero()), 20, 14);
     maps = upload_maps(device(), {&chart, 1}, patches, Vec3::Zero());
     seeds.assign(layout.size(), 0x7fffffff);
-    std::vector<int> texels;
+    lattice.positions.resize(layout.size(), Vec3::Zero());
+    diagonals.resize(layout.size(), 0);
+    const auto texel = [](int row, int column) { return (1 + row) * 20 + 2 + column % kWidth; };
     for (int row = 1; row + 1 < kHeight; ++row)
       for (int j = 0; j < kWidth; ++j) {
-        lattice.positions.push_back(shaken(on_tube(row / (kHeight - 1.0), static_cast<double>(j) / kWidth)));
-        texels.push_back((1 + row) * 20 + 2 + j);
-        seeds[texels.back()] = static_cast<int>(2 * (row * (kRings - 1) / kHeight * kAround + j * kAround / kWidth));
+        lattice.positions[texel(row, j)] = shaken(on_tube(row / (kHeight - 1.0), static_cast<double>(j) / kWidth));
+        seeds[texel(row, j)] = static_cast<int>(2 * (row * (kRings - 1) / kHeight * kAround + j * kAround / kWidth));
+        diagonals[texel(row, j)] = static_cast<int>(random() % 2);
       }
-    for (int row = 0; row + 3 < kHeight; ++row)
+    for (int row = 1; row + 2 < kHeight; ++row)
       for (int j = 0; j < kWidth; ++j) {
-        const int k = (j + 1) % kWidth, a = row * kWidth + j, b = row * kWidth + k;
-        lattice.triangles.push_back({a, b, b + kWidth}), lattice.triangles.push_back({a, b + kWidth, a + kWidth});
+        const int own = texel(row, j), right = texel(row, j + 1), above = texel(row + 1, j), beyond = texel(row + 1, j + 1);
+        const bool is_second = diagonals[own] != 0;
+        lattice.triangles.push_back({own, right, is_second ? above : beyond}), numbers.push_back(2 * own);
+        lattice.triangles.push_back({is_second ? right : own, beyond, above}), numbers.push_back(2 * own + 1);
       }
-    lattice.positions[20] = lattice.positions[21];
-    std::vector<int> corners;
-    for (const Triangle& t : lattice.triangles) corners.insert(corners.end(), t.begin(), t.end());
-    triangles = device().upload(corners), vertex_texels = device().upload(texels), texel_triangles = device().upload(seeds);
+    lattice.positions[texel(2, 5)] = lattice.positions[texel(2, 6)];
+    texel_triangles = device().upload(seeds);
     for (int axis = 0; axis < 3; ++axis) {
       std::vector<float> plane;
       for (const Vec3& p : lattice.positions) plane.push_back(static_cast<float>(p[axis]));
@@ -214,12 +272,14 @@ TEST(GuardKernels, AWalkIsNeverNearerThanTheMeshAndOnASmoothOneAsFar) {
     const int count = static_cast<int>(tube.lattice.triangles.size());
     std::vector<int> listed(count);
     for (int i = 0; i < count; ++i) listed[i] = (7 * i) % count;
+    std::vector<int> listed_corners;
+    for (const int i : listed) listed_corners.insert(listed_corners.end(), tube.lattice.triangles[i].begin(), tube.lattice.triangles[i].end());
     for (const float worth : {0.0f, 1e9f}) {
       auto distances = device().allocate<float>(count);
       auto turned = device().allocate<int>(count);
-      device().launch({"guard.cl", "measure_triangles"}, ClRange(count), count, worth, tube.maps.triangle_count, device().upload(listed),
-                      tube.triangles, tube.vertex_texels, tube.texel_triangles, tube.maps.corners, tube.maps.across, tube.maps.x, tube.maps.y,
-                      tube.maps.z, tube.points[0], tube.points[1], tube.points[2], distances, turned);
+      device().launch({"guard.cl", "measure_triangles"}, ClRange(count), count, worth, tube.maps.triangle_count,
+                      device().upload(listed_corners), tube.texel_triangles, tube.maps.corners, tube.maps.across, tube.maps.x, tube.maps.y, tube.maps.z,
+                      tube.points[0], tube.points[1], tube.points[2], distances, turned);
       const std::vector<float> found2 = device().download(distances);
       const std::vector<int> is_turned = device().download(turned);
       int further = 0, differently_turned = 0;
@@ -285,8 +345,8 @@ TEST(GuardKernels, AVertexIsMeasuredToTheQuadsAroundItsPlace) {
   const int count = static_cast<int>(vertices.size());
   auto distances = device().allocate<float>(count);
   auto nearest = device().allocate<int>(count);
-  device().launch({"guard.cl", "measure_vertices"}, ClRange(count), count, 0.0f, device().upload(vertices), device().upload(patches),
-                  device().upload(places), tube.layout.patches, device().upload(std::vector<int>{0}), tube.triangles, tube.maps.x, tube.maps.y,
+  device().launch({"guard.cl", "measure_vertices"}, ClRange(count), count, tube.layout.width, 0.0f, device().upload(vertices),
+                  device().upload(patches), device().upload(places), tube.layout.patches, device().upload(tube.diagonals), tube.maps.x, tube.maps.y,
                   tube.maps.z, tube.points[0], tube.points[1], tube.points[2], distances, nearest);
   const std::vector<float> found2 = device().download(distances);
   const std::vector<int> found = device().download(nearest);
@@ -294,7 +354,9 @@ TEST(GuardKernels, AVertexIsMeasuredToTheQuadsAroundItsPlace) {
     double expected = 1e9;
     for (const Triangle& t : tube.lattice.triangles) expected = std::min(expected, tube.distance(tube.chart.positions[i], t, tube.lattice.positions));
     EXPECT_NEAR(std::sqrt(found2[i]), expected, 1e-4) << i;
-    EXPECT_NEAR(tube.distance(tube.chart.positions[i], tube.lattice.triangles[found[i]], tube.lattice.positions), expected, 1e-4) << i;
+    const auto number = std::find(tube.numbers.begin(), tube.numbers.end(), found[i]) - tube.numbers.begin();
+    ASSERT_LT(number, std::ssize(tube.numbers));
+    EXPECT_NEAR(tube.distance(tube.chart.positions[i], tube.lattice.triangles[number], tube.lattice.positions), expected, 1e-4) << i;
   }
 }
 
@@ -302,13 +364,15 @@ TEST(GuardKernels, SuspicionsGrowWithSizeAndTheAngleToTheMesh) {
   std::mt19937 random(9);
   const TubeAndLattice tube(random, 0.1);
   const int quads = static_cast<int>(tube.lattice.triangles.size()) / 2, triangle_count = tube.maps.triangle_count;
-  auto normals = device().allocate<float>(3 * static_cast<std::size_t>(triangle_count)), suspicions = device().allocate<float>(quads);
+  auto normals = device().allocate<float>(3 * static_cast<std::size_t>(triangle_count)), suspicions = device().allocate<float>(tube.layout.size());
   device().launch({"guard.cl", "find_normals"}, ClRange(triangle_count), triangle_count, tube.maps.corners, tube.maps.x, tube.maps.y, tube.maps.z,
                   normals);
-  device().launch({"guard.cl", "suspect_quads"}, ClRange(quads), quads, triangle_count, tube.triangles, tube.vertex_texels, tube.texel_triangles,
-                  normals, tube.points[0], tube.points[1], tube.points[2], suspicions);
+  std::vector<LatticeRow> rows;
+  for (int row = 1; row + 2 < TubeAndLattice::kHeight; ++row) rows.push_back({0, row, 0, 0});
+  device().launch({"guard.cl", "suspect_quads"}, row_range(device(), rows.size()), static_cast<int>(rows.size()), tube.layout.width, triangle_count,
+                  device().upload(rows), tube.layout.patches, device().upload(tube.diagonals), tube.texel_triangles, normals, tube.points[0],
+                  tube.points[1], tube.points[2], suspicions);
   const std::vector<float> found2 = device().download(suspicions);
-  const std::vector<int> texels = device().download(tube.vertex_texels);
   int against = 0;
   for (int quad = 0; quad < quads; ++quad) {
     double expected = 0;
@@ -319,7 +383,7 @@ TEST(GuardKernels, SuspicionsGrowWithSizeAndTheAngleToTheMesh) {
       double longest = 0;
       for (int k = 0; k < 3; ++k) longest = std::max(longest, (tube.lattice.positions[t[k]] - tube.lattice.positions[t[(k + 1) % 3]]).norm());
       for (const int vertex : t) {
-        const Vec3 n = tube.normal(tube.chart.triangles[tube.seeds[texels[vertex]]], tube.chart.positions);
+        const Vec3 n = tube.normal(tube.chart.triangles[tube.seeds[vertex]], tube.chart.positions);
         const double sine = own.norm() > 1e-6 && n.norm() > 1e-6 ? own.cross(n).norm() / (own.norm() * n.norm()) : 1;
         is_against = is_against || own.dot(n) < -1e-4;
         is_unsure = is_unsure || std::abs(own.dot(n)) <= 1e-4;
@@ -329,9 +393,9 @@ TEST(GuardKernels, SuspicionsGrowWithSizeAndTheAngleToTheMesh) {
     if (is_unsure) continue;
     against += is_against;
     if (is_against)
-      EXPECT_TRUE(std::isinf(found2[quad])) << quad;
+      EXPECT_TRUE(std::isinf(found2[tube.numbers[2 * quad] / 2])) << quad;
     else
-      EXPECT_NEAR(std::sqrt(found2[quad]), expected, 2e-3) << quad;
+      EXPECT_NEAR(std::sqrt(found2[tube.numbers[2 * quad] / 2]), expected, 2e-3) << quad;
   }
   EXPECT_LT(against, quads / 2);
 }

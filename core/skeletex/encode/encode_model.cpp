@@ -145,7 +145,7 @@ void prepare_encoding(ClContext& context, const EncodeOptions& options) {
   if (options.method != EncodeMethod::kSpd && options.has_unfold) context.prepare({"unfold.cl", "find_folds"});
   if (options.has_snap || options.has_fit) {
     context.prepare({"snap.cl", "place_snapped"});
-    context.prepare({"reconstruct.cl", "triangulate_smoothly"});
+    context.prepare({"lattice.cl", "choose_diagonals"});
     context.prepare({"guard.cl", "suspect_quads"});
     context.prepare({"metro.cl", "find_nearest_triangles"});
     if (options.has_fit) context.prepare({"fit.cl", "read_samples"});

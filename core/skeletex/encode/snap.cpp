@@ -236,17 +236,18 @@ void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceM
                  context.upload(vertex_points), context.upload(edge_points), maps.x, maps.y, maps.z, points.x, points.y, points.z);
 }
 
-std::vector<int> put_back_marked(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before, const ClBuffer<int>& marks,
-                    bool with_vertices, ReadingPositions& positions, TexelPoints& points) {
+std::vector<int> put_back_listed(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before,
+                                 const std::vector<int>& texels, bool with_vertices, ReadingPositions& positions, TexelPoints& points) {
+  if (texels.empty()) return {};
   auto is_bad = context.allocate<int>(layout.size()), is_back = context.allocate<int>(layout.size());
   auto bad = context.allocate<int>(layout.size()), changed = context.allocate<int>(layout.size());
   // How many texels have gone back, quads at them are bad, texels of these have gone back, and so on.
   std::vector<int> counts(2 * kRoundsBetweenLooks + 1, 0);
   auto device_counts = context.upload(counts);
   context.fill(is_bad, 0), context.fill(is_back, 0);
-  context.launch({"snap.cl", "put_marked_back"}, layout.range(), layout.width, layout.height, static_cast<int>(with_vertices), marks, layout.texel_patches,
-                 layout.patches, before.x, before.y, before.z, positions.home_x, positions.home_y, is_back, positions.anchors, positions.x, positions.y,
-                 points.x, points.y, points.z, changed, device_counts);
+  context.launch({"snap.cl", "put_listed_back"}, over(static_cast<int>(texels.size())), static_cast<int>(texels.size()), static_cast<int>(with_vertices),
+                 context.upload(texels), before.x, before.y, before.z, positions.home_x, positions.home_y, is_back, positions.anchors, positions.x,
+                 positions.y, points.x, points.y, points.z, changed, device_counts);
   // Texels only ever go back, so this ends.
   do {
     for (int round = 0; round < kRoundsBetweenLooks; ++round) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "skeletex/encode/device_maps.h"
+#include "skeletex/reconstruct/displace.h"
 
 namespace skeletex {
 
@@ -48,20 +49,19 @@ ReadingPositions even_positions(ClContext& context, const DeviceLayout& layout);
 void snap_positions(ClContext& context, const DeviceLayout& layout, const SnapFeatures& features, ReadingPositions& positions);
 
 /// Planes of points, one per texel.
-struct TexelPoints {
-  ClBuffer<float> x, y, z;
-};
+using TexelPoints = DevicePlanes;
 
 /// Puts texels on vertices and edges exactly there.
 void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps, const SnapFeatures& features,
                    const ReadingPositions& positions, TexelPoints& points);
 
-/// Texels with a mark go back to the even lattice, those on vertices only `with_vertices`; and with them the texels of quads at
+/// Texels of inner rows go back to the even lattice, those on vertices only `with_vertices`; and with them the texels of quads at
 /// them that then fold in the map, or in space where the even lattice does not.
 /// \param even    the even lattice's points, the measure of folds
 /// \param before  what texels go back to: these as they would be stored
+/// \param texels  each once
 /// \return the texels that went back, in order
-std::vector<int> put_back_marked(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before, const ClBuffer<int>& marks,
-                    bool with_vertices, ReadingPositions& positions, TexelPoints& points);
+std::vector<int> put_back_listed(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before,
+                                 const std::vector<int>& texels, bool with_vertices, ReadingPositions& positions, TexelPoints& points);
 
 }  // namespace skeletex

@@ -14,7 +14,6 @@ namespace skeletex {
 namespace {
 
 constexpr int kSide = 4;  // quads along a side of a square
-constexpr int kPieceTriangles = 8;
 constexpr int kPiece = 2;             // quads along a side of a piece of a square
 constexpr int kNear = 8;              // quads: up to here a part of the lattice is looked at as a whole
 constexpr float kLeastCosine = 0.2f;  // between a part's normals and their middle
@@ -42,18 +41,18 @@ void add(const Box& other, Box& box) {
 /// (Without branches: which of the sides decides is chance.)
 template <class Box>
 bool do_overlap(const Box& a, const Box& b) {
-  return (a.least - b.greatest).max(b.least - a.greatest).maxCoeff() <= 0;
+  return (static_cast<int>(a.least[0] <= b.greatest[0]) & static_cast<int>(b.least[0] <= a.greatest[0]) &
+          static_cast<int>(a.least[1] <= b.greatest[1]) & static_cast<int>(b.least[1] <= a.greatest[1]) &
+          static_cast<int>(a.least[2] <= b.greatest[2]) & static_cast<int>(b.least[2] <= a.greatest[2])) != 0;
 }
 
 }  // namespace
 
-LatticeCrossings::LatticeCrossings(const SkeletexModel& model, const Lattice& lattice)
-    : origin_(model.origin),
-      margin_(static_cast<float>(4e-7 * model.diagonal)),
-      first_quad_(lattice.first_quad),
-      first_inner_(lattice.first_inner),
-      part_of_(lattice.triangle_count),
-      normals_(2 * static_cast<std::size_t>(lattice.quad_count)) {
+LatticeCrossings::LatticeCrossings(const LatticeMesh& lattice)
+    : margin_(static_cast<float>(4e-7 * lattice.model().diagonal)),
+      texture_width_(lattice.model().texture.width),
+      part_of_(lattice.triangle_count()) {
+  const SkeletexModel& model = lattice.model();
   struct Square {
     std::uint64_t key;
     int patch, column, row;
@@ -64,6 +63,8 @@ LatticeCrossings::LatticeCrossings(const SkeletexModel& model, const Lattice& la
     const Rectangle& r = model.patches[patch].rectangle;
     const int columns = (r.width + kSide - 1) / kSide, rows = (r.height - 3 + kSide - 1) / kSide;
     rectangles_.push_back(r);
+    first_normal_.push_back(static_cast<int>(normals_.size()));
+    normals_.resize(normals_.size() + 2 * static_cast<std::size_t>(r.width) * (r.height - 3));
     squares_.push_back({columns, rows});
     first_square_.push_back(places);
     places += columns * rows;
@@ -75,9 +76,8 @@ LatticeCrossings::LatticeCrossings(const SkeletexModel& model, const Lattice& la
   }
   std::sort(squares.begin(), squares.end(), [](const Square& a, const Square& b) { return a.key < b.key; });
   places_.resize(places);
-  triangles_.reserve(lattice.triangle_count);
+  triangles_.reserve(lattice.triangle_count());
   for (const Square& square : squares) {
-    const Rectangle& r = model.patches[square.patch].rectangle;
     places_[first_square_[square.patch] + square.row * squares_[square.patch][0] + square.column] = static_cast<int>(parts_.size());
     parts_.push_back({square.patch, square.column, square.row, static_cast<int>(pieces_.size()), 0});
     const Piece whole = quads_of(parts_.back());
@@ -93,14 +93,14 @@ LatticeCrossings::LatticeCrossings(const SkeletexModel& model, const Lattice& la
         for (int i = 0; i < piece.rows; ++i)
           for (int j = 0; j < piece.columns; ++j)
             for (const int side : {0, 1})
-              triangles_.push_back(2 * (lattice.first_quad[square.patch] + (piece.row + i) * r.width + piece.column + j) + side);
+              triangles_.push_back(2 * texel_of(square.patch, piece.column + j, piece.row + i) + side);
         piece.count = static_cast<int>(triangles_.size()) - piece.begin;
         pieces_.push_back(piece);
         ++parts_.back().count;
       }
   }
-  for (int begin = 2 * lattice.quad_count; begin < lattice.triangle_count; begin += kPieceTriangles) {
-    const int count = std::min(kPieceTriangles, lattice.triangle_count - begin);
+  for (int begin = lattice.first_end_triangle(); begin < lattice.triangle_count(); begin += kPieceTriangles) {
+    const int count = std::min(kPieceTriangles, lattice.triangle_count() - begin);
     parts_.push_back({-1, 0, 0, static_cast<int>(pieces_.size()), 1});
     pieces_.push_back({-1, 0, 0, 0, 0, static_cast<int>(triangles_.size()), count});
     for (int i = 0; i < count; ++i) triangles_.push_back(begin + i);
@@ -116,54 +116,61 @@ LatticeCrossings::LatticeCrossings(const SkeletexModel& model, const Lattice& la
   }
 }
 
-Eigen::Array4f LatticeCrossings::rounded(const Vec3& position) const {
-  const Eigen::Vector3f p = (position - origin_).cast<float>();
-  return {p[0], p[1], p[2], 0};
+/// The triangles of a piece, in order.
+LatticeCrossings::PieceTriangles LatticeCrossings::triangles_of(const LatticeMesh& lattice, const Piece& piece) const {
+  PieceTriangles triangles;
+  if (piece.patch < 0) {
+    for (int k = 0; k < piece.count; ++k) triangles[k] = lattice.triangle(triangles_[piece.begin + k]);
+    return triangles;
+  }
+  auto next = triangles.begin();
+  for (int row = piece.row; row < piece.row + piece.rows; ++row)
+    for (int column = piece.column; column < piece.column + piece.columns; ++column)
+      next = std::ranges::copy(lattice.triangles_of(texel_of(piece.patch, column, row), texel_of(piece.patch, column + 1, row)), next).out;
+  return triangles;
 }
 
-void LatticeCrossings::round(const TriangleMesh& mesh) {
-  points_.resize(mesh.positions.size());
-  for_each_block(points_.size(), 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) points_[i] = rounded(mesh.positions[i]);
-  });
+LatticeCrossings::Box LatticeCrossings::box_of(const LatticeMesh& lattice, const Triangle& triangle) const {
+  const Eigen::Array4f a = lattice.point(triangle[0]), b = lattice.point(triangle[1]), c = lattice.point(triangle[2]);
+  return {a.min(b).min(c) - margin_, a.max(b).max(c) + margin_};
 }
 
-LatticeCrossings::Box LatticeCrossings::box_of(const TriangleMesh& mesh, int triangle) const {
-  const auto [a, b, c] = mesh.triangles[triangle];
-  const Eigen::Array4f margin(margin_, margin_, margin_, 0);
-  return {points_[a].min(points_[b]).min(points_[c]) - margin, points_[a].max(points_[b]).max(points_[c]) + margin};
-}
-
-void LatticeCrossings::measure(const TriangleMesh& mesh, int part) {
+void LatticeCrossings::measure(const LatticeMesh& lattice, int part) {
   Box around = no_box<Box>(), normals = no_box<Box>();
   for (int i = parts_[part].begin; i < parts_[part].begin + parts_[part].count; ++i) {
     const Piece& piece = pieces_[i];
     Box box = no_box<Box>();
     if (piece.patch < 0) {
-      for (int k = piece.begin; k < piece.begin + piece.count; ++k) add(box_of(mesh, triangles_[k]), box);
+      for (int k = piece.begin; k < piece.begin + piece.count; ++k)
+        for (const int vertex : lattice.triangle(triangles_[k])) add({lattice.point(vertex), lattice.point(vertex)}, box);
     } else {
       // Each vertex once.
-      const int width = rectangles_[piece.patch].width;
-      for (int row = piece.row; row <= piece.row + piece.rows; ++row)
-        for (int column = piece.column; column <= piece.column + piece.columns; ++column) {
-          const Eigen::Array4f& point = points_[first_inner_[piece.patch] + row * width + (column < width ? column : column - width)];
-          add({point, point}, box);
+      std::array<std::array<Eigen::Array4f, kPiece + 1>, kPiece + 1> points;
+      for (int row = 0; row <= piece.rows; ++row)
+        for (int column = 0; column <= piece.columns; ++column) {
+          points[row][column] = lattice.point(texel_of(piece.patch, piece.column + column, piece.row + row));
+          add({points[row][column], points[row][column]}, box);
         }
-      const Eigen::Array4f margin(margin_, margin_, margin_, 0);
-      box = {box.least - margin, box.greatest + margin};
-      for (int k = piece.begin; k < piece.begin + piece.count; ++k) {
-        const auto [a, b, c] = mesh.triangles[triangles_[k]];
-        const Eigen::Array4f u = points_[b] - points_[a], v = points_[c] - points_[a];
-        const float x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2], z = u[0] * v[1] - u[1] * v[0];
-        // One without area may look anywhere.
-        const float length2 = x * x + y * y + z * z, inverse = length2 > 0 ? 1 / std::sqrt(length2) : 0;
-        const Eigen::Array4f normal(x * inverse, y * inverse, z * inverse, 0);
-        normals_[triangles_[k]] = normal;
-        add({normal, normal}, normals);
-      }
+      for (int row = 0; row < piece.rows; ++row)
+        for (int column = 0; column < piece.columns; ++column) {
+          const int texel = texel_of(piece.patch, piece.column + column, piece.row + row);
+          const Eigen::Array4f &own = points[row][column], &right = points[row][column + 1], &above = points[row + 1][column], &beyond = points[row + 1][column + 1];
+          const bool is_second = lattice.takes_second(texel);
+          const std::array<Eigen::Array4f, 2> u{right - own, beyond - (is_second ? above : own)};
+          const std::array<Eigen::Array4f, 2> v{(is_second ? above : beyond) - own, is_second ? Eigen::Array4f(above - right) : Eigen::Array4f(above - own)};
+          for (const int side : {0, 1}) {
+            const Eigen::Vector3f across = u[side].head<3>().matrix().cross(v[side].head<3>().matrix());
+            // One without area may look anywhere.
+            const float length2 = across.squaredNorm();
+            Eigen::Array4f normal = Eigen::Array4f::Zero();
+            if (length2 > 0) normal.head<3>() = across.array() / std::sqrt(length2);
+            normals_[normal_of(piece.patch, piece.column + column, piece.row + row) + side] = normal;
+            add({normal, normal}, normals);
+          }
+        }
     }
-    piece_boxes_[i] = box;
-    add(box, around);
+    piece_boxes_[i] = {box.least - margin_, box.greatest + margin_};
+    add(piece_boxes_[i], around);
   }
   boxes_[0][part] = around;
   normal_boxes_[part] = normals;
@@ -199,8 +206,8 @@ bool LatticeCrossings::is_smooth(const Piece& a, const Piece& b) const {
   const auto for_each_normal = [&](const auto& act) {
     for (int r = row; r < end; ++r)
       for (int j = 0; j < columns; ++j) {
-        const std::size_t quad = static_cast<std::size_t>(first_quad_[a.patch]) + r * width + (column + j < width ? column + j : column + j - width);
-        act(normals_[2 * quad]), act(normals_[2 * quad + 1]);
+        const int first = normal_of(a.patch, column + j, r);
+        act(normals_[first]), act(normals_[first + 1]);
       }
   };
   Eigen::Array4f middle = Eigen::Array4f::Zero();
@@ -225,16 +232,18 @@ bool LatticeCrossings::is_smooth(const Part& a, const Part& b) const {
   return least > kLeastCosine * middle.matrix().norm() || is_smooth(quads_of(a), quads_of(b));
 }
 
-void LatticeCrossings::find_between(const TriangleMesh& mesh, int a, int b, const std::vector<char>& is_asked,
+void LatticeCrossings::find_between(const LatticeMesh& lattice, int a, int b, const std::vector<char>& is_asked,
                                     std::vector<std::array<int, 2>>& pairs) const {
-  struct Boxes {
+  struct Measured {
     int piece = -1;
-    std::array<Box, kPieceTriangles> of;
+    PieceTriangles triangles;
+    std::array<Box, kPieceTriangles> boxes;
   };
-  const auto boxes_of = [&](int piece, Boxes& boxes) {
-    if (boxes.piece == piece) return;
-    boxes.piece = piece;
-    for (int k = 0; k < pieces_[piece].count; ++k) boxes.of[k] = box_of(mesh, triangles_[pieces_[piece].begin + k]);
+  const auto measure_piece = [&](int piece, Measured& measured) {
+    if (measured.piece == piece) return;
+    measured.piece = piece;
+    measured.triangles = triangles_of(lattice, pieces_[piece]);
+    for (int k = 0; k < pieces_[piece].count; ++k) measured.boxes[k] = box_of(lattice, measured.triangles[k]);
   };
   // The quad of a piece's triangle.
   const auto quad_at = [](const Piece& piece, int triangle) {
@@ -242,22 +251,23 @@ void LatticeCrossings::find_between(const TriangleMesh& mesh, int a, int b, cons
     const int quad = triangle / 2;
     return Piece{piece.patch, piece.column + quad % piece.columns, 1, piece.row + quad / piece.columns, 1, 0, 0};
   };
-  Boxes ones, others;
+  Measured ones, others;
   for (int i = parts_[a].begin; i < parts_[a].begin + parts_[a].count; ++i) {
     if (!do_overlap(piece_boxes_[i], boxes_[0][b])) continue;
     for (int j = a == b ? i : parts_[b].begin; j < parts_[b].begin + parts_[b].count; ++j) {
       if (!do_overlap(piece_boxes_[i], piece_boxes_[j])) continue;
       const Piece &one = pieces_[i], &other = pieces_[j];
       if (is_smooth(one, other)) continue;
-      boxes_of(i, ones), boxes_of(j, others);
+      measure_piece(i, ones), measure_piece(j, others);
       for (int k = 0; k < one.count; ++k) {
-        if (!do_overlap(ones.of[k], piece_boxes_[j])) continue;
+        if (!do_overlap(ones.boxes[k], piece_boxes_[j])) continue;
         for (int l = i == j ? k + 1 : 0; l < other.count; ++l) {
-          if (!do_overlap(ones.of[k], others.of[l])) continue;
+          if (!do_overlap(ones.boxes[k], others.boxes[l])) continue;
           const int s = triangles_[one.begin + k], t = triangles_[other.begin + l];
           if (!is_asked.empty() && !is_asked[s] && !is_asked[t]) continue;
           if (is_smooth(quad_at(one, k), quad_at(other, l))) continue;
-          if (do_triangles_intersect(mesh, std::min(s, t), std::max(s, t))) pairs.push_back({std::min(s, t), std::max(s, t)});
+          const Triangle &first = ones.triangles[k], &second = others.triangles[l];
+          if (do_triangles_intersect(first, lattice.corners(first), second, lattice.corners(second))) pairs.push_back({std::min(s, t), std::max(s, t)});
         }
       }
     }
@@ -266,7 +276,7 @@ void LatticeCrossings::find_between(const TriangleMesh& mesh, int a, int b, cons
 
 /// \param parts       all, or some in order: then pairs with one of these, when both are it is the first that finds them
 /// \param are_alone  pairs within `parts` only
-std::vector<std::array<int, 2>> LatticeCrossings::find_from(const TriangleMesh& mesh, std::span<const int> parts,
+std::vector<std::array<int, 2>> LatticeCrossings::find_from(const LatticeMesh& lattice, std::span<const int> parts,
                                                             const std::vector<char>& is_asked, bool are_alone) const {
   const bool are_all = parts.empty();
   const std::size_t count = are_all ? parts_.size() : parts.size();
@@ -301,7 +311,7 @@ std::vector<std::array<int, 2>> LatticeCrossings::find_from(const TriangleMesh& 
         for (const int other : near) {
           if (!do_overlap(boxes_[0][part], boxes_[0][other])) continue;
           if (are_all ? other < part : is_listed(other) ? other < part : are_alone) continue;
-          if (!is_smooth(parts_[part], parts_[other])) find_between(mesh, part, other, is_asked, found[block]);
+          if (!is_smooth(parts_[part], parts_[other])) find_between(lattice, part, other, is_asked, found[block]);
         }
       }
     }
@@ -312,16 +322,15 @@ std::vector<std::array<int, 2>> LatticeCrossings::find_from(const TriangleMesh& 
   return pairs;
 }
 
-std::vector<std::array<int, 2>> LatticeCrossings::find(const TriangleMesh& mesh) {
-  round(mesh);
+std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattice) {
   for_each_block(parts_.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t part = begin; part < end; ++part) measure(mesh, static_cast<int>(part));
+    for (std::size_t part = begin; part < end; ++part) measure(lattice, static_cast<int>(part));
   });
   join_boxes();
-  return find_from(mesh, {}, {});
+  return find_from(lattice, {}, {});
 }
 
-std::vector<std::array<int, 2>> LatticeCrossings::find(const TriangleMesh& mesh, std::span<const int> changed) {
+std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattice, std::span<const int> changed) {
   if (changed.empty()) return {};
   std::vector<char> is_asked(part_of_.size(), 0);
   std::vector<int> parts;
@@ -329,25 +338,21 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const TriangleMesh& mesh,
     is_asked[triangle] = 1;
     parts.push_back(part_of_[triangle]);
   }
-  measure_again(mesh, parts);
-  return find_from(mesh, parts, is_asked);
+  measure_again(lattice, parts);
+  return find_from(lattice, parts, is_asked);
 }
 
 /// \param parts  sorted here
-void LatticeCrossings::measure_again(const TriangleMesh& mesh, std::vector<int>& parts) {
+void LatticeCrossings::measure_again(const LatticeMesh& lattice, std::vector<int>& parts) {
   std::sort(parts.begin(), parts.end());
   parts.erase(std::unique(parts.begin(), parts.end()), parts.end());
-  for (const int part : parts)
-    for (int i = parts_[part].begin; i < parts_[part].begin + parts_[part].count; ++i)
-      for (int k = pieces_[i].begin; k < pieces_[i].begin + pieces_[i].count; ++k)
-        for (const int vertex : mesh.triangles[triangles_[k]]) points_[vertex] = rounded(mesh.positions[vertex]);
   for_each_block(parts.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) measure(mesh, parts[i]);
+    for (std::size_t i = begin; i < end; ++i) measure(lattice, parts[i]);
   });
   join_boxes();
 }
 
-std::vector<std::array<int, 2>> LatticeCrossings::find_around(std::span<const std::array<int, 2>> pairs, const TriangleMesh& mesh, const TriangleMesh& other) {
+std::vector<std::array<int, 2>> LatticeCrossings::find_around(std::span<const std::array<int, 2>> pairs, const LatticeMesh& lattice, const LatticeMesh& other) {
   std::vector<int> parts;
   for (const auto& pair : pairs)
     for (const int triangle : pair) {
@@ -363,7 +368,7 @@ std::vector<std::array<int, 2>> LatticeCrossings::find_around(std::span<const st
     }
   measure_again(other, parts);
   const auto found = find_from(other, parts, {}, true);
-  measure_again(mesh, parts);
+  measure_again(lattice, parts);
   return found;
 }
 

@@ -4,8 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "skeletex/model/texture.h"
-#include "skeletex/reconstruct/lattice.h"
+#include "skeletex/reconstruct/lattice_mesh.h"
 
 namespace skeletex {
 
@@ -14,18 +13,18 @@ namespace skeletex {
 /// lattice is such, and only other parts that lie near each other are looked at.
 class LatticeCrossings {
  public:
-  LatticeCrossings(const SkeletexModel& model, const Lattice& lattice);
+  explicit LatticeCrossings(const LatticeMesh& lattice);
 
   /// All pairs of triangles that intersect, the smaller index first, sorted. Cost: some 10 ns per triangle, all processors.
-  std::vector<std::array<int, 2>> find(const TriangleMesh& mesh);
-  /// Of the same mesh with some triangles changed: the pairs with one of these.
-  std::vector<std::array<int, 2>> find(const TriangleMesh& mesh, std::span<const int> changed);
+  std::vector<std::array<int, 2>> find(const LatticeMesh& lattice);
+  /// Of the same lattice with some triangles changed: the pairs with one of these.
+  std::vector<std::array<int, 2>> find(const LatticeMesh& lattice, std::span<const int> changed);
 
   /// Of another mesh of this lattice: the pairs that lie where given ones of this mesh do, or next to it.
-  std::vector<std::array<int, 2>> find_around(std::span<const std::array<int, 2>> pairs, const TriangleMesh& mesh, const TriangleMesh& other);
+  std::vector<std::array<int, 2>> find_around(std::span<const std::array<int, 2>> pairs, const LatticeMesh& lattice, const LatticeMesh& other);
 
  private:
-  /// Least and greatest coordinates, rounded outwards; the fourth is 0.
+  /// Least and greatest coordinates, rounded outwards; the fourth does not count.
   struct Box {
     Eigen::Array4f least, greatest;
   };
@@ -41,31 +40,41 @@ class LatticeCrossings {
     int column = 0, row = 0;   ///< of squares, in squares
     int begin = 0, count = 0;  ///< its pieces
   };
-  void measure(const TriangleMesh& mesh, int part);
+  void measure(const LatticeMesh& lattice, int part);
   void join_boxes();
-  void measure_again(const TriangleMesh& mesh, std::vector<int>& parts);
-  Eigen::Array4f rounded(const Vec3& position) const;
-  void round(const TriangleMesh& mesh);
-  Box box_of(const TriangleMesh& mesh, int triangle) const;
+  void measure_again(const LatticeMesh& lattice, std::vector<int>& parts);
+  /// The texel at a row of quads of a patch; columns wrap round once.
+  int texel_of(int patch, int column, int row) const {
+    const Rectangle& r = rectangles_[patch];
+    return (r.y + 1 + row) * texture_width_ + r.x + (column < r.width ? column : column - r.width);
+  }
+  /// The first of a quad's normals. (Not by its texel: textures are as wide as a power of two, so that columns would share few cache lines.)
+  int normal_of(int patch, int column, int row) const {
+    const int width = rectangles_[patch].width;
+    return first_normal_[patch] + 2 * (row * width + (column < width ? column : column - width));
+  }
+  static constexpr int kPieceTriangles = 8;
+  using PieceTriangles = std::array<Triangle, kPieceTriangles>;
+  PieceTriangles triangles_of(const LatticeMesh& lattice, const Piece& piece) const;
+  Box box_of(const LatticeMesh& lattice, const Triangle& triangle) const;
   Piece quads_of(const Part& part) const;
   bool is_smooth(const Part& a, const Part& b) const;
   bool is_smooth(const Piece& a, const Piece& b) const;
-  void find_between(const TriangleMesh& mesh, int a, int b, const std::vector<char>& is_asked, std::vector<std::array<int, 2>>& pairs) const;
-  std::vector<std::array<int, 2>> find_from(const TriangleMesh& mesh, std::span<const int> parts, const std::vector<char>& is_asked,
+  void find_between(const LatticeMesh& lattice, int a, int b, const std::vector<char>& is_asked, std::vector<std::array<int, 2>>& pairs) const;
+  std::vector<std::array<int, 2>> find_from(const LatticeMesh& lattice, std::span<const int> parts, const std::vector<char>& is_asked,
                                             bool are_alone = false) const;
 
-  Vec3 origin_;
   float margin_;
+  int texture_width_;
   std::vector<Rectangle> rectangles_;  // per patch
-  std::vector<int> first_quad_, first_inner_;
   std::vector<std::array<int, 2>> squares_;  // per patch, how many columns and rows of them
   std::vector<int> first_square_;            // per patch, in places_
   std::vector<int> places_;                  // per square, by rows of a patch, its part
   std::vector<Part> parts_;                  // squares along a curve, then strips
   std::vector<Piece> pieces_;
   std::vector<int> triangles_, part_of_;  // of the pieces; per triangle
-  std::vector<Eigen::Array4f> points_;    // of the mesh, from the origin
-  std::vector<Eigen::Array4f> normals_;   // per triangle between inner rows
+  std::vector<Eigen::Array4f> normals_;   // per triangle between inner rows, patch by patch
+  std::vector<int> first_normal_;         // per patch
   std::vector<Box> normal_boxes_;         // per part
   std::vector<Box> piece_boxes_;
   std::vector<std::vector<Box>> boxes_;  // per level: of parts, of every eight of them, and so on

@@ -138,7 +138,10 @@ std::vector<char> find_plain_vertices(const TriangleMesh& mesh) {
 }  // namespace
 
 bool do_triangles_intersect(const TriangleMesh& mesh, int first, int second) {
-  const Triangle &i = mesh.triangles[first], &j = mesh.triangles[second];
+  return do_triangles_intersect(mesh.triangles[first], corners_of(mesh, first), mesh.triangles[second], corners_of(mesh, second));
+}
+
+bool do_triangles_intersect(const Triangle& i, const std::array<Vec3, 3>& s, const Triangle& j, const std::array<Vec3, 3>& t) {
   int shared = 0, at_i = 0, at_j = 0, free_i = 0, free_j = 0;
   for (int k = 0; k < 3; ++k) {
     const auto there = std::find(j.begin(), j.end(), i[k]);
@@ -151,7 +154,6 @@ bool do_triangles_intersect(const TriangleMesh& mesh, int first, int second) {
     }
     if (std::find(i.begin(), i.end(), j[k]) == i.end()) free_j = k;
   }
-  const Corners s = corners_of(mesh, first), t = corners_of(mesh, second);
   switch (shared) {
     case 0: return do_disjoint_triangles_meet(s, t);
     case 1: return do_triangles_at_vertex_meet({s[at_i], s[(at_i + 1) % 3], s[(at_i + 2) % 3]}, {t[at_j], t[(at_j + 1) % 3], t[(at_j + 2) % 3]});

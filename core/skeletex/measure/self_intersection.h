@@ -12,6 +12,9 @@ namespace skeletex {
 /// counts, and so does a gap that double precision cannot tell from contact. Triangles without area count as segments;
 /// two of them do not meet.
 bool do_triangles_intersect(const TriangleMesh& mesh, int first, int second);
+/// The same of two triangles of any mesh, by their vertices' numbers and places.
+bool do_triangles_intersect(const Triangle& first, const std::array<Vec3, 3>& first_corners, const Triangle& second,
+                            const std::array<Vec3, 3>& second_corners);
 
 /// All pairs of triangles that intersect so, the smaller index first, sorted.
 /// \pre indices in range, coordinates finite

@@ -7,119 +7,115 @@
 
 namespace skeletex {
 
-LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, const Planes& planes)
+LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, ClBuffer<PatchRecord> patches, DevicePlanes points)
     : context_(context),
       model_(model),
       rule_(rule),
       walls_(model.skeleton),
       lattice_(number_lattice(model)),
-      quads_(upload_quads(context, model, walls_)) {
+      texel_patches_(static_cast<std::size_t>(model.texture.width) * model.texture.height, -1),
+      positions_(lattice_.vertex_count),
+      points_(std::move(points)),
+      patches_(std::move(patches)) {
   std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kInner);
-  int quad_rows = 0;
-  for (const Patch& patch : model.patches) {
-    first_row_.push_back(quad_rows);
-    quad_rows += patch.rectangle.height - 3;
+  std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == model.patches[row[0]].rectangle.height - 2; });
+  rows_ = context.upload(rows);
+  device_diagonals_ = context.allocate<int>(texel_patches_.size());
+  context.launch({"lattice.cl", "choose_diagonals"}, row_range(context, rows.size()), static_cast<int>(rows.size()), model.texture.width,
+                 static_cast<int>(rule == DiagonalRule::kSmooth), rows_, patches_, points_.x, points_.y, points_.z, device_diagonals_);
+  for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
+    const Rectangle& r = model.patches[bone].rectangle;
+    for (int row = 0; row < r.height; ++row)
+      std::fill_n(texel_patches_.begin() + (r.y + row) * static_cast<std::ptrdiff_t>(model.texture.width) + r.x, r.width, static_cast<int>(bone));
   }
-  texels_.resize(lattice_.inner_count);
-  mesh_.positions.resize(lattice_.vertex_count);
-  for (auto& plane : points_) plane.resize(texels_.size());
-  for_each_block(rows.size(), 32, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      const auto [patch, row, vertex, quad] = rows[k];
-      const Rectangle& r = model.patches[patch].rectangle;
-      const int texel = (r.y + row) * model.texture.width + r.x;
-      for (int j = 0; j < r.width; ++j) {
-        texels_[vertex + j] = texel + j;
-        for (int axis = 0; axis < 3; ++axis) {
-          points_[axis][vertex + j] = planes[axis][texel + j];
-          mesh_.positions[vertex + j][axis] = model.origin[axis] + static_cast<double>(planes[axis][texel + j]);
-        }
-      }
-    }
+  const std::vector<float> x = context.download(points_.x), y = context.download(points_.y), z = context.download(points_.z);
+  host_points_.resize(vertex_count());
+  for_each_block(x.size(), 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) host_points_[i] = {x[i], y[i], z[i], 0};
   });
-  device_points_ = {context.upload(points_[0]), context.upload(points_[1]), context.upload(points_[2])};
-  for_each_pole(model, lattice_, [&](int vertex, int, int, std::size_t texel) {
-    for (int axis = 0; axis < 3; ++axis) mesh_.positions[vertex][axis] = model.origin[axis] + static_cast<double>(planes[axis][texel]);
-  });
-  place_seams(model, walls_, lattice_, mesh_.positions);
-  device_triangles_ = triangulate(context, rule, quads_, lattice_, device_points_);
-  mesh_.triangles = context.download(device_triangles_);
-  mesh_.triangles.resize(2 * static_cast<std::size_t>(lattice_.quad_count));
-  first_end_.resize(model.patches.size());
-  for (std::size_t bone = 0; bone < model.patches.size(); ++bone)
-    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
-      first_end_[bone][static_cast<int>(end)] = mesh_.triangles.size();
-      append_end_triangles(model, walls_, lattice_, mesh_.positions, static_cast<int>(bone), end, mesh_.triangles);
-    }
-}
-
-int LatticeMesh::patch_of(int vertex) const {
-  return static_cast<int>(std::upper_bound(lattice_.first_inner.begin(), lattice_.first_inner.end(), vertex) - lattice_.first_inner.begin()) - 1;
-}
-
-void LatticeMesh::retriangulate(std::span<const int> quads) {
-  std::vector<int> listed;
-  for (const int quad : quads) {
-    const auto bone = std::upper_bound(lattice_.first_quad.begin(), lattice_.first_quad.end(), quad) - lattice_.first_quad.begin() - 1;
-    const int at = quad - lattice_.first_quad[bone], width = model_.patches[bone].rectangle.width;
-    listed.push_back(first_row_[bone] + at / width);
-    listed.push_back(at % width);
+  place_seams(model, walls_, lattice_, positions_);
+  for_each_pole(model, lattice_, [&](int vertex, int, int, std::size_t texel) { positions_[vertex] = position(static_cast<int>(texel)); });
+  for (int vertex = texel_count(); vertex < vertex_count(); ++vertex)
+    host_points_[vertex] << (position(vertex) - model.origin).cast<float>(), 0.0f;
+  std::vector<std::vector<Triangle>> ends(2 * model.patches.size());
+  for_each_block(ends.size(), 1, [&](std::size_t i, std::size_t, std::size_t) { ends[i] = fill_end(static_cast<int>(i / 2), static_cast<BoneEnd>(i % 2)); });
+  first_end_.push_back(0);
+  for (const std::vector<Triangle>& end : ends) {
+    end_triangles_.insert(end_triangles_.end(), end.begin(), end.end());
+    first_end_.push_back(static_cast<int>(end_triangles_.size()));
   }
-  const auto triangles = context_.allocate<Triangle>(2 * quads.size());
-  context_.launch({"reconstruct.cl", "triangulate_listed"}, ClRange(quads.size()), static_cast<int>(quads.size()),
-                  static_cast<int>(rule_ == DiagonalRule::kSmooth), context_.upload(listed), quads_.rows, quads_.patches, device_points_.x,
-                  device_points_.y, device_points_.z, device_triangles_, triangles);
-  const std::vector<Triangle> made = context_.download(triangles);
-  for (std::size_t i = 0; i < made.size(); ++i) mesh_.triangles[2 * static_cast<std::size_t>(quads[i / 2]) + i % 2] = made[i];
+  diagonals_ = context.download(device_diagonals_);
 }
 
-std::vector<int> LatticeMesh::move(std::span<const int> vertices, const Planes& planes) {
-  if (vertices.empty()) return {};
-  std::vector<char> is_moved(lattice_.vertex_count, 0);
+/// The strip or fan of an end.
+std::vector<Triangle> LatticeMesh::fill_end(int bone, BoneEnd end) {
+  const Rectangle& r = model_.patches[bone].rectangle;
+  const int first_texel = (r.y + (end == BoneEnd::kHead ? 1 : r.height - 2)) * model_.texture.width + r.x;
+  const int first_vertex = end_row(model_, lattice_, bone, end)[0];
+  for (int j = 0; j < r.width; ++j) positions_[first_vertex + j] = position(first_texel + j);
+  std::vector<Triangle> triangles;
+  append_end_triangles(model_, walls_, lattice_, positions_, bone, end, triangles);
+  for (Triangle& triangle : triangles)
+    for (int& vertex : triangle) vertex += vertex < lattice_.inner_count ? first_texel - first_vertex : texel_count() - lattice_.inner_count;
+  return triangles;
+}
+
+int LatticeMesh::beside(int texel, int columns, int rows) const {
+  const Rectangle& r = model_.patches[texel_patches_[texel]].rectangle;
+  const int column = texel % model_.texture.width - r.x;
+  return texel + rows * model_.texture.width + ((column + columns) % r.width + r.width) % r.width - column;
+}
+
+Triangle LatticeMesh::triangle(int index) const {
+  if (index >= first_end_triangle()) return end_triangles_[index - first_end_triangle()];
+  return triangles_of(index / 2, beside(index / 2, 1, 0))[index % 2];
+}
+
+std::vector<int> LatticeMesh::move(std::span<const int> texels, const LatticeMesh& home) {
+  if (texels.empty()) return {};
+  std::vector<char> is_moved(texel_patches_.size(), 0);
   std::vector<int> quads;
-  std::vector<std::array<char, 2>> has_moved_end(model_.patches.size(), {0, 0});
-  for (const int vertex : vertices) {
-    is_moved[vertex] = 1;
-    for (int axis = 0; axis < 3; ++axis) {
-      points_[axis][vertex] = planes[axis][texels_[vertex]];
-      mesh_.positions[vertex][axis] = model_.origin[axis] + static_cast<double>(points_[axis][vertex]);
-    }
-    const int bone = patch_of(vertex);
+  std::vector<char> has_moved_end(2 * model_.patches.size(), 0);
+  for (const int texel : texels) {
+    is_moved[texel] = 1;
+    host_points_[texel] = home.host_points_[texel];
+    const int bone = texel_patches_[texel];
     const Rectangle& r = model_.patches[bone].rectangle;
-    const int at = vertex - lattice_.first_inner[bone], row = at / r.width, column = at % r.width;
-    if (row == 0) has_moved_end[bone][0] = 1;
-    if (row == r.height - 3) has_moved_end[bone][1] = 1;
+    const int row = texel / model_.texture.width - r.y;
+    if (row == 1) has_moved_end[2 * bone] = 1;
+    if (row == r.height - 2) has_moved_end[2 * bone + 1] = 1;
     // The diagonal of a quad depends on the 4 x 4 vertices around it.
-    for (int i = std::max(0, row - 2); i <= std::min(r.height - 4, row + 1); ++i)
-      for (int j = column - 2; j <= column + 1; ++j) quads.push_back(lattice_.first_quad[bone] + i * r.width + (j + r.width) % r.width);
+    for (int i = std::max(1, row - 2); i <= std::min(r.height - 3, row + 1); ++i)
+      for (int j = -2; j <= 1; ++j) quads.push_back(beside(texel, j, i - row));
   }
   std::sort(quads.begin(), quads.end());
   quads.erase(std::unique(quads.begin(), quads.end()), quads.end());
-  context_.write(device_points_.x, points_[0]), context_.write(device_points_.y, points_[1]), context_.write(device_points_.z, points_[2]);
 
-  std::vector<int> candidates;
-  std::vector<Triangle> before;
-  const auto add = [&](std::size_t triangle) {
-    candidates.push_back(static_cast<int>(triangle));
-    before.push_back(mesh_.triangles[triangle]);
-  };
-  for (const int quad : quads) add(2 * static_cast<std::size_t>(quad)), add(2 * static_cast<std::size_t>(quad) + 1);
-  if (!quads.empty()) retriangulate(quads);
-  for (std::size_t bone = 0; bone < has_moved_end.size(); ++bone)
-    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
-      if (!has_moved_end[bone][static_cast<int>(end)]) continue;
-      std::vector<Triangle> made;
-      append_end_triangles(model_, walls_, lattice_, mesh_.positions, static_cast<int>(bone), end, made);
-      const std::size_t first = first_end_[bone][static_cast<int>(end)];
-      for (std::size_t i = 0; i < made.size(); ++i) {
-        add(first + i);
-        mesh_.triangles[first + i] = made[i];
-      }
+  std::vector<int> changed, patches;
+  for (const int quad : quads) patches.push_back(texel_patches_[quad]);
+  auto chosen = context_.allocate<int>(quads.size());
+  context_.launch({"lattice.cl", "choose_listed_diagonals"}, ClRange(quads.size()), static_cast<int>(quads.size()), model_.texture.width,
+                  static_cast<int>(rule_ == DiagonalRule::kSmooth), context_.upload(quads), context_.upload(patches), patches_, points_.x, points_.y,
+                  points_.z, device_diagonals_, chosen);
+  const std::vector<int> now = context_.download(chosen);
+  for (std::size_t i = 0; i < quads.size(); ++i) {
+    const bool is_other = now[i] != diagonals_[quads[i]];
+    diagonals_[quads[i]] = now[i];
+    for (const int index : {2 * quads[i], 2 * quads[i] + 1}) {
+      const Triangle t = triangle(index);
+      if (is_other || is_moved[t[0]] || is_moved[t[1]] || is_moved[t[2]]) changed.push_back(index);
     }
-  std::vector<int> changed;
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    const Triangle& now = mesh_.triangles[candidates[i]];
-    if (now != before[i] || is_moved[now[0]] || is_moved[now[1]] || is_moved[now[2]]) changed.push_back(candidates[i]);
+  }
+  for (std::size_t end = 0; end < has_moved_end.size(); ++end) {
+    if (!has_moved_end[end]) continue;
+    const std::vector<Triangle> made = fill_end(static_cast<int>(end / 2), static_cast<BoneEnd>(end % 2));
+    for (std::size_t i = 0; i < made.size(); ++i) {
+      Triangle& triangle = end_triangles_[first_end_[end] + i];
+      const bool is_other = triangle != made[i];
+      triangle = made[i];
+      if (is_other || std::any_of(made[i].begin(), made[i].end(), [&](int vertex) { return is_texel(vertex) && is_moved[vertex]; }))
+        changed.push_back(first_end_triangle() + first_end_[end] + static_cast<int>(i));
+    }
   }
   return changed;
 }

@@ -9,42 +9,78 @@
 namespace skeletex {
 
 /// The mesh that a model would reconstruct to whose texels decode to given points; its own texture is not looked at. Points
-/// can move, and what stands on them follows.
+/// can move, and what stands on them follows. Numbers are those of texels, so that most of it is never written down:
+///  - vertex: its texel; poles, samples of seams and corners follow behind all texels in the order of lattice.h;
+///  - triangles 2 t and 2 t + 1: of the quad to the right of and above texel t, between inner rows; those at ends follow behind all.
 class LatticeMesh {
  public:
-  using Planes = std::array<std::vector<float>, 3>;
-  /// \param rule    of its diagonals, in place of the model's
-  /// \param planes  x, y, z per texel of the texture, relative to the model's origin; of rows 0 and height-1 only poles count
-  LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, const Planes& planes);
+  /// \param rule     of its diagonals, in place of the model's
+  /// \param patches  see frame_tables
+  /// \param points   x, y, z per texel of the texture, relative to the model's origin; of rows 0 and height-1 only poles count.
+  ///                 These planes are kept, not copied: `move` is to be told what changes in them
+  LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, ClBuffer<PatchRecord> patches, DevicePlanes points);
 
-  const TriangleMesh& mesh() const { return mesh_; }
-  const Lattice& lattice() const { return lattice_; }
-  /// Per inner vertex its texel.
-  const std::vector<int>& texels() const { return texels_; }
-  /// Inner vertices and the triangles between inner rows, on the device.
-  const DevicePlanes& device_points() const { return device_points_; }
-  const ClBuffer<Triangle>& device_triangles() const { return device_triangles_; }
+  const SkeletexModel& model() const { return model_; }
+  int texel_count() const { return static_cast<int>(texel_patches_.size()); }
+  int vertex_count() const { return texel_count() + lattice_.vertex_count - lattice_.inner_count; }
+  int first_end_triangle() const { return 2 * texel_count(); }
+  int triangle_count() const { return first_end_triangle() + static_cast<int>(end_triangles_.size()); }
 
-  /// Moves inner vertices to their texels' points in other planes. Quads around them take their diagonals anew, strips beside
-  /// them are filled anew. \return the triangles that are not what they were, in order
-  std::vector<int> move(std::span<const int> vertices, const Planes& planes);
+  bool is_texel(int vertex) const { return vertex < texel_count(); }
+  int patch_of(int texel) const { return texel_patches_[texel]; }
+  /// The texel some columns and rows beside one of the same patch; columns wrap round.
+  int beside(int texel, int columns, int rows) const;
+  /// Vertices of a triangle, counter-clockwise from outside.
+  Triangle triangle(int index) const;
+  bool takes_second(int texel) const { return diagonals_[texel] != 0; }
+  /// The two of a texel's quad. \param right  the texel beside it
+  std::array<Triangle, 2> triangles_of(int texel, int right) const {
+    // As write_quad in reconstruct.cl.
+    const int above = texel + model_.texture.width, beyond = right + model_.texture.width;
+    if (takes_second(texel)) return {{{texel, right, above}, {above, right, beyond}}};
+    return {{{texel, right, beyond}, {texel, beyond, above}}};
+  }
+  /// From the model's origin, in single precision.
+  const Eigen::Array4f& point(int vertex) const { return host_points_[vertex]; }
+  Vec3 position(int vertex) const {
+    if (!is_texel(vertex)) return positions_[lattice_.inner_count + vertex - texel_count()];
+    return model_.origin + host_points_[vertex].head<3>().matrix().cast<double>();
+  }
+  std::array<Vec3, 3> corners(const Triangle& t) const { return {position(t[0]), position(t[1]), position(t[2])}; }
+  /// Of a strip or fan, the first triangle and that behind the last.
+  std::pair<int, int> triangles_of_end(int bone, BoneEnd end) const {
+    const std::size_t i = 2 * bone + static_cast<int>(end);
+    return {first_end_triangle() + first_end_[i], first_end_triangle() + first_end_[i + 1]};
+  }
+
+  const DevicePlanes& device_points() const { return points_; }
+  /// Per texel whether its quad takes the second diagonal.
+  const ClBuffer<int>& device_diagonals() const { return device_diagonals_; }
+  const ClBuffer<LatticeRow>& device_rows() const { return rows_; }
+  const ClBuffer<PatchRecord>& device_patches() const { return patches_; }
+
+  /// Some inner texels have the points of another lattice now, on the device already. Quads around them take their diagonals anew,
+  /// strips beside them are filled anew. \return the triangles that are not what they were, in order
+  std::vector<int> move(std::span<const int> texels, const LatticeMesh& home);
 
  private:
-  int patch_of(int vertex) const;
-  void retriangulate(std::span<const int> quads);
+  std::vector<Triangle> fill_end(int bone, BoneEnd end);
 
   ClContext& context_;
   const SkeletexModel& model_;
   DiagonalRule rule_;
   Walls walls_;
   Lattice lattice_;
-  std::vector<int> texels_, first_row_;                // first_row_: per patch, the first of the device's rows
-  std::vector<std::array<std::size_t, 2>> first_end_;  // per patch and end, the first triangle
-  Planes points_;
-  TriangleMesh mesh_;
-  DeviceQuads quads_;
-  DevicePlanes device_points_;
-  ClBuffer<Triangle> device_triangles_;
+  std::vector<int> texel_patches_;
+  std::vector<Eigen::Array4f> host_points_;
+  std::vector<Vec3> positions_;  // numbered as in lattice.h; of inner rows only those next to ends are there
+  std::vector<Triangle> end_triangles_;
+  std::vector<int> first_end_;  // per patch and end, in end_triangles_; and the end
+  std::vector<int> diagonals_;
+  DevicePlanes points_;
+  ClBuffer<LatticeRow> rows_;  // those that quads begin at
+  ClBuffer<PatchRecord> patches_;
+  ClBuffer<int> device_diagonals_;
 };
 
 }  // namespace skeletex

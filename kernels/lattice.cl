@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+// The decoder's triangles over points per texel, while texels still move. A quad is that to the right of and above its texel, between
+// inner rows; see quad_diagonal.h for its diagonals.
+//   choose_diagonals         of all quads
+//   choose_listed_diagonals  of some
+#include "skeletex_structs.h"
+#include "quad_diagonal.h"
+
+int second_diagonal(int texel, int column, int width, int texture_width, int has_before, int has_after, int is_smooth, global const float* restrict x,
+                    global const float* restrict y, global const float* restrict z) {
+  const int columns[4] = {column > 0 ? -1 : width - 1, 0, column + 1 < width ? 1 : 1 - width, column + 2 < width ? 2 : 2 - width};
+  int at[4][4];
+  for (int i = 0; i < 4; ++i) {
+    at[1][i] = texel + columns[i];
+    at[0][i] = at[1][i] - (has_before ? texture_width : 0);
+    at[2][i] = at[1][i] + texture_width;
+    at[3][i] = at[1][i] + (has_after ? 2 : 1) * texture_width;
+  }
+  return is_smooth ? takes_second_if_smoother(at, has_before, has_after, x, y, z) : takes_second_if_nearer(at, has_before, has_after, x, y, z);
+}
+
+// NDRange: one work-group per row, of any size, as in reconstruct.cl; lattice_rows: the rows that quads begin at.
+// out  diagonals: per texel 1 for the second
+kernel void choose_diagonals(const int row_count, const int texture_width, const int is_smooth, global const int* restrict lattice_rows,
+                             global const PatchRecord* restrict patches, global const float* restrict x, global const float* restrict y,
+                             global const float* restrict z, global int* restrict diagonals) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
+  const int row = lattice_rows[4 * k + 1], width = patch->width, step = get_local_size(0);
+  const int texel = (patch->y + row) * texture_width + patch->x;
+  const int has_before = row > 1, has_after = row + 2 < patch->height - 1;
+  for (int j = get_local_id(0); j < width; j += step)
+    diagonals[texel + j] = second_diagonal(texel + j, j, width, texture_width, has_before, has_after, is_smooth, x, y, z);
+}
+
+// NDRange (count). out  diagonals, at their places; listed_diagonals: the same one after the other
+kernel void choose_listed_diagonals(const int count, const int texture_width, const int is_smooth, global const int* restrict listed,
+                                    global const int* restrict listed_patches, global const PatchRecord* restrict patches,
+                                    global const float* restrict x, global const float* restrict y, global const float* restrict z,
+                                    global int* restrict diagonals, global int* restrict listed_diagonals) {
+  const int i = (int)get_global_id(0);
+  if (i >= count) return;
+  global const PatchRecord* restrict p = patches + listed_patches[i];
+  const int texel = listed[i], line = texel / texture_width, row = line - p->y;
+  const int is_second =
+      second_diagonal(texel, texel - line * texture_width - p->x, p->width, texture_width, row > 1, row + 2 < p->height - 1, is_smooth, x, y, z);
+  diagonals[texel] = is_second;
+  listed_diagonals[i] = is_second;
+}
