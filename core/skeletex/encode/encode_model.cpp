@@ -143,12 +143,12 @@ void prepare_encoding(ClContext& context, const EncodeOptions& options) {
   if (options.method != EncodeMethod::kSpd) context.prepare(vsm_kernel(context, options.vsm));
   context.prepare({"encode.cl", "encode_texels"});
   if (options.method != EncodeMethod::kSpd && options.has_unfold) context.prepare({"unfold.cl", "find_folds"});
-  if (options.has_snap || options.has_fit) {
+  // Whether texels snap depends on the mesh; most do.
+  if (options.method != EncodeMethod::kSpd && (options.has_snap.value_or(true) || options.has_fit.value_or(false))) {
     context.prepare({"snap.cl", "place_snapped"});
     context.prepare({"lattice.cl", "choose_diagonals"});
     context.prepare({"guard.cl", "suspect_quads"});
     context.prepare({"metro.cl", "find_nearest_triangles"});
-    if (options.has_fit) context.prepare({"fit.cl", "read_samples"});
   }
 }
 
