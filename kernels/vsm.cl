@@ -2,11 +2,14 @@
 // Vertex-sampling-maximizing maps of all charts together (design: docs/parameterization.md).
 //
 // Vertices of all charts lie in one list: each chart has a block that begins at a multiple of VSM_SLICE and holds its
-// inner vertices first, then its fixed ones. A vertex's map is (u, v) = (hi + lo)[2 * vertex], [2 * vertex + 1].
+// inner vertices first, then its fixed ones. A vertex's map (u, v) is the sum of two floats each: (x, y) + (z, w) of map[vertex].
 // Rows of the sparse systems are the inner vertices. Their entries, one per neighbour, lie in slices of VSM_SLICE rows,
 // column-major inside a slice: entry k of row i is slice_begin[i / VSM_SLICE] + k * VSM_SLICE + i % VSM_SLICE.
+// A row's neighbours that are eliminated later come first, then fixed ones, then those that are eliminated before it.
 // Per entry: column (the neighbour), jump (lifted v of the neighbour = v + jump; VSM_POLE: the neighbour is a pole,
 // which acts through u only), weight = mantissa * 2^exponent. Both directions of an edge carry the same weight bits.
+
+#include "vsm_structs.h"
 
 #ifndef VSM_SLICE
 #define VSM_SLICE 32
@@ -17,94 +20,137 @@ int entry_index(global const int* restrict slice_begin, int row, int k) {
   return slice_begin[row / VSM_SLICE] + k * VSM_SLICE + row % VSM_SLICE;
 }
 
-// (b - a) + jump of two values that are each a sum of two floats. Rounded once, relative to the result: the rounding
-// error of b_hi - a_hi is kept, because across the cut jump cancels nearly all of it.
-float lifted_difference(float a_hi, float a_lo, float b_hi, float b_lo, float jump) {
-  const float difference = b_hi - a_hi;
-  const float part = difference - b_hi;
-  const float error = (b_hi - (difference - part)) - (a_hi + part);
-  return (difference + jump) + (error + (b_lo - a_lo));
+// From vertex a to b in u and v; v's is (b - a) + jump. Rounded once, relative to the result: the rounding
+// error of the first parts' difference is kept, because across the cut jump cancels nearly all of it.
+float2 lifted_difference(float4 a, float4 b, float jump) {
+  const float2 difference = b.xy - a.xy;
+  const float2 part = difference - b.xy;
+  const float2 error = (b.xy - (difference - part)) - (a.xy + part);
+  return (difference + (float2)(0.0f, jump)) + (error + (b.zw - a.zw));
 }
 
 // Texture area of each triangle, in (v, u); for a pole's triangle that of the trapezoid between its opposite edge and
 // the pole's line. A pole is always corner 0. Never below a rounding error's worth, so that weights stay positive.
 // In: corners (3 planes of `count` vertices), jumps (2 planes: corners 1 and 2 against corner 0; with a pole the first
 // is VSM_POLE and the second that of corner 2 against corner 1). Out: areas. NDRange: triangles.
-kernel void measure_areas(int count, global const int* restrict corners, global const char* restrict jumps, global const float* restrict hi,
-                          global const float* restrict lo, global float* restrict areas) {
+kernel void measure_areas(int count, global const int* restrict corners, global const char* restrict jumps, global const float4* restrict map,
+                          global float* restrict areas) {
   const int t = get_global_id(0);
   if (t >= count) return;
-  const int a = 2 * corners[t], b = 2 * corners[count + t], c = 2 * corners[2 * count + t];
+  const float4 a = map[corners[t]], b = map[corners[count + t]], c = map[corners[2 * count + t]];
   const int jump_b = jumps[t], jump_c = jumps[count + t];
-  const float ub = lifted_difference(hi[a], lo[a], hi[b], lo[b], 0.0f);
-  const float uc = lifted_difference(hi[a], lo[a], hi[c], lo[c], 0.0f);
   float first, second;
   if (jump_b == VSM_POLE) {
-    first = lifted_difference(hi[b + 1], lo[b + 1], hi[c + 1], lo[c + 1], jump_c) * (-0.5f * (ub + uc));
+    const float2 across = lifted_difference(b, c, jump_c);
+    first = across.y * (-0.5f * (lifted_difference(a, b, 0.0f).x + lifted_difference(a, c, 0.0f).x));
     second = 0.0f;
   } else {
-    first = 0.5f * lifted_difference(hi[a + 1], lo[a + 1], hi[b + 1], lo[b + 1], jump_b) * uc;
-    second = 0.5f * lifted_difference(hi[a + 1], lo[a + 1], hi[c + 1], lo[c + 1], jump_c) * ub;
+    const float2 to_b = lifted_difference(a, b, jump_b), to_c = lifted_difference(a, c, jump_c);
+    first = 0.5f * to_b.y * to_c.x;
+    second = 0.5f * to_c.y * to_b.x;
   }
   areas[t] = fmax(first - second, fmax(1e-7f * (fabs(first) + fabs(second)), 1e-36f));
 }
 
+// A positive float as mantissa in [0.5, 1) and exponent; 0 where it is below all normal ones. frexp() and ldexp() are calls that no compiler makes
+// vector instructions of.
+float split_float(float value, int* exponent) {
+  const int bits = as_int(value);
+  *exponent = (bits >> 23) - 126;
+  return as_float((bits & 0x7fffff) | 0x3f000000);
+}
+float power_of_two(int exponent) { return as_float(clamp(exponent + 127, 0, 254) << 23); }
+
+// Raises a chart's value to the largest of a slice. Groups are slices here; slices belong to one chart.
+void raise_to_largest(local int* values, int value, global int* target) {
+  values[get_local_id(0)] = value;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (get_local_id(0) > 0) return;
+  for (int k = 1; k < VSM_SLICE; ++k) value = max(value, values[k]);
+  atomic_max(target, value);
+}
+
 // Multiplies each entry's weight by (A_left + A_right) * factor, where factor = 1 / A3^alpha, unless the row's slice is
-// frozen (first solve, or a chart that has stopped: weights as they are). Then normalises each row: share = weight / d with
-// d the row's sum = sum * 2^row_exponent, poles included; v_part is the share of d that does not belong to poles.
+// frozen (first solve, or a chart that has stopped: weights as they are). Then sums each row: d = 4^half_exponent / inverse_root^2,
+// poles included.
 // In: frozen (per slice), triangles (2 planes of `entries`: the two at the edge), factors. In and out: mantissas, exponents.
-// Out: shares, sums, row_exponents, v_parts. NDRange: vertices.
-kernel void weigh_rows(int vertices, int entries, global const int* restrict frozen, global const int* restrict slice_begin,
-                       global const int* restrict row_length, global const char* restrict jumps, global const int* restrict triangles,
-                       global const float* restrict factors, global const float* restrict areas, global float* restrict mantissas,
-                       global int* restrict exponents, global float* restrict shares, global float* restrict sums,
-                       global int* restrict row_exponents, global float* restrict v_parts) {
-  const int row = get_global_id(0);
-  if (row >= vertices) return;
-  const int length = row_length[row];
-  if (length == 0) return;
-  const int is_frozen = frozen[row / VSM_SLICE];
-  int largest = INT_MIN;
+// Out: weights in units of 4^half_exponent; inverse_roots, half_exponents; largest (per chart, INT_MIN before), the largest of these.
+// NDRange: vertices, in groups of VSM_SLICE.
+kernel void weigh_rows(int entries, global const int* restrict frozen, global const int* restrict slice_chart, global const int* restrict slice_begin,
+                       global const int* restrict row_length, global const int* restrict triangles, global const float* restrict factors,
+                       global const float* restrict areas, global float* restrict mantissas, global int* restrict exponents,
+                       global float* restrict weights, global float* restrict inverse_roots, global int* restrict half_exponents,
+                       global int* restrict largest) {
+  const int row = get_global_id(0), length = row_length[row], is_frozen = frozen[row / VSM_SLICE];
+  int largest_exponent = INT_MIN;
   for (int k = 0; k < length; ++k) {
     const int e = entry_index(slice_begin, row, k);
     if (!is_frozen) {
       int shift, exponent;
-      const float grown = frexp((areas[triangles[e]] + areas[triangles[entries + e]]) * factors[e], &shift);
-      mantissas[e] = frexp(mantissas[e] * grown, &exponent);
+      // A common factor of all weights does not count; this one keeps the smallest areas away from a float's end.
+      const float grown = split_float((areas[triangles[e]] + areas[triangles[entries + e]]) * (0x1p40f * factors[e]), &shift);
+      mantissas[e] = split_float(mantissas[e] * grown, &exponent);
       exponents[e] += shift + exponent;
     }
-    largest = max(largest, exponents[e]);
+    largest_exponent = max(largest_exponent, exponents[e]);
   }
-  float sum = 0.0f, v_sum = 0.0f;
+  const int half_exponent = length > 0 ? (largest_exponent + 1) >> 1 : INT_MIN;
+  float sum = 0.0f;
   for (int k = 0; k < length; ++k) {
     const int e = entry_index(slice_begin, row, k);
-    const float weight = ldexp(mantissas[e], exponents[e] - largest);
-    sum += weight;
-    v_sum += jumps[e] == VSM_POLE ? 0.0f : weight;
-    shares[e] = weight;
+    weights[e] = mantissas[e] * power_of_two(exponents[e] - 2 * half_exponent);
+    sum += weights[e];
   }
-  for (int k = 0; k < length; ++k) shares[entry_index(slice_begin, row, k)] /= sum;
-  sums[row] = sum;
-  row_exponents[row] = largest;
-  v_parts[row] = v_sum / sum;
+  inverse_roots[row] = 1.0f / sqrt(sum);
+  half_exponents[row] = half_exponent;
+  local int values[VSM_SLICE];
+  raise_to_largest(values, half_exponent, largest + slice_chart[row / VSM_SLICE]);
 }
 
-// The symmetric matrix scaled to a unit diagonal: a_ij = w_ij / sqrt(d_i d_j) = sqrt(share_ij share_ji); 0 where the
-// neighbour is fixed (twin -1). NDRange: vertices.
-kernel void scale_entries(int vertices, global const int* restrict slice_begin, global const int* restrict row_length, global const int* restrict twins,
-                          global const float* restrict shares, global float* restrict scaled) {
-  const int row = get_global_id(0);
-  if (row >= vertices) return;
-  const int length = row_length[row];
+// How far each inner vertex is from the weighted mean of its neighbours, from differences of neighbours, so that it is accurate relative to them
+// however small they are.
+// Out: roots_i = sqrt(d_i) in units of about the chart's largest; residual, of the system that these scale to a unit diagonal;
+// ratios (per chart, 0 before): the largest |x_i - mean| / mean |x_i - x_j|, as bits of a float, which order like integers.
+// NDRange: vertices, in groups of VSM_SLICE.
+kernel void form_residual(global const int* restrict slice_chart, global const int* restrict slice_begin, global const int* restrict row_length,
+                          global const int* restrict column, global const char* restrict jumps, global const float* restrict weights,
+                          global const float* restrict inverse_roots, global const int* restrict half_exponents, global const int* restrict largest,
+                          global const float4* restrict map, global float* restrict roots, global float2* restrict residual,
+                          global int* restrict ratios) {
+  const int row = get_global_id(0), length = row_length[row], chart = slice_chart[row / VSM_SLICE];
+  const float4 own = map[row];
+  float2 sum = 0.0f, total = 0.0f;
   for (int k = 0; k < length; ++k) {
-    const int e = entry_index(slice_begin, row, k);
-    const int twin = twins[e];
-    scaled[e] = twin < 0 ? 0.0f : sqrt(shares[e]) * sqrt(shares[twin]);
+    const int e = entry_index(slice_begin, row, k), jump = jumps[e];
+    const float2 weight = (float2)(weights[e], jump == VSM_POLE ? 0.0f : weights[e]);
+    const float2 difference = weight * lifted_difference(own, map[column[e]], jump);
+    sum += difference;
+    total += fabs(difference);
   }
+  if (length > 0) {
+    // In the middle of a float's range: 2^65 to 2^-65.
+    const float inverse_root = inverse_roots[row], root = power_of_two(max(half_exponents[row] - largest[chart], -130) + 65) / inverse_root;
+    const float over = inverse_root * inverse_root;
+    sum *= over;
+    total *= over;
+    roots[row] = root;
+    residual[row] = sum * root;
+  }
+  local int values[VSM_SLICE];
+  raise_to_largest(values, as_int(fmax(fabs(sum.x) / (total.x + 1e-13f), fabs(sum.y) / (total.y + 1e-13f))), ratios + chart);
 }
 
-// A work-group per chart. VSM_SINGLE: groups of one work-item, which need no barriers; CPU compilers turn each barrier in a
-// loop into a loop over work-items, which takes them seconds to tens of seconds here.
+// Elimination. To eliminate vertex k of the scaled system is to join its neighbours i and j by a_ik a_kj / d_k more (a star becomes a mesh), where
+// d_k, the diagonal entry then, is the sum of a_kj root_j / root_k over all j that are left, the fixed vertices among them. Nothing is
+// ever subtracted (Grassmann, Taksar and Heyman 1985), so every entry is accurate to a few rounding errors of its own, however far apart weights
+// are, and single precision will do.
+// Vertices are eliminated by fronts (Duff and Reid 1983). A front is a dense matrix of its pivots and its boundary, the sum of entries of the
+// system and of what its children have left between their boundaries. It keeps its pivots' rows, of which columns up to a row's own
+// are 0; its boundary's rows go to its parent. Of these only tiles on and above the diagonal are kept.
+//
+// A task is a run of fronts that one work-group takes one by one: a subtree. Tasks of one stage are independent; parents are in the same task or in a
+// later stage. VSM_SINGLE: groups of one work-item, which need no barriers; CPU compilers turn each barrier in a loop into a
+// loop over work-items, which takes them seconds to tens of seconds.
 #ifdef VSM_SINGLE
 #define VSM_GROUP __attribute__((reqd_work_group_size(1, 1, 1)))
 #define VSM_BARRIER()
@@ -113,291 +159,307 @@ kernel void scale_entries(int vertices, global const int* restrict slice_begin, 
 #define VSM_BARRIER() barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE)
 #endif
 
-// Sum (or maximum) of one value per work-item, the same for all of them; the order of additions is fixed. In two stages
-// of about sqrt(group size) values each, so the number of barriers is fixed too. What the group wrote before is visible to
-// all of it afterwards.
-// Local: scratch, VSM_STRIDE floats more than work-items.
-#define VSM_STRIDE 32
-float reduce_group(local float* scratch, float value, int is_maximum) {
-#ifdef VSM_SINGLE
-  return value;
-#else
-  const int lane = get_local_id(0), count = get_local_size(0);
-  VSM_BARRIER();
-  scratch[lane] = value;
-  barrier(CLK_LOCAL_MEM_FENCE);
-  local float* const stage = scratch + count;
-  const int used = min(count, VSM_STRIDE);
-  if (lane < used) {
-    float part = scratch[lane];
-    for (int k = lane + VSM_STRIDE; k < count; k += VSM_STRIDE) part = is_maximum ? fmax(part, scratch[k]) : part + scratch[k];
-    stage[lane] = part;
-  }
-  barrier(CLK_LOCAL_MEM_FENCE);
-  float total = stage[0];
-  for (int k = 1; k < used; ++k) total = is_maximum ? fmax(total, stage[k]) : total + stage[k];
-  return total;
-#endif
-}
+float sum8(float8 x) { return ((x.s0 + x.s1) + (x.s2 + x.s3)) + ((x.s4 + x.s5) + (x.s6 + x.s7)); }
 
-// The next chart of the queue, the same for all work-items of a group: groups take charts, largest first, so any number
-// of groups will do and none waits for another. Which group takes which chart has no influence on results.
-int take_chart(global int* queue, local int* taken) {
+// The next task of a queue, the same for all work-items of a group: any number of groups will do and none waits for another. Which group takes which
+// task has no influence on results.
+int take_task(global int* queue, local int* taken) {
   VSM_BARRIER();
   if (get_local_id(0) == 0) *taken = atomic_inc(queue);
   VSM_BARRIER();
   return *taken;
 }
 
-// The coarse half of the preconditioner I + P C P^T of the scaled matrix A: a chart's rows are grouped into cells of
-// neighbours; column I of P is sqrt(d_i) at the rows i of cell I and 0 elsewhere, times what gives P^T A P a unit diagonal;
-// C is the inverse of P^T A P. Poles count as fixed neighbours: that is u's matrix, and near enough to v's.
-// In: cell_first (per chart: its place in cell_begin and in coarse vectors), cell_counts, cell_begin (per chart the cells'
-// first rows, and the end), row_cells (the cell of each row).
-// Out: roots_i = sqrt(d_i) relative to the chart's largest; basis, the entries of P, one per row; inverses, per chart *minus*
-// C, symmetric, from matrix_begin on, each row padded with zeros to a multiple of VSM_BLOCK.
-// Work space: pivots, a coarse vector. Local: scratch (see reduce_group). NDRange: any number of work-groups.
-#define VSM_BLOCK 8
-kernel VSM_GROUP void invert_coarse(int charts, global int* restrict queue, global const int* restrict order, global const int* restrict chart_begin,
-                          global const int* restrict chart_rows, global const int* restrict cell_first, global const int* restrict cell_counts,
-                          global const int* restrict cell_begin, global const int* restrict row_cells, global const int* restrict matrix_begin,
-                          global const int* restrict slice_begin, global const int* restrict row_length, global const int* restrict column,
-                          global const float* restrict shares, global const float* restrict scaled, global const float* restrict sums,
-                          global const int* restrict row_exponents, global float* restrict roots, global float* restrict basis,
-                          global float* restrict inverses, global float* restrict pivots, local float* restrict scratch) {
-  const int lane = get_local_id(0), lanes = get_local_size(0);
-  local int taken;
-  for (int position = take_chart(queue, &taken); position < charts; position = take_chart(queue, &taken)) {
-    const int chart = order[position], begin = chart_begin[chart], end = begin + chart_rows[chart];
-    float largest = -1e30f;
-    for (int i = begin + lane; i < end; i += lanes) largest = fmax(largest, (float)row_exponents[i]);
-    largest = reduce_group(scratch, largest, 1);
-    for (int i = begin + lane; i < end; i += lanes) {
-      const int exponent = max(row_exponents[i] - (int)largest, -260) + 80;
-      roots[i] = ldexp(sqrt(exponent & 1 ? 2.0f * sums[i] : sums[i]), exponent >> 1);
-    }
-    VSM_BARRIER();
+int padded(int count) { return (count + VSM_TILE - 1) / VSM_TILE * VSM_TILE; }
 
-    const int cells = cell_counts[chart], width = (cells + VSM_BLOCK - 1) / VSM_BLOCK * VSM_BLOCK;
-    global const int* first_row = cell_begin + cell_first[chart];
-    global float* matrix = inverses + matrix_begin[chart];
-    global float* pivot = pivots + cell_first[chart];
-    for (int k = lane; k < cells * width; k += lanes) matrix[k] = 0.0f;
-    // A column's product with A is what leaves the cell, summed without cancellation, in units of the cell's largest root.
-    for (int cell = lane; cell < cells; cell += lanes) {
-      float unit = 0.0f, leaving = 0.0f;
-      for (int i = first_row[cell]; i < first_row[cell + 1]; ++i) unit = fmax(unit, roots[i]);
-      for (int i = first_row[cell]; i < first_row[cell + 1]; ++i) {
-        float outside = 0.0f;
-        for (int k = 0; k < row_length[i]; ++k) {
-          const int e = entry_index(slice_begin, i, k), j = column[e];
-          const int is_outside = j < first_row[cell] || j >= first_row[cell + 1];
-          outside += is_outside ? shares[e] : 0.0f;
-        }
-        leaving += outside * (roots[i] / unit) * (roots[i] / unit);
-      }
-      const float scale = leaving > 0.0f ? 1.0f / (unit * sqrt(leaving)) : 0.0f;
-      for (int i = first_row[cell]; i < first_row[cell + 1]; ++i) basis[i] = roots[i] * scale;
-    }
-    VSM_BARRIER();
-    for (int cell = lane; cell < cells; cell += lanes) {
-      for (int i = first_row[cell]; i < first_row[cell + 1]; ++i)
-        for (int k = 0; k < row_length[i]; ++k) {
-          const int e = entry_index(slice_begin, i, k), j = column[e];
-          const int is_outside = j < first_row[cell] || j >= first_row[cell + 1];
-          if (is_outside && j < end) matrix[cell * width + row_cells[j]] -= scaled[e] * (basis[i] * basis[j]);
-        }
-      matrix[cell * width + cell] = 1.0f;
-    }
-    VSM_BARRIER();
-    // The sweep operator (Beaton 1964) on every row in turn leaves minus the inverse. The matrix stays symmetric, so a pivot's
-    // row is read off its column; positive definite matrices need no other order. The floor is far below such pivots.
-    for (int k = 0; k < cells; ++k) {
-      for (int i = lane; i < cells; i += lanes) pivot[i] = matrix[i * width + k];
-      for (int i = cells + lane; i < width; i += lanes) pivot[i] = 0.0f;
-      VSM_BARRIER();
-      const float over = 1.0f / fmax(pivot[k], 1e-5f);
-      for (int i = lane; i < cells; i += lanes) {
-        const float factor = pivot[i];
-        for (int block = 0; block < width / VSM_BLOCK; ++block) {
-          const float8 values = vload8(block, pivot);
-          vstore8(i == k ? values * over : vload8(block, matrix + i * width) - (factor * values) * over, block, matrix + i * width);
-        }
-        matrix[i * width + k] = i == k ? -over : factor * over;
-      }
-      VSM_BARRIER();
-    }
+// Where column 0 of a row of the boundary's matrix would be: rows begin at their diagonal tile.
+int rest_row(int width, int row) {
+  const int above = row / VSM_TILE * VSM_TILE;
+  return above * width - above / 2 * (above - VSM_TILE) + (row - above) * (width - above) - above;
+}
+
+// target, a tile, += what the elimination of `pivots` vertices joins its rows and columns by. rows: the pivots' rows, from the first column on.
+void update_tile(global const float* rows, int width, global const float* inverse, int pivots, int row, int column, global float* target, int stride) {
+  float8 sum0 = vload8(0, target), sum1 = vload8(0, target + stride), sum2 = vload8(0, target + 2 * stride), sum3 = vload8(0, target + 3 * stride),
+         sum4 = vload8(0, target + 4 * stride), sum5 = vload8(0, target + 5 * stride), sum6 = vload8(0, target + 6 * stride),
+         sum7 = vload8(0, target + 7 * stride);
+  for (int k = 0; k < pivots; ++k) {
+    global const float* from = rows + k * width + row;
+    const float8 to = vload8(0, rows + k * width + column) * inverse[k];
+    sum0 += from[0] * to;
+    sum1 += from[1] * to;
+    sum2 += from[2] * to;
+    sum3 += from[3] * to;
+    sum4 += from[4] * to;
+    sum5 += from[5] * to;
+    sum6 += from[6] * to;
+    sum7 += from[7] * to;
+  }
+  vstore8(sum0, 0, target);
+  vstore8(sum1, 0, target + stride);
+  vstore8(sum2, 0, target + 2 * stride);
+  vstore8(sum3, 0, target + 3 * stride);
+  vstore8(sum4, 0, target + 4 * stride);
+  vstore8(sum5, 0, target + 5 * stride);
+  vstore8(sum6, 0, target + 6 * stride);
+  vstore8(sum7, 0, target + 7 * stride);
+}
+
+// A front's matrix and its four vectors.
+typedef struct FrontView {
+  int pivots, boundary, width;  // padded
+  global float* rows;           // of the pivots
+  global float* rest;           // rows of the boundary, see rest_row
+  global float* root;           // of the columns: roots; 1 for the fixed column
+  global float* u;              // residual, what is carried up, or solution
+  global float* v;
+  global float* inverse;        // 1 / d of the pivots
+} FrontView;
+
+FrontView view_front(global const FrontRecord* front, global float* matrices, global float* vectors) {
+  FrontView view;
+  view.pivots = padded(front->pivots);
+  view.boundary = padded(front->boundary);
+  view.width = view.pivots + view.boundary;
+  view.rows = matrices + (size_t)front->rows * VSM_TILE;
+  view.rest = matrices + (size_t)front->rest * VSM_TILE;
+  view.root = vectors + (size_t)front->vectors * VSM_TILE;
+  view.u = view.root + view.width;
+  view.v = view.u + view.width;
+  view.inverse = view.v + view.width;
+  return view;
+}
+
+// Adds what a child has left between its boundary's vertices.
+void add_child(FrontView to, FrontView from, int boundary, global const int* columns) {
+  for (int i = get_local_id(0); i < boundary - 1; i += get_local_size(0)) {
+    global const float* source = from.rest + rest_row(from.boundary, i);
+    global float* row = columns[i] < to.pivots ? to.rows + columns[i] * to.width : to.rest + rest_row(to.boundary, columns[i] - to.pivots) - to.pivots;
+    for (int j = i + 1; j < boundary; ++j) row[columns[j]] += source[j];
   }
 }
 
-// Preconditioned conjugate gradients on the scaled systems, u and v as one vector (interleaved), a work-group per chart.
-// Every `check_steps` steps the correction is added to the map and the true residual is formed from differences of
-// neighbours, so that it is accurate relative to them however small they are.
-// Stops when max over rows of |x_i - mean of neighbours| / mean |x_i - x_j| <= tolerance, or after max_steps.
-// All loops around barriers run on values that are the same for the whole group.
-// In: order (charts, largest first), the systems and what invert_coarse made; queue (1 int, 0). In and out: hi, lo.
-// Work space of 2 floats per vertex: residual, direction (0 at fixed vertices), product, correction (0); coarse: 4 planes
-// of `coarse_size` floats (a coarse vector and its image, u and v). Out: steps (added to), ratios, per chart.
-// Local: scratch (see reduce_group). NDRange: any number of work-groups.
-kernel VSM_GROUP void solve_charts(int charts, float tolerance, int max_steps, int check_steps, int coarse_size, global int* restrict queue,
-                         global const int* restrict order, global const int* restrict chart_begin, global const int* restrict chart_rows,
-                         global const int* restrict cell_first, global const int* restrict cell_counts, global const int* restrict cell_begin,
-                         global const int* restrict row_cells, global const int* restrict matrix_begin, global const int* restrict slice_begin,
-                         global const int* restrict row_length, global const int* restrict column, global const char* restrict jumps,
-                         global const float* restrict shares, global const float* restrict scaled, global const float* restrict v_parts,
-                         global const float* restrict roots, global const float* restrict basis, global const float* restrict inverses,
-                         global float* restrict hi, global float* restrict lo, global float* restrict residual, global float* restrict direction,
-                         global float* restrict product, global float* restrict correction, global float* restrict coarse,
-                         global int* restrict steps, global float* restrict ratios, local float* restrict scratch) {
+// Eliminates the pivots, a tile's rows at a time.
+void factor(FrontView front) {
+  const int lane = get_local_id(0), lanes = get_local_size(0), width = front.width;
+  global float* root = front.root;
+  global float* inverse = front.inverse;
+  global float* after = front.u;
+  for (int block = 0; block < front.pivots; block += VSM_TILE) {
+    global float* tile = front.rows + block * width + block;
+    for (int column = block + lane * VSM_TILE; column < width; column += lanes * VSM_TILE)
+      update_tile(front.rows, width, inverse, block, block, column, front.rows + block * width + column, width);
+    VSM_BARRIER();
+    // What joins a row to all columns after the tile's acts as one more column of the tile.
+    for (int k = lane; k < VSM_TILE; k += lanes) {
+      float8 sum = 0.0f;
+      for (int column = VSM_TILE; column < width - block; column += VSM_TILE)
+        sum += vload8(0, tile + k * width + column) * vload8(0, root + block + column);
+      after[block + k] = sum8(sum);
+    }
+    VSM_BARRIER();
+    // Below the diagonal the tile gets a_ki / d_k.
+    if (lane == 0)
+      for (int k = 0; k < VSM_TILE; ++k) {
+        float left = after[block + k];
+        for (int j = k + 1; j < VSM_TILE; ++j) left += tile[k * width + j] * root[block + j];
+        // Nothing is left of padding, and of the last vertex where nothing is fixed: its value may be any.
+        const float over = left > 0.0f ? root[block + k] / left : 0.0f;
+        inverse[block + k] = over;
+        for (int i = k + 1; i < VSM_TILE; ++i) {
+          const float factor = tile[k * width + i] * over;
+          tile[i * width + k] = factor;
+          after[block + i] += factor * after[block + k];
+          for (int j = i + 1; j < VSM_TILE; ++j) tile[i * width + j] += factor * tile[k * width + j];
+        }
+      }
+    VSM_BARRIER();
+    for (int column = (1 + lane) * VSM_TILE; column < width - block; column += lanes * VSM_TILE) {
+      float8 values[VSM_TILE];
+#pragma unroll
+      for (int i = 0; i < VSM_TILE; ++i) {
+        values[i] = vload8(0, tile + i * width + column);
+#pragma unroll
+        for (int k = 0; k < i; ++k) values[i] += tile[i * width + k] * values[k];
+        vstore8(values[i], 0, tile + i * width + column);
+      }
+    }
+    VSM_BARRIER();
+  }
+  const int tiles = front.boundary / VSM_TILE;
+  for (int t = lane; t < tiles * tiles; t += lanes) {
+    const int i = t / tiles * VSM_TILE, j = t % tiles * VSM_TILE;
+    if (i <= j)
+      update_tile(front.rows, width, inverse, front.pivots, front.pivots + i, front.pivots + j, front.rest + rest_row(front.boundary, i) + j,
+                  front.boundary - i);
+  }
+}
+
+// Carries the pivots' residuals to the boundary.
+void carry_up(FrontView front) {
+  const int lane = get_local_id(0), lanes = get_local_size(0);
+  for (int block = 0; block < front.pivots; block += VSM_TILE) {
+    global const float* rows = front.rows + block * front.width;
+    global float* u = front.u + block;
+    global float* v = front.v + block;
+    global const float* inverse = front.inverse + block;
+    if (lane == 0)
+      for (int k = 0; k < VSM_TILE; ++k)
+        for (int j = k + 1; j < VSM_TILE; ++j) {
+          const float factor = rows[j * front.width + block + k];
+          u[j] += factor * u[k];
+          v[j] += factor * v[k];
+        }
+    VSM_BARRIER();
+    for (int column = block + (1 + lane) * VSM_TILE; column < front.width; column += lanes * VSM_TILE) {
+      float8 sum_u = vload8(0, front.u + column), sum_v = vload8(0, front.v + column);
+      for (int k = 0; k < VSM_TILE; ++k) {
+        const float8 values = vload8(0, rows + k * front.width + column) * inverse[k];
+        sum_u += values * u[k];
+        sum_v += values * v[k];
+      }
+      vstore8(sum_u, 0, front.u + column);
+      vstore8(sum_v, 0, front.v + column);
+    }
+    VSM_BARRIER();
+  }
+}
+
+// Factors fronts (if `is_new`: the weights have changed) and carries the residual up from children to parents, for the charts whose ratio is
+// above `tolerance`.
+// In: tasks (first front and end, 2 ints each), from begin to end; queue, the one of `queues` to take them from (0); fronts and children (see vsm_structs.h); boundary_rows (the last of
+// a front, the fixed column, has none); parent_columns, the columns of the parent; later_end, fixed_end: entries of a row whose neighbours are
+// eliminated later, and these and fixed ones; entry_columns: of the first, the column in the front of its row.
+// In and out: matrices; vectors, 4 rows per front (see FrontView). NDRange: any number of work-groups.
+kernel VSM_GROUP void eliminate_fronts(int is_new, float tolerance, int task_begin, int task_end, global const int* restrict tasks, int queue,
+                                       global int* restrict queues, global const FrontRecord* restrict fronts, global const int* restrict children,
+                                       global const int* restrict boundary_rows, global const int* restrict parent_columns,
+                                       global const int* restrict slice_begin, global const int* restrict later_end,
+                                       global const int* restrict fixed_end, global const int* restrict neighbour,
+                                       global const char* restrict jumps, global const int* restrict entry_columns,
+                                       global const float* restrict mantissas, global const int* restrict exponents,
+                                       global const float* restrict weights, global const float* restrict inverse_roots,
+                                       global const int* restrict half_exponents, global const float* restrict roots,
+                                       global const float2* restrict residual, global const int* restrict ratios, global float* restrict matrices,
+                                       global float* restrict vectors) {
   const int lane = get_local_id(0), lanes = get_local_size(0);
   local int taken;
-  for (int position = take_chart(queue, &taken); position < charts; position = take_chart(queue, &taken)) {
-    const int chart = order[position], begin = chart_begin[chart], end = begin + chart_rows[chart];
-    const int cells = cell_counts[chart], width = (cells + VSM_BLOCK - 1) / VSM_BLOCK * VSM_BLOCK;
-    global const int* first_row = cell_begin + cell_first[chart];
-    global const float* inverse = inverses + matrix_begin[chart];
-    global float* coarse_u = coarse + cell_first[chart];
-    global float* coarse_v = coarse_u + coarse_size;
-    global float* image_u = coarse_v + coarse_size;
-    global float* image_v = image_u + coarse_size;
-
-    // energy: residual times preconditioned residual; norm: this work-item's part of the same without the coarse half.
-    int step = 0, is_going = 1, is_stuck = 0;
-    // Both in units of the residual's largest entry at the last start, because entries are as far apart as weights are.
-    float energy = 1.0f, norm = 0.0f, ratio = 0.0f, unit = 1.0f;
-    while (is_going) {
-      int is_restart = 0;
-      if (step % check_steps == 0) {
-        // The correction goes to the map; the rounding error of the sum is kept in `lo`.
-        for (int i = 2 * begin + lane; i < 2 * end; i += lanes) {
-          const float change = lo[i] + correction[i] * (unit / roots[i / 2]);
-          const float sum = hi[i] + change;
-          const float part = sum - hi[i];
-          lo[i] = (hi[i] - (sum - part)) + (change - part);
-          hi[i] = sum;
-          correction[i] = 0.0f;
+  for (int task = task_begin + take_task(queues + queue, &taken); task < task_end; task = task_begin + take_task(queues + queue, &taken))
+    for (int f = tasks[2 * task]; f < tasks[2 * task + 1]; ++f) {
+      global const FrontRecord* record = fronts + f;
+      if (as_float(ratios[record->chart]) <= tolerance) continue;
+      const FrontView front = view_front(record, matrices, vectors);
+      const int first = record->first, pivots = record->pivots, fixed_column = front.pivots + record->boundary - 1;
+      if (is_new) {
+        for (int k = lane; k < front.pivots * front.width / VSM_TILE; k += lanes) vstore8(0.0f, k, front.rows);
+        for (int k = lane; k < front.boundary / VSM_TILE * (front.boundary + VSM_TILE) / 2; k += lanes) vstore8(0.0f, k, front.rest);
+        for (int j = lane; j < front.width; j += lanes) {
+          const int i = j - front.pivots;
+          front.root[j] = j < pivots ? roots[first + j] : j == fixed_column ? 1.0f : i >= 0 && j < fixed_column ? roots[boundary_rows[record->list + i]] : 0.0f;
         }
         VSM_BARRIER();
-        // The true residual goes to `product`, but only in the rows that are not good enough yet: without this, rows of
-        // large weight, whose rounding errors outweigh all of a row of tiny weight, would blind the method to it.
-        float largest = 0.0f;
-        ratio = 0.0f;
-        for (int i = begin + lane; i < end; i += lanes) {
-          const float u_hi = hi[2 * i], u_lo = lo[2 * i], v_hi = hi[2 * i + 1], v_lo = lo[2 * i + 1];
-          const int length = row_length[i];
-          float ru = 0.0f, rv = 0.0f, mu = 0.0f, mv = 0.0f;
-          for (int k = 0; k < length; ++k) {
-            const int e = entry_index(slice_begin, i, k), j = 2 * column[e];
-            const int jump = jumps[e];
-            const float share = shares[e];
-            const float du = share * ((hi[j] - u_hi) + (lo[j] - u_lo));
-            const float dv = jump == VSM_POLE ? 0.0f : share * lifted_difference(v_hi, v_lo, hi[j + 1], lo[j + 1], jump);
-            ru += du;
-            rv += dv;
-            mu += fabs(du);
-            mv += fabs(dv);
+        for (int k = lane; k < pivots; k += lanes) {
+          const int row = first + k;
+          const float inverse_root = inverse_roots[row];
+          float fixed = 0.0f;
+          int n = 0;
+          for (; n < later_end[row]; ++n) {
+            // Not from weights, of which one row's may be too small for a float.
+            const int e = entry_index(slice_begin, row, n), j = neighbour[e];
+            front.rows[k * front.width + entry_columns[e]] =
+                mantissas[e] * (inverse_root * inverse_roots[j]) * power_of_two(exponents[e] - half_exponents[row] - half_exponents[j]);
           }
-          const float ratio_u = fabs(ru) / (mu + 1e-13f), ratio_v = fabs(rv) / (mv + 1e-13f);
-          ratio = fmax(ratio, fmax(ratio_u, ratio_v));
-          ru = ratio_u > 0.1f * tolerance ? ru * roots[i] : 0.0f;
-          rv = ratio_v > 0.1f * tolerance ? rv * roots[i] : 0.0f;
-          product[2 * i] = ru;
-          product[2 * i + 1] = rv;
-          largest = fmax(largest, fmax(fabs(ru), fabs(rv)));
-        }
-        ratio = reduce_group(scratch, ratio, 1);
-        largest = reduce_group(scratch, largest, 1);
-        float true_norm = 0.0f;
-        for (int i = begin + lane; i < end; i += lanes) {
-          const float ru = product[2 * i] / largest, rv = product[2 * i + 1] / largest;
-          true_norm += ru * ru + rv * rv / v_parts[i];
-        }
-        const float expected = reduce_group(scratch, norm, 0), found = reduce_group(scratch, true_norm, 0);
-        const float change = largest / unit;
-        is_going = ratio > tolerance && step < max_steps && largest > 0.0f;
-        // Go on as long as the recursive residual says the same as the true one, else start again from the true one.
-        is_restart = is_stuck || !(found * change * change < 4.0f * expected);
-        if (is_restart) {
-          is_stuck = 0;
-          unit = largest;
-          norm = true_norm;
-          for (int i = 2 * begin + lane; i < 2 * end; i += lanes) {
-            residual[i] = product[i] / unit;
-            direction[i] = 0.0f;
+          for (; n < fixed_end[row]; ++n) {
+            const int e = entry_index(slice_begin, row, n);
+            fixed += record->axes == 2 && jumps[e] == VSM_POLE ? 0.0f : weights[e];
           }
+          front.rows[k * front.width + fixed_column] = fixed * (inverse_root * inverse_root) * front.root[k];
+        }
+        VSM_BARRIER();
+        for (int c = record->child_begin; c < record->child_end; ++c) {
+          global const FrontRecord* child = fronts + children[c];
+          add_child(front, view_front(child, matrices, vectors), child->boundary, parent_columns + child->list);
           VSM_BARRIER();
         }
+        factor(front);
+        VSM_BARRIER();
       }
-      if (is_going) {
-        // The coarse half of the preconditioner.
-        for (int cell = lane; cell < width; cell += lanes) {
-          float tu = 0.0f, tv = 0.0f;
-          if (cell < cells)
-            for (int i = first_row[cell]; i < first_row[cell + 1]; ++i) {
-              tu += basis[i] * residual[2 * i];
-              tv += basis[i] * residual[2 * i + 1];
+      for (int j = lane; j < front.width; j += lanes) {
+        const float2 value = j < pivots ? residual[first + j] : (float2)0.0f;
+        front.u[j] = value.x;
+        front.v[j] = value.y;
+      }
+      VSM_BARRIER();
+      for (int c = record->child_begin; c < record->child_end; ++c) {
+        global const FrontRecord* child = fronts + children[c];
+        const FrontView from = view_front(child, matrices, vectors);
+        for (int i = lane; i < child->boundary - 1; i += lanes) {
+          const int column = parent_columns[child->list + i];
+          front.u[column] += from.u[from.pivots + i];
+          front.v[column] += from.v[from.pivots + i];
+        }
+        VSM_BARRIER();
+      }
+      carry_up(front);
+    }
+}
+
+// The way back, from parents to children, of the same tasks, each from its last front on: solves for the pivots and adds the result to the map; the
+// rounding error of the sum is kept in its second part. In and out: vectors, map. Work space: solution (2 floats per vertex).
+kernel VSM_GROUP void substitute_back(float tolerance, int task_begin, int task_end, global const int* restrict tasks, int queue, global int* restrict queues,
+                                      global const FrontRecord* restrict fronts, global const int* restrict boundary_rows,
+                                      global const float* restrict roots, global const int* restrict ratios, global float* restrict matrices,
+                                      global float* restrict vectors, global float* restrict solution, global float* restrict map) {
+  const int lane = get_local_id(0), lanes = get_local_size(0);
+  local int taken;
+  for (int task = task_begin + take_task(queues + queue, &taken); task < task_end; task = task_begin + take_task(queues + queue, &taken))
+    for (int f = tasks[2 * task + 1] - 1; f >= tasks[2 * task]; --f) {
+      global const FrontRecord* record = fronts + f;
+      if (as_float(ratios[record->chart]) <= tolerance) continue;
+      const FrontView front = view_front(record, matrices, vectors);
+      for (int i = lane; i < record->boundary; i += lanes) {
+        const int is_fixed = i == record->boundary - 1, row = is_fixed ? 0 : boundary_rows[record->list + i];
+        front.u[front.pivots + i] = is_fixed ? 0.0f : solution[2 * row];
+        front.v[front.pivots + i] = is_fixed ? 0.0f : solution[2 * row + 1];
+      }
+      VSM_BARRIER();
+      for (int block = front.pivots - VSM_TILE; block >= 0; block -= VSM_TILE) {
+        global const float* rows = front.rows + block * front.width;
+        global float* u = front.u + block;
+        global float* v = front.v + block;
+        for (int k = lane; k < VSM_TILE; k += lanes) {
+          float8 sum_u = 0.0f, sum_v = 0.0f;
+          for (int column = block + VSM_TILE; column < front.width; column += VSM_TILE) {
+            const float8 values = vload8(0, rows + k * front.width + column);
+            sum_u += values * vload8(0, front.u + column);
+            sum_v += values * vload8(0, front.v + column);
+          }
+          u[k] += sum8(sum_u);
+          v[k] += sum8(sum_v);
+        }
+        VSM_BARRIER();
+        if (lane == 0)
+          for (int k = VSM_TILE - 1; k >= 0; --k) {
+            for (int j = k + 1; j < VSM_TILE; ++j) {
+              u[k] += rows[k * front.width + block + j] * u[j];
+              v[k] += rows[k * front.width + block + j] * v[j];
             }
-          coarse_u[cell] = tu;
-          coarse_v[cell] = tv;
-        }
-        VSM_BARRIER();
-        float new_energy = norm;
-        for (int block = lane; block < width / VSM_BLOCK; block += lanes) {
-          float8 yu = 0.0f, yv = 0.0f;
-          for (int k = 0; k < cells; ++k) {
-            const float8 values = vload8(block, inverse + k * width);
-            yu -= values * coarse_u[k];
-            yv -= values * coarse_v[k];
+            u[k] *= front.inverse[block + k];
+            v[k] *= front.inverse[block + k];
           }
-          vstore8(yu, block, image_u);
-          vstore8(yv, block, image_v);
-          const float8 both = yu * vload8(block, coarse_u) + yv * vload8(block, coarse_v);
-          new_energy += ((both.s0 + both.s1) + (both.s2 + both.s3)) + ((both.s4 + both.s5) + (both.s6 + both.s7));
-        }
-        new_energy = reduce_group(scratch, new_energy, 0);
-        // The next direction, its product with the matrix, and the step along it.
-        const float beta = is_restart ? 0.0f : new_energy / energy;
-        energy = new_energy;
-        for (int i = begin + lane; i < end; i += lanes) {
-          const int cell = row_cells[i];
-          direction[2 * i] = residual[2 * i] + basis[i] * image_u[cell] + beta * direction[2 * i];
-          direction[2 * i + 1] = residual[2 * i + 1] / v_parts[i] + basis[i] * image_v[cell] + beta * direction[2 * i + 1];
-        }
         VSM_BARRIER();
-        float curvature = 0.0f;
-        for (int i = begin + lane; i < end; i += lanes) {
-          const int length = row_length[i];
-          const float pu = direction[2 * i], pv = direction[2 * i + 1];
-          float qu = pu, qv = v_parts[i] * pv;
-          for (int k = 0; k < length; ++k) {
-            const int e = entry_index(slice_begin, i, k), j = 2 * column[e];
-            const float a = scaled[e];
-            qu -= a * direction[j];
-            qv -= a * direction[j + 1];
-          }
-          product[2 * i] = qu;
-          product[2 * i + 1] = qv;
-          curvature += pu * qu + pv * qv;
-        }
-        curvature = reduce_group(scratch, curvature, 0);
-        is_stuck = is_stuck || !(curvature > 0.0f);  // rounding errors only: stands still until the next look
-        const float alpha = is_stuck ? 0.0f : energy / curvature;
-        norm = 0.0f;
-        for (int i = begin + lane; i < end; i += lanes) {
-          const float ru = residual[2 * i] - alpha * product[2 * i], rv = residual[2 * i + 1] - alpha * product[2 * i + 1];
-          residual[2 * i] = ru;
-          residual[2 * i + 1] = rv;
-          correction[2 * i] += alpha * direction[2 * i];
-          correction[2 * i + 1] += alpha * direction[2 * i + 1];
-          norm += ru * ru + rv * rv / v_parts[i];
-        }
-        VSM_BARRIER();
-        ++step;
       }
+      for (int i = lane; i < 2 * record->pivots; i += lanes) {
+        const int axis = i & 1, row = record->first + i / 2;
+        if (!(record->axes & (1 << axis))) continue;
+        const float value = axis ? front.v[i / 2] : front.u[i / 2];
+        global float* hi = map + 4 * row + axis;
+        global float* lo = hi + 2;
+        const float change = *lo + value / roots[row], sum = *hi + change, part = sum - *hi;
+        solution[2 * row + axis] = value;
+        *lo = (*hi - (sum - part)) + (change - part);
+        *hi = sum;
+      }
+      VSM_BARRIER();
     }
-    if (lane == 0) {
-      steps[chart] += step;
-      ratios[chart] = ratio;
-    }
-  }
 }

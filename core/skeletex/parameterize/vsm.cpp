@@ -1,33 +1,32 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/parameterize/vsm.h"
 
-#include <fmt/format.h>
-
 #include <Eigen/Geometry>
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <algorithm>
+#include <array>
+#include <bit>
+#include <climits>
 #include <cmath>
 #include <numbers>
 #include <numeric>
 
 #include "skeletex/model/parallel.h"
+#include "skeletex/parameterize/dissection.h"
 #include "skeletex/parameterize/half_edge_table.h"
+#include "vsm_structs.h"
 
 namespace skeletex {
 namespace {
 
 constexpr int kSlice = 32;   // VSM_SLICE
-constexpr int kStride = 32;  // VSM_STRIDE
-constexpr int kBlock = 8;    // VSM_BLOCK
-constexpr signed char kPoleJump = -128;  // VSM_POLE
+constexpr signed char kPole = -128;  // VSM_POLE
 
 /// Slivers of the cut count as this much of the mean surface area: their weights stay in the others' range.
 constexpr double kSmallestArea = 1e-6;
-constexpr int kCheckSteps = 10;  // between two looks at the true residual, which costs as much as two steps
-/// Cells of the coarse space have about this many vertices, more in charts that would get more cells than this: the cells'
-/// matrix is dense.
-constexpr std::size_t kCellSize = 16, kMaxCells = 192;
+/// One work-group takes whole subtrees of so many vertices: a share of all that keeps processors busy, within limits.
+constexpr int kSubtrees = 32, kSmallestSubtree = 256, kLargestSubtree = 1024;
 
 bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind == ChartVertex::kTailPole; }
 
@@ -54,166 +53,187 @@ double spread_of(const std::vector<double>& areas) {
   return std::sqrt(variance) / mean;
 }
 
-/// The inner neighbours of inner vertex i are vertices[begin[i]] to vertices[begin[i + 1] - 1].
-struct InnerNeighbours {
-  std::vector<int> begin, vertices;
+/// A run of fronts that one work-group takes, and when it can.
+struct Task {
+  int begin = 0, end = 0, stage = 0;
+  double work = 0;
 };
-
-InnerNeighbours find_inner_neighbours(const Chart& chart) {
-  const auto is_inner = [&](int v) { return chart.kinds[v] == ChartVertex::kInner; };
-  const auto for_edges = [&](const auto& visit) {
-    for (const Triangle& t : chart.triangles)
-      for (const int c : {0, 1, 2})
-        if (const int from = t[c], to = t[(c + 1) % 3]; is_inner(from) && is_inner(to)) visit(from, to);
-  };
-  InnerNeighbours found;
-  found.begin.assign(chart.positions.size() + 1, 0);
-  for_edges([&](int from, int) { ++found.begin[from + 1]; });
-  std::partial_sum(found.begin.begin(), found.begin.end(), found.begin.begin());
-  found.vertices.resize(found.begin.back());
-  std::vector<int> next(found.begin.begin(), found.begin.end() - 1);
-  for_edges([&](int from, int to) { found.vertices[next[from]++] = to; });
-  return found;
-}
-
-/// Groups the inner vertices of a chart into cells of `size` connected vertices, each grown breadth first from a vertex next
-/// to the cells before it. A cell that is walled in before it has more than half that size joins the smallest one beside it.
-std::vector<std::vector<int>> grow_cells(const Chart& chart, std::size_t size) {
-  const int count = static_cast<int>(chart.positions.size());
-  const InnerNeighbours neighbours = find_inner_neighbours(chart);
-  const auto beside = [&](int v) {
-    return std::span(neighbours.vertices).subspan(neighbours.begin[v], neighbours.begin[v + 1] - neighbours.begin[v]);
-  };
-  std::vector<std::vector<int>> cells;
-  std::vector<int> cell_of(count, -1);
-  std::vector<int> front;  // neighbours of cells, in the order in which the cells reached them
-  std::vector<bool> is_in_front(count, false);
-  auto take_seed = [&, next_front = std::size_t{0}, next_vertex = 0]() mutable {
-    for (; next_front < front.size(); ++next_front)
-      if (cell_of[front[next_front]] < 0) return front[next_front];
-    for (; next_vertex < count; ++next_vertex)
-      if (chart.kinds[next_vertex] == ChartVertex::kInner && cell_of[next_vertex] < 0) return next_vertex;
-    return -1;
-  };
-  for (int seed = take_seed(); seed >= 0; seed = take_seed()) {
-    const int id = static_cast<int>(cells.size());
-    std::vector<int> cell{seed};
-    cell_of[seed] = id;
-    for (std::size_t i = 0; i < cell.size(); ++i)
-      for (const int v : beside(cell[i]))
-        if (cell_of[v] < 0 && cell.size() < size) {
-          cell_of[v] = id;
-          cell.push_back(v);
-        }
-    int smallest = -1;
-    for (const int member : cell)
-      for (const int v : beside(member)) {
-        const int other = cell_of[v];
-        if (other >= 0 && other != id && (smallest < 0 || cells[other].size() < cells[smallest].size())) smallest = other;
-        if (!is_in_front[v]) {
-          is_in_front[v] = true;
-          front.push_back(v);
-        }
-      }
-    if (2 * cell.size() <= size && smallest >= 0) {
-      for (const int v : cell) cell_of[v] = smallest;
-      cells[smallest].insert(cells[smallest].end(), cell.begin(), cell.end());
-    } else {
-      cells.push_back(std::move(cell));
-    }
-  }
-  return cells;
-}
 
 /// The systems of all charts in the layout of vsm.cl.
 struct DeviceSystems {
   int vertices = 0, triangles = 0, entries = 0;
-  int coarse = 0, matrices = 0;  ///< values in a coarse vector and in the coarse matrices of all charts
-  std::vector<int> chart_begin, chart_rows, order;
+  std::vector<int> slice_chart, slice_begin, row_length, later_end, fixed_end;
   std::vector<std::vector<int>> device_vertices;  ///< per chart and vertex
-  std::vector<int> cell_first, cell_counts, cell_begin, row_cells, matrix_begin;
-  std::vector<int> slice_begin, row_length;
-  std::vector<int> columns, twins, entry_triangles;  ///< entry_triangles: two planes
+  std::vector<int> columns, entry_triangles, entry_columns;  ///< entry_triangles: two planes
   std::vector<signed char> jumps;
   std::vector<float> factors;
-  std::vector<int> corners;                 ///< three planes
-  std::vector<signed char> corner_jumps;    ///< two planes
-  std::vector<float> hi, lo;
+  std::vector<int> corners;               ///< three planes
+  std::vector<signed char> corner_jumps;  ///< two planes
+  std::vector<float> map;                 ///< u and v of all vertices, and what they are more than these floats
+  std::vector<FrontRecord> fronts;
+  std::vector<int> children, boundary_rows, parent_columns;
+  int matrix_rows = 0, vector_rows = 0;  ///< of VSM_TILE floats
+  std::vector<int> tasks, stage_begin;   ///< tasks: first front and end, largest first in each stage
 };
 
 int padded(int count, int unit) { return (count + unit - 1) / unit * unit; }
 
+/// Adds the fronts of a chart, and the tasks that they make. Columns of neighbours, and of boundaries in their parents, are found where a front's own
+/// columns are known.
+void add_fronts(const Dissection& d, int id, int first_row, int subtree_size, DeviceSystems& s, std::vector<int>& neighbour_columns,
+                std::vector<Task>& tasks) {
+  const int count = static_cast<int>(d.fronts.size());
+  std::vector<int> column(d.order.size(), -1), list(count), ids(count), stage(count, 0), depth(count, 0), rest_size(count);
+  std::vector<double> work(count, 0);
+  for (int f = count - 1; f >= 0; --f)
+    if (d.fronts[f].parent >= 0) depth[f] = depth[d.fronts[f].parent] + 1;
+  // A task's boundary rows lie on two stacks, by depth, so that little memory is touched: a front's go on one, its children's leave the other.
+  std::array<int, 2> stack{}, stack_size{};
+  neighbour_columns.assign(d.neighbours.size(), -1);
+  for (int f = 0; f < count; ++f) {
+    const Front& front = d.fronts[f];
+    const int pivots = padded(front.pivots, VSM_TILE), boundary_size = static_cast<int>(front.boundary.size());
+    const int boundary = padded(boundary_size + 1, VSM_TILE), width = pivots + boundary;
+    for (int i = 0; i < front.pivots; ++i) column[front.first + i] = i;
+    for (int i = 0; i < boundary_size; ++i) column[front.boundary[i]] = pivots + i;
+    for (int number = front.first; number < front.first + front.pivots; ++number)
+      for (int k = d.begin[d.order[number]]; k < d.begin[d.order[number] + 1]; ++k)
+        if (const int other = d.number[d.neighbours[k]]; other > number) neighbour_columns[k] = column[other];
+    for (const int child : front.children) {
+      const std::vector<int>& joined = d.fronts[child].boundary;
+      for (std::size_t i = 0; i < joined.size(); ++i) s.parent_columns[list[child] + i] = column[joined[i]];
+      s.parent_columns[list[child] + joined.size()] = pivots + boundary_size;
+    }
+    list[f] = static_cast<int>(s.boundary_rows.size());
+    for (const int number : front.boundary) s.boundary_rows.push_back(first_row + number);
+    s.boundary_rows.push_back(-1);
+    s.parent_columns.resize(s.boundary_rows.size(), -1);
+
+    const bool is_in_subtree = front.size <= subtree_size;
+    const int begin = ids[f] = static_cast<int>(s.fronts.size()), side = depth[f] % 2;
+    // Poles act on u only: beside them, which is last of all, u and v have fronts of their own.
+    for (const int axes : front.is_beside_poles ? std::vector<int>{1, 2} : std::vector<int>{3}) {
+      FrontRecord record{};
+      record.chart = id;
+      record.axes = axes;
+      record.first = first_row + front.first;
+      record.pivots = front.pivots;
+      record.boundary = boundary_size + 1;
+      record.list = list[f];
+      record.child_begin = static_cast<int>(s.children.size());
+      for (const int child : front.children) s.children.push_back(ids[child]);
+      record.child_end = static_cast<int>(s.children.size());
+      record.rows = s.matrix_rows;
+      s.matrix_rows += pivots * width / VSM_TILE;
+      int& rest_end = is_in_subtree ? stack[side] : s.matrix_rows;
+      record.rest = rest_end;
+      rest_end += boundary * (boundary + VSM_TILE) / 2 / VSM_TILE;
+      rest_size[f] += rest_end - record.rest;
+      record.vectors = s.vector_rows;
+      s.vector_rows += 4 * width / VSM_TILE;
+      s.fronts.push_back(record);
+    }
+    const int end = static_cast<int>(s.fronts.size());
+    const double own_work = static_cast<double>(pivots) * width * width;
+    work[f] += (end - begin) * own_work;
+    if (front.parent >= 0) work[front.parent] += work[f];
+    if (!is_in_subtree) {
+      for (const int child : front.children) stage[f] = std::max(stage[f], stage[child] + 1);
+      for (int k = begin; k < end; ++k) tasks.push_back({k, k + 1, stage[f], own_work});
+      continue;
+    }
+    stack_size[side] = std::max(stack_size[side], stack[side]);
+    for (const int child : front.children) stack[1 - side] -= rest_size[child];
+    if (front.parent >= 0 && d.fronts[front.parent].size <= subtree_size) continue;
+    tasks.push_back({ids[front.subtree], end, 0, work[f]});
+    for (int g = front.subtree; g <= f; ++g)
+      for (int k = ids[g]; k < (g < f ? ids[g + 1] : end); ++k) s.fronts[k].rest += s.matrix_rows + depth[g] % 2 * stack_size[0];
+    s.matrix_rows += stack_size[0] + stack_size[1];
+    stack = stack_size = {};
+  }
+}
+
 DeviceSystems build_systems(std::span<const Chart> charts, double alpha) {
   DeviceSystems s;
-  std::vector<HalfEdgeTable> tables;
-  for (const Chart& chart : charts) {
-    const int count = static_cast<int>(chart.positions.size());
-    tables.push_back(link_half_edges(chart.triangles, count));
-    const auto cells = grow_cells(chart, std::max(kCellSize, chart.positions.size() / kMaxCells));
-    const int cell_count = static_cast<int>(cells.size());
-    s.chart_begin.push_back(s.vertices);
-    std::vector<int>& map = s.device_vertices.emplace_back(count);
-    int next = s.vertices;
-    s.cell_first.push_back(s.coarse);
-    s.cell_counts.push_back(cell_count);
-    s.matrix_begin.push_back(s.matrices);
-    s.row_cells.resize(s.vertices + padded(count, kSlice), 0);
-    for (int cell = 0; cell < cell_count; ++cell) {
-      s.cell_begin.push_back(next);
-      for (const int v : cells[cell]) {
-        s.row_cells[next] = cell;
-        map[v] = next++;
-      }
-    }
-    s.cell_begin.push_back(next);
-    s.coarse += padded(cell_count + 1, kBlock);
-    s.cell_begin.resize(s.coarse, next);
-    s.matrices += cell_count * padded(cell_count, kBlock);
-    s.chart_rows.push_back(next - s.vertices);
-    for (int v = 0; v < count; ++v)
-      if (chart.kinds[v] != ChartVertex::kInner) map[v] = next++;
-    s.vertices += padded(count, kSlice);
-    s.triangles += static_cast<int>(chart.triangles.size());
-  }
-  s.order.resize(charts.size());
-  std::iota(s.order.begin(), s.order.end(), 0);
-  std::stable_sort(s.order.begin(), s.order.end(), [&](int a, int b) { return s.chart_rows[a] > s.chart_rows[b]; });
-
-  s.row_length.assign(s.vertices, 0);
-  s.hi.assign(2 * static_cast<std::size_t>(s.vertices), 0);
-  s.lo = s.hi;
+  std::vector<HalfEdgeTable> tables(charts.size());
+  std::vector<Dissection> dissections(charts.size());
+  for_each_block(2 * charts.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+    const Chart& chart = charts[i / 2];
+    if (i % 2 == 0)
+      dissections[i / 2] = dissect(chart);
+    else
+      tables[i / 2] = link_half_edges(chart.triangles, static_cast<int>(chart.positions.size()));
+  });
   for (std::size_t k = 0; k < charts.size(); ++k) {
     const Chart& chart = charts[k];
+    const int count = static_cast<int>(chart.positions.size());
+    std::vector<int>& map = s.device_vertices.emplace_back(count);
+    int next = s.vertices + static_cast<int>(dissections[k].order.size());
+    for (int v = 0; v < count; ++v) map[v] = chart.kinds[v] == ChartVertex::kInner ? s.vertices + dissections[k].number[v] : next++;
+    s.vertices += padded(count, kSlice);
+    s.slice_chart.resize(s.vertices / kSlice, static_cast<int>(k));
+    s.triangles += static_cast<int>(chart.triangles.size());
+  }
+  std::vector<std::vector<int>> neighbour_columns(charts.size());
+  std::vector<Task> tasks;
+  const int subtree_size = std::clamp(s.vertices / kSubtrees, kSmallestSubtree, kLargestSubtree);
+  for (std::size_t k = 0, row = 0; k < charts.size(); row += padded(static_cast<int>(charts[k].positions.size()), kSlice), ++k)
+    add_fronts(dissections[k], static_cast<int>(k), static_cast<int>(row), subtree_size, s, neighbour_columns[k], tasks);
+  std::stable_sort(tasks.begin(), tasks.end(), [](const Task& a, const Task& b) { return a.stage != b.stage ? a.stage < b.stage : a.work > b.work; });
+  for (const Task& task : tasks) {
+    s.stage_begin.resize(task.stage + 1, static_cast<int>(s.tasks.size() / 2));
+    s.tasks.insert(s.tasks.end(), {task.begin, task.end});
+  }
+  s.stage_begin.push_back(static_cast<int>(tasks.size()));
+
+  s.row_length.assign(s.vertices, 0);
+  s.later_end = s.fixed_end = s.row_length;
+  s.map.assign(4 * static_cast<std::size_t>(s.vertices), 0);
+  for_each_block(charts.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
+    const Chart& chart = charts[k];
+    const Dissection& d = dissections[k];
+    const std::vector<int>& map = s.device_vertices[k];
     for (const Triangle& t : chart.triangles)
       for (const int v : t)
-        if (chart.kinds[v] == ChartVertex::kInner) ++s.row_length[s.device_vertices[k][v]];
-    for (std::size_t v = 0; v < chart.positions.size(); ++v)
+        if (chart.kinds[v] == ChartVertex::kInner) ++s.row_length[map[v]];
+    for (std::size_t v = 0; v < chart.positions.size(); ++v) {
+      const auto neighbours = neighbour_columns[k].begin();
+      const auto later = std::count_if(neighbours + d.begin[v], neighbours + d.begin[v + 1], [](int column) { return column >= 0; });
+      s.later_end[map[v]] = static_cast<int>(later);
+      s.fixed_end[map[v]] = static_cast<int>(later) + s.row_length[map[v]] - (d.begin[v + 1] - d.begin[v]);
       for (const int axis : {0, 1}) {
         const double x = axis == 0 ? chart.u[v] : chart.v[v];
-        const std::size_t at = 2 * static_cast<std::size_t>(s.device_vertices[k][v]) + axis;
-        s.hi[at] = static_cast<float>(x);
-        s.lo[at] = static_cast<float>(x - static_cast<double>(s.hi[at]));
+        const std::size_t at = 4 * static_cast<std::size_t>(map[v]) + axis;
+        s.map[at] = static_cast<float>(x);
+        s.map[at + 2] = static_cast<float>(x - static_cast<double>(s.map[at]));
       }
-  }
+    }
+  });
   for (int slice = 0; slice < s.vertices; slice += kSlice) {
     s.slice_begin.push_back(s.entries);
     s.entries += kSlice * *std::max_element(s.row_length.begin() + slice, s.row_length.begin() + slice + kSlice);
   }
 
   s.columns.assign(s.entries, 0);
-  s.twins.assign(s.entries, -1);
+  s.entry_columns.assign(s.entries, 0);
   s.entry_triangles.assign(2 * static_cast<std::size_t>(s.entries), 0);
   s.jumps.assign(s.entries, 0);
   s.factors.assign(s.entries, 1);
   s.corners.resize(3 * static_cast<std::size_t>(s.triangles));
   s.corner_jumps.resize(2 * static_cast<std::size_t>(s.triangles));
-  std::vector<int> filled(s.vertices, 0);
-  int first_triangle = 0;
-  for (std::size_t k = 0; k < charts.size(); ++k) {
+  std::vector<int> first_triangles(charts.size(), 0);
+  for (std::size_t k = 1; k < charts.size(); ++k) first_triangles[k] = first_triangles[k - 1] + static_cast<int>(charts[k - 1].triangles.size());
+  for_each_block(charts.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
     const Chart& chart = charts[k];
+    const Dissection& d = dissections[k];
     const std::vector<int>& map = s.device_vertices[k];
     const HalfEdgeTable& table = tables[k];
     const std::vector<double> surface = relative_surface_areas(chart);
+    std::vector<int> next_neighbour = d.begin, next_later(map.size(), 0), next_fixed(map.size()), next_before(map.size());
+    for (std::size_t v = 0; v < map.size(); ++v) {
+      next_fixed[v] = s.later_end[map[v]];
+      next_before[v] = s.fixed_end[map[v]];
+    }
     // An inner vertex's neighbours are the ends of its outgoing half-edges.
     std::vector<int> entry_of(table.twins.size(), -1);
     for (int h = 0; h < static_cast<int>(table.twins.size()); ++h) {
@@ -221,42 +241,42 @@ DeviceSystems build_systems(std::span<const Chart> charts, double alpha) {
       const int from = t[h % 3], to = t[HalfEdgeTable::next(h) % 3];
       if (chart.kinds[from] != ChartVertex::kInner) continue;
       const int row = map[from];
-      const int e = s.slice_begin[row / kSlice] + kSlice * filled[row]++ + row % kSlice;
+      const bool is_inner = chart.kinds[to] == ChartVertex::kInner;
+      const int column = is_inner ? neighbour_columns[k][next_neighbour[from]++] : -1;
+      int& place = !is_inner ? next_fixed[from] : column >= 0 ? next_later[from] : next_before[from];
+      const int e = s.slice_begin[row / kSlice] + kSlice * place++ + row % kSlice;
       entry_of[h] = e;
+      s.entry_columns[e] = std::max(column, 0);
       s.columns[e] = map[to];
       const auto& turns = chart.turns[h / 3];
-      s.jumps[e] = is_pole(chart.kinds[to]) ? kPoleJump : static_cast<signed char>(turns[HalfEdgeTable::next(h) % 3] - turns[h % 3]);
+      s.jumps[e] = is_pole(chart.kinds[to]) ? kPole : static_cast<signed char>(turns[HalfEdgeTable::next(h) % 3] - turns[h % 3]);
       const int other = table.twins[h] / 3;
-      s.entry_triangles[e] = first_triangle + h / 3;
-      s.entry_triangles[s.entries + e] = first_triangle + other;
-      s.factors[e] = static_cast<float>(std::pow(surface[h / 3] + surface[other], -alpha));
-      if (const int twin = entry_of[table.twins[h]]; twin >= 0) {
-        s.twins[e] = twin;
-        s.twins[twin] = e;
-      }
+      s.entry_triangles[e] = first_triangles[k] + h / 3;
+      s.entry_triangles[s.entries + e] = first_triangles[k] + other;
+      const int twin = entry_of[table.twins[h]];
+      s.factors[e] = twin >= 0 ? s.factors[twin] : std::pow(static_cast<float>(surface[h / 3] + surface[other]), static_cast<float>(-alpha));
     }
     for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
       int first = 0;
       for (const int c : {1, 2})
         if (is_pole(chart.kinds[chart.triangles[t][c]])) first = c;
       const bool has_pole = is_pole(chart.kinds[chart.triangles[t][first]]);
-      const std::size_t at = first_triangle + t;
+      const std::size_t at = first_triangles[k] + t;
       for (int c = 0; c < 3; ++c) s.corners[c * static_cast<std::size_t>(s.triangles) + at] = map[chart.triangles[t][(first + c) % 3]];
       const auto turn = [&](int c) { return chart.turns[t][(first + c) % 3]; };
-      s.corner_jumps[at] = has_pole ? kPoleJump : static_cast<signed char>(turn(1) - turn(0));
+      s.corner_jumps[at] = has_pole ? kPole : static_cast<signed char>(turn(1) - turn(0));
       s.corner_jumps[s.triangles + at] = static_cast<signed char>(turn(2) - turn(has_pole ? 1 : 0));
     }
-    first_triangle += static_cast<int>(chart.triangles.size());
-  }
+  });
   return s;
 }
 
-void read_map(const DeviceSystems& s, std::size_t k, const std::vector<float>& hi, const std::vector<float>& lo, Chart& chart) {
+void read_map(const DeviceSystems& s, std::size_t k, const std::vector<float>& map, Chart& chart) {
   for (std::size_t v = 0; v < chart.positions.size(); ++v) {
     if (chart.kinds[v] != ChartVertex::kInner) continue;
-    const std::size_t at = 2 * static_cast<std::size_t>(s.device_vertices[k][v]);
-    chart.u[v] = static_cast<double>(hi[at]) + static_cast<double>(lo[at]);
-    chart.v[v] = static_cast<double>(hi[at + 1]) + static_cast<double>(lo[at + 1]);
+    const float* at = &map[4 * static_cast<std::size_t>(s.device_vertices[k][v])];
+    chart.u[v] = static_cast<double>(at[0]) + static_cast<double>(at[2]);
+    chart.v[v] = static_cast<double>(at[1]) + static_cast<double>(at[3]);
   }
 }
 
@@ -331,75 +351,94 @@ void solve_directly(Chart& chart, const VsmOptions& options, int iterations) {
 }
 
 std::size_t group_size(const ClContext& context, const VsmOptions& options) {
-  return options.work_group_size > 0 ? options.work_group_size : context.device().type == "cpu" ? 1 : 1024;
+  return options.work_group_size > 0 ? options.work_group_size : context.device().type == "cpu" ? 1 : 128;
 }
 
 }  // namespace
 
 ClKernelName vsm_kernel(const ClContext& context, const VsmOptions& options) {
-  return {"vsm.cl", "solve_charts", group_size(context, options) == 1 ? "-DVSM_SINGLE" : ""};
+  return {"vsm.cl", "eliminate_fronts", group_size(context, options) == 1 ? "-DVSM_SINGLE" : ""};
 }
 
 std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, const VsmOptions& options) {
   std::vector<VsmReport> reports(charts.size());
   if (charts.empty()) return reports;
   const DeviceSystems s = build_systems(charts, options.alpha);
-  const auto slice_begin = context.upload(s.slice_begin), row_length = context.upload(s.row_length);
-  const auto columns = context.upload(s.columns), twins = context.upload(s.twins), entry_triangles = context.upload(s.entry_triangles);
+  const auto slice_chart = context.upload(s.slice_chart), slice_begin = context.upload(s.slice_begin), row_length = context.upload(s.row_length),
+             later_end = context.upload(s.later_end), fixed_end = context.upload(s.fixed_end);
+  const auto columns = context.upload(s.columns), entry_triangles = context.upload(s.entry_triangles),
+             entry_columns = context.upload(s.entry_columns);
   const auto jumps = context.upload(s.jumps), corner_jumps = context.upload(s.corner_jumps);
   const auto factors = context.upload(s.factors);
   const auto corners = context.upload(s.corners);
-  const auto order = context.upload(s.order), chart_begin = context.upload(s.chart_begin), chart_rows = context.upload(s.chart_rows);
-  const auto hi = context.upload(s.hi), lo = context.upload(s.lo);
+  const auto fronts = context.upload(s.fronts);
+  const auto children = context.upload(s.children), boundary_rows = context.upload(s.boundary_rows), parent_columns = context.upload(s.parent_columns);
+  const auto tasks = context.upload(s.tasks);
+  const auto map = context.upload(s.map);
   auto areas = context.allocate<float>(s.triangles);
-  auto mantissas = context.allocate<float>(s.entries), shares = context.allocate<float>(s.entries), scaled = context.allocate<float>(s.entries);
+  auto mantissas = context.allocate<float>(s.entries), weights = context.allocate<float>(s.entries);
   auto exponents = context.allocate<int>(s.entries);
-  auto sums = context.allocate<float>(s.vertices), v_parts = context.allocate<float>(s.vertices), roots = context.allocate<float>(s.vertices);
-  auto row_exponents = context.allocate<int>(s.vertices);
-  const auto cell_first = context.upload(s.cell_first), cell_counts = context.upload(s.cell_counts), cell_begin = context.upload(s.cell_begin);
-  const auto row_cells = context.upload(s.row_cells), matrix_begin = context.upload(s.matrix_begin);
-  auto basis = context.allocate<float>(s.vertices), inverses = context.allocate<float>(s.matrices),
-       coarse = context.allocate<float>(4 * static_cast<std::size_t>(s.coarse));
+  auto inverse_roots = context.allocate<float>(s.vertices), roots = context.allocate<float>(s.vertices);
+  auto half_exponents = context.allocate<int>(s.vertices);
   const std::size_t pairs = 2 * static_cast<std::size_t>(s.vertices);
-  auto residual = context.allocate<float>(pairs), direction = context.allocate<float>(pairs), product = context.allocate<float>(pairs),
-       correction = context.allocate<float>(pairs);
-  auto queue = context.allocate<int>(1), steps = context.allocate<int>(charts.size());
-  auto ratios = context.allocate<float>(charts.size());
+  auto residual = context.allocate<float>(pairs), solution = context.allocate<float>(pairs);
+  auto matrices = context.allocate<float>(static_cast<std::size_t>(s.matrix_rows) * VSM_TILE),
+       vectors = context.allocate<float>(static_cast<std::size_t>(s.vector_rows) * VSM_TILE);
+  auto largest = context.allocate<int>(charts.size()), ratios = context.allocate<int>(charts.size());
+  const int stages = static_cast<int>(s.stage_begin.size()) - 1;
+  auto queues = context.allocate<int>(2 * stages);
   context.fill(mantissas, 0.5f);
   context.fill(exponents, 1);
-  context.fill(direction, 0.0f);
-  context.fill(correction, 0.0f);
-  context.fill(steps, 0);
 
-  // On a CPU one work-item runs a plain loop over the rows; elsewhere a group is as large as the device allows. One program
-  // holds all kernels: each is compiled once.
+  // On a CPU one work-item runs plain loops; elsewhere a group shares them. One program holds all kernels: each is compiled once.
   const std::size_t wanted = group_size(context, options);
   const auto kernel = [&](std::string_view name) { return ClKernelName{"vsm.cl", name, vsm_kernel(context, options).options}; };
-  const std::size_t group = context.work_group_size(kernel("invert_coarse"), context.work_group_size(kernel("solve_charts"), wanted));
-  // More groups than charts do no harm, and drivers that hand groups to threads in blocks then use every thread.
-  const std::size_t groups = std::max<std::size_t>(charts.size(), 64);
-  const ClRange group_range({groups * group, 1}, {group, 1});
-  const ClLocal scratch{(group + kStride) * sizeof(float)};
-  const int chart_count = static_cast<int>(charts.size());
-  std::vector<int> frozen(s.vertices / kSlice, 1), iterations(charts.size(), 0);
+  const std::size_t group = context.work_group_size(kernel("eliminate_fronts"), context.work_group_size(kernel("substitute_back"), wanted));
+  const ClRange slices({static_cast<std::size_t>(s.vertices), 1}, {kSlice, 1});
+  std::vector<int> frozen(s.vertices / kSlice, 1), iterations(charts.size(), 0), steps(charts.size(), 0);
+  std::vector<float> final_ratios(charts.size(), 0);
   std::vector<bool> is_stopped(charts.size(), false);
   std::vector<double> spreads(charts.size(), 0);
   auto frozen_slices = context.upload(frozen);
+
+  const auto for_stage = [&](int stage, const auto& launch) {
+    // More groups than tasks do no harm, and drivers that hand groups to threads in blocks then use every thread.
+    const std::size_t groups = std::max(s.stage_begin[stage + 1] - s.stage_begin[stage], 64);
+    launch(ClRange({groups * group, 1}, {group, 1}), s.stage_begin[stage], s.stage_begin[stage + 1]);
+  };
+  const auto is_solved = [&](float tolerance) {
+    context.fill(ratios, 0);
+    context.launch(kernel("form_residual"), slices, slice_chart, slice_begin, row_length, columns, jumps, weights, inverse_roots, half_exponents,
+                   largest, map, roots, residual, ratios);
+    const std::vector<int> bits = context.download(ratios);
+    for (std::size_t k = 0; k < charts.size(); ++k) final_ratios[k] = std::bit_cast<float>(bits[k]);
+    return std::all_of(final_ratios.begin(), final_ratios.end(), [&](float ratio) { return ratio <= tolerance; });
+  };
+  const auto solve = [&](float tolerance) {
+    for (int step = 0; !is_solved(tolerance) && step < options.max_steps; ++step) {
+      for (std::size_t k = 0; k < charts.size(); ++k) steps[k] += final_ratios[k] > tolerance;
+      context.fill(queues, 0);
+      for (int stage = 0; stage < stages; ++stage)
+        for_stage(stage, [&](const ClRange& range, int begin, int end) {
+          context.launch(kernel("eliminate_fronts"), range, step == 0 ? 1 : 0, tolerance, begin, end, tasks, stage, queues, fronts,
+                         children, boundary_rows, parent_columns, slice_begin, later_end, fixed_end, columns, jumps, entry_columns, mantissas, exponents, weights,
+                         inverse_roots, half_exponents, roots, residual, ratios,
+                         matrices, vectors);
+        });
+      for (int stage = stages - 1; stage >= 0; --stage)
+        for_stage(stage, [&](const ClRange& range, int begin, int end) {
+          context.launch(kernel("substitute_back"), range, tolerance, begin, end, tasks, stages + stage, queues, fronts, boundary_rows, roots, ratios,
+                         matrices, vectors, solution, map);
+        });
+    }
+  };
   for (bool is_last = options.iterations == 0;;) {
-    context.launch(kernel("weigh_rows"), ClRange(s.vertices), s.vertices, s.entries, frozen_slices, slice_begin, row_length, jumps, entry_triangles,
-                   factors, areas, mantissas, exponents, shares, sums, row_exponents, v_parts);
-    context.launch(kernel("scale_entries"), ClRange(s.vertices), s.vertices, slice_begin, row_length, twins, shares, scaled);
-    context.fill(queue, 0);
-    context.launch(kernel("invert_coarse"), group_range, chart_count, queue, order, chart_begin, chart_rows, cell_first, cell_counts, cell_begin,
-                   row_cells, matrix_begin, slice_begin, row_length, columns, shares, scaled, sums, row_exponents, roots, basis, inverses, coarse, scratch);
-    context.fill(queue, 0);
-    context.launch(kernel("solve_charts"), group_range, chart_count,
-                   static_cast<float>(is_last ? options.tolerance : options.intermediate_tolerance), options.max_steps, kCheckSteps, s.coarse, queue,
-                   order, chart_begin, chart_rows, cell_first, cell_counts, cell_begin, row_cells, matrix_begin, slice_begin, row_length, columns,
-                   jumps, shares, scaled, v_parts, roots, basis, inverses, hi, lo, residual, direction, product, correction, coarse, steps, ratios,
-                   scratch);
+    context.fill(largest, INT_MIN);
+    context.launch(kernel("weigh_rows"), slices, s.entries, frozen_slices, slice_chart, slice_begin, row_length, entry_triangles, factors, areas,
+                   mantissas, exponents, weights, inverse_roots, half_exponents, largest);
+    solve(static_cast<float>(is_last ? options.tolerance : options.intermediate_tolerance));
     if (is_last) break;
-    context.launch(kernel("measure_areas"), ClRange(s.triangles), s.triangles, corners, corner_jumps, hi, lo, areas);
+    context.launch(kernel("measure_areas"), ClRange(s.triangles), s.triangles, corners, corner_jumps, map, areas);
     if (options.stop_spread_change > 0) {
       const std::vector<float> now = context.download(areas);
       auto first = now.begin();
@@ -417,21 +456,18 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
         ++iterations[k];
         is_last &= iterations[k] == options.iterations;
       }
-      const auto begin = frozen.begin() + s.chart_begin[k] / kSlice;
-      std::fill(begin, begin + padded(static_cast<int>(charts[k].positions.size()), kSlice) / kSlice, is_stopped[k] ? 1 : 0);
     }
+    for (std::size_t slice = 0; slice < frozen.size(); ++slice) frozen[slice] = is_stopped[s.slice_chart[slice]] ? 1 : 0;
     context.write(frozen_slices, frozen);
   }
-  const auto final_hi = context.download(hi), final_lo = context.download(lo);
-  const auto final_steps = context.download(steps);
-  const auto final_ratios = context.download(ratios);
+  const auto final_map = context.download(map);
   for_each_block(charts.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
     Chart& chart = charts[k];
     VsmReport& report = reports[k];
     const std::vector<double> guess = chart.v;
-    read_map(s, k, final_hi, final_lo, chart);
+    read_map(s, k, final_map, chart);
     report.iterations = iterations[k];
-    report.solver_steps = final_steps[k];
+    report.solver_steps = steps[k];
     report.residual = final_ratios[k];
     report.flipped_triangles = count_flipped(chart);
     if (report.flipped_triangles > 0) {

@@ -22,14 +22,14 @@ struct VsmOptions {
   /// the last solve, and at those before it, which only serve to find weights.
   double tolerance = 1e-3;
   double intermediate_tolerance = 3e-2;
-  int max_steps = 2000;     ///< conjugate gradient steps per solve at most
+  int max_steps = 20;       ///< refinements per solve at most
   int work_group_size = 0;  ///< of the solver; 0: by device. Another size changes the map within the tolerance
 };
 
 struct VsmReport {
   int iterations = 0;       ///< reweightings done
   double spread = 0;        ///< coefficient of variation of the triangles' texture area
-  int solver_steps = 0;     ///< conjugate gradient steps, all iterations together
+  int solver_steps = 0;     ///< refinements, all iterations together
   double residual = 0;      ///< largest |x_i - weighted mean of neighbours| relative to the mean |x_i - x_j| there
   int flipped_triangles = 0;
   bool used_direct_solver = false;  ///< the device's solution was not good enough and a sparse factorization replaced it

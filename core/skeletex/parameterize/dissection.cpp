@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/parameterize/dissection.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <numeric>
+#include <span>
+
+namespace skeletex {
+namespace {
+
+constexpr std::size_t kLeaf = 24;  // so many vertices are eliminated together at most where nothing separates them
+
+void find_inner_neighbours(const Chart& chart, Dissection& d) {
+  const auto is_inner = [&](int v) { return chart.kinds[v] == ChartVertex::kInner; };
+  const auto for_edges = [&](const auto& visit) {
+    for (const Triangle& t : chart.triangles)
+      for (const int c : {0, 1, 2})
+        if (const int from = t[c], to = t[(c + 1) % 3]; is_inner(from) && is_inner(to)) visit(from, to);
+  };
+  d.begin.assign(chart.positions.size() + 1, 0);
+  for_edges([&](int from, int) { ++d.begin[from + 1]; });
+  std::partial_sum(d.begin.begin(), d.begin.end(), d.begin.begin());
+  d.neighbours.resize(d.begin.back());
+  std::vector<int> next(d.begin.begin(), d.begin.end() - 1);
+  for_edges([&](int from, int to) { d.neighbours[next[from]++] = to; });
+}
+
+class Dissector {
+ public:
+  Dissector(const Chart& chart, Dissection& result) : chart_(chart), d_(result), side_(chart.positions.size(), 0) {}
+
+  /// Orders the first `end` vertices; the rest is one more front.
+  void run(int end) {
+    std::vector<int> roots = divide(0, end);
+    if (const int all = static_cast<int>(d_.order.size()); end < all) d_.fronts[add_front(end, all, std::move(roots))].is_beside_poles = true;
+    find_boundaries();
+  }
+
+ private:
+  static constexpr signed char kLeft = 1, kRight = 2, kSeparator = 4;
+
+  /// Orders order[begin] to order[end - 1]. \return the fronts that have no parent yet
+  std::vector<int> divide(int begin, int end) {
+    if (begin == end) return {};
+    const std::span<int> all = std::span(d_.order).subspan(begin, end - begin);
+    if (all.size() <= kLeaf) return {add_front(begin, end, {})};
+    const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
+    const int axis = longest_axis(all);
+    std::nth_element(all.begin(), middle, all.end(), [&](int a, int b) { return chart_.positions[a][axis] < chart_.positions[b][axis]; });
+    // The half that has fewer vertices at the cut gives them.
+    for (auto v = all.begin(); v != all.end(); ++v) side_[*v] = v < middle ? kLeft : kRight;
+    const auto is_at_cut = [&](int v) {
+      return std::any_of(d_.neighbours.begin() + d_.begin[v], d_.neighbours.begin() + d_.begin[v + 1],
+                         [&](int w) { return side_[w] == kLeft + kRight - side_[v]; });
+    };
+    std::array<std::vector<int>, 2> cut;
+    for (const int v : all)
+      if (is_at_cut(v)) cut[side_[v] == kRight].push_back(v);
+    const std::vector<int>& separator = cut[cut[1].size() < cut[0].size()];
+    for (const int v : separator) side_[v] = kSeparator;
+    const auto left_end = std::stable_partition(all.begin(), all.end(), [&](int v) { return side_[v] == kLeft; });
+    const auto right_end = std::stable_partition(left_end, all.end(), [&](int v) { return side_[v] == kRight; });
+    for (const int v : all) side_[v] = 0;
+    const int left = begin + static_cast<int>(left_end - all.begin()), right = begin + static_cast<int>(right_end - all.begin());
+    std::vector<int> children = divide(begin, left);
+    for (const int child : divide(left, right)) children.push_back(child);
+    if (right == end) return children;
+    return {add_front(right, end, std::move(children))};
+  }
+
+  void find_boundaries() {
+    const int count = static_cast<int>(d_.order.size());
+    d_.number.assign(side_.size(), -1);
+    for (int i = 0; i < count; ++i) d_.number[d_.order[i]] = i;
+    std::vector<int> seen(count, -1);
+    for (int f = 0; f < static_cast<int>(d_.fronts.size()); ++f) {
+      Front& front = d_.fronts[f];
+      const int after = front.first + front.pivots;
+      const auto take = [&](int number) {
+        if (number < after || seen[number] == f) return;
+        seen[number] = f;
+        front.boundary.push_back(number);
+      };
+      for (int i = front.first; i < after; ++i)
+        for (int k = d_.begin[d_.order[i]]; k < d_.begin[d_.order[i] + 1]; ++k) take(d_.number[d_.neighbours[k]]);
+      for (const int child : front.children)
+        for (const int number : d_.fronts[child].boundary) take(number);
+      std::sort(front.boundary.begin(), front.boundary.end());
+    }
+  }
+
+  int longest_axis(std::span<const int> all) const {
+    Eigen::AlignedBox3d box;
+    for (const int v : all) box.extend(chart_.positions[v]);
+    int axis = 0;
+    box.sizes().maxCoeff(&axis);
+    return axis;
+  }
+
+  int add_front(int begin, int end, std::vector<int> children) {
+    const int id = static_cast<int>(d_.fronts.size());
+    Front front;
+    front.first = begin;
+    front.pivots = front.size = end - begin;
+    front.subtree = children.empty() ? id : d_.fronts[children.front()].subtree;
+    for (const int child : children) {
+      d_.fronts[child].parent = id;
+      front.size += d_.fronts[child].size;
+    }
+    front.children = std::move(children);
+    d_.fronts.push_back(std::move(front));
+    return id;
+  }
+
+  const Chart& chart_;
+  Dissection& d_;
+  std::vector<signed char> side_;
+};
+
+}  // namespace
+
+Dissection dissect(const Chart& chart) {
+  Dissection d;
+  find_inner_neighbours(chart, d);
+  const auto is_pole = [&](int v) { return chart.kinds[v] == ChartVertex::kHeadPole || chart.kinds[v] == ChartVertex::kTailPole; };
+  std::vector<bool> is_beside_pole(chart.kinds.size(), false);
+  for (const Triangle& t : chart.triangles)
+    if (std::any_of(t.begin(), t.end(), is_pole))
+      for (const int v : t) is_beside_pole[v] = true;
+  for (int v = 0; v < static_cast<int>(chart.kinds.size()); ++v)
+    if (chart.kinds[v] == ChartVertex::kInner) d.order.push_back(v);
+  const auto rings = std::stable_partition(d.order.begin(), d.order.end(), [&](int v) { return !is_beside_pole[v]; });
+  Dissector(chart, d).run(static_cast<int>(rings - d.order.begin()));
+  return d;
+}
+
+}  // namespace skeletex
