@@ -12,22 +12,22 @@ struct Front {
   std::vector<int> boundary;  ///< the vertices that are then joined to each other, by their numbers: all later, ascending
   std::vector<int> children;  ///< fronts whose boundaries lie in these pivots and this boundary
   int parent = -1;
-  int subtree = 0;  ///< the first front of this one's subtree, which is a run of fronts
-  int size = 0;     ///< pivots of the subtree
+  int subtree = 0;               ///< the first front of this one's subtree, which is a run of fronts
+  int size = 0;                  ///< pivots of the subtree
   bool is_beside_poles = false;  ///< its pivots are the neighbours of the chart's poles
 };
 
 /// The inner vertices of a chart in an order of elimination.
 struct Dissection {
   std::vector<int> order;
-  std::vector<int> number;  ///< of every vertex of the chart; -1 where it is fixed
+  std::vector<int> number;    ///< of every vertex of the chart; -1 where it is fixed
   std::vector<Front> fronts;  ///< children before parents
   /// The neighbours of an inner vertex that are inner ones too are neighbours[begin[v]] to neighbours[begin[v + 1] - 1].
   std::vector<int> begin, neighbours;
 };
 
-/// Nested dissection (George 1973): the vertices that separate two halves, cut across the longest extent, come after both; and so on in each half. The
-/// neighbours of poles come last of all.
+/// Nested dissection (George 1973): the vertices that separate two halves, cut across the longest extent, come after both; and so on in each half.
+/// The neighbours of poles come last of all.
 Dissection dissect(const Chart& chart);
 
 }  // namespace skeletex

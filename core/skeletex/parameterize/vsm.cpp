@@ -20,7 +20,7 @@
 namespace skeletex {
 namespace {
 
-constexpr int kSlice = 32;   // VSM_SLICE
+constexpr int kSlice = 32;           // VSM_SLICE
 constexpr signed char kPole = -128;  // VSM_POLE
 
 /// Slivers of the cut count as this much of the mean surface area: their weights stay in the others' range.
@@ -63,7 +63,7 @@ struct Task {
 struct DeviceSystems {
   int vertices = 0, triangles = 0, entries = 0;
   std::vector<int> slice_chart, slice_begin, row_length, later_end, fixed_end;
-  std::vector<std::vector<int>> device_vertices;  ///< per chart and vertex
+  std::vector<std::vector<int>> device_vertices;             ///< per chart and vertex
   std::vector<int> columns, entry_triangles, entry_columns;  ///< entry_triangles: two planes
   std::vector<signed char> jumps;
   std::vector<float> factors;
@@ -312,7 +312,8 @@ void solve_directly(Chart& chart, const VsmOptions& options, int iterations) {
         for (int h = 0; h < static_cast<int>(table.twins.size()); ++h) {
           const int to = corner(HalfEdgeTable::next(h));
           if (unknown[corner(h)] < 0 || (!is_u && is_pole(chart.kinds[to]))) continue;
-          visit(h, unknown[corner(h)], to, is_u ? 0.0 : static_cast<double>(chart.turns[h / 3][HalfEdgeTable::next(h) % 3] - chart.turns[h / 3][h % 3]));
+          visit(h, unknown[corner(h)], to,
+                is_u ? 0.0 : static_cast<double>(chart.turns[h / 3][HalfEdgeTable::next(h) % 3] - chart.turns[h / 3][h % 3]));
         }
       };
       Eigen::VectorXd diagonal = Eigen::VectorXd::Zero(rows), right = Eigen::VectorXd::Zero(rows);
@@ -372,7 +373,8 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
   const auto factors = context.upload(s.factors);
   const auto corners = context.upload(s.corners);
   const auto fronts = context.upload(s.fronts);
-  const auto children = context.upload(s.children), boundary_rows = context.upload(s.boundary_rows), parent_columns = context.upload(s.parent_columns);
+  const auto children = context.upload(s.children), boundary_rows = context.upload(s.boundary_rows),
+             parent_columns = context.upload(s.parent_columns);
   const auto tasks = context.upload(s.tasks);
   const auto map = context.upload(s.map);
   auto areas = context.allocate<float>(s.triangles);
@@ -420,10 +422,9 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
       context.fill(queues, 0);
       for (int stage = 0; stage < stages; ++stage)
         for_stage(stage, [&](const ClRange& range, int begin, int end) {
-          context.launch(kernel("eliminate_fronts"), range, step == 0 ? 1 : 0, tolerance, begin, end, tasks, stage, queues, fronts,
-                         children, boundary_rows, parent_columns, slice_begin, later_end, fixed_end, columns, jumps, entry_columns, mantissas, exponents, weights,
-                         inverse_roots, half_exponents, roots, residual, ratios,
-                         matrices, vectors);
+          context.launch(kernel("eliminate_fronts"), range, step == 0 ? 1 : 0, tolerance, begin, end, tasks, stage, queues, fronts, children,
+                         boundary_rows, parent_columns, slice_begin, later_end, fixed_end, columns, jumps, entry_columns, mantissas, exponents,
+                         weights, inverse_roots, half_exponents, roots, residual, ratios, matrices, vectors);
         });
       for (int stage = stages - 1; stage >= 0; --stage)
         for_stage(stage, [&](const ClRange& range, int begin, int end) {
@@ -457,8 +458,9 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
         is_last &= iterations[k] == options.iterations;
       }
     }
-    for (std::size_t slice = 0; slice < frozen.size(); ++slice) frozen[slice] = is_stopped[s.slice_chart[slice]] ? 1 : 0;
-    context.write(frozen_slices, frozen);
+    std::vector<int> now_frozen;
+    for (const int chart : s.slice_chart) now_frozen.push_back(is_stopped[chart] ? 1 : 0);
+    if (now_frozen != frozen) context.write(frozen_slices, frozen = now_frozen);
   }
   const auto final_map = context.download(map);
   for_each_block(charts.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {

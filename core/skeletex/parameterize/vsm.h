@@ -38,9 +38,9 @@ struct VsmReport {
 /// The kernel of solve_vsm that its others share a program with. \see ClContext::prepare
 ClKernelName vsm_kernel(const ClContext& context, const VsmOptions& options = {});
 
-/// Vertex-sampling-maximizing maps (paper 3.2.2) of all charts together: weights, then one conjugate-gradient solve per
-/// iteration in single precision on the device, u and v with a common matrix, a work-group per chart. Fills u and v of
-/// every inner vertex. A chart with flipped triangles is solved again by a sparse factorization on the host.
+/// Vertex-sampling-maximizing maps (paper 3.2.2) of all charts together: weights, then one elimination per iteration in single precision on the
+/// device, for u and v at once, by fronts that many work-groups share. Fills u and v of every inner vertex. A chart with flipped
+/// triangles is solved again by a sparse factorization on the host.
 /// \return one report per chart
 std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, const VsmOptions& options = {});
 
