@@ -11,6 +11,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <utility>
 
 #include "skeletex/model/parallel.h"
 #include "skeletex/parameterize/dissection.h"
@@ -364,19 +365,19 @@ ClKernelName vsm_kernel(const ClContext& context, const VsmOptions& options) {
 std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, const VsmOptions& options) {
   std::vector<VsmReport> reports(charts.size());
   if (charts.empty()) return reports;
-  const DeviceSystems s = build_systems(charts, options.alpha);
-  const auto slice_chart = context.upload(s.slice_chart), slice_begin = context.upload(s.slice_begin), row_length = context.upload(s.row_length),
-             later_end = context.upload(s.later_end), fixed_end = context.upload(s.fixed_end);
-  const auto columns = context.upload(s.columns), entry_triangles = context.upload(s.entry_triangles),
-             entry_columns = context.upload(s.entry_columns);
-  const auto jumps = context.upload(s.jumps), corner_jumps = context.upload(s.corner_jumps);
-  const auto factors = context.upload(s.factors);
-  const auto corners = context.upload(s.corners);
-  const auto fronts = context.upload(s.fronts);
-  const auto children = context.upload(s.children), boundary_rows = context.upload(s.boundary_rows),
-             parent_columns = context.upload(s.parent_columns);
-  const auto tasks = context.upload(s.tasks);
-  const auto map = context.upload(s.map);
+  DeviceSystems s = build_systems(charts, options.alpha);
+  // The host's copy goes at once: both together would be the largest part of all memory.
+  const auto hand_over = [&](auto& values) { return context.upload(std::exchange(values, {})); };
+  const auto slice_chart = context.upload(s.slice_chart), slice_begin = hand_over(s.slice_begin), row_length = hand_over(s.row_length),
+             later_end = hand_over(s.later_end), fixed_end = hand_over(s.fixed_end);
+  const auto columns = hand_over(s.columns), entry_triangles = hand_over(s.entry_triangles), entry_columns = hand_over(s.entry_columns);
+  const auto jumps = hand_over(s.jumps), corner_jumps = hand_over(s.corner_jumps);
+  const auto factors = hand_over(s.factors);
+  const auto corners = hand_over(s.corners);
+  const auto fronts = hand_over(s.fronts);
+  const auto children = hand_over(s.children), boundary_rows = hand_over(s.boundary_rows), parent_columns = hand_over(s.parent_columns);
+  const auto tasks = hand_over(s.tasks);
+  const auto map = hand_over(s.map);
   auto areas = context.allocate<float>(s.triangles);
   auto mantissas = context.allocate<float>(s.entries), weights = context.allocate<float>(s.entries);
   auto exponents = context.allocate<int>(s.entries);
