@@ -48,7 +48,7 @@ class LatticeCrossings {
     const Rectangle& r = rectangles_[patch];
     return (r.y + 1 + row) * texture_width_ + r.x + (column < r.width ? column : column - r.width);
   }
-  /// The first of a quad's normals. (Not by its texel: textures are as wide as a power of two, so that columns would share few cache lines.)
+  /// The first of a quad's normals.
   int normal_of(int patch, int column, int row) const {
     const int width = rectangles_[patch].width;
     return first_normal_[patch] + 2 * (row * width + (column < width ? column : column - width));
