@@ -492,6 +492,37 @@ TEST(Filters, KeepARealModelClosedWithItsGenus) {
   EXPECT_LT(smooth_model(device(), model, smooth).report.volume_after, 0.99 * result.report.volume_before);
 }
 
+TEST(Filters, OfSnappedModelsTakeTheSolverNoLongerAndLeaveTheRestBitByBit) {
+  const TestModel bear = load_standard_model("bear");
+  const auto encoded = [&](bool has_snap) {
+    EncodeOptions options;
+    options.width = options.height = 192;
+    options.has_snap = has_snap, options.has_fit = false;
+    return encode_model(device(), bear.mesh, bear.skeleton, options).model;
+  };
+  const SkeletexModel snapped = encoded(true);
+  const FilterResult whole = smooth_model(device(), snapped);
+  EXPECT_LT(whole.report.solver.steps, 1.5 * smooth_model(device(), encoded(false)).report.solver.steps);
+  EXPECT_EQ(whole.model.diagonals, DiagonalRule::kNearest);
+  EXPECT_EQ(broken_rule(reconstruct_mesh(device(), whole.model), 0), "");
+
+  const FilterRegion region{{snapped.skeleton.bones[1].name}, 0.02};
+  const SkeletexModel part = smooth_model(device(), snapped, {}, region).model;
+  EXPECT_EQ(part.diagonals, DiagonalRule::kSmooth);
+  std::size_t changed = 0;
+  for (std::size_t bone = 0; bone < snapped.patches.size(); ++bone) {
+    const auto [x, y, width, height] = snapped.patches[bone].rectangle;
+    for (int row = 0; row < height; ++row)
+      for (int j = 0; j < width; ++j) {
+        const std::size_t texel = static_cast<std::size_t>(y + row) * snapped.texture.width + x + j;
+        const bool is_same = part.texture.out[texel] == snapped.texture.out[texel] && part.texture.along[texel] == snapped.texture.along[texel];
+        EXPECT_TRUE(is_same || bone == 1) << bone << " " << row << " " << j;
+        changed += !is_same;
+      }
+  }
+  EXPECT_GT(changed, 100u);
+}
+
 TEST(Filters, OfNoEffectChangeNoBit) {
   const SkeletexModel model = synthetic(y_branch(), 24, 24);
   SmoothOptions smooth;

@@ -8,6 +8,7 @@
 
 #include "skeletex/edit/move_surface.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/even_lattice.h"
 
 namespace skeletex {
 namespace {
@@ -19,7 +20,8 @@ void check_length(double value, const char* what, double least, double most) {
 /// Everything a filter needs of the model it works on.
 struct FilterJob {
   ClContext& context;
-  const SkeletexModel& model;
+  const SkeletexModel& given;
+  SkeletexModel model;  ///< the given one on an even lattice: the slivers of a snapped one take the solver several times the steps
   ModelSurface surface;
   SurfaceOperator laplace;
   std::vector<float> weights;  ///< of the region, per vertex
@@ -72,7 +74,7 @@ std::vector<float> weigh_region(ClContext& context, const SurfaceOperator& lapla
 }
 
 FilterJob::FilterJob(ClContext& on, const SkeletexModel& of, const FilterRegion& region)
-    : context(on), model(of), surface(upload_surface(on, of)), laplace(make_surface_operator(on, surface.neighbours, surface.points)) {
+    : context(on), given(of), model(even_lattice(on, of)), surface(upload_surface(on, model)), laplace(make_surface_operator(on, surface.neighbours, surface.points)) {
   check_length(region.falloff, "the fall-off at the region's boundary", 0, 1);
   weights = weigh_region(context, laplace, inside_region(model, surface.lattice, region), region.falloff, solver);
 }
@@ -89,11 +91,32 @@ std::vector<Vec3> diffusion_moves(FilterJob& job, const DeviceField& points, con
   return moves;
 }
 
+/// Texels beyond the region become the given model's again.
+void keep_outside(const FilterJob& job, SkeletexModel& model) {
+  bool has_outside = false;
+  for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
+    const auto [x, y, width, height] = model.patches[bone].rectangle;
+    for (int row = 1; row + 1 < height; ++row)
+      for (int j = 0; j < width; ++j) {
+        if (job.weights[job.surface.lattice.first_inner[bone] + (row - 1) * width + j] != 0) continue;
+        has_outside = true;
+        const std::size_t texel = static_cast<std::size_t>(y + row) * model.texture.width + x + j;
+        model.texture.along[texel] = job.given.texture.along[texel];
+        model.texture.around[texel] = job.given.texture.around[texel];
+        model.texture.out[texel] = job.given.texture.out[texel];
+      }
+  }
+  if (!has_outside) return;
+  model.diagonals = job.given.diagonals;
+  model.encoder_settings = job.given.encoder_settings;
+}
+
 /// The model with its surface moved, where and as far as the region allows.
 FilterResult finish(FilterJob& job, std::vector<Vec3> moves, double volume_before) {
   for (std::size_t i = 0; i < moves.size(); ++i) moves[i] *= static_cast<double>(job.weights[i]);
   MovedModel moved = move_surface(job.context, job.model, job.surface, job.laplace, moves);
   add_solve(job.solver, moved.report.solver);
+  keep_outside(job, moved.model);
   return {std::move(moved.model), {moved.report, volume_before}};
 }
 
@@ -127,7 +150,7 @@ FilterResult smooth_model(ClContext& context, const SkeletexModel& model, const 
   for (int iteration = 1; iteration < options.iterations; ++iteration) {
     std::vector<Vec3> positions = job.surface.positions;
     for (std::size_t i = 0; i < positions.size(); ++i) positions[i] += moves[i];
-    const DeviceField points = upload_points(context, positions, model.origin, job.unit());
+    const DeviceField points = upload_points(context, positions, job.model.origin, job.unit());
     const std::vector<Vec3> more = diffusion_moves(job, points, make_surface_operator(context, job.surface.neighbours, points), scale);
     for (std::size_t i = 0; i < moves.size(); ++i) moves[i] += more[i];
   }

@@ -11,7 +11,8 @@
 namespace skeletex {
 
 /// Filters work on the surface of the bind pose, across seams, v = 0 and poles (neighbours.h), and write a model of the
-/// same skeleton, layout and seams' topology: it stays as closed as it was. Lengths are in diagonals.
+/// same skeleton, layout and seams' topology: it stays as closed as it was. Snapped models are made even (even_lattice.h) where the filter
+/// acts. Lengths are in diagonals.
 
 /// Where a filter acts.
 struct FilterRegion {
