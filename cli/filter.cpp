@@ -14,6 +14,7 @@
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/even_lattice.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/render/colours.h"
 
@@ -62,9 +63,10 @@ double usual_size(const std::vector<float>& values) {
 void run_curvature(const Arguments& arguments) {
   if (!arguments.output.ends_with(".ply")) throw IoError(fmt::format("{}: curvature is written as a mesh with values: .ply", arguments.output));
   check_output(arguments.output);
-  const SkeletexModel model = read_model(arguments.model);
+  const SkeletexModel stored = read_model(arguments.model);
   ClContext context(arguments.device);
   Stopwatch watch;
+  const SkeletexModel model = even_lattice(context, stored);  // as for filters: slivers slow the solver down
   const ModelSurface surface = upload_surface(context, model);
   const CurvatureResult result = mean_curvature(context, model, surface, arguments.scale);
   const std::vector<Vec3> normals = vertex_normals(context, surface);
