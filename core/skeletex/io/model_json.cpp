@@ -254,12 +254,13 @@ class ModelCheck {
       require(r.x >= 0 && r.y >= 0 && r.width >= 3 && r.height >= 2 && r.width <= m_.texture.width && r.height <= m_.texture.height &&
                   r.x <= m_.texture.width - r.width && r.y <= m_.texture.height - r.height,
               entry("patches", i), fmt::format("its rectangle must be at least 3 x 2 and lie in the texture of {} x {}", m_.texture.width, m_.texture.height));
-      for (int y = r.y; y < r.y + r.height; ++y)
-        for (int x = r.x; x < r.x + r.width; ++x) {
-          auto taken = is_taken[static_cast<std::size_t>(y) * static_cast<std::size_t>(m_.texture.width) + static_cast<std::size_t>(x)];
-          require(!taken, entry("patches", i), "its rectangle must not overlap others");
-          taken = true;
-        }
+      bool is_apart = true;
+      for (int y = r.y; y < r.y + r.height; ++y) {
+        const auto first = is_taken.begin() + y * static_cast<std::ptrdiff_t>(m_.texture.width) + r.x;
+        is_apart = is_apart && std::find(first, first + r.width, true) == first + r.width;
+        std::fill_n(first, r.width, true);
+      }
+      require(is_apart, entry("patches", i), "its rectangle must not overlap others");
       require(size_of(patch.row_u) == r.height, entry("patches", i), "row_u must have an entry per row");
       bool is_increasing = patch.row_u.front() == 0 && patch.row_u.back() == 1;
       for (std::size_t row = 1; row < patch.row_u.size(); ++row) is_increasing = is_increasing && patch.row_u[row - 1] < patch.row_u[row];
@@ -300,7 +301,7 @@ class ModelCheck {
         }
       }
       require(arc.samples.size() >= (arc.is_closed() ? 3u : 1u), entry("arcs", i), "a closed arc has at least three samples, an open one at least one");
-      for (const SeamSample& sample : arc.samples) require(is_sample(sample), entry("arcs", i), "turns must be in [0,1), distances not negative");
+      require(std::all_of(arc.samples.begin(), arc.samples.end(), is_sample), entry("arcs", i), "turns must be in [0,1), distances not negative");
     }
   }
 
