@@ -29,32 +29,32 @@ kernel void find_normals(const int triangle_count, global const int* restrict co
   normals[t] = n.x * inverse, normals[triangle_count + t] = n.y * inverse, normals[2 * triangle_count + t] = n.z * inverse;
 }
 
-Point either(int is_first, Point p, Point q) {
+__attribute__((always_inline)) Point either(int is_first, Point p, Point q) {
   const Point r = {is_first ? p.x : q.x, is_first ? p.y : q.y, is_first ? p.z : q.z};
   return r;
 }
 
 // The square of how far a triangle could be, at a corner where the mesh has a normal; infinite where it looks against that.
-float suspicion2_at(Point own, float area2, float side2, Point normal) {
+__attribute__((always_inline)) float suspicion2_at(Point own, float area2, float side2, Point normal) {
   const float along = product(own, normal);
   const float sine2 = area2 > 0.0f ? fmax(0.0f, 1.0f - along * along / area2) : 1.0f;
   return along < 0.0f ? INFINITY : 0.25f * side2 * sine2;
 }
 
-float suspicion2_of(Point a, Point b, Point c, Point at_a, Point at_b, Point at_c) {
+__attribute__((always_inline)) float suspicion2_of(Point a, Point b, Point c, Point at_a, Point at_b, Point at_c) {
   const Point ab = minus(b, a), ac = minus(c, a), bc = minus(c, b);
   const Point own = cross_of(ab, ac);
   const float area2 = product(own, own), side2 = fmax(product(ab, ab), fmax(product(ac, ac), product(bc, bc)));
   return fmax(suspicion2_at(own, area2, side2, at_a), fmax(suspicion2_at(own, area2, side2, at_b), suspicion2_at(own, area2, side2, at_c)));
 }
 
-Point normal_at(int texel, int triangle_count, global const int* restrict texel_triangles, global const float* restrict normals) {
+__attribute__((always_inline)) Point normal_at(int texel, int triangle_count, global const int* restrict texel_triangles, global const float* restrict normals) {
   const int t = min(texel_triangles[texel], triangle_count - 1);
   const Point n = {normals[t], normals[triangle_count + t], normals[2 * triangle_count + t]};
   return n;
 }
 
-float suspicion2_of_quad(int texel, int right, int texture_width, int triangle_count, int is_second, global const int* restrict texel_triangles,
+__attribute__((always_inline)) float suspicion2_of_quad(int texel, int right, int texture_width, int triangle_count, int is_second, global const int* restrict texel_triangles,
                          global const float* restrict normals, global const float* restrict x, global const float* restrict y,
                          global const float* restrict z) {
   const int above = texel + texture_width, beyond = right + texture_width;
@@ -77,13 +77,14 @@ kernel void suspect_quads(const int row_count, const int texture_width, const in
   const int k = get_group_id(0);
   if (k >= row_count) return;
   global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
-  const int width = patch->width, step = get_local_size(0);
+  const int width = patch->width;
   const int texel = (patch->y + lattice_rows[4 * k + 1]) * texture_width + patch->x;
   if (texel_triangles[texel] == NO_TRIANGLE) return;
-  // Without the last column, which wraps round, the loop becomes vector instructions.
-  for (int j = get_local_id(0); j < width - 1; j += step)
+  // Without the last column, which wraps round, the loop becomes vector instructions; see lattice.cl for `one`.
+  const int one = min(width, 1);
+  for (int j = get_local_id(0); j < width - 1; j += ROW_ITEMS)
     suspicions2[texel + j] =
-        suspicion2_of_quad(texel + j, texel + j + 1, texture_width, triangle_count, diagonals[texel + j], texel_triangles, normals, x, y, z);
+        suspicion2_of_quad(texel + j, texel + j + one, texture_width, triangle_count, diagonals[texel + j], texel_triangles, normals, x, y, z);
   if (get_local_id(0) == 0)
     suspicions2[texel + width - 1] =
         suspicion2_of_quad(texel + width - 1, texel, texture_width, triangle_count, diagonals[texel + width - 1], texel_triangles, normals, x, y, z);

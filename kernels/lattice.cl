@@ -6,17 +6,23 @@
 #include "skeletex_structs.h"
 #include "quad_diagonal.h"
 
-int second_diagonal(int texel, int column, int width, int texture_width, int has_before, int has_after, int is_smooth, global const float* restrict x,
-                    global const float* restrict y, global const float* restrict z) {
-  const int columns[4] = {column > 0 ? -1 : width - 1, 0, column + 1 < width ? 1 : 1 - width, column + 2 < width ? 2 : 2 - width};
-  int at[4][4];
-  for (int i = 0; i < 4; ++i) {
-    at[1][i] = texel + columns[i];
-    at[0][i] = at[1][i] - (has_before ? texture_width : 0);
-    at[2][i] = at[1][i] + texture_width;
-    at[3][i] = at[1][i] + (has_after ? 2 : 1) * texture_width;
-  }
+// left, right, beyond: the columns of the 4 x 4 vertices around the quad beside the texel's own, from this one.
+__attribute__((always_inline)) int second_diagonal(int texel, int left, int right, int beyond, int texture_width, int has_before, int has_after,
+                                                   int is_smooth, global const float* restrict x, global const float* restrict y,
+                                                   global const float* restrict z) {
+  const int before = has_before ? -texture_width : 0, above = texture_width, after = (has_after ? 2 : 1) * texture_width;
+  const int at[4][4] = {{texel + before + left, texel + before, texel + before + right, texel + before + beyond},
+                        {texel + left, texel, texel + right, texel + beyond},
+                        {texel + above + left, texel + above, texel + above + right, texel + above + beyond},
+                        {texel + after + left, texel + after, texel + after + right, texel + after + beyond}};
   return is_smooth ? takes_second_if_smoother(at, has_before, has_after, x, y, z) : takes_second_if_nearer(at, has_before, has_after, x, y, z);
+}
+
+// The same of any column: they wrap round.
+int second_diagonal_at(int texel, int column, int width, int texture_width, int has_before, int has_after, int is_smooth, global const float* restrict x,
+                       global const float* restrict y, global const float* restrict z) {
+  return second_diagonal(texel, column > 0 ? -1 : width - 1, column + 1 < width ? 1 : 1 - width, column + 2 < width ? 2 : 2 - width, texture_width,
+                         has_before, has_after, is_smooth, x, y, z);
 }
 
 // NDRange: one work-group per row, of any size, as in reconstruct.cl; lattice_rows: the rows that quads begin at.
@@ -27,11 +33,18 @@ kernel void choose_diagonals(const int row_count, const int texture_width, const
   const int k = get_group_id(0);
   if (k >= row_count) return;
   global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
-  const int row = lattice_rows[4 * k + 1], width = patch->width, step = get_local_size(0);
+  const int row = lattice_rows[4 * k + 1], width = patch->width;
   const int texel = (patch->y + row) * texture_width + patch->x;
   const int has_before = row > 1, has_after = row + 2 < patch->height - 1;
-  for (int j = get_local_id(0); j < width; j += step)
-    diagonals[texel + j] = second_diagonal(texel + j, j, width, texture_width, has_before, has_after, is_smooth, x, y, z);
+  // What wraps round apart from the rest, whose loads are contiguous. Distances are not written as the numbers that they are, or
+  // the compiler pairs loads next to each other and then no longer vectorises the loop.
+  const int one = min(width, 1), two = 2 * one;
+  for (int j = 1 + get_local_id(0); j < width - 2; j += ROW_ITEMS)
+    diagonals[texel + j] = second_diagonal(texel + j, -one, one, two, texture_width, has_before, has_after, is_smooth, x, y, z);
+  for (int j = max(1, width - 2) + get_local_id(0); j <= width; j += ROW_ITEMS) {
+    const int column = j < width ? j : 0;
+    diagonals[texel + column] = second_diagonal_at(texel + column, column, width, texture_width, has_before, has_after, is_smooth, x, y, z);
+  }
 }
 
 // NDRange (count). out  diagonals, at their places; listed_diagonals: the same one after the other
@@ -44,7 +57,7 @@ kernel void choose_listed_diagonals(const int count, const int texture_width, co
   global const PatchRecord* restrict p = patches + listed_patches[i];
   const int texel = listed[i], line = texel / texture_width, row = line - p->y;
   const int is_second =
-      second_diagonal(texel, texel - line * texture_width - p->x, p->width, texture_width, row > 1, row + 2 < p->height - 1, is_smooth, x, y, z);
+      second_diagonal_at(texel, texel - line * texture_width - p->x, p->width, texture_width, row > 1, row + 2 < p->height - 1, is_smooth, x, y, z);
   diagonals[texel] = is_second;
   listed_diagonals[i] = is_second;
 }

@@ -7,7 +7,7 @@
 // its midpoint from where a cubic through the 4 x 4 vertices has the surface. (Against the shorter diagonal: mean error -6 %,
 // maximum up to -20 %.) Beyond the first and last row the lattice goes on straight. Where rounding blurs d the shorter one is
 // taken, and of two as good the first.
-int takes_second_if_nearer(const int at[4][4], int has_before, int has_after, __global const float* restrict x, __global const float* restrict y,
+__attribute__((always_inline)) int takes_second_if_nearer(const int at[4][4], int has_before, int has_after, __global const float* restrict x, __global const float* restrict y,
                            __global const float* restrict z) {
   const float w_rows[4] = {has_before ? -0.0625f : 0.0f, 0.5625f - (has_before ? 0.0f : 0.125f) + (has_after ? 0.0f : 0.0625f),
                            0.5625f - (has_after ? 0.0f : 0.125f) + (has_before ? 0.0f : 0.0625f), has_after ? -0.0625f : 0.0f};
@@ -19,6 +19,7 @@ int takes_second_if_nearer(const int at[4][4], int has_before, int has_after, __
   const float nx = fy * gz - fz * gy, ny = fz * gx - fx * gz, nz = fx * gy - fy * gx;
   const float n_inverse = 1.0f / sqrt(fmax(nx * nx + ny * ny + nz * nz, 1e-37f));
   float cx = 0.0f, cy = 0.0f, cz = 0.0f;
+#pragma unroll
   for (int i = 0; i < 4; ++i) {
     const float w = i == 0 || i == 3 ? -0.0625f : 0.5625f;
     const int b = at[0][i], v = at[1][i], u = at[2][i], a = at[3][i];
@@ -37,7 +38,7 @@ typedef struct Normal {
   float x, y, z;
 } Normal;
 
-Normal normal_of(__global const float* restrict x, __global const float* restrict y, __global const float* restrict z, int a, int b, int c) {
+__attribute__((always_inline)) Normal normal_of(__global const float* restrict x, __global const float* restrict y, __global const float* restrict z, int a, int b, int c) {
   const float ux = x[b] - x[a], uy = y[b] - y[a], uz = z[b] - z[a];
   const float vx = x[c] - x[a], vy = y[c] - y[a], vz = z[c] - z[a];
   const float nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
@@ -47,12 +48,12 @@ Normal normal_of(__global const float* restrict x, __global const float* restric
 }
 
 // The turn from one normal to another as the length of their difference: 2 sin(angle / 2), precise for small angles.
-float turn_between(Normal a, Normal b) {
+__attribute__((always_inline)) float turn_between(Normal a, Normal b) {
   const float dx = a.x - b.x, dy = a.y - b.y, dz = a.z - b.z;
   return sqrt(dx * dx + dy * dy + dz * dz);
 }
 
-float least_turn(Normal own, Normal first, Normal second) { return fmin(turn_between(own, first), turn_between(own, second)); }
+__attribute__((always_inline)) float least_turn(Normal own, Normal first, Normal second) { return fmin(turn_between(own, first), turn_between(own, second)); }
 
 // The smoother diagonal, for lattices whose texels sit on edges of the surface: the one whose triangles go on more smoothly
 // into the quads around, that is, the smaller sum over the four sides of the turn between the quad's triangle there and the
@@ -61,7 +62,7 @@ float least_turn(Normal own, Normal first, Normal second) { return fmin(turn_bet
 // (less than CLEARLY of the other's turns), as where the lattice sits on nothing, it is the nearer one.
 #define CLEARLY 0.8f
 
-int takes_second_if_smoother(const int at[4][4], int has_before, int has_after, __global const float* restrict x, __global const float* restrict y,
+__attribute__((always_inline)) int takes_second_if_smoother(const int at[4][4], int has_before, int has_after, __global const float* restrict x, __global const float* restrict y,
                              __global const float* restrict z) {
   const float w_before = has_before ? 1.0f : 0.0f, w_after = has_after ? 1.0f : 0.0f;
   const int v00 = at[1][1], v01 = at[1][2], v10 = at[2][1], v11 = at[2][2];

@@ -188,7 +188,7 @@ void ClContext::fill_bytes(const ::cl::Buffer& buffer, const void* pattern, std:
   const std::string program_key = fmt::format("{}|{}", name.file, name.options);
   if (const auto it = programs_.find(program_key); it != programs_.end()) return it->second.program;
 
-  const std::string options = fmt::format("-cl-std=CL1.2 -cl-kernel-arg-info {}", name.options);
+  const std::string options = fmt::format("-cl-std=CL1.2 -cl-kernel-arg-info -D ROW_ITEMS={} {}", row_items(), name.options);
   // The hash guards against drivers whose kernel cache overlooks a change of options.
   const std::string body = kernel_source(name.file);
   const std::string source = fmt::format("// {:016x}\n{}", std::hash<std::string>{}(options + body), body);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <CL/opencl.hpp>
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <filesystem>
@@ -152,6 +153,11 @@ class ClContext {
   /// Launches since the last reset, by kernel, longest first. Waits for the queue.
   std::vector<ClProfileEntry> profile();
   void reset_profile();
+
+  /// Work-items of a group where a kernel has one group per row of a lattice: a loop of one over the columns on a CPU, neighbouring
+  /// columns side by side on all else. Kernels know it as ROW_ITEMS: with a step that the compiler knows, PoCL makes vector
+  /// instructions of such a loop before other passes pair up what is in it.
+  std::size_t row_items() const { return info_.type == "cpu" ? 1 : std::min<std::size_t>(128, info_.max_work_group_size); }
 
   /// The largest work-group, at most `wanted`, that this kernel can run with here.
   std::size_t work_group_size(const ClKernelName& name, std::size_t wanted);

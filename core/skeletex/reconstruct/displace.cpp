@@ -21,7 +21,7 @@ std::vector<LatticeRow> lattice_rows(const std::vector<Patch>& patches, RowChoic
 }
 
 ClRange row_range(const ClContext& context, std::size_t rows) {
-  const std::size_t group = context.device().type == "cpu" ? 1 : std::min<std::size_t>(128, context.device().max_work_group_size);
+  const std::size_t group = context.row_items();
   return {{rows * group, 1}, {group, 1}};
 }
 
