@@ -16,6 +16,7 @@
 
 #define REACH 0.7f         // cells from where a texel is to where it goes
 #define FURTHEST 1.0f      // cells from a texel's own place, along each axis
+#define LOOSE 0.5f         // the same of texels that nothing holds: where edges look for them
 #define LEAST_CROSS 0.05f  // cells squared: twice the area that the triangles around a texel keep in the map
 #define LEAST_COSINE 0.2f  // between a triangle and the even lattice's quad in space
 #define MARGIN 0.6f        // cells that the rows next to a seam or pole keep from it
@@ -151,7 +152,7 @@ kernel void relax_texels(const int first, const int count, const int texture_wid
   const float mean_x = 0.25f * (offset_x[n.left] + offset_x[n.right] + offset_x[below] + offset_x[above]);
   const float mean_y = 0.25f * (offset_y[n.left] + offset_y[n.right] + offset_y[below] + offset_y[above]);
   const float dx = 0.5f * (offset_x[texel] + mean_x), dy = 0.5f * (offset_y[texel] + mean_y);
-  if (fabs(dx - offset_x[texel]) + fabs(dy - offset_y[texel]) < LEAST_MOVE) return;
+  if (fabs(dx - offset_x[texel]) + fabs(dy - offset_y[texel]) < LEAST_MOVE || fmax(fabs(dx), fabs(dy)) > LOOSE) return;
   if (cross_around(n, p->height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) return;
   offset_x[texel] = dx;
   offset_y[texel] = dy;
@@ -175,29 +176,33 @@ kernel void offer_edges(const int edge_count, const int texture_width, const int
   const int e = (int)get_global_id(0);
   if (e >= edge_count) return;
   global const PatchRecord* p = patches + edge_patches[e];
-  const float ends[4] = {edge_ends[4 * e], edge_ends[4 * e + 1], edge_ends[4 * e + 2], edge_ends[4 * e + 3]};
-  const float ex = ends[2] - ends[0], ey = ends[3] - ends[1], length2 = ex * ex + ey * ey, inverse = length2 > 0.0f ? 1.0f / length2 : 0.0f;
-  const float margin = REACH + FURTHEST;
-  const float slope = ends[3] == ends[1] ? 0.0f : (ends[2] - ends[0]) / (ends[3] - ends[1]);
-  const int first_row = max(1, (int)ceil(fmin(ends[1], ends[3]) - margin)), last_row = min(p->height - 2, (int)floor(fmax(ends[1], ends[3]) + margin));
+  const int width = p->width, last_inner = p->height - 2, origin = p->y * texture_width + p->x;
+  const float x0 = edge_ends[4 * e], y0 = edge_ends[4 * e + 1], x1 = edge_ends[4 * e + 2], y1 = edge_ends[4 * e + 3];
+  const float ex = x1 - x0, ey = y1 - y0, length2 = ex * ex + ey * ey, inverse = length2 > 0.0f ? 1.0f / length2 : 0.0f;
+  const float margin = REACH + LOOSE, slope = ey == 0.0f ? 0.0f : ex / ey;
+  const float low_y = fmin(y0, y1), high_y = fmax(y0, y1), scale = offer_scale / edge_weights[e];
+  const int largest = (0x7fffffff >> edge_bits) - 1;
+  const int turned = (int)floor(x0 / (float)width) * width;
+  const int first_row = max(1, (int)ceil(low_y - margin)), last_row = min(last_inner, (int)floor(high_y + margin));
   for (int row = first_row; row <= last_row; ++row) {
     // The part of the edge near this row.
-    const float low = clamp((float)row - margin, fmin(ends[1], ends[3]), fmax(ends[1], ends[3]));
-    const float high = clamp((float)row + margin, fmin(ends[1], ends[3]), fmax(ends[1], ends[3]));
-    const float a = ends[3] == ends[1] ? ends[0] : ends[0] + slope * (low - ends[1]);
-    const float b = ends[3] == ends[1] ? ends[2] : ends[0] + slope * (high - ends[1]);
-    const int first = (int)ceil(fmin(a, b) - margin), last = min((int)floor(fmax(a, b) + margin), first + p->width - 1);
-    int wrapped = (first % p->width + p->width) % p->width;
+    const float a = ey == 0.0f ? x0 : x0 + slope * (clamp((float)row - margin, low_y, high_y) - y0);
+    const float b = ey == 0.0f ? x1 : x0 + slope * (clamp((float)row + margin, low_y, high_y) - y0);
+    const int first = (int)ceil(fmin(a, b) - margin), last = min((int)floor(fmax(a, b) + margin), first + width - 1);
+    int wrapped = first - turned;
+    while (wrapped < 0) wrapped += width;
+    while (wrapped >= width) wrapped -= width;
+    const int line = origin + row * texture_width;
     for (int column = first; column <= last; ++column) {
-      const int texel = (p->y + row) * texture_width + p->x + wrapped;
-      wrapped = wrapped + 1 < p->width ? wrapped + 1 : 0;
-      const float x = ends[0] - (float)column - offset_x[texel], y = ends[1] - (float)row - offset_y[texel];
+      const int texel = line + wrapped;
+      wrapped = wrapped + 1 < width ? wrapped + 1 : 0;
+      const float x = x0 - (float)column - offset_x[texel], y = y0 - (float)row - offset_y[texel];
       const float t = clamp(-(x * ex + y * ey) * inverse, 0.0f, 1.0f);
       const float dx = x + t * ex, dy = y + t * ey;
       const float distance2 = dx * dx + dy * dy;
       // One test, not two: each alone is as good as a coin.
       if ((distance2 > REACH * REACH) | (anchors[texel] != 0)) continue;
-      const int offer = min((int)(offer_scale * sqrt(distance2) / edge_weights[e]), (0x7fffffff >> edge_bits) - 1);
+      const int offer = min((int)(scale * sqrt(distance2)), largest);
       atomic_min(offers + texel, (offer << edge_bits) + e);
     }
   }

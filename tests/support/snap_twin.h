@@ -107,7 +107,7 @@ struct SnapLattice {
             double mean_x = 0, mean_y = 0;
             for (const int n : around) mean_x += x[n] / 4, mean_y += y[n] / 4;
             const double dx = (x[texel] + mean_x) / 2, dy = (y[texel] + mean_y) / 2;
-            if (std::abs(dx - x[texel]) + std::abs(dy - y[texel]) >= 0.01) move(j, row, dx, dy);
+            if (std::abs(dx - x[texel]) + std::abs(dy - y[texel]) >= 0.01 && std::max(std::abs(dx), std::abs(dy)) <= 0.5) move(j, row, dx, dy);
           }
   }
 
