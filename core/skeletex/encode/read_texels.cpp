@@ -174,7 +174,9 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   };
   if (maps.triangle_count > 0) {
     context.fill(covering, kNoTriangle);
-    context.launch({"encode.cl", "cover_texels"}, ClRange(maps.triangle_count, 8), maps.triangle_count, maps.corners, maps.turns, maps.poles,
+    // A CPU looks at each triangle once; a GPU needs more work-items for the rows of tall ones.
+    const std::size_t shares = context.device().type == "cpu" ? 1 : 8;
+    context.launch({"encode.cl", "cover_texels"}, ClRange(maps.triangle_count, shares), maps.triangle_count, maps.corners, maps.turns, maps.poles,
                    maps.triangle_patches, maps.u_high, maps.u_low, maps.v_high, maps.v_low, layout.patches, maps.row_high, maps.row_low, texture_width, covering);
     std::vector<int> texel_triangles = context.download(covering);
     result.report.missed_texels = fill_uncovered(sources.patches, texture_width, texel_triangles);
