@@ -3,6 +3,7 @@
 //   cover_texels        triangles of all charts   -> per texel the triangle that covers it (lowest index wins)
 //   walk_to_positions   the same for texels that read beside their place in the lattice
 //   read_surface        that triangle             -> position, and a mark on every triangle that is read
+//   read_listed         both, for a list of texels
 //   place_spd_points    distances along SPD rays  -> position
 //   place_points        a list of texels          -> position (end rows: seams and poles)
 //   prefilter_positions positions                 -> positions moved against their second differences
@@ -87,27 +88,17 @@ kernel void cover_texels(const int triangle_count, global const int* restrict co
   }
 }
 
-// NDRange (texture width, texture height). Texels that read beside their place in the lattice, and are held by nothing,
-// walk from the triangle that covers their place to the one that covers where they read: always across the edge that the
-// point is furthest behind. A walk that does not arrive stays at its last triangle, and read_surface at its border.
+// The map's triangle at a reading position, from the one at the texel's place: always across the edge that the point is furthest behind. A walk
+// that does not arrive stays at its last triangle, and read_point at its border. Both read at column + beside and row + above, in cells.
 // across: per triangle the ones behind the edges opposite to its corners, three planes; -1 at the map's border
-kernel void walk_to_positions(const int texture_width, const int texture_height, const int triangle_count, global const int* restrict texel_patches,
-                              global const int* restrict corners, global const int* restrict turns, global const int* restrict poles,
-                              global const int* restrict across, global const float* restrict u_high, global const float* restrict u_low,
-                              global const float* restrict v_high, global const float* restrict v_low, global const PatchRecord* restrict patches,
-                              global const float* restrict row_high, global const float* restrict row_low, global const float* restrict offset_x,
-                              global const float* restrict offset_y, global const int* restrict anchors, global int* restrict texel_triangles) {
-  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
-  if (column >= texture_width || line >= texture_height) return;
-  const int texel = line * texture_width + column;
-  int t = texel_triangles[texel];
-  if (t == NO_TRIANGLE || anchors[texel] != 0 || (offset_x[texel] == 0.0f && offset_y[texel] == 0.0f)) return;
-  global const PatchRecord* p = patches + texel_patches[texel];
-  const int row = p->row_begin + line - p->y;
+int walk_to(int t, const int column, const float beside, const int width, const int row, const float above, const int triangle_count,
+            global const int* restrict corners, global const int* restrict turns, global const int* restrict poles, global const int* restrict across,
+            global const float* restrict u_high, global const float* restrict u_low, global const float* restrict v_high, global const float* restrict v_low,
+            global const float* restrict row_high, global const float* restrict row_low) {
   for (int steps = 0; steps < 1000; ++steps) {
     const MapTriangle m = load_triangle(t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
-    const float u = row_offset(m, row_high, row_low, row, offset_y[texel]);
-    const float v = turned_offset(m, column - p->x, offset_x[texel], p->width);
+    const float u = row_offset(m, row_high, row_low, row, above);
+    const float v = turned_offset(m, column, beside, width);
     float w1, w2;
     weights_at(m, u, v, &w1, &w2);
     const float w0 = 1.0f - w1 - w2;
@@ -118,7 +109,45 @@ kernel void walk_to_positions(const int texture_width, const int texture_height,
     if (next < 0) break;
     t = next;
   }
-  texel_triangles[texel] = t;
+  return t;
+}
+
+float3 read_point(const int t, const int column, const float beside, const int width, const int row, const float above, const int triangle_count,
+                  global const int* restrict corners, global const int* restrict turns, global const int* restrict poles, global const float* restrict u_high,
+                  global const float* restrict u_low, global const float* restrict v_high, global const float* restrict v_low,
+                  global const float* restrict vertex_x, global const float* restrict vertex_y, global const float* restrict vertex_z,
+                  global const float* restrict row_high, global const float* restrict row_low) {
+  const MapTriangle m = load_triangle(t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
+  const float u = row_offset(m, row_high, row_low, row, above);
+  const float v = turned_offset(m, column, beside, width);
+  // Rounding may have put it a little outside.
+  float w1, w2;
+  weights_at(m, u, v, &w1, &w2);
+  w1 = fmax(0.0f, w1), w2 = fmax(0.0f, w2);
+  const float sum = w1 + w2;
+  if (sum > 1.0f) w1 /= sum, w2 /= sum;
+  const int a = corners[t], b = corners[triangle_count + t], c = corners[2 * triangle_count + t];
+  return (float3)(vertex_x[a] + w1 * (vertex_x[b] - vertex_x[a]) + w2 * (vertex_x[c] - vertex_x[a]),
+                  vertex_y[a] + w1 * (vertex_y[b] - vertex_y[a]) + w2 * (vertex_y[c] - vertex_y[a]),
+                  vertex_z[a] + w1 * (vertex_z[b] - vertex_z[a]) + w2 * (vertex_z[c] - vertex_z[a]));
+}
+
+// NDRange (texture width, texture height). Texels that read beside their place in the lattice, and are held by nothing,
+// walk from the triangle that covers their place to the one that covers where they read.
+kernel void walk_to_positions(const int texture_width, const int texture_height, const int triangle_count, global const int* restrict texel_patches,
+                              global const int* restrict corners, global const int* restrict turns, global const int* restrict poles,
+                              global const int* restrict across, global const float* restrict u_high, global const float* restrict u_low,
+                              global const float* restrict v_high, global const float* restrict v_low, global const PatchRecord* restrict patches,
+                              global const float* restrict row_high, global const float* restrict row_low, global const float* restrict offset_x,
+                              global const float* restrict offset_y, global const int* restrict anchors, global int* restrict texel_triangles) {
+  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (column >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + column;
+  const int t = texel_triangles[texel];
+  if (t == NO_TRIANGLE || anchors[texel] != 0 || (offset_x[texel] == 0.0f && offset_y[texel] == 0.0f)) return;
+  global const PatchRecord* p = patches + texel_patches[texel];
+  texel_triangles[texel] = walk_to(t, column - p->x, offset_x[texel], p->width, p->row_begin + line - p->y, offset_y[texel], triangle_count, corners, turns,
+                                   poles, across, u_high, u_low, v_high, v_low, row_high, row_low);
 }
 
 // NDRange (texture width, texture height). Every texel reads at its place in the lattice plus its offset, in cells.
@@ -135,23 +164,35 @@ kernel void read_surface(const int texture_width, const int texture_height, cons
   const int texel = line * texture_width + column;
   const int t = texel_triangles[texel];
   if (t == NO_TRIANGLE) return;
-  const int patch = texel_patches[texel];
-  const MapTriangle m = load_triangle(t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
-  const int width = patches[patch].width;
-  const int row = patches[patch].row_begin + line - patches[patch].y;
-  const float u = row_offset(m, row_high, row_low, row, offset_y[texel]);
-  const float v = turned_offset(m, column - patches[patch].x, offset_x[texel], width);
+  global const PatchRecord* p = patches + texel_patches[texel];
+  const float3 point = read_point(t, column - p->x, offset_x[texel], p->width, p->row_begin + line - p->y, offset_y[texel], triangle_count, corners, turns,
+                                  poles, u_high, u_low, v_high, v_low, vertex_x, vertex_y, vertex_z, row_high, row_low);
+  x[texel] = point.x, y[texel] = point.y, z[texel] = point.z;
+  is_triangle_read[t] = 1;
+}
 
-  // Rounding may have put it a little outside.
-  float w1, w2;
-  weights_at(m, u, v, &w1, &w2);
-  w1 = fmax(0.0f, w1), w2 = fmax(0.0f, w2);
-  const float sum = w1 + w2;
-  if (sum > 1.0f) w1 /= sum, w2 /= sum;
-  const int a = corners[t], b = corners[triangle_count + t], c = corners[2 * triangle_count + t];
-  x[texel] = vertex_x[a] + w1 * (vertex_x[b] - vertex_x[a]) + w2 * (vertex_x[c] - vertex_x[a]);
-  y[texel] = vertex_y[a] + w1 * (vertex_y[b] - vertex_y[a]) + w2 * (vertex_y[c] - vertex_y[a]);
-  z[texel] = vertex_z[a] + w1 * (vertex_z[b] - vertex_z[a]) + w2 * (vertex_z[c] - vertex_z[a]);
+// NDRange: count. Both for a list of texels that nothing holds; what covers their places stays.
+kernel void read_listed(const int count, const int texture_width, const int triangle_count, global const int* restrict texels,
+                        global const int* restrict texel_patches, global const int* restrict texel_triangles, global const int* restrict corners,
+                        global const int* restrict turns, global const int* restrict poles, global const int* restrict across,
+                        global const float* restrict u_high, global const float* restrict u_low, global const float* restrict v_high,
+                        global const float* restrict v_low, global const float* restrict vertex_x, global const float* restrict vertex_y,
+                        global const float* restrict vertex_z, global const PatchRecord* restrict patches, global const float* restrict row_high,
+                        global const float* restrict row_low, global const float* restrict offset_x, global const float* restrict offset_y,
+                        global float* restrict x, global float* restrict y, global float* restrict z, global int* restrict is_triangle_read) {
+  const int i = (int)get_global_id(0);
+  if (i >= count) return;
+  const int texel = texels[i];
+  int t = texel_triangles[texel];
+  if (t == NO_TRIANGLE) return;
+  global const PatchRecord* p = patches + texel_patches[texel];
+  const int column = texel % texture_width - p->x, row = p->row_begin + texel / texture_width - p->y;
+  const float beside = offset_x[texel], above = offset_y[texel];
+  if (beside != 0.0f || above != 0.0f)
+    t = walk_to(t, column, beside, p->width, row, above, triangle_count, corners, turns, poles, across, u_high, u_low, v_high, v_low, row_high, row_low);
+  const float3 point = read_point(t, column, beside, p->width, row, above, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low, vertex_x,
+                                  vertex_y, vertex_z, row_high, row_low);
+  x[texel] = point.x, y[texel] = point.y, z[texel] = point.z;
   is_triangle_read[t] = 1;
 }
 

@@ -4,7 +4,7 @@
 //   relax_folds  marked texels read nearer to their neighbours' mean, or go back to their own places
 // Reading positions are offsets from the texel's own place in cells, two planes over the texture, x around, y along. Rows 0 and
 // height-1 stay. A texel changes its own offset alone, and looks at its neighbours' points, which change between the passes: nothing
-// depends on the order of work-items.
+// depends on the order of work-items. Folds are few: each pass lists what the next one has to look at, in any order, once each.
 #include "skeletex_structs.h"
 #include "map_triangle.h"
 #include "patch_texels.h"
@@ -22,29 +22,33 @@ int is_turned(float3 a, float3 b, float3 c, float3 direction) {
   return dot(n, direction) < LEAST_COSINE * sqrt(dot(n, n) * dot(direction, direction));
 }
 
-// NDRange (texture width, texture height): the quad to the right of and above a texel. It is folded when for both diagonals a
+// Appends what is not on the list. `is_listed` has a flag for all that can be.
+void append_once(global int* restrict list, volatile global int* count, volatile global int* restrict is_listed, int what) {
+  if (atomic_xchg(is_listed + what, 1) == 0) list[atomic_inc(count)] = what;
+}
+
+// NDRange: quad_count[0]. A quad is the one to the right of and above its texel. It is folded when for both diagonals a
 // triangle looks against the surface, whose normal is the mean of those of the triangles that the texels' places lie in. The 16
-// texels around a folded quad are marked. Quads without a texel that `can_move` are not looked at.
-kernel void find_folds(const int texture_width, const int texture_height, const int triangle_count, global const int* restrict texel_patches,
+// texels around a folded quad are listed as marked. Quads are taken off their list.
+// Out: found[0], folded quads; found[1], marked texels (both 0 before).
+kernel void find_folds(const int texture_width, const int triangle_count, global const int* restrict texel_patches,
                        global const PatchRecord* restrict patches, global const int* restrict texel_triangles, global const int* restrict corners,
                        global const float* restrict vertex_x, global const float* restrict vertex_y, global const float* restrict vertex_z,
-                       global const float* restrict x, global const float* restrict y, global const float* restrict z, global const int* restrict can_move,
-                       global int* restrict is_marked, global int* restrict fold_count) {
-  const int across = (int)get_global_id(0), line = (int)get_global_id(1);
-  if (across >= texture_width || line >= texture_height) return;
-  const int texel = line * texture_width + across;
-  const int patch = texel_patches[texel];
-  if (patch < 0) return;
-  global const PatchRecord* p = patches + patch;
-  const int column = across - p->x, row = line - p->y;
-  if (row > p->height - 2) return;
+                       global const float* restrict x, global const float* restrict y, global const float* restrict z, global const int* restrict quad_count,
+                       global const int* restrict quads, global int* restrict is_listed, global int* restrict found, global int* restrict marked,
+                       global int* restrict is_marked) {
+  const int i = (int)get_global_id(0);
+  if (i >= quad_count[0]) return;
+  const int texel = quads[i];
+  is_listed[texel] = 0;
+  global const PatchRecord* p = patches + texel_patches[texel];
+  const int column = texel % texture_width - p->x, row = texel / texture_width - p->y;
   const int at[4] = {texel, texel_at(p, texture_width, column + 1, row), texel_at(p, texture_width, column + 1, row + 1), texel + texture_width};
-  if (!(can_move[at[0]] | can_move[at[1]] | can_move[at[2]] | can_move[at[3]])) return;
   float3 normal = (float3)(0.0f), q[4];
   float normals = 0.0f;
-  for (int i = 0; i < 4; ++i) {
-    q[i] = point_at(x, y, z, at[i]);
-    const int t = texel_triangles[at[i]], at_row = row + (i >= 2);
+  for (int k = 0; k < 4; ++k) {
+    q[k] = point_at(x, y, z, at[k]);
+    const int t = texel_triangles[at[k]], at_row = row + (k >= 2);
     if (t == NO_TRIANGLE || at_row == 0 || at_row == p->height - 1) continue;
     const float3 a = point_at(vertex_x, vertex_y, vertex_z, corners[t]);
     const float3 n = cross(point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + t]) - a,
@@ -55,31 +59,29 @@ kernel void find_folds(const int texture_width, const int texture_height, const 
   if (normals == 0.0f || dot(normal, normal) < LEAST_AGREEMENT * normals * normals) return;
   if (!is_turned(q[0], q[1], q[2], normal) && !is_turned(q[0], q[2], q[3], normal)) return;
   if (!is_turned(q[0], q[1], q[3], normal) && !is_turned(q[1], q[2], q[3], normal)) return;
-  atomic_inc(fold_count);
-  for (int i = -1; i <= 2; ++i)
-    for (int j = -1; j <= 2; ++j)
-      if (row + i >= 1 && row + i <= p->height - 2) is_marked[texel_at(p, texture_width, column + j, row + i)] = 1;
+  atomic_inc(found);
+  for (int r = -1; r <= 2; ++r)
+    for (int c = -1; c <= 2; ++c)
+      if (row + r >= 1 && row + r <= p->height - 2) append_once(marked, found + 1, is_marked, texel_at(p, texture_width, column + c, row + r));
 }
 
-// NDRange (texture width, texture height). Marked texels move towards the mean of their four neighbours, by the least-squares step in
-// the lattice's own directions; with `is_back` they return to their places. What is to be read again gets the triangle of its place in
-// `walkers`, all else none. Marks are taken off.
-kernel void relax_folds(const int texture_width, const int texture_height, const int is_back, global const int* restrict texel_patches,
-                        global const PatchRecord* restrict patches, global const int* restrict texel_triangles, global const float* restrict x,
-                        global const float* restrict y, global const float* restrict z, global int* restrict is_marked, global int* restrict can_move,
-                        global float* restrict offset_x, global float* restrict offset_y, global int* restrict walkers,
-                        global int* restrict back_count) {
-  const int across = (int)get_global_id(0), line = (int)get_global_id(1);
-  if (across >= texture_width || line >= texture_height) return;
-  const int texel = line * texture_width + across;
-  const int triangle = texel_triangles[texel];
-  const int is_moving = is_marked[texel] && triangle != NO_TRIANGLE;
+// NDRange: marked_count. Marked texels move towards the mean of their four neighbours, by the least-squares step in the lattice's own
+// directions; with `is_back` they return to their places. Marks are taken off, and the quads around listed.
+// In and out: quad_count[0] (0 before); back_count[0], how many were away from their places and return.
+kernel void relax_folds(const int texture_width, const int marked_count, const int is_back, global const int* restrict marked,
+                        global const int* restrict texel_patches, global const PatchRecord* restrict patches, global const int* restrict texel_triangles,
+                        global const float* restrict x, global const float* restrict y, global const float* restrict z, global int* restrict is_marked,
+                        global float* restrict offset_x, global float* restrict offset_y, global int* restrict quad_count, global int* restrict quads,
+                        global int* restrict is_listed, global int* restrict back_count) {
+  const int i = (int)get_global_id(0);
+  if (i >= marked_count) return;
+  const int texel = marked[i];
   is_marked[texel] = 0;
-  can_move[texel] = is_moving;
-  walkers[texel] = is_moving ? triangle : NO_TRIANGLE;
-  if (!is_moving) return;
+  if (texel_triangles[texel] == NO_TRIANGLE) return;
   global const PatchRecord* p = patches + texel_patches[texel];
-  const int column = across - p->x, row = line - p->y;
+  const int column = texel % texture_width - p->x, row = texel / texture_width - p->y;
+  for (int r = -1; r <= 0; ++r)
+    for (int c = -1; c <= 0; ++c) append_once(quads, quad_count, is_listed, texel_at(p, texture_width, column + c, row + r));
   if (is_back) {
     if (offset_x[texel] != 0.0f || offset_y[texel] != 0.0f) atomic_inc(back_count);
     offset_x[texel] = 0.0f, offset_y[texel] = 0.0f;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 #include <random>
 
 #include "skeletex/encode/encode_model.h"
@@ -68,31 +69,51 @@ TEST(Unfold, FindsAndMovesWhatItsTwinDoes) {
     if (expected.is_close) continue;
     ++compared;
     const TexelPoints on_device = upload_points(points);
-    auto can_move = device().upload(std::vector<int>(points.size(), 1)), marks = device().upload(std::vector<int>(points.size(), 0)), count = device().upload(std::vector<int>{0}),
-         walkers = device().allocate<int>(points.size());
-    device().launch({"unfold.cl", "find_folds"}, patch.layout.range(), kWidth, kHeight, 1, patch.layout.texel_patches, patch.layout.patches, patch.triangles, patch.maps.corners,
-                    patch.maps.x, patch.maps.y, patch.maps.z, on_device.x, on_device.y, on_device.z, can_move, marks, count);
-    EXPECT_EQ(device().download(count)[0], expected.count);
+    const std::vector<int> none(points.size(), 0);
+    std::vector<int> all(points.size() - kWidth);
+    std::iota(all.begin(), all.end(), 0);
+    auto quads = device().upload(all), quad_count = device().upload(std::vector{static_cast<int>(all.size())}), is_listed = device().upload(std::vector<int>(points.size(), 1));
+    auto marked = device().allocate<int>(points.size()), is_marked = device().upload(none), found = device().upload(std::vector{0, 0});
+    device().launch({"unfold.cl", "find_folds"}, ClRange(all.size()), kWidth, 1, patch.layout.texel_patches, patch.layout.patches, patch.triangles, patch.maps.corners,
+                    patch.maps.x, patch.maps.y, patch.maps.z, on_device.x, on_device.y, on_device.z, quad_count, quads, is_listed, found, marked, is_marked);
+    EXPECT_EQ(device().download(found)[0], expected.count);
     EXPECT_GT(expected.count, 0);
-    EXPECT_EQ(device().download(marks), expected.marks);
+    EXPECT_EQ(device().download(is_marked), expected.marks);
+    const int marks = device().download(found)[1];
+    const auto flags_of = [&](std::vector<int> list, int count) {
+      list.resize(count);
+      std::vector<int> flags = none;
+      for (const int texel : list) ++flags[texel];
+      return flags;
+    };
+    EXPECT_EQ(flags_of(device().download(marked), marks), expected.marks);
 
     std::vector<float> x, y;
     for (std::size_t i = 0; i < points.size(); ++i) x.push_back(static_cast<float>(unit(random))), y.push_back(static_cast<float>(0.5 * unit(random)));
     auto offset_x = device().upload(x), offset_y = device().upload(y);
-    device().launch({"unfold.cl", "relax_folds"}, patch.layout.range(), kWidth, kHeight, 0, patch.layout.texel_patches, patch.layout.patches, patch.triangles, on_device.x,
-                    on_device.y, on_device.z, marks, can_move, offset_x, offset_y, walkers, count);
+    // Flags are off again but for the last row, which has no quads.
+    std::vector<int> flags = device().download(is_listed);
+    EXPECT_EQ(std::accumulate(flags.begin(), flags.end(), 0), kWidth);
+    device().write(is_listed, none);
+    device().fill(quad_count, 0);
+    auto back_count = device().upload(std::vector{0});
+    device().launch({"unfold.cl", "relax_folds"}, ClRange(marks), kWidth, marks, 0, marked, patch.layout.texel_patches, patch.layout.patches, patch.triangles, on_device.x,
+                    on_device.y, on_device.z, is_marked, offset_x, offset_y, quad_count, quads, is_listed, back_count);
     const std::vector<float> new_x = device().download(offset_x), new_y = device().download(offset_y);
-    const std::vector<int> walking = device().download(walkers);
+    std::vector<int> around = none;
     for (int r = 0; r < kHeight; ++r)
       for (int j = 0; j < kWidth; ++j) {
         const std::size_t i = static_cast<std::size_t>(r) * kWidth + j;
-        EXPECT_EQ(walking[i], expected.marks[i] ? 0 : kNone);
+        if (expected.marks[i])
+          for (const int row : {r - 1, r})
+            for (const int column : {(j + kWidth - 1) % kWidth, j}) around[row * kWidth + column] = 1;
         const Eigen::Vector2d before(x[i], y[i]), wanted = expected.marks[i] ? twin::relaxed(points, kWidth, kHeight, j, r, before) : before;
         EXPECT_NEAR(new_x[i], wanted.x(), 2e-4);
         EXPECT_NEAR(new_y[i], wanted.y(), 2e-4);
       }
-    EXPECT_EQ(device().download(marks), std::vector<int>(points.size(), 0));
-    EXPECT_EQ(device().download(can_move), expected.marks);
+    EXPECT_EQ(device().download(is_marked), none);
+    EXPECT_EQ(device().download(is_listed), around);
+    EXPECT_EQ(flags_of(device().download(quads), device().download(quad_count)[0]), around);
   }
   EXPECT_GE(compared, 4);
 }
@@ -109,18 +130,19 @@ TEST(Unfold, TakesTheFoldsOutOfALatticeOverASwirlAndTouchesNothingElse) {
   for (int r = 0; r < kHeight; ++r)
     for (int j = 0; j < kWidth; ++j) even.push_back(swirl(j, r, kMost));
   TexelPoints points = upload_points(even);
-  const auto read = [&](ClBuffer<int>& walkers) {
-    const std::vector<int> walking = device().download(walkers);
+  const auto read = [&](const ClBuffer<int>& texels, int count) {
+    std::vector<int> walking = device().download(texels);
+    walking.resize(count);
     const std::vector<float> dx = device().download(positions.x), dy = device().download(positions.y);
     std::vector<float> x = device().download(points.x), y = device().download(points.y);
-    for (std::size_t i = 0; i < walking.size(); ++i) {
-      if (walking[i] == kNone) continue;
-      const Vec3 p = swirl(static_cast<double>(i % kWidth) + dx[i], static_cast<double>(i / kWidth) + dy[i], kMost);
+    for (const int i : walking) {
+      if (triangles[i] == kNone) continue;
+      const Vec3 p = swirl(i % kWidth + static_cast<double>(dx[i]), i / kWidth + static_cast<double>(dy[i]), kMost);
       x[i] = static_cast<float>(p.x()), y[i] = static_cast<float>(p.y());
     }
     device().write(points.x, x), device().write(points.y, y);
   };
-  const UnfoldReport report = unfold_lattice(device(), patch.layout, patch.maps, device().upload(triangles), read, positions, points);
+  const UnfoldReport report = unfold_lattice(device(), patch.layout, patch.patches, patch.maps, device().upload(triangles), read, positions, points);
   EXPECT_GT(report.folded_quads, 0);
   EXPECT_EQ(report.left, 0);
   const std::vector<float> x = device().download(points.x), y = device().download(points.y);

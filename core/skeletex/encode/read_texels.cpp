@@ -209,7 +209,12 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   place_end_rows(context, sources, texture_width, origin, points);
 
   if (options.has_unfold && maps.triangle_count > 0) {
-    result.report.unfold = unfold_lattice(context, layout, maps, covering, [&](ClBuffer<int>& walkers) { walk(walkers), read(walkers); }, positions, points);
+    const auto read_listed = [&](const ClBuffer<int>& listed, int count) {
+      context.launch({"encode.cl", "read_listed"}, ClRange(count), count, texture_width, maps.triangle_count, listed, layout.texel_patches, covering,
+                     maps.corners, maps.turns, maps.poles, maps.across, maps.u_high, maps.u_low, maps.v_high, maps.v_low, maps.x, maps.y, maps.z, layout.patches,
+                     maps.row_high, maps.row_low, positions.x, positions.y, points.x, points.y, points.z, is_read);
+    };
+    result.report.unfold = unfold_lattice(context, layout, sources.patches, maps, covering, read_listed, positions, points);
     copy_plane(context, positions.x, positions.home_x), copy_plane(context, positions.y, positions.home_y);
   }
   const TexelPoints even = points;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <functional>
+#include <span>
 
 #include "skeletex/encode/device_maps.h"
 #include "skeletex/encode/snap.h"
@@ -16,8 +17,9 @@ struct UnfoldReport {
 /// most part) read nearer to their neighbours' mean. Where that does not unfold them they stay at their own places. Folds at edges
 /// of the surface itself are left alone.
 /// \param triangles  per texel, the map's triangle at its place
-/// \param read       reads the points of the texels that have a triangle in the plane it is given, where `positions` say
-UnfoldReport unfold_lattice(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps, const ClBuffer<int>& triangles,
-                            const std::function<void(ClBuffer<int>& walkers)>& read, ReadingPositions& positions, TexelPoints& points);
+/// \param read       reads the points of the texels on a list, those that `triangles` has one for, where `positions` say
+UnfoldReport unfold_lattice(ClContext& context, const DeviceLayout& layout, std::span<const Patch> patches, const DeviceMaps& maps,
+                            const ClBuffer<int>& triangles, const std::function<void(const ClBuffer<int>& texels, int count)>& read,
+                            ReadingPositions& positions, TexelPoints& points);
 
 }  // namespace skeletex
