@@ -69,6 +69,7 @@ Chart jittered_chart(const Skeleton& skeleton, const Walls& walls, int bone, int
       add(last + j, 0, last + k, t, tail_pole, 0);
     }
   }
+  chart.half_edges = link_half_edges(chart.triangles, static_cast<int>(chart.positions.size()));
   return chart;
 }
 

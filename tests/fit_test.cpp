@@ -258,6 +258,7 @@ TEST(Fit, LeavesALatticeAloneThatIsTheMesh) {
   std::vector<std::array<std::vector<Vec3>, 2>> ends(1);
   ends[0][0].assign(chart.positions.begin(), chart.positions.begin() + kColumns);
   ends[0][1].assign(chart.positions.end() - kColumns, chart.positions.end());
+  chart.half_edges = link_half_edges(chart.triangles, static_cast<int>(chart.positions.size()));
   const std::vector<Chart> charts{chart};
   const std::vector<SpdHits> hits(1);
   const auto read = [&](bool has_fit) {

@@ -231,6 +231,7 @@ struct TubeAndLattice {
         chart.turns.push_back({0, turn, 0});
       }
     layout = upload_layout(device(), patches, frame_tables(skeleton, Walls(skeleton), patches, Vec3::Zero()), 20, 14);
+    chart.half_edges = link_half_edges(chart.triangles, static_cast<int>(chart.positions.size()));
     maps = upload_maps(device(), {&chart, 1}, patches, Vec3::Zero());
     seeds.assign(layout.size(), 0x7fffffff);
     lattice.positions.resize(layout.size(), Vec3::Zero());

@@ -92,6 +92,7 @@ Chart square_tube(int rows) {
       chart.triangles.push_back({a, c, d});
       chart.turns.push_back({0, turn, 0});
     }
+  chart.half_edges = link_half_edges(chart.triangles, static_cast<int>(chart.positions.size()));
   return chart;
 }
 

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "skeletex/parameterize/half_edge_table.h"
-
 namespace skeletex {
 namespace {
 
@@ -58,7 +56,6 @@ DeviceMaps upload_maps(ClContext& context, std::span<const Chart> charts, std::s
       y.push_back(static_cast<float>(p[1]));
       z.push_back(static_cast<float>(p[2]));
     }
-    const HalfEdgeTable table = link_half_edges(chart.triangles, static_cast<int>(chart.positions.size()));
     for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
       const std::size_t at = maps.first_triangle[bone] + t;
       int pole = -1;
@@ -69,7 +66,7 @@ DeviceMaps upload_maps(ClContext& context, std::span<const Chart> charts, std::s
         const int from = (k + shift) % 3;
         corners[k * count + at] = base + chart.triangles[t][from];
         turns[k * count + at] = from == pole ? 0 : chart.turns[t][from];
-        const int twin = table.twins[3 * t + (from + 1) % 3];
+        const int twin = chart.half_edges.twins[3 * t + (from + 1) % 3];
         across[k * count + at] = twin < 0 ? -1 : maps.first_triangle[bone] + twin / 3;
       }
       if (pole >= 0) poles[at] = chart.kinds[chart.triangles[t][pole]] == ChartVertex::kTailPole ? 1 : -1;

@@ -12,7 +12,6 @@
 
 #include "skeletex/model/error.h"
 #include "skeletex/model/loop_turns.h"
-#include "skeletex/parameterize/half_edge_table.h"
 
 namespace skeletex {
 namespace {
@@ -187,13 +186,13 @@ double axis_distance(const std::array<double, 2>& a, const std::array<double, 2>
 class Unroller {
  public:
   Unroller(Chart& chart, const Skeleton& skeleton, const Walls& walls)
-      : chart_(chart), bone_name_(skeleton.bones[chart.bone].name), basis_(walls.bases()[chart.bone]) {
+      : chart_(chart), bone_name_(skeleton.bones[chart.bone].name), basis_(walls.bases()[chart.bone]), table_(chart.half_edges) {
     const Vec3& head = end_position(skeleton, chart.bone, BoneEnd::kHead);
     for (const Vec3& p : chart.positions) {
       seen_.push_back({(p - head).dot(basis_.s), (p - head).dot(basis_.b)});
       angles_.push_back(walls.turn_of(chart.bone, p - head));
     }
-    table_ = link_half_edges(chart.triangles, static_cast<int>(chart.positions.size()));
+    chart.half_edges = link_half_edges(chart.triangles, static_cast<int>(chart.positions.size()));
     first_.assign(chart.positions.size(), -1);
     for (int h = static_cast<int>(table_.twins.size()) - 1; h >= 0; --h) first_[from(h)] = h;
     // A boundary vertex's fan begins at its boundary half-edge.
@@ -367,7 +366,7 @@ class Unroller {
   const BoneBasis& basis_;
   std::vector<std::array<double, 2>> seen_;  ///< positions seen along the axis
   std::vector<double> angles_;
-  HalfEdgeTable table_;
+  const HalfEdgeTable& table_;
   std::vector<int> first_;
 };
 

@@ -6,6 +6,7 @@
 
 #include "skeletex/model/segment.h"
 #include "skeletex/model/walls.h"
+#include "skeletex/parameterize/half_edge_table.h"
 
 namespace skeletex {
 
@@ -26,6 +27,7 @@ struct Chart {
   SegmentTopology topology = SegmentTopology::kAnnulus;
   std::vector<Vec3> positions;  ///< the segment's vertices first, then poles and the midpoints of split chords
   std::vector<Triangle> triangles;
+  HalfEdgeTable half_edges;  ///< of the triangles
   std::vector<std::array<std::int8_t, 3>> turns;
   std::vector<ChartVertex> kinds;
   std::vector<double> u, v;  ///< per vertex; rows are fixed, the rest is filled by a parameterization

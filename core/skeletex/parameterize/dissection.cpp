@@ -3,6 +3,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <numeric>
 #include <span>
 
@@ -26,42 +28,73 @@ void find_inner_neighbours(const Chart& chart, Dissection& d) {
   for_edges([&](int from, int to) { d.neighbours[next[from]++] = to; });
 }
 
+/// A vertex as it is sorted: with what is asked for, so that this lies together.
+struct Item {
+  std::array<float, 3> at;
+  float reach;  ///< the longest edge here
+  int vertex;
+};
+
 class Dissector {
  public:
-  Dissector(const Chart& chart, Dissection& result) : chart_(chart), d_(result), side_(chart.positions.size(), 0) {}
+  Dissector(const Chart& chart, Dissection& result) : d_(result), side_(chart.positions.size(), 0) {
+    items_.reserve(d_.order.size());
+    for (const int v : d_.order) {
+      double reach2 = 0;
+      for (int k = d_.begin[v]; k < d_.begin[v + 1]; ++k) reach2 = std::max(reach2, (chart.positions[d_.neighbours[k]] - chart.positions[v]).squaredNorm());
+      const Eigen::Vector3f p = chart.positions[v].cast<float>();
+      // More than rounding can take away.
+      items_.push_back({{p.x(), p.y(), p.z()}, 1.0001f * static_cast<float>(std::sqrt(reach2)) + 1e-6f * p.cwiseAbs().maxCoeff(), v});
+    }
+  }
 
   /// Orders the first `end` vertices; the rest is one more front.
   void run(int end) {
     std::vector<int> roots = divide(0, end);
     if (const int all = static_cast<int>(d_.order.size()); end < all) d_.fronts[add_front(end, all, std::move(roots))].is_beside_poles = true;
+    for (std::size_t i = 0; i < items_.size(); ++i) d_.order[i] = items_[i].vertex;
     find_boundaries();
   }
 
  private:
   static constexpr signed char kLeft = 1, kRight = 2, kSeparator = 4;
 
-  /// Orders order[begin] to order[end - 1]. \return the fronts that have no parent yet
+  /// Orders items_[begin] to items_[end - 1]. \return the fronts that have no parent yet
   std::vector<int> divide(int begin, int end) {
     if (begin == end) return {};
-    const std::span<int> all = std::span(d_.order).subspan(begin, end - begin);
+    const std::span<Item> all = std::span(items_).subspan(begin, end - begin);
     if (all.size() <= kLeaf) return {add_front(begin, end, {})};
     const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
     const int axis = longest_axis(all);
-    std::nth_element(all.begin(), middle, all.end(), [&](int a, int b) { return chart_.positions[a][axis] < chart_.positions[b][axis]; });
-    // The half that has fewer vertices at the cut gives them.
-    for (auto v = all.begin(); v != all.end(); ++v) side_[*v] = v < middle ? kLeft : kRight;
+    std::nth_element(all.begin(), middle, all.end(), [&](const Item& a, const Item& b) { return a.at[axis] < b.at[axis]; });
+    const float border = middle->at[axis];
+    // Only vertices that reach the border can have a neighbour beyond it.
+    near_.clear();
+    for (auto item = all.begin(); item != all.end(); ++item)
+      if (std::abs(item->at[axis] - border) <= item->reach) {
+        side_[item->vertex] = item < middle ? kLeft : kRight;
+        near_.push_back(item->vertex);
+      }
     const auto is_at_cut = [&](int v) {
       return std::any_of(d_.neighbours.begin() + d_.begin[v], d_.neighbours.begin() + d_.begin[v + 1],
                          [&](int w) { return side_[w] == kLeft + kRight - side_[v]; });
     };
-    std::array<std::vector<int>, 2> cut;
-    for (const int v : all)
-      if (is_at_cut(v)) cut[side_[v] == kRight].push_back(v);
-    const std::vector<int>& separator = cut[cut[1].size() < cut[0].size()];
+    // The half that has fewer vertices at the cut gives them.
+    for (std::vector<int>& cut : cuts_) cut.clear();
+    for (const int v : near_)
+      if (is_at_cut(v)) cuts_[side_[v] == kRight].push_back(v);
+    const bool is_right = cuts_[1].size() < cuts_[0].size();
+    const std::vector<int>& separator = cuts_[is_right];
     for (const int v : separator) side_[v] = kSeparator;
-    const auto left_end = std::stable_partition(all.begin(), all.end(), [&](int v) { return side_[v] == kLeft; });
-    const auto right_end = std::stable_partition(left_end, all.end(), [&](int v) { return side_[v] == kRight; });
-    for (const int v : all) side_[v] = 0;
+    const auto is_kept = [&](const Item& item) { return side_[item.vertex] != kSeparator; };
+    auto left_end = middle, right_end = all.end();
+    if (is_right) {
+      right_end = std::stable_partition(middle, all.end(), is_kept);
+    } else {
+      left_end = std::stable_partition(all.begin(), middle, is_kept);
+      right_end = std::rotate(left_end, middle, all.end());
+    }
+    for (const int v : near_) side_[v] = 0;
     const int left = begin + static_cast<int>(left_end - all.begin()), right = begin + static_cast<int>(right_end - all.begin());
     std::vector<int> children = divide(begin, left);
     for (const int child : divide(left, right)) children.push_back(child);
@@ -90,11 +123,16 @@ class Dissector {
     }
   }
 
-  int longest_axis(std::span<const int> all) const {
-    Eigen::AlignedBox3d box;
-    for (const int v : all) box.extend(chart_.positions[v]);
+  static int longest_axis(std::span<const Item> all) {
+    std::array<float, 3> low = all.front().at, high = low;
+    for (const Item& item : all)
+      for (int k = 0; k < 3; ++k) {
+        low[k] = std::min(low[k], item.at[k]);
+        high[k] = std::max(high[k], item.at[k]);
+      }
     int axis = 0;
-    box.sizes().maxCoeff(&axis);
+    for (const int k : {1, 2})
+      if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
     return axis;
   }
 
@@ -113,9 +151,11 @@ class Dissector {
     return id;
   }
 
-  const Chart& chart_;
   Dissection& d_;
+  std::vector<Item> items_;
   std::vector<signed char> side_;
+  std::vector<int> near_;
+  std::array<std::vector<int>, 2> cuts_;
 };
 
 }  // namespace

@@ -15,7 +15,6 @@
 
 #include "skeletex/model/parallel.h"
 #include "skeletex/parameterize/dissection.h"
-#include "skeletex/parameterize/half_edge_table.h"
 #include "vsm_structs.h"
 
 namespace skeletex {
@@ -60,6 +59,43 @@ struct Task {
   double work = 0;
 };
 
+/// The fronts of charts in the layout of vsm.cl.
+struct FrontTables {
+  std::vector<FrontRecord> fronts;
+  std::vector<int> children, boundary_rows, parent_columns;
+  int matrix_rows = 0, vector_rows = 0;  ///< of VSM_TILE floats
+  std::vector<Task> tasks;
+};
+
+template <class T>
+void append(std::vector<T>& to, const std::vector<T>& more) {
+  to.insert(to.end(), more.begin(), more.end());
+}
+
+void append_tables(FrontTables& to, FrontTables&& more) {
+  const int fronts = static_cast<int>(to.fronts.size()), children = static_cast<int>(to.children.size()), list = static_cast<int>(to.boundary_rows.size());
+  for (FrontRecord& front : more.fronts) {
+    front.list += list;
+    front.child_begin += children;
+    front.child_end += children;
+    front.rows += to.matrix_rows;
+    front.rest += to.matrix_rows;
+    front.vectors += to.vector_rows;
+  }
+  for (int& child : more.children) child += fronts;
+  for (Task& task : more.tasks) {
+    task.begin += fronts;
+    task.end += fronts;
+  }
+  append(to.fronts, more.fronts);
+  append(to.children, more.children);
+  append(to.boundary_rows, more.boundary_rows);
+  append(to.parent_columns, more.parent_columns);
+  append(to.tasks, more.tasks);
+  to.matrix_rows += more.matrix_rows;
+  to.vector_rows += more.vector_rows;
+}
+
 /// The systems of all charts in the layout of vsm.cl.
 struct DeviceSystems {
   int vertices = 0, triangles = 0, entries = 0;
@@ -71,18 +107,16 @@ struct DeviceSystems {
   std::vector<int> corners;               ///< three planes
   std::vector<signed char> corner_jumps;  ///< two planes
   std::vector<float> map;                 ///< u and v of all vertices, and what they are more than these floats
-  std::vector<FrontRecord> fronts;
-  std::vector<int> children, boundary_rows, parent_columns;
-  int matrix_rows = 0, vector_rows = 0;  ///< of VSM_TILE floats
-  std::vector<int> tasks, stage_begin;   ///< tasks: first front and end, largest first in each stage
+  FrontTables fronts;
+  std::vector<int> tasks, stage_begin;  ///< tasks: first front and end, largest first in each stage
 };
 
 int padded(int count, int unit) { return (count + unit - 1) / unit * unit; }
 
-/// Adds the fronts of a chart, and the tasks that they make. Columns of neighbours, and of boundaries in their parents, are found where a front's own
+/// The fronts of a chart, and the tasks that they make. Columns of neighbours, and of boundaries in their parents, are found where a front's own
 /// columns are known.
-void add_fronts(const Dissection& d, int id, int first_row, int subtree_size, DeviceSystems& s, std::vector<int>& neighbour_columns,
-                std::vector<Task>& tasks) {
+FrontTables make_fronts(const Dissection& d, int id, int first_row, int subtree_size, std::vector<int>& neighbour_columns) {
+  FrontTables s;
   const int count = static_cast<int>(d.fronts.size());
   std::vector<int> column(d.order.size(), -1), list(count), ids(count), stage(count, 0), depth(count, 0), rest_size(count);
   std::vector<double> work(count, 0);
@@ -140,64 +174,61 @@ void add_fronts(const Dissection& d, int id, int first_row, int subtree_size, De
     if (front.parent >= 0) work[front.parent] += work[f];
     if (!is_in_subtree) {
       for (const int child : front.children) stage[f] = std::max(stage[f], stage[child] + 1);
-      for (int k = begin; k < end; ++k) tasks.push_back({k, k + 1, stage[f], own_work});
+      for (int k = begin; k < end; ++k) s.tasks.push_back({k, k + 1, stage[f], own_work});
       continue;
     }
     stack_size[side] = std::max(stack_size[side], stack[side]);
     for (const int child : front.children) stack[1 - side] -= rest_size[child];
     if (front.parent >= 0 && d.fronts[front.parent].size <= subtree_size) continue;
-    tasks.push_back({ids[front.subtree], end, 0, work[f]});
+    s.tasks.push_back({ids[front.subtree], end, 0, work[f]});
     for (int g = front.subtree; g <= f; ++g)
       for (int k = ids[g]; k < (g < f ? ids[g + 1] : end); ++k) s.fronts[k].rest += s.matrix_rows + depth[g] % 2 * stack_size[0];
     s.matrix_rows += stack_size[0] + stack_size[1];
     stack = stack_size = {};
   }
+  return s;
+}
+
+/// Calls act(k) for every chart on all processors, the largest first, so that these end together.
+template <class Act>
+void for_each_chart(std::span<const Chart> charts, const Act& act) {
+  std::vector<std::size_t> order(charts.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return charts[a].triangles.size() > charts[b].triangles.size(); });
+  for_each_block(order.size(), 1, [&](std::size_t i, std::size_t, std::size_t) { act(order[i]); });
 }
 
 DeviceSystems build_systems(std::span<const Chart> charts, double alpha) {
   DeviceSystems s;
-  std::vector<HalfEdgeTable> tables(charts.size());
-  std::vector<Dissection> dissections(charts.size());
-  for_each_block(2 * charts.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-    const Chart& chart = charts[i / 2];
-    if (i % 2 == 0)
-      dissections[i / 2] = dissect(chart);
-    else
-      tables[i / 2] = link_half_edges(chart.triangles, static_cast<int>(chart.positions.size()));
-  });
+  std::vector<int> first_rows, first_triangles;
   for (std::size_t k = 0; k < charts.size(); ++k) {
-    const Chart& chart = charts[k];
-    const int count = static_cast<int>(chart.positions.size());
-    std::vector<int>& map = s.device_vertices.emplace_back(count);
-    int next = s.vertices + static_cast<int>(dissections[k].order.size());
-    for (int v = 0; v < count; ++v) map[v] = chart.kinds[v] == ChartVertex::kInner ? s.vertices + dissections[k].number[v] : next++;
-    s.vertices += padded(count, kSlice);
+    first_rows.push_back(s.vertices);
+    first_triangles.push_back(s.triangles);
+    s.vertices += padded(static_cast<int>(charts[k].positions.size()), kSlice);
     s.slice_chart.resize(s.vertices / kSlice, static_cast<int>(k));
-    s.triangles += static_cast<int>(chart.triangles.size());
+    s.triangles += static_cast<int>(charts[k].triangles.size());
   }
-  std::vector<std::vector<int>> neighbour_columns(charts.size());
-  std::vector<Task> tasks;
   const int subtree_size = std::clamp(s.vertices / kSubtrees, kSmallestSubtree, kLargestSubtree);
-  for (std::size_t k = 0, row = 0; k < charts.size(); row += padded(static_cast<int>(charts[k].positions.size()), kSlice), ++k)
-    add_fronts(dissections[k], static_cast<int>(k), static_cast<int>(row), subtree_size, s, neighbour_columns[k], tasks);
-  std::stable_sort(tasks.begin(), tasks.end(), [](const Task& a, const Task& b) { return a.stage != b.stage ? a.stage < b.stage : a.work > b.work; });
-  for (const Task& task : tasks) {
-    s.stage_begin.resize(task.stage + 1, static_cast<int>(s.tasks.size() / 2));
-    s.tasks.insert(s.tasks.end(), {task.begin, task.end});
-  }
-  s.stage_begin.push_back(static_cast<int>(tasks.size()));
-
+  s.device_vertices.resize(charts.size());
   s.row_length.assign(s.vertices, 0);
   s.later_end = s.fixed_end = s.row_length;
   s.map.assign(4 * static_cast<std::size_t>(s.vertices), 0);
-  for_each_block(charts.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
+  std::vector<Dissection> dissections(charts.size());
+  std::vector<std::vector<int>> neighbour_columns(charts.size());
+  std::vector<FrontTables> fronts(charts.size());
+  for_each_chart(charts, [&](std::size_t k) {
     const Chart& chart = charts[k];
-    const Dissection& d = dissections[k];
-    const std::vector<int>& map = s.device_vertices[k];
+    const Dissection& d = dissections[k] = dissect(chart);
+    const int count = static_cast<int>(chart.positions.size());
+    std::vector<int>& map = s.device_vertices[k];
+    map.resize(count);
+    int next = first_rows[k] + static_cast<int>(d.order.size());
+    for (int v = 0; v < count; ++v) map[v] = chart.kinds[v] == ChartVertex::kInner ? first_rows[k] + d.number[v] : next++;
+    fronts[k] = make_fronts(d, static_cast<int>(k), first_rows[k], subtree_size, neighbour_columns[k]);
     for (const Triangle& t : chart.triangles)
       for (const int v : t)
         if (chart.kinds[v] == ChartVertex::kInner) ++s.row_length[map[v]];
-    for (std::size_t v = 0; v < chart.positions.size(); ++v) {
+    for (int v = 0; v < count; ++v) {
       const auto neighbours = neighbour_columns[k].begin();
       const auto later = std::count_if(neighbours + d.begin[v], neighbours + d.begin[v + 1], [](int column) { return column >= 0; });
       s.later_end[map[v]] = static_cast<int>(later);
@@ -210,6 +241,15 @@ DeviceSystems build_systems(std::span<const Chart> charts, double alpha) {
       }
     }
   });
+  for (FrontTables& tables : fronts) append_tables(s.fronts, std::exchange(tables, {}));
+  std::vector<Task>& tasks = s.fronts.tasks;
+  std::stable_sort(tasks.begin(), tasks.end(), [](const Task& a, const Task& b) { return a.stage != b.stage ? a.stage < b.stage : a.work > b.work; });
+  for (const Task& task : tasks) {
+    s.stage_begin.resize(task.stage + 1, static_cast<int>(s.tasks.size() / 2));
+    s.tasks.insert(s.tasks.end(), {task.begin, task.end});
+  }
+  s.stage_begin.push_back(static_cast<int>(tasks.size()));
+
   for (int slice = 0; slice < s.vertices; slice += kSlice) {
     s.slice_begin.push_back(s.entries);
     s.entries += kSlice * *std::max_element(s.row_length.begin() + slice, s.row_length.begin() + slice + kSlice);
@@ -222,13 +262,11 @@ DeviceSystems build_systems(std::span<const Chart> charts, double alpha) {
   s.factors.assign(s.entries, 1);
   s.corners.resize(3 * static_cast<std::size_t>(s.triangles));
   s.corner_jumps.resize(2 * static_cast<std::size_t>(s.triangles));
-  std::vector<int> first_triangles(charts.size(), 0);
-  for (std::size_t k = 1; k < charts.size(); ++k) first_triangles[k] = first_triangles[k - 1] + static_cast<int>(charts[k - 1].triangles.size());
-  for_each_block(charts.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
+  for_each_chart(charts, [&](std::size_t k) {
     const Chart& chart = charts[k];
     const Dissection& d = dissections[k];
     const std::vector<int>& map = s.device_vertices[k];
-    const HalfEdgeTable& table = tables[k];
+    const HalfEdgeTable& table = chart.half_edges;
     const std::vector<double> surface = relative_surface_areas(chart);
     std::vector<int> next_neighbour = d.begin, next_later(map.size(), 0), next_fixed(map.size()), next_before(map.size());
     for (std::size_t v = 0; v < map.size(); ++v) {
@@ -255,7 +293,8 @@ DeviceSystems build_systems(std::span<const Chart> charts, double alpha) {
       s.entry_triangles[e] = first_triangles[k] + h / 3;
       s.entry_triangles[s.entries + e] = first_triangles[k] + other;
       const int twin = entry_of[table.twins[h]];
-      s.factors[e] = twin >= 0 ? s.factors[twin] : std::pow(static_cast<float>(surface[h / 3] + surface[other]), static_cast<float>(-alpha));
+      const auto area = static_cast<float>(surface[h / 3] + surface[other]);
+      s.factors[e] = twin >= 0 ? s.factors[twin] : alpha == 0.5 ? 1 / std::sqrt(area) : std::pow(area, static_cast<float>(-alpha));
     }
     for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
       int first = 0;
@@ -298,7 +337,7 @@ void settle_rotation(Chart& chart, const std::vector<double>& guess) {
 /// The same map by a sparse factorization in double precision on the host.
 void solve_directly(Chart& chart, const VsmOptions& options, int iterations) {
   const int count = static_cast<int>(chart.positions.size());
-  const HalfEdgeTable table = link_half_edges(chart.triangles, count);
+  const HalfEdgeTable& table = chart.half_edges;
   const std::vector<double> surface = relative_surface_areas(chart);
   std::vector<int> unknown(count, -1);
   int rows = 0;
@@ -374,8 +413,8 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
   const auto jumps = hand_over(s.jumps), corner_jumps = hand_over(s.corner_jumps);
   const auto factors = hand_over(s.factors);
   const auto corners = hand_over(s.corners);
-  const auto fronts = hand_over(s.fronts);
-  const auto children = hand_over(s.children), boundary_rows = hand_over(s.boundary_rows), parent_columns = hand_over(s.parent_columns);
+  const auto fronts = hand_over(s.fronts.fronts);
+  const auto children = hand_over(s.fronts.children), boundary_rows = hand_over(s.fronts.boundary_rows), parent_columns = hand_over(s.fronts.parent_columns);
   const auto tasks = hand_over(s.tasks);
   const auto map = hand_over(s.map);
   auto areas = context.allocate<float>(s.triangles);
@@ -385,8 +424,8 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
   auto half_exponents = context.allocate<int>(s.vertices);
   const std::size_t pairs = 2 * static_cast<std::size_t>(s.vertices);
   auto residual = context.allocate<float>(pairs), solution = context.allocate<float>(pairs);
-  auto matrices = context.allocate<float>(static_cast<std::size_t>(s.matrix_rows) * VSM_TILE),
-       vectors = context.allocate<float>(static_cast<std::size_t>(s.vector_rows) * VSM_TILE);
+  auto matrices = context.allocate<float>(static_cast<std::size_t>(s.fronts.matrix_rows) * VSM_TILE),
+       vectors = context.allocate<float>(static_cast<std::size_t>(s.fronts.vector_rows) * VSM_TILE);
   auto largest = context.allocate<int>(charts.size()), ratios = context.allocate<int>(charts.size());
   const int stages = static_cast<int>(s.stage_begin.size()) - 1;
   auto queues = context.allocate<int>(2 * stages);
@@ -464,7 +503,7 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
     if (now_frozen != frozen) context.write(frozen_slices, frozen = now_frozen);
   }
   const auto final_map = context.download(map);
-  for_each_block(charts.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
+  for_each_chart(charts, [&](std::size_t k) {
     Chart& chart = charts[k];
     VsmReport& report = reports[k];
     const std::vector<double> guess = chart.v;
