@@ -61,13 +61,36 @@ float split_float(float value, int* exponent) {
 }
 float power_of_two(int exponent) { return as_float(clamp(exponent + 127, 0, 254) << 23); }
 
-// Raises a chart's value to the largest of a slice. Groups are slices here; slices belong to one chart.
-void raise_to_largest(local int* values, int value, global int* target) {
+// VSM_SINGLE: groups of one work-item, which need no barriers; CPU compilers turn each barrier in a loop into a
+// loop over work-items, which takes them seconds to tens of seconds.
+#ifdef VSM_SINGLE
+#define VSM_GROUP __attribute__((reqd_work_group_size(1, 1, 1)))
+#define VSM_BARRIER()
+#define VSM_LANES VSM_SLICE  // rows of a slice that a work-item takes side by side: loops over them become vector instructions
+#else
+#define VSM_GROUP
+#define VSM_BARRIER() barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE)
+#define VSM_LANES 1
+#endif
+
+// Raises a chart's value to the largest of a slice, which one group takes; slices belong to one chart.
+void raise_to_largest(local int* values, const int* own, global int* target) {
+  int value = own[0];
+  for (int i = 1; i < VSM_LANES; ++i) value = max(value, own[i]);
+#ifndef VSM_SINGLE
   values[get_local_id(0)] = value;
   barrier(CLK_LOCAL_MEM_FENCE);
   if (get_local_id(0) > 0) return;
   for (int k = 1; k < VSM_SLICE; ++k) value = max(value, values[k]);
+#endif
   atomic_max(target, value);
+}
+
+// The longest of a work-item's rows: what entries of shorter ones there are, up to it, is padding.
+int longest_row(global const int* restrict row_length, int first) {
+  int longest = 0;
+  for (int i = 0; i < VSM_LANES; ++i) longest = max(longest, row_length[first + i]);
+  return longest;
 }
 
 // Multiplies each entry's weight by (A_left + A_right) * factor, where factor = 1 / A3^alpha, unless the row's slice is
@@ -75,69 +98,100 @@ void raise_to_largest(local int* values, int value, global int* target) {
 // poles included.
 // In: frozen (per slice), triangles (2 planes of `entries`: the two at the edge), factors. In and out: mantissas, exponents.
 // Out: weights in units of 4^half_exponent; inverse_roots, half_exponents; largest (per chart, INT_MIN before), the largest of these.
-// NDRange: vertices, in groups of VSM_SLICE.
-kernel void weigh_rows(int entries, global const int* restrict frozen, global const int* restrict slice_chart, global const int* restrict slice_begin,
-                       global const int* restrict row_length, global const int* restrict triangles, global const float* restrict factors,
-                       global const float* restrict areas, global float* restrict mantissas, global int* restrict exponents,
-                       global float* restrict weights, global float* restrict inverse_roots, global int* restrict half_exponents,
-                       global int* restrict largest) {
-  const int row = get_global_id(0), length = row_length[row], is_frozen = frozen[row / VSM_SLICE];
-  int largest_exponent = INT_MIN;
-  for (int k = 0; k < length; ++k) {
-    const int e = entry_index(slice_begin, row, k);
-    if (!is_frozen) {
-      int shift, exponent;
-      // A common factor of all weights does not count; this one keeps the smallest areas away from a float's end.
-      const float grown = split_float((areas[triangles[e]] + areas[triangles[entries + e]]) * (0x1p40f * factors[e]), &shift);
-      mantissas[e] = split_float(mantissas[e] * grown, &exponent);
-      exponents[e] += shift + exponent;
+// NDRange: slices, in groups of VSM_SLICE / VSM_LANES.
+kernel VSM_GROUP void weigh_rows(int entries, global const int* restrict frozen, global const int* restrict slice_chart,
+                                 global const int* restrict slice_begin, global const int* restrict row_length, global const int* restrict triangles,
+                                 global const float* restrict factors, global const float* restrict areas, global float* restrict mantissas,
+                                 global int* restrict exponents, global float* restrict weights, global float* restrict inverse_roots,
+                                 global int* restrict half_exponents, global int* restrict largest) {
+  const int slice = get_group_id(0), first = slice * VSM_SLICE + get_local_id(0), longest = longest_row(row_length, first);
+  int half_exponent[VSM_LANES];
+  for (int i = 0; i < VSM_LANES; ++i) half_exponent[i] = INT_MIN;
+  for (int k = 0; k < longest; ++k) {
+    const int begin = entry_index(slice_begin, first, k);
+    if (!frozen[slice])
+      for (int i = 0; i < VSM_LANES; ++i) {
+        const int e = begin + i;
+        int shift, exponent;
+        // A common factor of all weights does not count; this one keeps the smallest areas away from a float's end.
+        const float grown = split_float((areas[triangles[e]] + areas[triangles[entries + e]]) * (0x1p40f * factors[e]), &shift);
+        mantissas[e] = split_float(mantissas[e] * grown, &exponent);
+        exponents[e] += shift + exponent;
+      }
+    for (int i = 0; i < VSM_LANES; ++i) half_exponent[i] = k < row_length[first + i] ? max(half_exponent[i], exponents[begin + i]) : half_exponent[i];
+  }
+  float sum[VSM_LANES];
+  for (int i = 0; i < VSM_LANES; ++i) {
+    half_exponent[i] = half_exponent[i] == INT_MIN ? INT_MIN : (half_exponent[i] + 1) >> 1;
+    sum[i] = 0.0f;
+  }
+  for (int k = 0; k < longest; ++k) {
+    const int begin = entry_index(slice_begin, first, k);
+    for (int i = 0; i < VSM_LANES; ++i) {
+      const int is_entry = k < row_length[first + i];
+      const float weight = is_entry ? mantissas[begin + i] * power_of_two(exponents[begin + i] - 2 * half_exponent[i]) : 0.0f;
+      weights[begin + i] = weight;
+      sum[i] += weight;
     }
-    largest_exponent = max(largest_exponent, exponents[e]);
   }
-  const int half_exponent = length > 0 ? (largest_exponent + 1) >> 1 : INT_MIN;
-  float sum = 0.0f;
-  for (int k = 0; k < length; ++k) {
-    const int e = entry_index(slice_begin, row, k);
-    weights[e] = mantissas[e] * power_of_two(exponents[e] - 2 * half_exponent);
-    sum += weights[e];
+  for (int i = 0; i < VSM_LANES; ++i) {
+    inverse_roots[first + i] = 1.0f / sqrt(sum[i]);
+    half_exponents[first + i] = half_exponent[i];
   }
-  inverse_roots[row] = 1.0f / sqrt(sum);
-  half_exponents[row] = half_exponent;
   local int values[VSM_SLICE];
-  raise_to_largest(values, half_exponent, largest + slice_chart[row / VSM_SLICE]);
+  raise_to_largest(values, half_exponent, largest + slice_chart[slice]);
+}
+
+// From vertex a to b as lifted_difference, of one coordinate.
+float difference_of(float a, float a_rest, float b, float b_rest, float jump) {
+  const float difference = b - a;
+  const float part = difference - b;
+  const float error = (b - (difference - part)) - (a + part);
+  return (difference + jump) + (error + (b_rest - a_rest));
 }
 
 // How far each inner vertex is from the weighted mean of its neighbours, from differences of neighbours, so that it is accurate relative to them
 // however small they are.
 // Out: roots_i = sqrt(d_i) in units of about the chart's largest; residual, of the system that these scale to a unit diagonal;
 // ratios (per chart, 0 before): the largest |x_i - mean| / mean |x_i - x_j|, as bits of a float, which order like integers.
-// NDRange: vertices, in groups of VSM_SLICE.
-kernel void form_residual(global const int* restrict slice_chart, global const int* restrict slice_begin, global const int* restrict row_length,
-                          global const int* restrict column, global const char* restrict jumps, global const float* restrict weights,
-                          global const float* restrict inverse_roots, global const int* restrict half_exponents, global const int* restrict largest,
-                          global const float4* restrict map, global float* restrict roots, global float2* restrict residual,
-                          global int* restrict ratios) {
-  const int row = get_global_id(0), length = row_length[row], chart = slice_chart[row / VSM_SLICE];
-  const float4 own = map[row];
-  float2 sum = 0.0f, total = 0.0f;
-  for (int k = 0; k < length; ++k) {
-    const int e = entry_index(slice_begin, row, k), jump = jumps[e];
-    const float2 weight = (float2)(weights[e], jump == VSM_POLE ? 0.0f : weights[e]);
-    const float2 difference = weight * lifted_difference(own, map[column[e]], jump);
-    sum += difference;
-    total += fabs(difference);
+// NDRange: slices, in groups of VSM_SLICE / VSM_LANES.
+kernel VSM_GROUP void form_residual(global const int* restrict slice_chart, global const int* restrict slice_begin, global const int* restrict row_length,
+                                    global const int* restrict column, global const char* restrict jumps, global const float* restrict weights,
+                                    global const float* restrict inverse_roots, global const int* restrict half_exponents,
+                                    global const int* restrict largest, global const float* restrict map, global float* restrict roots,
+                                    global float* restrict residual, global int* restrict ratios) {
+  const int slice = get_group_id(0), first = slice * VSM_SLICE + get_local_id(0), longest = longest_row(row_length, first), chart = slice_chart[slice];
+  float sum_u[VSM_LANES], sum_v[VSM_LANES], total_u[VSM_LANES], total_v[VSM_LANES];
+  for (int i = 0; i < VSM_LANES; ++i) sum_u[i] = sum_v[i] = total_u[i] = total_v[i] = 0.0f;
+  for (int k = 0; k < longest; ++k) {
+    const int begin = entry_index(slice_begin, first, k);
+    for (int i = 0; i < VSM_LANES; ++i) {
+      const int e = begin + i, jump = jumps[e];
+      global const float* own = map + 4 * (first + i);
+      global const float* other = map + 4 * column[e];
+      // Weights of padding are 0.
+      const float weight_u = weights[e], weight_v = jump == VSM_POLE ? 0.0f : weight_u;
+      const float u = weight_u * difference_of(own[0], own[2], other[0], other[2], 0.0f);
+      const float v = weight_v * difference_of(own[1], own[3], other[1], other[3], (float)jump);
+      sum_u[i] += u, sum_v[i] += v;
+      total_u[i] += fabs(u), total_v[i] += fabs(v);
+    }
   }
-  if (length > 0) {
+  int ratio[VSM_LANES];
+  for (int i = 0; i < VSM_LANES; ++i) {
+    const int row = first + i, is_inner = row_length[row] > 0;
+    const float inverse_root = is_inner ? inverse_roots[row] : 1.0f;
     // In the middle of a float's range: 2^65 to 2^-65.
-    const float inverse_root = inverse_roots[row], root = power_of_two(max(half_exponents[row] - largest[chart], -130) + 65) / inverse_root;
-    const float over = inverse_root * inverse_root;
-    sum *= over;
-    total *= over;
+    const float root = power_of_two((is_inner ? max(half_exponents[row] - largest[chart], -130) : 0) + 65) / inverse_root;
+    const float over = inverse_root * inverse_root, u = sum_u[i] * over, v = sum_v[i] * over;
     roots[row] = root;
-    residual[row] = sum * root;
+    residual[2 * row] = u * root;
+    residual[2 * row + 1] = v * root;
+    const float ratio_u = fabs(u) / (total_u[i] * over + 1e-13f), ratio_v = fabs(v) / (total_v[i] * over + 1e-13f);
+    ratio[i] = max(as_int(ratio_u), as_int(ratio_v));
   }
   local int values[VSM_SLICE];
-  raise_to_largest(values, as_int(fmax(fabs(sum.x) / (total.x + 1e-13f), fabs(sum.y) / (total.y + 1e-13f))), ratios + chart);
+  raise_to_largest(values, ratio, ratios + chart);
 }
 
 // Elimination. To eliminate vertex k of the scaled system is to join its neighbours i and j by a_ik a_kj / d_k more (a star becomes a mesh), where
@@ -149,15 +203,7 @@ kernel void form_residual(global const int* restrict slice_chart, global const i
 // are 0; its boundary's rows go to its parent. Of these only tiles on and above the diagonal are kept.
 //
 // A task is a run of fronts that one work-group takes one by one: a subtree. Tasks of one stage are independent; parents are in the same task or in a
-// later stage. VSM_SINGLE: groups of one work-item, which need no barriers; CPU compilers turn each barrier in a loop into a
-// loop over work-items, which takes them seconds to tens of seconds.
-#ifdef VSM_SINGLE
-#define VSM_GROUP __attribute__((reqd_work_group_size(1, 1, 1)))
-#define VSM_BARRIER()
-#else
-#define VSM_GROUP
-#define VSM_BARRIER() barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE)
-#endif
+// later stage.
 
 float sum8(float8 x) { return ((x.s0 + x.s1) + (x.s2 + x.s3)) + ((x.s4 + x.s5) + (x.s6 + x.s7)); }
 

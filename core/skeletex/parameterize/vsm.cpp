@@ -436,7 +436,8 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
   const std::size_t wanted = group_size(context, options);
   const auto kernel = [&](std::string_view name) { return ClKernelName{"vsm.cl", name, vsm_kernel(context, options).options}; };
   const std::size_t group = context.work_group_size(kernel("eliminate_fronts"), context.work_group_size(kernel("substitute_back"), wanted));
-  const ClRange slices({static_cast<std::size_t>(s.vertices), 1}, {kSlice, 1});
+  const std::size_t lanes = wanted == 1 ? 1 : kSlice;  // work-items that share a slice
+  const ClRange slices({s.vertices / kSlice * lanes, 1}, {lanes, 1});
   std::vector<int> frozen(s.vertices / kSlice, 1), iterations(charts.size(), 0), steps(charts.size(), 0);
   std::vector<float> final_ratios(charts.size(), 0);
   std::vector<bool> is_stopped(charts.size(), false);
