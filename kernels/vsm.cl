@@ -205,7 +205,40 @@ kernel VSM_GROUP void form_residual(global const int* restrict slice_chart, glob
 // A task is a run of fronts that one work-group takes one by one: a subtree. Tasks of one stage are independent; parents are in the same task or in a
 // later stage.
 
+#ifdef VSM_SINGLE
+float8 sums_of_pairs(float8 a, float8 b) { return (float8)(a.even + a.odd, b.even + b.odd); }
+#else
 float sum8(float8 x) { return ((x.s0 + x.s1) + (x.s2 + x.s3)) + ((x.s4 + x.s5) + (x.s6 + x.s7)); }
+#endif
+
+// target[k] (0 if `is_new`) += row k of a tile's rows times x, both from `begin` to `end`.
+void multiply_rows(global const float* rows, int width, int begin, int end, global const float* x, int is_new, global float* target) {
+#ifdef VSM_SINGLE
+  float8 sum0 = 0.0f, sum1 = 0.0f, sum2 = 0.0f, sum3 = 0.0f, sum4 = 0.0f, sum5 = 0.0f, sum6 = 0.0f, sum7 = 0.0f;
+  for (int column = begin; column < end; column += VSM_TILE) {
+    global const float* from = rows + column;
+    const float8 by = vload8(0, x + column);
+    sum0 += vload8(0, from) * by;
+    sum1 += vload8(0, from + width) * by;
+    sum2 += vload8(0, from + 2 * width) * by;
+    sum3 += vload8(0, from + 3 * width) * by;
+    sum4 += vload8(0, from + 4 * width) * by;
+    sum5 += vload8(0, from + 5 * width) * by;
+    sum6 += vload8(0, from + 6 * width) * by;
+    sum7 += vload8(0, from + 7 * width) * by;
+  }
+  const float8 low = sums_of_pairs(sums_of_pairs(sum0, sum1), sums_of_pairs(sum2, sum3));
+  const float8 high = sums_of_pairs(sums_of_pairs(sum4, sum5), sums_of_pairs(sum6, sum7));
+  const float8 sums = sums_of_pairs(low, high);
+  vstore8(is_new ? sums : vload8(0, target) + sums, 0, target);
+#else
+  for (int k = get_local_id(0); k < VSM_TILE; k += get_local_size(0)) {
+    float8 sum = 0.0f;
+    for (int column = begin; column < end; column += VSM_TILE) sum += vload8(0, rows + k * width + column) * vload8(0, x + column);
+    target[k] = is_new ? sum8(sum) : target[k] + sum8(sum);
+  }
+#endif
+}
 
 // The next task of a queue, the same for all work-items of a group: any number of groups will do and none waits for another. Which group takes which
 // task has no influence on results.
@@ -297,12 +330,7 @@ void factor(FrontView front) {
       update_tile(front.rows, width, inverse, block, block, column, front.rows + block * width + column, width);
     VSM_BARRIER();
     // What joins a row to all columns after the tile's acts as one more column of the tile.
-    for (int k = lane; k < VSM_TILE; k += lanes) {
-      float8 sum = 0.0f;
-      for (int column = VSM_TILE; column < width - block; column += VSM_TILE)
-        sum += vload8(0, tile + k * width + column) * vload8(0, root + block + column);
-      after[block + k] = sum8(sum);
-    }
+    multiply_rows(tile, width, VSM_TILE, width - block, root + block, 1, after + block);
     VSM_BARRIER();
     // Below the diagonal the tile gets a_ki / d_k.
     if (lane == 0)
@@ -473,16 +501,8 @@ kernel VSM_GROUP void substitute_back(float tolerance, int task_begin, int task_
         global const float* rows = front.rows + block * front.width;
         global float* u = front.u + block;
         global float* v = front.v + block;
-        for (int k = lane; k < VSM_TILE; k += lanes) {
-          float8 sum_u = 0.0f, sum_v = 0.0f;
-          for (int column = block + VSM_TILE; column < front.width; column += VSM_TILE) {
-            const float8 values = vload8(0, rows + k * front.width + column);
-            sum_u += values * vload8(0, front.u + column);
-            sum_v += values * vload8(0, front.v + column);
-          }
-          u[k] += sum8(sum_u);
-          v[k] += sum8(sum_v);
-        }
+        multiply_rows(rows, front.width, block + VSM_TILE, front.width, front.u, 0, u);
+        multiply_rows(rows, front.width, block + VSM_TILE, front.width, front.v, 0, v);
         VSM_BARRIER();
         if (lane == 0)
           for (int k = VSM_TILE - 1; k >= 0; --k) {

@@ -13,21 +13,6 @@ namespace {
 
 constexpr std::size_t kLeaf = 24;  // so many vertices are eliminated together at most where nothing separates them
 
-void find_inner_neighbours(const Chart& chart, Dissection& d) {
-  const auto is_inner = [&](int v) { return chart.kinds[v] == ChartVertex::kInner; };
-  const auto for_edges = [&](const auto& visit) {
-    for (const Triangle& t : chart.triangles)
-      for (const int c : {0, 1, 2})
-        if (const int from = t[c], to = t[(c + 1) % 3]; is_inner(from) && is_inner(to)) visit(from, to);
-  };
-  d.begin.assign(chart.positions.size() + 1, 0);
-  for_edges([&](int from, int) { ++d.begin[from + 1]; });
-  std::partial_sum(d.begin.begin(), d.begin.end(), d.begin.begin());
-  d.neighbours.resize(d.begin.back());
-  std::vector<int> next(d.begin.begin(), d.begin.end() - 1);
-  for_edges([&](int from, int to) { d.neighbours[next[from]++] = to; });
-}
-
 /// A vertex as it is sorted: with what is asked for, so that this lies together.
 struct Item {
   std::array<float, 3> at;
@@ -37,11 +22,11 @@ struct Item {
 
 class Dissector {
  public:
-  Dissector(const Chart& chart, Dissection& result) : d_(result), side_(chart.positions.size(), 0) {
+  Dissector(const Chart& chart, Dissection& result) : table_(chart.half_edges), d_(result), side_(chart.positions.size(), 0) {
     items_.reserve(d_.order.size());
     for (const int v : d_.order) {
       double reach2 = 0;
-      for (int k = d_.begin[v]; k < d_.begin[v + 1]; ++k) reach2 = std::max(reach2, (chart.positions[d_.neighbours[k]] - chart.positions[v]).squaredNorm());
+      for (const int w : neighbours(v)) reach2 = std::max(reach2, (chart.positions[w] - chart.positions[v]).squaredNorm());
       const Eigen::Vector3f p = chart.positions[v].cast<float>();
       // More than rounding can take away.
       items_.push_back({{p.x(), p.y(), p.z()}, 1.0001f * static_cast<float>(std::sqrt(reach2)) + 1e-6f * p.cwiseAbs().maxCoeff(), v});
@@ -57,6 +42,8 @@ class Dissector {
   }
 
  private:
+  std::span<const int> neighbours(int v) const { return std::span(table_.targets).subspan(table_.begin[v], table_.begin[v + 1] - table_.begin[v]); }
+
   static constexpr signed char kLeft = 1, kRight = 2, kSeparator = 4;
 
   /// Orders items_[begin] to items_[end - 1]. \return the fronts that have no parent yet
@@ -76,8 +63,8 @@ class Dissector {
         near_.push_back(item->vertex);
       }
     const auto is_at_cut = [&](int v) {
-      return std::any_of(d_.neighbours.begin() + d_.begin[v], d_.neighbours.begin() + d_.begin[v + 1],
-                         [&](int w) { return side_[w] == kLeft + kRight - side_[v]; });
+      const std::span<const int> beside = neighbours(v);
+      return std::any_of(beside.begin(), beside.end(), [&](int w) { return side_[w] == kLeft + kRight - side_[v]; });
     };
     // The half that has fewer vertices at the cut gives them.
     for (std::vector<int>& cut : cuts_) cut.clear();
@@ -116,7 +103,7 @@ class Dissector {
         front.boundary.push_back(number);
       };
       for (int i = front.first; i < after; ++i)
-        for (int k = d_.begin[d_.order[i]]; k < d_.begin[d_.order[i] + 1]; ++k) take(d_.number[d_.neighbours[k]]);
+        for (const int v : neighbours(d_.order[i])) take(d_.number[v]);
       for (const int child : front.children)
         for (const int number : d_.fronts[child].boundary) take(number);
       std::sort(front.boundary.begin(), front.boundary.end());
@@ -151,6 +138,7 @@ class Dissector {
     return id;
   }
 
+  const HalfEdgeTable& table_;
   Dissection& d_;
   std::vector<Item> items_;
   std::vector<signed char> side_;
@@ -162,7 +150,6 @@ class Dissector {
 
 Dissection dissect(const Chart& chart) {
   Dissection d;
-  find_inner_neighbours(chart, d);
   const auto is_pole = [&](int v) { return chart.kinds[v] == ChartVertex::kHeadPole || chart.kinds[v] == ChartVertex::kTailPole; };
   std::vector<bool> is_beside_pole(chart.kinds.size(), false);
   for (const Triangle& t : chart.triangles)

@@ -22,9 +22,6 @@ struct Dissection {
   std::vector<int> order;
   std::vector<int> number;    ///< of every vertex of the chart; -1 where it is fixed
   std::vector<Front> fronts;  ///< children before parents
-  /// The neighbours of an inner vertex that are inner ones too are neighbours[begin[v]] to neighbours[begin[v + 1] - 1], in the order of its
-  /// outgoing half-edges.
-  std::vector<int> begin, neighbours;
 };
 
 /// Nested dissection (George 1973): the vertices that separate two halves, cut across the longest extent, come after both; and so on in each half.

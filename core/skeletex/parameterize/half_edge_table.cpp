@@ -1,29 +1,38 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/parameterize/half_edge_table.h"
 
+#include <numeric>
+
 namespace skeletex {
 
 HalfEdgeTable link_half_edges(std::span<const Triangle> triangles, int vertex_count) {
   const int count = 3 * static_cast<int>(triangles.size());
-  const auto from = [&](int h) { return triangles[h / 3][h % 3]; };
-  const auto to = [&](int h) { return triangles[h / 3][(h + 1) % 3]; };
-  std::vector<int> begin(vertex_count + 1, 0), outgoing(count);
-  for (int h = 0; h < count; ++h) ++begin[from(h) + 1];
-  for (int v = 0; v < vertex_count; ++v) begin[v + 1] += begin[v];
-  std::vector<int> fill(begin.begin(), begin.end() - 1);
-  for (int h = 0; h < count; ++h) outgoing[fill[from(h)]++] = h;
-
   HalfEdgeTable table;
+  table.begin.assign(vertex_count + 1, 0);
+  for (const Triangle& t : triangles)
+    for (const int v : t) ++table.begin[v + 1];
+  std::partial_sum(table.begin.begin(), table.begin.end(), table.begin.begin());
+  table.outgoing.resize(count), table.targets.resize(count);
+  std::vector<int> next(table.begin.begin(), table.begin.end() - 1);
+  int h = 0;
+  for (const Triangle& t : triangles)
+    for (const int c : {0, 1, 2}) {
+      const int at = next[t[c]]++;
+      table.outgoing[at] = h++;
+      table.targets[at] = t[(c + 1) % 3];
+    }
   table.twins.assign(count, -1);
-  for (int h = 0; h < count; ++h) {
-    if (table.twins[h] >= 0) continue;
-    for (int k = begin[to(h)]; k < begin[to(h) + 1]; ++k)
-      if (to(outgoing[k]) == from(h)) {
-        table.twins[h] = outgoing[k];
-        table.twins[outgoing[k]] = h;
-        break;
-      }
-  }
+  for (int v = 0; v < vertex_count; ++v)
+    for (int k = table.begin[v]; k < table.begin[v + 1]; ++k) {
+      const int to = table.targets[k];
+      if (to < v) continue;
+      for (int back = table.begin[to]; back < table.begin[to + 1]; ++back)
+        if (table.targets[back] == v) {
+          table.twins[table.outgoing[k]] = table.outgoing[back];
+          table.twins[table.outgoing[back]] = table.outgoing[k];
+          break;
+        }
+    }
   return table;
 }
 

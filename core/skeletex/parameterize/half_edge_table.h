@@ -11,6 +11,8 @@ namespace skeletex {
 /// corner (c + 1) % 3.
 struct HalfEdgeTable {
   std::vector<int> twins;  ///< per half-edge, the opposite one; -1 on a boundary
+  /// Half-edges out of vertex v are outgoing[begin[v]] to outgoing[begin[v + 1] - 1], ascending; they lead to `targets`.
+  std::vector<int> begin, outgoing, targets;
 
   static int next(int h) { return h % 3 == 2 ? h - 2 : h + 1; }
   static int previous(int h) { return h % 3 == 0 ? h + 2 : h - 1; }

@@ -113,9 +113,9 @@ struct DeviceSystems {
 
 int padded(int count, int unit) { return (count + unit - 1) / unit * unit; }
 
-/// The fronts of a chart, and the tasks that they make. Columns of neighbours, and of boundaries in their parents, are found where a front's own
-/// columns are known.
-FrontTables make_fronts(const Dissection& d, int id, int first_row, int subtree_size, std::vector<int>& neighbour_columns) {
+/// The fronts of a chart, and the tasks that they make. Columns of later neighbours (per place in `table.targets`, else -1), and of boundaries in
+/// their parents, are found where a front's own columns are known.
+FrontTables make_fronts(const HalfEdgeTable& table, const Dissection& d, int id, int first_row, int subtree_size, std::vector<int>& neighbour_columns) {
   FrontTables s;
   const int count = static_cast<int>(d.fronts.size());
   std::vector<int> column(d.order.size(), -1), list(count), ids(count), stage(count, 0), depth(count, 0), rest_size(count);
@@ -124,7 +124,7 @@ FrontTables make_fronts(const Dissection& d, int id, int first_row, int subtree_
     if (d.fronts[f].parent >= 0) depth[f] = depth[d.fronts[f].parent] + 1;
   // A task's boundary rows lie on two stacks, by depth, so that little memory is touched: a front's go on one, its children's leave the other.
   std::array<int, 2> stack{}, stack_size{};
-  neighbour_columns.assign(d.neighbours.size(), -1);
+  neighbour_columns.assign(table.targets.size(), -1);
   for (int f = 0; f < count; ++f) {
     const Front& front = d.fronts[f];
     const int pivots = padded(front.pivots, VSM_TILE), boundary_size = static_cast<int>(front.boundary.size());
@@ -132,8 +132,8 @@ FrontTables make_fronts(const Dissection& d, int id, int first_row, int subtree_
     for (int i = 0; i < front.pivots; ++i) column[front.first + i] = i;
     for (int i = 0; i < boundary_size; ++i) column[front.boundary[i]] = pivots + i;
     for (int number = front.first; number < front.first + front.pivots; ++number)
-      for (int k = d.begin[d.order[number]]; k < d.begin[d.order[number] + 1]; ++k)
-        if (const int other = d.number[d.neighbours[k]]; other > number) neighbour_columns[k] = column[other];
+      for (int v = d.order[number], k = table.begin[v]; k < table.begin[v + 1]; ++k)
+        if (const int other = d.number[table.targets[k]]; other > number) neighbour_columns[k] = column[other];
     for (const int child : front.children) {
       const std::vector<int>& joined = d.fronts[child].boundary;
       for (std::size_t i = 0; i < joined.size(); ++i) s.parent_columns[list[child] + i] = column[joined[i]];
@@ -224,18 +224,19 @@ DeviceSystems build_systems(std::span<const Chart> charts, double alpha) {
     map.resize(count);
     int next = first_rows[k] + static_cast<int>(d.order.size());
     for (int v = 0; v < count; ++v) map[v] = chart.kinds[v] == ChartVertex::kInner ? first_rows[k] + d.number[v] : next++;
-    fronts[k] = make_fronts(d, static_cast<int>(k), first_rows[k], subtree_size, neighbour_columns[k]);
-    for (const Triangle& t : chart.triangles)
-      for (const int v : t)
-        if (chart.kinds[v] == ChartVertex::kInner) ++s.row_length[map[v]];
+    const HalfEdgeTable& table = chart.half_edges;
+    fronts[k] = make_fronts(table, d, static_cast<int>(k), first_rows[k], subtree_size, neighbour_columns[k]);
     for (int v = 0; v < count; ++v) {
-      const auto neighbours = neighbour_columns[k].begin();
-      const auto later = std::count_if(neighbours + d.begin[v], neighbours + d.begin[v + 1], [](int column) { return column >= 0; });
-      s.later_end[map[v]] = static_cast<int>(later);
-      s.fixed_end[map[v]] = static_cast<int>(later) + s.row_length[map[v]] - (d.begin[v + 1] - d.begin[v]);
+      const int row = map[v];
+      if (chart.kinds[v] == ChartVertex::kInner)
+        for (int at = table.begin[v]; at < table.begin[v + 1]; ++at) {
+          ++s.row_length[row];
+          s.later_end[row] += neighbour_columns[k][at] >= 0;
+          s.fixed_end[row] += neighbour_columns[k][at] >= 0 || d.number[table.targets[at]] < 0;
+        }
       for (const int axis : {0, 1}) {
         const double x = axis == 0 ? chart.u[v] : chart.v[v];
-        const std::size_t at = 4 * static_cast<std::size_t>(map[v]) + axis;
+        const std::size_t at = 4 * static_cast<std::size_t>(row) + axis;
         s.map[at] = static_cast<float>(x);
         s.map[at + 2] = static_cast<float>(x - static_cast<double>(s.map[at]));
       }
@@ -268,33 +269,23 @@ DeviceSystems build_systems(std::span<const Chart> charts, double alpha) {
     const std::vector<int>& map = s.device_vertices[k];
     const HalfEdgeTable& table = chart.half_edges;
     const std::vector<double> surface = relative_surface_areas(chart);
-    std::vector<int> next_neighbour = d.begin, next_later(map.size(), 0), next_fixed(map.size()), next_before(map.size());
-    for (std::size_t v = 0; v < map.size(); ++v) {
-      next_fixed[v] = s.later_end[map[v]];
-      next_before[v] = s.fixed_end[map[v]];
-    }
-    // An inner vertex's neighbours are the ends of its outgoing half-edges.
-    std::vector<int> entry_of(table.twins.size(), -1);
-    for (int h = 0; h < static_cast<int>(table.twins.size()); ++h) {
-      const Triangle& t = chart.triangles[h / 3];
-      const int from = t[h % 3], to = t[HalfEdgeTable::next(h) % 3];
-      if (chart.kinds[from] != ChartVertex::kInner) continue;
-      const int row = map[from];
-      const bool is_inner = chart.kinds[to] == ChartVertex::kInner;
-      const int column = is_inner ? neighbour_columns[k][next_neighbour[from]++] : -1;
-      int& place = !is_inner ? next_fixed[from] : column >= 0 ? next_later[from] : next_before[from];
-      const int e = s.slice_begin[row / kSlice] + kSlice * place++ + row % kSlice;
-      entry_of[h] = e;
-      s.entry_columns[e] = std::max(column, 0);
-      s.columns[e] = map[to];
-      const auto& turns = chart.turns[h / 3];
-      s.jumps[e] = is_pole(chart.kinds[to]) ? kPole : static_cast<signed char>(turns[HalfEdgeTable::next(h) % 3] - turns[h % 3]);
-      const int other = table.twins[h] / 3;
-      s.entry_triangles[e] = first_triangles[k] + h / 3;
-      s.entry_triangles[s.entries + e] = first_triangles[k] + other;
-      const int twin = entry_of[table.twins[h]];
-      const auto area = static_cast<float>(surface[h / 3] + surface[other]);
-      s.factors[e] = twin >= 0 ? s.factors[twin] : alpha == 0.5 ? 1 / std::sqrt(area) : std::pow(area, static_cast<float>(-alpha));
+    for (const int v : d.order) {
+      const int row = map[v];
+      int later = 0, fixed = s.later_end[row], before = s.fixed_end[row];
+      for (int at = table.begin[v]; at < table.begin[v + 1]; ++at) {
+        const int h = table.outgoing[at], to = table.targets[at], column = neighbour_columns[k][at];
+        int& place = column >= 0 ? later : d.number[to] < 0 ? fixed : before;
+        const int e = s.slice_begin[row / kSlice] + kSlice * place++ + row % kSlice, own = h / 3, other = table.twins[h] / 3;
+        s.entry_columns[e] = std::max(column, 0);
+        s.columns[e] = map[to];
+        const auto& turns = chart.turns[own];
+        s.jumps[e] = is_pole(chart.kinds[to]) ? kPole : static_cast<signed char>(turns[HalfEdgeTable::next(h) % 3] - turns[h % 3]);
+        s.entry_triangles[e] = first_triangles[k] + own;
+        s.entry_triangles[s.entries + e] = first_triangles[k] + other;
+        // The same bits in both directions.
+        const auto area = static_cast<float>(surface[own] + surface[other]);
+        s.factors[e] = alpha == 0.5 ? 1 / std::sqrt(area) : std::pow(area, static_cast<float>(-alpha));
+      }
     }
     for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
       int first = 0;
