@@ -25,7 +25,7 @@ struct Arguments {
   std::string mesh, skeleton, output, device, json, size = "512", method = "vsm";
   int iterations = 4;
   double alpha = 0.5, stop_spread = 0, hybrid_threshold = EncodeOptions{}.hybrid_unseen_threshold;
-  std::string rows = "surface", spd_hit = "last", share, diagonals, compression = "zip";
+  std::string rows = "surface", spd_hit = "last", share, diagonals, compression = "auto";
   bool has_no_prefilter = false, has_no_unfold = false, is_snapped = false, is_fitted = false, is_paper_recipe = false, is_half = false;
   std::vector<std::string> bone_methods;
 };
@@ -191,6 +191,10 @@ Input read_input(const Arguments& arguments, const EncodeOptions& options) {
   return input;
 }
 
+ExrCompression compression_of(const std::string& name) {
+  return name == "none" ? ExrCompression::kNone : name == "zip" ? ExrCompression::kZip : name == "piz" ? ExrCompression::kPiz : ExrCompression::kAuto;
+}
+
 void run(const Arguments& arguments, const CLI::App& command) {
   EncodeOptions options = encode_options(arguments, command);
   Stopwatch watch;
@@ -219,7 +223,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
   bar->show("writing", 1);
   write_model(arguments.output, result.model,
               {.format = arguments.is_half ? TexelFormat::kHalf : TexelFormat::kFloat,
-               .compression = arguments.compression == "piz" ? ExrCompression::kPiz : ExrCompression::kZip});
+               .compression = compression_of(arguments.compression)});
   bar.reset();
   for (const BoneReport& bone : result.report.bones) {
     if (bone.flipped_triangles > 0) warn(fmt::format("bone \"{}\": {} triangles are flipped in its map", bone.name, bone.flipped_triangles));
@@ -296,7 +300,7 @@ void add_encode_command(CLI::App& program) {
                 "as the paper: --rows uniform --alpha 0 --iterations 1 --no-unfold --no-prefilter --no-snap --no-fit (unfold and prefilter stay off, the others can still be given)")
       ->group("Texels");
   command.add_flag("--half", a.is_half, "16 bits a channel: half the file, but an error of some 2e-5 of the diagonal; for drafts")->group("File");
-  take_one_of(add("File", "--compression", a.compression, "lossless compression of the file"), {"zip", "piz"});
+  take_one_of(add("File", "--compression", a.compression, "lossless compression of the file; auto: zip where it saves a sixteenth or more, else none"), {"auto", "none", "zip", "piz"});
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(

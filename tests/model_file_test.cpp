@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <random>
 
 #include "skeletex/io/model_json.h"
 #include "skeletex/model/error.h"
@@ -161,7 +162,7 @@ bool contains(const std::string& text, const std::string& part) { return text.fi
 TEST(ModelFile, GivesEveryNumberBackBitByBit) {
   const ScratchFolder folder;
   for (const SkeletexModel& model : {branch_model(), lone_bone_model()})
-    for (const ExrCompression compression : {ExrCompression::kZip, ExrCompression::kPiz}) {
+    for (const ExrCompression compression : {ExrCompression::kNone, ExrCompression::kZip, ExrCompression::kPiz}) {
       write_model(folder / "m.skx.exr", model, {TexelFormat::kFloat, compression});
       const SkeletexModel read = read_model(folder / "m.skx.exr");
       expect_same(model, read);
@@ -192,11 +193,31 @@ TEST(ModelFile, HalfTexelsAreTheNearestHalvesAndAllElseStaysExact) {
 TEST(ModelFile, TheSameModelGivesTheSameBytes) {
   const ScratchFolder folder;
   const SkeletexModel model = branch_model(200, 100);
-  for (const ExrCompression compression : {ExrCompression::kZip, ExrCompression::kPiz}) {
+  for (const ExrCompression compression : {ExrCompression::kNone, ExrCompression::kZip, ExrCompression::kPiz}) {
     write_model(folder / "a.skx.exr", model, {TexelFormat::kFloat, compression});
     const SkeletexModel read = read_model(folder / "a.skx.exr");
     write_model(folder / "b.skx.exr", read, {TexelFormat::kFloat, compression});
     EXPECT_EQ(read_bytes(folder / "a.skx.exr"), read_bytes(folder / "b.skx.exr"));
+  }
+}
+
+TEST(ModelFile, IsCompressedWhereThatPays) {
+  const ScratchFolder folder;
+  std::mt19937 random(1);
+  std::uniform_int_distribution<std::uint32_t> bits;
+  for (const bool is_noise : {false, true}) {
+    SCOPED_TRACE(is_noise);
+    SkeletexModel model = branch_model(200, 200);
+    for (std::vector<float>* plane : {&model.texture.along, &model.texture.around, &model.texture.out})
+      for (float& x : *plane) x = is_noise ? std::bit_cast<float>(0x3f000000u | (bits(random) >> 9)) : 1.0f;
+    const auto size_with = [&](ExrCompression compression) {
+      write_model(folder / "m.skx.exr", model, {TexelFormat::kFloat, compression});
+      EXPECT_TRUE(same_bits(model.texture.out, read_model(folder / "m.skx.exr").texture.out));
+      return std::filesystem::file_size(folder / "m.skx.exr");
+    };
+    const auto zip = size_with(ExrCompression::kZip), none = size_with(ExrCompression::kNone);
+    EXPECT_LE(zip, none);
+    EXPECT_EQ(size_with(ExrCompression::kAuto), is_noise ? none : zip);
   }
 }
 
@@ -302,7 +323,7 @@ TEST(ModelFile, ReadsOrRefusesDamagedFilesButNeverCrashes) {
   const ScratchFolder folder;
   const auto path = folder / "m.skx.exr";
   int accepted = 0, refused = 0;
-  for (const ExrCompression compression : {ExrCompression::kZip, ExrCompression::kPiz}) {
+  for (const ExrCompression compression : {ExrCompression::kNone, ExrCompression::kZip, ExrCompression::kPiz}) {
     write_model(path, branch_model(), {TexelFormat::kFloat, compression});
     // Also with the JSON short, so that the damage hits the rest of the header more often.
     for (const std::string& good : {read_bytes(path), [&] { write_model(path, lone_bone_model(), {TexelFormat::kHalf, compression}); return read_bytes(path); }()})

@@ -44,6 +44,19 @@ class ExrStream : public Imf::OStream {
   OutputFile& file_;
 };
 
+/// Counts bytes.
+class CountingStream : public Imf::OStream {
+ public:
+  CountingStream() : Imf::OStream("memory") {}
+  void write(const char[], int count) override { size_ = std::max(size_, at_ += static_cast<std::uint64_t>(count)); }
+  std::uint64_t tellp() override { return at_; }
+  void seekp(std::uint64_t position) override { at_ = position; }
+  std::uint64_t size() const { return size_; }
+
+ private:
+  std::uint64_t at_ = 0, size_ = 0;
+};
+
 /// Chunks are compressed independently and written in order, so the number of threads does not show in the file.
 void use_threads() {
   static std::once_flag once;
@@ -96,6 +109,36 @@ struct ExrPart {
   Imf::FrameBuffer frame;
   std::vector<half> halves[3];
 };
+
+/// Whether ZIP takes off a sixteenth or more, by three of its blocks of lines.
+bool pays_zip(const ExrPart& part, int width, int height) {
+  constexpr int kLines = 16, kBlocks = 3;
+  if (height < 2 * kLines * kBlocks) return true;
+  Imf::Header header(width, kLines * kBlocks);
+  header.compression() = Imf::ZIP_COMPRESSION;
+  header.channels() = part.header.channels();
+  Imf::FrameBuffer frame;
+  std::vector<std::vector<char>> planes;
+  for (auto slice = part.frame.begin(); slice != part.frame.end(); ++slice) {
+    const std::size_t line = slice.slice().yStride;
+    std::vector<char>& plane = planes.emplace_back();
+    for (int block = 0; block < kBlocks; ++block) {
+      const char* from = slice.slice().base + line * static_cast<std::size_t>(height * (block + 1) / (kBlocks + 1) - kLines / 2);
+      plane.insert(plane.end(), from, from + line * kLines);
+    }
+    frame.insert(slice.name(), Imf::Slice(slice.slice().type, plane.data(), slice.slice().xStride, line));
+  }
+  CountingStream counted;
+  {
+    Imf::OutputFile exr(counted, header);
+    exr.setFrameBuffer(frame);
+    exr.writePixels(kLines * kBlocks);
+  }
+  std::size_t plain = 0;
+  for (const std::vector<char>& plane : planes) plain += plane.size();
+  return 16 * counted.size() < 15 * plain;
+}
+
 ExrPart make_part(const SkeletexModel& model, const ModelFileOptions& options, const std::string& where) {
   check_model(model, where);
   check_texels(model.texture, where);
@@ -108,7 +151,6 @@ ExrPart make_part(const SkeletexModel& model, const ModelFileOptions& options, c
   }
   const bool is_half = options.format == TexelFormat::kHalf;
   ExrPart part{Imf::Header(width, height), {}, {}};
-  part.header.compression() = options.compression == ExrCompression::kZip ? Imf::ZIP_COMPRESSION : Imf::PIZ_COMPRESSION;
   part.header.insert(kAttribute, Imf::StringAttribute(json));
   for (int i = 0; i < 3; ++i) {
     const std::vector<float>& texels = plane(model.texture, i);
@@ -124,6 +166,8 @@ ExrPart make_part(const SkeletexModel& model, const ModelFileOptions& options, c
     part.header.channels().insert(kChannels[i], Imf::Channel(type));
     part.frame.insert(kChannels[i], Imf::Slice(type, static_cast<char*>(const_cast<void*>(data)), bytes, bytes * static_cast<std::size_t>(width)));
   }
+  const bool has_zip = options.compression == ExrCompression::kZip || (options.compression == ExrCompression::kAuto && pays_zip(part, width, height));
+  part.header.compression() = has_zip ? Imf::ZIP_COMPRESSION : options.compression == ExrCompression::kPiz ? Imf::PIZ_COMPRESSION : Imf::NO_COMPRESSION;
   return part;
 }
 
@@ -136,9 +180,9 @@ void write_model(const std::filesystem::path& path, const SkeletexModel& model, 
 void write_model_levels(const std::filesystem::path& path, std::span<const SkeletexModel> levels, const ModelFileOptions& options) {
   const std::string where = path.string();
   if (levels.empty()) throw IoError(where + ": a model has at least one level");
+  use_threads();
   std::vector<ExrPart> parts;
   for (const SkeletexModel& level : levels) parts.push_back(make_part(level, options, where));
-  use_threads();
   write_atomically(path, [&](const std::filesystem::path& temporary) {
     OutputFile file(temporary, path);
     with_openexr(where, "cannot write", [&] {

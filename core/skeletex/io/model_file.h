@@ -13,11 +13,12 @@
 namespace skeletex {
 
 enum class TexelFormat { kFloat, kHalf };
-enum class ExrCompression { kZip, kPiz };
+/// kAuto: ZIP where it pays. Of float texels in small textures it may save a thirtieth, and takes a sixth of the time of encoding.
+enum class ExrCompression { kAuto, kNone, kZip, kPiz };
 
 struct ModelFileOptions {
   TexelFormat format = TexelFormat::kFloat;
-  ExrCompression compression = ExrCompression::kZip;
+  ExrCompression compression = ExrCompression::kAuto;
 };
 
 /// Writes a model as one OpenEXR file: channels R (along), G (around), B (out), and the string attribute

@@ -41,21 +41,21 @@ LocalTriangles localize(const Skeleton& skeleton, const Walls& walls, std::span<
   local.points.resize(9 * static_cast<std::size_t>(local.count()));
   local.first_turn.resize(local.count());
   local.last_turn.resize(local.count());
-  std::vector<std::array<float, 3>> positions;
-  std::vector<double> turns;
-  int t = 0;
-  for (const Chart& chart : charts) {
+  std::vector<double> extents(charts.size(), 0);
+  for_each_block(charts.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
+    const Chart& chart = charts[k];
     const BoneBasis& basis = walls.bases()[chart.bone];
     const Vec3& head = end_position(skeleton, chart.bone, BoneEnd::kHead);
-    positions.clear();
-    turns.clear();
+    std::vector<std::array<float, 3>> positions;
+    std::vector<double> turns;
+    int t = local.begins[k];
     for (const Vec3& position : chart.positions) {
       const Vec3 offset = position - head;
       positions.push_back(
           {static_cast<float>(offset.dot(basis.s)), static_cast<float>(offset.dot(basis.b)), static_cast<float>(offset.dot(basis.o))});
       // Of the rounded coordinates: the device must find the same half-planes.
       turns.push_back(std::atan2(static_cast<double>(positions.back()[1]), static_cast<double>(positions.back()[0])) / (2 * std::numbers::pi));
-      local.extent = std::max(local.extent, offset.norm());
+      extents[k] = std::max(extents[k], offset.norm());
     }
     for (const Triangle& triangle : chart.triangles) {
       for (int corner = 0; corner < 3; ++corner)
@@ -80,7 +80,8 @@ LocalTriangles localize(const Skeleton& skeleton, const Walls& walls, std::span<
       }
       ++t;
     }
-  }
+  });
+  for (const double extent : extents) local.extent = std::max(local.extent, extent);
   return local;
 }
 
@@ -106,16 +107,18 @@ void for_each_angle(const LocalTriangles& local, int triangle, int count, AngleC
   for (int j = first; j <= last; ++j) visit(((j % count) + count) % count);
 }
 
-/// Compressed rows from a function that calls visit(list, triangle) for everything that belongs into them, in order.
+/// Compressed rows of charts, whose lists lie behind each other, from a function that calls visit(list, triangle) for everything that belongs into
+/// those of one, in order.
 template <class ForEach>
-Lists fill_lists(int count, ForEach&& for_each_list) {
+Lists fill_lists(int count, std::size_t charts, ForEach&& for_each_list) {
   Lists lists;
   lists.begins.assign(count + 1, 0);
-  for_each_list([&](int list, int) { ++lists.begins[list + 1]; });
+  const auto for_charts = [&](const auto& visit) { for_each_block(charts, 1, [&](std::size_t chart, std::size_t, std::size_t) { for_each_list(chart, visit); }); };
+  for_charts([&](int list, int) { ++lists.begins[list + 1]; });
   for (std::size_t i = 1; i < lists.begins.size(); ++i) lists.begins[i] += lists.begins[i - 1];
   lists.triangles.resize(lists.begins.back());
   std::vector<int> next(lists.begins.begin(), lists.begins.end() - 1);
-  for_each_list([&](int list, int t) { lists.triangles[next[list]++] = t; });
+  for_charts([&](int list, int t) { lists.triangles[next[list]++] = t; });
   return lists;
 }
 
@@ -166,10 +169,9 @@ std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton,
       column_patches.push_back(static_cast<int>(i));
     }
   }
-  const Lists lists = fill_lists(static_cast<int>(columns.size()), [&](auto&& visit) {
-    for (std::size_t i = 0; i < charts.size(); ++i)
-      for (int t = local.begins[i]; t < local.begins[i + 1]; ++t)
-        for_each_angle(local, t, records[i].width, AngleCell::kAngle, [&](int j) { visit(records[i].column_begin + j, t); });
+  const Lists lists = fill_lists(static_cast<int>(columns.size()), charts.size(), [&](std::size_t i, auto&& visit) {
+    for (int t = local.begins[i]; t < local.begins[i + 1]; ++t)
+      for_each_angle(local, t, records[i].width, AngleCell::kAngle, [&](int j) { visit(records[i].column_begin + j, t); });
   });
 
   const int column_count = static_cast<int>(columns.size());
@@ -220,15 +222,14 @@ std::vector<double> unseen_area_fractions(ClContext& context, const Skeleton& sk
   const auto slab_of = [&](std::size_t chart, float z) {
     return std::clamp(static_cast<int>((z - lowest[chart]) * slabs_per_height[chart]), 0, slabs[chart] - 1);
   };
-  const Lists lists = fill_lists(first_lists.back(), [&](auto&& visit) {
-    for (std::size_t i = 0; i < charts.size(); ++i)
-      for (int t = local.begins[i]; t < local.begins[i + 1]; ++t) {
-        const float* p = &local.points[9 * static_cast<std::size_t>(t)];
-        const int first = slab_of(i, std::min({p[2], p[5], p[8]})), last = slab_of(i, std::max({p[2], p[5], p[8]}));
-        for_each_angle(local, t, sectors[i], AngleCell::kSector, [&](int sector) {
-          for (int slab = first; slab <= last; ++slab) visit(first_lists[i] + sector * slabs[i] + slab, t);
-        });
-      }
+  const Lists lists = fill_lists(first_lists.back(), charts.size(), [&](std::size_t i, auto&& visit) {
+    for (int t = local.begins[i]; t < local.begins[i + 1]; ++t) {
+      const float* p = &local.points[9 * static_cast<std::size_t>(t)];
+      const int first = slab_of(i, std::min({p[2], p[5], p[8]})), last = slab_of(i, std::max({p[2], p[5], p[8]}));
+      for_each_angle(local, t, sectors[i], AngleCell::kSector, [&](int sector) {
+        for (int slab = first; slab <= last; ++slab) visit(first_lists[i] + sector * slabs[i] + slab, t);
+      });
+    }
   });
   std::vector<SpdSightLine> lines(local.count());
   std::vector<float> spheres(4 * static_cast<std::size_t>(local.count()));
@@ -280,7 +281,7 @@ std::vector<double> unseen_area_fractions(ClContext& context, const Skeleton& sk
   const std::vector<int> hidden = context.download(is_hidden);
 
   std::vector<double> fractions(charts.size(), 0);
-  for (std::size_t i = 0; i < charts.size(); ++i) {
+  for_each_block(charts.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
     double unseen = 0, area = 0;
     for (std::size_t t = 0; t < charts[i].triangles.size(); ++t) {
       const Triangle& triangle = charts[i].triangles[t];
@@ -290,7 +291,7 @@ std::vector<double> unseen_area_fractions(ClContext& context, const Skeleton& sk
       if (hidden[local.begins[i] + t]) unseen += a;
     }
     fractions[i] = area > 0 ? unseen / area : 0;
-  }
+  });
   return fractions;
 }
 
