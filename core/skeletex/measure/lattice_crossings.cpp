@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <utility>
 
 #include "skeletex/measure/self_intersection.h"
 #include "skeletex/model/parallel.h"
@@ -17,6 +18,7 @@ constexpr int kSide = 4;  // quads along a side of a square
 constexpr int kPiece = 2;             // quads along a side of a piece of a square
 constexpr int kNear = 8;              // quads: up to here a part of the lattice is looked at as a whole
 constexpr float kLeastCosine = 0.2f;  // between a part's normals and their middle
+constexpr double kRounding = 1e-10;   // of a product of lengths: far more than double precision rounds off
 constexpr std::size_t kWidth = 8;
 constexpr std::size_t kAtOnce = 128;
 
@@ -44,6 +46,35 @@ bool do_overlap(const Box& a, const Box& b) {
   return (static_cast<int>(a.least[0] <= b.greatest[0]) & static_cast<int>(b.least[0] <= a.greatest[0]) &
           static_cast<int>(a.least[1] <= b.greatest[1]) & static_cast<int>(b.least[1] <= a.greatest[1]) &
           static_cast<int>(a.least[2] <= b.greatest[2]) & static_cast<int>(b.least[2] <= a.greatest[2])) != 0;
+}
+
+/// 0 of a triangle without area: it may look anywhere.
+Eigen::Array4f unit_normal(const Eigen::Array4f& u, const Eigen::Array4f& v) {
+  const Eigen::Vector3f across = u.head<3>().matrix().cross(v.head<3>().matrix());
+  const float length2 = across.squaredNorm();
+  Eigen::Array4f normal = Eigen::Array4f::Zero();
+  if (length2 > 0) normal.head<3>() = across.array() / std::sqrt(length2);
+  return normal;
+}
+
+/// Whether all normals of a box lie within a cone.
+template <class Box>
+bool is_narrow(const Box& normals) {
+  const Eigen::Array4f middle = 0.5f * (normals.least + normals.greatest);
+  return (middle * normals.least).min(middle * normals.greatest).sum() > kLeastCosine * middle.matrix().norm();
+}
+
+/// Whether what two triangles do not share of the second one lies on one side of the first one's plane, further than rounding could
+/// put it: then they do not meet. So it is with nearly all neighbours, and this is far cheaper than do_triangles_intersect.
+bool is_beside(const Triangle& own, const std::array<Vec3, 3>& corners, const Vec3& normal, const Triangle& other, const std::array<Vec3, 3>& other_corners) {
+  int free = 0, above = 0, below = 0;
+  for (int k = 0; k < 3; ++k) {
+    if (other[k] == own[0] || other[k] == own[1] || other[k] == own[2]) continue;
+    const Vec3 offset = other_corners[k] - corners[0];
+    const double height = normal.dot(offset), margin = kRounding * normal.cwiseAbs().dot(offset.cwiseAbs());
+    ++free, above += height > margin, below += height < -margin;
+  }
+  return free > 0 && (above == free || below == free);
 }
 
 }  // namespace
@@ -159,11 +190,7 @@ void LatticeCrossings::measure(const LatticeMesh& lattice, int part) {
           const std::array<Eigen::Array4f, 2> u{right - own, beyond - (is_second ? above : own)};
           const std::array<Eigen::Array4f, 2> v{(is_second ? above : beyond) - own, is_second ? Eigen::Array4f(above - right) : Eigen::Array4f(above - own)};
           for (const int side : {0, 1}) {
-            const Eigen::Vector3f across = u[side].head<3>().matrix().cross(v[side].head<3>().matrix());
-            // One without area may look anywhere.
-            const float length2 = across.squaredNorm();
-            Eigen::Array4f normal = Eigen::Array4f::Zero();
-            if (length2 > 0) normal.head<3>() = across.array() / std::sqrt(length2);
+            const Eigen::Array4f normal = unit_normal(u[side], v[side]);
             normals_[normal_of(piece.patch, piece.column + column, piece.row + row) + side] = normal;
             add({normal, normal}, normals);
           }
@@ -227,47 +254,54 @@ bool LatticeCrossings::is_smooth(const Part& a, const Part& b) const {
   Box normals = no_box<Box>();
   for (int row = std::min(a.row, b.row); row <= std::max(a.row, b.row); ++row)
     for (int step = 0; step <= steps; ++step) add(normal_boxes_[places_[first_square_[a.patch] + row * columns + (first + step) % columns]], normals);
-  const Eigen::Array4f middle = 0.5f * (normals.least + normals.greatest);
-  const float least = (middle * normals.least).min(middle * normals.greatest).sum();
-  return least > kLeastCosine * middle.matrix().norm() || is_smooth(quads_of(a), quads_of(b));
+  return is_narrow(normals) || is_smooth(quads_of(a), quads_of(b));
+}
+
+void LatticeCrossings::measure(const LatticeMesh& lattice, int piece, MeasuredPiece& measured) const {
+  if (measured.piece == piece) return;
+  measured.piece = piece;
+  measured.triangles = triangles_of(lattice, pieces_[piece]);
+  measured.has_corners.fill(false);
+  for (int k = 0; k < pieces_[piece].count; ++k) measured.boxes[k] = box_of(lattice, measured.triangles[k]);
+}
+
+void LatticeCrossings::MeasuredPiece::place(const LatticeMesh& lattice, int triangle) {
+  if (std::exchange(has_corners[triangle], true)) return;
+  corners[triangle] = lattice.corners(triangles[triangle]);
+  const auto& [a, b, c] = corners[triangle];
+  normals[triangle] = (b - a).cross(c - a);
 }
 
 void LatticeCrossings::find_between(const LatticeMesh& lattice, int a, int b, const std::vector<char>& is_asked,
-                                    std::vector<std::array<int, 2>>& pairs) const {
-  struct Measured {
-    int piece = -1;
-    PieceTriangles triangles;
-    std::array<Box, kPieceTriangles> boxes;
-  };
-  const auto measure_piece = [&](int piece, Measured& measured) {
-    if (measured.piece == piece) return;
-    measured.piece = piece;
-    measured.triangles = triangles_of(lattice, pieces_[piece]);
-    for (int k = 0; k < pieces_[piece].count; ++k) measured.boxes[k] = box_of(lattice, measured.triangles[k]);
-  };
+                                    std::array<MeasuredPiece, 2>& measured, std::vector<std::array<int, 2>>& pairs) const {
   // The quad of a piece's triangle.
   const auto quad_at = [](const Piece& piece, int triangle) {
     if (piece.patch < 0) return piece;
     const int quad = triangle / 2;
     return Piece{piece.patch, piece.column + quad % piece.columns, 1, piece.row + quad / piece.columns, 1, 0, 0};
   };
-  Measured ones, others;
+  auto& [ones, others] = measured;
   for (int i = parts_[a].begin; i < parts_[a].begin + parts_[a].count; ++i) {
     if (!do_overlap(piece_boxes_[i], boxes_[0][b])) continue;
     for (int j = a == b ? i : parts_[b].begin; j < parts_[b].begin + parts_[b].count; ++j) {
       if (!do_overlap(piece_boxes_[i], piece_boxes_[j])) continue;
       const Piece &one = pieces_[i], &other = pieces_[j];
       if (is_smooth(one, other)) continue;
-      measure_piece(i, ones), measure_piece(j, others);
+      measure(lattice, i, ones), measure(lattice, j, others);
       for (int k = 0; k < one.count; ++k) {
         if (!do_overlap(ones.boxes[k], piece_boxes_[j])) continue;
         for (int l = i == j ? k + 1 : 0; l < other.count; ++l) {
           if (!do_overlap(ones.boxes[k], others.boxes[l])) continue;
           const int s = triangles_[one.begin + k], t = triangles_[other.begin + l];
           if (!is_asked.empty() && !is_asked[s] && !is_asked[t]) continue;
-          if (is_smooth(quad_at(one, k), quad_at(other, l))) continue;
           const Triangle &first = ones.triangles[k], &second = others.triangles[l];
-          if (do_triangles_intersect(first, lattice.corners(first), second, lattice.corners(second))) pairs.push_back({std::min(s, t), std::max(s, t)});
+          ones.place(lattice, k), others.place(lattice, l);
+          const auto &first_corners = ones.corners[k], &second_corners = others.corners[l];
+          if (is_beside(first, first_corners, ones.normals[k], second, second_corners) ||
+              is_beside(second, second_corners, others.normals[l], first, first_corners))
+            continue;
+          if (is_smooth(quad_at(one, k), quad_at(other, l))) continue;
+          if (do_triangles_intersect(first, first_corners, second, second_corners)) pairs.push_back({std::min(s, t), std::max(s, t)});
         }
       }
     }
@@ -284,6 +318,7 @@ std::vector<std::array<int, 2>> LatticeCrossings::find_from(const LatticeMesh& l
   for_each_block(count, kAtOnce, [&](std::size_t block, std::size_t begin, std::size_t end) {
     std::vector<std::pair<int, int>> stack;  // level, node
     std::vector<int> near;
+    std::array<MeasuredPiece, 2> measured;
     const int top = static_cast<int>(boxes_.size()) - 1;
     // The tree is asked once for several parts that lie beside each other.
     for (std::size_t first = begin; first < end; first += kWidth) {
@@ -311,7 +346,7 @@ std::vector<std::array<int, 2>> LatticeCrossings::find_from(const LatticeMesh& l
         for (const int other : near) {
           if (!do_overlap(boxes_[0][part], boxes_[0][other])) continue;
           if (are_all ? other < part : is_listed(other) ? other < part : are_alone) continue;
-          if (!is_smooth(parts_[part], parts_[other])) find_between(lattice, part, other, is_asked, found[block]);
+          if (!is_smooth(parts_[part], parts_[other])) find_between(lattice, part, other, is_asked, measured, found[block]);
         }
       }
     }

@@ -60,7 +60,19 @@ class LatticeCrossings {
   Piece quads_of(const Part& part) const;
   bool is_smooth(const Part& a, const Part& b) const;
   bool is_smooth(const Piece& a, const Piece& b) const;
-  void find_between(const LatticeMesh& lattice, int a, int b, const std::vector<char>& is_asked, std::vector<std::array<int, 2>>& pairs) const;
+  /// A piece as it is when its triangles are looked at one by one.
+  struct MeasuredPiece {
+    int piece = -1;
+    PieceTriangles triangles;
+    std::array<Box, kPieceTriangles> boxes;
+    std::array<bool, kPieceTriangles> has_corners;  ///< those that were asked for
+    std::array<std::array<Vec3, 3>, kPieceTriangles> corners;
+    std::array<Vec3, kPieceTriangles> normals;
+    void place(const LatticeMesh& lattice, int triangle);
+  };
+  void measure(const LatticeMesh& lattice, int piece, MeasuredPiece& measured) const;
+  void find_between(const LatticeMesh& lattice, int a, int b, const std::vector<char>& is_asked, std::array<MeasuredPiece, 2>& measured,
+                    std::vector<std::array<int, 2>>& pairs) const;
   std::vector<std::array<int, 2>> find_from(const LatticeMesh& lattice, std::span<const int> parts, const std::vector<char>& is_asked,
                                             bool are_alone = false) const;
 
