@@ -283,9 +283,12 @@ TEST(Snap, AndFitAreOnWhereTheyPayUnlessToldOtherwise) {
     return std::pair{report.snap.has_value(), report.fit.has_value()};
   };
   const auto nothing = [](EncodeOptions&) {};
-  const int vertices = static_cast<int>(model.mesh.positions.size()), few = (2 * vertices - 1) / 128, enough = (2 * vertices + 127) / 128;
+  const int vertices = static_cast<int>(model.mesh.positions.size());
+  const int few = (3 * vertices - 1) / 256, some = (3 * vertices + 255) / 256, less = (2 * vertices - 1) / 128, enough = (2 * vertices + 127) / 128;
   EXPECT_EQ(reported(128, few, nothing), std::pair(false, true));
-  EXPECT_EQ(reported(128, enough, nothing), std::pair(true, true));
+  EXPECT_EQ(reported(128, some, nothing), std::pair(true, true));
+  EXPECT_EQ(reported(128, less, [](EncodeOptions& o) { o.has_fit = false; }), std::pair(false, false));
+  EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.has_fit = false; }), std::pair(true, false));
   EXPECT_EQ(reported(256, 257, nothing), std::pair(true, false));
   EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.has_snap = false; }), std::pair(false, true));
   EXPECT_EQ(reported(128, few, [](EncodeOptions& o) { o.has_snap = true, o.has_fit = false; }), std::pair(true, false));

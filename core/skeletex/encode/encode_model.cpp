@@ -21,7 +21,8 @@
 namespace skeletex {
 namespace {
 
-constexpr std::size_t kSnapTexelsPerVertex = 2;     // with fewer, vertices pull texels about without making edges between them
+// With fewer, vertices pull texels about without making edges between them; the fit makes up for some of that.
+constexpr double kSnapTexelsPerVertex = 2, kFittedSnapTexelsPerVertex = 1.5;
 constexpr std::size_t kMostFitTexels = 256 * 256;  // beyond that the fit gains little, and takes longest
 
 class Stopwatch {
@@ -62,8 +63,9 @@ std::vector<Method> choose_methods(const EncodeOptions& options, const Skeleton&
 /// SPD patches are neither snapped nor fitted.
 TexelOptions choose_texel_options(const EncodeOptions& options, const TriangleMesh& mesh, bool is_all_spd) {
   const auto texels = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
-  const bool has_snap = !is_all_spd && options.has_snap.value_or(texels >= kSnapTexelsPerVertex * mesh.positions.size());
   const bool has_fit = !is_all_spd && options.has_fit.value_or(options.has_prefilter && texels <= kMostFitTexels);
+  const double least_texels = (has_fit ? kFittedSnapTexelsPerVertex : kSnapTexelsPerVertex) * static_cast<double>(mesh.positions.size());
+  const bool has_snap = !is_all_spd && options.has_snap.value_or(static_cast<double>(texels) >= least_texels);
   return {.has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_snap = has_snap, .has_fit = has_fit};
 }
 
