@@ -314,17 +314,18 @@ std::vector<std::array<int, 2>> LatticeCrossings::find_from(const LatticeMesh& l
                                                             const std::vector<char>& is_asked, bool are_alone) const {
   const bool are_all = parts.empty();
   const std::size_t count = are_all ? parts_.size() : parts.size();
-  std::vector<std::vector<std::array<int, 2>>> found(block_count(count, kAtOnce));
-  for_each_block(count, kAtOnce, [&](std::size_t block, std::size_t begin, std::size_t end) {
+  const std::size_t at_once = are_all ? kAtOnce : kWidth;
+  std::vector<std::vector<std::array<int, 2>>> found(block_count(count, at_once));
+  for_each_block(count, at_once, [&](std::size_t block, std::size_t begin, std::size_t end) {
     std::vector<std::pair<int, int>> stack;  // level, node
     std::vector<int> near;
     std::array<MeasuredPiece, 2> measured;
     const int top = static_cast<int>(boxes_.size()) - 1;
+    const auto is_listed = [&](int part) { return std::binary_search(parts.begin(), parts.end(), part); };
+    const auto part_at = [&](std::size_t i) { return are_all ? static_cast<int>(i) : parts[i]; };
     // The tree is asked once for several parts that lie beside each other.
-    for (std::size_t first = begin; first < end; first += kWidth) {
-      const std::size_t last = std::min(end, first + kWidth);
-      const auto is_listed = [&](int part) { return std::binary_search(parts.begin(), parts.end(), part); };
-      const auto part_at = [&](std::size_t i) { return are_all ? static_cast<int>(i) : parts[i]; };
+    for (std::size_t first = begin, last = begin; first < end; first = last) {
+      while (last < end && last - first < kWidth && part_at(last) - part_at(first) < static_cast<int>(2 * kWidth)) ++last;
       Box around = no_box<Box>();
       for (std::size_t i = first; i < last; ++i) add(boxes_[0][part_at(i)], around);
       near.clear();
