@@ -99,12 +99,11 @@ int walk_to(int t, const int column, const float beside, const int width, const 
     const MapTriangle m = load_triangle(t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
     const float u = row_offset(m, row_high, row_low, row, above);
     const float v = turned_offset(m, column, beside, width);
-    float w1, w2;
-    weights_at(m, u, v, &w1, &w2);
-    const float w0 = 1.0f - w1 - w2;
-    const float least = fmin(w0, fmin(w1, w2));
+    const CornerWeights w = weights_at(m, u, v);
+    const float w0 = 1.0f - w.w1 - w.w2;
+    const float least = fmin(w0, fmin(w.w1, w.w2));
     if (!(least < -1e-6f)) break;
-    const int corner = least == w0 ? 0 : least == w1 ? 1 : 2;
+    const int corner = least == w0 ? 0 : least == w.w1 ? 1 : 2;
     const int next = across[corner * triangle_count + t];
     if (next < 0) break;
     t = next;
@@ -112,24 +111,27 @@ int walk_to(int t, const int column, const float beside, const int width, const 
   return t;
 }
 
-float3 read_point(const int t, const int column, const float beside, const int width, const int row, const float above, const int triangle_count,
-                  global const int* restrict corners, global const int* restrict turns, global const int* restrict poles, global const float* restrict u_high,
-                  global const float* restrict u_low, global const float* restrict v_high, global const float* restrict v_low,
-                  global const float* restrict vertex_x, global const float* restrict vertex_y, global const float* restrict vertex_z,
-                  global const float* restrict row_high, global const float* restrict row_low) {
+typedef struct SurfacePoint {
+  float x, y, z;
+} SurfacePoint;
+
+__attribute__((always_inline)) SurfacePoint read_point(const int t, const int column, const float beside, const int width, const int row, const float above,
+                                                       const int triangle_count, global const int* restrict corners, global const int* restrict turns,
+                                                       global const int* restrict poles, global const float* restrict u_high,
+                                                       global const float* restrict u_low, global const float* restrict v_high,
+                                                       global const float* restrict v_low, global const float* restrict vertex_x,
+                                                       global const float* restrict vertex_y, global const float* restrict vertex_z,
+                                                       global const float* restrict row_high, global const float* restrict row_low) {
   const MapTriangle m = load_triangle(t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
-  const float u = row_offset(m, row_high, row_low, row, above);
-  const float v = turned_offset(m, column, beside, width);
+  const CornerWeights w = weights_at(m, row_offset(m, row_high, row_low, row, above), turned_offset(m, column, beside, width));
   // Rounding may have put it a little outside.
-  float w1, w2;
-  weights_at(m, u, v, &w1, &w2);
-  w1 = fmax(0.0f, w1), w2 = fmax(0.0f, w2);
-  const float sum = w1 + w2;
-  if (sum > 1.0f) w1 /= sum, w2 /= sum;
+  const float inner1 = fmax(0.0f, w.w1), inner2 = fmax(0.0f, w.w2), scale = 1.0f / fmax(1.0f, inner1 + inner2);
+  const float w1 = inner1 * scale, w2 = inner2 * scale;
   const int a = corners[t], b = corners[triangle_count + t], c = corners[2 * triangle_count + t];
-  return (float3)(vertex_x[a] + w1 * (vertex_x[b] - vertex_x[a]) + w2 * (vertex_x[c] - vertex_x[a]),
-                  vertex_y[a] + w1 * (vertex_y[b] - vertex_y[a]) + w2 * (vertex_y[c] - vertex_y[a]),
-                  vertex_z[a] + w1 * (vertex_z[b] - vertex_z[a]) + w2 * (vertex_z[c] - vertex_z[a]));
+  const SurfacePoint point = {vertex_x[a] + w1 * (vertex_x[b] - vertex_x[a]) + w2 * (vertex_x[c] - vertex_x[a]),
+                              vertex_y[a] + w1 * (vertex_y[b] - vertex_y[a]) + w2 * (vertex_y[c] - vertex_y[a]),
+                              vertex_z[a] + w1 * (vertex_z[b] - vertex_z[a]) + w2 * (vertex_z[c] - vertex_z[a])};
+  return point;
 }
 
 // NDRange (texture width, texture height). Texels that read beside their place in the lattice, and are held by nothing,
@@ -150,8 +152,9 @@ kernel void walk_to_positions(const int texture_width, const int texture_height,
                                    poles, across, u_high, u_low, v_high, v_low, row_high, row_low);
 }
 
-// NDRange (texture width, texture height). Every texel reads at its place in the lattice plus its offset, in cells.
-kernel void read_surface(const int texture_width, const int texture_height, const int triangle_count, global const int* restrict texel_patches,
+// NDRange: one work-group per row, of any size, as in reconstruct.cl. Every texel of the rows (lattice_rows) reads at its place in the lattice plus its
+// offset, in cells; those that no triangle covers keep their points.
+kernel void read_surface(const int row_count, const int texture_width, const int triangle_count, global const int* restrict lattice_rows,
                          global const int* restrict texel_triangles, global const int* restrict corners, global const int* restrict turns,
                          global const int* restrict poles, global const float* restrict u_high, global const float* restrict u_low,
                          global const float* restrict v_high, global const float* restrict v_low, global const float* restrict vertex_x,
@@ -159,16 +162,21 @@ kernel void read_surface(const int texture_width, const int texture_height, cons
                          global const float* restrict row_high, global const float* restrict row_low, global const float* restrict offset_x,
                          global const float* restrict offset_y, global float* restrict x, global float* restrict y, global float* restrict z,
                          global int* restrict is_triangle_read) {
-  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
-  if (column >= texture_width || line >= texture_height) return;
-  const int texel = line * texture_width + column;
-  const int t = texel_triangles[texel];
-  if (t == NO_TRIANGLE) return;
-  global const PatchRecord* p = patches + texel_patches[texel];
-  const float3 point = read_point(t, column - p->x, offset_x[texel], p->width, p->row_begin + line - p->y, offset_y[texel], triangle_count, corners, turns,
-                                  poles, u_high, u_low, v_high, v_low, vertex_x, vertex_y, vertex_z, row_high, row_low);
-  x[texel] = point.x, y[texel] = point.y, z[texel] = point.z;
-  is_triangle_read[t] = 1;
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  global const PatchRecord* restrict p = patches + lattice_rows[4 * k];
+  const int width = p->width, row = p->row_begin + lattice_rows[4 * k + 1];
+  const int first = (p->y + lattice_rows[4 * k + 1]) * texture_width + p->x;
+  for (int j = get_local_id(0); j < width; j += ROW_ITEMS) {
+    const int texel = first + j, is_covered = texel_triangles[texel] != NO_TRIANGLE, t = min(texel_triangles[texel], triangle_count - 1);
+    const SurfacePoint point = read_point(t, j, offset_x[texel], width, row, offset_y[texel], triangle_count, corners, turns, poles, u_high, u_low, v_high,
+                                          v_low, vertex_x, vertex_y, vertex_z, row_high, row_low);
+    const float px = is_covered ? point.x : x[texel], py = is_covered ? point.y : y[texel], pz = is_covered ? point.z : z[texel];
+    x[texel] = px, y[texel] = py, z[texel] = pz;
+  }
+  // Apart, as it writes to chance places.
+  for (int j = get_local_id(0); j < width; j += ROW_ITEMS)
+    if (texel_triangles[first + j] != NO_TRIANGLE) is_triangle_read[texel_triangles[first + j]] = 1;
 }
 
 // NDRange: count. Both for a list of texels that nothing holds; what covers their places stays.
@@ -190,7 +198,7 @@ kernel void read_listed(const int count, const int texture_width, const int tria
   const float beside = offset_x[texel], above = offset_y[texel];
   if (beside != 0.0f || above != 0.0f)
     t = walk_to(t, column, beside, p->width, row, above, triangle_count, corners, turns, poles, across, u_high, u_low, v_high, v_low, row_high, row_low);
-  const float3 point = read_point(t, column, beside, p->width, row, above, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low, vertex_x,
+  const SurfacePoint point = read_point(t, column, beside, p->width, row, above, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low, vertex_x,
                                   vertex_y, vertex_z, row_high, row_low);
   x[texel] = point.x, y[texel] = point.y, z[texel] = point.z;
   is_triangle_read[t] = 1;
@@ -237,23 +245,29 @@ kernel void place_points(const int count, global const int* restrict texels, glo
   z[texel] = from_z[i];
 }
 
-// NDRange (texture width, texture height). The prefilter, of inner rows that nothing holds; end rows stay.
-kernel void prefilter_positions(const int texture_width, const int texture_height, global const int* restrict texel_patches,
-                                global const PatchRecord* restrict patches, global const int* restrict anchors, global const float* restrict x, global const float* restrict y,
-                                global const float* restrict z, global float* restrict out_x, global float* restrict out_y, global float* restrict out_z) {
-  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
-  if (column >= texture_width || line >= texture_height) return;
-  const int texel = line * texture_width + column;
-  float px = x[texel], py = y[texel], pz = z[texel];
-  const int patch = texel_patches[texel];
-  if (patch >= 0) {
-    global const PatchRecord* p = patches + patch;
-    const int row = line - p->y, inner = column - p->x;
-    if (row > 0 && row < p->height - 1 && anchors[texel] == 0)
-      prefilter_point(x, y, z, texel, texel - inner + (inner == 0 ? p->width - 1 : inner - 1), texel - inner + (inner == p->width - 1 ? 0 : inner + 1),
-                      texel - texture_width, texel + texture_width, &px, &py, &pz);
+// NDRange: one work-group per row, of any size, as in reconstruct.cl. The prefilter, of inner rows (lattice_rows); texels that are held stay.
+kernel void prefilter_positions(const int row_count, const int texture_width, global const int* restrict lattice_rows,
+                                global const PatchRecord* restrict patches, global const int* restrict anchors, global const float* restrict x,
+                                global const float* restrict y, global const float* restrict z, global float* restrict out_x, global float* restrict out_y,
+                                global float* restrict out_z) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  global const PatchRecord* restrict p = patches + lattice_rows[4 * k];
+  const int width = p->width, texel = (p->y + lattice_rows[4 * k + 1]) * texture_width + p->x;
+  // What wraps round apart from the rest; see lattice.cl for `one`.
+  const int one = min(width, 1);
+  for (int j = 1 + get_local_id(0); j < width - 1; j += ROW_ITEMS) {
+    const int own = texel + j, is_held = anchors[own] != 0;
+    const FilteredPoint q = prefilter_point(x, y, z, own, own - one, own + one, own - texture_width, own + texture_width);
+    const float px = is_held ? x[own] : q.x, py = is_held ? y[own] : q.y, pz = is_held ? z[own] : q.z;
+    out_x[own] = px, out_y[own] = py, out_z[own] = pz;
   }
-  out_x[texel] = px, out_y[texel] = py, out_z[texel] = pz;
+  for (int side = get_local_id(0); side < 2; side += ROW_ITEMS) {
+    const int own = side == 0 ? texel : texel + width - 1;
+    const FilteredPoint q = prefilter_point(x, y, z, own, side == 0 ? texel + width - 1 : own - 1, side == 0 ? texel + 1 : texel, own - texture_width,
+                                            own + texture_width);
+    if (anchors[own] == 0) out_x[own] = q.x, out_y[own] = q.y, out_z[own] = q.z;
+  }
 }
 
 // NDRange (texture width, texture height).

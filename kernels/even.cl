@@ -88,8 +88,8 @@ kernel void prefilter_rows(const int row_count, global const int* restrict latti
   const int vertex = lattice_rows[4 * k + 2], width = patches[lattice_rows[4 * k]].width;
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
     const int own = vertex + j;
-    float px, py, pz;
-    prefilter_point(at_x, at_y, at_z, own, j > 0 ? own - 1 : own + width - 1, j + 1 < width ? own + 1 : vertex, own - width, own + width, &px, &py, &pz);
-    x[own] = px, y[own] = py, z[own] = pz;
+    const FilteredPoint p =
+        prefilter_point(at_x, at_y, at_z, own, j > 0 ? own - 1 : own + width - 1, j + 1 < width ? own + 1 : vertex, own - width, own + width);
+    x[own] = p.x, y[own] = p.y, z[own] = p.z;
   }
 }

@@ -76,19 +76,19 @@ kernel void read_samples(const int texture_width, const int texture_height, cons
     const float dx = s + (1.0f - q) * ((1.0f - s) * offset_x[at[0]] + s * offset_x[at[1]]) + q * ((1.0f - s) * offset_x[at[3]] + s * offset_x[at[2]]);
     const float dy = q + (1.0f - q) * ((1.0f - s) * offset_y[at[0]] + s * offset_y[at[1]]) + q * ((1.0f - s) * offset_y[at[3]] + s * offset_y[at[2]]);
     const int rows_up = clamp((int)floor(dy), -row, p->height - 2 - row);
-    float w1 = 0.0f, w2 = 0.0f;
+    CornerWeights w = {0.0f, 0.0f};
     for (int steps = 0; steps < 1000; ++steps) {
       const MapTriangle m = load_triangle(t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
       const float u = row_offset(m, row_high, row_low, p->row_begin + row + rows_up, clamp(dy - (float)rows_up, 0.0f, 1.0f));
-      weights_at(m, u, turned_offset(m, inner, dx, p->width), &w1, &w2);
-      const float w0 = 1.0f - w1 - w2;
-      const float least = fmin(w0, fmin(w1, w2));
+      w = weights_at(m, u, turned_offset(m, inner, dx, p->width));
+      const float w0 = 1.0f - w.w1 - w.w2;
+      const float least = fmin(w0, fmin(w.w1, w.w2));
       if (!(least < -1e-6f)) break;
-      const int next = across[(least == w0 ? 0 : least == w1 ? 1 : 2) * triangle_count + t];
+      const int next = across[(least == w0 ? 0 : least == w.w1 ? 1 : 2) * triangle_count + t];
       if (next < 0) break;
       t = next;
     }
-    w1 = fmax(0.0f, w1), w2 = fmax(0.0f, w2);
+    float w1 = fmax(0.0f, w.w1), w2 = fmax(0.0f, w.w2);
     const float sum = w1 + w2;
     if (sum > 1.0f) w1 /= sum, w2 /= sum;
     const Point a = point_at(vertex_x, vertex_y, vertex_z, corners[t]);

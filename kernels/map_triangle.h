@@ -13,7 +13,7 @@ typedef struct MapTriangle {
   int pole;  // 0, -1: head's, +1: tail's at corner 2 (then du2 reaches the pole's row and dv2 is unused)
 } MapTriangle;
 
-MapTriangle load_triangle(int t, int triangle_count, global const int* restrict corners, global const int* restrict turns, global const int* restrict poles,
+__attribute__((always_inline)) MapTriangle load_triangle(int t, int triangle_count, global const int* restrict corners, global const int* restrict turns, global const int* restrict poles,
                           global const float* restrict u_high, global const float* restrict u_low, global const float* restrict v_high,
                           global const float* restrict v_low) {
   const int a = corners[t], b = corners[triangle_count + t], c = corners[2 * triangle_count + t];
@@ -32,46 +32,49 @@ MapTriangle load_triangle(int t, int triangle_count, global const int* restrict 
 }
 
 // v of a column from the triangle's base.
-float column_offset(MapTriangle m, int column, int width) {
+__attribute__((always_inline)) float column_offset(MapTriangle m, int column, int width) {
   const float high = (float)column / (float)width;
   const float low = fma(-high, (float)width, (float)column) / (float)width;
   return (high - m.v_base_high) + (low - m.v_base_low);
 }
 
 // u from the triangle's base of a reading position: a row of the table, and the share of the way to the next one.
-float row_offset(MapTriangle m, global const float* restrict row_high, global const float* restrict row_low, int row, float share) {
+__attribute__((always_inline)) float row_offset(MapTriangle m, global const float* restrict row_high, global const float* restrict row_low, int row, float share) {
   const int next = share < 0.0f ? row - 1 : share > 0.0f ? row + 1 : row;
   const float span = (row_high[next] - row_high[row]) + (row_low[next] - row_low[row]);
   return ((row_high[row] - m.u_base_high) + (row_low[row] - m.u_base_low)) + fabs(share) * span;
 }
 
-// Where a map's triangle has a point at (u, v), both from the triangle's base: the weights of corners 1 and 2. They are
-// negative, or their sum is above 1, outside the triangle.
-void weights_at(MapTriangle m, float u, float v, float* w1, float* w2) {
-  if (m.pole == 0) {
-    // Scaled by the extents, so that products of tiny differences stay in range.
-    const float scale_u = 1.0f / fmax(fmax(fabs(m.du1), fabs(m.du2)), 1e-30f), scale_v = 1.0f / fmax(fmax(fabs(m.dv1), fabs(m.dv2)), 1e-30f);
-    const float a1 = m.du1 * scale_u, b1 = m.dv1 * scale_v, a2 = m.du2 * scale_u, b2 = m.dv2 * scale_v;
-    const float pu = u * scale_u, pv = v * scale_v;
-    const float determinant = a1 * b2 - a2 * b1;
-    const float inverse = determinant == 0.0f ? 0.0f : 1.0f / determinant;
-    *w1 = (pu * b2 - a2 * pv) * inverse;
-    *w2 = (a1 * pv - pu * b1) * inverse;
-  } else {
-    const float lambda = m.dv1 == 0.0f ? 0.0f : v / m.dv1;
-    const float edge = lambda * m.du1;
-    const float rest = m.du2 - edge;
-    const float tau = rest == 0.0f ? 1.0f : (u - edge) / rest;
-    *w1 = (1.0f - tau) * lambda;
-    *w2 = tau;
-  }
+// Weights of corners 1 and 2. (By value: see prefilter.h.)
+typedef struct CornerWeights {
+  float w1, w2;
+} CornerWeights;
+
+// Where a map's triangle has a point at (u, v), both from the triangle's base. Weights are negative, or their sum is above 1, outside
+// the triangle. Without branches: loops around it become vector instructions.
+__attribute__((always_inline)) CornerWeights weights_at(MapTriangle m, float u, float v) {
+  // Scaled by the extents, so that products of tiny differences stay in range.
+  const float scale_u = 1.0f / fmax(fmax(fabs(m.du1), fabs(m.du2)), 1e-30f), scale_v = 1.0f / fmax(fmax(fabs(m.dv1), fabs(m.dv2)), 1e-30f);
+  const float a1 = m.du1 * scale_u, b1 = m.dv1 * scale_v, a2 = m.du2 * scale_u, b2 = m.dv2 * scale_v;
+  const float pu = u * scale_u, pv = v * scale_v;
+  const float determinant = a1 * b2 - a2 * b1;
+  const float inverse = determinant == 0.0f ? 0.0f : 1.0f / determinant;
+  // The trapezoid between the edge 0-1 and the pole's row.
+  const float lambda = m.dv1 == 0.0f ? 0.0f : v / m.dv1;
+  const float edge = lambda * m.du1;
+  const float rest = m.du2 - edge;
+  const float tau = rest == 0.0f ? 1.0f : (u - edge) / rest;
+  const int is_plain = m.pole == 0;
+  const CornerWeights w = {is_plain ? (pu * b2 - a2 * pv) * inverse : (1.0f - tau) * lambda, is_plain ? (a1 * pv - pu * b1) * inverse : tau};
+  return w;
 }
 
 // v from the triangle's base of a reading position, at the turn that lies nearest to the triangle's middle.
-float turned_offset(MapTriangle m, int column, float share, int width) {
+__attribute__((always_inline)) float turned_offset(MapTriangle m, int column, float share, int width) {
   const float middle = m.pole == 0 ? (m.dv1 + m.dv2) / 3.0f : 0.5f * m.dv1;
   const float beside = share / (float)width;
-  const int lift = (int)rint(middle - (column_offset(m, column, width) + beside));
+  // Rounded to the nearest: rint() would not become one instruction.
+  const int lift = (int)(((middle - (column_offset(m, column, width) + beside)) + 12582912.0f) - 12582912.0f);
   return column_offset(m, column + lift * width, width) + beside;
 }
 

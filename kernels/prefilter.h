@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Flat triangles over points on a surface lie on its inner side where it is convex. So points move by -1/16 of their second differences in
 // both lattice directions, along the lattice's normal. Planes of points; numbers of a point and of its neighbours.
-void prefilter_point(global const float* restrict x, global const float* restrict y, global const float* restrict z, int own, int left, int right,
-                     int below, int above, float* px, float* py, float* pz) {
+// (By value: through pointers PoCL's compiler no longer sees that the loops around it may become vector instructions.)
+typedef struct FilteredPoint {
+  float x, y, z;
+} FilteredPoint;
+
+__attribute__((always_inline)) FilteredPoint prefilter_point(global const float* restrict x, global const float* restrict y, global const float* restrict z, int own, int left, int right,
+                     int below, int above) {
   const float ux = x[above] - x[below], uy = y[above] - y[below], uz = z[above] - z[below];
   const float vx = x[right] - x[left], vy = y[right] - y[left], vz = z[right] - z[left];
   const float nx = vy * uz - vz * uy, ny = vz * ux - vx * uz, nz = vx * uy - vy * ux;
@@ -11,5 +16,6 @@ void prefilter_point(global const float* restrict x, global const float* restric
   const float dy = (y[above] - y[own]) + (y[below] - y[own]) + (y[right] - y[own]) + (y[left] - y[own]);
   const float dz = (z[above] - z[own]) + (z[below] - z[own]) + (z[right] - z[own]) + (z[left] - z[own]);
   const float move = length2 > 0.0f ? -0.0625f * (dx * nx + dy * ny + dz * nz) / length2 : 0.0f;
-  *px = x[own] + move * nx, *py = y[own] + move * ny, *pz = z[own] + move * nz;
+  const FilteredPoint p = {x[own] + move * nx, y[own] + move * ny, z[own] + move * nz};
+  return p;
 }

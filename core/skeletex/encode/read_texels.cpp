@@ -151,6 +151,8 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   const std::size_t texels = layout.size();
   const auto rows = context.upload(tables.rows);
   const auto columns = context.upload(tables.columns);
+  const auto inner_rows = context.upload(lattice_rows({sources.patches.begin(), sources.patches.end()}, RowChoice::kInner));
+  const int inner_row_count = static_cast<int>(inner_rows.size);
   TexelPoints points = allocate_points(context, texels);
   context.fill(points.x, 0.f), context.fill(points.y, 0.f), context.fill(points.z, 0.f);
   ReadingPositions positions = even_positions(context, layout);
@@ -163,7 +165,7 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   auto is_read = context.allocate<int>(std::max(1, maps.triangle_count));
   context.fill(is_read, 0);
   const auto read = [&](const ClBuffer<int>& triangles) {
-    context.launch({"encode.cl", "read_surface"}, layout.range(), texture_width, texture_height, maps.triangle_count, layout.texel_patches, triangles,
+    context.launch({"encode.cl", "read_surface"}, row_range(context, inner_rows.size), inner_row_count, texture_width, maps.triangle_count, inner_rows, triangles,
                    maps.corners, maps.turns, maps.poles, maps.u_high, maps.u_low, maps.v_high, maps.v_low, maps.x, maps.y, maps.z, layout.patches,
                    maps.row_high, maps.row_low, positions.x, positions.y, points.x, points.y, points.z, is_read);
   };
@@ -239,9 +241,9 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   }
 
   const auto prefilter = [&](const TexelPoints& from, const ClBuffer<int>& held) {
-    TexelPoints filtered = allocate_points(context, texels);
-    context.launch({"encode.cl", "prefilter_positions"}, layout.range(), texture_width, texture_height, layout.texel_patches, layout.patches, held, from.x,
-                   from.y, from.z, filtered.x, filtered.y, filtered.z);
+    TexelPoints filtered = copy_points(context, from);
+    context.launch({"encode.cl", "prefilter_positions"}, row_range(context, inner_rows.size), inner_row_count, texture_width, inner_rows, layout.patches, held,
+                   from.x, from.y, from.z, filtered.x, filtered.y, filtered.z);
     return filtered;
   };
   if (is_fitted) result.report.fit = fit_points(context, layout, maps, covering, positions, points);
