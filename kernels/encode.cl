@@ -152,7 +152,7 @@ kernel void walk_to_positions(const int texture_width, const int texture_height,
                                    poles, across, u_high, u_low, v_high, v_low, row_high, row_low);
 }
 
-// NDRange: one work-group per row, of any size, as in reconstruct.cl. Every texel of the rows (lattice_rows) reads at its place in the lattice plus its
+// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. Every texel of the rows (lattice_rows) reads at its place in the lattice plus its
 // offset, in cells; those that no triangle covers keep their points.
 kernel void read_surface(const int row_count, const int texture_width, const int triangle_count, global const int* restrict lattice_rows,
                          global const int* restrict texel_triangles, global const int* restrict corners, global const int* restrict turns,
@@ -245,7 +245,7 @@ kernel void place_points(const int count, global const int* restrict texels, glo
   z[texel] = from_z[i];
 }
 
-// NDRange: one work-group per row, of any size, as in reconstruct.cl. The prefilter, of inner rows (lattice_rows); texels that are held stay.
+// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. The prefilter, of inner rows (lattice_rows); texels that are held stay.
 kernel void prefilter_positions(const int row_count, const int texture_width, global const int* restrict lattice_rows,
                                 global const PatchRecord* restrict patches, global const int* restrict anchors, global const float* restrict x,
                                 global const float* restrict y, global const float* restrict z, global float* restrict out_x, global float* restrict out_y,

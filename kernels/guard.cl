@@ -65,7 +65,7 @@ __attribute__((always_inline)) float suspicion2_of_quad(int texel, int right, in
               suspicion2_of(either(is_second, b, a), c, d, either(is_second, at_b, at_a), at_c, at_d));
 }
 
-// NDRange: one work-group per row, of any size, as in reconstruct.cl. A triangle whose corners lie on the mesh leaves it by about half its
+// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. A triangle whose corners lie on the mesh leaves it by about half its
 // longest side times the sine of the angle to the mesh at its corners: a chord over a crease.
 // in   lattice_rows: those that quads begin at; texel_triangles: per texel a triangle of the mesh there, of all texels of a patch or of none
 // out  suspicions2: per quad that distance, squared, the larger of both triangles'; infinite where one looks against the mesh at a

@@ -25,7 +25,7 @@ int second_diagonal_at(int texel, int column, int width, int texture_width, int 
                          has_before, has_after, is_smooth, x, y, z);
 }
 
-// NDRange: one work-group per row, of any size, as in reconstruct.cl; lattice_rows: the rows that quads begin at.
+// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl; lattice_rows: the rows that quads begin at.
 // out  diagonals: per texel 1 for the second
 kernel void choose_diagonals(const int row_count, const int texture_width, const int is_smooth, global const int* restrict lattice_rows,
                              global const PatchRecord* restrict patches, global const float* restrict x, global const float* restrict y,
