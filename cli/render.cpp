@@ -116,7 +116,7 @@ Subject load_subject(const Arguments& arguments, ClContext& context) {
     subject.mesh = load_mesh(arguments.input);
     if (arguments.mode == "segments") {
       require_valid(subject.mesh, *subject.skeleton);
-      Segmentation segmentation = segment_mesh(context, build_half_edges(subject.mesh), *subject.skeleton);
+      Segmentation segmentation = segment_mesh(context, subject.mesh, *subject.skeleton);
       subject.mesh = std::move(segmentation.cut_mesh);
       subject.bones = std::move(segmentation.triangle_bones);
     }

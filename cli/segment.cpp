@@ -37,9 +37,9 @@ void run(const Arguments& arguments) {
     context.reset_profile();
     bar.show("segmenting", 0.5);
     Stopwatch watch;
-    const HalfEdgeMesh half_edges = build_half_edges(mesh);
+    CutMesh half_edges = cut_mesh_of(mesh);
     half_edge_ms = watch.lap_ms();
-    segmentation = segment_mesh(context, half_edges, skeleton);
+    segmentation = segment_mesh(context, std::move(half_edges), skeleton);
     segmentation_ms = watch.lap_ms();
     bar.show("writing", 0.9);
     std::vector<VertexColour> colours;

@@ -15,6 +15,7 @@
 #include "skeletex/model/walls.h"
 #include "skeletex/segment/cells.h"
 #include "skeletex/segment/check_skeleton.h"
+#include "skeletex/segment/half_edge.h"
 #include "support/load_model.h"
 #include "support/random_skeleton.h"
 #include "support/segment_twin.h"
@@ -29,7 +30,7 @@ ClContext& context() {
 }
 
 Segmentation segment(const TriangleMesh& mesh, const Skeleton& skeleton) {
-  return segment_mesh(context(), build_half_edges(mesh), skeleton);
+  return segment_mesh(context(), mesh, skeleton);
 }
 
 std::vector<double> bone_areas(const Segmentation& segmentation) {
@@ -416,6 +417,35 @@ TEST(HalfEdge, KeepsNumbersAndCounts) {
   }
 }
 
+TEST(CutMesh, LinksTheHalfEdgesOfClosedSurfacesAndRefusesAllElse) {
+  const TriangleMesh closed = y_shape(0.3).mesh;
+  const CutMesh mesh = cut_mesh_of(closed);
+  ASSERT_EQ(mesh.origins.size(), 3 * closed.triangles.size());
+  for (int h = 0; h < static_cast<int>(mesh.origins.size()); ++h) {
+    EXPECT_EQ(mesh.origins[h], closed.triangles[h / 3][h % 3]);
+    EXPECT_EQ(mesh.opposites[mesh.opposites[h]], h);
+    EXPECT_EQ(mesh.origins[mesh.opposites[h]], mesh.target(h));
+  }
+  TriangleMesh open = closed;
+  open.triangles.pop_back();
+  EXPECT_THROW(cut_mesh_of(open), InputError);
+  TriangleMesh twice = closed;
+  twice.triangles.push_back(closed.triangles[0]);
+  EXPECT_THROW(cut_mesh_of(twice), InputError);
+  TriangleMesh beyond = closed;
+  beyond.triangles[5][1] = static_cast<int>(closed.positions.size());
+  EXPECT_THROW(cut_mesh_of(beyond), InputError);
+  // Two bodies that share a vertex.
+  TriangleMesh touching = closed;
+  const int count = static_cast<int>(closed.positions.size());
+  for (const Vec3& p : closed.positions) touching.positions.push_back(p + Vec3(9, 0, 0));
+  for (Triangle t : closed.triangles) {
+    for (int& v : t) v = v == 0 ? 0 : v + count;
+    touching.triangles.push_back(t);
+  }
+  EXPECT_THROW(cut_mesh_of(touching), InputError);
+}
+
 TEST(HalfEdge, RefusesWhatIsNoSurfaceAndNamesTheTriangle) {
   const auto message = [](const TriangleMesh& mesh) {
     try {
@@ -448,7 +478,7 @@ TEST(WindingNumber, IsTheSolidAngle) {
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
   const TriangleMesh mesh = theta_shape(0.3).mesh;
-  const CutMesh half_edges = cut_mesh_of(build_half_edges(mesh));
+  const CutMesh half_edges = cut_mesh_of(mesh);
   const BoundingBox box = bounding_box(mesh);
   for (int k = 0; k < 300; ++k) {
     Vec3 p;
@@ -460,7 +490,7 @@ TEST(WindingNumber, IsTheSolidAngle) {
       const Vec3 a = mesh.positions[t[0]] - p, b = mesh.positions[t[1]] - p, c = mesh.positions[t[2]] - p;
       angle += 2 * std::atan2(a.dot(b.cross(c)), a.norm() * b.norm() * c.norm() + a.dot(b) * c.norm() + b.dot(c) * a.norm() + c.dot(a) * b.norm());
     }
-    EXPECT_EQ(winding_number(half_edges, p), std::lround(angle / (4 * std::numbers::pi))) << p.transpose();
+    EXPECT_EQ(winding_number(half_edges.positions, half_edges.origins, p), std::lround(angle / (4 * std::numbers::pi))) << p.transpose();
   }
 }
 

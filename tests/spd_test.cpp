@@ -353,7 +353,7 @@ TEST(Spd, EveryRayOfRealModelsMeetsThemAndAllOfABearIsSeen) {
     SCOPED_TRACE(name);
     const TestModel model = load_standard_model(name);
     const Walls walls(model.skeleton);
-    const Segmentation segmentation = segment_mesh(context(), build_half_edges(model.mesh), model.skeleton);
+    const Segmentation segmentation = segment_mesh(context(), model.mesh, model.skeleton);
     std::vector<Chart> charts;
     std::vector<Patch> patches;
     for (const Segment& segment : segmentation.segments) {

@@ -274,7 +274,7 @@ TEST(Validate, ABoneThroughTheSurfaceIsShownWithAllItsCrossings) {
   EXPECT_MENTIONS(f.message, "out at (");
   EXPECT_MENTIONS(f.message, "in at (");
   const SurfaceProbe probe(shape.mesh);
-  EXPECT_GT(probe.winding_numbers(std::vector<Vec3>{point_in(f.remedy)})[0], 0.99) << "the new node lies in the body: " << f.remedy;
+  EXPECT_GT(probe.winding_numbers(std::vector<Vec3>{point_in(f.remedy)}, true)[0], 0.99) << "the new node lies in the body: " << f.remedy;
   EXPECT_MENTIONS(finding(findings, "genus").message, "1 handle (its genus), but the skeleton has 2 independent cycles");
   EXPECT_FALSE(rules(findings).contains("node-inside"));
 }
@@ -400,11 +400,13 @@ TEST(Validate, EverythingIsSaidAtOnce) {
 TEST(Validate, TheSurfaceProbeKnowsInsideNearestAndCrossings) {
   const TriangleMesh mesh = torus_shape().mesh;  // core radius 2, tube 0.5
   const SurfaceProbe probe(mesh);
-  const std::vector<double> windings = probe.winding_numbers(std::vector<Vec3>{{2, 0, 0}, {0, 0, 0}, {0, 2.3, 0.1}, {9, 9, 9}});
-  EXPECT_NEAR(windings[0], 1, 1e-9);
-  EXPECT_NEAR(windings[1], 0, 1e-9);
-  EXPECT_NEAR(windings[2], 1, 1e-9);
-  EXPECT_NEAR(windings[3], 0, 1e-9);
+  for (const bool is_closed : {true, false}) {
+    const std::vector<double> windings = probe.winding_numbers(std::vector<Vec3>{{2, 0, 0}, {0, 0, 0}, {0, 2.3, 0.1}, {9, 9, 9}}, is_closed);
+    EXPECT_NEAR(windings[0], 1, 1e-9);
+    EXPECT_NEAR(windings[1], 0, 1e-9);
+    EXPECT_NEAR(windings[2], 1, 1e-9);
+    EXPECT_NEAR(windings[3], 0, 1e-9);
+  }
   const NearestPoint nearest = probe.nearest(Vec3(2, 0, 1));
   EXPECT_NEAR(nearest.distance, 0.5, 0.01);
   EXPECT_GT(nearest.normal.z(), 0.95);

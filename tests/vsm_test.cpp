@@ -234,7 +234,7 @@ std::vector<Chart> charts_of_model(const std::string& name) {
   const TestModel model = load_standard_model(name);
   const Walls walls(model.skeleton);
   std::vector<Chart> charts;
-  for (const Segment& segment : segment_mesh(context(), build_half_edges(model.mesh), model.skeleton).segments)
+  for (const Segment& segment : segment_mesh(context(), model.mesh, model.skeleton).segments)
     charts.push_back(make_chart(segment, model.skeleton, walls));
   return charts;
 }

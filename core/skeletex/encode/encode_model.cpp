@@ -180,10 +180,10 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
 
   Stopwatch watch;
   progress("half edges", 0);
-  const HalfEdgeMesh half_edges = build_half_edges(mesh);
+  CutMesh half_edges = cut_mesh_of(mesh);
   report.half_edge_ms = watch.lap();
   progress("segmentation", 0.05);
-  const Segmentation segmentation = segment_mesh(context, half_edges, skeleton);
+  const Segmentation segmentation = segment_mesh(context, std::move(half_edges), skeleton);
   report.segmentation_ms = watch.lap();
 
   progress("parameterization", 0.2);

@@ -16,14 +16,17 @@ constexpr double kUniformPart = 1e-4;
 /// lowers the maximum (docs/encoding.md).
 constexpr double kExponent = 1.25;
 
-/// Integral up to u of a width that rises linearly from `low` to `middle`, falls to `high`, and has the total `area`.
-double hat_integral(double u, double low, double middle, double high, double area) {
-  if (u <= low) return 0;
-  if (u >= high) return area;
-  const double peak = 2 * area / (high - low);
-  if (u < middle) return peak * (u - low) * (u - low) / (2 * (middle - low));
-  return area - peak * (high - u) * (high - u) / (2 * (high - middle));
-}
+/// A width that rises linearly from `low` to `middle`, falls to `high`, and has the total `area`.
+struct Hat {
+  double low, middle, high, area;
+  double rise = middle > low ? area / ((high - low) * (middle - low)) : 0, fall = high > middle ? area / ((high - low) * (high - middle)) : 0;
+
+  double integral_to(double u) const {
+    if (u <= low) return 0;
+    if (u >= high) return area;
+    return u < middle ? rise * (u - low) * (u - low) : area - fall * (high - u) * (high - u);
+  }
+};
 
 /// Integrals over bins of u, of |dP/du| and of its power.
 struct Bins {
@@ -83,9 +86,10 @@ RowProfile row_profile(const Chart& chart) {
     std::size_t bin = std::upper_bound(bins.borders.begin(), bins.borders.end(), low) - bins.borders.begin();
     bin = bin == 0 ? 0 : bin - 1;
     const double density_power = std::pow(density, kExponent);
-    double before = hat_integral(bins.borders[bin], low, middle, high, area);
+    const Hat hat{low, middle, high, area};
+    double before = hat.integral_to(bins.borders[bin]);
     for (; bin < bins.length.size() && bins.borders[bin] < high; ++bin) {
-      const double after = hat_integral(bins.borders[bin + 1], low, middle, high, area);
+      const double after = hat.integral_to(bins.borders[bin + 1]);
       bins.add(bin, after - before, density, density_power);
       before = after;
     }

@@ -9,7 +9,7 @@
 #include <numeric>
 
 #include "skeletex/model/parallel.h"
-#include "skeletex/parameterize/half_edge_table.h"
+#include "skeletex/model/half_edge_table.h"
 
 namespace skeletex {
 namespace {

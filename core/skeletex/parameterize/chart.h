@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "skeletex/model/half_edge_table.h"
 #include "skeletex/model/segment.h"
 #include "skeletex/model/walls.h"
-#include "skeletex/parameterize/half_edge_table.h"
 
 namespace skeletex {
 

@@ -15,11 +15,11 @@ namespace skeletex {
 
 /// Crossings of the ray from the point along +z, with sign. Sides of edges are found from the lower vertex, and vertices
 /// at the ray's y count as above it, so neighbouring triangles never both or neither claim the ray.
-int winding_number(const CutMesh& mesh, const Vec3& point) {
-  const auto is_above = [&](int v) { return mesh.positions[v].y() >= point.y(); };
+int winding_number(std::span<const Vec3> positions, std::span<const int> corners, const Vec3& point) {
+  const auto is_above = [&](int v) { return positions[v].y() >= point.y(); };
   int winding = 0;
-  for (std::size_t base = 0; base < mesh.origins.size(); base += 3) {
-    const int* v = &mesh.origins[base];
+  for (std::size_t base = 0; base < corners.size(); base += 3) {
+    const int* v = &corners[base];
     const bool a = is_above(v[0]), b = is_above(v[1]), c = is_above(v[2]);
     if (a == b && b == c) continue;
     int sign = 0;  // of the triangle around the ray, seen from +z
@@ -28,13 +28,13 @@ int winding_number(const CutMesh& mesh, const Vec3& point) {
       const bool is_i_above = is_above(i);
       if (is_i_above == is_above(j)) continue;
       if (i > j) std::swap(i, j);
-      const Vec3 &p = mesh.positions[i], &q = mesh.positions[j];
+      const Vec3 &p = positions[i], &q = positions[j];
       // x at which the edge meets the ray's plane
       const double x = p.x() + (point.y() - p.y()) / (q.y() - p.y()) * (q.x() - p.x());
       if (x > point.x()) sign += is_i_above ? -1 : 1;
     }
     if (sign == 0) continue;
-    const Vec3 &p = mesh.positions[v[0]], &q = mesh.positions[v[1]], &r = mesh.positions[v[2]];
+    const Vec3 &p = positions[v[0]], &q = positions[v[1]], &r = positions[v[2]];
     const Vec3 normal = (q - p).cross(r - p);
     // Over or under the point: the plane's z at the point's x, y.
     if ((point - p).dot(normal) * (normal.z() > 0 ? 1 : -1) < 0) winding += sign;
@@ -94,7 +94,7 @@ void check_skeleton_inside(const CutMesh& mesh, const Skeleton& skeleton) {
   for (const Bone& bone : skeleton.bones) is_used[bone.head] = is_used[bone.tail] = true;
   std::vector<int> windings(skeleton.nodes.size(), 1);
   for_each_block(windings.size(), 1, [&](std::size_t n, std::size_t, std::size_t) {
-    if (is_used[n]) windings[n] = winding_number(mesh, skeleton.nodes[n].position);
+    if (is_used[n]) windings[n] = winding_number(mesh.positions, mesh.origins, skeleton.nodes[n].position);
   });
   for (std::size_t n = 0; n < skeleton.nodes.size(); ++n) {
     const Node& node = skeleton.nodes[n];

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <span>
+
 #include "skeletex/model/skeleton.h"
 #include "skeletex/segment/cut.h"
 
@@ -10,6 +12,7 @@ namespace skeletex {
 void check_skeleton_inside(const CutMesh& mesh, const Skeleton& skeleton);
 
 /// How often a closed mesh winds around a point off its surface: 1 inside, 0 outside, -1 inside a mesh that is inside out.
-int winding_number(const CutMesh& mesh, const Vec3& point);
+/// \param corners  three vertices per triangle
+int winding_number(std::span<const Vec3> positions, std::span<const int> corners, const Vec3& point);
 
 }  // namespace skeletex

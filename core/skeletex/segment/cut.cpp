@@ -1,41 +1,77 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/segment/cut.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <numbers>
 #include <numeric>
 
+#include "skeletex/model/error.h"
+#include "skeletex/model/half_edge_table.h"
+#include "skeletex/model/parallel.h"
+#include "skeletex/segment/half_edge.h"
+
 namespace skeletex {
 
-CutMesh cut_mesh_of(const HalfEdgeMesh& mesh) {
-  CutMesh cut;
-  cut.positions.reserve(mesh.n_vertices());
-  for (const auto v : mesh.vertices()) {
-    const auto& p = mesh.point(v);
-    cut.positions.emplace_back(p[0], p[1], p[2]);
-  }
-  std::vector<int> index(mesh.n_halfedges(), -1);
-  std::vector<OpenMesh::HalfedgeHandle> handles(3 * mesh.n_faces());
-  for (const auto f : mesh.faces()) {
-    auto h = mesh.halfedge_handle(f);
-    for (int c = 0; c < 3; ++c) {
-      index[h.idx()] = 3 * f.idx() + c;
-      handles[3 * f.idx() + c] = h;
-      h = mesh.next_halfedge_handle(h);
+namespace {
+
+/// Every directed edge once and its opposite as well, and one fan of triangles around each vertex.
+bool is_closed_surface(const HalfEdgeTable& table, int vertex_count) {
+  for (int h = 0; h < static_cast<int>(table.twins.size()); ++h)
+    if (table.twins[h] < 0 || table.twins[table.twins[h]] != h) return false;
+  std::atomic<bool> is_closed = true;
+  for_each_block(vertex_count, 4096, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) {
+      const int valence = table.begin[v + 1] - table.begin[v];
+      if (valence == 0) continue;
+      const int first = table.outgoing[table.begin[v]];
+      int count = 0, h = first;
+      do h = table.turn_left(h), ++count;
+      while (h != first && count <= valence);
+      if (count != valence) is_closed = false;
     }
-  }
-  cut.origins.resize(handles.size());
-  cut.opposites.resize(handles.size());
-  for (std::size_t h = 0; h < handles.size(); ++h) {
-    cut.origins[h] = mesh.from_vertex_handle(handles[h]).idx();
-    cut.opposites[h] = index[mesh.opposite_halfedge_handle(handles[h]).idx()];
-  }
-  cut.seams.assign(handles.size(), -1);
+  });
+  return is_closed;
+}
+
+bool has_good_triangles(const TriangleMesh& mesh) {
+  const int count = static_cast<int>(mesh.positions.size());
+  return std::all_of(mesh.triangles.begin(), mesh.triangles.end(), [&](const Triangle& t) {
+    return t[0] != t[1] && t[1] != t[2] && t[2] != t[0] && std::all_of(t.begin(), t.end(), [&](int v) { return v >= 0 && v < count; });
+  });
+}
+
+/// OpenMesh says where.
+[[noreturn]] void throw_not_closed(const TriangleMesh& mesh) {
+  const HalfEdgeMesh half_edges = build_half_edges(mesh);
+  for (const auto h : half_edges.halfedges())
+    if (half_edges.is_boundary(h)) {
+      const auto& p = half_edges.point(half_edges.from_vertex_handle(h));
+      throw InputError(fmt::format("the mesh is not closed: there is a hole at ({:.6g}, {:.6g}, {:.6g}); close it", p[0], p[1], p[2]));
+    }
+  throw InputError("the mesh is no closed surface; make it 2-manifold and consistently oriented");
+}
+
+}  // namespace
+
+CutMesh cut_mesh_of(const TriangleMesh& mesh) {
+  if (!has_good_triangles(mesh)) throw_not_closed(mesh);
+  const int count = static_cast<int>(mesh.positions.size());
+  HalfEdgeTable table = link_half_edges(mesh.triangles, count);
+  if (!is_closed_surface(table, count)) throw_not_closed(mesh);
+  CutMesh cut;
+  cut.positions = mesh.positions;
+  cut.origins.reserve(table.twins.size());
+  for (const Triangle& t : mesh.triangles) cut.origins.insert(cut.origins.end(), t.begin(), t.end());
+  cut.opposites = std::move(table.twins);
+  cut.seams.assign(cut.origins.size(), -1);
   return cut;
 }
 

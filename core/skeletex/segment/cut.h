@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "skeletex/model/mesh.h"
 #include "skeletex/segment/cells.h"
-#include "skeletex/segment/half_edge.h"
 
 namespace skeletex {
 
@@ -20,7 +20,8 @@ struct CutMesh {
   int target(int h) const { return origins[next(h)]; }
 };
 
-CutMesh cut_mesh_of(const HalfEdgeMesh& mesh);
+/// \throw InputError when the mesh is no closed, oriented 2-manifold
+CutMesh cut_mesh_of(const TriangleMesh& mesh);
 
 enum class CutStatus {
   kCut,

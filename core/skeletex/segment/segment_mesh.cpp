@@ -34,11 +34,11 @@ struct HalfEdgeLoop {
 
 class Segmenter {
  public:
-  Segmenter(ClContext& context, const HalfEdgeMesh& half_edges, const Skeleton& skeleton, const SegmentOptions& options)
-      : context_(context), half_edges_(half_edges), skeleton_(skeleton), options_(options), walls_(skeleton) {}
+  Segmenter(ClContext& context, CutMesh mesh, const Skeleton& skeleton, const SegmentOptions& options)
+      : context_(context), skeleton_(skeleton), options_(options), walls_(skeleton), mesh_(std::move(mesh)),
+        genus_(1 - (static_cast<int>(mesh_.positions.size()) - mesh_.triangle_count() / 2) / 2) {}
 
   Segmentation run() {
-    mesh_ = cut_mesh_of(half_edges_);
     check_skeleton_inside(mesh_, skeleton_);
     cut();
     flood();
@@ -63,11 +63,11 @@ class Segmenter {
   double turn(int bone, int node, int vertex) const { return walls_.turn_of(bone, position(vertex) - skeleton_.nodes[node].position); }
 
   ClContext& context_;
-  const HalfEdgeMesh& half_edges_;
   const Skeleton& skeleton_;
   const SegmentOptions& options_;
   Walls walls_;
   CutMesh mesh_;
+  int genus_;  // Euler's formula for a closed triangle mesh: edges are 3/2 of the triangles
   std::vector<SeamSide> sides_;
   std::vector<std::uint8_t> seam_degree_;  // seams that meet at a vertex
   std::vector<std::array<std::vector<HalfEdgeLoop>, 2>> loops_;  // per bone and end
@@ -154,18 +154,15 @@ void Segmenter::flood() {
               for (const Bone& bone : skeleton_.bones) is_used[bone.head] = is_used[bone.tail] = true;
               return bone_count - static_cast<int>(std::count(is_used.begin(), is_used.end(), true)) + 1;
             };
-            const int genus = 1 - (static_cast<int>(half_edges_.n_vertices()) - static_cast<int>(half_edges_.n_edges()) +
-                                   static_cast<int>(half_edges_.n_faces())) /
-                                      2;
             std::string remedy = a.node == b.node
                                      ? fmt::format("the walls at node \"{}\" do not close around the body; move the node, or turn the bones there",
                                                    node_name(a.node))
                                      : fmt::format("the walls at node \"{}\" or at node \"{}\" reach another part of the body; move one of them, or "
                                                    "put a node in between",
                                                    node_name(a.node), node_name(b.node));
-            if (genus != count_cycles())
-              remedy = fmt::format("the mesh has {} handle{} and the skeleton {} ring{} of bones; lay one ring through every handle", genus,
-                                   genus == 1 ? "" : "s", count_cycles(), count_cycles() == 1 ? "" : "s");
+            if (genus_ != count_cycles())
+              remedy = fmt::format("the mesh has {} handle{} and the skeleton {} ring{} of bones; lay one ring through every handle", genus_,
+                                   genus_ == 1 ? "" : "s", count_cycles(), count_cycles() == 1 ? "" : "s");
             throw TopologyError(fmt::format("bone \"{}\": its surface runs over into that of bone \"{}\", from {} at node \"{}\" to {} at node "
                                             "\"{}\" without a wall between; {}",
                                             bone_name(a.bone.bone), bone_name(b.bone.bone), text_of(position(mesh_.origins[seam])),
@@ -388,17 +385,12 @@ void Segmenter::build_segments() {
 
 }  // namespace
 
-Segmentation segment_mesh(ClContext& context, const HalfEdgeMesh& mesh, const Skeleton& skeleton, const SegmentOptions& options) {
+Segmentation segment_mesh(ClContext& context, CutMesh mesh, const Skeleton& skeleton, const SegmentOptions& options) {
   if (skeleton.bones.empty()) throw InputError("the skeleton has no bones; give it at least one");
-  if (mesh.n_faces() == 0) throw InputError("the mesh has no triangles");
-  for (const auto v : mesh.vertices())
-    if (!std::isfinite(mesh.point(v).sqrnorm())) throw InputError(fmt::format("vertex {} of the mesh has no finite position; remove it", v.idx()));
-  for (const auto h : mesh.halfedges())
-    if (mesh.is_boundary(h)) {
-      const auto& p = mesh.point(mesh.from_vertex_handle(h));
-      throw InputError(fmt::format("the mesh is not closed: there is a hole at ({:.6g}, {:.6g}, {:.6g}); close it", p[0], p[1], p[2]));
-    }
-  return Segmenter(context, mesh, skeleton, options).run();
+  if (mesh.origins.empty()) throw InputError("the mesh has no triangles");
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+    if (!std::isfinite(mesh.positions[v].squaredNorm())) throw InputError(fmt::format("vertex {} of the mesh has no finite position; remove it", v));
+  return Segmenter(context, std::move(mesh), skeleton, options).run();
 }
 
 }  // namespace skeletex

@@ -2,7 +2,7 @@
 #pragma once
 #include "skeletex/cl/context.h"
 #include "skeletex/model/segment.h"
-#include "skeletex/segment/half_edge.h"
+#include "skeletex/segment/cut.h"
 
 namespace skeletex {
 
@@ -16,6 +16,9 @@ struct SegmentOptions {
 /// to the mesh's, and depend neither on the order of vertices and triangles nor on that of bones and nodes.
 /// \pre the mesh is closed, oriented outwards, 2-manifold and connected; the skeleton's nodes lie inside
 /// \throw TopologyError naming bone and node, the rule that broke, the point, and what to move
-Segmentation segment_mesh(ClContext& context, const HalfEdgeMesh& mesh, const Skeleton& skeleton, const SegmentOptions& options = {});
+Segmentation segment_mesh(ClContext& context, CutMesh mesh, const Skeleton& skeleton, const SegmentOptions& options = {});
+inline Segmentation segment_mesh(ClContext& context, const TriangleMesh& mesh, const Skeleton& skeleton, const SegmentOptions& options = {}) {
+  return segment_mesh(context, cut_mesh_of(mesh), skeleton, options);
+}
 
 }  // namespace skeletex

@@ -237,7 +237,7 @@ void find_between(const SurfaceProbe& surface, bool is_closed, const Skeleton& s
     nodes.push_back(n);
     points.push_back(skeleton.nodes[n].position);
   }
-  const std::vector<double> windings = surface.winding_numbers(points);
+  const std::vector<double> windings = surface.winding_numbers(points, is_closed);
   const char* doubt = is_closed ? "" : " (as far as a surface that is not closed has an inside)";
 
   std::vector<bool> is_outside(skeleton.nodes.size(), false);

@@ -10,6 +10,7 @@
 
 #include "skeletex/measure/point_triangle.h"
 #include "skeletex/model/parallel.h"
+#include "skeletex/segment/check_skeleton.h"
 
 namespace skeletex {
 namespace {
@@ -25,8 +26,15 @@ double solid_angle(const Vec3& p, const Vec3& q, const Vec3& r, const Vec3& from
 
 }  // namespace
 
-std::vector<double> SurfaceProbe::winding_numbers(std::span<const Vec3> points) const {
+std::vector<double> SurfaceProbe::winding_numbers(std::span<const Vec3> points, bool is_closed) const {
   const std::size_t count = mesh_.triangles.size();
+  std::vector<double> windings(points.size(), 0);
+  if (is_closed) {
+    static_assert(sizeof(Triangle) == 3 * sizeof(int));
+    const std::span corners(mesh_.triangles.data()->data(), 3 * count);
+    for_each_block(points.size(), 1, [&](std::size_t i, std::size_t, std::size_t) { windings[i] = winding_number(mesh_.positions, corners, points[i]); });
+    return windings;
+  }
   std::vector<std::vector<double>> sums(block_count(count, kBlock));
   for_each_block(count, kBlock, [&](std::size_t block, std::size_t begin, std::size_t end) {
     sums[block].assign(points.size(), 0);
@@ -36,7 +44,6 @@ std::vector<double> SurfaceProbe::winding_numbers(std::span<const Vec3> points) 
         sums[block][i] += solid_angle(mesh_.positions[a], mesh_.positions[b], mesh_.positions[c], points[i]);
     }
   });
-  std::vector<double> windings(points.size(), 0);
   for (const auto& sum : sums)
     for (std::size_t i = 0; i < points.size(); ++i) windings[i] += sum[i] / (4 * std::numbers::pi);
   return windings;

@@ -27,9 +27,9 @@ class SurfaceProbe {
   explicit SurfaceProbe(const TriangleMesh& mesh) : mesh_(mesh), diagonal_(bounding_box(mesh).diagonal()) {}
 
   double diagonal() const { return diagonal_; }
-  /// How often the surface winds around each point, by solid angles: a whole number for a closed surface, something in
-  /// between near the holes of an open one.
-  std::vector<double> winding_numbers(std::span<const Vec3> points) const;
+  /// How often the surface winds around each point: a whole number for a closed surface, found by rays; something in between near the holes
+  /// of an open one, by solid angles.
+  std::vector<double> winding_numbers(std::span<const Vec3> points, bool is_closed) const;
   NearestPoint nearest(const Vec3& point) const;
   /// All crossings from begin to end, in that order.
   std::vector<Crossing> crossings(const Vec3& begin, const Vec3& end) const;

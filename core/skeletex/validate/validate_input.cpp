@@ -8,7 +8,6 @@
 
 #include "skeletex/measure/self_intersection.h"
 #include "skeletex/model/error.h"
-#include "skeletex/segment/half_edge.h"
 #include "skeletex/segment/segment_mesh.h"
 #include "skeletex/validate/findings.h"
 
@@ -55,7 +54,7 @@ std::vector<Finding> validate_before_segmentation(TriangleMesh& mesh, const Skel
   const TriangleMesh surface = usable_surface(mesh, report);
   const double unit = surface.triangles.empty() ? diagonal : bounding_box(surface).diagonal();
   const bool is_usable_skeleton = find_in_skeleton(skeleton, unit, findings);
-  if (is_usable_skeleton && !surface.triangles.empty()) find_between(SurfaceProbe(surface), is_closed, skeleton, findings);
+  if (is_usable_skeleton && !surface.triangles.empty()) find_between(SurfaceProbe(surface), is_good_mesh, skeleton, findings);
   if (is_usable_skeleton && is_closed && report.components == 1) {
     const int cycles = count_cycles(skeleton);
     if (cycles != report.genus)
@@ -74,7 +73,7 @@ std::vector<Finding> validate_input(ClContext& context, TriangleMesh& mesh, cons
   std::vector<Finding> findings = validate_before_segmentation(mesh, skeleton);
   if (has_errors(findings)) return findings;
   try {
-    segment_mesh(context, build_half_edges(mesh), skeleton);
+    segment_mesh(context, mesh, skeleton);
   } catch (const TopologyError& error) {
     findings.push_back(finding_of(error));
   } catch (const InputError& error) {

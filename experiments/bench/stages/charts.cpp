@@ -8,7 +8,7 @@ namespace skeletex {
 ChartSet charts_of(ClContext& context, const MeshInput& input) {
   const Walls walls(input.skeleton);
   ChartSet set;
-  for (const Segment& segment : segment_mesh(context, build_half_edges(input.mesh), input.skeleton).segments) {
+  for (const Segment& segment : segment_mesh(context, input.mesh, input.skeleton).segments) {
     set.charts.push_back(make_chart(segment, input.skeleton, walls));
     set.areas.push_back(surface_area(segment.mesh));
   }

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "skeletex/segment/half_edge.h"
 #include "skeletex/segment/segment_mesh.h"
 #include "stages.h"
 
@@ -10,7 +11,7 @@ Stage segment_stage(ClContext& context, MeshInputPointer input) {
   stage.model = input->name;
   stage.size = static_cast<int>(input->mesh.triangles.size());
   stage.reference = "OpenMesh taking in the same faces, one pass";
-  stage.run = [&context, input] { segment_mesh(context, build_half_edges(input->mesh), input->skeleton); };
+  stage.run = [&context, input] { segment_mesh(context, input->mesh, input->skeleton); };
   stage.run_reference = [input] {
     return wall_ms([&] {
       HalfEdgeMesh mesh;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/parameterize/half_edge_table.h"
+#include "skeletex/model/half_edge_table.h"
 
 #include <numeric>
 
