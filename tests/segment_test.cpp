@@ -422,7 +422,7 @@ TEST(CutMesh, LinksTheHalfEdgesOfClosedSurfacesAndRefusesAllElse) {
   const CutMesh mesh = cut_mesh_of(closed);
   ASSERT_EQ(mesh.origins.size(), 3 * closed.triangles.size());
   for (int h = 0; h < static_cast<int>(mesh.origins.size()); ++h) {
-    EXPECT_EQ(mesh.origins[h], closed.triangles[h / 3][h % 3]);
+    EXPECT_EQ(mesh.origins[h], closed.triangles[h / 3][(h + 2) % 3]);
     EXPECT_EQ(mesh.opposites[mesh.opposites[h]], h);
     EXPECT_EQ(mesh.origins[mesh.opposites[h]], mesh.target(h));
   }

@@ -64,13 +64,17 @@ bool has_good_triangles(const TriangleMesh& mesh) {
 CutMesh cut_mesh_of(const TriangleMesh& mesh) {
   if (!has_good_triangles(mesh)) throw_not_closed(mesh);
   const int count = static_cast<int>(mesh.positions.size());
-  HalfEdgeTable table = link_half_edges(mesh.triangles, count);
+  const HalfEdgeTable table = link_half_edges(mesh.triangles, count);
   if (!is_closed_surface(table, count)) throw_not_closed(mesh);
   CutMesh cut;
   cut.positions = mesh.positions;
-  cut.origins.reserve(table.twins.size());
-  for (const Triangle& t : mesh.triangles) cut.origins.insert(cut.origins.end(), t.begin(), t.end());
-  cut.opposites = std::move(table.twins);
+  // A triangle's last corner comes first, as in OpenMesh: results and messages stay those of earlier versions to the last digit.
+  cut.origins.resize(table.twins.size()), cut.opposites.resize(table.twins.size());
+  for (int h = 0; h < static_cast<int>(table.twins.size()); ++h) {
+    const int at = CutMesh::next(h);
+    cut.origins[at] = mesh.triangles[h / 3][h % 3];
+    cut.opposites[at] = CutMesh::next(table.twins[h]);
+  }
   cut.seams.assign(cut.origins.size(), -1);
   return cut;
 }

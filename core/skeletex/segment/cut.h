@@ -20,6 +20,7 @@ struct CutMesh {
   int target(int h) const { return origins[next(h)]; }
 };
 
+/// Corner c is the triangle's corner (c + 2) % 3.
 /// \throw InputError when the mesh is no closed, oriented 2-manifold
 CutMesh cut_mesh_of(const TriangleMesh& mesh);
 
