@@ -152,7 +152,6 @@ void run(const Arguments& arguments) {
   }
   print(arguments.json, table.text() + fmt::format("medians; on {}\n", context.device().name));
   write_json(arguments.json, json);
-  context.save_programs();
 }
 
 }  // namespace

@@ -235,7 +235,6 @@ void run(const Arguments& arguments, const CLI::App& command) {
   json["kernels"] = profile_json(context);
   print(arguments.json, report_text(result.report, options, arguments.output));
   write_json(arguments.json, json);
-  context.save_programs();
 }
 
 }  // namespace

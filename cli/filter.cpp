@@ -90,7 +90,6 @@ void run_curvature(const Arguments& arguments) {
                               {"times_ms", {{"filter", ms}}},
                               {"device", context.device().name},
                               {"kernels", profile_json(context)}});
-  context.save_programs();
 }
 
 FilterResult apply_filter(ClContext& context, const SkeletexModel& model, Arguments arguments) {
@@ -130,7 +129,6 @@ void run(const Arguments& arguments) {
                               {"times_ms", {{"filter", filter_ms}, {"write", write_ms}}},
                               {"device", context.device().name},
                               {"kernels", profile_json(context)}});
-  context.save_programs();
 }
 
 }  // namespace

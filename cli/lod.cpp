@@ -50,7 +50,6 @@ void run(const Arguments& arguments) {
   json["kernels"] = profile_json(context);
   print(arguments.json, text + arguments.output + "\n");
   write_json(arguments.json, json);
-  context.save_programs();
 }
 
 }  // namespace

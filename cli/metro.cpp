@@ -100,7 +100,6 @@ void run(const Arguments& arguments) {
             {"kernels", profile_json(context)}};
   if (!arguments.ply.empty()) json["ply_scale"] = {0, scale};
   write_json(arguments.json, json);
-  context.save_programs();
 }
 
 }  // namespace

@@ -112,7 +112,6 @@ void run(const Arguments& arguments) {
   json["kernels"] = profile_json(context);
   print(arguments.json, text);
   write_json(arguments.json, json);
-  context.save_programs();
 }
 
 }  // namespace

@@ -90,7 +90,6 @@ void run(const Arguments& arguments) {
                                 {"total", total_ms}}},
                               {"device", context.device().name},
                               {"kernels", profile_json(context)}});
-  context.save_programs();
 }
 
 }  // namespace

@@ -278,7 +278,6 @@ void run(Arguments arguments) {
             {"renderer", gl.renderer()}};
   if (!scale.colours.empty()) json["error_max"] = scale.highest;
   write_json(arguments.json, json);
-  context.save_programs();
 }
 
 }  // namespace

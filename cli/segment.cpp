@@ -73,7 +73,6 @@ void run(const Arguments& arguments) {
                               {"times_ms", {{"half_edge", half_edge_ms}, {"segmentation", segmentation_ms}}},
                               {"device", context.device().name},
                               {"kernels", profile_json(context)}});
-  context.save_programs();
 }
 
 }  // namespace

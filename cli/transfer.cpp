@@ -116,7 +116,6 @@ void run(const Arguments& arguments) {
   json["kernels"] = profile_json(context);
   print(arguments.json, fmt::format("{}\n", arguments.output));
   write_json(arguments.json, json);
-  context.save_programs();
 }
 
 }  // namespace

@@ -56,7 +56,6 @@ void run(const Arguments& arguments) {
                               {"vertices", mesh.positions.size()},
                               {"triangles", mesh.triangles.size()},
                               {"bones", skeleton.bones.size()}});
-  context.save_programs();
   if (errors > 0) throw CLI::RuntimeError(kExitBad);
 }
 

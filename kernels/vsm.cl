@@ -63,6 +63,10 @@ float power_of_two(int exponent) { return as_float(clamp(exponent + 127, 0, 254)
 
 // VSM_SINGLE: groups of one work-item, which need no barriers; CPU compilers turn each barrier in a loop into a
 // loop over work-items, which takes them seconds to tens of seconds.
+#if ROW_ITEMS == 1 && !defined(VSM_BARRIERS)
+#define VSM_SINGLE
+#endif
+
 #ifdef VSM_SINGLE
 #define VSM_GROUP __attribute__((reqd_work_group_size(1, 1, 1)))
 #define VSM_BARRIER()

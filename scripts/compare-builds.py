@@ -41,7 +41,7 @@ def build(revision, folder):
 def bench(program, folder, arguments):
     """One run in this project's folder, which has the meshes. Kernels' caches are the program's own."""
     report = folder / "bench.json"
-    environment = {**os.environ, "POCL_CACHE_DIR": str(program.parent / "pocl"), "SKELETEX_CACHE_DIR": str(program.parent / "programs")}
+    environment = {**os.environ, "POCL_CACHE_DIR": str(program.parent / "pocl")}
     done = subprocess.run([program, "bench", *arguments, "--json", report], cwd=SOURCE, env=environment, capture_output=True, text=True)
     if done.returncode != 0:
         sys.exit(f"{program} bench: {done.stderr.strip()}")

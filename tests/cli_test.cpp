@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -431,6 +432,40 @@ TEST_F(Program, GivesTheSameBytesTwice) {
   ASSERT_EQ(run({"encode", "y.ply", "y.skeleton.json", "-o", "twin.skx.exr", "--size", "64"}).code, 0);
   EXPECT_TRUE(text_of(folder_ / "twin.skx.exr") == text_of(folder_ / "y.skx.exr"));
   fs::remove(folder_ / "twin.skx.exr");
+}
+
+TEST_F(Program, CompilesEachKernelOnceAndNothingInASecondProcess) {
+  const char* const own = std::getenv("POCL_CACHE_DIR");
+  const std::string before = own ? own : "";
+  const fs::path cache = folder_ / "kernels";
+  fs::create_directory(cache);
+  ::setenv("POCL_CACHE_DIR", cache.c_str(), 1);
+  const auto encode = [] { return run({"encode", "y.ply", "y.skeleton.json", "-o", "c.skx.exr", "--size", "64", "--no-snap", "--no-fit"}).code; };
+  const auto compiled = [&] {
+    std::map<fs::path, fs::file_time_type> files;
+    for (const auto& entry : fs::recursive_directory_iterator(cache))
+      if (entry.path().extension() == ".so" || entry.path().extension() == ".bc") files[entry.path()] = entry.last_write_time();
+    return files;
+  };
+  const int first_code = encode();
+  const auto first = compiled();
+  const int second_code = encode();
+  const auto second = compiled();
+  own ? ::setenv("POCL_CACHE_DIR", before.c_str(), 1) : ::unsetenv("POCL_CACHE_DIR");
+  EXPECT_EQ(first_code, 0);
+  EXPECT_EQ(second_code, 0);
+  if (first.empty()) GTEST_SKIP() << "the device is none of PoCL's";
+  EXPECT_EQ(first, second);
+  // Folders: a program, a kernel, its versions by size of work-groups.
+  std::set<fs::path> programs, kernels;
+  for (const auto& [path, time] : first) {
+    if (path.extension() == ".bc")
+      EXPECT_TRUE(programs.insert(path.parent_path()).second) << path;
+    else
+      EXPECT_TRUE(kernels.insert(path.parent_path().parent_path()).second) << path;
+  }
+  EXPECT_EQ(programs.size(), 1u);
+  EXPECT_GT(kernels.size(), 5u);
 }
 
 TEST_F(Program, TakesThePapersRecipeAndItsPartsAlike) {

@@ -10,7 +10,6 @@
 #include <numeric>
 
 #include "skeletex/cl/kernel_source.h"
-#include "skeletex/cl/program_cache.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
@@ -48,30 +47,19 @@ class Kernels : public ::testing::Test {
     ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
     folder_ = pattern;
     ::setenv("SKELETEX_KERNEL_DIR", folder_.c_str(), 1);
-    ::setenv("SKELETEX_CACHE_DIR", "off", 1);
     write("scale.cl", kScaleKernel);
   }
   void TearDown() override {
     ::unsetenv("SKELETEX_KERNEL_DIR");
-    ::setenv("SKELETEX_CACHE_DIR", "off", 1);
     std::error_code ignored;
     std::filesystem::permissions(folder_, std::filesystem::perms::owner_all, ignored);
     std::filesystem::remove_all(folder_, ignored);
   }
   void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name, std::ios::binary) << text; }
-  std::filesystem::path use_cache() const {
-    ::setenv("SKELETEX_CACHE_DIR", (folder_ / "cache").c_str(), 1);
-    return folder_ / "cache";
-  }
   static std::vector<float> scaled(ClContext& context, const std::string& options = "") {
     auto buffer = context.upload(std::vector<float>{1, 2, 3.5f});
     context.launch({"scale.cl", "scale", options}, 3, buffer, 3, 2.0f);
     return context.download(buffer);
-  }
-  static std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder) {
-    std::vector<std::filesystem::path> files;
-    for (const auto& entry : std::filesystem::directory_iterator(folder)) files.push_back(entry.path());
-    return files;
   }
   const std::vector<float> twice_{2, 4, 7};
   std::filesystem::path folder_;
@@ -131,13 +119,28 @@ TEST(Context, BuildsEveryKernelFileOfTheLibraryAsItStands) {
   ClContext context;
   for (const EmbeddedKernelFile& file : embedded_kernel_files()) {
     if (!file.name.ends_with(".cl")) continue;
-    const std::string text = kernel_source(file.name);
+    const std::string text = kernel_source(std::vector<std::string_view>{file.name});
     const std::size_t begin = text.find("\n__kernel") == std::string::npos ? text.find("\nkernel") : text.find("\n__kernel");
     ASSERT_NE(begin, std::string::npos) << file.name;
     const std::size_t name = text.find("void ", begin) + 5;
     const std::string kernel = text.substr(name, text.find('(', name) - name);
     EXPECT_GT(context.work_group_size({file.name, kernel}, 64), 0u) << file.name;
   }
+}
+
+TEST(Context, BuildsFilesOfOneProgramTogetherAndEachHeaderOnce) {
+  const auto files = files_of_program("encode.cl");
+  EXPECT_EQ(files, files_of_program("vsm.cl"));
+  EXPECT_EQ(files_of_program("fit.cl"), std::vector<std::string_view>{"fit.cl"});
+  const std::string text = kernel_source(files);
+  for (const std::string_view file : files) expect_contains(text, "#line 1 \"" + std::string(file) + "\"");
+  for (const EmbeddedKernelFile& file : embedded_kernel_files())
+    if (file.name != files_of_program(file.name).back()) {
+      EXPECT_EQ(file.text.find("#pragma OPENCL"), std::string_view::npos) << file.name << ": the pragma would hold for the files after it";
+    }
+  const std::string header = "#line 1 \"skeletex_structs.h\"";
+  expect_contains(text, header);
+  EXPECT_EQ(text.find(header), text.rfind(header));
 }
 
 TEST_F(Kernels, ComeFromTheFolderThatTheVariableNames) {
@@ -234,6 +237,18 @@ TEST_F(Kernels, RefuseAWorkGroupThatTheDeviceCannotRun) {
   EXPECT_LE(context.work_group_size({"scale.cl", "scale"}, too_large), context.device().max_work_group_size);
 }
 
+TEST_F(Kernels, AreBuiltAgainWhenSourceOrOptionsChange) {
+  write("scale.cl", "#include \"by.h\"\n__kernel void scale(__global float* restrict values, const int count, const float factor) {\n"
+                    "  const int i = (int)get_global_id(0);\n  if (i < count) values[i] = BY(values[i], factor);\n}\n");
+  write("by.h", "#ifdef ANOTHER\n#define BY(x, y) ((x) - (y))\n#else\n#define BY(x, y) ((x) * (y))\n#endif\n");
+  ClContext context;
+  EXPECT_EQ(scaled(context), twice_);
+  EXPECT_EQ(scaled(context, "-DANOTHER"), (std::vector<float>{-1, 0, 1.5f}));
+  write("by.h", "#define BY(x, y) ((x) + (y))\n");
+  ClContext changed;
+  EXPECT_EQ(scaled(changed), (std::vector<float>{3, 4, 5.5f}));
+}
+
 TEST_F(Kernels, AreTimedByName) {
   ClContext context;
   for (int i = 0; i < 3; ++i) scaled(context);
@@ -244,96 +259,6 @@ TEST_F(Kernels, AreTimedByName) {
   EXPECT_GT(profile[0].milliseconds, 0);
   context.reset_profile();
   EXPECT_TRUE(context.profile().empty());
-}
-
-TEST_F(Kernels, ComeFromTheCacheOnDiskAtTheNextStart) {
-  const auto cache = use_cache();
-  {
-    ClContext context;
-    EXPECT_EQ(scaled(context), twice_);
-    EXPECT_EQ(context.save_programs(), 1);
-    EXPECT_EQ(context.save_programs(), 0);
-    EXPECT_EQ(context.cached_program_count(), 0);
-  }
-  ASSERT_EQ(files_in(cache).size(), 1u);
-  ClContext context;
-  EXPECT_EQ(scaled(context), twice_);
-  EXPECT_EQ(context.cached_program_count(), 1);
-  EXPECT_EQ(context.save_programs(), 0);
-}
-
-TEST_F(Kernels, AreBuiltAgainWhenSourceOrOptionsChange) {
-  use_cache();
-  {
-    ClContext context;
-    scaled(context);
-    context.save_programs();
-  }
-  ClContext context;
-  scaled(context, "-DANOTHER");
-  EXPECT_EQ(context.cached_program_count(), 0);
-  std::string text = kScaleKernel;
-  text.replace(text.find("*= factor"), 9, "+= factor");
-  write("scale.cl", text);
-  ClContext changed;
-  EXPECT_EQ(scaled(changed), (std::vector<float>{3, 4, 5.5f}));
-  EXPECT_EQ(changed.cached_program_count(), 0);
-}
-
-TEST_F(Kernels, AreBuiltAgainWhenTheCacheIsDamaged) {
-  const auto cache = use_cache();
-  {
-    ClContext context;
-    scaled(context);
-    context.save_programs();
-  }
-  const auto entry = files_in(cache).front();
-  std::ifstream in(entry, std::ios::binary);
-  const std::string good((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-  std::vector<std::string> bad{
-      "", good.substr(0, 10), good.substr(0, good.size() / 2), good.substr(0, good.size() - 1), good + "x", std::string(good.size(), '\0')};
-  bad.push_back(good);
-  bad.back()[good.size() - 100] = static_cast<char>(bad.back()[good.size() - 100] ^ 1);
-  for (const std::string& text : bad) {
-    std::ofstream(entry, std::ios::binary) << text;
-    ClContext context;
-    EXPECT_EQ(scaled(context), twice_);
-    EXPECT_EQ(context.cached_program_count(), 0);
-  }
-  std::ofstream(entry, std::ios::binary) << good;
-  ClContext context;
-  EXPECT_EQ(scaled(context), twice_);
-  EXPECT_EQ(context.cached_program_count(), 1);
-}
-
-TEST_F(Kernels, RunWithoutACacheThatCannotBeWritten) {
-  write("file", "");
-  ::setenv("SKELETEX_CACHE_DIR", (folder_ / "file" / "cache").c_str(), 1);
-  ClContext context;
-  EXPECT_EQ(scaled(context), twice_);
-  EXPECT_EQ(context.save_programs(), 0);
-}
-
-TEST_F(Kernels, AreNotSavedWhenTheCacheIsOff) {
-  for (const char* off : {"off", ""}) {
-    ::setenv("SKELETEX_CACHE_DIR", off, 1);
-    EXPECT_TRUE(program_cache_folder().empty());
-    ClContext context;
-    scaled(context);
-    EXPECT_EQ(context.save_programs(), 0);
-  }
-}
-
-TEST(ProgramCache, LiesBelowTheUsersCacheFolder) {
-  ::unsetenv("SKELETEX_CACHE_DIR");
-  ::setenv("XDG_CACHE_HOME", "/a", 1);
-  EXPECT_EQ(program_cache_folder(), "/a/skeletex");
-  ::unsetenv("XDG_CACHE_HOME");
-  ::setenv("HOME", "/b", 1);
-  EXPECT_EQ(program_cache_folder(), "/b/.cache/skeletex");
-  ::setenv("SKELETEX_CACHE_DIR", "/c", 1);
-  EXPECT_EQ(program_cache_folder(), "/c");
-  ::setenv("SKELETEX_CACHE_DIR", "off", 1);
 }
 
 }  // namespace skeletex

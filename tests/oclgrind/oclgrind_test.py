@@ -68,7 +68,7 @@ def run(name, arguments, kernels=SOURCE / "kernels"):
     log, report = WORK / f"{name}.log", WORK / f"{name}.json"
     environment = {**os.environ, "LD_PRELOAD": f"{SHIM}:{OCLGRIND}", "OCLGRIND_BUILD_OPTIONS": "-cl-opt-disable",
                    "OCLGRIND_UNINITIALIZED": "1", "OCLGRIND_DATA_RACES": "1", "OCLGRIND_CHECK_API": "1", "OCLGRIND_MAX_ERRORS": "20",
-                   "OCLGRIND_MAX_WGSIZE": "64", "OCLGRIND_LOG": str(log), "SKELETEX_KERNEL_DIR": str(kernels), "SKELETEX_CACHE_DIR": "off"}
+                   "OCLGRIND_MAX_WGSIZE": "64", "OCLGRIND_LOG": str(log), "SKELETEX_KERNEL_DIR": str(kernels)}
     done = subprocess.run([PROGRAM, *arguments.split(), "--json", report], cwd=WORK, env=environment, capture_output=True, text=True, timeout=500)
     reports = log.read_text() if log.exists() else ""
     if done.returncode != 0:

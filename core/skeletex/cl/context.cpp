@@ -10,7 +10,6 @@
 #include <functional>
 
 #include "skeletex/cl/kernel_source.h"
-#include "skeletex/cl/program_cache.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
@@ -156,7 +155,6 @@ ClContext::ClContext(const std::string& selector) {
   check(code, "creating an OpenCL context");
   queue_ = ::cl::CommandQueue(context_, device_, CL_QUEUE_PROFILING_ENABLE, &code);
   check(code, "creating an OpenCL queue");
-  cache_folder_ = program_cache_folder();
 }
 
 ClContext::~ClContext() = default;
@@ -185,23 +183,14 @@ void ClContext::fill_bytes(const ::cl::Buffer& buffer, const void* pattern, std:
 }
 
 ::cl::Program ClContext::get_program(const ClKernelName& name) {
-  const std::string program_key = fmt::format("{}|{}", name.file, name.options);
-  if (const auto it = programs_.find(program_key); it != programs_.end()) return it->second.program;
+  const auto files = name.options.empty() ? files_of_program(name.file) : std::vector<std::string_view>{name.file};
+  const std::string program_key = fmt::format("{}|{}", files.front(), name.options);
+  if (const auto it = programs_.find(program_key); it != programs_.end()) return it->second;
 
-  const std::string options = fmt::format("-cl-std=CL1.2 -cl-kernel-arg-info -D ROW_ITEMS={} {}", row_items(), name.options);
+  const std::string options = fmt::format("-cl-std=CL1.2 -cl-kernel-arg-info -DROW_ITEMS={} {}", row_items(), name.options);
   // The hash guards against drivers whose kernel cache overlooks a change of options.
-  const std::string body = kernel_source(name.file);
+  const std::string body = kernel_source(files);
   const std::string source = fmt::format("// {:016x}\n{}", std::hash<std::string>{}(options + body), body);
-  const std::string cache_key = fmt::format("{}\n{}\n{}\n{}\n{}\n{}", info_.platform, info_.name, info_.driver, info_.version, options, source);
-
-  if (const auto binary = load_program_binary(cache_folder_, cache_key)) {
-    cl_int code = CL_SUCCESS;
-    ::cl::Program loaded(context_, {device_}, {*binary}, nullptr, &code);
-    if (code == CL_SUCCESS && loaded.build({device_}, options.c_str()) == CL_SUCCESS) {
-      ++cached_programs_;
-      return programs_.emplace(program_key, BuiltProgram{loaded, ""}).first->second.program;
-    }
-  }
   cl_int code = CL_SUCCESS;
   ::cl::Program built(context_, source, false, &code);
   check(code, fmt::format("{}: creating the program", name.file));
@@ -211,7 +200,7 @@ void ClContext::fill_bytes(const ::cl::Buffer& buffer, const void* pattern, std:
     built.getBuildInfo(device_, CL_PROGRAM_BUILD_LOG, &log);
     throw DeviceError(fmt::format("{}: {} on {}\n{}", name.file, describe(code), info_.name, quote_kernel_lines(log)));
   }
-  return programs_.emplace(program_key, BuiltProgram{built, cache_key}).first->second.program;
+  return programs_.emplace(program_key, built).first->second;
 }
 
 const ClContext::BuiltKernel& ClContext::get_kernel(const ClKernelName& name) {
@@ -225,23 +214,6 @@ const ClContext::BuiltKernel& ClContext::get_kernel(const ClKernelName& name) {
   std::vector<ClArgument> arguments;
   for (cl_uint i = 0; i < count; ++i) arguments.push_back(argument_kind(kernel, i));
   return kernels_.emplace(key, BuiltKernel{kernel, std::move(arguments)}).first->second;
-}
-
-int ClContext::save_programs() noexcept {
-  int saved = 0;
-  try {
-    if (cache_folder_.empty()) return 0;
-    for (auto& [name, built] : programs_) {
-      if (built.cache_key.empty()) continue;
-      cl_int code = CL_SUCCESS;
-      const auto binaries = built.program.getInfo<CL_PROGRAM_BINARIES>(&code);
-      if (code != CL_SUCCESS || binaries.size() != 1 || binaries[0].empty()) continue;
-      if (save_program_binary(cache_folder_, built.cache_key, binaries[0])) ++saved;
-      built.cache_key.clear();
-    }
-  } catch (...) {  // a cache is never a reason to fail
-  }
-  return saved;
 }
 
 void ClContext::check_arguments(const BuiltKernel& kernel, const ClKernelName& name, std::span<const ClArgument> given) {

@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <filesystem>
 #include <map>
-#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -124,8 +122,7 @@ class ClContext {
   }
 
   /// Queues a kernel. Arguments: ClBuffer, ClLocal, or trivially copyable scalars of the kernel's own types (int,
-  /// unsigned, float). Programs are built on first use and kept; an entry of the cache on disk replaces the build (see
-  /// program_cache.h and save_programs).
+  /// unsigned, float). Programs are built on first use and kept, see files_of_program.
   /// \throw DeviceError naming the kernel, the failing call and its code in words; the argument whose number or kind is
   ///        not the kernel's own (kinds where the driver tells them); for a build the log with the kernel file's lines
   template <class... Args>
@@ -141,14 +138,6 @@ class ClContext {
 
   /// Builds or loads the program of a kernel before its first launch.
   void prepare(const ClKernelName& name) { get_kernel(name); }
-
-  /// Puts the programs that this context built from source into the cache on disk. Costs about as much as building them
-  /// did (PoCL compiles each kernel again, for any work-group size); the next start saves the parsing. Tools call it
-  /// last, when the user has his results.
-  /// \return how many were written
-  int save_programs() noexcept;
-  /// Programs that this context took from the cache on disk.
-  int cached_program_count() const { return cached_programs_; }
 
   /// Launches since the last reset, by kernel, longest first. Waits for the queue.
   std::vector<ClProfileEntry> profile();
@@ -169,10 +158,6 @@ class ClContext {
   struct BuiltKernel {
     ::cl::Kernel kernel;
     std::vector<ClArgument> arguments;  ///< kUnknown where the driver does not tell
-  };
-  struct BuiltProgram {
-    ::cl::Program program;
-    std::string cache_key;  ///< empty: already in the cache
   };
   const BuiltKernel& get_kernel(const ClKernelName& name);
   ::cl::Program get_program(const ClKernelName& name);
@@ -219,10 +204,8 @@ class ClContext {
   ::cl::Device device_;
   ::cl::Context context_;
   ::cl::CommandQueue queue_;
-  std::filesystem::path cache_folder_;
-  std::map<std::string, BuiltProgram> programs_;
+  std::map<std::string, ::cl::Program> programs_;
   std::map<std::string, BuiltKernel> kernels_;
-  int cached_programs_ = 0;
   std::vector<PendingEvent> pending_;
   std::map<std::string, ClProfileEntry> profile_;
 };

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <charconv>
 #include <cstdlib>
@@ -16,6 +17,12 @@
 
 namespace skeletex {
 namespace {
+
+// A pragma of a file holds for those after it, so spd.cl, which has one, is last.
+const std::vector<std::vector<std::string_view>> kPrograms{{"segment.cl", "vsm.cl", "encode.cl", "unfold.cl", "spd.cl"},
+                                                           {"snap.cl", "guard.cl", "lattice.cl", "metro.cl"},
+                                                           {"reconstruct.cl", "pose.cl", "even.cl", "blend.cl", "transfer.cl"},
+                                                           {"filter.cl", "orientation.cl"}};
 
 std::string load(std::string_view file) {
   if (const char* folder = std::getenv("SKELETEX_KERNEL_DIR"); folder && *folder) {
@@ -31,24 +38,31 @@ std::string load(std::string_view file) {
   throw DeviceError(fmt::format("the library holds no kernel file \"{}\"", file));
 }
 
-void append_source(std::string& out, const std::string& file, std::vector<std::string>& open_files) {
-  if (std::find(open_files.begin(), open_files.end(), file) != open_files.end())
-    throw DeviceError(fmt::format("the kernel file \"{}\" includes itself", file));
-  open_files.push_back(file);
+struct Inclusion {
+  std::string file;
+  bool is_open = true;
+};
+
+void append_source(std::string& out, const std::string& file, std::vector<Inclusion>& included) {
+  const auto known = std::find_if(included.begin(), included.end(), [&](const Inclusion& other) { return other.file == file; });
+  if (known != included.end() && known->is_open) throw DeviceError(fmt::format("the kernel file \"{}\" includes itself", file));
+  if (known != included.end()) return;
+  const std::size_t index = included.size();
+  included.push_back({file});
   out += fmt::format("#line 1 \"{}\"\n", file);
   std::istringstream in(load(file));
   std::string line;
   for (int number = 1; std::getline(in, line); ++number) {
     constexpr std::string_view kInclude = "#include \"";
     if (line.starts_with(kInclude)) {
-      append_source(out, line.substr(kInclude.size(), line.find('"', kInclude.size()) - kInclude.size()), open_files);
+      append_source(out, line.substr(kInclude.size(), line.find('"', kInclude.size()) - kInclude.size()), included);
       out += fmt::format("#line {} \"{}\"\n", number + 1, file);
     } else {
       out += line;
       out += '\n';
     }
   }
-  open_files.pop_back();
+  included[index].is_open = false;
 }
 
 std::optional<std::string> line_of(const std::string& file, int number) {
@@ -94,10 +108,16 @@ std::optional<Place> place_in(const std::string& log_line) {
 
 }  // namespace
 
-std::string kernel_source(std::string_view file) {
+std::vector<std::string_view> files_of_program(std::string_view file) {
+  for (const auto& program : kPrograms)
+    if (std::find(program.begin(), program.end(), file) != program.end()) return program;
+  return {file};
+}
+
+std::string kernel_source(std::span<const std::string_view> files) {
   std::string out;
-  std::vector<std::string> open_files;
-  append_source(out, std::string(file), open_files);
+  std::vector<Inclusion> included;
+  for (const std::string_view file : files) append_source(out, std::string(file), included);
   return out;
 }
 

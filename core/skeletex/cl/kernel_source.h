@@ -3,6 +3,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace skeletex {
 
@@ -14,11 +15,15 @@ struct EmbeddedKernelFile {
 /// The files of `kernels/` as they were when the library was built.
 std::span<const EmbeddedKernelFile> embedded_kernel_files();
 
-/// Text of a kernel file: from the folder that SKELETEX_KERNEL_DIR names when it is set, else the embedded copy.
-/// Lines `#include "x.h"` are replaced by the file x.h (in turn), so that a program is one text on every driver;
-/// `#line` keeps the files' own line numbers.
+/// The kernel files that make one program with a file; that alone where none do. A program costs PoCL 26 ms of processor time at every start and
+/// 120 ms at the first, whatever is in it, and each further file 2 and 40: so there is one for each part of the work.
+std::vector<std::string_view> files_of_program(std::string_view file);
+
+/// Text of kernel files, one after the other: each from the folder that SKELETEX_KERNEL_DIR names when it is set, else the embedded copy.
+/// Lines `#include "x.h"` are replaced by the file x.h (in turn), the first time, so that a program is one text on every
+/// driver; `#line` keeps the files' own line numbers.
 /// \throw DeviceError when the file does not exist, or includes itself
-std::string kernel_source(std::string_view file);
+std::string kernel_source(std::span<const std::string_view> files);
 
 /// A driver's build log with the kernel file's own line below each message that names a file and a line, where the
 /// driver does not print it itself. Cut after some 100 lines.

@@ -140,18 +140,10 @@ int pole_of(const Chart& chart, ChartVertex kind) {
 }  // namespace
 
 void prepare_encoding(ClContext& context, const EncodeOptions& options) {
-  context.prepare({"segment.cl", "classify_points"});
-  context.prepare({"spd.cl", "find_hidden"});
-  if (options.method != EncodeMethod::kSpd) context.prepare(vsm_kernel(context, options.vsm));
   context.prepare({"encode.cl", "encode_texels"});
-  if (options.method != EncodeMethod::kSpd && options.has_unfold) context.prepare({"unfold.cl", "find_folds"});
   // Whether texels snap depends on the mesh; most do.
-  if (options.method != EncodeMethod::kSpd && (options.has_snap.value_or(true) || options.has_fit.value_or(false))) {
+  if (options.method != EncodeMethod::kSpd && (options.has_snap.value_or(true) || options.has_fit.value_or(false)))
     context.prepare({"snap.cl", "place_snapped"});
-    context.prepare({"lattice.cl", "choose_diagonals"});
-    context.prepare({"guard.cl", "suspect_quads"});
-    context.prepare({"metro.cl", "find_nearest_triangles"});
-  }
 }
 
 EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& input_skeleton, const EncodeOptions& options) {

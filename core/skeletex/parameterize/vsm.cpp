@@ -383,14 +383,10 @@ void solve_directly(Chart& chart, const VsmOptions& options, int iterations) {
 }
 
 std::size_t group_size(const ClContext& context, const VsmOptions& options) {
-  return options.work_group_size > 0 ? options.work_group_size : context.device().type == "cpu" ? 1 : 128;
+  return options.work_group_size > 0 ? options.work_group_size : context.row_items();
 }
 
 }  // namespace
-
-ClKernelName vsm_kernel(const ClContext& context, const VsmOptions& options) {
-  return {"vsm.cl", "eliminate_fronts", group_size(context, options) == 1 ? "-DVSM_SINGLE" : ""};
-}
 
 std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, const VsmOptions& options) {
   std::vector<VsmReport> reports(charts.size());
@@ -425,9 +421,11 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
 
   // On a CPU one work-item runs plain loops; elsewhere a group shares them. One program holds all kernels: each is compiled once.
   const std::size_t wanted = group_size(context, options);
-  const auto kernel = [&](std::string_view name) { return ClKernelName{"vsm.cl", name, vsm_kernel(context, options).options}; };
+  const bool is_single = wanted == 1 && context.row_items() == 1;  // VSM_SINGLE
+  const char* const kernel_options = !is_single && context.row_items() == 1 ? "-DVSM_BARRIERS" : "";
+  const auto kernel = [&](std::string_view name) { return ClKernelName{"vsm.cl", name, kernel_options}; };
   const std::size_t group = context.work_group_size(kernel("eliminate_fronts"), context.work_group_size(kernel("substitute_back"), wanted));
-  const std::size_t lanes = wanted == 1 ? 1 : kSlice;  // work-items that share a slice
+  const std::size_t lanes = is_single ? 1 : kSlice;  // work-items that share a slice
   const ClRange slices({s.vertices / kSlice * lanes, 1}, {lanes, 1});
   std::vector<int> frozen(s.vertices / kSlice, 1), iterations(charts.size(), 0), steps(charts.size(), 0);
   std::vector<float> final_ratios(charts.size(), 0);

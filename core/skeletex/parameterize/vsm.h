@@ -35,9 +35,6 @@ struct VsmReport {
   bool used_direct_solver = false;  ///< the device's solution was not good enough and a sparse factorization replaced it
 };
 
-/// The kernel of solve_vsm that its others share a program with. \see ClContext::prepare
-ClKernelName vsm_kernel(const ClContext& context, const VsmOptions& options = {});
-
 /// Vertex-sampling-maximizing maps (paper 3.2.2) of all charts together: weights, then one elimination per iteration in single precision on the
 /// device, for u and v at once, by fronts that many work-groups share. Fills u and v of every inner vertex. A chart with flipped
 /// triangles is solved again by a sparse factorization on the host.
