@@ -70,10 +70,16 @@ float power_of_two(int exponent) { return as_float(clamp(exponent + 127, 0, 254)
 #ifdef VSM_SINGLE
 #define VSM_GROUP __attribute__((reqd_work_group_size(1, 1, 1)))
 #define VSM_BARRIER()
+#define VSM_ITEM 0
+#define VSM_ITEMS 1
+#define VSM_ONCE __attribute__((noinline))  // PoCL makes three copies of a kernel with all that is inlined in it, and compiles each
 #define VSM_LANES VSM_SLICE  // rows of a slice that a work-item takes side by side: loops over them become vector instructions
 #else
 #define VSM_GROUP
 #define VSM_BARRIER() barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE)
+#define VSM_ITEM ((int)get_local_id(0))
+#define VSM_ITEMS ((int)get_local_size(0))
+#define VSM_ONCE
 #define VSM_LANES 1
 #endif
 
@@ -236,7 +242,7 @@ void multiply_rows(global const float* rows, int width, int begin, int end, glob
   const float8 sums = sums_of_pairs(low, high);
   vstore8(is_new ? sums : vload8(0, target) + sums, 0, target);
 #else
-  for (int k = get_local_id(0); k < VSM_TILE; k += get_local_size(0)) {
+  for (int k = VSM_ITEM; k < VSM_TILE; k += VSM_ITEMS) {
     float8 sum = 0.0f;
     for (int column = begin; column < end; column += VSM_TILE) sum += vload8(0, rows + k * width + column) * vload8(0, x + column);
     target[k] = is_new ? sum8(sum) : target[k] + sum8(sum);
@@ -248,7 +254,7 @@ void multiply_rows(global const float* rows, int width, int begin, int end, glob
 // task has no influence on results.
 int take_task(global int* queue, local int* taken) {
   VSM_BARRIER();
-  if (get_local_id(0) == 0) *taken = atomic_inc(queue);
+  if (VSM_ITEM == 0) *taken = atomic_inc(queue);
   VSM_BARRIER();
   return *taken;
 }
@@ -314,8 +320,8 @@ FrontView view_front(global const FrontRecord* front, global float* matrices, gl
 }
 
 // Adds what a child has left between its boundary's vertices.
-void add_child(FrontView to, FrontView from, int boundary, global const int* columns) {
-  for (int i = get_local_id(0); i < boundary - 1; i += get_local_size(0)) {
+VSM_ONCE void add_child(FrontView to, FrontView from, int boundary, global const int* columns) {
+  for (int i = VSM_ITEM; i < boundary - 1; i += VSM_ITEMS) {
     global const float* source = from.rest + rest_row(from.boundary, i);
     global float* row = columns[i] < to.pivots ? to.rows + columns[i] * to.width : to.rest + rest_row(to.boundary, columns[i] - to.pivots) - to.pivots;
     for (int j = i + 1; j < boundary; ++j) row[columns[j]] += source[j];
@@ -323,8 +329,8 @@ void add_child(FrontView to, FrontView from, int boundary, global const int* col
 }
 
 // Eliminates the pivots, a tile's rows at a time.
-void factor(FrontView front) {
-  const int lane = get_local_id(0), lanes = get_local_size(0), width = front.width;
+VSM_ONCE void factor(FrontView front) {
+  const int lane = VSM_ITEM, lanes = VSM_ITEMS, width = front.width;
   global float* root = front.root;
   global float* inverse = front.inverse;
   global float* after = front.u;
@@ -374,8 +380,8 @@ void factor(FrontView front) {
 }
 
 // Carries the pivots' residuals to the boundary.
-void carry_up(FrontView front) {
-  const int lane = get_local_id(0), lanes = get_local_size(0);
+VSM_ONCE void carry_up(FrontView front) {
+  const int lane = VSM_ITEM, lanes = VSM_ITEMS;
   for (int block = 0; block < front.pivots; block += VSM_TILE) {
     global const float* rows = front.rows + block * front.width;
     global float* u = front.u + block;
@@ -420,7 +426,7 @@ kernel VSM_GROUP void eliminate_fronts(int is_new, float tolerance, int task_beg
                                        global const int* restrict half_exponents, global const float* restrict roots,
                                        global const float2* restrict residual, global const int* restrict ratios, global float* restrict matrices,
                                        global float* restrict vectors) {
-  const int lane = get_local_id(0), lanes = get_local_size(0);
+  const int lane = VSM_ITEM, lanes = VSM_ITEMS;
   local int taken;
   for (int task = task_begin + take_task(queues + queue, &taken); task < task_end; task = task_begin + take_task(queues + queue, &taken))
     for (int f = tasks[2 * task]; f < tasks[2 * task + 1]; ++f) {
@@ -488,7 +494,7 @@ kernel VSM_GROUP void substitute_back(float tolerance, int task_begin, int task_
                                       global const FrontRecord* restrict fronts, global const int* restrict boundary_rows,
                                       global const float* restrict roots, global const int* restrict ratios, global float* restrict matrices,
                                       global float* restrict vectors, global float* restrict solution, global float* restrict map) {
-  const int lane = get_local_id(0), lanes = get_local_size(0);
+  const int lane = VSM_ITEM, lanes = VSM_ITEMS;
   local int taken;
   for (int task = task_begin + take_task(queues + queue, &taken); task < task_end; task = task_begin + take_task(queues + queue, &taken))
     for (int f = tasks[2 * task + 1] - 1; f >= tasks[2 * task]; --f) {
