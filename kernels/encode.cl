@@ -116,12 +116,12 @@ typedef struct SurfacePoint {
 } SurfacePoint;
 
 __attribute__((always_inline)) SurfacePoint read_point(const int t, const int column, const float beside, const int width, const int row, const float above,
-                                                       const int triangle_count, global const int* restrict corners, global const int* restrict turns,
-                                                       global const int* restrict poles, global const float* restrict u_high,
-                                                       global const float* restrict u_low, global const float* restrict v_high,
-                                                       global const float* restrict v_low, global const float* restrict vertex_x,
-                                                       global const float* restrict vertex_y, global const float* restrict vertex_z,
-                                                       global const float* restrict row_high, global const float* restrict row_low) {
+                                                       const int triangle_count, global const int* corners, global const int* turns,
+                                                       global const int* poles, global const float* u_high,
+                                                       global const float* u_low, global const float* v_high,
+                                                       global const float* v_low, global const float* vertex_x,
+                                                       global const float* vertex_y, global const float* vertex_z,
+                                                       global const float* row_high, global const float* row_low) {
   const MapTriangle m = load_triangle(t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
   const CornerWeights w = weights_at(m, row_offset(m, row_high, row_low, row, above), turned_offset(m, column, beside, width));
   // Rounding may have put it a little outside.

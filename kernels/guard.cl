@@ -48,15 +48,15 @@ __attribute__((always_inline)) float suspicion2_of(Point a, Point b, Point c, Po
   return fmax(suspicion2_at(own, area2, side2, at_a), fmax(suspicion2_at(own, area2, side2, at_b), suspicion2_at(own, area2, side2, at_c)));
 }
 
-__attribute__((always_inline)) Point normal_at(int texel, int triangle_count, global const int* restrict texel_triangles, global const float* restrict normals) {
+__attribute__((always_inline)) Point normal_at(int texel, int triangle_count, global const int* texel_triangles, global const float* normals) {
   const int t = min(texel_triangles[texel], triangle_count - 1);
   const Point n = {normals[t], normals[triangle_count + t], normals[2 * triangle_count + t]};
   return n;
 }
 
-__attribute__((always_inline)) float suspicion2_of_quad(int texel, int right, int texture_width, int triangle_count, int is_second, global const int* restrict texel_triangles,
-                         global const float* restrict normals, global const float* restrict x, global const float* restrict y,
-                         global const float* restrict z) {
+__attribute__((always_inline)) float suspicion2_of_quad(int texel, int right, int texture_width, int triangle_count, int is_second, global const int* texel_triangles,
+                         global const float* normals, global const float* x, global const float* y,
+                         global const float* z) {
   const int above = texel + texture_width, beyond = right + texture_width;
   const Point a = point_at(x, y, z, texel), b = point_at(x, y, z, right), c = point_at(x, y, z, beyond), d = point_at(x, y, z, above);
   const Point at_a = normal_at(texel, triangle_count, texel_triangles, normals), at_b = normal_at(right, triangle_count, texel_triangles, normals);

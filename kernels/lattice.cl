@@ -8,8 +8,8 @@
 
 // left, right, beyond: the columns of the 4 x 4 vertices around the quad beside the texel's own, from this one.
 __attribute__((always_inline)) int second_diagonal(int texel, int left, int right, int beyond, int texture_width, int has_before, int has_after,
-                                                   int is_smooth, global const float* restrict x, global const float* restrict y,
-                                                   global const float* restrict z) {
+                                                   int is_smooth, global const float* x, global const float* y,
+                                                   global const float* z) {
   const int before = has_before ? -texture_width : 0, above = texture_width, after = (has_after ? 2 : 1) * texture_width;
   const int at[4][4] = {{texel + before + left, texel + before, texel + before + right, texel + before + beyond},
                         {texel + left, texel, texel + right, texel + beyond},

@@ -13,9 +13,9 @@ typedef struct MapTriangle {
   int pole;  // 0, -1: head's, +1: tail's at corner 2 (then du2 reaches the pole's row and dv2 is unused)
 } MapTriangle;
 
-__attribute__((always_inline)) MapTriangle load_triangle(int t, int triangle_count, global const int* restrict corners, global const int* restrict turns, global const int* restrict poles,
-                          global const float* restrict u_high, global const float* restrict u_low, global const float* restrict v_high,
-                          global const float* restrict v_low) {
+__attribute__((always_inline)) MapTriangle load_triangle(int t, int triangle_count, global const int* corners, global const int* turns, global const int* poles,
+                          global const float* u_high, global const float* u_low, global const float* v_high,
+                          global const float* v_low) {
   const int a = corners[t], b = corners[triangle_count + t], c = corners[2 * triangle_count + t];
   MapTriangle m;
   m.u_base_high = u_high[a];
@@ -39,7 +39,7 @@ __attribute__((always_inline)) float column_offset(MapTriangle m, int column, in
 }
 
 // u from the triangle's base of a reading position: a row of the table, and the share of the way to the next one.
-__attribute__((always_inline)) float row_offset(MapTriangle m, global const float* restrict row_high, global const float* restrict row_low, int row, float share) {
+__attribute__((always_inline)) float row_offset(MapTriangle m, global const float* row_high, global const float* row_low, int row, float share) {
   const int next = share < 0.0f ? row - 1 : share > 0.0f ? row + 1 : row;
   const float span = (row_high[next] - row_high[row]) + (row_low[next] - row_low[row]);
   return ((row_high[row] - m.u_base_high) + (row_low[row] - m.u_base_low)) + fabs(share) * span;

@@ -6,7 +6,7 @@ typedef struct FilteredPoint {
   float x, y, z;
 } FilteredPoint;
 
-__attribute__((always_inline)) FilteredPoint prefilter_point(global const float* restrict x, global const float* restrict y, global const float* restrict z, int own, int left, int right,
+__attribute__((always_inline)) FilteredPoint prefilter_point(global const float* x, global const float* y, global const float* z, int own, int left, int right,
                      int below, int above) {
   const float ux = x[above] - x[below], uy = y[above] - y[below], uz = z[above] - z[below];
   const float vx = x[right] - x[left], vy = y[right] - y[left], vz = z[right] - z[left];

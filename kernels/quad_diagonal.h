@@ -7,8 +7,8 @@
 // its midpoint from where a cubic through the 4 x 4 vertices has the surface. (Against the shorter diagonal: mean error -6 %,
 // maximum up to -20 %.) Beyond the first and last row the lattice goes on straight. Where rounding blurs d the shorter one is
 // taken, and of two as good the first.
-__attribute__((always_inline)) int takes_second_if_nearer(const int at[4][4], int has_before, int has_after, __global const float* restrict x, __global const float* restrict y,
-                           __global const float* restrict z) {
+__attribute__((always_inline)) int takes_second_if_nearer(const int at[4][4], int has_before, int has_after, __global const float* x, __global const float* y,
+                           __global const float* z) {
   const float w_rows[4] = {has_before ? -0.0625f : 0.0f, 0.5625f - (has_before ? 0.0f : 0.125f) + (has_after ? 0.0f : 0.0625f),
                            0.5625f - (has_after ? 0.0f : 0.125f) + (has_before ? 0.0f : 0.0625f), has_after ? -0.0625f : 0.0f};
   const int v00 = at[1][1], v01 = at[1][2], v10 = at[2][1], v11 = at[2][2];
@@ -38,7 +38,7 @@ typedef struct Normal {
   float x, y, z;
 } Normal;
 
-__attribute__((always_inline)) Normal normal_of(__global const float* restrict x, __global const float* restrict y, __global const float* restrict z, int a, int b, int c) {
+__attribute__((always_inline)) Normal normal_of(__global const float* x, __global const float* y, __global const float* z, int a, int b, int c) {
   const float ux = x[b] - x[a], uy = y[b] - y[a], uz = z[b] - z[a];
   const float vx = x[c] - x[a], vy = y[c] - y[a], vz = z[c] - z[a];
   const float nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
@@ -62,8 +62,8 @@ __attribute__((always_inline)) float least_turn(Normal own, Normal first, Normal
 // (less than CLEARLY of the other's turns), as where the lattice sits on nothing, it is the nearer one.
 #define CLEARLY 0.8f
 
-__attribute__((always_inline)) int takes_second_if_smoother(const int at[4][4], int has_before, int has_after, __global const float* restrict x, __global const float* restrict y,
-                             __global const float* restrict z) {
+__attribute__((always_inline)) int takes_second_if_smoother(const int at[4][4], int has_before, int has_after, __global const float* x, __global const float* y,
+                             __global const float* z) {
   const float w_before = has_before ? 1.0f : 0.0f, w_after = has_after ? 1.0f : 0.0f;
   const int v00 = at[1][1], v01 = at[1][2], v10 = at[2][1], v11 = at[2][2];
   const Normal a = normal_of(x, y, z, v00, v01, v11), b = normal_of(x, y, z, v00, v11, v10);
