@@ -65,6 +65,13 @@ __attribute__((always_inline)) float suspicion2_of_quad(int texel, int right, in
               suspicion2_of(either(is_second, b, a), c, d, either(is_second, at_b, at_a), at_c, at_d));
 }
 
+// The same, compiled once.
+__attribute__((noinline)) float suspicion2_at_end(int texel, int right, int texture_width, int triangle_count, int is_second,
+                                                  global const int* texel_triangles, global const float* normals, global const float* x,
+                                                  global const float* y, global const float* z) {
+  return suspicion2_of_quad(texel, right, texture_width, triangle_count, is_second, texel_triangles, normals, x, y, z);
+}
+
 // NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. A triangle whose corners lie on the mesh leaves it by about half its
 // longest side times the sine of the angle to the mesh at its corners: a chord over a crease.
 // in   lattice_rows: those that quads begin at; texel_triangles: per texel a triangle of the mesh there, of all texels of a patch or of none
@@ -87,7 +94,7 @@ kernel void suspect_quads(const int row_count, const int texture_width, const in
         suspicion2_of_quad(texel + j, texel + j + one, texture_width, triangle_count, diagonals[texel + j], texel_triangles, normals, x, y, z);
   if (get_local_id(0) == 0)
     suspicions2[texel + width - 1] =
-        suspicion2_of_quad(texel + width - 1, texel, texture_width, triangle_count, diagonals[texel + width - 1], texel_triangles, normals, x, y, z);
+        suspicion2_at_end(texel + width - 1, texel, texture_width, triangle_count, diagonals[texel + width - 1], texel_triangles, normals, x, y, z);
 }
 
 // NDRange (count). Triangles of a list, from the mesh: at their middles, and at the other places too where the middle is further
@@ -125,7 +132,7 @@ kernel void measure_triangles(const int count, const float worth_a_look2, const 
 }
 
 // The nearest triangle of the quads up to `reach` columns and rows from one.
-void nearest_around(Point p, global const PatchRecord* restrict patch, int texture_width, int column, int row, int reach,
+__attribute__((noinline)) void nearest_around(Point p, global const PatchRecord* restrict patch, int texture_width, int column, int row, int reach,
                     global const int* restrict diagonals, global const float* restrict x, global const float* restrict y, global const float* restrict z,
                     float* best, int* nearest) {
   for (int r = max(1, row - reach); r <= min(patch->height - 3, row + reach); ++r)

@@ -15,11 +15,13 @@ __attribute__((always_inline)) int second_diagonal(int texel, int left, int righ
                         {texel + left, texel, texel + right, texel + beyond},
                         {texel + above + left, texel + above, texel + above + right, texel + above + beyond},
                         {texel + after + left, texel + after, texel + after + right, texel + after + beyond}};
-  return is_smooth ? takes_second_if_smoother(at, has_before, has_after, x, y, z) : takes_second_if_nearer(at, has_before, has_after, x, y, z);
+  // Both rules, and no branch: the compiler would make a loop for each.
+  const int smoother = smoother_diagonal(at, has_before, has_after, x, y, z), nearer = takes_second_if_nearer(at, has_before, has_after, x, y, z);
+  return is_smooth && smoother >= 0 ? smoother : nearer;
 }
 
-// The same of any column: they wrap round.
-int second_diagonal_at(int texel, int column, int width, int texture_width, int has_before, int has_after, int is_smooth, global const float* restrict x,
+// The same of any column: they wrap round. Compiled once.
+__attribute__((noinline)) int second_diagonal_at(int texel, int column, int width, int texture_width, int has_before, int has_after, int is_smooth, global const float* restrict x,
                        global const float* restrict y, global const float* restrict z) {
   return second_diagonal(texel, column > 0 ? -1 : width - 1, column + 1 < width ? 1 : 1 - width, column + 2 < width ? 2 : 2 - width, texture_width,
                          has_before, has_after, is_smooth, x, y, z);

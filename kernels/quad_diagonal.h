@@ -62,7 +62,8 @@ __attribute__((always_inline)) float least_turn(Normal own, Normal first, Normal
 // (less than CLEARLY of the other's turns), as where the lattice sits on nothing, it is the nearer one.
 #define CLEARLY 0.8f
 
-__attribute__((always_inline)) int takes_second_if_smoother(const int at[4][4], int has_before, int has_after, __global const float* x, __global const float* y,
+// 1 for the second, 0 for the first, -1 where neither is much smoother.
+__attribute__((always_inline)) int smoother_diagonal(const int at[4][4], int has_before, int has_after, __global const float* x, __global const float* y,
                              __global const float* z) {
   const float w_before = has_before ? 1.0f : 0.0f, w_after = has_after ? 1.0f : 0.0f;
   const int v00 = at[1][1], v01 = at[1][2], v10 = at[2][1], v11 = at[2][2];
@@ -94,7 +95,11 @@ __attribute__((always_inline)) int takes_second_if_smoother(const int at[4][4], 
   // Rounding of the points turns normals by about this much; where it could decide, the first diagonal is taken.
   const float fx = x[v11] - x[v00], fy = y[v11] - y[v00], fz = z[v11] - z[v00];
   const float blur = 1e-6f * (fabs(x[v00]) + fabs(y[v00]) + fabs(z[v00])) * rsqrt(fmax(fx * fx + fy * fy + fz * fz, 1e-37f));
-  if (second < CLEARLY * first - blur) return 1;
-  if (first < CLEARLY * second - blur) return 0;
-  return takes_second_if_nearer(at, has_before, has_after, x, y, z);
+  return second < CLEARLY * first - blur ? 1 : first < CLEARLY * second - blur ? 0 : -1;
+}
+
+__attribute__((always_inline)) int takes_second_if_smoother(const int at[4][4], int has_before, int has_after, __global const float* x,
+                                                            __global const float* y, __global const float* z) {
+  const int smoother = smoother_diagonal(at, has_before, has_after, x, y, z), nearer = takes_second_if_nearer(at, has_before, has_after, x, y, z);
+  return smoother < 0 ? nearer : smoother;
 }
