@@ -29,14 +29,9 @@ float2 lifted_difference(float4 a, float4 b, float jump) {
   return (difference + (float2)(0.0f, jump)) + (error + (b.zw - a.zw));
 }
 
-// Texture area of each triangle, in (v, u); for a pole's triangle that of the trapezoid between its opposite edge and
+// Texture area of a triangle, in (v, u); for a pole's triangle that of the trapezoid between its opposite edge and
 // the pole's line. A pole is always corner 0. Never below a rounding error's worth, so that weights stay positive.
-// In: corners (3 planes of `count` vertices), jumps (2 planes: corners 1 and 2 against corner 0; with a pole the first
-// is VSM_POLE and the second that of corner 2 against corner 1). Out: areas. NDRange: triangles.
-kernel void measure_areas(int count, global const int* restrict corners, global const char* restrict jumps, global const float4* restrict map,
-                          global float* restrict areas) {
-  const int t = get_global_id(0);
-  if (t >= count) return;
+float texture_area(int t, int count, global const int* corners, global const char* jumps, global const float4* map) {
   const float4 a = map[corners[t]], b = map[corners[count + t]], c = map[corners[2 * count + t]];
   const int jump_b = jumps[t], jump_c = jumps[count + t];
   float first, second;
@@ -49,7 +44,16 @@ kernel void measure_areas(int count, global const int* restrict corners, global 
     first = 0.5f * to_b.y * to_c.x;
     second = 0.5f * to_c.y * to_b.x;
   }
-  areas[t] = fmax(first - second, fmax(1e-7f * (fabs(first) + fabs(second)), 1e-36f));
+  return fmax(first - second, fmax(1e-7f * (fabs(first) + fabs(second)), 1e-36f));
+}
+
+// Texture areas of all triangles.
+// In: corners (3 planes of `count` vertices), jumps (2 planes: corners 1 and 2 against corner 0; with a pole the first
+// is VSM_POLE and the second that of corner 2 against corner 1). Out: areas. NDRange: triangles.
+kernel void measure_areas(int count, global const int* restrict corners, global const char* restrict jumps, global const float4* restrict map,
+                          global float* restrict areas) {
+  const int t = get_global_id(0);
+  if (t < count) areas[t] = texture_area(t, count, corners, jumps, map);
 }
 
 // A positive float as mantissa in [0.5, 1) and exponent; 0 where it is below all normal ones. frexp() and ldexp() are calls that no compiler makes
@@ -103,23 +107,25 @@ int longest_row(global const int* restrict row_length, int first) {
   return longest;
 }
 
-// Multiplies each entry's weight by (A_left + A_right) * factor, where factor = 1 / A3^alpha, unless the row's slice is
-// frozen (first solve, or a chart that has stopped: weights as they are). Then sums each row: d = 4^half_exponent / inverse_root^2,
-// poles included.
-// In: frozen (per slice), triangles (2 planes of `entries`: the two at the edge), factors. In and out: mantissas, exponents.
-// Out: weights in units of 4^half_exponent; inverse_roots, half_exponents; largest (per chart, INT_MIN before), the largest of these.
-// NDRange: slices, in groups of VSM_SLICE / VSM_LANES.
-kernel VSM_GROUP void weigh_rows(int entries, global const int* restrict frozen, global const int* restrict slice_chart,
-                                 global const int* restrict slice_begin, global const int* restrict row_length, global const int* restrict triangles,
-                                 global const float* restrict factors, global const float* restrict areas, global float* restrict mantissas,
-                                 global int* restrict exponents, global float* restrict weights, global float* restrict inverse_roots,
-                                 global int* restrict half_exponents, global int* restrict largest) {
-  const int slice = get_group_id(0), first = slice * VSM_SLICE + get_local_id(0), longest = longest_row(row_length, first);
+#ifdef VSM_SINGLE
+VSM_ONCE void measure_triangles(int begin, int end, int count, global const int* restrict corners, global const char* restrict jumps,
+                                global const float4* restrict map, global float* restrict areas) {
+  for (int t = begin; t < end; ++t) areas[t] = texture_area(t, count, corners, jumps, map);
+}
+#endif
+
+// Multiplies each entry's weight by (A_left + A_right) * factor, where factor = 1 / A3^alpha, unless `is_frozen`: weights as they are. Then sums each
+// row of the slice: d = 4^half_exponent / inverse_root^2, poles included. values: work space of a group, VSM_SLICE.
+VSM_ONCE void weigh_slice(int slice, int is_frozen, int entries, global const int* restrict slice_begin, global const int* restrict row_length,
+                          global const int* restrict triangles, global const float* restrict factors, global const float* restrict areas,
+                          global float* restrict mantissas, global int* restrict exponents, global float* restrict weights,
+                          global float* restrict inverse_roots, global int* restrict half_exponents, global int* restrict largest, local int* values) {
+  const int first = slice * VSM_SLICE + get_local_id(0), longest = longest_row(row_length, first);
   int half_exponent[VSM_LANES];
   for (int i = 0; i < VSM_LANES; ++i) half_exponent[i] = INT_MIN;
   for (int k = 0; k < longest; ++k) {
     const int begin = entry_index(slice_begin, first, k);
-    if (!frozen[slice])
+    if (!is_frozen)
       for (int i = 0; i < VSM_LANES; ++i) {
         const int e = begin + i;
         int shift, exponent;
@@ -148,8 +154,23 @@ kernel VSM_GROUP void weigh_rows(int entries, global const int* restrict frozen,
     inverse_roots[first + i] = 1.0f / sqrt(sum[i]);
     half_exponents[first + i] = half_exponent[i];
   }
+  raise_to_largest(values, half_exponent, largest);
+}
+
+// Weighs the rows of all slices.
+// In: frozen (per slice: first solve, or a chart that has stopped), triangles (2 planes of `entries`: the two at the edge), factors. In and out:
+// mantissas, exponents. Out: weights in units of 4^half_exponent; inverse_roots, half_exponents; largest (per chart, INT_MIN before), the largest
+// of these.
+// NDRange: slices, in groups of VSM_SLICE / VSM_LANES.
+kernel VSM_GROUP void weigh_rows(int entries, global const int* restrict frozen, global const int* restrict slice_chart,
+                                 global const int* restrict slice_begin, global const int* restrict row_length, global const int* restrict triangles,
+                                 global const float* restrict factors, global const float* restrict areas, global float* restrict mantissas,
+                                 global int* restrict exponents, global float* restrict weights, global float* restrict inverse_roots,
+                                 global int* restrict half_exponents, global int* restrict largest) {
+  const int slice = get_group_id(0);
   local int values[VSM_SLICE];
-  raise_to_largest(values, half_exponent, largest + slice_chart[slice]);
+  weigh_slice(slice, frozen[slice], entries, slice_begin, row_length, triangles, factors, areas, mantissas, exponents, weights, inverse_roots,
+              half_exponents, largest + slice_chart[slice], values);
 }
 
 // From vertex a to b as lifted_difference, of one coordinate.
@@ -160,17 +181,14 @@ float difference_of(float a, float a_rest, float b, float b_rest, float jump) {
   return (difference + jump) + (error + (b_rest - a_rest));
 }
 
-// How far each inner vertex is from the weighted mean of its neighbours, from differences of neighbours, so that it is accurate relative to them
-// however small they are.
-// Out: roots_i = sqrt(d_i) in units of about the chart's largest; residual, of the system that these scale to a unit diagonal;
-// ratios (per chart, 0 before): the largest |x_i - mean| / mean |x_i - x_j|, as bits of a float, which order like integers.
-// NDRange: slices, in groups of VSM_SLICE / VSM_LANES.
-kernel VSM_GROUP void form_residual(global const int* restrict slice_chart, global const int* restrict slice_begin, global const int* restrict row_length,
-                                    global const int* restrict column, global const char* restrict jumps, global const float* restrict weights,
-                                    global const float* restrict inverse_roots, global const int* restrict half_exponents,
-                                    global const int* restrict largest, global const float* restrict map, global float* restrict roots,
-                                    global float* restrict residual, global int* restrict ratios) {
-  const int slice = get_group_id(0), first = slice * VSM_SLICE + get_local_id(0), longest = longest_row(row_length, first), chart = slice_chart[slice];
+// How far each inner vertex of a slice is from the weighted mean of its neighbours, from differences of neighbours, so that it is accurate relative
+// to them however small they are. largest: of the slice's chart.
+VSM_ONCE void form_residual_of_slice(int slice, global const int* restrict slice_begin, global const int* restrict row_length,
+                                     global const int* restrict column, global const char* restrict jumps, global const float* restrict weights,
+                                     global const float* restrict inverse_roots, global const int* restrict half_exponents, int largest,
+                                     global const float* restrict map, global float* restrict roots, global float* restrict residual,
+                                     global int* restrict ratio_of_chart, local int* values) {
+  const int first = slice * VSM_SLICE + get_local_id(0), longest = longest_row(row_length, first);
   float sum_u[VSM_LANES], sum_v[VSM_LANES], total_u[VSM_LANES], total_v[VSM_LANES];
   for (int i = 0; i < VSM_LANES; ++i) sum_u[i] = sum_v[i] = total_u[i] = total_v[i] = 0.0f;
   for (int k = 0; k < longest; ++k) {
@@ -192,7 +210,7 @@ kernel VSM_GROUP void form_residual(global const int* restrict slice_chart, glob
     const int row = first + i, is_inner = row_length[row] > 0;
     const float inverse_root = is_inner ? inverse_roots[row] : 1.0f;
     // In the middle of a float's range: 2^65 to 2^-65.
-    const float root = power_of_two((is_inner ? max(half_exponents[row] - largest[chart], -130) : 0) + 65) / inverse_root;
+    const float root = power_of_two((is_inner ? max(half_exponents[row] - largest, -130) : 0) + 65) / inverse_root;
     const float over = inverse_root * inverse_root, u = sum_u[i] * over, v = sum_v[i] * over;
     roots[row] = root;
     residual[2 * row] = u * root;
@@ -200,8 +218,22 @@ kernel VSM_GROUP void form_residual(global const int* restrict slice_chart, glob
     const float ratio_u = fabs(u) / (total_u[i] * over + 1e-13f), ratio_v = fabs(v) / (total_v[i] * over + 1e-13f);
     ratio[i] = max(as_int(ratio_u), as_int(ratio_v));
   }
+  raise_to_largest(values, ratio, ratio_of_chart);
+}
+
+// Residuals of all slices.
+// Out: roots_i = sqrt(d_i) in units of about the chart's largest; residual, of the system that these scale to a unit diagonal;
+// ratios (per chart, 0 before): the largest |x_i - mean| / mean |x_i - x_j|, as bits of a float, which order like integers.
+// NDRange: slices, in groups of VSM_SLICE / VSM_LANES.
+kernel VSM_GROUP void form_residual(global const int* restrict slice_chart, global const int* restrict slice_begin, global const int* restrict row_length,
+                                    global const int* restrict column, global const char* restrict jumps, global const float* restrict weights,
+                                    global const float* restrict inverse_roots, global const int* restrict half_exponents,
+                                    global const int* restrict largest, global const float* restrict map, global float* restrict roots,
+                                    global float* restrict residual, global int* restrict ratios) {
+  const int slice = get_group_id(0), chart = slice_chart[slice];
   local int values[VSM_SLICE];
-  raise_to_largest(values, ratio, ratios + chart);
+  form_residual_of_slice(slice, slice_begin, row_length, column, jumps, weights, inverse_roots, half_exponents, largest[chart], map, roots, residual,
+                         ratios + chart, values);
 }
 
 // Elimination. To eliminate vertex k of the scaled system is to join its neighbours i and j by a_ik a_kj / d_k more (a star becomes a mesh), where
@@ -217,6 +249,11 @@ kernel VSM_GROUP void form_residual(global const int* restrict slice_chart, glob
 
 #ifdef VSM_SINGLE
 float8 sums_of_pairs(float8 a, float8 b) { return (float8)(a.even + a.odd, b.even + b.odd); }
+float8 add_across(const float8* sums) {
+  const float8 low = sums_of_pairs(sums_of_pairs(sums[0], sums[1]), sums_of_pairs(sums[2], sums[3]));
+  const float8 high = sums_of_pairs(sums_of_pairs(sums[4], sums[5]), sums_of_pairs(sums[6], sums[7]));
+  return sums_of_pairs(low, high);
+}
 #else
 float sum8(float8 x) { return ((x.s0 + x.s1) + (x.s2 + x.s3)) + ((x.s4 + x.s5) + (x.s6 + x.s7)); }
 #endif
@@ -224,29 +261,46 @@ float sum8(float8 x) { return ((x.s0 + x.s1) + (x.s2 + x.s3)) + ((x.s4 + x.s5) +
 // target[k] (0 if `is_new`) += row k of a tile's rows times x, both from `begin` to `end`.
 void multiply_rows(global const float* rows, int width, int begin, int end, global const float* x, int is_new, global float* target) {
 #ifdef VSM_SINGLE
-  float8 sum0 = 0.0f, sum1 = 0.0f, sum2 = 0.0f, sum3 = 0.0f, sum4 = 0.0f, sum5 = 0.0f, sum6 = 0.0f, sum7 = 0.0f;
+  float8 sums[VSM_TILE];
+#pragma unroll
+  for (int k = 0; k < VSM_TILE; ++k) sums[k] = 0.0f;
   for (int column = begin; column < end; column += VSM_TILE) {
-    global const float* from = rows + column;
     const float8 by = vload8(0, x + column);
-    sum0 += vload8(0, from) * by;
-    sum1 += vload8(0, from + width) * by;
-    sum2 += vload8(0, from + 2 * width) * by;
-    sum3 += vload8(0, from + 3 * width) * by;
-    sum4 += vload8(0, from + 4 * width) * by;
-    sum5 += vload8(0, from + 5 * width) * by;
-    sum6 += vload8(0, from + 6 * width) * by;
-    sum7 += vload8(0, from + 7 * width) * by;
+#pragma unroll
+    for (int k = 0; k < VSM_TILE; ++k) sums[k] += vload8(0, rows + k * width + column) * by;
   }
-  const float8 low = sums_of_pairs(sums_of_pairs(sum0, sum1), sums_of_pairs(sum2, sum3));
-  const float8 high = sums_of_pairs(sums_of_pairs(sum4, sum5), sums_of_pairs(sum6, sum7));
-  const float8 sums = sums_of_pairs(low, high);
-  vstore8(is_new ? sums : vload8(0, target) + sums, 0, target);
+  const float8 sum = add_across(sums);
+  vstore8(is_new ? sum : vload8(0, target) + sum, 0, target);
 #else
   for (int k = VSM_ITEM; k < VSM_TILE; k += VSM_ITEMS) {
     float8 sum = 0.0f;
     for (int column = begin; column < end; column += VSM_TILE) sum += vload8(0, rows + k * width + column) * vload8(0, x + column);
     target[k] = is_new ? sum8(sum) : target[k] + sum8(sum);
   }
+#endif
+}
+
+// The same of two vectors, without `is_new`: rows are read once.
+void multiply_rows_twice(global const float* rows, int width, int begin, int end, global const float* u, global const float* v, global float* target_u,
+                         global float* target_v) {
+#ifdef VSM_SINGLE
+  float8 sums_u[VSM_TILE], sums_v[VSM_TILE];
+#pragma unroll
+  for (int k = 0; k < VSM_TILE; ++k) sums_u[k] = sums_v[k] = 0.0f;
+  for (int column = begin; column < end; column += VSM_TILE) {
+    const float8 by_u = vload8(0, u + column), by_v = vload8(0, v + column);
+#pragma unroll
+    for (int k = 0; k < VSM_TILE; ++k) {
+      const float8 row = vload8(0, rows + k * width + column);
+      sums_u[k] += row * by_u;
+      sums_v[k] += row * by_v;
+    }
+  }
+  vstore8(vload8(0, target_u) + add_across(sums_u), 0, target_u);
+  vstore8(vload8(0, target_v) + add_across(sums_v), 0, target_v);
+#else
+  multiply_rows(rows, width, begin, end, u, 0, target_u);
+  multiply_rows(rows, width, begin, end, v, 0, target_v);
 #endif
 }
 
@@ -267,31 +321,21 @@ int rest_row(int width, int row) {
   return above * width - above / 2 * (above - VSM_TILE) + (row - above) * (width - above) - above;
 }
 
-// target, a tile, += what the elimination of `pivots` vertices joins its rows and columns by. rows: the pivots' rows, from the first column on.
-void update_tile(global const float* rows, int width, global const float* inverse, int pivots, int row, int column, global float* target, int stride) {
-  float8 sum0 = vload8(0, target), sum1 = vload8(0, target + stride), sum2 = vload8(0, target + 2 * stride), sum3 = vload8(0, target + 3 * stride),
-         sum4 = vload8(0, target + 4 * stride), sum5 = vload8(0, target + 5 * stride), sum6 = vload8(0, target + 6 * stride),
-         sum7 = vload8(0, target + 7 * stride);
+// target, a tile (0 if `is_new`), += what the elimination of `pivots` vertices joins its rows and columns by. rows: the pivots' rows, from the first
+// column on.
+void update_tile(global const float* rows, int width, global const float* inverse, int pivots, int row, int column, int is_new, global float* target,
+                 int stride) {
+  float8 sums[VSM_TILE];
+#pragma unroll
+  for (int i = 0; i < VSM_TILE; ++i) sums[i] = is_new ? (float8)0.0f : vload8(0, target + i * stride);
   for (int k = 0; k < pivots; ++k) {
     global const float* from = rows + k * width + row;
     const float8 to = vload8(0, rows + k * width + column) * inverse[k];
-    sum0 += from[0] * to;
-    sum1 += from[1] * to;
-    sum2 += from[2] * to;
-    sum3 += from[3] * to;
-    sum4 += from[4] * to;
-    sum5 += from[5] * to;
-    sum6 += from[6] * to;
-    sum7 += from[7] * to;
+#pragma unroll
+    for (int i = 0; i < VSM_TILE; ++i) sums[i] += from[i] * to;
   }
-  vstore8(sum0, 0, target);
-  vstore8(sum1, 0, target + stride);
-  vstore8(sum2, 0, target + 2 * stride);
-  vstore8(sum3, 0, target + 3 * stride);
-  vstore8(sum4, 0, target + 4 * stride);
-  vstore8(sum5, 0, target + 5 * stride);
-  vstore8(sum6, 0, target + 6 * stride);
-  vstore8(sum7, 0, target + 7 * stride);
+#pragma unroll
+  for (int i = 0; i < VSM_TILE; ++i) vstore8(sums[i], 0, target + i * stride);
 }
 
 // A front's matrix and its four vectors.
@@ -319,9 +363,9 @@ FrontView view_front(global const FrontRecord* front, global float* matrices, gl
   return view;
 }
 
-// Adds what a child has left between its boundary's vertices.
-VSM_ONCE void add_child(FrontView to, FrontView from, int boundary, global const int* columns) {
-  for (int i = VSM_ITEM; i < boundary - 1; i += VSM_ITEMS) {
+// Adds what a child has left between its boundary's vertices: rows from begin to end of its boundary.
+VSM_ONCE void add_child(FrontView to, FrontView from, int begin, int end, int boundary, global const int* columns) {
+  for (int i = begin + VSM_ITEM; i < end; i += VSM_ITEMS) {
     global const float* source = from.rest + rest_row(from.boundary, i);
     global float* row = columns[i] < to.pivots ? to.rows + columns[i] * to.width : to.rest + rest_row(to.boundary, columns[i] - to.pivots) - to.pivots;
     for (int j = i + 1; j < boundary; ++j) row[columns[j]] += source[j];
@@ -337,7 +381,7 @@ VSM_ONCE void factor(FrontView front) {
   for (int block = 0; block < front.pivots; block += VSM_TILE) {
     global float* tile = front.rows + block * width + block;
     for (int column = block + lane * VSM_TILE; column < width; column += lanes * VSM_TILE)
-      update_tile(front.rows, width, inverse, block, block, column, front.rows + block * width + column, width);
+      update_tile(front.rows, width, inverse, block, block, column, 0, front.rows + block * width + column, width);
     VSM_BARRIER();
     // What joins a row to all columns after the tile's acts as one more column of the tile.
     multiply_rows(tile, width, VSM_TILE, width - block, root + block, 1, after + block);
@@ -370,13 +414,11 @@ VSM_ONCE void factor(FrontView front) {
     }
     VSM_BARRIER();
   }
-  const int tiles = front.boundary / VSM_TILE;
-  for (int t = lane; t < tiles * tiles; t += lanes) {
-    const int i = t / tiles * VSM_TILE, j = t % tiles * VSM_TILE;
-    if (i <= j)
-      update_tile(front.rows, width, inverse, front.pivots, front.pivots + i, front.pivots + j, front.rest + rest_row(front.boundary, i) + j,
+  // What joins the boundary's vertices then; its memory is not written before.
+  for (int i = 0; i < front.boundary; i += VSM_TILE)
+    for (int j = i + lane * VSM_TILE; j < front.boundary; j += lanes * VSM_TILE)
+      update_tile(front.rows, width, inverse, front.pivots, front.pivots + i, front.pivots + j, 1, front.rest + rest_row(front.boundary, i) + j,
                   front.boundary - i);
-  }
 }
 
 // Carries the pivots' residuals to the boundary.
@@ -387,13 +429,22 @@ VSM_ONCE void carry_up(FrontView front) {
     global float* u = front.u + block;
     global float* v = front.v + block;
     global const float* inverse = front.inverse + block;
-    if (lane == 0)
-      for (int k = 0; k < VSM_TILE; ++k)
-        for (int j = k + 1; j < VSM_TILE; ++j) {
+    if (lane == 0) {
+      // In registers: each value waits for the one before.
+      float own_u[VSM_TILE], own_v[VSM_TILE];
+#pragma unroll
+      for (int j = 0; j < VSM_TILE; ++j) {
+        float sum_u = u[j], sum_v = v[j];
+#pragma unroll
+        for (int k = 0; k < j; ++k) {
           const float factor = rows[j * front.width + block + k];
-          u[j] += factor * u[k];
-          v[j] += factor * v[k];
+          sum_u += factor * own_u[k];
+          sum_v += factor * own_v[k];
         }
+        u[j] = own_u[j] = sum_u;
+        v[j] = own_v[j] = sum_v;
+      }
+    }
     VSM_BARRIER();
     for (int column = block + (1 + lane) * VSM_TILE; column < front.width; column += lanes * VSM_TILE) {
       float8 sum_u = vload8(0, front.u + column), sum_v = vload8(0, front.v + column);
@@ -409,11 +460,84 @@ VSM_ONCE void carry_up(FrontView front) {
   }
 }
 
-// Factors fronts (if `is_new`: the weights have changed) and carries the residual up from children to parents, for the charts whose ratio is
-// above `tolerance`.
-// In: tasks (first front and end, 2 ints each), from begin to end; queue, the one of `queues` to take them from (0); fronts and children (see vsm_structs.h); boundary_rows (the last of
-// a front, the fixed column, has none); parent_columns, the columns of the parent; later_end, fixed_end: entries of a row whose neighbours are
-// eliminated later, and these and fixed ones; entry_columns: of the first, the column in the front of its row.
+// Factors fronts from begin to end (if `is_new`: the weights have changed), all of one chart, and carries the residual up from children to parents.
+VSM_ONCE void eliminate(int begin, int end, int is_new, global const FrontRecord* restrict fronts, global const int* restrict children,
+                        global const int* restrict boundary_rows, global const int* restrict parent_columns, global const int* restrict slice_begin,
+                        global const int* restrict later_end, global const int* restrict fixed_end, global const int* restrict neighbour,
+                        global const char* restrict jumps, global const int* restrict entry_columns, global const float* restrict mantissas,
+                        global const int* restrict exponents, global const float* restrict weights, global const float* restrict inverse_roots,
+                        global const int* restrict half_exponents, global const float* restrict roots, global const float2* restrict residual,
+                        global float* restrict matrices, global float* restrict vectors) {
+  const int lane = VSM_ITEM, lanes = VSM_ITEMS;
+  for (int f = begin; f < end; ++f) {
+    global const FrontRecord* record = fronts + f;
+    const FrontView front = view_front(record, matrices, vectors);
+    const int first = record->first, pivots = record->pivots, fixed_column = front.pivots + record->boundary - 1;
+    if (is_new) {
+      for (int k = 0; k < front.pivots; ++k)
+        for (int column = k / VSM_TILE * VSM_TILE + lane * VSM_TILE; column < front.width; column += lanes * VSM_TILE)
+          vstore8(0.0f, 0, front.rows + k * front.width + column);
+      for (int j = lane; j < front.width; j += lanes) {
+        const int i = j - front.pivots;
+        front.root[j] = j < pivots ? roots[first + j] : j == fixed_column ? 1.0f : i >= 0 && j < fixed_column ? roots[boundary_rows[record->list + i]] : 0.0f;
+      }
+      VSM_BARRIER();
+      for (int k = lane; k < pivots; k += lanes) {
+        const int row = first + k;
+        const float inverse_root = inverse_roots[row];
+        float fixed = 0.0f;
+        int n = 0;
+        for (; n < later_end[row]; ++n) {
+          // Not from weights, of which one row's may be too small for a float.
+          const int e = entry_index(slice_begin, row, n), j = neighbour[e];
+          front.rows[k * front.width + entry_columns[e]] =
+              mantissas[e] * (inverse_root * inverse_roots[j]) * power_of_two(exponents[e] - half_exponents[row] - half_exponents[j]);
+        }
+        for (; n < fixed_end[row]; ++n) {
+          const int e = entry_index(slice_begin, row, n);
+          fixed += record->axes == 2 && jumps[e] == VSM_POLE ? 0.0f : weights[e];
+        }
+        front.rows[k * front.width + fixed_column] = fixed * (inverse_root * inverse_root) * front.root[k];
+      }
+      VSM_BARRIER();
+      for (int c = record->child_begin; c < record->child_end; ++c) {
+        global const FrontRecord* child = fronts + children[c];
+        add_child(front, view_front(child, matrices, vectors), 0, child->shared, child->boundary, parent_columns + child->list);
+        VSM_BARRIER();
+      }
+      factor(front);
+      VSM_BARRIER();
+      for (int c = record->child_begin; c < record->child_end; ++c) {
+        global const FrontRecord* child = fronts + children[c];
+        add_child(front, view_front(child, matrices, vectors), child->shared, child->boundary - 1, child->boundary, parent_columns + child->list);
+        VSM_BARRIER();
+      }
+    }
+    for (int j = lane; j < front.width; j += lanes) {
+      const float2 value = j < pivots ? residual[first + j] : (float2)0.0f;
+      front.u[j] = value.x;
+      front.v[j] = value.y;
+    }
+    VSM_BARRIER();
+    for (int c = record->child_begin; c < record->child_end; ++c) {
+      global const FrontRecord* child = fronts + children[c];
+      const FrontView from = view_front(child, matrices, vectors);
+      for (int i = lane; i < child->boundary - 1; i += lanes) {
+        const int column = parent_columns[child->list + i];
+        front.u[column] += from.u[from.pivots + i];
+        front.v[column] += from.v[from.pivots + i];
+      }
+      VSM_BARRIER();
+    }
+    carry_up(front);
+  }
+}
+
+// Eliminates the fronts of tasks, for the charts whose ratio is above `tolerance`.
+// In: tasks (first front and end, 2 ints each), from task_begin to task_end; queue, the one of `queues` to take them from (0); fronts and children
+// (see vsm_structs.h); boundary_rows (the last of a front, the fixed column, has none); parent_columns, the columns of the parent; later_end,
+// fixed_end: entries of a row whose neighbours are eliminated later, and these and fixed ones; entry_columns: of the first, the column in the front
+// of its row.
 // In and out: matrices; vectors, 4 rows per front (see FrontView). NDRange: any number of work-groups.
 kernel VSM_GROUP void eliminate_fronts(int is_new, float tolerance, int task_begin, int task_end, global const int* restrict tasks, int queue,
                                        global int* restrict queues, global const FrontRecord* restrict fronts, global const int* restrict children,
@@ -426,116 +550,126 @@ kernel VSM_GROUP void eliminate_fronts(int is_new, float tolerance, int task_beg
                                        global const int* restrict half_exponents, global const float* restrict roots,
                                        global const float2* restrict residual, global const int* restrict ratios, global float* restrict matrices,
                                        global float* restrict vectors) {
-  const int lane = VSM_ITEM, lanes = VSM_ITEMS;
   local int taken;
-  for (int task = task_begin + take_task(queues + queue, &taken); task < task_end; task = task_begin + take_task(queues + queue, &taken))
-    for (int f = tasks[2 * task]; f < tasks[2 * task + 1]; ++f) {
-      global const FrontRecord* record = fronts + f;
-      if (as_float(ratios[record->chart]) <= tolerance) continue;
-      const FrontView front = view_front(record, matrices, vectors);
-      const int first = record->first, pivots = record->pivots, fixed_column = front.pivots + record->boundary - 1;
-      if (is_new) {
-        for (int k = lane; k < front.pivots * front.width / VSM_TILE; k += lanes) vstore8(0.0f, k, front.rows);
-        for (int k = lane; k < front.boundary / VSM_TILE * (front.boundary + VSM_TILE) / 2; k += lanes) vstore8(0.0f, k, front.rest);
-        for (int j = lane; j < front.width; j += lanes) {
-          const int i = j - front.pivots;
-          front.root[j] = j < pivots ? roots[first + j] : j == fixed_column ? 1.0f : i >= 0 && j < fixed_column ? roots[boundary_rows[record->list + i]] : 0.0f;
-        }
-        VSM_BARRIER();
-        for (int k = lane; k < pivots; k += lanes) {
-          const int row = first + k;
-          const float inverse_root = inverse_roots[row];
-          float fixed = 0.0f;
-          int n = 0;
-          for (; n < later_end[row]; ++n) {
-            // Not from weights, of which one row's may be too small for a float.
-            const int e = entry_index(slice_begin, row, n), j = neighbour[e];
-            front.rows[k * front.width + entry_columns[e]] =
-                mantissas[e] * (inverse_root * inverse_roots[j]) * power_of_two(exponents[e] - half_exponents[row] - half_exponents[j]);
-          }
-          for (; n < fixed_end[row]; ++n) {
-            const int e = entry_index(slice_begin, row, n);
-            fixed += record->axes == 2 && jumps[e] == VSM_POLE ? 0.0f : weights[e];
-          }
-          front.rows[k * front.width + fixed_column] = fixed * (inverse_root * inverse_root) * front.root[k];
-        }
-        VSM_BARRIER();
-        for (int c = record->child_begin; c < record->child_end; ++c) {
-          global const FrontRecord* child = fronts + children[c];
-          add_child(front, view_front(child, matrices, vectors), child->boundary, parent_columns + child->list);
-          VSM_BARRIER();
-        }
-        factor(front);
-        VSM_BARRIER();
-      }
-      for (int j = lane; j < front.width; j += lanes) {
-        const float2 value = j < pivots ? residual[first + j] : (float2)0.0f;
-        front.u[j] = value.x;
-        front.v[j] = value.y;
-      }
-      VSM_BARRIER();
-      for (int c = record->child_begin; c < record->child_end; ++c) {
-        global const FrontRecord* child = fronts + children[c];
-        const FrontView from = view_front(child, matrices, vectors);
-        for (int i = lane; i < child->boundary - 1; i += lanes) {
-          const int column = parent_columns[child->list + i];
-          front.u[column] += from.u[from.pivots + i];
-          front.v[column] += from.v[from.pivots + i];
-        }
-        VSM_BARRIER();
-      }
-      carry_up(front);
-    }
+  for (int task = task_begin + take_task(queues + queue, &taken); task < task_end; task = task_begin + take_task(queues + queue, &taken)) {
+    const int begin = tasks[2 * task], end = tasks[2 * task + 1];
+    if (as_float(ratios[fronts[begin].chart]) > tolerance)
+      eliminate(begin, end, is_new, fronts, children, boundary_rows, parent_columns, slice_begin, later_end, fixed_end, neighbour, jumps, entry_columns,
+                mantissas, exponents, weights, inverse_roots, half_exponents, roots, residual, matrices, vectors);
+  }
 }
 
-// The way back, from parents to children, of the same tasks, each from its last front on: solves for the pivots and adds the result to the map; the
-// rounding error of the sum is kept in its second part. In and out: vectors, map. Work space: solution (2 floats per vertex).
+// The way back, from parents to children: solves for the pivots of fronts from the last of them on, and adds the result to the map; the rounding
+// error of the sum is kept in its second part.
+VSM_ONCE void substitute(int begin, int end, global const FrontRecord* restrict fronts, global const int* restrict boundary_rows,
+                         global const float* restrict roots, global float* restrict matrices, global float* restrict vectors,
+                         global float* restrict solution, global float* restrict map) {
+  const int lane = VSM_ITEM, lanes = VSM_ITEMS;
+  for (int f = end - 1; f >= begin; --f) {
+    global const FrontRecord* record = fronts + f;
+    const FrontView front = view_front(record, matrices, vectors);
+    for (int i = lane; i < record->boundary; i += lanes) {
+      const int is_fixed = i == record->boundary - 1, row = is_fixed ? 0 : boundary_rows[record->list + i];
+      front.u[front.pivots + i] = is_fixed ? 0.0f : solution[2 * row];
+      front.v[front.pivots + i] = is_fixed ? 0.0f : solution[2 * row + 1];
+    }
+    VSM_BARRIER();
+    for (int block = front.pivots - VSM_TILE; block >= 0; block -= VSM_TILE) {
+      global const float* rows = front.rows + block * front.width;
+      global float* u = front.u + block;
+      global float* v = front.v + block;
+      multiply_rows_twice(rows, front.width, block + VSM_TILE, front.width, front.u, front.v, u, v);
+      VSM_BARRIER();
+      if (lane == 0) {
+        // In registers: each value waits for the one before.
+        float own_u[VSM_TILE], own_v[VSM_TILE];
+#pragma unroll
+        for (int k = VSM_TILE - 1; k >= 0; --k) {
+          float sum_u = u[k], sum_v = v[k];
+#pragma unroll
+          for (int j = VSM_TILE - 1; j > k; --j) {
+            const float value = rows[k * front.width + block + j];
+            sum_u += value * own_u[j];
+            sum_v += value * own_v[j];
+          }
+          u[k] = own_u[k] = sum_u * front.inverse[block + k];
+          v[k] = own_v[k] = sum_v * front.inverse[block + k];
+        }
+      }
+      VSM_BARRIER();
+    }
+    for (int i = lane; i < 2 * record->pivots; i += lanes) {
+      const int axis = i & 1, row = record->first + i / 2;
+      if (!(record->axes & (1 << axis))) continue;
+      const float value = axis ? front.v[i / 2] : front.u[i / 2];
+      global float* hi = map + 4 * row + axis;
+      global float* lo = hi + 2;
+      const float change = *lo + value / roots[row], sum = *hi + change, part = sum - *hi;
+      solution[2 * row + axis] = value;
+      *lo = (*hi - (sum - part)) + (change - part);
+      *hi = sum;
+    }
+    VSM_BARRIER();
+  }
+}
+
+// The way back of the same tasks. In and out: vectors, map. Work space: solution (2 floats per vertex).
 kernel VSM_GROUP void substitute_back(float tolerance, int task_begin, int task_end, global const int* restrict tasks, int queue, global int* restrict queues,
                                       global const FrontRecord* restrict fronts, global const int* restrict boundary_rows,
                                       global const float* restrict roots, global const int* restrict ratios, global float* restrict matrices,
                                       global float* restrict vectors, global float* restrict solution, global float* restrict map) {
-  const int lane = VSM_ITEM, lanes = VSM_ITEMS;
   local int taken;
-  for (int task = task_begin + take_task(queues + queue, &taken); task < task_end; task = task_begin + take_task(queues + queue, &taken))
-    for (int f = tasks[2 * task + 1] - 1; f >= tasks[2 * task]; --f) {
-      global const FrontRecord* record = fronts + f;
-      if (as_float(ratios[record->chart]) <= tolerance) continue;
-      const FrontView front = view_front(record, matrices, vectors);
-      for (int i = lane; i < record->boundary; i += lanes) {
-        const int is_fixed = i == record->boundary - 1, row = is_fixed ? 0 : boundary_rows[record->list + i];
-        front.u[front.pivots + i] = is_fixed ? 0.0f : solution[2 * row];
-        front.v[front.pivots + i] = is_fixed ? 0.0f : solution[2 * row + 1];
-      }
-      VSM_BARRIER();
-      for (int block = front.pivots - VSM_TILE; block >= 0; block -= VSM_TILE) {
-        global const float* rows = front.rows + block * front.width;
-        global float* u = front.u + block;
-        global float* v = front.v + block;
-        multiply_rows(rows, front.width, block + VSM_TILE, front.width, front.u, 0, u);
-        multiply_rows(rows, front.width, block + VSM_TILE, front.width, front.v, 0, v);
-        VSM_BARRIER();
-        if (lane == 0)
-          for (int k = VSM_TILE - 1; k >= 0; --k) {
-            for (int j = k + 1; j < VSM_TILE; ++j) {
-              u[k] += rows[k * front.width + block + j] * u[j];
-              v[k] += rows[k * front.width + block + j] * v[j];
-            }
-            u[k] *= front.inverse[block + k];
-            v[k] *= front.inverse[block + k];
-          }
-        VSM_BARRIER();
-      }
-      for (int i = lane; i < 2 * record->pivots; i += lanes) {
-        const int axis = i & 1, row = record->first + i / 2;
-        if (!(record->axes & (1 << axis))) continue;
-        const float value = axis ? front.v[i / 2] : front.u[i / 2];
-        global float* hi = map + 4 * row + axis;
-        global float* lo = hi + 2;
-        const float change = *lo + value / roots[row], sum = *hi + change, part = sum - *hi;
-        solution[2 * row + axis] = value;
-        *lo = (*hi - (sum - part)) + (change - part);
-        *hi = sum;
-      }
-      VSM_BARRIER();
-    }
+  for (int task = task_begin + take_task(queues + queue, &taken); task < task_end; task = task_begin + take_task(queues + queue, &taken)) {
+    const int begin = tasks[2 * task], end = tasks[2 * task + 1];
+    if (as_float(ratios[fronts[begin].chart]) > tolerance)
+      substitute(begin, end, fronts, boundary_rows, roots, matrices, vectors, solution, map);
+  }
 }
+
+#ifdef VSM_SINGLE
+// The same for charts of moderate size, each from its first weights to its last solution by one work-item: what it needs stays in a processor's cache,
+// and it waits for no other chart.
+// In: charts, largest first; queue (0). In and out: steps (per chart, 0), of the solver. All else as for the kernels above. NDRange: any number of
+// work-groups.
+kernel VSM_GROUP void map_charts(int iterations, float intermediate_tolerance, float tolerance, int max_steps, int chart_count,
+                                 global const ChartRecord* restrict charts, global int* restrict queue, int entries, int triangles,
+                                 global const int* restrict slice_begin, global const int* restrict row_length, global const int* restrict later_end,
+                                 global const int* restrict fixed_end, global const int* restrict columns, global const int* restrict entry_triangles,
+                                 global const int* restrict entry_columns, global const char* restrict jumps, global const float* restrict factors,
+                                 global const int* restrict corners, global const char* restrict corner_jumps,
+                                 global const FrontRecord* restrict fronts, global const int* restrict children,
+                                 global const int* restrict boundary_rows, global const int* restrict parent_columns, global float* restrict areas,
+                                 global float* restrict mantissas, global int* restrict exponents, global float* restrict weights,
+                                 global float* restrict inverse_roots, global float* restrict roots, global int* restrict half_exponents,
+                                 global float* restrict residual, global float* restrict solution, global float* restrict matrices,
+                                 global float* restrict vectors, global float* restrict map, global int* restrict largest,
+                                 global int* restrict ratios, global int* restrict steps) {
+  local int taken, values[VSM_SLICE];
+  for (int task = take_task(queue, &taken); task < chart_count; task = take_task(queue, &taken)) {
+    const ChartRecord record = charts[task];
+    const int chart = record.chart;
+    for (int iteration = 0;; ++iteration) {
+      const int is_last = iteration == iterations;
+      const float wanted = is_last ? tolerance : intermediate_tolerance;
+      largest[chart] = INT_MIN;
+      for (int slice = record.slice_begin; slice < record.slice_end; ++slice)
+        weigh_slice(slice, iteration == 0, entries, slice_begin, row_length, entry_triangles, factors, areas, mantissas, exponents, weights,
+                    inverse_roots, half_exponents, largest + chart, values);
+      for (int step = 0;; ++step) {
+        ratios[chart] = 0;
+        for (int slice = record.slice_begin; slice < record.slice_end; ++slice)
+          form_residual_of_slice(slice, slice_begin, row_length, columns, jumps, weights, inverse_roots, half_exponents, largest[chart], map, roots,
+                                 residual, ratios + chart, values);
+        if (as_float(ratios[chart]) <= wanted || step == max_steps) break;
+        ++steps[chart];
+        eliminate(record.front_begin, record.front_end, step == 0, fronts, children, boundary_rows, parent_columns, slice_begin, later_end, fixed_end,
+                  columns, jumps, entry_columns, mantissas, exponents, weights, inverse_roots, half_exponents, roots, (global const float2*)residual,
+                  matrices, vectors);
+        substitute(record.front_begin, record.front_end, fronts, boundary_rows, roots, matrices, vectors, solution, map);
+      }
+      if (is_last) break;
+      measure_triangles(record.triangle_begin, record.triangle_end, triangles, corners, corner_jumps, (global const float4*)map, areas);
+    }
+  }
+}
+#endif

@@ -21,6 +21,7 @@ typedef struct FrontRecord {
   SKELETEX_INT pivots;
   SKELETEX_INT boundary;     ///< vertices that come later and are neighbours; the last column stands for all fixed vertices
   SKELETEX_INT list;         ///< first entry of the boundary in `boundary_rows` and `parent_columns`
+  SKELETEX_INT shared;       ///< so many of these, the first, are pivots of the parent
   SKELETEX_INT child_begin;  ///< fronts whose boundaries lie in this front: children[child_begin] to children[child_end - 1]
   SKELETEX_INT child_end;
   SKELETEX_INT rows;         ///< the pivots' rows in `matrices`, in tiles' rows (VSM_TILE floats)
@@ -28,8 +29,20 @@ typedef struct FrontRecord {
   SKELETEX_INT vectors;      ///< four rows of `vectors`, in the same unit
 } FrontRecord;
 
+/// A chart, and what of each list is its own.
+typedef struct ChartRecord {
+  SKELETEX_INT chart;
+  SKELETEX_INT slice_begin;
+  SKELETEX_INT slice_end;
+  SKELETEX_INT front_begin;
+  SKELETEX_INT front_end;
+  SKELETEX_INT triangle_begin;
+  SKELETEX_INT triangle_end;
+} ChartRecord;
+
 #ifndef __OPENCL_C_VERSION__
-static_assert(sizeof(FrontRecord) == 4 * 11);
+static_assert(sizeof(ChartRecord) == 4 * 7);
+static_assert(sizeof(FrontRecord) == 4 * 12);
 }  // namespace skeletex
 #endif
 #undef SKELETEX_INT

@@ -151,9 +151,11 @@ TEST(Vsm, StopsWhenTheSpreadHasSettled) {
 }
 
 TEST(Vsm, ChartsDoNotInfluenceEachOther) {
-  std::vector<Chart> together;
-  for (const auto& [name, made] : all_kinds_of_segments()) together.push_back(chart_of(made));
-  const std::vector<Chart> before = together;
+  // So many, that on a CPU one work-item takes all of a chart; one alone is shared.
+  std::vector<Chart> before, together;
+  for (const auto& [name, made] : all_kinds_of_segments()) before.push_back(chart_of(made));
+  const int copies = 4 * context().device().compute_units;
+  for (int i = 0; i < copies; ++i) together.insert(together.end(), before.begin(), before.end());
   solve_vsm(context(), together);
   for (std::size_t k = 0; k < before.size(); ++k) {
     std::vector<Chart> alone{before[k]};

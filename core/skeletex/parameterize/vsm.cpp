@@ -28,6 +28,9 @@ constexpr double kSmallestArea = 1e-6;
 /// One work-group takes whole subtrees of so many vertices: a share of all that keeps processors busy, within limits.
 constexpr int kSubtrees = 32, kSmallestSubtree = 256, kLargestSubtree = 1024;
 
+/// More groups than tasks do no harm, and drivers that hand groups to threads in blocks then use every thread.
+constexpr int kLeastGroups = 64;
+
 bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind == ChartVertex::kTailPole; }
 
 /// Surface areas, kept away from zero, in units of the chart's mean.
@@ -99,6 +102,7 @@ void append_tables(FrontTables& to, FrontTables&& more) {
 /// The systems of all charts in the layout of vsm.cl.
 struct DeviceSystems {
   int vertices = 0, triangles = 0, entries = 0;
+  std::vector<ChartRecord> charts;  ///< the largest first
   std::vector<int> slice_chart, slice_begin, row_length, later_end, fixed_end;
   std::vector<std::vector<int>> device_vertices;             ///< per chart and vertex
   std::vector<int> columns, entry_triangles, entry_columns;  ///< entry_triangles: two planes
@@ -114,8 +118,9 @@ struct DeviceSystems {
 int padded(int count, int unit) { return (count + unit - 1) / unit * unit; }
 
 /// The fronts of a chart, and the tasks that they make. Columns of later neighbours (per place in `table.targets`, else -1), and of boundaries in
-/// their parents, are found where a front's own columns are known.
-FrontTables make_fronts(const HalfEdgeTable& table, const Dissection& d, int id, int first_row, int subtree_size, std::vector<int>& neighbour_columns) {
+/// their parents, are found where a front's own columns are known; and the lengths of the chart's rows, from `first_row` on.
+FrontTables make_fronts(const HalfEdgeTable& table, const Dissection& d, int id, int first_row, int subtree_size, std::vector<int>& neighbour_columns,
+                        DeviceSystems& systems) {
   FrontTables s;
   const int count = static_cast<int>(d.fronts.size());
   std::vector<int> column(d.order.size(), -1), list(count), ids(count), stage(count, 0), depth(count, 0), rest_size(count);
@@ -131,13 +136,24 @@ FrontTables make_fronts(const HalfEdgeTable& table, const Dissection& d, int id,
     const int boundary = padded(boundary_size + 1, VSM_TILE), width = pivots + boundary;
     for (int i = 0; i < front.pivots; ++i) column[front.first + i] = i;
     for (int i = 0; i < boundary_size; ++i) column[front.boundary[i]] = pivots + i;
-    for (int number = front.first; number < front.first + front.pivots; ++number)
-      for (int v = d.order[number], k = table.begin[v]; k < table.begin[v + 1]; ++k)
-        if (const int other = d.number[table.targets[k]]; other > number) neighbour_columns[k] = column[other];
+    for (int number = front.first; number < front.first + front.pivots; ++number) {
+      const int v = d.order[number], begin = table.begin[v], end = table.begin[v + 1];
+      int later = 0, fixed = 0;
+      for (int k = begin; k < end; ++k) {
+        const int other = d.number[table.targets[k]];
+        if (other > number) neighbour_columns[k] = column[other], ++later;
+        fixed += other < 0;
+      }
+      systems.row_length[first_row + number] = end - begin;
+      systems.later_end[first_row + number] = later;
+      systems.fixed_end[first_row + number] = later + fixed;
+    }
     for (const int child : front.children) {
       const std::vector<int>& joined = d.fronts[child].boundary;
       for (std::size_t i = 0; i < joined.size(); ++i) s.parent_columns[list[child] + i] = column[joined[i]];
       s.parent_columns[list[child] + joined.size()] = pivots + boundary_size;
+      const int shared = static_cast<int>(std::lower_bound(joined.begin(), joined.end(), front.first + front.pivots) - joined.begin());
+      for (int k = ids[child]; k < (child + 1 < f ? ids[child + 1] : static_cast<int>(s.fronts.size())); ++k) s.fronts[k].shared = shared;
     }
     list[f] = static_cast<int>(s.boundary_rows.size());
     for (const int number : front.boundary) s.boundary_rows.push_back(first_row + number);
@@ -189,26 +205,35 @@ FrontTables make_fronts(const HalfEdgeTable& table, const Dissection& d, int id,
   return s;
 }
 
-/// Calls act(k) for every chart on all processors, the largest first, so that these end together.
+using ChartPointers = std::vector<Chart*>;
+
+/// Charts by number, the largest first: processors that take them in this order end together.
+std::vector<int> by_falling_size(const ChartPointers& charts) {
+  std::vector<int> order(charts.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return charts[a]->triangles.size() > charts[b]->triangles.size(); });
+  return order;
+}
+
+/// Calls act(k) for every chart on all processors.
 template <class Act>
-void for_each_chart(std::span<const Chart> charts, const Act& act) {
-  std::vector<std::size_t> order(charts.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return charts[a].triangles.size() > charts[b].triangles.size(); });
+void for_each_chart(const ChartPointers& charts, const Act& act) {
+  const std::vector<int> order = by_falling_size(charts);
   for_each_block(order.size(), 1, [&](std::size_t i, std::size_t, std::size_t) { act(order[i]); });
 }
 
-DeviceSystems build_systems(std::span<const Chart> charts, double alpha) {
+/// \param are_whole  charts are not divided into subtrees
+DeviceSystems build_systems(const ChartPointers& charts, double alpha, bool are_whole) {
   DeviceSystems s;
-  std::vector<int> first_rows, first_triangles;
+  std::vector<int> first_rows, first_triangles, first_fronts;
   for (std::size_t k = 0; k < charts.size(); ++k) {
     first_rows.push_back(s.vertices);
     first_triangles.push_back(s.triangles);
-    s.vertices += padded(static_cast<int>(charts[k].positions.size()), kSlice);
+    s.vertices += padded(static_cast<int>(charts[k]->positions.size()), kSlice);
     s.slice_chart.resize(s.vertices / kSlice, static_cast<int>(k));
-    s.triangles += static_cast<int>(charts[k].triangles.size());
+    s.triangles += static_cast<int>(charts[k]->triangles.size());
   }
-  const int subtree_size = std::clamp(s.vertices / kSubtrees, kSmallestSubtree, kLargestSubtree);
+  const int subtree_size = are_whole ? INT_MAX : std::clamp(s.vertices / kSubtrees, kSmallestSubtree, kLargestSubtree);
   s.device_vertices.resize(charts.size());
   s.row_length.assign(s.vertices, 0);
   s.later_end = s.fixed_end = s.row_length;
@@ -217,32 +242,31 @@ DeviceSystems build_systems(std::span<const Chart> charts, double alpha) {
   std::vector<std::vector<int>> neighbour_columns(charts.size());
   std::vector<FrontTables> fronts(charts.size());
   for_each_chart(charts, [&](std::size_t k) {
-    const Chart& chart = charts[k];
+    const Chart& chart = *charts[k];
     const Dissection& d = dissections[k] = dissect(chart);
     const int count = static_cast<int>(chart.positions.size());
     std::vector<int>& map = s.device_vertices[k];
     map.resize(count);
     int next = first_rows[k] + static_cast<int>(d.order.size());
     for (int v = 0; v < count; ++v) map[v] = chart.kinds[v] == ChartVertex::kInner ? first_rows[k] + d.number[v] : next++;
-    const HalfEdgeTable& table = chart.half_edges;
-    fronts[k] = make_fronts(table, d, static_cast<int>(k), first_rows[k], subtree_size, neighbour_columns[k]);
+    fronts[k] = make_fronts(chart.half_edges, d, static_cast<int>(k), first_rows[k], subtree_size, neighbour_columns[k], s);
     for (int v = 0; v < count; ++v) {
-      const int row = map[v];
-      if (chart.kinds[v] == ChartVertex::kInner)
-        for (int at = table.begin[v]; at < table.begin[v + 1]; ++at) {
-          ++s.row_length[row];
-          s.later_end[row] += neighbour_columns[k][at] >= 0;
-          s.fixed_end[row] += neighbour_columns[k][at] >= 0 || d.number[table.targets[at]] < 0;
-        }
       for (const int axis : {0, 1}) {
         const double x = axis == 0 ? chart.u[v] : chart.v[v];
-        const std::size_t at = 4 * static_cast<std::size_t>(row) + axis;
+        const std::size_t at = 4 * static_cast<std::size_t>(map[v]) + axis;
         s.map[at] = static_cast<float>(x);
         s.map[at + 2] = static_cast<float>(x - static_cast<double>(s.map[at]));
       }
     }
   });
-  for (FrontTables& tables : fronts) append_tables(s.fronts, std::exchange(tables, {}));
+  for (FrontTables& tables : fronts) {
+    first_fronts.push_back(static_cast<int>(s.fronts.fronts.size()));
+    append_tables(s.fronts, std::exchange(tables, {}));
+  }
+  first_rows.push_back(s.vertices), first_triangles.push_back(s.triangles), first_fronts.push_back(static_cast<int>(s.fronts.fronts.size()));
+  for (const int k : by_falling_size(charts))
+    s.charts.push_back({k, first_rows[k] / kSlice, first_rows[k + 1] / kSlice, first_fronts[k], first_fronts[k + 1], first_triangles[k],
+                        first_triangles[k + 1]});
   std::vector<Task>& tasks = s.fronts.tasks;
   std::stable_sort(tasks.begin(), tasks.end(), [](const Task& a, const Task& b) { return a.stage != b.stage ? a.stage < b.stage : a.work > b.work; });
   for (const Task& task : tasks) {
@@ -264,29 +288,39 @@ DeviceSystems build_systems(std::span<const Chart> charts, double alpha) {
   s.corners.resize(3 * static_cast<std::size_t>(s.triangles));
   s.corner_jumps.resize(2 * static_cast<std::size_t>(s.triangles));
   for_each_chart(charts, [&](std::size_t k) {
-    const Chart& chart = charts[k];
+    const Chart& chart = *charts[k];
     const Dissection& d = dissections[k];
     const std::vector<int>& map = s.device_vertices[k];
     const HalfEdgeTable& table = chart.half_edges;
     const std::vector<double> surface = relative_surface_areas(chart);
+    // Where they lie does not change, which compilers cannot know where bytes are written.
+    int *const columns = s.columns.data(), *const entry_columns = s.entry_columns.data(), *const triangles = s.entry_triangles.data();
+    signed char* const jumps = s.jumps.data();
+    float* const factors = s.factors.data();
+    const int *const numbers = d.number.data(), *const own_columns = neighbour_columns[k].data(), *const rows = map.data();
+    const int *const outgoing = table.outgoing.data(), *const targets = table.targets.data(), *const twins = table.twins.data();
+    const auto* const turns = chart.turns.data();
+    const ChartVertex* const kinds = chart.kinds.data();
+    const int entries = s.entries, first_triangle = first_triangles[k];
     for (const int v : d.order) {
-      const int row = map[v];
+      const int row = map[v], first_entry = s.slice_begin[row / kSlice] + row % kSlice;
       int later = 0, fixed = s.later_end[row], before = s.fixed_end[row];
       for (int at = table.begin[v]; at < table.begin[v + 1]; ++at) {
-        const int h = table.outgoing[at], to = table.targets[at], column = neighbour_columns[k][at];
-        int& place = column >= 0 ? later : d.number[to] < 0 ? fixed : before;
-        const int e = s.slice_begin[row / kSlice] + kSlice * place++ + row % kSlice, own = h / 3, other = table.twins[h] / 3;
-        s.entry_columns[e] = std::max(column, 0);
-        s.columns[e] = map[to];
-        const auto& turns = chart.turns[own];
-        s.jumps[e] = is_pole(chart.kinds[to]) ? kPole : static_cast<signed char>(turns[HalfEdgeTable::next(h) % 3] - turns[h % 3]);
-        s.entry_triangles[e] = first_triangles[k] + own;
-        s.entry_triangles[s.entries + e] = first_triangles[k] + other;
+        const int h = outgoing[at], to = targets[at], column = own_columns[at];
+        int& place = column >= 0 ? later : numbers[to] < 0 ? fixed : before;
+        const int e = first_entry + kSlice * place++, own = h / 3, corner = h % 3, other = twins[h] / 3;
+        entry_columns[e] = std::max(column, 0);
+        columns[e] = rows[to];
+        jumps[e] = is_pole(kinds[to]) ? kPole : static_cast<signed char>(turns[own][corner < 2 ? corner + 1 : 0] - turns[own][corner]);
+        triangles[e] = first_triangle + own;
+        triangles[entries + e] = first_triangle + other;
         // The same bits in both directions.
-        const auto area = static_cast<float>(surface[own] + surface[other]);
-        s.factors[e] = alpha == 0.5 ? 1 / std::sqrt(area) : std::pow(area, static_cast<float>(-alpha));
+        factors[e] = static_cast<float>(surface[own] + surface[other]);
       }
     }
+    const auto slice_of = [&](int row) { return row < s.vertices ? s.slice_begin[row / kSlice] : s.entries; };
+    for (int e = slice_of(first_rows[k]); e < slice_of(first_rows[k + 1]); ++e)
+      factors[e] = alpha == 0.5 ? 1 / std::sqrt(factors[e]) : std::pow(factors[e], static_cast<float>(-alpha));
     for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
       int first = 0;
       for (const int c : {1, 2})
@@ -386,12 +420,14 @@ std::size_t group_size(const ClContext& context, const VsmOptions& options) {
   return options.work_group_size > 0 ? options.work_group_size : context.row_items();
 }
 
-}  // namespace
+/// VSM_SINGLE
+bool is_single(const ClContext& context, const VsmOptions& options) { return group_size(context, options) == 1 && context.row_items() == 1; }
 
-std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, const VsmOptions& options) {
+/// \param s          the charts' systems
+/// \param are_whole  one work-item takes a chart from its first weights to its last solution; else work-groups share each step of all charts
+std::vector<VsmReport> solve_charts(ClContext& context, const ChartPointers& charts, DeviceSystems s, const VsmOptions& options, bool are_whole) {
   std::vector<VsmReport> reports(charts.size());
   if (charts.empty()) return reports;
-  DeviceSystems s = build_systems(charts, options.alpha);
   // The host's copy goes at once: both together would be the largest part of all memory.
   const auto hand_over = [&](auto& values) { return context.upload(std::exchange(values, {})); };
   const auto slice_chart = context.upload(s.slice_chart), slice_begin = hand_over(s.slice_begin), row_length = hand_over(s.row_length),
@@ -415,35 +451,47 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
        vectors = context.allocate<float>(static_cast<std::size_t>(s.fronts.vector_rows) * VSM_TILE);
   auto largest = context.allocate<int>(charts.size()), ratios = context.allocate<int>(charts.size());
   const int stages = static_cast<int>(s.stage_begin.size()) - 1;
-  auto queues = context.allocate<int>(2 * stages);
+  auto queues = context.allocate<int>(2 * stages + 1);
   context.fill(mantissas, 0.5f);
   context.fill(exponents, 1);
 
   // On a CPU one work-item runs plain loops; elsewhere a group shares them. One program holds all kernels: each is compiled once.
   const std::size_t wanted = group_size(context, options);
-  const bool is_single = wanted == 1 && context.row_items() == 1;  // VSM_SINGLE
-  const char* const kernel_options = !is_single && context.row_items() == 1 ? "-DVSM_BARRIERS" : "";
+  const char* const kernel_options = !is_single(context, options) && context.row_items() == 1 ? "-DVSM_BARRIERS" : "";
   const auto kernel = [&](std::string_view name) { return ClKernelName{"vsm.cl", name, kernel_options}; };
-  const std::size_t group = context.work_group_size(kernel("eliminate_fronts"), context.work_group_size(kernel("substitute_back"), wanted));
-  const std::size_t lanes = is_single ? 1 : kSlice;  // work-items that share a slice
-  const ClRange slices({s.vertices / kSlice * lanes, 1}, {lanes, 1});
-  std::vector<int> frozen(s.vertices / kSlice, 1), iterations(charts.size(), 0), steps(charts.size(), 0);
+  std::vector<int> iterations(charts.size(), 0), steps(charts.size(), 0);
   std::vector<float> final_ratios(charts.size(), 0);
-  std::vector<bool> is_stopped(charts.size(), false);
-  std::vector<double> spreads(charts.size(), 0);
-  auto frozen_slices = context.upload(frozen);
+  const auto read_ratios = [&] {
+    const std::vector<int> bits = context.download(ratios);
+    for (std::size_t k = 0; k < charts.size(); ++k) final_ratios[k] = std::bit_cast<float>(bits[k]);
+  };
+  const auto map_whole_charts = [&] {
+    const auto order = context.upload(s.charts);
+    auto steps_of_charts = context.upload(steps);
+    context.fill(queues, 0);
+    context.launch(kernel("map_charts"), ClRange({std::max<std::size_t>(kLeastGroups, charts.size()), 1}, {1, 1}), options.iterations,
+                   static_cast<float>(options.intermediate_tolerance), static_cast<float>(options.tolerance), options.max_steps,
+                   static_cast<int>(charts.size()), order, queues, s.entries, s.triangles, slice_begin, row_length, later_end, fixed_end, columns,
+                   entry_triangles, entry_columns, jumps, factors, corners, corner_jumps, fronts, children, boundary_rows, parent_columns, areas,
+                   mantissas, exponents, weights, inverse_roots, roots, half_exponents, residual, solution, matrices, vectors, map, largest, ratios,
+                   steps_of_charts);
+    steps = context.download(steps_of_charts);
+    read_ratios();
+    iterations.assign(charts.size(), options.iterations);
+  };
 
+  const std::size_t lanes = is_single(context, options) ? 1 : kSlice;  // work-items that share a slice
+  const ClRange slices({s.vertices / kSlice * lanes, 1}, {lanes, 1});
   const auto for_stage = [&](int stage, const auto& launch) {
-    // More groups than tasks do no harm, and drivers that hand groups to threads in blocks then use every thread.
-    const std::size_t groups = std::max(s.stage_begin[stage + 1] - s.stage_begin[stage], 64);
+    const std::size_t group = context.work_group_size(kernel("eliminate_fronts"), context.work_group_size(kernel("substitute_back"), wanted));
+    const std::size_t groups = std::max(s.stage_begin[stage + 1] - s.stage_begin[stage], kLeastGroups);
     launch(ClRange({groups * group, 1}, {group, 1}), s.stage_begin[stage], s.stage_begin[stage + 1]);
   };
   const auto is_solved = [&](float tolerance) {
     context.fill(ratios, 0);
     context.launch(kernel("form_residual"), slices, slice_chart, slice_begin, row_length, columns, jumps, weights, inverse_roots, half_exponents,
                    largest, map, roots, residual, ratios);
-    const std::vector<int> bits = context.download(ratios);
-    for (std::size_t k = 0; k < charts.size(); ++k) final_ratios[k] = std::bit_cast<float>(bits[k]);
+    read_ratios();
     return std::all_of(final_ratios.begin(), final_ratios.end(), [&](float ratio) { return ratio <= tolerance; });
   };
   const auto solve = [&](float tolerance) {
@@ -463,38 +511,48 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
         });
     }
   };
-  for (bool is_last = options.iterations == 0;;) {
-    context.fill(largest, INT_MIN);
-    context.launch(kernel("weigh_rows"), slices, s.entries, frozen_slices, slice_chart, slice_begin, row_length, entry_triangles, factors, areas,
-                   mantissas, exponents, weights, inverse_roots, half_exponents, largest);
-    solve(static_cast<float>(is_last ? options.tolerance : options.intermediate_tolerance));
-    if (is_last) break;
-    context.launch(kernel("measure_areas"), ClRange(s.triangles), s.triangles, corners, corner_jumps, map, areas);
-    if (options.stop_spread_change > 0) {
-      const std::vector<float> now = context.download(areas);
-      auto first = now.begin();
+  const auto map_together = [&] {
+    std::vector<int> frozen(s.vertices / kSlice, 1);
+    std::vector<bool> is_stopped(charts.size(), false);
+    std::vector<double> spreads(charts.size(), 0);
+    auto frozen_slices = context.upload(frozen);
+    for (bool is_last = options.iterations == 0;;) {
+      context.fill(largest, INT_MIN);
+      context.launch(kernel("weigh_rows"), slices, s.entries, frozen_slices, slice_chart, slice_begin, row_length, entry_triangles, factors, areas,
+                     mantissas, exponents, weights, inverse_roots, half_exponents, largest);
+      solve(static_cast<float>(is_last ? options.tolerance : options.intermediate_tolerance));
+      if (is_last) break;
+      context.launch(kernel("measure_areas"), ClRange(s.triangles), s.triangles, corners, corner_jumps, map, areas);
+      if (options.stop_spread_change > 0) {
+        const std::vector<float> now = context.download(areas);
+        auto first = now.begin();
+        for (std::size_t k = 0; k < charts.size(); ++k) {
+          const auto end = first + static_cast<std::ptrdiff_t>(charts[k]->triangles.size());
+          const double spread = spread_of(std::vector<double>(first, end));
+          if (iterations[k] > 0 && std::abs(spread - spreads[k]) < options.stop_spread_change * spreads[k]) is_stopped[k] = true;
+          spreads[k] = spread;
+          first = end;
+        }
+      }
+      is_last = true;
       for (std::size_t k = 0; k < charts.size(); ++k) {
-        const auto end = first + static_cast<std::ptrdiff_t>(charts[k].triangles.size());
-        const double spread = spread_of(std::vector<double>(first, end));
-        if (iterations[k] > 0 && std::abs(spread - spreads[k]) < options.stop_spread_change * spreads[k]) is_stopped[k] = true;
-        spreads[k] = spread;
-        first = end;
+        if (!is_stopped[k]) {
+          ++iterations[k];
+          is_last &= iterations[k] == options.iterations;
+        }
       }
+      std::vector<int> now_frozen;
+      for (const int chart : s.slice_chart) now_frozen.push_back(is_stopped[chart] ? 1 : 0);
+      if (now_frozen != frozen) context.write(frozen_slices, frozen = now_frozen);
     }
-    is_last = true;
-    for (std::size_t k = 0; k < charts.size(); ++k) {
-      if (!is_stopped[k]) {
-        ++iterations[k];
-        is_last &= iterations[k] == options.iterations;
-      }
-    }
-    std::vector<int> now_frozen;
-    for (const int chart : s.slice_chart) now_frozen.push_back(is_stopped[chart] ? 1 : 0);
-    if (now_frozen != frozen) context.write(frozen_slices, frozen = now_frozen);
-  }
+  };
+  if (are_whole)
+    map_whole_charts();
+  else
+    map_together();
   const auto final_map = context.download(map);
   for_each_chart(charts, [&](std::size_t k) {
-    Chart& chart = charts[k];
+    Chart& chart = *charts[k];
     VsmReport& report = reports[k];
     const std::vector<double> guess = chart.v;
     read_map(s, k, final_map, chart);
@@ -510,6 +568,26 @@ std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, co
     if (chart.topology == SegmentTopology::kSphere) settle_rotation(chart, guess);
     report.spread = spread_of(texture_areas(chart));
   });
+  return reports;
+}
+
+}  // namespace
+
+std::vector<VsmReport> solve_vsm(ClContext& context, std::span<Chart> charts, const VsmOptions& options) {
+  // On a CPU a chart of moderate size is one task: what it needs stays in one processor's cache. Larger ones would leave others idle, and are shared.
+  std::size_t vertices = 0;
+  for (const Chart& chart : charts) vertices += chart.positions.size();
+  const std::size_t largest_whole =
+      is_single(context, options) && options.stop_spread_change == 0 ? vertices / (4 * std::max(1, context.device().compute_units)) : 0;
+  std::array<ChartPointers, 2> groups;
+  for (Chart& chart : charts) groups[chart.positions.size() <= largest_whole].push_back(&chart);
+  std::array<DeviceSystems, 2> systems;
+  for_each_block(groups.size(), 1, [&](std::size_t i, std::size_t, std::size_t) { systems[i] = build_systems(groups[i], options.alpha, i == 1); });
+  std::vector<VsmReport> reports(charts.size());
+  for (const std::size_t i : {0, 1}) {
+    const std::vector<VsmReport> of_group = solve_charts(context, groups[i], std::move(systems[i]), options, i == 1);
+    for (std::size_t k = 0; k < of_group.size(); ++k) reports[groups[i][k] - charts.data()] = of_group[k];
+  }
   return reports;
 }
 
