@@ -4,14 +4,18 @@
 #include <charconv>
 #include <exception>
 #include <filesystem>
+#include <functional>
 #include <future>
 #include <map>
 #include <memory>
 #include <optional>
+#include <ranges>
 
 #include "command.h"
 #include "progress_bar.h"
+#include "second_compiler.h"
 #include "skeletex/encode/encode_model.h"
+#include "skeletex/encode/encoding_kernels.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/io/suggestion.h"
@@ -195,11 +199,31 @@ ExrCompression compression_of(const std::string& name) {
   return name == "none" ? ExrCompression::kNone : name == "zip" ? ExrCompression::kZip : name == "piz" ? ExrCompression::kPiz : ExrCompression::kAuto;
 }
 
+/// Programs, so that they are loaded beside the input. A launch of nothing that takes long has compiled its kernel: then there are more to compile,
+/// for two processes.
+void prepare_encoding(ClContext& context, const EncodeOptions& options, SecondCompiler& second) {
+  constexpr double kCompiling = 20;  // ms: more than it takes to load a kernel, less than to compile one
+  const std::vector<KernelVariant> kernels = encoding_kernels(context, options);
+  context.prepare(kernels.front().name);
+  Stopwatch watch;
+  context.compile(kernels.front().name, kernels.front().range);
+  if (watch.lap_ms() > kCompiling) return second.start();
+  for (const KernelVariant& kernel : kernels) context.prepare(kernel.name);
+}
+
+/// The last ones first: the other process begins with the first.
+void compile_from_last(const std::string& device, const EncodeOptions& options, const std::function<bool()>& is_wanted) {
+  ClContext context(device);
+  for (const KernelVariant& kernel : encoding_kernels(context, options) | std::views::reverse)
+    if (is_wanted()) context.compile(kernel.name, kernel.range);
+}
+
 void run(const Arguments& arguments, const CLI::App& command) {
   EncodeOptions options = encode_options(arguments, command);
   Stopwatch watch;
   check_output(arguments.output);
   check_json_target(arguments.json);
+  SecondCompiler second([&](const std::function<bool()>& is_wanted) { compile_from_last(arguments.device, options, is_wanted); });
   std::optional<ProgressBar> bar(std::in_place);
   bar->show("reading and checking the input", 0);
   // A driver takes as long to load as the input. It stays on this thread, as some keep state per thread.
@@ -208,7 +232,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
   std::exception_ptr no_device;
   try {
     loaded = std::make_unique<ClContext>(arguments.device);
-    prepare_encoding(*loaded, options);
+    prepare_encoding(*loaded, options, second);
   } catch (...) {
     no_device = std::current_exception();
   }

@@ -250,6 +250,28 @@ void ClContext::enqueue(const ::cl::Kernel& kernel, const ClKernelName& name, co
   if (pending_.size() >= 1024) collect_events();
 }
 
+void ClContext::compile(const ClKernelName& name, const ClRange& range) {
+  constexpr std::size_t kBytes = 4096;  // enough for what kernels read before they look at how much there is to do
+  const BuiltKernel& built = get_kernel(name);
+  ::cl::Kernel kernel = built.kernel;
+  std::vector<::cl::Buffer> buffers;
+  for (cl_uint i = 0; i < built.arguments.size(); ++i) {
+    const cl_int zero = 0;
+    if (built.arguments[i] == ClArgument::kLocal) {
+      set_argument(kernel, name, i, ClLocal{kBytes});
+    } else if (built.arguments[i] == ClArgument::kBuffer) {
+      buffers.push_back(allocate_bytes(kBytes));
+      fill_bytes(buffers.back(), &zero, sizeof zero, kBytes);
+      check_argument(kernel.setArg(i, buffers.back()), name, i);
+    } else {
+      check_argument(kernel.setArg(i, sizeof zero, &zero), name, i);
+    }
+  }
+  enqueue(kernel, name, range);
+  finish();
+  if (!pending_.empty()) pending_.pop_back();  // no launch that anybody asked for
+}
+
 void ClContext::finish() { check(queue_.finish(), "waiting for the device"); }
 
 void ClContext::collect_events() {

@@ -23,7 +23,6 @@ namespace {
 
 // With fewer, vertices pull texels about without making edges between them; the fit makes up for some of that.
 constexpr double kSnapTexelsPerVertex = 2, kFittedSnapTexelsPerVertex = 1.5;
-constexpr std::size_t kMostFitTexels = 256 * 256;  // beyond that the fit gains little, and takes longest
 
 class Stopwatch {
  public:
@@ -63,7 +62,7 @@ std::vector<Method> choose_methods(const EncodeOptions& options, const Skeleton&
 /// SPD patches are neither snapped nor fitted.
 TexelOptions choose_texel_options(const EncodeOptions& options, const TriangleMesh& mesh, bool is_all_spd) {
   const auto texels = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
-  const bool has_fit = !is_all_spd && options.has_fit.value_or(options.has_prefilter && texels <= kMostFitTexels);
+  const bool has_fit = !is_all_spd && options.has_fit.value_or(options.has_prefilter && texels <= kMostFittedTexels);
   const double least_texels = (has_fit ? kFittedSnapTexelsPerVertex : kSnapTexelsPerVertex) * static_cast<double>(mesh.positions.size());
   const bool has_snap = !is_all_spd && options.has_snap.value_or(static_cast<double>(texels) >= least_texels);
   return {.has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_snap = has_snap, .has_fit = has_fit};
@@ -138,13 +137,6 @@ int pole_of(const Chart& chart, ChartVertex kind) {
 }
 
 }  // namespace
-
-void prepare_encoding(ClContext& context, const EncodeOptions& options) {
-  context.prepare({"encode.cl", "encode_texels"});
-  // Whether texels snap depends on the mesh; most do.
-  if (options.method != EncodeMethod::kSpd && (options.has_snap.value_or(true) || options.has_fit.value_or(false)))
-    context.prepare({"snap.cl", "place_snapped"});
-}
 
 EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& input_skeleton, const EncodeOptions& options) {
   check_options(options, input_skeleton);

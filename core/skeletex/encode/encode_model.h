@@ -19,6 +19,9 @@ enum class RowSpacing { kSurfaceLength, kUniform };
 /// What a patch's share of the texels follows.
 enum class TexelShare { kTriangles, kArea };
 
+/// Up to here the fit is the default: beyond it gains little, and takes longest.
+inline constexpr std::size_t kMostFittedTexels = 256 * 256;
+
 struct EncodeOptions {
   int width = 512, height = 512;
   EncodeMethod method = EncodeMethod::kVsm;
@@ -74,9 +77,6 @@ struct EncodeResult {
   SkeletexModel model;
   EncodeReport report;
 };
-
-/// Loads or compiles the programs of encode_model, so that this can happen beside the reading and checking of the input.
-void prepare_encoding(ClContext& context, const EncodeOptions& options = {});
 
 /// Turns a closed mesh and its skeleton into a model (paper 3.1-3.4): half edges, segments, maps, atlas, texels.
 /// \pre validate_before_segmentation reports no error      \throw TopologyError, InputError, DeviceError
