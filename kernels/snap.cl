@@ -48,16 +48,19 @@ Neighbours neighbours_of(global const PatchRecord* restrict p, int texture_width
   return n;
 }
 
+// Without fmin's care for NaN, which takes three instructions.
+__attribute__((always_inline)) float lesser(float a, float b) { return a < b ? a : b; }
+
 // The three corners of the quad (0, 0), a, b, c, counter-clockwise, whose cross product depends on (0, 0).
-float least_cross(float ax, float ay, float bx, float by, float cx, float cy) {
+__attribute__((always_inline)) float least_cross(float ax, float ay, float bx, float by, float cx, float cy) {
   const float own = ax * cy - ay * cx, at_a = (ax - bx) * ay - (ay - by) * ax, at_c = cx * (cy - by) - cy * (cx - bx);
-  return fmin(own, fmin(at_a, at_c));
+  return lesser(own, lesser(at_a, at_c));
 }
 
 // The smallest cross product at the corners of the four quads around a texel that depend on its offset, if that were (dx, dy); 0 when it
 // would come too near to a seam, whose own samples are not at the columns.
-float cross_around(Neighbours n, int height, int texture_width, int row, float dx, float dy, global const float* restrict offset_x,
-                   global const float* restrict offset_y) {
+__attribute__((always_inline)) float cross_around(Neighbours n, int height, int texture_width, int row, float dx, float dy, global const float* offset_x,
+                                                  global const float* offset_y) {
   const float rx = 1.0f + offset_x[n.right] - dx, ry = offset_y[n.right] - dy, lx = -1.0f + offset_x[n.left] - dx, ly = offset_y[n.left] - dy;
   const int above = texture_width, below = -texture_width;
   const float ax = offset_x[n.own + above] - dx, ay = 1.0f + offset_y[n.own + above] - dy;
@@ -67,7 +70,13 @@ float cross_around(Neighbours n, int height, int texture_width, int row, float d
   const float left_below = least_cross(lx, ly, -1.0f + offset_x[n.left + below] - dx, -1.0f + offset_y[n.left + below] - dy, bx, by);
   const float right_below = least_cross(bx, by, 1.0f + offset_x[n.right + below] - dx, -1.0f + offset_y[n.right + below] - dy, rx, ry);
   const int is_near_end = (float)row + dy < MARGIN || (float)row + dy > (float)(height - 1) - MARGIN;
-  return is_near_end ? 0.0f : fmin(fmin(right_above, left_above), fmin(left_below, right_below));
+  return is_near_end ? 0.0f : lesser(lesser(right_above, left_above), lesser(left_below, right_below));
+}
+
+// The same, compiled once.
+__attribute__((noinline)) float cross_around_one(Neighbours n, int height, int texture_width, int row, float dx, float dy, global const float* offset_x,
+                                                 global const float* offset_y) {
+  return cross_around(n, height, texture_width, row, dx, dy, offset_x, offset_y);
 }
 
 // The candidate of a vertex: the k-th nearest corner of its cell, and the vertex' offset from it.
@@ -125,7 +134,7 @@ kernel void decide_claims(const int vertex_count, const int texture_width, globa
     return;
   }
   const Neighbours n = neighbours_of(p, texture_width, column, row);
-  if (cross_around(n, p->height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) {
+  if (cross_around_one(n, p->height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) {
     states[v] += 1;
     if (states[v] < 4) atomic_inc(open_count);
     return;
@@ -136,26 +145,60 @@ kernel void decide_claims(const int vertex_count, const int texture_width, globa
   states[v] = PLACED;
 }
 
-// NDRange (count). Free texels of a colour go half way to the mean of their four neighbours.
-// in   texels: the inner ones of VSM patches, by colour; the colour's are `count` from `first` on
-kernel void relax_texels(const int first, const int count, const int texture_width, global const int* restrict texels,
-                         global const int* restrict texel_patches, global const PatchRecord* restrict patches, global const int* restrict anchors,
-                         global float* restrict offset_x, global float* restrict offset_y) {
-  const int i = (int)get_global_id(0);
-  if (i >= count) return;
-  const int texel = texels[first + i];
-  if (anchors[texel] != 0) return;
-  global const PatchRecord* p = patches + texel_patches[texel];
-  const int line = texel / texture_width, row = line - p->y;
-  const Neighbours n = neighbours_of(p, texture_width, texel - line * texture_width - p->x, row);
-  const int below = texel - texture_width, above = texel + texture_width;
+typedef struct Offset {
+  float x, y;
+} Offset;
+
+// Where a texel that nothing holds goes: half way to the mean of its four neighbours, when that is worth its test and stands it.
+__attribute__((always_inline)) Offset relaxed(Offset own, int is_held, Neighbours n, int height, int texture_width, int row, global const float* offset_x,
+                                              global const float* offset_y) {
+  const int below = n.own - texture_width, above = n.own + texture_width;
   const float mean_x = 0.25f * (offset_x[n.left] + offset_x[n.right] + offset_x[below] + offset_x[above]);
   const float mean_y = 0.25f * (offset_y[n.left] + offset_y[n.right] + offset_y[below] + offset_y[above]);
-  const float dx = 0.5f * (offset_x[texel] + mean_x), dy = 0.5f * (offset_y[texel] + mean_y);
-  if (fabs(dx - offset_x[texel]) + fabs(dy - offset_y[texel]) < LEAST_MOVE || fmax(fabs(dx), fabs(dy)) > LOOSE) return;
-  if (cross_around(n, p->height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) return;
-  offset_x[texel] = dx;
-  offset_y[texel] = dy;
+  const Offset moved = {0.5f * (own.x + mean_x), 0.5f * (own.y + mean_y)};
+  const int is_worth_it = (fabs(moved.x - own.x) + fabs(moved.y - own.y) >= LEAST_MOVE) & (fmax(fabs(moved.x), fabs(moved.y)) <= LOOSE);
+  const int stands = cross_around(n, height, texture_width, row, moved.x, moved.y, offset_x, offset_y) >= LEAST_CROSS;
+  const int moves = !is_held & is_worth_it & stands;
+  const Offset now = {moves ? moved.x : own.x, moves ? moved.y : own.y};
+  return now;
+}
+
+// The same where columns wrap round. Compiled once.
+__attribute__((noinline)) Offset relaxed_at_end(Offset own, int is_held, int texel, int column, int width, int height, int texture_width, int row,
+                                                global const float* offset_x, global const float* offset_y) {
+  const Neighbours n = {texel, column > 0 ? texel - 1 : texel + width - 1, column + 1 < width ? texel + 1 : texel + 1 - width};
+  return relaxed(own, is_held, n, height, texture_width, row, offset_x, offset_y);
+}
+
+// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. Free texels of a colour relax.
+// in   rows: patch and row, four numbers each: inner ones, even or odd; first_column: 0 or 1 for every second one up to the last of an odd
+//      width, 2 for that; offset_x, offset_y: the same as own_x, own_y, of which only texels of the colour are read there
+kernel void relax_texels(const int row_count, const int texture_width, const int first_column, global const int* restrict rows,
+                         global const PatchRecord* restrict patches, global const int* restrict anchors, global const float* restrict offset_x,
+                         global const float* restrict offset_y, global float* restrict own_x, global float* restrict own_y) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  global const PatchRecord* restrict p = patches + rows[4 * k];
+  const int row = rows[4 * k + 1], width = p->width, height = p->height;
+  const int first = (p->y + row) * texture_width + p->x;
+  const int paired = width & ~1;
+  // What wraps round apart from the rest, which becomes vector instructions.
+  if (first_column < 2) {
+    for (int j = (first_column == 0 ? 2 : 1) + 2 * get_local_id(0); j < width - 1; j += 2 * ROW_ITEMS) {
+      const Offset own = {own_x[first + j], own_y[first + j]};
+      const Neighbours n = {first + j, first + j - 1, first + j + 1};
+      const Offset now = relaxed(own, anchors[first + j] != 0, n, height, texture_width, row, offset_x, offset_y);
+      own_x[first + j] = now.x;
+      own_y[first + j] = now.y;
+    }
+  }
+  const int at_end = first_column == 0 ? 0 : width - 1;
+  if (get_local_id(0) == 0 && (first_column < 2 ? at_end < paired : paired < width)) {
+    const Offset own = {own_x[first + at_end], own_y[first + at_end]};
+    const Offset now = relaxed_at_end(own, anchors[first + at_end] != 0, first + at_end, at_end, width, height, texture_width, row, offset_x, offset_y);
+    own_x[first + at_end] = now.x;
+    own_y[first + at_end] = now.y;
+  }
 }
 
 // The point of an edge nearest to (x, y): its parameter.
@@ -208,39 +251,42 @@ kernel void offer_edges(const int edge_count, const int texture_width, const int
   }
 }
 
-// NDRange (count). Free texels of a colour go to the edge that made the least offer. Texels as for relax_texels.
+// NDRange and rows as for relax_texels. Free texels of a colour go to the edge that made the least offer.
 // out  parameters: where on its edge a texel is, 0 to 1
-kernel void place_on_edges(const int first, const int count, const int texture_width, const int edge_bits, global const int* restrict texels,
-                           global const int* restrict texel_patches, global const PatchRecord* restrict patches, global const float* restrict edge_ends,
-                           global const int* restrict offers, global int* restrict anchors, global float* restrict parameters,
-                           global float* restrict offset_x, global float* restrict offset_y) {
-  const int i = (int)get_global_id(0);
-  if (i >= count) return;
-  const int texel = texels[first + i];
-  if (offers[texel] == NO_OFFER || anchors[texel] != 0) return;
-  const int e = offers[texel] & ((1 << edge_bits) - 1);
-  global const PatchRecord* p = patches + texel_patches[texel];
-  const int line = texel / texture_width, row = line - p->y, column = texel - line * texture_width - p->x;
-  const float ends[4] = {edge_ends[4 * e], edge_ends[4 * e + 1], edge_ends[4 * e + 2], edge_ends[4 * e + 3]};
-  // The turn of v at which the edge lies next to the texel: for short edges that of its middle.
-  const float y = (float)row + offset_y[texel];
-  const float x = (float)column + offset_x[texel];
-  const float width = (float)p->width;
-  float best = INFINITY, t = 0.0f, dx = 0.0f, dy = 0.0f;
-  const int turn = (int)rint((0.5f * (ends[0] + ends[2]) - x) / width);
-  const int beside = width < 16.0f || fabs(ends[2] - ends[0]) > 0.25f * width;
-  for (int k = turn - beside; k <= turn + beside; ++k) {
-    const float lifted = x + (float)k * width;
-    const float at = nearest_on_edge(ends, lifted, y);
-    const float ex = ends[0] + at * (ends[2] - ends[0]) - lifted, ey = ends[1] + at * (ends[3] - ends[1]) - y;
-    if (ex * ex + ey * ey < best) best = ex * ex + ey * ey, t = at, dx = ex + offset_x[texel], dy = ey + offset_y[texel];
+kernel void place_on_edges(const int row_count, const int texture_width, const int first_column, const int edge_bits, global const int* restrict rows,
+                           global const PatchRecord* restrict patches, global const float* restrict edge_ends, global const int* restrict offers,
+                           global int* restrict anchors, global float* restrict parameters, global float* restrict offset_x,
+                           global float* restrict offset_y) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  global const PatchRecord* restrict p = patches + rows[4 * k];
+  const int row = rows[4 * k + 1], width = p->width, height = p->height, first = (p->y + row) * texture_width + p->x;
+  const int begin = first_column < 2 ? first_column : width & ~1, end = first_column < 2 ? width & ~1 : width;
+  for (int column = begin + 2 * get_local_id(0); column < end; column += 2 * ROW_ITEMS) {
+    const int texel = first + column;
+    if ((offers[texel] == NO_OFFER) | (anchors[texel] != 0)) continue;
+    const int e = offers[texel] & ((1 << edge_bits) - 1);
+    const float ends[4] = {edge_ends[4 * e], edge_ends[4 * e + 1], edge_ends[4 * e + 2], edge_ends[4 * e + 3]};
+    // The turn of v at which the edge lies next to the texel: for short edges that of its middle.
+    const float y = (float)row + offset_y[texel];
+    const float x = (float)column + offset_x[texel];
+    const float around = (float)width;
+    float best = INFINITY, t = 0.0f, dx = 0.0f, dy = 0.0f;
+    const int turn = (int)rint((0.5f * (ends[0] + ends[2]) - x) / around);
+    const int beside = around < 16.0f || fabs(ends[2] - ends[0]) > 0.25f * around;
+    for (int i = turn - beside; i <= turn + beside; ++i) {
+      const float lifted = x + (float)i * around;
+      const float at = nearest_on_edge(ends, lifted, y);
+      const float ex = ends[0] + at * (ends[2] - ends[0]) - lifted, ey = ends[1] + at * (ends[3] - ends[1]) - y;
+      if (ex * ex + ey * ey < best) best = ex * ex + ey * ey, t = at, dx = ex + offset_x[texel], dy = ey + offset_y[texel];
+    }
+    if (fabs(dx) > FURTHEST || fabs(dy) > FURTHEST) continue;
+    if (cross_around_one(neighbours_of(p, texture_width, column, row), height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) continue;
+    offset_x[texel] = dx;
+    offset_y[texel] = dy;
+    parameters[texel] = t;
+    anchors[texel] = -1 - e;
   }
-  if (fabs(dx) > FURTHEST || fabs(dy) > FURTHEST) return;
-  if (cross_around(neighbours_of(p, texture_width, column, row), p->height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) return;
-  offset_x[texel] = dx;
-  offset_y[texel] = dy;
-  parameters[texel] = t;
-  anchors[texel] = -1 - e;
 }
 
 // NDRange (texture width, texture height). points: number of the vertex' point in the planes; edge_points: two per edge.

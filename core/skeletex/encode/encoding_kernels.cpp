@@ -42,7 +42,10 @@ std::vector<KernelVariant> encoding_kernels(const ClContext& context, const Enco
   const bool can_snap = has_vsm && options.has_snap.value_or(true);
   const bool can_fit = has_vsm && options.has_fit.value_or(options.has_prefilter && texels <= kMostFittedTexels);
   if (can_snap) {
-    add("snap.cl", {"claim_texels", "decide_claims", "relax_texels", "offer_edges", "place_on_edges"}, items);
+    add("snap.cl", {"claim_texels", "decide_claims"}, items);
+    add("snap.cl", {"relax_texels"}, rows);
+    add("snap.cl", {"offer_edges"}, items);
+    add("snap.cl", {"place_on_edges"}, rows);
     add("encode.cl", {"walk_to_positions"}, items);
     add("snap.cl", {"place_snapped"}, items);
   }

@@ -14,7 +14,6 @@
 namespace skeletex {
 namespace {
 
-constexpr int kColours = 6;
 constexpr int kFirstRelaxPasses = 3, kRelaxPasses = 1;
 constexpr int kEdgeRounds = 2;          // what one round has moved lets texels through that the fold test had stopped
 constexpr double kFlat = 1e-6;          // radians: what rounding may make of a flat edge
@@ -141,45 +140,36 @@ void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const std:
     }
 }
 
-/// The inner texels of all patches, by colour.
-struct ColouredTexels {
-  ClBuffer<int> texels;
-  std::array<int, kColours + 1> begin{};
+/// The rows that texels move in, even and odd ones apart, as in LatticeRow. Two rows and two columns apart texels do not look at each
+/// other: with those of odd widths' last columns on their own these are six colours (colour_of in patch_texels.h).
+struct ColouredRows {
+  std::array<ClBuffer<LatticeRow>, 2> rows;
+  bool has_odd_width = false;
 };
-ColouredTexels colour_texels(ClContext& context, const DeviceLayout& layout) {
+ColouredRows colour_rows(ClContext& context, const DeviceLayout& layout) {
   const std::vector<PatchRecord> patches = context.download(layout.patches);
-  ColouredTexels coloured;
-  std::vector<int> texels;
-  for (int colour = 0; colour < kColours; ++colour) {
-    coloured.begin[colour] = static_cast<int>(texels.size());
-    for (const PatchRecord& p : patches)
-      for (int row = 1 + (colour / 3 == 0); row + 1 < p.height; row += 2) {
-        // As colour_of: even and odd columns, and where the width is odd the last.
-        const int last = p.width % 2 == 1 ? p.width - 1 : p.width;
-        const int line = (p.y + row) * layout.width + p.x;
-        if (colour % 3 < 2)
-          for (int column = colour % 3; column < last; column += 2) texels.push_back(line + column);
-        else if (last < p.width)
-          texels.push_back(line + last);
-      }
+  ColouredRows coloured;
+  std::array<std::vector<LatticeRow>, 2> rows;
+  for (int patch = 0; patch < static_cast<int>(patches.size()); ++patch) {
+    coloured.has_odd_width |= patches[patch].width % 2 == 1;
+    for (int row = 1; row < patches[patch].height - 1; ++row) rows[row % 2].push_back({patch, row, 0, 0});
   }
-  coloured.begin[kColours] = static_cast<int>(texels.size());
-  coloured.texels = context.upload(texels);
+  for (const int parity : {0, 1}) coloured.rows[parity] = context.upload(rows[parity]);
   return coloured;
 }
 
-/// Calls launch(first, count) for every colour.
+/// Calls launch(rows, first column) for every colour.
 template <class Launch>
-void for_each_colour(const ColouredTexels& texels, const Launch& launch) {
-  for (int colour = 0; colour < kColours; ++colour)
-    if (const int count = texels.begin[colour + 1] - texels.begin[colour]; count > 0) launch(texels.begin[colour], count);
+void for_each_colour(const ColouredRows& coloured, const Launch& launch) {
+  for (const auto& rows : coloured.rows)
+    for (int first_column = 0; first_column < (coloured.has_odd_width ? 3 : 2); ++first_column) launch(rows, first_column);
 }
 
-void relax(ClContext& context, const DeviceLayout& layout, const ColouredTexels& texels, int passes, ReadingPositions& positions) {
+void relax(ClContext& context, const DeviceLayout& layout, const ColouredRows& coloured, int passes, ReadingPositions& positions) {
   for (int pass = 0; pass < passes; ++pass)
-    for_each_colour(texels, [&](int first, int count) {
-      context.launch({"snap.cl", "relax_texels"}, over(count), first, count, layout.width, texels.texels, layout.texel_patches, layout.patches,
-                     positions.anchors, positions.x, positions.y);
+    for_each_colour(coloured, [&](const ClBuffer<LatticeRow>& rows, int first_column) {
+      context.launch({"snap.cl", "relax_texels"}, row_range(context, rows.size), static_cast<int>(rows.size), layout.width, first_column, rows,
+                     layout.patches, positions.anchors, positions.x, positions.y, positions.x, positions.y);
     });
 }
 
@@ -200,7 +190,7 @@ DeviceEdges upload_edges(ClContext& context, const std::vector<SnapFeatures::Edg
   return {static_cast<int>(edges.size()), context.upload(patches), context.upload(ends), context.upload(weights)};
 }
 
-void snap_to_edges(ClContext& context, const DeviceLayout& layout, const ColouredTexels& texels, const DeviceEdges& edges, ReadingPositions& positions) {
+void snap_to_edges(ClContext& context, const DeviceLayout& layout, const ColouredRows& coloured, const DeviceEdges& edges, ReadingPositions& positions) {
   if (edges.count == 0) return;
   const int bits = std::bit_width(static_cast<unsigned>(edges.count));
   const auto scale = static_cast<float>((0x7fffffff >> bits) / kLargestOffer);
@@ -208,9 +198,9 @@ void snap_to_edges(ClContext& context, const DeviceLayout& layout, const Coloure
   context.fill(offers, kNoOffer);
   context.launch({"snap.cl", "offer_edges"}, over(edges.count), edges.count, layout.width, bits, scale, edges.patches, edges.ends, edges.weights,
                  layout.patches, positions.anchors, positions.x, positions.y, offers);
-  for_each_colour(texels, [&](int first, int count) {
-    context.launch({"snap.cl", "place_on_edges"}, over(count), first, count, layout.width, bits, texels.texels, layout.texel_patches, layout.patches,
-                   edges.ends, offers, positions.anchors, positions.parameters, positions.x, positions.y);
+  for_each_colour(coloured, [&](const ClBuffer<LatticeRow>& rows, int first_column) {
+    context.launch({"snap.cl", "place_on_edges"}, row_range(context, rows.size), static_cast<int>(rows.size), layout.width, first_column, bits, rows,
+                   layout.patches, edges.ends, offers, positions.anchors, positions.parameters, positions.x, positions.y);
   });
 }
 
@@ -218,13 +208,13 @@ void snap_to_edges(ClContext& context, const DeviceLayout& layout, const Coloure
 
 void snap_positions(ClContext& context, const DeviceLayout& layout, const SnapFeatures& features, ReadingPositions& positions) {
   snap_to_vertices(context, layout, features.vertices, positions);
-  const ColouredTexels texels = colour_texels(context, layout);
+  const ColouredRows coloured = colour_rows(context, layout);
   const DeviceEdges edges = upload_edges(context, features.edges);
   for (int round = 0; round < kEdgeRounds; ++round) {
-    relax(context, layout, texels, round == 0 ? kFirstRelaxPasses : kRelaxPasses, positions);
-    snap_to_edges(context, layout, texels, edges, positions);
+    relax(context, layout, coloured, round == 0 ? kFirstRelaxPasses : kRelaxPasses, positions);
+    snap_to_edges(context, layout, coloured, edges, positions);
   }
-  relax(context, layout, texels, kRelaxPasses, positions);
+  relax(context, layout, coloured, kRelaxPasses, positions);
 }
 
 void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps, const SnapFeatures& features,
