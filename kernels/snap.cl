@@ -25,6 +25,7 @@
 #define TAKEN 1            // by one of the work-items that would put a texel back
 #define BACK 2
 #define NO_OFFER 0x7fffffff
+#define AT_ONCE 4          // columns that edges look at together
 
 // The smallest cross product at the four corners of a quad in the map; 1 in the even lattice.
 float quad_cross(const float x[4], const float y[4]) {
@@ -208,6 +209,17 @@ float nearest_on_edge(const float ends[4], float x, float y) {
   return length2 > 0.0f ? clamp(((x - ends[0]) * ex + (y - ends[1]) * ey) / length2, 0.0f, 1.0f) : 0.0f;
 }
 
+// As floor() and ceil(), which PoCL 3.1 makes more of.
+int floor_of(float x) { return (int)x - (x < (float)(int)x); }
+int ceil_of(float x) { return (int)x + (x > (float)(int)x); }
+
+// The squared distance of a texel from an edge, whose first point is (x, y) away from it; infinite where something holds the texel.
+__attribute__((always_inline)) float edge_distance2(float x, float y, float ex, float ey, float inverse_length2, int is_held) {
+  const float t = clamp(-(x * ex + y * ey) * inverse_length2, 0.0f, 1.0f);
+  const float dx = x + t * ex, dy = y + t * ey;
+  return is_held ? INFINITY : dx * dx + dy * dy;
+}
+
 // NDRange (edges). Offers every free texel within reach a point of the edge. An offer is the distance divided by the
 // edge's weight, in steps of 1 / offer_scale; the least wins, of two as good the first edge.
 // edge_ends: per edge x, y of its first and of its last point
@@ -225,28 +237,35 @@ kernel void offer_edges(const int edge_count, const int texture_width, const int
   const float margin = REACH + LOOSE, slope = ey == 0.0f ? 0.0f : ex / ey;
   const float low_y = fmin(y0, y1), high_y = fmax(y0, y1), scale = offer_scale / edge_weights[e];
   const int largest = (0x7fffffff >> edge_bits) - 1;
-  const int turned = (int)floor(x0 / (float)width) * width;
-  const int first_row = max(1, (int)ceil(low_y - margin)), last_row = min(last_inner, (int)floor(high_y + margin));
+  const int turned = floor_of(x0 / (float)width) * width;
+  const int first_row = max(1, ceil_of(low_y - margin)), last_row = min(last_inner, floor_of(high_y + margin));
   for (int row = first_row; row <= last_row; ++row) {
     // The part of the edge near this row.
     const float a = ey == 0.0f ? x0 : x0 + slope * (clamp((float)row - margin, low_y, high_y) - y0);
     const float b = ey == 0.0f ? x1 : x0 + slope * (clamp((float)row + margin, low_y, high_y) - y0);
-    const int first = (int)ceil(fmin(a, b) - margin), last = min((int)floor(fmax(a, b) + margin), first + width - 1);
+    const int first = ceil_of(fmin(a, b) - margin), last = min(floor_of(fmax(a, b) + margin), first + width - 1);
     int wrapped = first - turned;
     while (wrapped < 0) wrapped += width;
     while (wrapped >= width) wrapped -= width;
     const int line = origin + row * texture_width;
-    for (int column = first; column <= last; ++column) {
+    for (int column = first, count; column <= last; column += count) {
       const int texel = line + wrapped;
-      wrapped = wrapped + 1 < width ? wrapped + 1 : 0;
-      const float x = x0 - (float)column - offset_x[texel], y = y0 - (float)row - offset_y[texel];
-      const float t = clamp(-(x * ex + y * ey) * inverse, 0.0f, 1.0f);
-      const float dx = x + t * ex, dy = y + t * ey;
-      const float distance2 = dx * dx + dy * dy;
-      // One test, not two: each alone is as good as a coin.
-      if ((distance2 > REACH * REACH) | (anchors[texel] != 0)) continue;
-      const int offer = min((int)(scale * sqrt(distance2)), largest);
-      atomic_min(offers + texel, (offer << edge_bits) + e);
+      float distances2[AT_ONCE];
+      count = wrapped + AT_ONCE <= width ? AT_ONCE : 1;
+      if (count == AT_ONCE) {
+        // Vector instructions. That the last ones are further than `last` their distances tell.
+        for (int i = 0; i < AT_ONCE; ++i)
+          distances2[i] = edge_distance2(x0 - (float)(column + i) - offset_x[texel + i], y0 - (float)row - offset_y[texel + i], ex, ey, inverse,
+                                         anchors[texel + i] != 0);
+      } else {
+        distances2[0] = edge_distance2(x0 - (float)column - offset_x[texel], y0 - (float)row - offset_y[texel], ex, ey, inverse, anchors[texel] != 0);
+      }
+      for (int i = 0; i < count; ++i) {
+        if (distances2[i] > REACH * REACH) continue;
+        const int offer = min((int)(scale * sqrt(distances2[i])), largest);
+        atomic_min(offers + texel + i, (offer << edge_bits) + e);
+      }
+      wrapped = wrapped + count < width ? wrapped + count : 0;
     }
   }
 }
