@@ -94,8 +94,9 @@ void candidate_of(float x, float y, int k, int* column, int* row, float* dx, flo
 }
 
 // NDRange (vertices). A vertex that is not placed claims the first of its candidates that it can still have.
-kernel void claim_texels(const int vertex_count, const int texture_width, global const int* restrict vertex_patches, global const float* restrict vertex_x,
-                         global const float* restrict vertex_y, global const int* restrict strengths, global const PatchRecord* restrict patches,
+// in   ranks: by strength, from 1; least: 0 or more than all claims of rounds before
+kernel void claim_texels(const int vertex_count, const int texture_width, const int least, global const int* restrict vertex_patches, global const float* restrict vertex_x,
+                         global const float* restrict vertex_y, global const int* restrict ranks, global const PatchRecord* restrict patches,
                          global const int* restrict anchors, global int* restrict states, global int* restrict claims) {
   const int v = (int)get_global_id(0);
   if (v >= vertex_count) return;
@@ -108,7 +109,7 @@ kernel void claim_texels(const int vertex_count, const int texture_width, global
     if (row < 1 || row > p->height - 2 || dx * dx + dy * dy > REACH * REACH) continue;
     const int texel = texel_at(p, texture_width, (column % p->width + p->width) % p->width, row);
     if (anchors[texel] != 0) continue;
-    atomic_max(claims + texel, strengths[v]);
+    atomic_max(claims + texel, least + ranks[v]);
     break;
   }
   states[v] = state;
@@ -116,8 +117,8 @@ kernel void claim_texels(const int vertex_count, const int texture_width, global
 
 // NDRange (vertices). A claim that is the strongest on its texel and the eight around is decided: it stands when the map
 // does not fold. `open_count` counts the vertices that wait.
-kernel void decide_claims(const int vertex_count, const int texture_width, global const int* restrict vertex_patches, global const float* restrict vertex_x,
-                          global const float* restrict vertex_y, global const int* restrict strengths, global const PatchRecord* restrict patches,
+kernel void decide_claims(const int vertex_count, const int texture_width, const int least, global const int* restrict vertex_patches, global const float* restrict vertex_x,
+                          global const float* restrict vertex_y, global const int* restrict ranks, global const PatchRecord* restrict patches,
                           global const int* restrict claims, global int* restrict states, global int* restrict anchors, global float* restrict offset_x,
                           global float* restrict offset_y, global int* restrict open_count) {
   const int v = (int)get_global_id(0);
@@ -129,7 +130,7 @@ kernel void decide_claims(const int vertex_count, const int texture_width, globa
   column = (column % p->width + p->width) % p->width;
   int is_strongest = 1;
   for (int i = -1; i <= 1; ++i)
-    for (int j = -1; j <= 1; ++j) is_strongest &= claims[texel_at(p, texture_width, column + j, row + i)] <= strengths[v];
+    for (int j = -1; j <= 1; ++j) is_strongest &= claims[texel_at(p, texture_width, column + j, row + i)] <= least + ranks[v];
   if (!is_strongest) {
     atomic_inc(open_count);
     return;

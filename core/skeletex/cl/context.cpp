@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <cstddef>
 #include <cstdlib>
+#include <cstring>
 #include <functional>
 
 #include "skeletex/cl/kernel_source.h"
@@ -179,7 +181,15 @@ void ClContext::read_bytes(const ::cl::Buffer& buffer, void* data, std::size_t b
 }
 
 void ClContext::fill_bytes(const ::cl::Buffer& buffer, const void* pattern, std::size_t pattern_bytes, std::size_t bytes) {
-  if (bytes > 0) check(::clEnqueueFillBuffer(queue_(), buffer(), pattern, pattern_bytes, 0, bytes, 0, nullptr, nullptr), "filling a device buffer");
+  if (bytes == 0) return;
+  // Drivers write one pattern after the other: the longest that OpenCL takes, where that divides the size.
+  std::array<std::byte, 128> repeated;
+  const bool is_repeated = repeated.size() % pattern_bytes == 0 && bytes % repeated.size() == 0;
+  if (is_repeated)
+    for (std::size_t i = 0; i < repeated.size(); i += pattern_bytes) std::memcpy(repeated.data() + i, pattern, pattern_bytes);
+  check(::clEnqueueFillBuffer(queue_(), buffer(), is_repeated ? repeated.data() : pattern, is_repeated ? repeated.size() : pattern_bytes, 0, bytes, 0,
+                              nullptr, nullptr),
+        "filling a device buffer");
 }
 
 ::cl::Program ClContext::get_program(const ClKernelName& name) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "skeletex/model/parallel.h"
 #include "skeletex/model/half_edge_table.h"
@@ -115,27 +116,32 @@ namespace {
 void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const std::vector<SnapFeatures::Vertex>& vertices, ReadingPositions& positions) {
   if (vertices.empty()) return;
   const int count = static_cast<int>(vertices.size());
-  std::vector<int> order(count), ranks(count), vertex_patches(count);
+  std::vector<std::pair<double, int>> by_strength(count);
+  for (int i = 0; i < count; ++i) by_strength[i] = {vertices[i].strength, i};
+  std::sort(by_strength.begin(), by_strength.end());
+  std::vector<int> ranks(count), vertex_patches(count);
   std::vector<float> xs(count), ys(count);
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return vertices[a].strength < vertices[b].strength; });
   for (int i = 0; i < count; ++i) {
-    ranks[order[i]] = i + 1;
+    ranks[by_strength[i].second] = i + 1;
     vertex_patches[i] = vertices[i].patch;
     xs[i] = static_cast<float>(vertices[i].x);
     ys[i] = static_cast<float>(vertices[i].y);
   }
-  const auto patch = context.upload(vertex_patches), strength = context.upload(ranks);
+  const auto patch = context.upload(vertex_patches), rank = context.upload(ranks);
   const auto x = context.upload(xs), y = context.upload(ys);
   auto states = context.allocate<int>(count), claims = context.allocate<int>(layout.size()), open = context.allocate<int>(1);
   context.fill(states, 0);
+  // A claim is more than all of the rounds before, so these need not be taken off.
+  const int bits = std::bit_width(static_cast<unsigned>(count)), rounds_at_once = 0x7fffffff >> bits;
   // Every round decides at least the strongest claim that is open, so this ends; it takes some ten rounds.
-  for (int waiting = count; waiting > 0; waiting = context.download(open)[0])
-    for (int round = 0; round < kRoundsBetweenReads; ++round) {
+  for (int round = 0, waiting = count; waiting > 0; waiting = context.download(open)[0])
+    for (int i = 0; i < kRoundsBetweenReads; ++i, ++round) {
+      const int least = round % rounds_at_once << bits;
+      if (least == 0) context.fill(claims, 0);
       context.fill(open, 0);
-      context.fill(claims, 0);
-      context.launch({"snap.cl", "claim_texels"}, over(count), count, layout.width, patch, x, y, strength, layout.patches, positions.anchors, states, claims);
-      context.launch({"snap.cl", "decide_claims"}, over(count), count, layout.width, patch, x, y, strength, layout.patches, claims, states,
+      context.launch({"snap.cl", "claim_texels"}, over(count), count, layout.width, least, patch, x, y, rank, layout.patches, positions.anchors, states,
+                     claims);
+      context.launch({"snap.cl", "decide_claims"}, over(count), count, layout.width, least, patch, x, y, rank, layout.patches, claims, states,
                      positions.anchors, positions.x, positions.y, open);
     }
 }
