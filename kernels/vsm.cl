@@ -29,6 +29,14 @@ float2 lifted_difference(float4 a, float4 b, float jump) {
   return (difference + (float2)(0.0f, jump)) + (error + (b.zw - a.zw));
 }
 
+// The same for the u and v of four vertices; the second parts of a and b apart, jump 0 for u.
+float8 lifted_differences(float8 a, float8 a_rest, float8 b, float8 b_rest, float8 jump) {
+  const float8 difference = b - a;
+  const float8 part = difference - b;
+  const float8 error = (b - (difference - part)) - (a + part);
+  return (difference + jump) + (error + (b_rest - a_rest));
+}
+
 // Texture area of a triangle, in (v, u); for a pole's triangle that of the trapezoid between its opposite edge and
 // the pole's line. A pole is always corner 0. Never below a rounding error's worth, so that weights stay positive.
 float texture_area(int t, int count, global const int* corners, global const char* jumps, global const float4* map) {
@@ -173,14 +181,6 @@ kernel VSM_GROUP void weigh_rows(int entries, global const int* restrict frozen,
               half_exponents, largest + slice_chart[slice], values);
 }
 
-// From vertex a to b as lifted_difference, of one coordinate.
-float difference_of(float a, float a_rest, float b, float b_rest, float jump) {
-  const float difference = b - a;
-  const float part = difference - b;
-  const float error = (b - (difference - part)) - (a + part);
-  return (difference + jump) + (error + (b_rest - a_rest));
-}
-
 // How far each inner vertex of a slice is from the weighted mean of its neighbours, from differences of neighbours, so that it is accurate relative
 // to them however small they are. largest: of the slice's chart.
 VSM_ONCE void form_residual_of_slice(int slice, global const int* restrict slice_begin, global const int* restrict row_length,
@@ -188,34 +188,52 @@ VSM_ONCE void form_residual_of_slice(int slice, global const int* restrict slice
                                      global const float* restrict inverse_roots, global const int* restrict half_exponents, int largest,
                                      global const float* restrict map, global float* restrict roots, global float* restrict residual,
                                      global int* restrict ratio_of_chart, local int* values) {
-  const int first = slice * VSM_SLICE + get_local_id(0), longest = longest_row(row_length, first);
-  float sum_u[VSM_LANES], sum_v[VSM_LANES], total_u[VSM_LANES], total_v[VSM_LANES];
-  for (int i = 0; i < VSM_LANES; ++i) sum_u[i] = sum_v[i] = total_u[i] = total_v[i] = 0.0f;
-  for (int k = 0; k < longest; ++k) {
-    const int begin = entry_index(slice_begin, first, k);
-    for (int i = 0; i < VSM_LANES; ++i) {
-      const int e = begin + i, jump = jumps[e];
-      global const float* own = map + 4 * (first + i);
-      global const float* other = map + 4 * column[e];
+  const int first = slice * VSM_SLICE + get_local_id(0);
+  float sums[2 * VSM_LANES], totals[2 * VSM_LANES];  // of u and v for each row
+#ifdef VSM_SINGLE
+  // Four rows at once: a neighbour's map is one load, where eight rows side by side would gather each of its parts.
+  for (int i = 0; i < VSM_LANES; i += 4) {
+    const int row = first + i, longest = max(max(row_length[row], row_length[row + 1]), max(row_length[row + 2], row_length[row + 3]));
+    const float16 own = vload16(0, map + 4 * row);
+    float8 sum = 0.0f, total = 0.0f;
+    for (int k = 0; k < longest; ++k) {
+      const int e = entry_index(slice_begin, row, k);
+      const float4 at0 = vload4(column[e], map), at1 = vload4(column[e + 1], map), at2 = vload4(column[e + 2], map), at3 = vload4(column[e + 3], map);
+      const int4 jump = convert_int4(vload4(0, jumps + e));
       // Weights of padding are 0.
-      const float weight_u = weights[e], weight_v = jump == VSM_POLE ? 0.0f : weight_u;
-      const float u = weight_u * difference_of(own[0], own[2], other[0], other[2], 0.0f);
-      const float v = weight_v * difference_of(own[1], own[3], other[1], other[3], (float)jump);
-      sum_u[i] += u, sum_v[i] += v;
-      total_u[i] += fabs(u), total_v[i] += fabs(v);
+      const float4 weight_u = vload4(0, weights + e), weight_v = jump == VSM_POLE ? (float4)0.0f : weight_u;
+      const float8 jump_v = (float8)((float4)0.0f, convert_float4(jump)).s04152637, weight = (float8)(weight_u, weight_v).s04152637;
+      const float8 value = weight * lifted_differences(own.s014589cd, own.s2367abef, (float8)(at0.xy, at1.xy, at2.xy, at3.xy),
+                                                       (float8)(at0.zw, at1.zw, at2.zw, at3.zw), jump_v);
+      sum += value;
+      total += fabs(value);
     }
+    vstore8(sum, 0, sums + 2 * i);
+    vstore8(total, 0, totals + 2 * i);
   }
+#else
+  float2 sum = 0.0f, total = 0.0f;
+  for (int k = 0; k < row_length[first]; ++k) {
+    const int e = entry_index(slice_begin, first, k), jump = jumps[e];
+    const float2 weight = (float2)(weights[e], jump == VSM_POLE ? 0.0f : weights[e]);
+    const float2 value = weight * lifted_difference(vload4(first, map), vload4(column[e], map), jump);
+    sum += value;
+    total += fabs(value);
+  }
+  vstore2(sum, 0, sums);
+  vstore2(total, 0, totals);
+#endif
   int ratio[VSM_LANES];
   for (int i = 0; i < VSM_LANES; ++i) {
     const int row = first + i, is_inner = row_length[row] > 0;
     const float inverse_root = is_inner ? inverse_roots[row] : 1.0f;
     // In the middle of a float's range: 2^65 to 2^-65.
     const float root = power_of_two((is_inner ? max(half_exponents[row] - largest, -130) : 0) + 65) / inverse_root;
-    const float over = inverse_root * inverse_root, u = sum_u[i] * over, v = sum_v[i] * over;
+    const float over = inverse_root * inverse_root, u = sums[2 * i] * over, v = sums[2 * i + 1] * over;
     roots[row] = root;
     residual[2 * row] = u * root;
     residual[2 * row + 1] = v * root;
-    const float ratio_u = fabs(u) / (total_u[i] * over + 1e-13f), ratio_v = fabs(v) / (total_v[i] * over + 1e-13f);
+    const float ratio_u = fabs(u) / (totals[2 * i] * over + 1e-13f), ratio_v = fabs(v) / (totals[2 * i + 1] * over + 1e-13f);
     ratio[i] = max(as_int(ratio_u), as_int(ratio_v));
   }
   raise_to_largest(values, ratio, ratio_of_chart);
