@@ -16,6 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::size_t kBuffer = 1 << 20;  // bytes
+
 void flush_to_disk(const fs::path& path, const fs::path& target, int flags) {
   const int descriptor = ::open(path.c_str(), flags | O_CLOEXEC);
   if (descriptor < 0) throw IoError(fmt::format("{}: cannot write: {}", target.string(), std::strerror(errno)));
@@ -81,8 +83,9 @@ void write_text_atomically(const fs::path& path, std::string_view text) {
   });
 }
 
-OutputFile::OutputFile(const fs::path& temporary, const fs::path& target) : target_(target), file_(std::fopen(temporary.c_str(), "wb")) {
+OutputFile::OutputFile(const fs::path& temporary, const fs::path& target) : target_(target), buffer_(kBuffer), file_(std::fopen(temporary.c_str(), "wb")) {
   if (file_ == nullptr) fail();
+  std::setvbuf(file_, buffer_.data(), _IOFBF, buffer_.size());
 }
 
 OutputFile::~OutputFile() {

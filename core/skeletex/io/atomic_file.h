@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <string_view>
+#include <vector>
 
 namespace skeletex {
 
@@ -35,6 +36,7 @@ class OutputFile {
  private:
   [[noreturn]] void fail();
   std::filesystem::path target_;
+  std::vector<char> buffer_;  ///< large: some writers hand over a line at a time
   std::FILE* file_;
   int error_ = 0;  ///< errno of the first failure
 };

@@ -110,23 +110,26 @@ struct ExrPart {
   std::vector<half> halves[3];
 };
 
-/// Whether ZIP takes off a sixteenth or more, by three of its blocks of lines.
+/// Whether ZIP takes off a sixteenth or more, by three pieces of its blocks of lines.
 bool pays_zip(const ExrPart& part, int width, int height) {
-  constexpr int kLines = 16, kBlocks = 3;
+  constexpr int kLines = 16, kBlocks = 3, kColumns = 128;
   if (height < 2 * kLines * kBlocks) return true;
-  Imf::Header header(width, kLines * kBlocks);
+  const int columns = std::min(width, kColumns);
+  Imf::Header header(columns, kLines * kBlocks);
   header.compression() = Imf::ZIP_COMPRESSION;
   header.channels() = part.header.channels();
   Imf::FrameBuffer frame;
   std::vector<std::vector<char>> planes;
   for (auto slice = part.frame.begin(); slice != part.frame.end(); ++slice) {
-    const std::size_t line = slice.slice().yStride;
+    const std::size_t texel = slice.slice().xStride, line = slice.slice().yStride;
     std::vector<char>& plane = planes.emplace_back();
-    for (int block = 0; block < kBlocks; ++block) {
-      const char* from = slice.slice().base + line * static_cast<std::size_t>(height * (block + 1) / (kBlocks + 1) - kLines / 2);
-      plane.insert(plane.end(), from, from + line * kLines);
+    for (int i = 0; i < kBlocks * kLines; ++i) {
+      const int block = i / kLines;
+      const char* from = slice.slice().base + line * static_cast<std::size_t>(height * (block + 1) / (kBlocks + 1) - kLines / 2 + i % kLines) +
+                         texel * static_cast<std::size_t>((width - columns) * block / (kBlocks - 1));
+      plane.insert(plane.end(), from, from + texel * columns);
     }
-    frame.insert(slice.name(), Imf::Slice(slice.slice().type, plane.data(), slice.slice().xStride, line));
+    frame.insert(slice.name(), Imf::Slice(slice.slice().type, plane.data(), texel, texel * columns));
   }
   CountingStream counted;
   {
@@ -180,9 +183,10 @@ void write_model(const std::filesystem::path& path, const SkeletexModel& model, 
 void write_model_levels(const std::filesystem::path& path, std::span<const SkeletexModel> levels, const ModelFileOptions& options) {
   const std::string where = path.string();
   if (levels.empty()) throw IoError(where + ": a model has at least one level");
-  use_threads();
   std::vector<ExrPart> parts;
   for (const SkeletexModel& level : levels) parts.push_back(make_part(level, options, where));
+  // To be handed a plain line takes a thread longer than to write it.
+  if (std::any_of(parts.begin(), parts.end(), [](const ExrPart& part) { return part.header.compression() != Imf::NO_COMPRESSION; })) use_threads();
   write_atomically(path, [&](const std::filesystem::path& temporary) {
     OutputFile file(temporary, path);
     with_openexr(where, "cannot write", [&] {
