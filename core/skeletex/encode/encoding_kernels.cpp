@@ -8,7 +8,7 @@ namespace {
 
 /// Groups of the kernels that walk through lists or trees (spd.cpp, nearest_search.cpp).
 const ClRange kSearch{{32, 1}, {32, 1}};
-/// Groups of VSM's kernels over fronts and slices: plain loops on a CPU.
+/// VSM on a CPU: a work-item takes a whole chart.
 const ClRange kSingle{{1, 1}, {1, 1}};
 
 }  // namespace
@@ -22,10 +22,7 @@ std::vector<KernelVariant> encoding_kernels(const ClContext& context, const Enco
     for (const char* name : names) kernels.push_back({{file, name}, range});
   };
   add("segment.cl", {"classify_points"}, items);
-  if (has_vsm) {
-    add("vsm.cl", {"weigh_rows", "form_residual", "eliminate_fronts", "substitute_back"}, kSingle);
-    add("vsm.cl", {"measure_areas"}, items);
-  }
+  if (has_vsm) add("vsm.cl", {"map_charts"}, kSingle);
   add("spd.cl", {"find_hidden"}, kSearch);
   if (has_spd) add("spd.cl", {"cast_rays"}, kSearch);
   if (has_vsm) {

@@ -13,8 +13,8 @@ struct KernelVariant {
   ClRange range;
 };
 
-/// The kernels of encode_model on a CPU in the order of their first launches, for ClContext::compile. Whether texels snap depends on the mesh as well,
-/// unless options tell; their kernels are listed where they can.
+/// The kernels of encode_model on a CPU in the order of their first launches, for ClContext::compile: without VSM's for charts that are too large for one
+/// work-item, and with those for snapping, unless options exclude it, though whether texels snap depends on the mesh as well.
 std::vector<KernelVariant> encoding_kernels(const ClContext& context, const EncodeOptions& options = {});
 
 }  // namespace skeletex
