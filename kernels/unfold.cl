@@ -11,15 +11,24 @@
 
 #define LEAST_COSINE 0.1f      // between a triangle and the surface
 #define LEAST_AGREEMENT 0.8f   // squared length of the mean of the normals around; less is an edge of the surface, no fold of the lattice
+#define CLEAR_COSINE 0.9f      // between a quad's triangles and the surface at its first texel: then the others need no look
 #define FURTHEST 1.0f          // cells from a texel's own place, along each axis
 #define LARGEST_STEP 0.4f      // cells
 #define MARGIN 0.3f            // cells that the rows next to a seam or pole keep from it
 
 float3 point_at(global const float* restrict x, global const float* restrict y, global const float* restrict z, int i) { return (float3)(x[i], y[i], z[i]); }
 
-int is_turned(float3 a, float3 b, float3 c, float3 direction) {
+// Whether a triangle looks further from a direction than a cosine says.
+int is_off(float3 a, float3 b, float3 c, float3 direction, float least_cosine) {
   const float3 n = cross(b - a, c - a);
-  return dot(n, direction) < LEAST_COSINE * sqrt(dot(n, n) * dot(direction, direction));
+  return dot(n, direction) < least_cosine * sqrt(dot(n, n) * dot(direction, direction));
+}
+int is_turned(float3 a, float3 b, float3 c, float3 direction) { return is_off(a, b, c, direction, LEAST_COSINE); }
+
+float3 normal_of_map(int t, int triangle_count, global const int* restrict corners, global const float* restrict vertex_x, global const float* restrict vertex_y,
+                     global const float* restrict vertex_z) {
+  const float3 a = point_at(vertex_x, vertex_y, vertex_z, corners[t]);
+  return cross(point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + t]) - a, point_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + t]) - a);
 }
 
 // Appends what is not on the list. `is_listed` has a flag for all that can be.
@@ -45,14 +54,17 @@ kernel void find_folds(const int texture_width, const int triangle_count, global
   const int column = texel % texture_width - p->x, row = texel / texture_width - p->y;
   const int at[4] = {texel, texel_at(p, texture_width, column + 1, row), texel_at(p, texture_width, column + 1, row + 1), texel + texture_width};
   float3 normal = (float3)(0.0f), q[4];
+  for (int k = 0; k < 4; ++k) q[k] = point_at(x, y, z, at[k]);
+  if (row > 0 && texel_triangles[texel] != NO_TRIANGLE) {
+    // Normals that agree as below are within 48 degrees of their mean.
+    const float3 first = normal_of_map(texel_triangles[texel], triangle_count, corners, vertex_x, vertex_y, vertex_z);
+    if (dot(first, first) > 0.0f && !is_off(q[0], q[1], q[2], first, CLEAR_COSINE) && !is_off(q[0], q[2], q[3], first, CLEAR_COSINE)) return;
+  }
   float normals = 0.0f;
   for (int k = 0; k < 4; ++k) {
-    q[k] = point_at(x, y, z, at[k]);
     const int t = texel_triangles[at[k]], at_row = row + (k >= 2);
     if (t == NO_TRIANGLE || at_row == 0 || at_row == p->height - 1) continue;
-    const float3 a = point_at(vertex_x, vertex_y, vertex_z, corners[t]);
-    const float3 n = cross(point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + t]) - a,
-                           point_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + t]) - a);
+    const float3 n = normal_of_map(t, triangle_count, corners, vertex_x, vertex_y, vertex_z);
     const float length2 = dot(n, n);
     if (length2 > 0.0f) normal += n / sqrt(length2), normals += 1.0f;
   }
