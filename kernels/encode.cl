@@ -11,6 +11,7 @@
 #include "skeletex_structs.h"
 #include "map_triangle.h"
 #include "prefilter.h"
+#include "rounding.h"
 
 // v at which the edge from (ua, va) to (ub, vb) crosses u; the caller has checked that it does.
 float crossing(float ua, float va, float ub, float vb, float u) {
@@ -77,13 +78,17 @@ kernel void cover_texels(const int triangle_count, global const int* restrict co
     const float extent = fmax(fabs(m.dv1), m.pole == 0 ? fabs(m.dv2) : 0.0f);
     const float tolerance = 4e-7f * extent + 1e-12f;
     const float base = m.v_base_high + m.v_base_low;
-    const int begin = (int)floor((base + left) * (float)width) - 1;
-    const int end = (int)ceil((base + right) * (float)width) + 1;
+    const int begin = floor_of((base + left) * (float)width) - 1;
+    const int end = ceil_of((base + right) * (float)width) + 1;
+    const int line = origin + row * texture_width;
+    // Wrapped once: a remainder takes longer than all else in this loop.
+    int wrapped = (begin % width + width) % width;
     for (int column = begin; column <= end; ++column) {
+      const int texel = line + wrapped;
+      wrapped = wrapped + 1 < width ? wrapped + 1 : 0;
       const float v = column_offset(m, column, width);
       if (v < left - tolerance || v > right + tolerance) continue;
-      const int wrapped = ((column % width) + width) % width;
-      atomic_min(&texel_triangles[origin + row * texture_width + wrapped], t);
+      atomic_min(&texel_triangles[texel], t);
     }
   }
 }

@@ -13,6 +13,7 @@
 // them, the other kernels run once per colour (see colour_of). So nothing depends on the order of work-items.
 #include "skeletex_structs.h"
 #include "patch_texels.h"
+#include "rounding.h"
 
 #define REACH 0.7f         // cells from where a texel is to where it goes
 #define FURTHEST 1.0f      // cells from a texel's own place, along each axis
@@ -209,10 +210,6 @@ float nearest_on_edge(const float ends[4], float x, float y) {
   const float length2 = ex * ex + ey * ey;
   return length2 > 0.0f ? clamp(((x - ends[0]) * ex + (y - ends[1]) * ey) / length2, 0.0f, 1.0f) : 0.0f;
 }
-
-// As floor() and ceil(), which PoCL 3.1 makes more of.
-int floor_of(float x) { return (int)x - (x < (float)(int)x); }
-int ceil_of(float x) { return (int)x + (x > (float)(int)x); }
 
 // The squared distance of a texel from an edge, whose first point is (x, y) away from it; infinite where something holds the texel.
 __attribute__((always_inline)) float edge_distance2(float x, float y, float ex, float ey, float inverse_length2, int is_held) {
