@@ -200,15 +200,14 @@ ExrCompression compression_of(const std::string& name) {
 }
 
 /// Programs, so that they are loaded beside the input. A launch of nothing that takes long has compiled its kernel: then there are more to compile,
-/// for two processes.
+/// for two processes. Both share the driver's folder of kernels, which is safe for kernels, not for programs: here these are there before.
 void prepare_encoding(ClContext& context, const EncodeOptions& options, SecondCompiler& second) {
   constexpr double kCompiling = 20;  // ms: more than it takes to load a kernel, less than to compile one
   const std::vector<KernelVariant> kernels = encoding_kernels(context, options);
-  context.prepare(kernels.front().name);
+  for (const KernelVariant& kernel : kernels) context.prepare(kernel.name);
   Stopwatch watch;
   context.compile(kernels.front().name, kernels.front().range);
-  if (watch.lap_ms() > kCompiling) return second.start();
-  for (const KernelVariant& kernel : kernels) context.prepare(kernel.name);
+  if (watch.lap_ms() > kCompiling) second.start();
 }
 
 /// The last ones first: the other process begins with the first.
