@@ -161,7 +161,7 @@ __attribute__((always_inline)) Offset relaxed(Offset own, int is_held, Neighbour
   const Offset moved = {0.5f * (own.x + mean_x), 0.5f * (own.y + mean_y)};
   const int is_worth_it = (fabs(moved.x - own.x) + fabs(moved.y - own.y) >= LEAST_MOVE) & (fmax(fabs(moved.x), fabs(moved.y)) <= LOOSE);
   const int stands = cross_around(n, height, texture_width, row, moved.x, moved.y, offset_x, offset_y) >= LEAST_CROSS;
-  const int moves = !is_held & is_worth_it & stands;
+  const int moves = (is_held == 0) & is_worth_it & stands;
   const Offset now = {moves ? moved.x : own.x, moves ? moved.y : own.y};
   return now;
 }
