@@ -11,7 +11,7 @@
 namespace skeletex {
 namespace {
 
-constexpr std::size_t kLeaf = 24;  // so many vertices are eliminated together at most where nothing separates them
+constexpr std::size_t kLeaf = 32;  // so many vertices are eliminated together at most where nothing separates them
 
 /// A vertex as it is sorted: with what is asked for, so that this lies together.
 struct Item {

@@ -118,7 +118,7 @@ struct DeviceSystems {
 int padded(int count, int unit) { return (count + unit - 1) / unit * unit; }
 
 /// The fronts of a chart, and the tasks that they make. Columns of later neighbours (per place in `table.targets`, else -1), and of boundaries in
-/// their parents, are found where a front's own columns are known; and the lengths of the chart's rows, from `first_row` on.
+/// their parents, are found where a front's own columns are known; and how many neighbours of a row are later or fixed.
 FrontTables make_fronts(const HalfEdgeTable& table, const Dissection& d, int id, int first_row, int subtree_size, std::vector<int>& neighbour_columns,
                         DeviceSystems& systems) {
   FrontTables s;
@@ -144,7 +144,6 @@ FrontTables make_fronts(const HalfEdgeTable& table, const Dissection& d, int id,
         if (other > number) neighbour_columns[k] = column[other], ++later;
         fixed += other < 0;
       }
-      systems.row_length[first_row + number] = end - begin;
       systems.later_end[first_row + number] = later;
       systems.fixed_end[first_row + number] = later + fixed;
     }
@@ -233,48 +232,18 @@ DeviceSystems build_systems(const ChartPointers& charts, double alpha, bool are_
     s.slice_chart.resize(s.vertices / kSlice, static_cast<int>(k));
     s.triangles += static_cast<int>(charts[k]->triangles.size());
   }
+  first_rows.push_back(s.vertices), first_triangles.push_back(s.triangles);
   const int subtree_size = are_whole ? INT_MAX : std::clamp(s.vertices / kSubtrees, kSmallestSubtree, kLargestSubtree);
   s.device_vertices.resize(charts.size());
   s.row_length.assign(s.vertices, 0);
   s.later_end = s.fixed_end = s.row_length;
   s.map.assign(4 * static_cast<std::size_t>(s.vertices), 0);
   std::vector<Dissection> dissections(charts.size());
-  std::vector<std::vector<int>> neighbour_columns(charts.size());
-  std::vector<FrontTables> fronts(charts.size());
   for_each_chart(charts, [&](std::size_t k) {
-    const Chart& chart = *charts[k];
-    const Dissection& d = dissections[k] = dissect(chart);
-    const int count = static_cast<int>(chart.positions.size());
-    std::vector<int>& map = s.device_vertices[k];
-    map.resize(count);
-    int next = first_rows[k] + static_cast<int>(d.order.size());
-    for (int v = 0; v < count; ++v) map[v] = chart.kinds[v] == ChartVertex::kInner ? first_rows[k] + d.number[v] : next++;
-    fronts[k] = make_fronts(chart.half_edges, d, static_cast<int>(k), first_rows[k], subtree_size, neighbour_columns[k], s);
-    for (int v = 0; v < count; ++v) {
-      for (const int axis : {0, 1}) {
-        const double x = axis == 0 ? chart.u[v] : chart.v[v];
-        const std::size_t at = 4 * static_cast<std::size_t>(map[v]) + axis;
-        s.map[at] = static_cast<float>(x);
-        s.map[at + 2] = static_cast<float>(x - static_cast<double>(s.map[at]));
-      }
-    }
+    const Dissection& d = dissections[k] = dissect(*charts[k]);
+    const std::vector<int>& begin = charts[k]->half_edges.begin;
+    for (std::size_t i = 0; i < d.order.size(); ++i) s.row_length[first_rows[k] + i] = begin[d.order[i] + 1] - begin[d.order[i]];
   });
-  for (FrontTables& tables : fronts) {
-    first_fronts.push_back(static_cast<int>(s.fronts.fronts.size()));
-    append_tables(s.fronts, std::exchange(tables, {}));
-  }
-  first_rows.push_back(s.vertices), first_triangles.push_back(s.triangles), first_fronts.push_back(static_cast<int>(s.fronts.fronts.size()));
-  for (const int k : by_falling_size(charts))
-    s.charts.push_back({k, first_rows[k] / kSlice, first_rows[k + 1] / kSlice, first_fronts[k], first_fronts[k + 1], first_triangles[k],
-                        first_triangles[k + 1]});
-  std::vector<Task>& tasks = s.fronts.tasks;
-  std::stable_sort(tasks.begin(), tasks.end(), [](const Task& a, const Task& b) { return a.stage != b.stage ? a.stage < b.stage : a.work > b.work; });
-  for (const Task& task : tasks) {
-    s.stage_begin.resize(task.stage + 1, static_cast<int>(s.tasks.size() / 2));
-    s.tasks.insert(s.tasks.end(), {task.begin, task.end});
-  }
-  s.stage_begin.push_back(static_cast<int>(tasks.size()));
-
   for (int slice = 0; slice < s.vertices; slice += kSlice) {
     s.slice_begin.push_back(s.entries);
     s.entries += kSlice * *std::max_element(s.row_length.begin() + slice, s.row_length.begin() + slice + kSlice);
@@ -287,17 +256,32 @@ DeviceSystems build_systems(const ChartPointers& charts, double alpha, bool are_
   s.factors.assign(s.entries, 1);
   s.corners.resize(3 * static_cast<std::size_t>(s.triangles));
   s.corner_jumps.resize(2 * static_cast<std::size_t>(s.triangles));
+  std::vector<FrontTables> fronts(charts.size());
   for_each_chart(charts, [&](std::size_t k) {
     const Chart& chart = *charts[k];
-    const Dissection& d = dissections[k];
-    const std::vector<int>& map = s.device_vertices[k];
+    const Dissection d = std::exchange(dissections[k], {});
     const HalfEdgeTable& table = chart.half_edges;
+    const int count = static_cast<int>(chart.positions.size());
+    std::vector<int>& map = s.device_vertices[k];
+    map.resize(count);
+    int next = first_rows[k] + static_cast<int>(d.order.size());
+    for (int v = 0; v < count; ++v) {
+      map[v] = chart.kinds[v] == ChartVertex::kInner ? first_rows[k] + d.number[v] : next++;
+      for (const int axis : {0, 1}) {
+        const double x = axis == 0 ? chart.u[v] : chart.v[v];
+        const std::size_t at = 4 * static_cast<std::size_t>(map[v]) + axis;
+        s.map[at] = static_cast<float>(x);
+        s.map[at + 2] = static_cast<float>(x - static_cast<double>(s.map[at]));
+      }
+    }
+    std::vector<int> neighbour_columns;
+    fronts[k] = make_fronts(table, d, static_cast<int>(k), first_rows[k], subtree_size, neighbour_columns, s);
     const std::vector<double> surface = relative_surface_areas(chart);
     // Where they lie does not change, which compilers cannot know where bytes are written.
     int *const columns = s.columns.data(), *const entry_columns = s.entry_columns.data(), *const triangles = s.entry_triangles.data();
     signed char* const jumps = s.jumps.data();
     float* const factors = s.factors.data();
-    const int *const numbers = d.number.data(), *const own_columns = neighbour_columns[k].data(), *const rows = map.data();
+    const int *const numbers = d.number.data(), *const own_columns = neighbour_columns.data(), *const rows = map.data();
     const int *const outgoing = table.outgoing.data(), *const targets = table.targets.data(), *const twins = table.twins.data();
     const auto* const turns = chart.turns.data();
     const ChartVertex* const kinds = chart.kinds.data();
@@ -319,20 +303,42 @@ DeviceSystems build_systems(const ChartPointers& charts, double alpha, bool are_
       }
     }
     const auto slice_of = [&](int row) { return row < s.vertices ? s.slice_begin[row / kSlice] : s.entries; };
-    for (int e = slice_of(first_rows[k]); e < slice_of(first_rows[k + 1]); ++e)
-      factors[e] = alpha == 0.5 ? 1 / std::sqrt(factors[e]) : std::pow(factors[e], static_cast<float>(-alpha));
+    const std::span own_factors(factors + slice_of(first_rows[k]), factors + slice_of(first_rows[k + 1]));
+    if (alpha == 0.5)
+      for (float& factor : own_factors) factor = 1 / std::sqrt(factor);
+    else
+      for (float& factor : own_factors) factor = std::pow(factor, static_cast<float>(-alpha));
+    int* const corners = s.corners.data() + first_triangle;
+    signed char* const corner_jumps = s.corner_jumps.data() + first_triangle;
+    const int all = s.triangles;
     for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
-      int first = 0;
-      for (const int c : {1, 2})
-        if (is_pole(chart.kinds[chart.triangles[t][c]])) first = c;
-      const bool has_pole = is_pole(chart.kinds[chart.triangles[t][first]]);
-      const std::size_t at = first_triangles[k] + t;
-      for (int c = 0; c < 3; ++c) s.corners[c * static_cast<std::size_t>(s.triangles) + at] = map[chart.triangles[t][(first + c) % 3]];
-      const auto turn = [&](int c) { return chart.turns[t][(first + c) % 3]; };
-      s.corner_jumps[at] = has_pole ? kPole : static_cast<signed char>(turn(1) - turn(0));
-      s.corner_jumps[s.triangles + at] = static_cast<signed char>(turn(2) - turn(has_pole ? 1 : 0));
+      const Triangle& triangle = chart.triangles[t];
+      const auto& own_turns = turns[t];
+      // The pole first, if there is one.
+      const int a = is_pole(kinds[triangle[1]]) ? 1 : is_pole(kinds[triangle[2]]) ? 2 : 0, b = a < 2 ? a + 1 : 0, c = b < 2 ? b + 1 : 0;
+      const bool has_pole = is_pole(kinds[triangle[a]]);
+      corners[t] = rows[triangle[a]];
+      corners[all + t] = rows[triangle[b]];
+      corners[2 * static_cast<std::size_t>(all) + t] = rows[triangle[c]];
+      corner_jumps[t] = has_pole ? kPole : static_cast<signed char>(own_turns[b] - own_turns[a]);
+      corner_jumps[all + t] = static_cast<signed char>(own_turns[c] - own_turns[has_pole ? b : a]);
     }
   });
+  for (FrontTables& tables : fronts) {
+    first_fronts.push_back(static_cast<int>(s.fronts.fronts.size()));
+    append_tables(s.fronts, std::exchange(tables, {}));
+  }
+  first_fronts.push_back(static_cast<int>(s.fronts.fronts.size()));
+  for (const int k : by_falling_size(charts))
+    s.charts.push_back({k, first_rows[k] / kSlice, first_rows[k + 1] / kSlice, first_fronts[k], first_fronts[k + 1], first_triangles[k],
+                        first_triangles[k + 1]});
+  std::vector<Task>& tasks = s.fronts.tasks;
+  std::stable_sort(tasks.begin(), tasks.end(), [](const Task& a, const Task& b) { return a.stage != b.stage ? a.stage < b.stage : a.work > b.work; });
+  for (const Task& task : tasks) {
+    s.stage_begin.resize(task.stage + 1, static_cast<int>(s.tasks.size() / 2));
+    s.tasks.insert(s.tasks.end(), {task.begin, task.end});
+  }
+  s.stage_begin.push_back(static_cast<int>(tasks.size()));
   return s;
 }
 
