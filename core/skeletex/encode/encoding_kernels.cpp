@@ -22,7 +22,7 @@ std::vector<KernelVariant> encoding_kernels(const ClContext& context, const Enco
     for (const char* name : names) kernels.push_back({{file, name}, range});
   };
   add("segment.cl", {"classify_points"}, items);
-  if (has_vsm) add("vsm.cl", {"map_charts"}, kSingle);
+  if (has_vsm && context.row_items() == 1) add("vsm.cl", {"map_charts"}, kSingle);  // elsewhere there is none
   add("spd.cl", {"find_hidden"}, kSearch);
   if (has_spd) add("spd.cl", {"cast_rays"}, kSearch);
   if (has_vsm) {
