@@ -363,7 +363,7 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
     marks.clear();
     const auto pairs = pass == 0 ? crossings.find(lattice) : crossings.find(lattice, changed);
     if (pass == 0 && pairs.size() > kManyPairs) {
-      const auto even_pairs = crossings.find_around(pairs, lattice, even_lattice);
+      const auto even_pairs = crossings.find_around(pairs, even_lattice);
       for (const auto& pair : even_pairs)
         for (const int triangle : pair) even_faults.add(even_lattice.triangle(triangle), kTolerance);
       const auto near = std::count_if(pairs.begin(), pairs.end(), is_pair_near_even_fault);

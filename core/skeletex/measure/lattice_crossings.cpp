@@ -4,7 +4,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <utility>
 
@@ -14,22 +13,19 @@
 namespace skeletex {
 namespace {
 
-constexpr int kSide = 4;  // quads along a side of a square
-constexpr int kPiece = 2;             // quads along a side of a piece of a square
-constexpr int kNear = 8;              // quads: up to here a part of the lattice is looked at as a whole
+constexpr int kEndTriangles = 8;      // of a leaf of a strip or fan
+constexpr int kNear = 2;              // nodes: up to here a part of the lattice is looked at as a whole
+constexpr int kNearQuads = 8;         // quads, likewise
 constexpr float kLeastCosine = 0.2f;  // between a part's normals and their middle
 constexpr double kRounding = 1e-10;   // of a product of lengths: far more than double precision rounds off
-constexpr std::size_t kWidth = 8;
 constexpr std::size_t kAtOnce = 128;
+constexpr int kTaskLevel = 3;         // nodes up to here are one task
+constexpr std::size_t kTasks = 8;     // at once
+constexpr std::size_t kLeaves = 256;   // kept by each thread
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-/// Bits of a number, one place apart.
-std::uint64_t spread(std::uint32_t value) {
-  std::uint64_t spread = 0;
-  for (int bit = 0; bit < 16; ++bit) spread |= static_cast<std::uint64_t>(value >> bit & 1u) << (2 * bit);
-  return spread;
-}
+using Four = Eigen::Array4f;
 
 template <class Box>
 Box no_box() {
@@ -40,19 +36,28 @@ void add(const Box& other, Box& box) {
   box.least = box.least.min(other.least);
   box.greatest = box.greatest.max(other.greatest);
 }
+template <class Box>
+void add(const Four& point, Box& box) {
+  box.least = box.least.min(point);
+  box.greatest = box.greatest.max(point);
+}
+template <class Box>
+void widen(float margin, Box& box) {
+  const Four by{margin, margin, margin, 0};
+  box.least -= by, box.greatest += by;
+}
 /// (Without branches: which of the sides decides is chance.)
 template <class Box>
 bool do_overlap(const Box& a, const Box& b) {
-  return (static_cast<int>(a.least[0] <= b.greatest[0]) & static_cast<int>(b.least[0] <= a.greatest[0]) &
-          static_cast<int>(a.least[1] <= b.greatest[1]) & static_cast<int>(b.least[1] <= a.greatest[1]) &
-          static_cast<int>(a.least[2] <= b.greatest[2]) & static_cast<int>(b.least[2] <= a.greatest[2])) != 0;
+  const Four gaps = (a.least - b.greatest).max(b.least - a.greatest);
+  return gaps.maxCoeff() <= 0;
 }
 
 /// 0 of a triangle without area: it may look anywhere.
-Eigen::Array4f unit_normal(const Eigen::Array4f& u, const Eigen::Array4f& v) {
+Four unit_normal(const Four& u, const Four& v) {
   const Eigen::Vector3f across = u.head<3>().matrix().cross(v.head<3>().matrix());
   const float length2 = across.squaredNorm();
-  Eigen::Array4f normal = Eigen::Array4f::Zero();
+  Four normal = Four::Zero();
   if (length2 > 0) normal.head<3>() = across.array() / std::sqrt(length2);
   return normal;
 }
@@ -60,296 +65,564 @@ Eigen::Array4f unit_normal(const Eigen::Array4f& u, const Eigen::Array4f& v) {
 /// Whether all normals of a box lie within a cone.
 template <class Box>
 bool is_narrow(const Box& normals) {
-  const Eigen::Array4f middle = 0.5f * (normals.least + normals.greatest);
+  const Four middle = 0.5f * (normals.least + normals.greatest);
   return (middle * normals.least).min(middle * normals.greatest).sum() > kLeastCosine * middle.matrix().norm();
 }
 
-/// Whether what two triangles do not share of the second one lies on one side of the first one's plane, further than rounding could
-/// put it: then they do not meet. So it is with nearly all neighbours, and this is far cheaper than do_triangles_intersect.
-bool is_beside(const Triangle& own, const std::array<Vec3, 3>& corners, const Vec3& normal, const Triangle& other, const std::array<Vec3, 3>& other_corners) {
-  int free = 0, above = 0, below = 0;
-  for (int k = 0; k < 3; ++k) {
-    if (other[k] == own[0] || other[k] == own[1] || other[k] == own[2]) continue;
-    const Vec3 offset = other_corners[k] - corners[0];
-    const double height = normal.dot(offset), margin = kRounding * normal.cwiseAbs().dot(offset.cwiseAbs());
-    ++free, above += height > margin, below += height < -margin;
-  }
-  return free > 0 && (above == free || below == free);
+bool do_share_vertex(const Triangle& a, const Triangle& b) {
+  int shared = 0;
+  for (int k = 0; k < 3; ++k) shared |= static_cast<int>(a[k] == b[0]) | static_cast<int>(a[k] == b[1]) | static_cast<int>(a[k] == b[2]);
+  return shared != 0;
+}
+
+using FourPoints = std::array<Four, 3>;
+/// \param is_first  1 or 0 of each
+Four either(const Four& is_first, const Four& a, const Four& b) { return a * is_first + b * (1 - is_first); }
+FourPoints four_times(const Four& point) { return {Four::Constant(point[0]), Four::Constant(point[1]), Four::Constant(point[2])}; }
+/// Four boxes and one: 0 or less of those that overlap it.
+Four gaps(const FourPoints& least, const FourPoints& greatest, const FourPoints& other_least, const FourPoints& other_greatest) {
+  return (least[0] - other_greatest[0])
+      .max(other_least[0] - greatest[0])
+      .max((least[1] - other_greatest[1]).max(other_least[1] - greatest[1]))
+      .max((least[2] - other_greatest[2]).max(other_least[2] - greatest[2]));
+}
+
+/// From a to b round a circle, the shorter way: where it starts, and its steps.
+std::pair<int, int> between(int a, int b, int around) {
+  const int ahead = (b - a + around) % around, behind = (around - ahead) % around;
+  return ahead <= behind ? std::pair(a, ahead) : std::pair(b, behind);
 }
 
 }  // namespace
 
 LatticeCrossings::LatticeCrossings(const LatticeMesh& lattice)
-    : margin_(static_cast<float>(4e-7 * lattice.model().diagonal)),
-      texture_width_(lattice.model().texture.width),
-      part_of_(lattice.triangle_count()) {
+    : margin_(static_cast<float>(4e-7 * lattice.model().diagonal)), texture_width_(lattice.model().texture.width),
+      extent_(lattice.model().origin.lpNorm<Eigen::Infinity>() + lattice.model().diagonal) {
   const SkeletexModel& model = lattice.model();
-  struct Square {
-    std::uint64_t key;
-    int patch, column, row;
+  const auto add_grid = [&](Grid grid, int columns, int rows) {
+    for (int level = 0;; ++level, columns = (columns + 1) / 2, rows = (rows + 1) / 2) {
+      grid.levels.push_back({static_cast<int>(nodes_.size()), columns, rows});
+      for (int row = 0; row < rows; ++row)
+        for (int column = 0; column < columns; ++column) {
+          if (level == 0) leaves_.push_back(static_cast<int>(nodes_.size()));
+          nodes_.push_back({static_cast<int>(grids_.size()), level, row, column});
+        }
+      if (columns == 1 && rows == 1) break;
+    }
+    grids_.push_back(std::move(grid));
   };
-  std::vector<Square> squares;
-  int places = 0;
-  for (int patch = 0; patch < static_cast<int>(model.patches.size()); ++patch) {
+  const int patches = static_cast<int>(model.patches.size());
+  for (int patch = 0; patch < patches; ++patch) {
     const Rectangle& r = model.patches[patch].rectangle;
-    const int columns = (r.width + kSide - 1) / kSide, rows = (r.height - 3 + kSide - 1) / kSide;
     rectangles_.push_back(r);
-    first_normal_.push_back(static_cast<int>(normals_.size()));
-    normals_.resize(normals_.size() + 2 * static_cast<std::size_t>(r.width) * (r.height - 3));
-    squares_.push_back({columns, rows});
-    first_square_.push_back(places);
-    places += columns * rows;
-    for (int row = 0; row < rows; ++row)
-      for (int column = 0; column < columns; ++column)
-        squares.push_back(
-            {static_cast<std::uint64_t>(patch) << 40 | spread(static_cast<std::uint32_t>(row)) << 1 | spread(static_cast<std::uint32_t>(column)),
-             patch, column, row});
+    add_grid({patch, -1, {}, 0, 0, 0, false}, static_cast<int>(block_count(r.width, kSide)), static_cast<int>(block_count(r.height - 3, kSide)));
   }
-  std::sort(squares.begin(), squares.end(), [](const Square& a, const Square& b) { return a.key < b.key; });
-  places_.resize(places);
-  triangles_.reserve(lattice.triangle_count());
-  for (const Square& square : squares) {
-    places_[first_square_[square.patch] + square.row * squares_[square.patch][0] + square.column] = static_cast<int>(parts_.size());
-    parts_.push_back({square.patch, square.column, square.row, static_cast<int>(pieces_.size()), 0});
-    const Piece whole = quads_of(parts_.back());
-    for (int row = 0; row < whole.rows; row += kPiece)
-      for (int column = 0; column < whole.columns; column += kPiece) {
-        Piece piece{square.patch,
-                    whole.column + column,
-                    std::min(kPiece, whole.columns - column),
-                    whole.row + row,
-                    std::min(kPiece, whole.rows - row),
-                    static_cast<int>(triangles_.size()),
-                    0};
-        for (int i = 0; i < piece.rows; ++i)
-          for (int j = 0; j < piece.columns; ++j)
-            for (const int side : {0, 1})
-              triangles_.push_back(2 * texel_of(square.patch, piece.column + j, piece.row + i) + side);
-        piece.count = static_cast<int>(triangles_.size()) - piece.begin;
-        pieces_.push_back(piece);
-        ++parts_.back().count;
+  for (int patch = 0; patch < patches; ++patch)
+    for (const int end : {0, 1}) {
+      const auto [first, last] = lattice.triangles_of_end(patch, static_cast<BoneEnd>(end));
+      const int skipped = (first - lattice.first_end_triangle()) % kEndTriangles;
+      add_grid({patch, end, {}, first, last, skipped, lattice.is_pole(patch, static_cast<BoneEnd>(end))},
+               static_cast<int>(block_count(skipped + last - first, kEndTriangles)), 1);
+    }
+}
+
+LatticeCrossings::EndLeaf LatticeCrossings::describe_end(const LatticeMesh& lattice, const Node& node) const {
+  const Grid& grid = grids_[node.grid];
+  const Rectangle& r = rectangles_[grid.patch];
+  EndLeaf leaf;
+  std::vector<int> samples;
+  int least = 0, greatest = 0, first = -1;
+  const auto [begin, end] = triangles_of_end(node);
+  for (int i = begin; i < end; ++i)
+    for (const int vertex : lattice.triangle(i)) {
+      if (!lattice.is_texel(vertex)) {
+        samples.push_back(vertex);
+        continue;
       }
+      const int at = vertex % texture_width_ - r.x;
+      if (first < 0) first = at;
+      int offset = at - first;  // at most some half turn
+      if (2 * offset > r.width) offset -= r.width;
+      if (2 * offset < -r.width) offset += r.width;
+      least = std::min(least, offset), greatest = std::max(greatest, offset);
+    }
+  if (first >= 0) {
+    leaf.first_column = (first + least + r.width) % r.width;
+    leaf.last_column = leaf.first_column + greatest - least;
   }
-  for (int begin = lattice.first_end_triangle(); begin < lattice.triangle_count(); begin += kPieceTriangles) {
-    const int count = std::min(kPieceTriangles, lattice.triangle_count() - begin);
-    parts_.push_back({-1, 0, 0, static_cast<int>(pieces_.size()), 1});
-    pieces_.push_back({-1, 0, 0, 0, 0, static_cast<int>(triangles_.size()), count});
-    for (int i = 0; i < count; ++i) triangles_.push_back(begin + i);
+  std::sort(samples.begin(), samples.end());
+  samples.erase(std::unique(samples.begin(), samples.end()), samples.end());
+  if (!samples.empty() && samples.back() - samples.front() + 1 == std::ssize(samples)) leaf.first_sample = samples.front(), leaf.last_sample = samples.back();
+  return leaf;
+}
+
+int LatticeCrossings::leaf_of(const LatticeMesh& lattice, int triangle) const {
+  const int patches = static_cast<int>(rectangles_.size());
+  if (triangle < lattice.first_end_triangle()) {
+    const int texel = triangle / 2, patch = lattice.patch_of(texel);
+    const Rectangle& r = rectangles_[patch];
+    return node_at(grids_[patch], 0, (texel / texture_width_ - r.y - 1) / kSide, (texel % texture_width_ - r.x) / kSide);
   }
-  for (std::size_t part = 0; part < parts_.size(); ++part)
-    for (int i = parts_[part].begin; i < parts_[part].begin + parts_[part].count; ++i)
-      for (int k = pieces_[i].begin; k < pieces_[i].begin + pieces_[i].count; ++k) part_of_[triangles_[k]] = static_cast<int>(part);
-  piece_boxes_.resize(pieces_.size());
-  normal_boxes_.resize(parts_.size());
-  for (std::size_t size = parts_.size();; size = block_count(size, kWidth)) {
-    boxes_.emplace_back(size);
-    if (size <= kWidth) break;
+  const auto grid = std::prev(std::upper_bound(grids_.begin() + patches, grids_.end(), triangle, [](int t, const Grid& g) { return t < g.first_triangle; }));
+  return node_at(*grid, 0, 0, (triangle - grid->first_triangle + grid->skipped) / kEndTriangles);
+}
+
+std::pair<int, int> LatticeCrossings::triangles_of_end(const Node& node) const {
+  const Grid& grid = grids_[node.grid];
+  const int begin = grid.first_triangle - grid.skipped + kEndTriangles * node.column;
+  return {std::max(begin, grid.first_triangle), std::min(begin + kEndTriangles, grid.last_triangle)};
+}
+
+void LatticeCrossings::view(const LatticeMesh& lattice, const Node& node, SquareVertices& square) const {
+  const int patch = grids_[node.grid].patch, width = rectangles_[patch].width, column = kSide * node.column, row = kSide * node.row;
+  square.columns = std::min(kSide, width - column), square.rows = std::min(kSide, rectangles_[patch].height - 3 - row);
+  if (column + kSide < width) {
+    square.stride = texture_width_;
+    for (int axis = 0; axis < 3; ++axis) square.axes[axis] = lattice.planes()[axis].data() + texel_of(patch, column, row);
+    for (int i = 0; i < square.rows; ++i) square.diagonals[i] = lattice.diagonals().data() + texel_of(patch, column, row + i);
+    return;
+  }
+  constexpr int kAcross = kSide + 1;
+  square.stride = kAcross;
+  for (int i = 0; i <= square.rows; ++i)
+    for (int k = 0; k < kAcross; ++k) {
+      const int texel = texel_of(patch, std::min(column + k, width), row + i);
+      for (int axis = 0; axis < 3; ++axis) square.copies[(axis * kAcross + i) * kAcross + k] = lattice.planes()[axis][texel];
+      if (i < square.rows && k < kSide) square.copied_diagonals[i * kSide + k] = lattice.diagonals()[texel];
+    }
+  for (int axis = 0; axis < 3; ++axis) square.axes[axis] = square.copies.data() + axis * kAcross * kAcross;
+  for (int i = 0; i < square.rows; ++i) square.diagonals[i] = square.copied_diagonals.data() + i * kSide;
+}
+
+/// Four columns at a time, and no more than their loads, or the compiler keeps copies in memory.
+LatticeCrossings::Bounds LatticeCrossings::measure_square(const LatticeMesh& lattice, const Node& node) const {
+  SquareVertices square;
+  view(lattice, node, square);
+  const Four none = Four::Constant(kInfinity);
+  Four least[3] = {none, none, none}, greatest[3] = {-none, -none, -none};
+  Four least_normals[3] = {none, none, none}, greatest_normals[3] = {-none, -none, -none};
+  for (int row = 0; row < square.rows; ++row) {
+    const Four is_second = Eigen::Map<const Eigen::Array4i>(square.diagonals[row]).cast<float>();
+    Four u[2][3], v[2][3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const float* at = square.axes[axis] + row * square.stride;
+      const Four own = Eigen::Map<const Four>(at), right = Eigen::Map<const Four>(at + 1);
+      const Four above = Eigen::Map<const Four>(at + square.stride), beyond = Eigen::Map<const Four>(at + square.stride + 1);
+      least[axis] = least[axis].min(own.min(right).min(above.min(beyond)));
+      greatest[axis] = greatest[axis].max(own.max(right).max(above.max(beyond)));
+      u[0][axis] = right - own, v[0][axis] = either(is_second, above, beyond) - own;
+      u[1][axis] = beyond - either(is_second, above, own), v[1][axis] = above - either(is_second, right, own);
+    }
+    for (int side = 0; side < 2; ++side) {
+      const Four x = u[side][1] * v[side][2] - u[side][2] * v[side][1], y = u[side][2] * v[side][0] - u[side][0] * v[side][2],
+                 z = u[side][0] * v[side][1] - u[side][1] * v[side][0];
+      const Four inverse = 1 / (x * x + y * y + z * z).sqrt().max(std::numeric_limits<float>::min());
+      Four normal[3] = {x * inverse, y * inverse, z * inverse};
+      for (int axis = 0; axis < 3; ++axis) {
+        for (int k = square.columns; k < kSide; ++k) normal[axis][k] = normal[axis][0];
+        least_normals[axis] = least_normals[axis].min(normal[axis]);
+        greatest_normals[axis] = greatest_normals[axis].max(normal[axis]);
+      }
+    }
+  }
+  Bounds bounds{{{least[0].minCoeff(), least[1].minCoeff(), least[2].minCoeff(), 0}, {greatest[0].maxCoeff(), greatest[1].maxCoeff(), greatest[2].maxCoeff(), 0}},
+                {{least_normals[0].minCoeff(), least_normals[1].minCoeff(), least_normals[2].minCoeff(), 0},
+                 {greatest_normals[0].maxCoeff(), greatest_normals[1].maxCoeff(), greatest_normals[2].maxCoeff(), 0}}};
+  widen(margin_, bounds.around);
+  return bounds;
+}
+
+LatticeCrossings::Bounds LatticeCrossings::measure_end(const LatticeMesh& lattice, const Node& node) const {
+  Bounds bounds{no_box<Box>(), no_box<Box>()};
+  const auto [begin, end] = triangles_of_end(node);
+  for (int i = begin; i < end; ++i) {
+    const Triangle t = lattice.triangle(i);
+    const Four a = lattice.point(t[0]), b = lattice.point(t[1]), c = lattice.point(t[2]);
+    for (const Four& point : {a, b, c}) add(point, bounds.around);
+    add(unit_normal(b - a, c - a), bounds.normals);
+  }
+  widen(margin_, bounds.around);
+  return bounds;
+}
+
+void LatticeCrossings::measure(const LatticeMesh& lattice, int node, Tree& tree) const {
+  if (node < first_of_ends()) {
+    tree.nodes[node] = measure_square(lattice, nodes_[node]);
+  } else {
+    tree.nodes[node] = measure_end(lattice, nodes_[node]);
+    tree.ends[node - first_of_ends()] = describe_end(lattice, nodes_[node]);
   }
 }
 
-/// The triangles of a piece, in order.
-LatticeCrossings::PieceTriangles LatticeCrossings::triangles_of(const LatticeMesh& lattice, const Piece& piece) const {
-  PieceTriangles triangles;
-  if (piece.patch < 0) {
-    for (int k = 0; k < piece.count; ++k) triangles[k] = lattice.triangle(triangles_[piece.begin + k]);
-    return triangles;
-  }
-  auto next = triangles.begin();
-  for (int row = piece.row; row < piece.row + piece.rows; ++row)
-    for (int column = piece.column; column < piece.column + piece.columns; ++column)
-      next = std::ranges::copy(lattice.triangles_of(texel_of(piece.patch, column, row), texel_of(piece.patch, column + 1, row)), next).out;
-  return triangles;
-}
-
-LatticeCrossings::Box LatticeCrossings::box_of(const LatticeMesh& lattice, const Triangle& triangle) const {
-  const Eigen::Array4f a = lattice.point(triangle[0]), b = lattice.point(triangle[1]), c = lattice.point(triangle[2]);
-  return {a.min(b).min(c) - margin_, a.max(b).max(c) + margin_};
-}
-
-void LatticeCrossings::measure(const LatticeMesh& lattice, int part) {
-  Box around = no_box<Box>(), normals = no_box<Box>();
-  for (int i = parts_[part].begin; i < parts_[part].begin + parts_[part].count; ++i) {
-    const Piece& piece = pieces_[i];
-    Box box = no_box<Box>();
-    if (piece.patch < 0) {
-      for (int k = piece.begin; k < piece.begin + piece.count; ++k)
-        for (const int vertex : lattice.triangle(triangles_[k])) add({lattice.point(vertex), lattice.point(vertex)}, box);
-    } else {
-      // Each vertex once.
-      std::array<std::array<Eigen::Array4f, kPiece + 1>, kPiece + 1> points;
-      for (int row = 0; row <= piece.rows; ++row)
-        for (int column = 0; column <= piece.columns; ++column) {
-          points[row][column] = lattice.point(texel_of(piece.patch, piece.column + column, piece.row + row));
-          add({points[row][column], points[row][column]}, box);
-        }
-      for (int row = 0; row < piece.rows; ++row)
-        for (int column = 0; column < piece.columns; ++column) {
-          const int texel = texel_of(piece.patch, piece.column + column, piece.row + row);
-          const Eigen::Array4f &own = points[row][column], &right = points[row][column + 1], &above = points[row + 1][column], &beyond = points[row + 1][column + 1];
-          const bool is_second = lattice.takes_second(texel);
-          const std::array<Eigen::Array4f, 2> u{right - own, beyond - (is_second ? above : own)};
-          const std::array<Eigen::Array4f, 2> v{(is_second ? above : beyond) - own, is_second ? Eigen::Array4f(above - right) : Eigen::Array4f(above - own)};
-          for (const int side : {0, 1}) {
-            const Eigen::Array4f normal = unit_normal(u[side], v[side]);
-            normals_[normal_of(piece.patch, piece.column + column, piece.row + row) + side] = normal;
-            add({normal, normal}, normals);
-          }
+/// Levels above the leaves, and caps.
+void LatticeCrossings::join(Tree& tree) const {
+  for (const Grid& grid : grids_)
+    for (std::size_t level = 1; level < grid.levels.size(); ++level) {
+      const auto [first, columns, rows] = grid.levels[level];
+      const Grid::Level& below = grid.levels[level - 1];
+      for (int row = 0; row < rows; ++row)
+        for (int column = 0; column < columns; ++column) {
+          Bounds& all = tree.nodes[first + row * columns + column];
+          all = {no_box<Box>(), no_box<Box>()};
+          for (int r = 2 * row; r < std::min(2 * row + 2, below.rows); ++r)
+            for (int c = 2 * column; c < std::min(2 * column + 2, below.columns); ++c) {
+              const Bounds& part = tree.nodes[below.first + r * below.columns + c];
+              add(part.around, all.around), add(part.normals, all.normals);
+            }
         }
     }
-    piece_boxes_[i] = {box.least - margin_, box.greatest + margin_};
-    add(piece_boxes_[i], around);
+  const std::size_t patches = rectangles_.size();
+  tree.caps.assign(patches, {-1, -1});
+  for (std::size_t i = patches; i < grids_.size(); ++i) {
+    const Grid &fan = grids_[i], &quads = grids_[fan.patch];
+    if (!fan.is_fan) continue;
+    Box normals = tree.nodes[fan.levels.back().first].normals;
+    const auto [first, columns, rows] = quads.levels[0];
+    int& cap = tree.caps[fan.patch][fan.end];
+    while (is_narrow(normals) && ++cap < rows)
+      for (int column = 0; column < columns; ++column) add(tree.nodes[first + (fan.end == 0 ? cap : rows - 1 - cap) * columns + column].normals, normals);
   }
-  boxes_[0][part] = around;
-  normal_boxes_[part] = normals;
 }
 
-void LatticeCrossings::join_boxes() {
-  for (std::size_t level = 1; level < boxes_.size(); ++level)
-    for (std::size_t i = 0; i < boxes_[level].size(); ++i) {
-      boxes_[level][i] = no_box<Box>();
-      for (std::size_t child = kWidth * i; child < std::min(boxes_[level - 1].size(), kWidth * (i + 1)); ++child)
-        add(boxes_[level - 1][child], boxes_[level][i]);
-    }
+void LatticeCrossings::measure_all(const LatticeMesh& lattice, Tree& tree) const {
+  tree.nodes.resize(nodes_.size());
+  tree.ends.resize(nodes_.size() - first_of_ends());
+  for_each_block(leaves_.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) measure(lattice, leaves_[i], tree);
+  });
+  join(tree);
 }
 
-/// All quads of a square.
-LatticeCrossings::Piece LatticeCrossings::quads_of(const Part& part) const {
-  const Rectangle& r = rectangles_[part.patch];
-  const int column = kSide * part.column, row = kSide * part.row;
-  return {part.patch, column, std::min(kSide, r.width - column), row, std::min(kSide, r.height - 3 - row), 0, 0};
+/// Leaves, and all that they are parts of.
+void LatticeCrossings::mark(std::span<const int> leaves, std::vector<char>& are_asked) const {
+  are_asked.assign(nodes_.size(), 0);
+  for (const int leaf : leaves) {
+    const Node& node = nodes_[leaf];
+    const Grid& grid = grids_[node.grid];
+    for (int level = 0; level < static_cast<int>(grid.levels.size()); ++level)
+      if (std::exchange(are_asked[node_at(grid, level, node.row >> level, node.column >> level)], 1) != 0) break;
+  }
 }
 
-/// Whether the lattice around two bends so little that nothing in it can meet.
-bool LatticeCrossings::is_smooth(const Piece& a, const Piece& b) const {
-  if (a.patch < 0 || a.patch != b.patch) return false;
-  const int width = rectangles_[a.patch].width;
+/// By how little the lattice around two nodes bends, or one.
+LatticeCrossings::Contact LatticeCrossings::contact(const Tree& tree, int a, int b) const {
+  const Node &one = nodes_[a], &other = nodes_[b];
+  const Grid &first = grids_[one.grid], &second = grids_[other.grid];
+  const bool are_squares = first.end < 0 && second.end < 0;
+  if (!are_squares && !first.is_fan && !second.is_fan && (one.level > 0 || other.level > 0)) return Contact::kAny;
+  const Contact of_smooth = are_squares || first.is_fan || second.is_fan ? Contact::kNone : Contact::kByRounding;
+  if (a == b) return is_narrow(tree.nodes[a].normals) ? of_smooth : Contact::kAny;
+  bool is_smooth = false;
+  if (first.patch == second.patch)
+    for (const int end : {0, 1}) is_smooth = is_smooth || (tree.caps[first.patch][end] >= 0 && is_in_cap(tree, one, end) && is_in_cap(tree, other, end));
+  if (one.grid == other.grid) return is_smooth || is_smooth_within(tree, one, other) ? of_smooth : Contact::kAny;
+  if (are_squares) return Contact::kAny;
+  if (is_smooth) return of_smooth;
+  if (one.level > 0 || other.level > 0) return Contact::kAny;
+  if (first.end >= 0 && second.end >= 0) return is_smooth_over_seam(tree, a, b) ? Contact::kByRounding : Contact::kAny;
+  if (first.patch != second.patch) return Contact::kAny;
+  const auto& [strip, square] = first.end >= 0 ? std::pair(one, other) : std::pair(other, one);
+  if (!is_smooth_at_end(tree, strip, square)) return Contact::kAny;
+  return do_share(tree, strip, square) ? of_smooth : Contact::kNone;
+}
+
+/// Whether a leaf of a strip or fan and a square of its patch have vertices in common.
+bool LatticeCrossings::do_share(const Tree& tree, const Node& end, const Node& square) const {
+  const Grid& grid = grids_[square.grid];
+  if (square.row != (grids_[end.grid].end == 0 ? 0 : grid.levels[0].rows - 1)) return false;
+  const EndLeaf& leaf = tree.ends[node_at(grids_[end.grid], 0, 0, end.column) - first_of_ends()];
+  const int width = rectangles_[grid.patch].width, ahead = (kSide * square.column - leaf.first_column + width) % width;
+  return ahead <= leaf.last_column - leaf.first_column || ahead + kSide >= width;
+}
+
+bool LatticeCrossings::is_in_cap(const Tree& tree, const Node& node, int end) const {
+  const Grid& grid = grids_[node.grid];
+  const int cap = tree.caps[grid.patch][end];
+  if (grid.end >= 0) return grid.end == end;
+  const int rows = grid.levels[0].rows, first = node.row << node.level, last = std::min(rows, (node.row + 1) << node.level);
+  return end == 0 ? last <= cap : first >= rows - cap;
+}
+
+/// Two nodes of one grid and level.
+bool LatticeCrossings::is_smooth_within(const Tree& tree, const Node& a, const Node& b) const {
+  const Grid& grid = grids_[a.grid];
+  const int columns = grid.levels[a.level].columns;
   if (std::abs(a.row - b.row) > kNear) return false;
-  const int ahead = (b.column - a.column + width) % width, behind = (width - ahead) % width;
-  if (std::min(ahead, behind) > kNear) return false;
-  const int column = ahead <= behind ? a.column : b.column;
-  const int columns =
-      std::min(width, std::min(ahead, behind) + (ahead <= behind ? std::max(b.columns, a.columns - ahead) : std::max(a.columns, b.columns - behind)));
-  const int row = std::min(a.row, b.row), end = std::max(a.row + a.rows, b.row + b.rows);
-  const auto for_each_normal = [&](const auto& act) {
-    for (int r = row; r < end; ++r)
-      for (int j = 0; j < columns; ++j) {
-        const int first = normal_of(a.patch, column + j, r);
-        act(normals_[first]), act(normals_[first + 1]);
-      }
+  const auto [first, steps] = between(a.column, b.column, columns);
+  if (steps > kNear) return false;
+  Box normals = no_box<Box>();
+  for (int row = std::min(a.row, b.row); row <= std::max(a.row, b.row); ++row)
+    for (int step = 0; step <= steps; ++step) add(tree.nodes[node_at(grid, a.level, row, (first + step) % columns)].normals, normals);
+  return is_narrow(normals);
+}
+
+/// A leaf of a strip or fan and a square of the patch: all squares up to that, and what of the end lies at them.
+bool LatticeCrossings::is_smooth_at_end(const Tree& tree, const Node& end, const Node& square) const {
+  const Grid &strip = grids_[end.grid], &quads = grids_[square.grid];
+  const auto [first_square, columns, rows] = quads.levels[0];
+  const int row = strip.end == 0 ? square.row : rows - 1 - square.row;
+  if (row > 1) return false;
+  const int width = rectangles_[strip.patch].width, pieces = strip.levels[0].columns;
+  const auto leaf_at = [&](int column) -> const EndLeaf& { return tree.ends[node_at(strip, 0, 0, (column % pieces + pieces) % pieces) - first_of_ends()]; };
+  // In columns from the strip's first one on.
+  const int origin = leaf_at(end.column).first_column, own = leaf_at(end.column).last_column - origin;
+  int first = ((kSide * square.column - origin) % width + width) % width;
+  if (2 * first > width) first -= width;
+  const int last = std::max(own, first + kSide), reach = 3 * kSide;
+  first = std::min(0, first);
+  if (last - first > reach || 2 * reach > width) return false;
+  Box normals = tree.nodes[node_at(strip, 0, 0, end.column)].normals;
+  for (int column = first, at; column < last; column += kSide - at % kSide) {
+    at = ((origin + column) % width + width) % width;
+    for (int r = 0; r <= row; ++r) add(tree.nodes[node_at(quads, 0, strip.end == 0 ? r : rows - 1 - r, at / kSide)].normals, normals);
+  }
+  // On both sides of the leaf.
+  const auto step_between = [&](int from, int to) { return ((to - from) % width + width) % width; };
+  for (int piece = end.column, at = own; at < last; ++piece) {
+    const int step = step_between(leaf_at(piece).last_column, leaf_at(piece + 1).last_column);
+    if (piece - end.column > 3) return false;
+    add(tree.nodes[node_at(strip, 0, 0, (piece + 1) % pieces)].normals, normals);
+    at += step;
+  }
+  for (int piece = end.column, at = 0; at > first; --piece) {
+    const int step = step_between(leaf_at(piece - 1).first_column, leaf_at(piece).first_column);
+    if (end.column - piece > 3) return false;
+    add(tree.nodes[node_at(strip, 0, 0, ((piece - 1) % pieces + pieces) % pieces)].normals, normals);
+    at -= step;
+  }
+  return is_narrow(normals);
+}
+
+/// Two leaves of strips on both sides of a seam.
+bool LatticeCrossings::is_smooth_over_seam(const Tree& tree, int a, int b) const {
+  const auto do_share_side = [&](int one, int other) {
+    const EndLeaf &first = tree.ends[one - first_of_ends()], &second = tree.ends[other - first_of_ends()];
+    return std::min(first.last_sample, second.last_sample) > std::max(first.first_sample, second.first_sample);
   };
-  Eigen::Array4f middle = Eigen::Array4f::Zero();
-  for_each_normal([&](const Eigen::Array4f& normal) { middle += normal; });
-  float least = std::numeric_limits<float>::infinity();
-  for_each_normal([&](const Eigen::Array4f& normal) { least = std::min(least, (normal * middle).sum()); });
+  Box normals = tree.nodes[a].normals;
+  add(tree.nodes[b].normals, normals);
+  if (!is_narrow(normals)) return false;
+  if (do_share_side(a, b)) return true;
+  // By way of a neighbour.
+  for (const auto& [from, to] : {std::pair(a, b), std::pair(b, a)}) {
+    const Node& node = nodes_[to];
+    const Grid& grid = grids_[node.grid];
+    const int pieces = grid.levels[0].columns;
+    for (const int step : {1, pieces - 1}) {
+      const int beside = node_at(grid, 0, 0, (node.column + step) % pieces);
+      if (!do_share_side(from, beside)) continue;
+      Box all = normals;
+      add(tree.nodes[beside].normals, all);
+      if (is_narrow(all)) return true;
+    }
+  }
+  return false;
+}
+
+/// Whether the lattice around the quads of two of a patch's triangles bends so little.
+bool LatticeCrossings::are_quads_smooth(const LatticeMesh& lattice, int patch, int s, int t) const {
+  const Rectangle& r = rectangles_[patch];
+  const auto row_of = [&](int triangle) { return triangle / 2 / texture_width_ - r.y - 1; };
+  const auto column_of = [&](int triangle) { return triangle / 2 % texture_width_ - r.x; };
+  const int row = std::min(row_of(s), row_of(t)), end = std::max(row_of(s), row_of(t)) + 1;
+  const auto [column, steps] = between(column_of(s), column_of(t), r.width);
+  if (end - 1 - row > kNearQuads || steps > kNearQuads) return false;
+  std::array<Four, 2 * (kNearQuads + 1) * (kNearQuads + 1)> normals;
+  int count = 0;
+  Four middle = Four::Zero();
+  for (int i = row; i < end; ++i)
+    for (int j = column; j < std::min(column + steps + 1, column + r.width); ++j)
+      for (const Triangle& triangle : lattice.triangles_of(texel_of(patch, j < r.width ? j : j - r.width, i), texel_of(patch, (j + 1) % r.width, i))) {
+        const Four a = lattice.point(triangle[0]), b = lattice.point(triangle[1]), c = lattice.point(triangle[2]);
+        middle += normals[count++] = unit_normal(b - a, c - a);
+      }
+  float least = kInfinity;
+  for (int k = 0; k < count; ++k) least = std::min(least, (normals[k] * middle).sum());
   return least > kLeastCosine * middle.matrix().norm();
 }
 
-bool LatticeCrossings::is_smooth(const Part& a, const Part& b) const {
-  if (a.patch < 0 || a.patch != b.patch || std::abs(a.row - b.row) * kSide > kNear) return false;
-  const int columns = squares_[a.patch][0];
-  const int ahead = (b.column - a.column + columns) % columns, behind = columns - ahead;
-  const int steps = std::min(ahead, behind), first = ahead <= behind ? a.column : b.column;
-  if (steps * kSide > kNear) return false;
-  // By boxes of normals; one by one where these are not enough.
-  Box normals = no_box<Box>();
-  for (int row = std::min(a.row, b.row); row <= std::max(a.row, b.row); ++row)
-    for (int step = 0; step <= steps; ++step) add(normal_boxes_[places_[first_square_[a.patch] + row * columns + (first + step) % columns]], normals);
-  return is_narrow(normals) || is_smooth(quads_of(a), quads_of(b));
-}
-
-void LatticeCrossings::measure(const LatticeMesh& lattice, int piece, MeasuredPiece& measured) const {
-  if (measured.piece == piece) return;
-  measured.piece = piece;
-  measured.triangles = triangles_of(lattice, pieces_[piece]);
-  measured.has_corners.fill(false);
-  for (int k = 0; k < pieces_[piece].count; ++k) measured.boxes[k] = box_of(lattice, measured.triangles[k]);
-}
-
-void LatticeCrossings::MeasuredPiece::place(const LatticeMesh& lattice, int triangle) {
-  if (std::exchange(has_corners[triangle], true)) return;
-  corners[triangle] = lattice.corners(triangles[triangle]);
-  const auto& [a, b, c] = corners[triangle];
-  normals[triangle] = (b - a).cross(c - a);
-}
-
-void LatticeCrossings::find_between(const LatticeMesh& lattice, int a, int b, const std::vector<char>& is_asked,
-                                    std::array<MeasuredPiece, 2>& measured, std::vector<std::array<int, 2>>& pairs) const {
-  // The quad of a piece's triangle.
-  const auto quad_at = [](const Piece& piece, int triangle) {
-    if (piece.patch < 0) return piece;
-    const int quad = triangle / 2;
-    return Piece{piece.patch, piece.column + quad % piece.columns, 1, piece.row + quad / piece.columns, 1, 0, 0};
+LatticeCrossings::Leaf& LatticeCrossings::leaf_at(const LatticeMesh& lattice, int number, Leaf& leaf) const {
+  if (leaf.node == number) return leaf;
+  leaf.node = number, leaf.fours = 0;
+  leaf.is_placed.fill(false);
+  const Node& node = nodes_[number];
+  const Grid& grid = grids_[node.grid];
+  const auto add_four = [&](const auto& coordinates_of, int count) {
+    FourPoints &least = leaf.least[leaf.fours], &greatest = leaf.greatest[leaf.fours];
+    for (int axis = 0; axis < 3; ++axis) {
+      Four a, b, c;
+      coordinates_of(axis, a, b, c);
+      least[axis] = a.min(b).min(c) - margin_, greatest[axis] = a.max(b).max(c) + margin_;
+      leaf.least_of_fours[leaf.fours / 4][axis][leaf.fours % 4] = least[axis].minCoeff();
+      leaf.greatest_of_fours[leaf.fours / 4][axis][leaf.fours % 4] = greatest[axis].maxCoeff();
+    }
+    for (int k = count; k < 4; ++k) least[0][k] = kInfinity;
+    ++leaf.fours;
   };
-  auto& [ones, others] = measured;
-  for (int i = parts_[a].begin; i < parts_[a].begin + parts_[a].count; ++i) {
-    if (!do_overlap(piece_boxes_[i], boxes_[0][b])) continue;
-    for (int j = a == b ? i : parts_[b].begin; j < parts_[b].begin + parts_[b].count; ++j) {
-      if (!do_overlap(piece_boxes_[i], piece_boxes_[j])) continue;
-      const Piece &one = pieces_[i], &other = pieces_[j];
-      if (is_smooth(one, other)) continue;
-      measure(lattice, i, ones), measure(lattice, j, others);
-      for (int k = 0; k < one.count; ++k) {
-        if (!do_overlap(ones.boxes[k], piece_boxes_[j])) continue;
-        for (int l = i == j ? k + 1 : 0; l < other.count; ++l) {
-          if (!do_overlap(ones.boxes[k], others.boxes[l])) continue;
-          const int s = triangles_[one.begin + k], t = triangles_[other.begin + l];
-          if (!is_asked.empty() && !is_asked[s] && !is_asked[t]) continue;
-          const Triangle &first = ones.triangles[k], &second = others.triangles[l];
-          ones.place(lattice, k), others.place(lattice, l);
-          const auto &first_corners = ones.corners[k], &second_corners = others.corners[l];
-          if (is_beside(first, first_corners, ones.normals[k], second, second_corners) ||
-              is_beside(second, second_corners, others.normals[l], first, first_corners))
-            continue;
-          if (is_smooth(quad_at(one, k), quad_at(other, l))) continue;
-          if (do_triangles_intersect(first, first_corners, second, second_corners)) pairs.push_back({std::min(s, t), std::max(s, t)});
-        }
+  if (grid.end < 0) {
+    SquareVertices square;
+    view(lattice, node, square);
+    for (int i = 0; i < 2 * square.rows; ++i) {
+      const Four is_second = Eigen::Map<const Eigen::Array4i>(square.diagonals[i / 2]).cast<float>();
+      add_four(
+          [&](int axis, Four& a, Four& b, Four& c) {
+            const float* at = square.axes[axis] + i / 2 * square.stride;
+            const Four own = Eigen::Map<const Four>(at), right = Eigen::Map<const Four>(at + 1);
+            const Four above = Eigen::Map<const Four>(at + square.stride), beyond = Eigen::Map<const Four>(at + square.stride + 1);
+            a = i % 2 == 0 ? own : above, b = i % 2 == 0 ? right : beyond;
+            c = i % 2 == 0 ? either(is_second, above, beyond) : either(is_second, right, own);
+          },
+          square.columns);
+    }
+    return leaf;
+  }
+  const auto [begin, end] = triangles_of_end(node);
+  for (int first = begin; first < end; first += 4) {
+    std::array<Triangle, 4> triangles;
+    for (int k = 0; k < 4; ++k) triangles[k] = lattice.triangle(std::min(first + k, end - 1));
+    add_four(
+        [&](int axis, Four& a, Four& b, Four& c) {
+          const std::vector<float>& plane = lattice.planes()[axis];
+          for (int k = 0; k < 4; ++k) a[k] = plane[triangles[k][0]], b[k] = plane[triangles[k][1]], c[k] = plane[triangles[k][2]];
+        },
+        std::min(4, end - first));
+  }
+  return leaf;
+}
+
+/// All about a triangle of a leaf.
+void LatticeCrossings::place(const LatticeMesh& lattice, int i, Leaf& leaf) const {
+  leaf.is_placed[i] = true;
+  const Node& node = nodes_[leaf.node];
+  const Grid& grid = grids_[node.grid];
+  Triangle& triangle = leaf.triangles[i];
+  if (grid.end < 0) {
+    const int column = kSide * node.column + i % 4, row = kSide * node.row + i / 8, side = i / 4 % 2;
+    const int texel = texel_of(grid.patch, column, row);
+    triangle = lattice.triangles_of(texel, texel_of(grid.patch, column + 1, row))[side];
+    leaf.numbers[i] = 2 * texel + side;
+  } else {
+    leaf.numbers[i] = triangles_of_end(node).first + i;
+    triangle = lattice.triangle(leaf.numbers[i]);
+  }
+  leaf.are_on_seam[i] = std::count_if(triangle.begin(), triangle.end(), [&](int vertex) { return !lattice.is_texel(vertex); }) > 1;
+  leaf.corners[i] = lattice.corners(triangle);
+  const auto& [a, b, c] = leaf.corners[i];
+  leaf.normals[i] = (b - a).cross(c - a);
+  leaf.offsets[i] = leaf.normals[i].dot(a);
+  leaf.margins[i] = kRounding * extent_ * leaf.normals[i].lpNorm<1>();
+}
+
+/// Whether what two triangles do not share of the second one lies on one side of the first one's plane, further than rounding could
+/// put it: then they do not meet. So it is with nearly all neighbours, and this is far cheaper than do_triangles_intersect.
+bool LatticeCrossings::is_beside(const Leaf& leaf, int i, const Leaf& others, int k) {
+  const Triangle &own = leaf.triangles[i], &other = others.triangles[k];
+  const Vec3& normal = leaf.normals[i];
+  int free = 0, above = 0, below = 0;
+  for (int c = 0; c < 3; ++c) {
+    const int is_free = static_cast<int>(other[c] != own[0]) & static_cast<int>(other[c] != own[1]) & static_cast<int>(other[c] != own[2]);
+    const double height = normal.dot(others.corners[k][c]) - leaf.offsets[i];
+    free += is_free, above += is_free & static_cast<int>(height > leaf.margins[i]), below += is_free & static_cast<int>(height < -leaf.margins[i]);
+  }
+  return free > 0 && (above == free || below == free);
+}
+
+/// Triangles of two leaves, or of one.
+void LatticeCrossings::find_between(const Search& search, int a, int b, Contact contact, Leaves& leaves, std::vector<std::array<int, 2>>& pairs) const {
+  const LatticeMesh& lattice = search.lattice;
+  // The last one is for two that are kept at the same place.
+  const std::size_t places = leaves.size() - 1, place_a = a % places, place_b = a != b && b % places == place_a ? places : b % places;
+  Leaf &one = leaf_at(lattice, a, leaves[place_a]), &other = leaf_at(lattice, b, leaves[place_b]);
+  const bool is_of_one_patch = nodes_[a].grid == nodes_[b].grid && grids_[nodes_[a].grid].end < 0;
+  const auto look_at = [&](int k, int l) {
+    if (!one.is_placed[k]) place(lattice, k, one);
+    if (!other.is_placed[l]) place(lattice, l, other);
+    const int s = one.numbers[k], t = other.numbers[l];
+    if (search.is_asked && !(*search.is_asked)[s] && !(*search.is_asked)[t]) return;
+    const Triangle &first = one.triangles[k], &second = other.triangles[l];
+    if (contact == Contact::kByRounding && !(one.are_on_seam[k] && other.are_on_seam[l]) && !do_share_vertex(first, second)) return;
+    const auto &first_corners = one.corners[k], &second_corners = other.corners[l];
+    if (is_beside(one, k, other, l) || is_beside(other, l, one, k)) return;
+    if (!do_triangles_intersect(first, first_corners, second, second_corners)) return;
+    if (is_of_one_patch && are_quads_smooth(lattice, grids_[nodes_[a].grid].patch, s, t)) return;
+    pairs.push_back({std::min(s, t), std::max(s, t)});
+  };
+  const Box& around = search.tree.nodes[b].around;
+  const FourPoints least = four_times(around.least), greatest = four_times(around.greatest);
+  for (int i = 0; i < one.fours; ++i) {
+    const Four near = gaps(one.least[i], one.greatest[i], least, greatest);
+    for (int m = 0; m < 4; ++m) {
+      if (near[m] > 0) continue;
+      const FourPoints own_least = four_times({one.least[i][0][m], one.least[i][1][m], one.least[i][2][m], 0});
+      const FourPoints own_greatest = four_times({one.greatest[i][0][m], one.greatest[i][1][m], one.greatest[i][2][m], 0});
+      std::array<Four, 2> of_fours;
+      for (int half = 0; half < 2; ++half) of_fours[half] = gaps(other.least_of_fours[half], other.greatest_of_fours[half], own_least, own_greatest);
+      for (int j = a == b ? i : 0; j < other.fours; ++j) {
+        if (of_fours[j / 4][j % 4] > 0) continue;
+        const Four gap = gaps(other.least[j], other.greatest[j], own_least, own_greatest);
+        for (int n = a == b && i == j ? m + 1 : 0; n < 4; ++n)
+          if (gap[n] <= 0) look_at(4 * i + m, 4 * j + n);
       }
     }
   }
 }
 
-/// \param parts       all, or some in order: then pairs with one of these, when both are it is the first that finds them
-/// \param are_alone  pairs within `parts` only
-std::vector<std::array<int, 2>> LatticeCrossings::find_from(const LatticeMesh& lattice, std::span<const int> parts,
-                                                            const std::vector<char>& is_asked, bool are_alone) const {
-  const bool are_all = parts.empty();
-  const std::size_t count = are_all ? parts_.size() : parts.size();
-  const std::size_t at_once = are_all ? kAtOnce : kWidth;
-  std::vector<std::vector<std::array<int, 2>>> found(block_count(count, at_once));
-  for_each_block(count, at_once, [&](std::size_t block, std::size_t begin, std::size_t end) {
-    std::vector<std::pair<int, int>> stack;  // level, node
-    std::vector<int> near;
-    std::array<MeasuredPiece, 2> measured;
-    const int top = static_cast<int>(boxes_.size()) - 1;
-    const auto is_listed = [&](int part) { return std::binary_search(parts.begin(), parts.end(), part); };
-    const auto part_at = [&](std::size_t i) { return are_all ? static_cast<int>(i) : parts[i]; };
-    // The tree is asked once for several parts that lie beside each other.
-    for (std::size_t first = begin, last = begin; first < end; first = last) {
-      while (last < end && last - first < kWidth && part_at(last) - part_at(first) < static_cast<int>(2 * kWidth)) ++last;
-      Box around = no_box<Box>();
-      for (std::size_t i = first; i < last; ++i) add(boxes_[0][part_at(i)], around);
-      near.clear();
-      for (int node = 0; node < static_cast<int>(boxes_[top].size()); ++node) stack.push_back({top, node});
-      while (!stack.empty()) {
-        const auto [level, node] = stack.back();
-        stack.pop_back();
-        // With all of them every pair is found from its first part.
-        if (are_all && (static_cast<std::int64_t>(node) + 1) << (3 * level) <= part_at(first)) continue;
-        if (!do_overlap(around, boxes_[level][node])) continue;
-        if (level == 0)
-          near.push_back(node);
-        else
-          for (int child = 8 * node; child < std::min(static_cast<int>(boxes_[level - 1].size()), 8 * (node + 1)); ++child)
-            stack.push_back({level - 1, child});
-      }
-      for (std::size_t i = first; i < last; ++i) {
-        const int part = part_at(i);
-        for (const int other : near) {
-          if (!do_overlap(boxes_[0][part], boxes_[0][other])) continue;
-          if (are_all ? other < part : is_listed(other) ? other < part : are_alone) continue;
-          if (!is_smooth(parts_[part], parts_[other])) find_between(lattice, part, other, is_asked, measured, found[block]);
-        }
-      }
+/// What is to be asked in place of a pair of nodes, or a node by itself. \return of leaves, how they can meet
+LatticeCrossings::Contact LatticeCrossings::split(const Search& search, const Task& task, std::vector<Task>& tasks) const {
+  const auto [a, b] = task;
+  if (search.are_asked) {
+    const bool is_first = (*search.are_asked)[a] != 0, is_second = (*search.are_asked)[b] != 0;
+    if (search.are_both ? !is_first || !is_second : !is_first && !is_second) return Contact::kNone;
+  }
+  if (a != b && !do_overlap(search.tree.nodes[a].around, search.tree.nodes[b].around)) return Contact::kNone;
+  const Contact how = contact(search.tree, a, b);
+  const Node &one = nodes_[a], &other = nodes_[b];
+  if (how == Contact::kNone || (one.level == 0 && other.level == 0)) return how;
+  const auto parts_of = [&](const Node& node, std::array<int, 4>& parts) {
+    const Grid& grid = grids_[node.grid];
+    const Grid::Level& below = grid.levels[node.level - 1];
+    int count = 0;
+    for (int row = 2 * node.row; row < std::min(2 * node.row + 2, below.rows); ++row)
+      for (int column = 2 * node.column; column < std::min(2 * node.column + 2, below.columns); ++column) parts[count++] = node_at(grid, node.level - 1, row, column);
+    return count;
+  };
+  std::array<int, 4> parts{a}, others{b};
+  if (a == b) {
+    const int count = parts_of(one, parts);
+    for (int i = 0; i < count; ++i)
+      for (int j = i; j < count; ++j) tasks.push_back({parts[i], parts[j]});
+    return Contact::kNone;
+  }
+  // Nodes of one grid keep the same level.
+  const int count = one.level >= other.level ? parts_of(one, parts) : 1, other_count = other.level >= one.level ? parts_of(other, others) : 1;
+  for (int i = 0; i < count; ++i)
+    for (int j = 0; j < other_count; ++j) tasks.push_back({parts[i], others[j]});
+  return Contact::kNone;
+}
+
+std::vector<std::array<int, 2>> LatticeCrossings::find(const Search& search) const {
+  // Large nodes first, so that there are tasks for all processors.
+  std::vector<Task> large, tasks;
+  for (std::size_t i = 0; i < grids_.size(); ++i)
+    for (std::size_t j = i; j < grids_.size(); ++j) large.push_back({grids_[i].levels.back().first, grids_[j].levels.back().first});
+  while (!large.empty()) {
+    const Task task = large.back();
+    large.pop_back();
+    if (std::max(nodes_[task[0]].level, nodes_[task[1]].level) <= kTaskLevel)
+      tasks.push_back(task);
+    else
+      split(search, task, large);
+  }
+  std::vector<std::vector<std::array<int, 2>>> found(block_count(tasks.size(), kTasks));
+  for_each_block(tasks.size(), kTasks, [&](std::size_t block, std::size_t begin, std::size_t end) {
+    static thread_local Leaves leaves(kLeaves + 1);
+    for (Leaf& leaf : leaves) leaf.node = -1;
+    std::vector<Task> stack(tasks.begin() + static_cast<std::ptrdiff_t>(begin), tasks.begin() + static_cast<std::ptrdiff_t>(end));
+    while (!stack.empty()) {
+      const Task task = stack.back();
+      stack.pop_back();
+      const Contact how = split(search, task, stack);
+      if (how != Contact::kNone) find_between(search, task[0], task[1], how, leaves, found[block]);
     }
   });
   std::vector<std::array<int, 2>> pairs;
@@ -359,53 +632,50 @@ std::vector<std::array<int, 2>> LatticeCrossings::find_from(const LatticeMesh& l
 }
 
 std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattice) {
-  for_each_block(parts_.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t part = begin; part < end; ++part) measure(lattice, static_cast<int>(part));
-  });
-  join_boxes();
-  return find_from(lattice, {}, {});
+  measure_all(lattice, tree_);
+  return find({lattice, tree_});
 }
 
 std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattice, std::span<const int> changed) {
   if (changed.empty()) return {};
-  std::vector<char> is_asked(part_of_.size(), 0);
-  std::vector<int> parts;
+  std::vector<char> is_asked(lattice.triangle_count(), 0), are_asked;
+  std::vector<int> leaves;
   for (const int triangle : changed) {
     is_asked[triangle] = 1;
-    parts.push_back(part_of_[triangle]);
+    leaves.push_back(leaf_of(lattice, triangle));
   }
-  measure_again(lattice, parts);
-  return find_from(lattice, parts, is_asked);
+  std::sort(leaves.begin(), leaves.end());
+  leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
+  for (const int leaf : leaves) measure(lattice, leaf, tree_);
+  join(tree_);
+  mark(leaves, are_asked);
+  return find({lattice, tree_, &are_asked, &is_asked});
 }
 
-/// \param parts  sorted here
-void LatticeCrossings::measure_again(const LatticeMesh& lattice, std::vector<int>& parts) {
-  std::sort(parts.begin(), parts.end());
-  parts.erase(std::unique(parts.begin(), parts.end()), parts.end());
-  for_each_block(parts.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) measure(lattice, parts[i]);
-  });
-  join_boxes();
-}
-
-std::vector<std::array<int, 2>> LatticeCrossings::find_around(std::span<const std::array<int, 2>> pairs, const LatticeMesh& lattice, const LatticeMesh& other) {
-  std::vector<int> parts;
+std::vector<std::array<int, 2>> LatticeCrossings::find_around(std::span<const std::array<int, 2>> pairs, const LatticeMesh& other) const {
+  std::vector<int> leaves;
   for (const auto& pair : pairs)
     for (const int triangle : pair) {
-      const Part& part = parts_[part_of_[triangle]];
-      if (part.patch < 0) {
-        parts.push_back(part_of_[triangle]);
+      const int leaf = leaf_of(other, triangle);
+      const Node& node = nodes_[leaf];
+      const Grid& grid = grids_[node.grid];
+      const auto [first, columns, rows] = grid.levels[0];
+      if (grid.end >= 0) {
+        // Eight can be of two ends.
+        leaves.push_back(leaf);
+        const auto [begin, end] = triangles_of_end(node);
+        if (begin == grid.first_triangle && grid.skipped > 0) leaves.push_back(leaf_of(other, begin - 1));
+        if (end == grid.last_triangle && end < other.triangle_count() && (end - other.first_end_triangle()) % kEndTriangles != 0) leaves.push_back(leaf_of(other, end));
         continue;
       }
-      const auto [columns, rows] = squares_[part.patch];
-      for (int row = std::max(0, part.row - 1); row <= std::min(rows - 1, part.row + 1); ++row)
-        for (int step = -1; step <= 1; ++step)
-          parts.push_back(places_[first_square_[part.patch] + row * columns + (part.column + step + columns) % columns]);
+      for (int row = std::max(0, node.row - 1); row <= std::min(rows - 1, node.row + 1); ++row)
+        for (int step = -1; step <= 1; ++step) leaves.push_back(node_at(grid, 0, row, (node.column + step + columns) % columns));
     }
-  measure_again(other, parts);
-  const auto found = find_from(other, parts, {}, true);
-  measure_again(lattice, parts);
-  return found;
+  std::vector<char> are_asked;
+  mark(leaves, are_asked);
+  Tree tree;
+  measure_all(other, tree);
+  return find({other, tree, &are_asked, nullptr, true});
 }
 
 }  // namespace skeletex

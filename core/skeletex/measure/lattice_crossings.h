@@ -21,75 +21,120 @@ class LatticeCrossings {
   std::vector<std::array<int, 2>> find(const LatticeMesh& lattice, std::span<const int> changed);
 
   /// Of another mesh of this lattice: the pairs that lie where given ones of this mesh do, or next to it.
-  std::vector<std::array<int, 2>> find_around(std::span<const std::array<int, 2>> pairs, const LatticeMesh& lattice, const LatticeMesh& other);
+  std::vector<std::array<int, 2>> find_around(std::span<const std::array<int, 2>> pairs, const LatticeMesh& other) const;
 
  private:
-  /// Least and greatest coordinates, rounded outwards; the fourth does not count.
+  /// Least and greatest coordinates; the fourth does not count.
   struct Box {
     Eigen::Array4f least, greatest;
   };
-  /// Up to eight neighbouring triangles: of 2 x 2 quads, or one after the other in a strip or fan.
-  struct Piece {
-    int patch = -1;                                  ///< -1: of a strip or fan
-    int column = 0, columns = 0, row = 0, rows = 0;  ///< its quads
-    int begin = 0, count = 0;                        ///< its triangles in triangles_
+  /// What is known of a node's triangles: where they lie, rounded outwards, and unit normals.
+  struct Bounds {
+    Box around, normals;
   };
-  /// Up to four pieces: of 4 x 4 quads, or of a strip or fan.
-  struct Part {
-    int patch = -1;
-    int column = 0, row = 0;   ///< of squares, in squares
-    int begin = 0, count = 0;  ///< its pieces
+  /// Squares of 4 x 4 quads between a patch's inner rows; or of a strip or fan eight triangles each, counted from the first strip on, as one row. Above
+  /// them a tree: each level joins two columns and rows of the one below. Columns wrap round.
+  struct Grid {
+    struct Level {
+      int first, columns, rows;  ///< first: node
+    };
+    int patch = 0;
+    int end = -1;             ///< -1: between inner rows
+    std::vector<Level> levels;
+    int first_triangle = 0, last_triangle = 0, skipped = 0;  ///< of a strip or fan; last: behind it; skipped: of its first eight those before it
+    bool is_fan = false;
   };
-  void measure(const LatticeMesh& lattice, int part);
-  void join_boxes();
-  void measure_again(const LatticeMesh& lattice, std::vector<int>& parts);
+  struct Node {
+    int grid, level, row, column;
+  };
+  using FourPoints = std::array<Eigen::Array4f, 3>;  ///< by coordinate
+  static constexpr int kSide = 4;  ///< quads along a side of a square
+  static constexpr int kLeafTriangles = 32;
+  /// A leaf as it is when its triangles are looked at one by one, by fours: of a square the lower or upper ones in a row of quads.
+  struct Leaf {
+    int node = -1, fours = 0;
+    std::array<FourPoints, kLeafTriangles / 4> least, greatest;  ///< infinite where there is no triangle
+    std::array<FourPoints, 2> least_of_fours, greatest_of_fours;
+    std::array<bool, kLeafTriangles> is_placed;                  ///< of these the rest is known
+    std::array<int, kLeafTriangles> numbers;
+    std::array<Triangle, kLeafTriangles> triangles;
+    std::array<bool, kLeafTriangles> are_on_seam;  ///< with a side
+    std::array<std::array<Vec3, 3>, kLeafTriangles> corners;
+    std::array<Vec3, kLeafTriangles> normals;
+    std::array<double, kLeafTriangles> offsets, margins;  ///< of their planes, and how far from them rounding could put a vertex
+  };
+  using Leaves = std::vector<Leaf>;
+  /// What a strip's or fan's triangles share with others.
+  struct EndLeaf {
+    int first_column = 0, last_column = 0;   ///< of its patch: from the first on, not wrapped
+    int first_sample = 0, last_sample = -1;  ///< vertices of the seam, if they are neighbours on an arc
+  };
+  struct Tree {
+    std::vector<Bounds> nodes;
+    std::vector<EndLeaf> ends;             ///< per node behind those of patches
+    std::vector<std::array<int, 2>> caps;  ///< per patch and end: how many rows of squares bend little together with the fan there; -1: none
+  };
+  struct Search {
+    const LatticeMesh& lattice;
+    const Tree& tree;
+    const std::vector<char>* are_asked = nullptr;  ///< nodes; all without
+    const std::vector<char>* is_asked = nullptr;   ///< triangles; all without
+    bool are_both = false;                         ///< both nodes of a pair are to be asked for
+  };
+  using Task = std::array<int, 2>;  // nodes
+  /// Where triangles of two nodes can meet. Those in one plane can seem to at vertices that they share, or with sides on one straight seam, by
+  /// rounding: in strips and fans that counts.
+  enum class Contact { kNone, kByRounding, kAny };
+
+  int leaf_of(const LatticeMesh& lattice, int triangle) const;
+  /// Of a leaf of a strip or fan, the first triangle and that behind the last.
+  std::pair<int, int> triangles_of_end(const Node& node) const;
+  int node_at(const Grid& grid, int level, int row, int column) const { return grid.levels[level].first + row * grid.levels[level].columns + column; }
   /// The texel at a row of quads of a patch; columns wrap round once.
   int texel_of(int patch, int column, int row) const {
     const Rectangle& r = rectangles_[patch];
     return (r.y + 1 + row) * texture_width_ + r.x + (column < r.width ? column : column - r.width);
   }
-  /// The first of a quad's normals.
-  int normal_of(int patch, int column, int row) const {
-    const int width = rectangles_[patch].width;
-    return first_normal_[patch] + 2 * (row * width + (column < width ? column : column - width));
-  }
-  static constexpr int kPieceTriangles = 8;
-  using PieceTriangles = std::array<Triangle, kPieceTriangles>;
-  PieceTriangles triangles_of(const LatticeMesh& lattice, const Piece& piece) const;
-  Box box_of(const LatticeMesh& lattice, const Triangle& triangle) const;
-  Piece quads_of(const Part& part) const;
-  bool is_smooth(const Part& a, const Part& b) const;
-  bool is_smooth(const Piece& a, const Piece& b) const;
-  /// A piece as it is when its triangles are looked at one by one.
-  struct MeasuredPiece {
-    int piece = -1;
-    PieceTriangles triangles;
-    std::array<Box, kPieceTriangles> boxes;
-    std::array<bool, kPieceTriangles> has_corners;  ///< those that were asked for
-    std::array<std::array<Vec3, 3>, kPieceTriangles> corners;
-    std::array<Vec3, kPieceTriangles> normals;
-    void place(const LatticeMesh& lattice, int triangle);
+  /// The vertices of a square: of its quads' four columns and the one beside them, the last again where there are fewer.
+  struct SquareVertices {
+    std::array<const float*, 3> axes;
+    std::array<const int*, kSide> diagonals;  ///< per row
+    int stride, columns, rows;  ///< of quads
+    std::array<float, 3 * (kSide + 1) * (kSide + 1)> copies;
+    std::array<int, kSide * kSide> copied_diagonals;
   };
-  void measure(const LatticeMesh& lattice, int piece, MeasuredPiece& measured) const;
-  void find_between(const LatticeMesh& lattice, int a, int b, const std::vector<char>& is_asked, std::array<MeasuredPiece, 2>& measured,
-                    std::vector<std::array<int, 2>>& pairs) const;
-  std::vector<std::array<int, 2>> find_from(const LatticeMesh& lattice, std::span<const int> parts, const std::vector<char>& is_asked,
-                                            bool are_alone = false) const;
+  void view(const LatticeMesh& lattice, const Node& node, SquareVertices& square) const;
+  Bounds measure_square(const LatticeMesh& lattice, const Node& node) const;
+  Bounds measure_end(const LatticeMesh& lattice, const Node& node) const;
+  void measure(const LatticeMesh& lattice, int node, Tree& tree) const;
+  void measure_all(const LatticeMesh& lattice, Tree& tree) const;
+  void join(Tree& tree) const;
+  void mark(std::span<const int> leaves, std::vector<char>& are_asked) const;
+  EndLeaf describe_end(const LatticeMesh& lattice, const Node& node) const;
+  int first_of_ends() const { return grids_[rectangles_.size()].levels[0].first; }
+
+  Contact contact(const Tree& tree, int a, int b) const;
+  bool do_share(const Tree& tree, const Node& end, const Node& square) const;
+  bool is_smooth_within(const Tree& tree, const Node& a, const Node& b) const;
+  bool is_smooth_at_end(const Tree& tree, const Node& end, const Node& square) const;
+  bool is_smooth_over_seam(const Tree& tree, int a, int b) const;
+  bool is_in_cap(const Tree& tree, const Node& node, int end) const;
+  bool are_quads_smooth(const LatticeMesh& lattice, int patch, int s, int t) const;
+  Contact split(const Search& search, const Task& task, std::vector<Task>& tasks) const;
+  Leaf& leaf_at(const LatticeMesh& lattice, int node, Leaf& leaf) const;
+  void place(const LatticeMesh& lattice, int i, Leaf& leaf) const;
+  static bool is_beside(const Leaf& leaf, int i, const Leaf& others, int k);
+  void find_between(const Search& search, int a, int b, Contact contact, Leaves& leaves, std::vector<std::array<int, 2>>& pairs) const;
+  std::vector<std::array<int, 2>> find(const Search& search) const;
 
   float margin_;
   int texture_width_;
+  double extent_;                      // of coordinates
   std::vector<Rectangle> rectangles_;  // per patch
-  std::vector<std::array<int, 2>> squares_;  // per patch, how many columns and rows of them
-  std::vector<int> first_square_;            // per patch, in places_
-  std::vector<int> places_;                  // per square, by rows of a patch, its part
-  std::vector<Part> parts_;                  // squares along a curve, then strips
-  std::vector<Piece> pieces_;
-  std::vector<int> triangles_, part_of_;  // of the pieces; per triangle
-  std::vector<Eigen::Array4f> normals_;   // per triangle between inner rows, patch by patch
-  std::vector<int> first_normal_;         // per patch
-  std::vector<Box> normal_boxes_;         // per part
-  std::vector<Box> piece_boxes_;
-  std::vector<std::vector<Box>> boxes_;  // per level: of parts, of every eight of them, and so on
+  std::vector<Grid> grids_;            // of patches, then of their ends
+  std::vector<Node> nodes_;
+  std::vector<int> leaves_;
+  Tree tree_;
 };
 
 }  // namespace skeletex

@@ -28,15 +28,12 @@ LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, Diagona
     for (int row = 0; row < r.height; ++row)
       std::fill_n(texel_patches_.begin() + (r.y + row) * static_cast<std::ptrdiff_t>(model.texture.width) + r.x, r.width, static_cast<int>(bone));
   }
-  const std::vector<float> x = context.download(points_.x), y = context.download(points_.y), z = context.download(points_.z);
-  host_points_.resize(vertex_count());
-  for_each_block(x.size(), 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) host_points_[i] = {x[i], y[i], z[i], 0};
-  });
+  planes_ = {context.download(points_.x), context.download(points_.y), context.download(points_.z)};
+  for (std::vector<float>& plane : planes_) plane.resize(vertex_count());
   place_seams(model, walls_, lattice_, positions_);
   for_each_pole(model, lattice_, [&](int vertex, int, int, std::size_t texel) { positions_[vertex] = position(static_cast<int>(texel)); });
   for (int vertex = texel_count(); vertex < vertex_count(); ++vertex)
-    host_points_[vertex] << (position(vertex) - model.origin).cast<float>(), 0.0f;
+    for (int axis = 0; axis < 3; ++axis) planes_[axis][vertex] = static_cast<float>(position(vertex)[axis] - model.origin[axis]);
   std::vector<std::vector<Triangle>> ends(2 * model.patches.size());
   for_each_block(ends.size(), 1, [&](std::size_t i, std::size_t, std::size_t) { ends[i] = fill_end(static_cast<int>(i / 2), static_cast<BoneEnd>(i % 2)); });
   first_end_.push_back(0);
@@ -78,7 +75,7 @@ std::vector<int> LatticeMesh::move(std::span<const int> texels, const LatticeMes
   std::vector<char> has_moved_end(2 * model_.patches.size(), 0);
   for (const int texel : texels) {
     is_moved[texel] = 1;
-    host_points_[texel] = home.host_points_[texel];
+    for (int axis = 0; axis < 3; ++axis) planes_[axis][texel] = home.planes_[axis][texel];
     const int bone = texel_patches_[texel];
     const Rectangle& r = model_.patches[bone].rectangle;
     const int row = texel / model_.texture.width - r.y;

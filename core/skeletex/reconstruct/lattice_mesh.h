@@ -33,6 +33,7 @@ class LatticeMesh {
   /// Vertices of a triangle, counter-clockwise from outside.
   Triangle triangle(int index) const;
   bool takes_second(int texel) const { return diagonals_[texel] != 0; }
+  const std::vector<int>& diagonals() const { return diagonals_; }
   /// The two of a texel's quad. \param right  the texel beside it
   std::array<Triangle, 2> triangles_of(int texel, int right) const {
     // As write_quad in reconstruct.cl.
@@ -40,11 +41,12 @@ class LatticeMesh {
     if (takes_second(texel)) return {{{texel, right, above}, {above, right, beyond}}};
     return {{{texel, right, beyond}, {texel, beyond, above}}};
   }
-  /// From the model's origin, in single precision.
-  const Eigen::Array4f& point(int vertex) const { return host_points_[vertex]; }
+  /// From the model's origin, in single precision: planes of x, y and z per vertex.
+  const std::array<std::vector<float>, 3>& planes() const { return planes_; }
+  Eigen::Array4f point(int vertex) const { return {planes_[0][vertex], planes_[1][vertex], planes_[2][vertex], 0}; }
   Vec3 position(int vertex) const {
     if (!is_texel(vertex)) return positions_[lattice_.inner_count + vertex - texel_count()];
-    return model_.origin + host_points_[vertex].head<3>().matrix().cast<double>();
+    return model_.origin + Vec3(planes_[0][vertex], planes_[1][vertex], planes_[2][vertex]);
   }
   std::array<Vec3, 3> corners(const Triangle& t) const { return {position(t[0]), position(t[1]), position(t[2])}; }
   /// Of a strip or fan, the first triangle and that behind the last.
@@ -52,6 +54,8 @@ class LatticeMesh {
     const std::size_t i = 2 * bone + static_cast<int>(end);
     return {first_end_triangle() + first_end_[i], first_end_triangle() + first_end_[i + 1]};
   }
+  /// Whether that is a fan around a pole.
+  bool is_pole(int bone, BoneEnd end) const { return lattice_.poles[bone][static_cast<int>(end)] >= 0; }
 
   const DevicePlanes& device_points() const { return points_; }
   /// Per texel whether its quad takes the second diagonal.
@@ -72,7 +76,7 @@ class LatticeMesh {
   Walls walls_;
   Lattice lattice_;
   std::vector<int> texel_patches_;
-  std::vector<Eigen::Array4f> host_points_;
+  std::array<std::vector<float>, 3> planes_;
   std::vector<Vec3> positions_;  // numbered as in lattice.h; of inner rows only those next to ends are there
   std::vector<Triangle> end_triangles_;
   std::vector<int> first_end_;  // per patch and end, in end_triangles_; and the end
