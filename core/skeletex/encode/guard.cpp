@@ -26,6 +26,7 @@ constexpr float kWorthALook = 0.15f;      // of the limit, at the middle of a tr
 constexpr double kShareOfEven = 0.02;     // of the even lattice's quads, the most suspicious: among them is its furthest
 constexpr float kWorthAWalk = 0.75f;      // of the limit: how far a quad could be
 constexpr float kEvenWorthALook = 0.5f;   // of the furthest middle, in the even lattice
+constexpr int kVertexReach = 4;           // columns and rows around a vertex of the original whose vertices it is measured to, by guard.cl
 constexpr std::size_t kManyPairs = 50;    // from here on it is looked at whether the even lattice intersects itself as well
 constexpr int kTolerance = 2;             // columns and rows around a fault of the even lattice
 constexpr double kMuchWorse = 1.1;        // the number of faults there, against the even lattice's
@@ -148,46 +149,59 @@ class Distances {
   const std::vector<Measured>& faults() const { return faults_; }
 
   /// From the original's vertices that no texel sits on to the lattice.
+  /// \param changed  triangles since the call before: only vertices near them are looked at again. All in the first call
+  /// \param anchors  per texel
   /// \return those that are further than the limit: the triangles that they are nearest to
-  std::vector<int> find_far_vertices(const LatticeMesh& lattice, const SnapFeatures& features, const std::vector<int>& anchors, float limit) {
+  std::vector<int> find_far_vertices(const LatticeMesh& lattice, const SnapFeatures& features, const std::vector<int>& changed,
+                                     const std::vector<int>& anchors, float limit) {
+    const bool is_first = vertices_.empty();
     std::vector<char> is_held(maps_.x.size, 0);
     for (const int anchor : anchors)
       if (anchor > 0) is_held[features.vertices[anchor - 1].point] = 1;
+    vertices_.resize(placed_.size());
+    if (!is_first) {
+      is_near_.assign(anchors.size(), 0);
+      for (const int triangle : changed) add_quads_around(lattice, triangle, is_near_);
+    }
     std::vector<int> points, patches, asked;  // asked: of placed_
     std::vector<float> places;
     for (std::size_t i = 0; i < placed_.size(); ++i) {
       const PlacedVertex& vertex = placed_[i];
+      if (!is_first && is_near_[texel_of(vertex)] == 0) continue;
+      vertices_[i].is_far = false;
       if (is_held[vertex.point]) continue;
       asked.push_back(static_cast<int>(i));
       points.push_back(vertex.point), patches.push_back(vertex.patch);
       places.push_back(vertex.x), places.push_back(vertex.y);
     }
-    if (points.empty()) return {};
-    auto device_distances = context_.allocate<float>(points.size());
-    auto device_nearest = context_.allocate<int>(points.size());
-    context_.launch({"guard.cl", "measure_vertices"}, over(points.size()), static_cast<int>(points.size()), layout_.width, limit * limit,
-                    context_.upload(points), context_.upload(patches), context_.upload(places), layout_.patches, lattice.device_diagonals(), maps_.x,
-                    maps_.y, maps_.z, lattice.device_points().x, lattice.device_points().y, lattice.device_points().z, device_distances, device_nearest);
-    const std::vector<float> distances2 = context_.download(device_distances);
-    const std::vector<int> nearest = context_.download(device_nearest);
+    if (!points.empty()) {
+      auto device_distances = context_.allocate<float>(points.size());
+      auto device_nearest = context_.allocate<int>(points.size());
+      context_.launch({"guard.cl", "measure_vertices"}, over(points.size()), static_cast<int>(points.size()), layout_.width, limit * limit,
+                      context_.upload(points), context_.upload(patches), context_.upload(places), layout_.patches, lattice.device_diagonals(), maps_.x,
+                      maps_.y, maps_.z, lattice.device_points().x, lattice.device_points().y, lattice.device_points().z, device_distances, device_nearest);
+      const std::vector<float> distances2 = context_.download(device_distances);
+      const std::vector<int> nearest = context_.download(device_nearest);
+      for (std::size_t k = 0; k < asked.size(); ++k) vertices_[asked[k]] = {distances2[k], nearest[k], distances2[k] > limit * limit};
+    }
     std::vector<int> far;
     std::vector<std::size_t> at_ends;
-    for (std::size_t i = 0; i < nearest.size(); ++i) {
-      if (distances2[i] <= limit * limit) continue;
-      const PlacedVertex& vertex = placed_[asked[i]];
+    for (std::size_t i = 0; i < placed_.size(); ++i) {
+      if (!vertices_[i].is_far) continue;
+      const PlacedVertex& vertex = placed_[i];
       if (vertex.y < 2 || vertex.y > static_cast<float>(sources_.model.patches[vertex.patch].rectangle.height - 3)) {
         at_ends.push_back(i);
       } else {
-        far.push_back(nearest[i]);
+        far.push_back(vertices_[i].nearest);
       }
     }
     // Strips and fans can be nearer: nearly always their own, those across the seam else.
     std::vector<int> nearer(at_ends.size());
     for_each_block(at_ends.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
-      const PlacedVertex& vertex = placed_[asked[at_ends[k]]];
+      const PlacedVertex& vertex = placed_[at_ends[k]];
       const Vec3& point = sources_.charts[vertex.patch].positions[vertex.point - maps_.first_vertex[vertex.patch]];
-      double least2 = distances2[at_ends[k]];
-      nearer[k] = nearest[at_ends[k]];
+      double least2 = vertices_[at_ends[k]].distance2;
+      nearer[k] = vertices_[at_ends[k]].nearest;
       const auto [begin, end] = lattice.triangles_of_end(vertex.patch, vertex.y < 2 ? BoneEnd::kHead : BoneEnd::kTail);
       for (const auto& [first, last] : {std::pair(begin, end), std::pair(lattice.first_end_triangle(), lattice.triangle_count())}) {
         for (int i = first; i < last; ++i) {
@@ -204,6 +218,28 @@ class Distances {
   }
 
  private:
+  /// A vertex of the original as it was measured last, to the quads around it.
+  struct MeasuredVertex {
+    float distance2 = 0;
+    int nearest = -1;
+    bool is_far = false;
+  };
+  /// The texel whose quad a vertex is measured around.
+  int texel_of(const PlacedVertex& vertex) const {
+    const Rectangle& r = sources_.model.patches[vertex.patch].rectangle;
+    const int column = static_cast<int>(std::floor(vertex.x)), row = std::clamp(static_cast<int>(std::floor(vertex.y)), 1, r.height - 3);
+    return (r.y + row) * layout_.width + r.x + (column % r.width + r.width) % r.width;
+  }
+  /// Texels whose vertices can be measured to a triangle.
+  static void add_quads_around(const LatticeMesh& lattice, int triangle, std::vector<char>& is_near) {
+    for (const int vertex : lattice.triangle(triangle)) {
+      if (!lattice.is_texel(vertex)) continue;
+      const Rectangle& r = lattice.model().patches[lattice.patch_of(vertex)].rectangle;
+      const int row = vertex / lattice.model().texture.width - r.y;
+      for (int i = std::max(1, row - kVertexReach); i <= std::min(r.height - 3, row + kVertexReach); ++i)
+        for (int j = -kVertexReach; j <= kVertexReach; ++j) is_near[lattice.beside(vertex, j, i - row)] = 1;
+    }
+  }
   /// Per texel the square of how far its quad could be.
   std::vector<float> suspect(const LatticeMesh& lattice, const ClBuffer<int>& texel_triangles) {
     auto suspicions2 = context_.allocate<float>(layout_.size());
@@ -299,6 +335,8 @@ class Distances {
   std::vector<PlacedVertex> placed_;
   ClBuffer<float> normals_;  // of the maps' triangles
   std::vector<Measured> faults_;
+  std::vector<MeasuredVertex> vertices_;  // as placed_
+  std::vector<char> is_near_;             // texels
 };
 
 /// A set of texels of inner rows.
@@ -359,6 +397,7 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
   const auto is_pair_near_even_fault = [&](const std::array<int, 2>& pair) { return is_near_even_fault(pair[0]) && is_near_even_fault(pair[1]); };
   bool tolerates_crossing = false, tolerates_turning = false;
   std::vector<int> changed;  // triangles, since the pass before
+  std::vector<int> anchors = context.download(positions.anchors);
   for (int pass = 0; pass < kPasses; ++pass) {
     marks.clear();
     const auto pairs = pass == 0 ? crossings.find(lattice) : crossings.find(lattice, changed);
@@ -390,7 +429,7 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
       else if (!(tolerates_turning && is_near_even_fault(fault.triangle)))
         marks.add(lattice.triangle(fault.triangle), 0);
     }
-    for (const int triangle : distances.find_far_vertices(lattice, features, context.download(positions.anchors), limit))
+    for (const int triangle : distances.find_far_vertices(lattice, features, changed, anchors, limit))
       marks.add(lattice.triangle(triangle), kReach);
 
     // Vertices are given up only when the texels between them have been.
@@ -398,6 +437,7 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
     const std::vector<int> back = put_back_listed(context, layout, even, filtered, marks.texels(), with_vertices, positions, points);
     report.texels_put_back += static_cast<int>(back.size());
     if (back.empty() && with_vertices) break;
+    for (const int texel : back) anchors[texel] = 0;
     changed = lattice.move(back, even_lattice);
   }
   return report;

@@ -284,11 +284,12 @@ void LatticeCrossings::join(Tree& tree) const {
   }
 }
 
-void LatticeCrossings::measure_all(const LatticeMesh& lattice, Tree& tree) const {
+/// Some leaves, and what they are parts of.
+void LatticeCrossings::measure(const LatticeMesh& lattice, std::span<const int> leaves, Tree& tree) const {
   tree.nodes.resize(nodes_.size());
   tree.ends.resize(nodes_.size() - first_of_ends());
-  for_each_block(leaves_.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) measure(lattice, leaves_[i], tree);
+  for_each_block(leaves.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) measure(lattice, leaves[i], tree);
   });
   join(tree);
 }
@@ -632,7 +633,7 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const Search& search) con
 }
 
 std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattice) {
-  measure_all(lattice, tree_);
+  measure(lattice, leaves_, tree_);
   return find({lattice, tree_});
 }
 
@@ -646,8 +647,7 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattic
   }
   std::sort(leaves.begin(), leaves.end());
   leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
-  for (const int leaf : leaves) measure(lattice, leaf, tree_);
-  join(tree_);
+  measure(lattice, leaves, tree_);
   mark(leaves, are_asked);
   return find({lattice, tree_, &are_asked, &is_asked});
 }
@@ -673,8 +673,10 @@ std::vector<std::array<int, 2>> LatticeCrossings::find_around(std::span<const st
     }
   std::vector<char> are_asked;
   mark(leaves, are_asked);
-  Tree tree;
-  measure_all(other, tree);
+  std::sort(leaves.begin(), leaves.end());
+  leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
+  Tree tree = tree_;
+  measure(other, leaves, tree);
   return find({other, tree, &are_asked, nullptr, true});
 }
 

@@ -107,7 +107,7 @@ class LatticeCrossings {
   Bounds measure_square(const LatticeMesh& lattice, const Node& node) const;
   Bounds measure_end(const LatticeMesh& lattice, const Node& node) const;
   void measure(const LatticeMesh& lattice, int node, Tree& tree) const;
-  void measure_all(const LatticeMesh& lattice, Tree& tree) const;
+  void measure(const LatticeMesh& lattice, std::span<const int> leaves, Tree& tree) const;
   void join(Tree& tree) const;
   void mark(std::span<const int> leaves, std::vector<char>& are_asked) const;
   EndLeaf describe_end(const LatticeMesh& lattice, const Node& node) const;
