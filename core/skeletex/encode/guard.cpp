@@ -26,7 +26,7 @@ constexpr float kWorthALook = 0.15f;      // of the limit, at the middle of a tr
 constexpr double kShareOfEven = 0.02;     // of the even lattice's quads, the most suspicious: among them is its furthest
 constexpr float kWorthAWalk = 0.75f;      // of the limit: how far a quad could be
 constexpr float kEvenWorthALook = 0.5f;   // of the furthest middle, in the even lattice
-constexpr int kVertexReach = 4;           // columns and rows around a vertex of the original whose vertices it is measured to, by guard.cl
+constexpr int kVertexReach = 6;           // columns and rows around a texel: diagonals depend on it, and vertices are measured to quads, by guard.cl
 constexpr std::size_t kManyPairs = 50;    // from here on it is looked at whether the even lattice intersects itself as well
 constexpr int kTolerance = 2;             // columns and rows around a fault of the even lattice
 constexpr double kMuchWorse = 1.1;        // the number of faults there, against the even lattice's
@@ -149,11 +149,12 @@ class Distances {
   const std::vector<Measured>& faults() const { return faults_; }
 
   /// From the original's vertices that no texel sits on to the lattice.
-  /// \param changed  triangles since the call before: only vertices near them are looked at again. All in the first call
+  /// \param back, changed  texels that have gone back since the call before, and triangles: only vertices near them are looked at again.
+  ///                       All in the first call
   /// \param anchors  per texel
   /// \return those that are further than the limit: the triangles that they are nearest to
-  std::vector<int> find_far_vertices(const LatticeMesh& lattice, const SnapFeatures& features, const std::vector<int>& changed,
-                                     const std::vector<int>& anchors, float limit) {
+  std::vector<int> find_far_vertices(const LatticeMesh& lattice, const SnapFeatures& features, const std::vector<int>& back,
+                                     const std::vector<int>& changed, const std::vector<int>& anchors, float limit) {
     const bool is_first = vertices_.empty();
     std::vector<char> is_held(maps_.x.size, 0);
     for (const int anchor : anchors)
@@ -161,7 +162,7 @@ class Distances {
     vertices_.resize(placed_.size());
     if (!is_first) {
       is_near_.assign(anchors.size(), 0);
-      for (const int triangle : changed) add_quads_around(lattice, triangle, is_near_);
+      for (const int texel : back) add_around(lattice, texel);
     }
     std::vector<int> points, patches, asked;  // asked: of placed_
     std::vector<float> places;
@@ -195,25 +196,29 @@ class Distances {
         far.push_back(vertices_[i].nearest);
       }
     }
+    // Where these are not what they were, all are compared to them again.
+    const bool have_ends_moved = std::any_of(changed.begin(), changed.end(), [&](int triangle) { return triangle >= lattice.first_end_triangle(); });
     // Strips and fans can be nearer: nearly always their own, those across the seam else.
-    std::vector<int> nearer(at_ends.size());
     for_each_block(at_ends.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
+      MeasuredVertex& measured = vertices_[at_ends[k]];
+      if (measured.is_compared && !have_ends_moved) return;
       const PlacedVertex& vertex = placed_[at_ends[k]];
       const Vec3& point = sources_.charts[vertex.patch].positions[vertex.point - maps_.first_vertex[vertex.patch]];
-      double least2 = vertices_[at_ends[k]].distance2;
-      nearer[k] = vertices_[at_ends[k]].nearest;
+      double least2 = measured.distance2;
+      measured.is_compared = true, measured.nearer = measured.nearest;
       const auto [begin, end] = lattice.triangles_of_end(vertex.patch, vertex.y < 2 ? BoneEnd::kHead : BoneEnd::kTail);
       for (const auto& [first, last] : {std::pair(begin, end), std::pair(lattice.first_end_triangle(), lattice.triangle_count())}) {
         for (int i = first; i < last; ++i) {
           const auto [a, b, c] = lattice.corners(lattice.triangle(i));
           const double distance2 = offset_from_triangle(point, a, b, c).squaredNorm();
-          if (distance2 < least2) least2 = distance2, nearer[k] = i;
+          if (distance2 < least2) least2 = distance2, measured.nearer = i;
         }
-        if (least2 <= static_cast<double>(limit) * limit) nearer[k] = -1;
-        if (nearer[k] < 0) return;
+        if (least2 <= static_cast<double>(limit) * limit) measured.nearer = -1;
+        if (measured.nearer < 0) return;
       }
     });
-    std::copy_if(nearer.begin(), nearer.end(), std::back_inserter(far), [](int triangle) { return triangle >= 0; });
+    for (const std::size_t i : at_ends)
+      if (vertices_[i].nearer >= 0) far.push_back(vertices_[i].nearer);
     return far;
   }
 
@@ -223,6 +228,8 @@ class Distances {
     float distance2 = 0;
     int nearest = -1;
     bool is_far = false;
+    bool is_compared = false;  ///< to strips and fans as well
+    int nearer = -1;           ///< then the triangle that it is nearest to, -1 if it is not far
   };
   /// The texel whose quad a vertex is measured around.
   int texel_of(const PlacedVertex& vertex) const {
@@ -230,14 +237,16 @@ class Distances {
     const int column = static_cast<int>(std::floor(vertex.x)), row = std::clamp(static_cast<int>(std::floor(vertex.y)), 1, r.height - 3);
     return (r.y + row) * layout_.width + r.x + (column % r.width + r.width) % r.width;
   }
-  /// Texels whose vertices can be measured to a triangle.
-  static void add_quads_around(const LatticeMesh& lattice, int triangle, std::vector<char>& is_near) {
-    for (const int vertex : lattice.triangle(triangle)) {
-      if (!lattice.is_texel(vertex)) continue;
-      const Rectangle& r = lattice.model().patches[lattice.patch_of(vertex)].rectangle;
-      const int row = vertex / lattice.model().texture.width - r.y;
-      for (int i = std::max(1, row - kVertexReach); i <= std::min(r.height - 3, row + kVertexReach); ++i)
-        for (int j = -kVertexReach; j <= kVertexReach; ++j) is_near[lattice.beside(vertex, j, i - row)] = 1;
+  /// Texels whose vertices can be measured to a triangle that changes with one.
+  void add_around(const LatticeMesh& lattice, int texel) {
+    const Rectangle& r = lattice.model().patches[lattice.patch_of(texel)].rectangle;
+    const int row = texel / layout_.width - r.y, column = texel % layout_.width - r.x;
+    for (int i = std::max(1, row - kVertexReach); i <= std::min(r.height - 3, row + kVertexReach); ++i) {
+      const auto line = is_near_.begin() + (r.y + i) * static_cast<std::ptrdiff_t>(layout_.width) + r.x;
+      if (column >= kVertexReach && column + kVertexReach < r.width)
+        std::fill_n(line + column - kVertexReach, 2 * kVertexReach + 1, 1);
+      else
+        for (int j = column - kVertexReach; j <= column + kVertexReach; ++j) line[(j % r.width + r.width) % r.width] = 1;
     }
   }
   /// Per texel the square of how far its quad could be.
@@ -396,7 +405,7 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
   const auto is_near_even_fault = [&](int triangle) { return even_faults.has(lattice.triangle(triangle)); };
   const auto is_pair_near_even_fault = [&](const std::array<int, 2>& pair) { return is_near_even_fault(pair[0]) && is_near_even_fault(pair[1]); };
   bool tolerates_crossing = false, tolerates_turning = false;
-  std::vector<int> changed;  // triangles, since the pass before
+  std::vector<int> back, changed;  // texels and triangles, since the pass before
   std::vector<int> anchors = context.download(positions.anchors);
   for (int pass = 0; pass < kPasses; ++pass) {
     marks.clear();
@@ -429,12 +438,12 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
       else if (!(tolerates_turning && is_near_even_fault(fault.triangle)))
         marks.add(lattice.triangle(fault.triangle), 0);
     }
-    for (const int triangle : distances.find_far_vertices(lattice, features, changed, anchors, limit))
+    for (const int triangle : distances.find_far_vertices(lattice, features, back, changed, anchors, limit))
       marks.add(lattice.triangle(triangle), kReach);
 
     // Vertices are given up only when the texels between them have been.
     const bool with_vertices = pass > 0;
-    const std::vector<int> back = put_back_listed(context, layout, even, filtered, marks.texels(), with_vertices, positions, points);
+    back = put_back_listed(context, layout, even, filtered, marks.texels(), with_vertices, positions, points);
     report.texels_put_back += static_cast<int>(back.size());
     if (back.empty() && with_vertices) break;
     for (const int texel : back) anchors[texel] = 0;

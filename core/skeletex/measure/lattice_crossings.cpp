@@ -479,12 +479,14 @@ LatticeCrossings::Leaf& LatticeCrossings::leaf_at(const LatticeMesh& lattice, in
   }
   const auto [begin, end] = triangles_of_end(node);
   for (int first = begin; first < end; first += 4) {
-    std::array<Triangle, 4> triangles;
-    for (int k = 0; k < 4; ++k) triangles[k] = lattice.triangle(std::min(first + k, end - 1));
+    std::array<std::array<Four, 4>, 3> points;
+    for (int k = 0; k < 4; ++k) {
+      const Triangle t = lattice.triangle(std::min(first + k, end - 1));
+      for (int corner = 0; corner < 3; ++corner) points[corner][k] = lattice.point(t[corner]);
+    }
     add_four(
         [&](int axis, Four& a, Four& b, Four& c) {
-          const std::vector<float>& plane = lattice.planes()[axis];
-          for (int k = 0; k < 4; ++k) a[k] = plane[triangles[k][0]], b[k] = plane[triangles[k][1]], c[k] = plane[triangles[k][2]];
+          for (int k = 0; k < 4; ++k) a[k] = points[0][k][axis], b[k] = points[1][k][axis], c[k] = points[2][k][axis];
         },
         std::min(4, end - first));
   }

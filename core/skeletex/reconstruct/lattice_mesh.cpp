@@ -20,6 +20,8 @@ LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, Diagona
   std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kInner);
   std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == model.patches[row[0]].rectangle.height - 2; });
   rows_ = context.upload(rows);
+  // Before the kernel is queued, so that the host can go on beside it.
+  planes_ = {context.download(points_.x), context.download(points_.y), context.download(points_.z)};
   device_diagonals_ = context.allocate<int>(texel_patches_.size());
   context.launch({"lattice.cl", "choose_diagonals"}, row_range(context, rows.size()), static_cast<int>(rows.size()), model.texture.width,
                  static_cast<int>(rule == DiagonalRule::kSmooth), rows_, patches_, points_.x, points_.y, points_.z, device_diagonals_);
@@ -28,12 +30,12 @@ LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, Diagona
     for (int row = 0; row < r.height; ++row)
       std::fill_n(texel_patches_.begin() + (r.y + row) * static_cast<std::ptrdiff_t>(model.texture.width) + r.x, r.width, static_cast<int>(bone));
   }
-  planes_ = {context.download(points_.x), context.download(points_.y), context.download(points_.z)};
-  for (std::vector<float>& plane : planes_) plane.resize(vertex_count());
   place_seams(model, walls_, lattice_, positions_);
   for_each_pole(model, lattice_, [&](int vertex, int, int, std::size_t texel) { positions_[vertex] = position(static_cast<int>(texel)); });
-  for (int vertex = texel_count(); vertex < vertex_count(); ++vertex)
-    for (int axis = 0; axis < 3; ++axis) planes_[axis][vertex] = static_cast<float>(position(vertex)[axis] - model.origin[axis]);
+  for (int vertex = texel_count(); vertex < vertex_count(); ++vertex) {
+    end_points_.emplace_back(0);
+    end_points_.back().head<3>() = (position(vertex) - model.origin).cast<float>();
+  }
   std::vector<std::vector<Triangle>> ends(2 * model.patches.size());
   for_each_block(ends.size(), 1, [&](std::size_t i, std::size_t, std::size_t) { ends[i] = fill_end(static_cast<int>(i / 2), static_cast<BoneEnd>(i % 2)); });
   first_end_.push_back(0);

@@ -41,9 +41,12 @@ class LatticeMesh {
     if (takes_second(texel)) return {{{texel, right, above}, {above, right, beyond}}};
     return {{{texel, right, beyond}, {texel, beyond, above}}};
   }
-  /// From the model's origin, in single precision: planes of x, y and z per vertex.
+  /// From the model's origin, in single precision: x, y and z per texel, and of any vertex.
   const std::array<std::vector<float>, 3>& planes() const { return planes_; }
-  Eigen::Array4f point(int vertex) const { return {planes_[0][vertex], planes_[1][vertex], planes_[2][vertex], 0}; }
+  Eigen::Array4f point(int vertex) const {
+    if (!is_texel(vertex)) return end_points_[vertex - texel_count()];
+    return {planes_[0][vertex], planes_[1][vertex], planes_[2][vertex], 0};
+  }
   Vec3 position(int vertex) const {
     if (!is_texel(vertex)) return positions_[lattice_.inner_count + vertex - texel_count()];
     return model_.origin + Vec3(planes_[0][vertex], planes_[1][vertex], planes_[2][vertex]);
@@ -77,6 +80,7 @@ class LatticeMesh {
   Lattice lattice_;
   std::vector<int> texel_patches_;
   std::array<std::vector<float>, 3> planes_;
+  std::vector<Eigen::Array4f> end_points_;  // of vertices behind the texels
   std::vector<Vec3> positions_;  // numbered as in lattice.h; of inner rows only those next to ends are there
   std::vector<Triangle> end_triangles_;
   std::vector<int> first_end_;  // per patch and end, in end_triangles_; and the end
