@@ -26,7 +26,7 @@ constexpr float kWorthALook = 0.15f;      // of the limit, at the middle of a tr
 constexpr double kShareOfEven = 0.02;     // of the even lattice's quads, the most suspicious: among them is its furthest
 constexpr float kWorthAWalk = 0.75f;      // of the limit: how far a quad could be
 constexpr float kEvenWorthALook = 0.5f;   // of the furthest middle, in the even lattice
-constexpr int kVertexReach = 6;           // columns and rows around a texel: diagonals depend on it, and vertices are measured to quads, by guard.cl
+constexpr int kVertexReach = 6;           // columns and rows around a texel: diagonals depend on it, vertices are measured to their quads (guard.cl)
 constexpr std::size_t kManyPairs = 50;    // from here on it is looked at whether the even lattice intersects itself as well
 constexpr int kTolerance = 2;             // columns and rows around a fault of the even lattice
 constexpr double kMuchWorse = 1.1;        // the number of faults there, against the even lattice's
@@ -149,8 +149,8 @@ class Distances {
   const std::vector<Measured>& faults() const { return faults_; }
 
   /// From the original's vertices that no texel sits on to the lattice.
-  /// \param back, changed  texels that have gone back since the call before, and triangles: only vertices near them are looked at again.
-  ///                       All in the first call
+  /// \param back, changed  texels that have gone back since the call before, and triangles that have changed: only vertices near them are
+  ///                       looked at again. All in the first call
   /// \param anchors  per texel
   /// \return those that are further than the limit: the triangles that they are nearest to
   std::vector<int> find_far_vertices(const LatticeMesh& lattice, const SnapFeatures& features, const std::vector<int>& back,
@@ -390,13 +390,15 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
   const SkeletexModel& model = sources.model;
   auto tree = std::async(std::launch::async, [&] { return build_triangle_tree(sources.mesh); });
   const LatticeMesh even_lattice(context, model, DiagonalRule::kNearest, layout.patches, filtered);
-  auto setting_up = std::async(std::launch::async, [&] { return LatticeCrossings(even_lattice); });
   LatticeMesh lattice(context, model, model.diagonals, layout.patches, points);
+  // Crossings are the host's alone: they are found beside distances, which are for the most part the device's.
+  using Pairs = std::vector<std::array<int, 2>>;
+  LatticeCrossings crossings(lattice);
+  std::future<Pairs> finding_all = std::async(std::launch::async, [&] { return crossings.find(lattice); });
   Distances distances(context, sources, layout, maps, tree.get());
   std::vector<int> even_turned;
   const float limit = kShareOfFurthest * distances.measure_even(even_lattice, even_triangles, even_turned);
   report.even_turned_triangles = static_cast<int>(even_turned.size());
-  LatticeCrossings crossings = setting_up.get();
 
   TexelSet marks(lattice);
   // Where the even lattice is at fault itself there is nothing to go back to, as long as it is not much worse.
@@ -409,7 +411,13 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
   std::vector<int> anchors = context.download(positions.anchors);
   for (int pass = 0; pass < kPasses; ++pass) {
     marks.clear();
-    const auto pairs = pass == 0 ? crossings.find(lattice) : crossings.find(lattice, changed);
+    auto finding = pass == 0 ? std::move(finding_all) : std::async(std::launch::async, [&] { return crossings.find(lattice, changed); });
+    if (pass == 0)
+      distances.measure_suspects(lattice, triangles, limit);
+    else
+      distances.measure_triangles(lattice, changed, triangles, limit);
+    const std::vector<int> far = distances.find_far_vertices(lattice, features, back, changed, anchors, limit);
+    const Pairs pairs = finding.get();
     if (pass == 0 && pairs.size() > kManyPairs) {
       const auto even_pairs = crossings.find_around(pairs, even_lattice);
       for (const auto& pair : even_pairs)
@@ -421,10 +429,6 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
       if (!tolerates_crossing || !is_pair_near_even_fault(pair))
         for (const int triangle : pair) marks.add(lattice.triangle(triangle), 0);
 
-    if (pass == 0)
-      distances.measure_suspects(lattice, triangles, limit);
-    else
-      distances.measure_triangles(lattice, changed, triangles, limit);
     const auto is_turned = [](const Distances::Measured& fault) { return fault.is_turned; };
     report.turned_triangles = static_cast<int>(std::count_if(distances.faults().begin(), distances.faults().end(), is_turned));
     if (pass == 0) {
@@ -438,8 +442,7 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
       else if (!(tolerates_turning && is_near_even_fault(fault.triangle)))
         marks.add(lattice.triangle(fault.triangle), 0);
     }
-    for (const int triangle : distances.find_far_vertices(lattice, features, back, changed, anchors, limit))
-      marks.add(lattice.triangle(triangle), kReach);
+    for (const int triangle : far) marks.add(lattice.triangle(triangle), kReach);
 
     // Vertices are given up only when the texels between them have been.
     const bool with_vertices = pass > 0;

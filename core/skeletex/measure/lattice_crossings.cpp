@@ -21,7 +21,7 @@ constexpr double kRounding = 1e-10;   // of a product of lengths: far more than 
 constexpr std::size_t kAtOnce = 128;
 constexpr int kTaskLevel = 3;         // nodes up to here are one task
 constexpr std::size_t kTasks = 8;     // at once
-constexpr std::size_t kLeaves = 256;   // kept by each thread
+constexpr std::size_t kLeaves = 96;   // kept by each thread
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
@@ -32,12 +32,12 @@ Box no_box() {
   return {{kInfinity, kInfinity, kInfinity, 0}, {-kInfinity, -kInfinity, -kInfinity, 0}};
 }
 template <class Box>
-void add(const Box& other, Box& box) {
+inline void add(const Box& other, Box& box) {
   box.least = box.least.min(other.least);
   box.greatest = box.greatest.max(other.greatest);
 }
 template <class Box>
-void add(const Four& point, Box& box) {
+inline void add(const Four& point, Box& box) {
   box.least = box.least.min(point);
   box.greatest = box.greatest.max(point);
 }
@@ -48,13 +48,13 @@ void widen(float margin, Box& box) {
 }
 /// (Without branches: which of the sides decides is chance.)
 template <class Box>
-bool do_overlap(const Box& a, const Box& b) {
+inline bool do_overlap(const Box& a, const Box& b) {
   const Four gaps = (a.least - b.greatest).max(b.least - a.greatest);
   return gaps.maxCoeff() <= 0;
 }
 
 /// 0 of a triangle without area: it may look anywhere.
-Four unit_normal(const Four& u, const Four& v) {
+inline Four unit_normal(const Four& u, const Four& v) {
   const Eigen::Vector3f across = u.head<3>().matrix().cross(v.head<3>().matrix());
   const float length2 = across.squaredNorm();
   Four normal = Four::Zero();
@@ -64,12 +64,12 @@ Four unit_normal(const Four& u, const Four& v) {
 
 /// Whether all normals of a box lie within a cone.
 template <class Box>
-bool is_narrow(const Box& normals) {
+inline bool is_narrow(const Box& normals) {
   const Four middle = 0.5f * (normals.least + normals.greatest);
   return (middle * normals.least).min(middle * normals.greatest).sum() > kLeastCosine * middle.matrix().norm();
 }
 
-bool do_share_vertex(const Triangle& a, const Triangle& b) {
+inline bool do_share_vertex(const Triangle& a, const Triangle& b) {
   int shared = 0;
   for (int k = 0; k < 3; ++k) shared |= static_cast<int>(a[k] == b[0]) | static_cast<int>(a[k] == b[1]) | static_cast<int>(a[k] == b[2]);
   return shared != 0;
@@ -77,10 +77,10 @@ bool do_share_vertex(const Triangle& a, const Triangle& b) {
 
 using FourPoints = std::array<Four, 3>;
 /// \param is_first  1 or 0 of each
-Four either(const Four& is_first, const Four& a, const Four& b) { return a * is_first + b * (1 - is_first); }
-FourPoints four_times(const Four& point) { return {Four::Constant(point[0]), Four::Constant(point[1]), Four::Constant(point[2])}; }
+inline Four either(const Four& is_first, const Four& a, const Four& b) { return a * is_first + b * (1 - is_first); }
+inline FourPoints four_times(const Four& point) { return {Four::Constant(point[0]), Four::Constant(point[1]), Four::Constant(point[2])}; }
 /// Four boxes and one: 0 or less of those that overlap it.
-Four gaps(const FourPoints& least, const FourPoints& greatest, const FourPoints& other_least, const FourPoints& other_greatest) {
+inline Four gaps(const FourPoints& least, const FourPoints& greatest, const FourPoints& other_least, const FourPoints& other_greatest) {
   return (least[0] - other_greatest[0])
       .max(other_least[0] - greatest[0])
       .max((least[1] - other_greatest[1]).max(other_least[1] - greatest[1]))
