@@ -139,7 +139,7 @@ class ClContext {
   /// Builds or loads the program of a kernel before its first launch.
   void prepare(const ClKernelName& name) { get_kernel(name); }
   /// Has the driver compile a kernel for a size of groups, by a launch with zeros for all its arguments and in its buffers, which must do nothing.
-  /// Most drivers have compiled it with its program, but PoCL does so at the first launch with that size.
+  /// Most drivers have compiled it with its program, but PoCL does so at the first launch with that size. \throw DeviceError as launch
   void compile(const ClKernelName& name, const ClRange& range);
 
   /// Launches since the last reset, by kernel, longest first. Waits for the queue.
