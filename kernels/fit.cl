@@ -262,7 +262,8 @@ kernel void match_lattice(const int texture_width, const int texture_height, con
     const float area = 0.5f * sqrt(product(own, own));
     float w[3];
     Point nearest = middle, normal = own;
-    const float best = walk_over_mesh(middle, t, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &nearest, &normal, w);
+    int end = t;
+    const float best = walk_over_mesh(middle, 0.0f, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &end, &nearest, &normal, w);
     // On a side or at a corner the way to the point is the direction; within a triangle that is its normal.
     const Point gap = minus(middle, nearest);
     const float distance = sqrt(best);

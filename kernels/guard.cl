@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // How far a lattice and the mesh are from each other, found from nearby instead of by a tree.
 //   find_normals       normals of the mesh's triangles
-//   suspect_quads      quads of the lattice -> how far they could be from the mesh, as these differ from the mesh's at their corners
+//   normals_of_texels  normals of the mesh at texels
+//   suspect_quads      quads of the lattice -> how far they could be from the mesh, by its planes at their corners
 //   measure_triangles  triangles of the lattice -> the mesh, by a walk over it
 //   measure_vertices   vertices of the mesh -> the lattice, among the quads around their place in the map
 // The last two can only find too large a distance, where the nearest point lies elsewhere. Vertices of the lattice are texels; triangles
@@ -34,52 +35,68 @@ __attribute__((always_inline)) Point either(int is_first, Point p, Point q) {
   return r;
 }
 
-// The square of how far a triangle could be, at a corner where the mesh has a normal; infinite where it looks against that.
-__attribute__((always_inline)) float suspicion2_at(Point own, float area2, float side2, Point normal) {
-  const float along = product(own, normal);
-  const float sine2 = area2 > 0.0f ? fmax(0.0f, 1.0f - along * along / area2) : 1.0f;
-  return along < 0.0f ? INFINITY : 0.25f * side2 * sine2;
+// NDRange (texel_count). Normals of the mesh at texels, so that quads find them side by side.
+// in   texel_triangles: per texel a triangle of the mesh there, or none
+// out  texel_normals: three planes; 0 where there is none
+kernel void normals_of_texels(const int texel_count, const int triangle_count, global const int* restrict texel_triangles, global const float* restrict normals,
+                              global float* restrict texel_normals) {
+  const int i = (int)get_global_id(0);
+  if (i >= texel_count) return;
+  const int is_known = texel_triangles[i] < triangle_count, t = min(texel_triangles[i], triangle_count - 1);
+  texel_normals[i] = is_known ? normals[t] : 0.0f;
+  texel_normals[texel_count + i] = is_known ? normals[triangle_count + t] : 0.0f;
+  texel_normals[2 * texel_count + i] = is_known ? normals[2 * triangle_count + t] : 0.0f;
 }
 
+__attribute__((always_inline)) float sum_of_sizes(Point p) { return fabs(p.x) + fabs(p.y) + fabs(p.z); }
+
+// From the plane of the mesh at one end of a side to its other end; as far as that can be where no normal is known.
+__attribute__((always_inline)) float rise(Point side, Point normal) { return sum_of_sizes(normal) > 0.0f ? fabs(product(side, normal)) : sum_of_sizes(side); }
+
+// How far a side could be from the mesh, at a crease between its ends: where the mesh's planes at these meet. That is no further than
+// half the larger rise and the smaller one, and nothing where the side lies in either plane, as sides of triangles at snapped edges do.
+__attribute__((always_inline)) float suspicion_of_side(Point side, Point normal, Point other_normal) {
+  const float p = rise(side, normal), q = rise(side, other_normal);
+  return p * q / fmax(p + q, FLT_MIN);
+}
+
+// The square of how far a triangle could be; infinite where it looks against the mesh at a corner.
 __attribute__((always_inline)) float suspicion2_of(Point a, Point b, Point c, Point at_a, Point at_b, Point at_c) {
   const Point ab = minus(b, a), ac = minus(c, a), bc = minus(c, b);
   const Point own = cross_of(ab, ac);
-  const float area2 = product(own, own), side2 = fmax(product(ab, ab), fmax(product(ac, ac), product(bc, bc)));
-  return fmax(suspicion2_at(own, area2, side2, at_a), fmax(suspicion2_at(own, area2, side2, at_b), suspicion2_at(own, area2, side2, at_c)));
+  const float most = fmax(suspicion_of_side(ab, at_a, at_b), fmax(suspicion_of_side(ac, at_a, at_c), suspicion_of_side(bc, at_b, at_c)));
+  return fmin(product(own, at_a), fmin(product(own, at_b), product(own, at_c))) < 0.0f ? INFINITY : most * most;
 }
 
-__attribute__((always_inline)) Point normal_at(int texel, int triangle_count, global const int* texel_triangles, global const float* normals) {
-  const int t = min(texel_triangles[texel], triangle_count - 1);
-  const Point n = {normals[t], normals[triangle_count + t], normals[2 * triangle_count + t]};
+__attribute__((always_inline)) Point normal_at(int texel, int texel_count, global const float* texel_normals) {
+  const Point n = {texel_normals[texel], texel_normals[texel_count + texel], texel_normals[2 * texel_count + texel]};
   return n;
 }
 
-__attribute__((always_inline)) float suspicion2_of_quad(int texel, int right, int texture_width, int triangle_count, int is_second, global const int* texel_triangles,
-                         global const float* normals, global const float* x, global const float* y,
-                         global const float* z) {
+__attribute__((always_inline)) float suspicion2_of_quad(int texel, int right, int texture_width, int texel_count, int is_second, global const float* texel_normals,
+                         global const float* x, global const float* y, global const float* z) {
   const int above = texel + texture_width, beyond = right + texture_width;
   const Point a = point_at(x, y, z, texel), b = point_at(x, y, z, right), c = point_at(x, y, z, beyond), d = point_at(x, y, z, above);
-  const Point at_a = normal_at(texel, triangle_count, texel_triangles, normals), at_b = normal_at(right, triangle_count, texel_triangles, normals);
-  const Point at_c = normal_at(beyond, triangle_count, texel_triangles, normals), at_d = normal_at(above, triangle_count, texel_triangles, normals);
+  const Point at_a = normal_at(texel, texel_count, texel_normals), at_b = normal_at(right, texel_count, texel_normals);
+  const Point at_c = normal_at(beyond, texel_count, texel_normals), at_d = normal_at(above, texel_count, texel_normals);
   return fmax(suspicion2_of(a, b, either(is_second, d, c), at_a, at_b, either(is_second, at_d, at_c)),
               suspicion2_of(either(is_second, b, a), c, d, either(is_second, at_b, at_a), at_c, at_d));
 }
 
 // The same, compiled once.
-__attribute__((noinline)) float suspicion2_at_end(int texel, int right, int texture_width, int triangle_count, int is_second,
-                                                  global const int* texel_triangles, global const float* normals, global const float* x,
-                                                  global const float* y, global const float* z) {
-  return suspicion2_of_quad(texel, right, texture_width, triangle_count, is_second, texel_triangles, normals, x, y, z);
+__attribute__((noinline)) float suspicion2_at_end(int texel, int right, int texture_width, int texel_count, int is_second, global const float* texel_normals,
+                                                  global const float* x, global const float* y, global const float* z) {
+  return suspicion2_of_quad(texel, right, texture_width, texel_count, is_second, texel_normals, x, y, z);
 }
 
-// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. A triangle whose corners lie on the mesh leaves it by about half its
-// longest side times the sine of the angle to the mesh at its corners: a chord over a crease.
+// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. A triangle whose corners lie on the mesh leaves it where it bends
+// between them: a chord over a crease.
 // in   lattice_rows: those that quads begin at; texel_triangles: per texel a triangle of the mesh there, of all texels of a patch or of none
-// out  suspicions2: per quad that distance, squared, the larger of both triangles'; infinite where one looks against the mesh at a
-//                   corner. Nothing is written where nothing is known
-kernel void suspect_quads(const int row_count, const int texture_width, const int triangle_count, global const int* restrict lattice_rows,
+// out  suspicions2: per quad how far it could be, squared, the larger of both triangles'; infinite where one looks against the mesh at
+//                   a corner. Nothing is written where nothing is known
+kernel void suspect_quads(const int row_count, const int texture_width, const int texel_count, global const int* restrict lattice_rows,
                           global const PatchRecord* restrict patches, global const int* restrict diagonals, global const int* restrict texel_triangles,
-                          global const float* restrict normals, global const float* restrict x, global const float* restrict y,
+                          global const float* restrict texel_normals, global const float* restrict x, global const float* restrict y,
                           global const float* restrict z, global float* restrict suspicions2) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
@@ -91,41 +108,63 @@ kernel void suspect_quads(const int row_count, const int texture_width, const in
   const int one = min(width, 1);
   for (int j = get_local_id(0); j < width - 1; j += ROW_ITEMS)
     suspicions2[texel + j] =
-        suspicion2_of_quad(texel + j, texel + j + one, texture_width, triangle_count, diagonals[texel + j], texel_triangles, normals, x, y, z);
+        suspicion2_of_quad(texel + j, texel + j + one, texture_width, texel_count, diagonals[texel + j], texel_normals, x, y, z);
   if (get_local_id(0) == 0)
     suspicions2[texel + width - 1] =
-        suspicion2_at_end(texel + width - 1, texel, texture_width, triangle_count, diagonals[texel + width - 1], texel_triangles, normals, x, y, z);
+        suspicion2_at_end(texel + width - 1, texel, texture_width, texel_count, diagonals[texel + width - 1], texel_normals, x, y, z);
 }
 
-// NDRange (count). Triangles of a list, from the mesh: at their middles, and at the other places too where the middle is further
-// than the root of `worth_a_look2`.
-// in   listed: their corners, three texels each; texel_triangles: where walks begin
-// out  distances2: the furthest of the places, squared, 0 where no walk can begin; is_turned: whether it looks against the mesh
-kernel void measure_triangles(const int count, const float worth_a_look2, const int triangle_count, global const int* restrict listed,
-                              global const int* restrict texel_triangles, global const int* restrict corners, global const int* restrict across,
-                              global const float* restrict vertex_x, global const float* restrict vertex_y, global const float* restrict vertex_z,
-                              global const float* restrict x, global const float* restrict y, global const float* restrict z,
-                              global float* restrict distances2, global int* restrict is_turned) {
+// A vertex of the lattice: a texel, or behind these a vertex of its ends.
+__attribute__((always_inline)) Point lattice_point(int vertex, int texel_count, global const float* restrict x, global const float* restrict y,
+                                                   global const float* restrict z, global const float* restrict end_x, global const float* restrict end_y,
+                                                   global const float* restrict end_z) {
+  return vertex < texel_count ? point_at(x, y, z, vertex) : point_at(end_x, end_y, end_z, vertex - texel_count);
+}
+
+// NDRange (count). Triangles of a list, from the mesh: at their middles, and where the middle is further than the root of
+// `worth_a_look2` at the other places too.
+// in   listed: their corners, three vertices each; texel_triangles: where walks begin; middle_enough2, enough2: walks from there end
+//      where they are as near as that
+// out  distances2: the furthest of the places, squared; what is less than what is enough may be less or more; -1 where no walk can begin
+//      is_turned: whether it looks against the mesh where its middle's walk ends
+kernel void measure_triangles(const int count, const int texel_count, const float middle_enough2, const float worth_a_look2, const float enough2, const int triangle_count,
+                              global const int* restrict listed, global const int* restrict texel_triangles, global const int* restrict corners,
+                              global const int* restrict across, global const float* restrict vertex_x, global const float* restrict vertex_y,
+                              global const float* restrict vertex_z, global const float* restrict x, global const float* restrict y,
+                              global const float* restrict z, global const float* restrict end_x, global const float* restrict end_y,
+                              global const float* restrict end_z, global float* restrict distances2, global int* restrict is_turned) {
   const int i = (int)get_global_id(0);
   if (i >= count) return;
-  distances2[i] = 0.0f;
+  distances2[i] = -1.0f;
   is_turned[i] = 0;
-  global const int* restrict lattice_corners = listed + 3 * i;
-  int from = NO_TRIANGLE;
-  for (int k = 0; k < 3 && from == NO_TRIANGLE; ++k) from = texel_triangles[lattice_corners[k]];
-  if (from == NO_TRIANGLE) return;
-  const Point a = point_at(x, y, z, lattice_corners[0]), b = point_at(x, y, z, lattice_corners[1]), c = point_at(x, y, z, lattice_corners[2]);
-  const Point ab = minus(b, a), ac = minus(c, a);
+  int at = NO_TRIANGLE;
+  Point abc[3];
+  for (int k = 0; k < 3; ++k) {
+    const int vertex = listed[3 * i + k];
+    abc[k] = lattice_point(vertex, texel_count, x, y, z, end_x, end_y, end_z);
+    if (at == NO_TRIANGLE && vertex < texel_count) at = texel_triangles[vertex];
+  }
+  if (at == NO_TRIANGLE) return;
+  const Point ab = minus(abc[1], abc[0]), ac = minus(abc[2], abc[0]);
   const float third[3] = {1.0f / 3.0f, 1.0f / 3.0f, 1.0f / 3.0f};
   float w[3];
   Point nearest, normal;
-  float furthest2 = walk_over_mesh(weighted(third, a, b, c), from, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &nearest, &normal, w);
-  is_turned[i] = product(cross_of(ab, ac), normal) < 0.0f;
+  const Point middle = weighted(third, abc[0], abc[1], abc[2]), own = cross_of(ab, ac);
+  float furthest2 = walk_over_mesh(middle, middle_enough2, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &at, &nearest, &normal, w);
+  if (product(own, normal) < 0.0f)
+    furthest2 = walk_over_mesh(middle, 0.0f, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &at, &nearest, &normal, w);
+  is_turned[i] = product(own, normal) < 0.0f;
   if (furthest2 > worth_a_look2) {
-    for (int k = 0; k < PLACES; ++k) {
+    // No point of a triangle is further from another triangle than the furthest of its corners.
+    const Point d = point_at(vertex_x, vertex_y, vertex_z, corners[at]), e = point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + at]),
+                f = point_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + at]);
+    float most2 = 0.0f;
+    for (int k = 0; k < 3 && most2 <= enough2; ++k) most2 = fmax(most2, nearest_of_triangle(abc[k], d, e, f, w));
+    for (int k = 0; k < PLACES && most2 > enough2; ++k) {
       const float s = place_s[k], t = place_t[k];
-      const Point p = {a.x + s * ab.x + t * ac.x, a.y + s * ab.y + t * ac.y, a.z + s * ab.z + t * ac.z};
-      furthest2 = fmax(furthest2, walk_over_mesh(p, from, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &nearest, &normal, w));
+      const Point p = {abc[0].x + s * ab.x + t * ac.x, abc[0].y + s * ab.y + t * ac.y, abc[0].z + s * ab.z + t * ac.z};
+      int start = at;
+      furthest2 = fmax(furthest2, walk_over_mesh(p, enough2, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &start, &nearest, &normal, w));
     }
   }
   distances2[i] = furthest2;

@@ -57,21 +57,24 @@ float nearest_of_triangle(Point p, Point a, Point b, Point c, float w[3]) {
   return product(gap, gap);
 }
 
-// The point of the mesh near p: a walk from triangle t across sides that the nearest point lies on, as long as it comes
-// nearer. It does not leave the patch's map. Returns the squared distance.
-float walk_over_mesh(Point p, int t, int triangle_count, global const int* restrict corners, global const int* restrict across,
-                     global const float* restrict vertex_x, global const float* restrict vertex_y, global const float* restrict vertex_z, Point* nearest,
-                     Point* normal, float w[3]) {
+// The point of the mesh near p: a walk from a triangle across sides that the nearest point lies on, as long as it comes
+// nearer and is further than the root of `enough2`. It does not leave the patch's map. Returns the squared distance.
+// in/out  at: the triangle where the walk begins; where it ends
+float walk_over_mesh(Point p, float enough2, int triangle_count, global const int* restrict corners, global const int* restrict across,
+                     global const float* restrict vertex_x, global const float* restrict vertex_y, global const float* restrict vertex_z, int* at,
+                     Point* nearest, Point* normal, float w[3]) {
   float best = INFINITY;
-  int next = t;
+  int next = *at;
   for (int steps = 0; steps < 40 && next >= 0; ++steps) {
-    t = next;
+    const int t = next;
+    *at = t;
     const Point d = point_at(vertex_x, vertex_y, vertex_z, corners[t]), e = point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + t]),
                 f = point_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + t]);
     best = nearest_of_triangle(p, d, e, f, w);
     *nearest = weighted(w, d, e, f);
     *normal = cross_of(minus(e, d), minus(f, d));
     next = -1;
+    if (best <= enough2) break;
     float nearer = best;
     for (int k = 0; k < 3; ++k) {
       if (w[k] != 0.0f) continue;
@@ -86,15 +89,15 @@ float walk_over_mesh(Point p, int t, int triangle_count, global const int* restr
     // At a corner the way on may lead through any triangle around it.
     int k = w[0] == 1.0f ? 0 : w[1] == 1.0f ? 1 : w[2] == 1.0f ? 2 : -1;
     const int vertex = k < 0 ? -1 : corners[k * triangle_count + t];
-    for (int turns = 0, at = t; turns < 16 && next < 0 && k >= 0; ++turns) {
-      at = across[(k == 2 ? 0 : k + 1) * triangle_count + at];
-      if (at < 0 || at == t) break;
-      const int a = corners[at], b = corners[triangle_count + at], c = corners[2 * triangle_count + at];
+    for (int turns = 0, turned = t; turns < 16 && next < 0 && k >= 0; ++turns) {
+      turned = across[(k == 2 ? 0 : k + 1) * triangle_count + turned];
+      if (turned < 0 || turned == t) break;
+      const int a = corners[turned], b = corners[triangle_count + turned], c = corners[2 * triangle_count + turned];
       k = a == vertex ? 0 : b == vertex ? 1 : c == vertex ? 2 : -1;
       float other_w[3];
       const float distance2 = nearest_of_triangle(p, point_at(vertex_x, vertex_y, vertex_z, a), point_at(vertex_x, vertex_y, vertex_z, b),
                                                   point_at(vertex_x, vertex_y, vertex_z, c), other_w);
-      if (distance2 < best) next = at;
+      if (distance2 < best) next = turned;
     }
   }
   return best;

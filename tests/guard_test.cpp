@@ -266,6 +266,14 @@ struct TubeAndLattice {
   }
 };
 
+void launch_measuring(const TubeAndLattice& tube, const ClBuffer<int>& listed, int count, float middle_enough2, float worth_a_look2, float enough2,
+                      ClBuffer<float>& distances, ClBuffer<int>& turned, const std::array<std::vector<float>, 3>& ends = {{{0}, {0}, {0}}}) {
+  device().launch({"guard.cl", "measure_triangles"}, ClRange(count), count, static_cast<int>(tube.layout.size()), middle_enough2, worth_a_look2, enough2,
+                  tube.maps.triangle_count, listed, tube.texel_triangles, tube.maps.corners, tube.maps.across, tube.maps.x, tube.maps.y, tube.maps.z,
+                  tube.points[0], tube.points[1], tube.points[2], device().upload(ends[0]), device().upload(ends[1]), device().upload(ends[2]), distances,
+                  turned);
+}
+
 TEST(GuardKernels, AWalkIsNeverNearerThanTheMeshAndOnASmoothOneAsFar) {
   std::mt19937 random(7);
   for (const double noise : {0.0, 0.02, 0.3}) {
@@ -278,9 +286,7 @@ TEST(GuardKernels, AWalkIsNeverNearerThanTheMeshAndOnASmoothOneAsFar) {
     for (const float worth : {0.0f, 1e9f}) {
       auto distances = device().allocate<float>(count);
       auto turned = device().allocate<int>(count);
-      device().launch({"guard.cl", "measure_triangles"}, ClRange(count), count, worth, tube.maps.triangle_count,
-                      device().upload(listed_corners), tube.texel_triangles, tube.maps.corners, tube.maps.across, tube.maps.x, tube.maps.y, tube.maps.z,
-                      tube.points[0], tube.points[1], tube.points[2], distances, turned);
+      launch_measuring(tube, device().upload(listed_corners), count, 0, worth, 0, distances, turned);
       const std::vector<float> found2 = device().download(distances);
       const std::vector<int> is_turned = device().download(turned);
       int further = 0, differently_turned = 0;
@@ -361,17 +367,82 @@ TEST(GuardKernels, AVertexIsMeasuredToTheQuadsAroundItsPlace) {
   }
 }
 
-TEST(GuardKernels, SuspicionsGrowWithSizeAndTheAngleToTheMesh) {
+// What is near enough is not looked at more closely, and what is not is found as without that.
+TEST(GuardKernels, WalksEndWhereTheyAreNearEnough) {
+  std::mt19937 random(10);
+  const TubeAndLattice tube(random, 0.02);
+  std::vector<int> corners;
+  for (const Triangle& t : tube.lattice.triangles) corners.insert(corners.end(), t.begin(), t.end());
+  const auto listed = device().upload(corners);
+  const int count = static_cast<int>(tube.lattice.triangles.size());
+  auto distances = device().allocate<float>(count);
+  auto turned = device().allocate<int>(count);
+  launch_measuring(tube, listed, count, 0, 0, 0, distances, turned);
+  const std::vector<float> exact2 = device().download(distances);
+  std::vector<float> sorted = exact2;
+  std::nth_element(sorted.begin(), sorted.begin() + count / 2, sorted.end());
+  const float enough2 = sorted[count / 2];
+  for (const float middle2 : {0.0f, 0.1f * enough2}) {
+    launch_measuring(tube, listed, count, middle2, middle2, enough2, distances, turned);
+    const std::vector<float> found2 = device().download(distances);
+    int near = 0;
+    for (int i = 0; i < count; ++i) {
+      if (middle2 > 0 && found2[i] <= middle2) continue;  // its other places were not looked at
+      // A walk that begins elsewhere can be led elsewhere, but not nearer than the mesh.
+      if (found2[i] <= enough2) {
+        ++near;
+        EXPECT_LE(exact2[i], std::max(1.05f * enough2, found2[i])) << i;
+      } else {
+        EXPECT_NEAR(found2[i], exact2[i], 0.05 * exact2[i]) << i;
+      }
+    }
+    EXPECT_GT(near, count / 5);
+    EXPECT_LT(near, 2 * count / 3);
+  }
+}
+
+TEST(GuardKernels, TrianglesAtEndsAreMeasuredByTheirTexels) {
+  std::mt19937 random(11);
+  const TubeAndLattice tube(random, 0.02);
+  const int count = static_cast<int>(tube.lattice.triangles.size()), texels = static_cast<int>(tube.layout.size());
+  std::vector<int> corners, of_ends;
+  std::array<std::vector<float>, 3> ends;
+  for (const Triangle& t : tube.lattice.triangles) {
+    corners.insert(corners.end(), t.begin(), t.end());
+    of_ends.insert(of_ends.end(), {t[0], texels + static_cast<int>(ends[0].size()), t[2]});
+    for (int axis = 0; axis < 3; ++axis) ends[axis].push_back(static_cast<float>(tube.lattice.positions[t[1]][axis]));
+  }
+  // One that no texel is a corner of.
+  of_ends.insert(of_ends.end(), {texels, texels + 1, texels + 2});
+  auto distances = device().allocate<float>(count + 1);
+  auto turned = device().allocate<int>(count + 1);
+  launch_measuring(tube, device().upload(corners), count, 0, 0, 0, distances, turned);
+  const std::vector<float> expected2 = device().download(distances);
+  const std::vector<int> expected_turned = device().download(turned);
+  launch_measuring(tube, device().upload(of_ends), count + 1, 0, 0, 0, distances, turned, ends);
+  const std::vector<float> found2 = device().download(distances);
+  const std::vector<int> found_turned = device().download(turned);
+  for (int i = 0; i < count; ++i) {
+    EXPECT_EQ(found2[i], expected2[i]) << i;
+    EXPECT_EQ(found_turned[i], expected_turned[i]) << i;
+  }
+  EXPECT_EQ(found2[count], -1);
+}
+
+TEST(GuardKernels, SuspicionsAreWhereTheMeshsPlanesMeet) {
   std::mt19937 random(9);
   const TubeAndLattice tube(random, 0.1);
   const int quads = static_cast<int>(tube.lattice.triangles.size()) / 2, triangle_count = tube.maps.triangle_count;
   auto normals = device().allocate<float>(3 * static_cast<std::size_t>(triangle_count)), suspicions = device().allocate<float>(tube.layout.size());
+  const int texels = static_cast<int>(tube.layout.size());
+  auto texel_normals = device().allocate<float>(3 * tube.layout.size());
   device().launch({"guard.cl", "find_normals"}, ClRange(triangle_count), triangle_count, tube.maps.corners, tube.maps.x, tube.maps.y, tube.maps.z,
                   normals);
+  device().launch({"guard.cl", "normals_of_texels"}, ClRange(texels), texels, triangle_count, tube.texel_triangles, normals, texel_normals);
   std::vector<LatticeRow> rows;
   for (int row = 1; row + 2 < TubeAndLattice::kHeight; ++row) rows.push_back({0, row, 0, 0});
-  device().launch({"guard.cl", "suspect_quads"}, row_range(device(), rows.size()), static_cast<int>(rows.size()), tube.layout.width, triangle_count,
-                  device().upload(rows), tube.layout.patches, device().upload(tube.diagonals), tube.texel_triangles, normals, tube.points[0],
+  device().launch({"guard.cl", "suspect_quads"}, row_range(device(), rows.size()), static_cast<int>(rows.size()), tube.layout.width, texels,
+                  device().upload(rows), tube.layout.patches, device().upload(tube.diagonals), tube.texel_triangles, texel_normals, tube.points[0],
                   tube.points[1], tube.points[2], suspicions);
   const std::vector<float> found2 = device().download(suspicions);
   int against = 0;
@@ -381,14 +452,18 @@ TEST(GuardKernels, SuspicionsGrowWithSizeAndTheAngleToTheMesh) {
     for (const int side : {0, 1}) {
       const Triangle& t = tube.lattice.triangles[2 * quad + side];
       const Vec3 own = tube.normal(t, tube.lattice.positions);
-      double longest = 0;
-      for (int k = 0; k < 3; ++k) longest = std::max(longest, (tube.lattice.positions[t[k]] - tube.lattice.positions[t[(k + 1) % 3]]).norm());
-      for (const int vertex : t) {
-        const Vec3 n = tube.normal(tube.chart.triangles[tube.seeds[vertex]], tube.chart.positions);
-        const double sine = own.norm() > 1e-6 && n.norm() > 1e-6 ? own.cross(n).norm() / (own.norm() * n.norm()) : 1;
-        is_against = is_against || own.dot(n) < -1e-4;
-        is_unsure = is_unsure || std::abs(own.dot(n)) <= 1e-4;
-        expected = std::max(expected, 0.5 * longest * sine);
+      // Points of a side in both planes' half spaces: the least height over it where one of the planes is reached, at the crease.
+      const auto normal_at = [&](int vertex) { return tube.normal(tube.chart.triangles[tube.seeds[vertex]], tube.chart.positions); };
+      for (int k = 0; k < 3; ++k) {
+        const int from = t[k], to = t[(k + 1) % 3];
+        const Vec3 along = tube.lattice.positions[to] - tube.lattice.positions[from];
+        const auto rise = [&](const Vec3& n) { return n.norm() > 1e-6 ? std::abs(along.dot(n.normalized())) : along.lpNorm<1>(); };
+        double most = 0;
+        for (double share = 0; share <= 1; share += 1e-3) most = std::max(most, std::min(share * rise(normal_at(from)), (1 - share) * rise(normal_at(to))));
+        expected = std::max(expected, most);
+        const double product = own.dot(normal_at(from));
+        is_against = is_against || product < -1e-4;
+        is_unsure = is_unsure || std::abs(product) <= 1e-4;
       }
     }
     if (is_unsure) continue;

@@ -51,7 +51,7 @@ std::vector<KernelVariant> encoding_kernels(const ClContext& context, const Enco
   if (options.has_prefilter) add("encode.cl", {"prefilter_positions"}, rows);
   if (can_snap || can_fit) {
     add("lattice.cl", {"choose_diagonals"}, rows);
-    add("guard.cl", {"find_normals"}, items);
+    add("guard.cl", {"find_normals", "normals_of_texels"}, items);
     add("guard.cl", {"suspect_quads"}, rows);
     add("guard.cl", {"measure_triangles"}, items);
     add("metro.cl", {"find_nearest_triangles"}, kSearch);

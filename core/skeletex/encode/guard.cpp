@@ -23,6 +23,7 @@ constexpr int kPasses = 7;                // it takes some four
 constexpr int kReach = 1;                 // columns and rows around a triangle that is too far that go back with it
 constexpr float kShareOfFurthest = 0.9f;  // what is measured is not all that there is
 constexpr float kWorthALook = 0.15f;      // of the limit, at the middle of a triangle: then it is measured more densely
+constexpr double kShareOfFew = 0.001;     // of the even lattice's quads, the most suspicious: they tell which of the others matter
 constexpr double kShareOfEven = 0.02;     // of the even lattice's quads, the most suspicious: among them is its furthest
 constexpr float kWorthAWalk = 0.75f;      // of the limit: how far a quad could be
 constexpr float kEvenWorthALook = 0.5f;   // of the furthest middle, in the even lattice
@@ -31,10 +32,11 @@ constexpr std::size_t kManyPairs = 50;    // from here on it is looked at whethe
 constexpr int kTolerance = 2;             // columns and rows around a fault of the even lattice
 constexpr double kMuchWorse = 1.1;        // the number of faults there, against the even lattice's
 constexpr std::size_t kBlock = 1 << 13;
-// Places of a triangle, as shares of its first two sides: the middle; or corners, quarters and middles of the sides, and points
+// Places of a triangle, as shares of its first two sides: the middle, corners, quarters and middles of the sides, and points
 // between them and the middle. As in guard.cl.
 constexpr std::array<std::array<double, 2>, 1> kMiddle{{{1 / 3.0, 1 / 3.0}}};
-constexpr std::array<std::array<double, 2>, 15> kPlaces{{{0, 0},
+constexpr std::array<std::array<double, 2>, 16> kPlaces{{{1 / 3.0, 1 / 3.0},
+                                                         {0, 0},
                                                          {1, 0},
                                                          {0, 1},
                                                          {0.25, 0},
@@ -82,7 +84,8 @@ class Distances {
         maps_(maps),
         search_(context, std::move(tree)),
         placed_(place_vertices(sources.charts, sources.model.patches, maps)),
-        normals_(context.allocate<float>(3 * static_cast<std::size_t>(maps.triangle_count))) {
+        normals_(context.allocate<float>(3 * static_cast<std::size_t>(maps.triangle_count))),
+        texel_normals_(context.allocate<float>(3 * layout.size())) {
     context.launch({"guard.cl", "find_normals"}, over(maps.triangle_count), maps.triangle_count, maps.corners, maps.x, maps.y, maps.z, normals_);
   }
 
@@ -98,9 +101,12 @@ class Distances {
     const std::vector<float> suspicions2 = suspect(lattice, texel_triangles);
     std::vector<float> some;  // enough to tell how large the largest are
     for (std::size_t i = 0; i < suspicions2.size(); i += 7) some.push_back(suspicions2[i]);
-    const auto last = some.begin() + static_cast<std::ptrdiff_t>(kShareOfEven * static_cast<double>(some.size()));
-    std::nth_element(some.begin(), last, some.end(), std::greater<>());
-    std::vector<Measured> measured = measure_near(lattice, triangles_above(lattice, suspicions2, *last), texel_triangles, std::numeric_limits<float>::max());
+    const auto least_of = [&](double share) {
+      const auto last = some.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(some.size()));
+      std::nth_element(some.begin(), last, some.end(), std::greater<>());
+      return *last;
+    };
+    std::vector<Measured> measured;
     const auto furthest_of = [&] {
       float furthest = 0;
       for (const Measured& each : measured) furthest = std::max(furthest, each.distance);
@@ -112,14 +118,25 @@ class Distances {
         if (each.distance >= least) triangles.push_back(each.triangle);
       return triangles;
     };
+    // A few tell what the others need not be asked for.
+    constexpr float kNever = std::numeric_limits<float>::max();
+    std::vector<int> few;
+    const float least_of_few = least_of(kShareOfFew);
+    for (int texel = 0; texel < static_cast<int>(suspicions2.size()); ++texel)
+      if (suspicions2[texel] > least_of_few && !std::isinf(suspicions2[texel])) few.push_back(2 * texel), few.push_back(2 * texel + 1);
+    measured = measure_near(lattice, few, texel_triangles, {0, kNever, 0});
+    float least = kEvenWorthALook * furthest_of();
+    measured = measure_near(lattice, triangles_above(lattice, suspicions2, least_of(kShareOfEven)), texel_triangles, {least, kNever, 0});
     for (const int triangle : look_again_at_turned(lattice, measured)) turned.push_back(triangle);
     // Places beside the middle, where these could be the furthest.
-    measured = measure_near(lattice, above(kEvenWorthALook * furthest_of()), texel_triangles, 0);
+    least = kEvenWorthALook * furthest_of();
+    measured = measure_near(lattice, above(least), texel_triangles, {0, 0, least});
     // The furthest is at least that of any, and it is among those that seem further.
     float furthest = furthest_of();
+    std::vector<int> nearest;
     for (float limit = kEvenWorthALook * furthest; furthest > 0; limit = furthest) {
       furthest = 0;
-      for (const float distance : measure_exactly(lattice, above(limit))) furthest = std::max(furthest, distance);
+      for (const float distance : measure_exactly(lattice, above(limit), nearest)) furthest = std::max(furthest, distance);
       if (furthest >= limit) break;
     }
     return furthest;
@@ -133,11 +150,11 @@ class Distances {
   /// Some of them again: at their middles, and more densely where these are further than a share of the limit.
   /// \param asked  in order
   void measure_triangles(const LatticeMesh& lattice, const std::vector<int>& asked, const ClBuffer<int>& texel_triangles, float limit) {
-    std::vector<Measured> measured = measure_near(lattice, asked, texel_triangles, kWorthALook * limit);
-    std::vector<int> suspects;
+    std::vector<Measured> measured = measure_near(lattice, asked, texel_triangles, {kWorthALook * limit, kWorthALook * limit, limit});
+    std::vector<int> suspects, nearest;
     for (const Measured& each : measured)
       if (each.distance > limit) suspects.push_back(each.triangle);
-    const std::vector<float> exact = measure_exactly(lattice, suspects);
+    const std::vector<float> exact = measure_exactly(lattice, suspects, nearest);
     std::size_t next = 0;
     for (Measured& each : measured)
       if (each.distance > limit) each.distance = exact[next++];
@@ -251,11 +268,12 @@ class Distances {
   }
   /// Per texel the square of how far its quad could be.
   std::vector<float> suspect(const LatticeMesh& lattice, const ClBuffer<int>& texel_triangles) {
+    const int rows = static_cast<int>(lattice.device_rows().size), texels = lattice.texel_count();
+    context_.launch({"guard.cl", "normals_of_texels"}, over(texels), texels, maps_.triangle_count, texel_triangles, normals_, texel_normals_);
     auto suspicions2 = context_.allocate<float>(layout_.size());
     context_.fill(suspicions2, 0.f);
-    const int rows = static_cast<int>(lattice.device_rows().size);
-    context_.launch({"guard.cl", "suspect_quads"}, row_range(context_, rows), rows, layout_.width, maps_.triangle_count, lattice.device_rows(),
-                    layout_.patches, lattice.device_diagonals(), texel_triangles, normals_, lattice.device_points().x, lattice.device_points().y,
+    context_.launch({"guard.cl", "suspect_quads"}, row_range(context_, rows), rows, layout_.width, texels, lattice.device_rows(), layout_.patches,
+                    lattice.device_diagonals(), texel_triangles, texel_normals_, lattice.device_points().x, lattice.device_points().y,
                     lattice.device_points().z, suspicions2);
     return context_.download(suspicions2);
   }
@@ -267,32 +285,37 @@ class Distances {
     for (int i = lattice.first_end_triangle(); i < lattice.triangle_count(); ++i) triangles.push_back(i);
     return triangles;
   }
-  /// From nearby, triangles at ends by the tree. \param asked  in order
-  std::vector<Measured> measure_near(const LatticeMesh& lattice, const std::vector<int>& asked, const ClBuffer<int>& texel_triangles, float worth_a_look) {
+  /// How near walks need not come nearer: from middles, and from other places, where middles are further than worth a look.
+  struct Enough {
+    float middle, worth_a_look, places;
+  };
+  /// From nearby, or by the tree where there is no map.
+  /// \param asked  in order
+  std::vector<Measured> measure_near(const LatticeMesh& lattice, const std::vector<int>& asked, const ClBuffer<int>& texel_triangles, Enough enough) {
     std::vector<Measured> measured;
-    const auto first_end = std::lower_bound(asked.begin(), asked.end(), lattice.first_end_triangle());
-    const std::vector<int> inner(asked.begin(), first_end), ends(first_end, asked.end());
-    if (!inner.empty()) {
-      std::vector<int> corners;
-      for (const int i : inner)
-        for (const int vertex : lattice.triangle(i)) corners.push_back(vertex);
-      auto device_distances = context_.allocate<float>(inner.size());
-      auto device_turned = context_.allocate<int>(inner.size());
-      context_.launch({"guard.cl", "measure_triangles"}, over(inner.size()), static_cast<int>(inner.size()), worth_a_look * worth_a_look,
-                      maps_.triangle_count, context_.upload(corners), texel_triangles, maps_.corners, maps_.across, maps_.x, maps_.y, maps_.z,
-                      lattice.device_points().x, lattice.device_points().y, lattice.device_points().z, device_distances, device_turned);
-      const std::vector<float> distances2 = context_.download(device_distances);
-      const std::vector<int> turned = context_.download(device_turned);
-      for (std::size_t k = 0; k < inner.size(); ++k) measured.push_back({inner[k], std::sqrt(distances2[k]), turned[k] != 0});
+    if (asked.empty()) return measured;
+    std::vector<int> corners;
+    for (const int i : asked)
+      for (const int vertex : lattice.triangle(i)) corners.push_back(vertex);
+    std::array<std::vector<float>, 3> ends;
+    for (int vertex = lattice.texel_count(); vertex < lattice.vertex_count(); ++vertex)
+      for (int axis = 0; axis < 3; ++axis) ends[axis].push_back(lattice.point(vertex)[axis]);
+    auto device_distances = context_.allocate<float>(asked.size());
+    auto device_turned = context_.allocate<int>(asked.size());
+    context_.launch({"guard.cl", "measure_triangles"}, over(asked.size()), static_cast<int>(asked.size()), lattice.texel_count(), enough.middle * enough.middle,
+                    enough.worth_a_look * enough.worth_a_look, enough.places * enough.places, maps_.triangle_count, context_.upload(corners), texel_triangles, maps_.corners, maps_.across, maps_.x, maps_.y, maps_.z,
+                    lattice.device_points().x, lattice.device_points().y, lattice.device_points().z, context_.upload(ends[0]), context_.upload(ends[1]),
+                    context_.upload(ends[2]), device_distances, device_turned);
+    const std::vector<float> distances2 = context_.download(device_distances);
+    const std::vector<int> turned = context_.download(device_turned);
+    std::vector<int> unmapped;
+    for (std::size_t k = 0; k < asked.size(); ++k) {
+      if (distances2[k] >= 0) measured.push_back({asked[k], std::sqrt(distances2[k]), turned[k] != 0});
+      else if (asked[k] >= lattice.first_end_triangle()) unmapped.push_back(asked[k]);
     }
-    std::vector<int> nearest, far;
-    std::vector<float> distances;
-    find(lattice, ends, kMiddle, nearest, distances);
-    for (std::size_t k = 0; k < ends.size(); ++k)
-      if (distances[k] > worth_a_look) far.push_back(ends[k]);
-    const std::vector<float> exact = measure_exactly(lattice, far);
-    for (std::size_t k = 0, next = 0; k < ends.size(); ++k)
-      measured.push_back({ends[k], distances[k] > worth_a_look ? exact[next++] : distances[k], looks_against(lattice, ends[k], nearest[k])});
+    std::vector<int> nearest;
+    const std::vector<float> exact = measure_exactly(lattice, unmapped, nearest);
+    for (std::size_t k = 0; k < unmapped.size(); ++k) measured.push_back({unmapped[k], exact[k], looks_against(lattice, unmapped[k], nearest[k])});
     return measured;
   }
   bool looks_against(const LatticeMesh& lattice, int triangle, int nearest) const {
@@ -314,12 +337,16 @@ class Distances {
     }
     return turned;
   }
-  std::vector<float> measure_exactly(const LatticeMesh& lattice, const std::vector<int>& asked) {
-    std::vector<float> most, distances;
-    std::vector<int> nearest;
-    find(lattice, asked, kMiddle, nearest, most);
-    find(lattice, asked, kPlaces, nearest, distances);
-    for (std::size_t k = 0; k < distances.size(); ++k) most[k / kPlaces.size()] = std::max(most[k / kPlaces.size()], distances[k]);
+  /// \param nearest  out: to their middles
+  std::vector<float> measure_exactly(const LatticeMesh& lattice, const std::vector<int>& asked, std::vector<int>& nearest) {
+    std::vector<float> most(asked.size(), 0), distances;
+    std::vector<int> triangles;
+    find(lattice, asked, kPlaces, triangles, distances);
+    nearest.resize(asked.size());
+    for (std::size_t k = 0; k < distances.size(); ++k) {
+      most[k / kPlaces.size()] = std::max(most[k / kPlaces.size()], distances[k]);
+      if (k % kPlaces.size() == 0) nearest[k / kPlaces.size()] = triangles[k];
+    }
     return most;
   }
   template <std::size_t kCount>
@@ -342,7 +369,8 @@ class Distances {
   const DeviceMaps& maps_;
   NearestSearch search_;
   std::vector<PlacedVertex> placed_;
-  ClBuffer<float> normals_;  // of the maps' triangles
+  ClBuffer<float> normals_;        // of the maps' triangles
+  ClBuffer<float> texel_normals_;  // of those at the texels of the lattice that was measured last
   std::vector<Measured> faults_;
   std::vector<MeasuredVertex> vertices_;  // as placed_
   std::vector<char> is_near_;             // texels
