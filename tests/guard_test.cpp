@@ -186,8 +186,14 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
     const std::vector<int> changed = lattice.move(points.take(model, others, 50), other_lattice);
     const Pairs found_of_changed = crossings.find(lattice, changed);
     Pairs all = LatticeCrossings(lattice).find(lattice);
-    EXPECT_FALSE(crossings.find_around(all, other_lattice).empty()) << each.name;
-    EXPECT_EQ(crossings.find_around(all, lattice), all) << each.name;
+    const LatticeCrossings::Others same = crossings.find_between_same(all, lattice), different = crossings.find_between_same(all, other_lattice);
+    EXPECT_EQ(same.pairs, all) << each.name;
+    EXPECT_EQ(same.given_there, all.size()) << each.name;
+    EXPECT_FALSE(different.pairs.empty()) << each.name;
+    EXPECT_GT(different.given_there, 0u) << each.name;
+    EXPECT_LT(different.given_there, all.size()) << each.name;
+    const Pairs all_of_other = LatticeCrossings(other_lattice).find(other_lattice);
+    EXPECT_TRUE(std::includes(all_of_other.begin(), all_of_other.end(), different.pairs.begin(), different.pairs.end())) << each.name;
     const std::set<int> is_changed(changed.begin(), changed.end());
     std::erase_if(all, [&](const auto& pair) { return !is_changed.contains(pair[0]) && !is_changed.contains(pair[1]); });
     EXPECT_EQ(found_of_changed, all) << each.name;

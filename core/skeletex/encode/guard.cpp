@@ -28,7 +28,7 @@ constexpr double kShareOfEven = 0.02;     // of the even lattice's quads, the mo
 constexpr float kWorthAWalk = 0.75f;      // of the limit: how far a quad could be
 constexpr float kEvenWorthALook = 0.5f;   // of the furthest middle, in the even lattice
 constexpr int kVertexReach = 6;           // columns and rows around a texel: diagonals depend on it, vertices are measured to their quads (guard.cl)
-constexpr std::size_t kManyPairs = 50;    // from here on it is looked at whether the even lattice intersects itself as well
+constexpr std::size_t kManyPairs = 50;    // from here on it is looked at whether the even lattice intersects itself as much
 constexpr int kTolerance = 2;             // columns and rows around a fault of the even lattice
 constexpr double kMuchWorse = 1.1;        // the number of faults there, against the even lattice's
 constexpr std::size_t kBlock = 1 << 13;
@@ -447,11 +447,10 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
     const std::vector<int> far = distances.find_far_vertices(lattice, features, back, changed, anchors, limit);
     const Pairs pairs = finding.get();
     if (pass == 0 && pairs.size() > kManyPairs) {
-      const auto even_pairs = crossings.find_around(pairs, even_lattice);
-      for (const auto& pair : even_pairs)
+      const LatticeCrossings::Others evens = crossings.find_between_same(pairs, even_lattice);
+      for (const auto& pair : evens.pairs)
         for (const int triangle : pair) even_faults.add(even_lattice.triangle(triangle), kTolerance);
-      const auto near = std::count_if(pairs.begin(), pairs.end(), is_pair_near_even_fault);
-      tolerates_crossing = static_cast<double>(near) <= kMuchWorse * static_cast<double>(even_pairs.size());
+      tolerates_crossing = evens.pairs.size() > kManyPairs && static_cast<double>(evens.given_there) <= kMuchWorse * static_cast<double>(evens.pairs.size());
     }
     for (const auto& pair : pairs)
       if (!tolerates_crossing || !is_pair_near_even_fault(pair))

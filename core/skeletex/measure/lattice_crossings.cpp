@@ -531,8 +531,8 @@ bool LatticeCrossings::is_beside(const Leaf& leaf, int i, const Leaf& others, in
 }
 
 /// Triangles of two leaves, or of one.
-void LatticeCrossings::find_between(const Search& search, int a, int b, Contact contact, Leaves& leaves, std::vector<std::array<int, 2>>& pairs) const {
-  const LatticeMesh& lattice = search.lattice;
+void LatticeCrossings::find_between(const LatticeMesh& lattice, int a, int b, const Box& around_b, Contact contact, const std::vector<char>* is_asked,
+                                    Leaves& leaves, std::vector<std::array<int, 2>>& pairs) const {
   // The last one is for two that are kept at the same place.
   const std::size_t places = leaves.size() - 1, place_a = a % places, place_b = a != b && b % places == place_a ? places : b % places;
   Leaf &one = leaf_at(lattice, a, leaves[place_a]), &other = leaf_at(lattice, b, leaves[place_b]);
@@ -541,7 +541,7 @@ void LatticeCrossings::find_between(const Search& search, int a, int b, Contact 
     if (!one.is_placed[k]) place(lattice, k, one);
     if (!other.is_placed[l]) place(lattice, l, other);
     const int s = one.numbers[k], t = other.numbers[l];
-    if (search.is_asked && !(*search.is_asked)[s] && !(*search.is_asked)[t]) return;
+    if (is_asked && !(*is_asked)[s] && !(*is_asked)[t]) return;
     const Triangle &first = one.triangles[k], &second = other.triangles[l];
     if (contact == Contact::kByRounding && !(one.are_on_seam[k] && other.are_on_seam[l]) && !do_share_vertex(first, second)) return;
     const auto &first_corners = one.corners[k], &second_corners = other.corners[l];
@@ -550,8 +550,7 @@ void LatticeCrossings::find_between(const Search& search, int a, int b, Contact 
     if (is_of_one_patch && are_quads_smooth(lattice, grids_[nodes_[a].grid].patch, s, t)) return;
     pairs.push_back({std::min(s, t), std::max(s, t)});
   };
-  const Box& around = search.tree.nodes[b].around;
-  const FourPoints least = four_times(around.least), greatest = four_times(around.greatest);
+  const FourPoints least = four_times(around_b.least), greatest = four_times(around_b.greatest);
   for (int i = 0; i < one.fours; ++i) {
     const Four near = gaps(one.least[i], one.greatest[i], least, greatest);
     for (int m = 0; m < 4; ++m) {
@@ -570,12 +569,19 @@ void LatticeCrossings::find_between(const Search& search, int a, int b, Contact 
   }
 }
 
+/// The thread's own, none of them known.
+LatticeCrossings::Leaves& LatticeCrossings::fresh_leaves() {
+  static thread_local Leaves leaves(kLeaves + 1);
+  for (Leaf& leaf : leaves) leaf.node = -1;
+  return leaves;
+}
+
 /// What is to be asked in place of a pair of nodes, or a node by itself. \return of leaves, how they can meet
 LatticeCrossings::Contact LatticeCrossings::split(const Search& search, const Task& task, std::vector<Task>& tasks) const {
   const auto [a, b] = task;
   if (search.are_asked) {
     const bool is_first = (*search.are_asked)[a] != 0, is_second = (*search.are_asked)[b] != 0;
-    if (search.are_both ? !is_first || !is_second : !is_first && !is_second) return Contact::kNone;
+    if (!is_first && !is_second) return Contact::kNone;
   }
   if (a != b && !do_overlap(search.tree.nodes[a].around, search.tree.nodes[b].around)) return Contact::kNone;
   const Contact how = contact(search.tree, a, b);
@@ -618,14 +624,13 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const Search& search) con
   }
   std::vector<std::vector<std::array<int, 2>>> found(block_count(tasks.size(), kTasks));
   for_each_block(tasks.size(), kTasks, [&](std::size_t block, std::size_t begin, std::size_t end) {
-    static thread_local Leaves leaves(kLeaves + 1);
-    for (Leaf& leaf : leaves) leaf.node = -1;
+    Leaves& leaves = fresh_leaves();
     std::vector<Task> stack(tasks.begin() + static_cast<std::ptrdiff_t>(begin), tasks.begin() + static_cast<std::ptrdiff_t>(end));
     while (!stack.empty()) {
       const Task task = stack.back();
       stack.pop_back();
       const Contact how = split(search, task, stack);
-      if (how != Contact::kNone) find_between(search, task[0], task[1], how, leaves, found[block]);
+      if (how != Contact::kNone) find_between(search.lattice, task[0], task[1], search.tree.nodes[task[1]].around, how, search.is_asked, leaves, found[block]);
     }
   });
   std::vector<std::array<int, 2>> pairs;
@@ -654,32 +659,31 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattic
   return find({lattice, tree_, &are_asked, &is_asked});
 }
 
-std::vector<std::array<int, 2>> LatticeCrossings::find_around(std::span<const std::array<int, 2>> pairs, const LatticeMesh& other) const {
-  std::vector<int> leaves;
-  for (const auto& pair : pairs)
-    for (const int triangle : pair) {
-      const int leaf = leaf_of(other, triangle);
-      const Node& node = nodes_[leaf];
-      const Grid& grid = grids_[node.grid];
-      const auto [first, columns, rows] = grid.levels[0];
-      if (grid.end >= 0) {
-        // Eight can be of two ends.
-        leaves.push_back(leaf);
-        const auto [begin, end] = triangles_of_end(node);
-        if (begin == grid.first_triangle && grid.skipped > 0) leaves.push_back(leaf_of(other, begin - 1));
-        if (end == grid.last_triangle && end < other.triangle_count() && (end - other.first_end_triangle()) % kEndTriangles != 0) leaves.push_back(leaf_of(other, end));
-        continue;
-      }
-      for (int row = std::max(0, node.row - 1); row <= std::min(rows - 1, node.row + 1); ++row)
-        for (int step = -1; step <= 1; ++step) leaves.push_back(node_at(grid, 0, row, (node.column + step + columns) % columns));
+LatticeCrossings::Others LatticeCrossings::find_between_same(std::span<const std::array<int, 2>> pairs, const LatticeMesh& other) const {
+  std::vector<Task> leaves_of_pairs, tasks;
+  for (const auto& [s, t] : pairs) {
+    const int a = leaf_of(other, s), b = leaf_of(other, t);
+    leaves_of_pairs.push_back({std::min(a, b), std::max(a, b)});
+  }
+  tasks = leaves_of_pairs;
+  std::sort(tasks.begin(), tasks.end());
+  tasks.erase(std::unique(tasks.begin(), tasks.end()), tasks.end());
+  std::vector<std::vector<std::array<int, 2>>> found(tasks.size());
+  for_each_block(tasks.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
+    Leaves& leaves = fresh_leaves();
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto [a, b] = tasks[i];
+      const Bounds bounds = b < first_of_ends() ? measure_square(other, nodes_[b]) : measure_end(other, nodes_[b]);
+      find_between(other, a, b, bounds.around, contact(tree_, a, b), nullptr, leaves, found[i]);
     }
-  std::vector<char> are_asked;
-  mark(leaves, are_asked);
-  std::sort(leaves.begin(), leaves.end());
-  leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
-  Tree tree = tree_;
-  measure(other, leaves, tree);
-  return find({other, tree, &are_asked, nullptr, true});
+  });
+  Others others;
+  for (const auto& some : found) others.pairs.insert(others.pairs.end(), some.begin(), some.end());
+  std::sort(others.pairs.begin(), others.pairs.end());
+  others.given_there = std::count_if(leaves_of_pairs.begin(), leaves_of_pairs.end(), [&](const Task& task) {
+    return !found[std::lower_bound(tasks.begin(), tasks.end(), task) - tasks.begin()].empty();
+  });
+  return others;
 }
 
 }  // namespace skeletex

@@ -20,8 +20,12 @@ class LatticeCrossings {
   /// Of the same lattice with some triangles changed: the pairs with one of these.
   std::vector<std::array<int, 2>> find(const LatticeMesh& lattice, std::span<const int> changed);
 
-  /// Of another mesh of this lattice: the pairs that lie where given ones of this mesh do, or next to it.
-  std::vector<std::array<int, 2>> find_around(std::span<const std::array<int, 2>> pairs, const LatticeMesh& other) const;
+  /// Of another mesh of this lattice: the pairs between the same parts (4 x 4 quads, or eight triangles at an end) as given ones.
+  struct Others {
+    std::vector<std::array<int, 2>> pairs;
+    std::size_t given_there = 0;  ///< of the given ones, those between parts where there is any of the others
+  };
+  Others find_between_same(std::span<const std::array<int, 2>> pairs, const LatticeMesh& other) const;
 
  private:
   /// Least and greatest coordinates; the fourth does not count.
@@ -79,7 +83,6 @@ class LatticeCrossings {
     const Tree& tree;
     const std::vector<char>* are_asked = nullptr;  ///< nodes; all without
     const std::vector<char>* is_asked = nullptr;   ///< triangles; all without
-    bool are_both = false;                         ///< both nodes of a pair are to be asked for
   };
   using Task = std::array<int, 2>;  // nodes
   /// Where triangles of two nodes can meet. Those in one plane can seem to at vertices that they share, or with sides on one straight seam, by
@@ -121,10 +124,12 @@ class LatticeCrossings {
   bool is_in_cap(const Tree& tree, const Node& node, int end) const;
   bool are_quads_smooth(const LatticeMesh& lattice, int patch, int s, int t) const;
   Contact split(const Search& search, const Task& task, std::vector<Task>& tasks) const;
+  static Leaves& fresh_leaves();
   Leaf& leaf_at(const LatticeMesh& lattice, int node, Leaf& leaf) const;
   void place(const LatticeMesh& lattice, int i, Leaf& leaf) const;
   static bool is_beside(const Leaf& leaf, int i, const Leaf& others, int k);
-  void find_between(const Search& search, int a, int b, Contact contact, Leaves& leaves, std::vector<std::array<int, 2>>& pairs) const;
+  void find_between(const LatticeMesh& lattice, int a, int b, const Box& around_b, Contact contact, const std::vector<char>* is_asked, Leaves& leaves,
+                    std::vector<std::array<int, 2>>& pairs) const;
   std::vector<std::array<int, 2>> find(const Search& search) const;
 
   float margin_;
