@@ -4,8 +4,7 @@
 //   relax_texels                 free texels follow their neighbours half way
 //   offer_edges, place_on_edges  free texels go to the nearest point of a creased edge
 //   place_snapped                positions of texels on vertices and edges
-//   put_listed_back, find_bad_around, put_back
-//                                texels of a list, and what then folds in the map or in space, go back to the even lattice
+//   put_listed_back              texels of a list, and what then folds in the map or in space, go back to the even lattice
 // A reading position is an offset from the texel's own place in the lattice, in cells: two planes over the texture, x
 // around, y along. Rows 0 and height-1 stay. `anchors` says what holds a texel: 0 nothing, 1 + i vertex i of the list
 // of vertices, -1 - i edge i. Vertices and edges come with their patch and their place (x, y) in its cells, x unwrapped.
@@ -23,8 +22,7 @@
 #define MARGIN 0.6f        // cells that the rows next to a seam or pole keep from it
 #define LEAST_MOVE 0.01f   // cells: shorter steps of free texels are not worth their test
 #define PLACED 5           // states of a vertex: 0 to 3 the candidate it claims, 4 none is left
-#define TAKEN 1            // by one of the work-items that would put a texel back
-#define BACK 2
+#define BAD 1              // a mark of a texel's quad
 #define NO_OFFER 0x7fffffff
 #define AT_ONCE 4          // columns that edges look at together
 
@@ -370,69 +368,64 @@ int is_bad_quad(global const PatchRecord* restrict p, int texture_width, int col
          (is_turned(now[1], now[2], now[3], normal) && !is_turned(even[1], even[2], even[3], normal));
 }
 
-// Both kernels take the length of their list from the device, so that a launch need not wait for the one before: NDRange any.
-// The list of bad quads among the four at each of a list of texels; their order is any.
-// in   counts[in]: how many texels there are
-// out  is_bad: 1 for those of the list; counts[in + 1]: how many they are, 0 before
-kernel void find_bad_around(const int in, const int texture_width, global const int* restrict changed, global const int* restrict texel_patches,
-                            global const PatchRecord* restrict patches, global const float* restrict offset_x, global const float* restrict offset_y,
-                            global const float* restrict even_x, global const float* restrict even_y, global const float* restrict even_z,
-                            global const float* restrict x, global const float* restrict y, global const float* restrict z, global int* restrict is_bad,
-                            global int* restrict bad, global int* restrict counts) {
-  for (int i = (int)get_global_id(0), count = 4 * counts[in]; i < count; i += (int)get_global_size(0)) {
-    const int texel = changed[i >> 2];
-    global const PatchRecord* p = patches + texel_patches[texel];
-    const int line = texel / texture_width;
-    const int from = texel - line * texture_width - p->x - (i & 1);
-    const int column = from < 0 ? from + p->width : from, row = line - p->y - ((i >> 1) & 1);
-    const int quad = texel_at(p, texture_width, column, row);
-    if (is_bad_quad(p, texture_width, column, row, offset_x, offset_y, even_x, even_y, even_z, x, y, z) && atomic_xchg(is_bad + quad, 1) == 0)
-      bad[atomic_inc(counts + in + 1)] = quad;
-  }
-}
+#if ROW_ITEMS > 1
+#define WAIT_FOR_GROUP() barrier(CLK_GLOBAL_MEM_FENCE)
+#else
+#define WAIT_FOR_GROUP()
+#endif
 
-// The texels of bad quads go back as well. What a texel does here does not depend on others, so
-// that their order is any.
-// in   counts[in]: how many quads there are; before_x, before_y, before_z: where they were; is_back: BACK for texels that have gone back, TAKEN for those that were there
-// out  changed: the list of texels that have gone back now; counts[in + 1]: how many they are, 0 before; is_bad: 0 again
-kernel void put_back(const int in, const int texture_width, global const int* restrict bad, global const int* restrict texel_patches,
-                     global const PatchRecord* restrict patches, global const float* restrict before_x, global const float* restrict before_y,
-                     global const float* restrict before_z, global const float* restrict home_x, global const float* restrict home_y,
-                     global int* restrict is_bad, global int* restrict is_back, global int* restrict anchors, global float* restrict offset_x,
-                     global float* restrict offset_y, global float* restrict x, global float* restrict y, global float* restrict z,
-                     global int* restrict changed, global int* restrict counts) {
-  for (int i = (int)get_global_id(0), count = 4 * counts[in]; i < count; i += (int)get_global_size(0)) {
-    const int quad = bad[i >> 2];
-    is_bad[quad] = 0;
-    global const PatchRecord* p = patches + texel_patches[quad];
-    const int line = quad / texture_width, row = line - p->y + ((i >> 1) & 1);
-    if (row < 1 || row > p->height - 2) continue;
-    const int texel = texel_at(p, texture_width, quad - line * texture_width - p->x + (i & 1), row);
-    if (atomic_cmpxchg(is_back + texel, 0, TAKEN) != 0) continue;
-    if (x[texel] == before_x[texel] && y[texel] == before_y[texel] && z[texel] == before_z[texel]) continue;
-    x[texel] = before_x[texel], y[texel] = before_y[texel], z[texel] = before_z[texel];
-    offset_x[texel] = home_x[texel], offset_y[texel] = home_y[texel];
-    anchors[texel] = 0;
-    atomic_xchg(is_back + texel, BACK);
-    changed[atomic_inc(counts + in + 1)] = texel;
+// NDRange: one work-group of ROW_ITEMS. Texels of a list go back, those on vertices only `with_vertices`; and in rounds those of bad quads at texels that
+// have gone back in the round before. Rounds are many, but soon of few texels, and a launch takes longer than most of them. What a
+// texel does within a round does not depend on others, so that their order is any.
+// in   before_x, before_y, before_z: where they were
+// in and out  marks: per texel bits; `taken`: it has gone back, or was there, set in none before; BAD: its quad, in none
+// out  back: behind their number (0 before), those that have gone back; bad: quads of a round
+kernel void put_listed_back(const int count, const int with_vertices, const int taken, const int texture_width, global const int* restrict listed,
+                            global const int* restrict texel_patches, global const PatchRecord* restrict patches, global const float* restrict even_x,
+                            global const float* restrict even_y, global const float* restrict even_z, global const float* restrict before_x,
+                            global const float* restrict before_y, global const float* restrict before_z, global const float* restrict home_x,
+                            global const float* restrict home_y, volatile global int* marks, global int* restrict anchors,
+                            global float* offset_x, global float* offset_y, global float* x, global float* y, global float* z,
+                            volatile global int* back, volatile global int* bad) {
+  const int own = (int)get_local_id(0);
+  for (int begin = 0, end = -1; begin != end;) {
+    // The texels of the list in the first round, then those of bad quads.
+    const int is_first = end < 0, candidates = is_first ? count : 4 * bad[0];
+    for (int i = own; i < candidates; i += ROW_ITEMS) {
+      int texel;
+      if (is_first) {
+        texel = listed[i];
+        if (anchors[texel] > 0 && !with_vertices) continue;
+      } else {
+        const int quad = bad[1 + (i >> 2)];
+        atomic_and(marks + quad, ~BAD);
+        global const PatchRecord* p = patches + texel_patches[quad];
+        const int line = quad / texture_width, row = line - p->y + ((i >> 1) & 1);
+        if (row < 1 || row > p->height - 2) continue;
+        texel = texel_at(p, texture_width, quad - line * texture_width - p->x + (i & 1), row);
+        if (atomic_or(marks + texel, taken) & taken) continue;
+      }
+      if (x[texel] == before_x[texel] && y[texel] == before_y[texel] && z[texel] == before_z[texel]) continue;
+      if (is_first) atomic_or(marks + texel, taken);
+      x[texel] = before_x[texel], y[texel] = before_y[texel], z[texel] = before_z[texel];
+      offset_x[texel] = home_x[texel], offset_y[texel] = home_y[texel];
+      anchors[texel] = 0;
+      back[1 + atomic_inc(back)] = texel;
+    }
+    WAIT_FOR_GROUP();
+    begin = max(end, 0), end = back[0];
+    if (own == 0) bad[0] = 0;
+    WAIT_FOR_GROUP();
+    for (int i = 4 * begin + own; i < 4 * end; i += ROW_ITEMS) {
+      const int texel = back[1 + (i >> 2)];
+      global const PatchRecord* p = patches + texel_patches[texel];
+      const int line = texel / texture_width;
+      const int from = texel - line * texture_width - p->x - (i & 1);
+      const int column = from < 0 ? from + p->width : from, row = line - p->y - ((i >> 1) & 1);
+      const int quad = texel_at(p, texture_width, column, row);
+      if (is_bad_quad(p, texture_width, column, row, offset_x, offset_y, even_x, even_y, even_z, x, y, z) && !(atomic_or(marks + quad, BAD) & BAD))
+        bad[1 + atomic_inc(bad)] = quad;
+    }
+    WAIT_FOR_GROUP();
   }
-}
-
-// NDRange (count). Texels of a list go back, those on vertices only when `with_vertices` says so.
-// out  changed: those that have; changed_count: how many they are, 0 before
-kernel void put_listed_back(const int count, const int with_vertices, global const int* restrict listed,
-                            global const float* restrict before_x, global const float* restrict before_y, global const float* restrict before_z,
-                            global const float* restrict home_x, global const float* restrict home_y, global int* restrict is_back,
-                            global int* restrict anchors, global float* restrict offset_x, global float* restrict offset_y, global float* restrict x,
-                            global float* restrict y, global float* restrict z, global int* restrict changed, global int* restrict changed_count) {
-  const int i = (int)get_global_id(0);
-  if (i >= count) return;
-  const int texel = listed[i];
-  if (anchors[texel] > 0 && !with_vertices) return;
-  if (x[texel] == before_x[texel] && y[texel] == before_y[texel] && z[texel] == before_z[texel]) return;
-  is_back[texel] = BACK;
-  x[texel] = before_x[texel], y[texel] = before_y[texel], z[texel] = before_z[texel];
-  offset_x[texel] = home_x[texel], offset_y[texel] = home_y[texel];
-  anchors[texel] = 0;
-  changed[atomic_inc(changed_count)] = texel;
 }

@@ -209,7 +209,8 @@ TEST(Snap, WithTexelsThatGoBackGoesWhatThenFoldsAndNothingElse) {
   for (int r = 1; r + 1 < height; ++r)
     for (int j = 0; j < width; ++j)
       if (random() % 10 == 0) marks[patch.texel(j, r)] = 1, marked.push_back(static_cast<int>(patch.texel(j, r)));
-  const std::vector<int> back = put_back_listed(device(), patch.layout, even_points, even_points, marked, true, positions, points);
+  TexelReturns returns(device(), patch.layout);
+  const std::vector<int> back = put_back_listed(device(), patch.layout, even_points, even_points, marked, true, returns, positions, points);
   EXPECT_FALSE(back.empty());
   const std::array<std::vector<float>, 3> got{device().download(points.x), device().download(points.y), device().download(points.z)};
 

@@ -56,7 +56,7 @@ std::vector<KernelVariant> encoding_kernels(const ClContext& context, const Enco
     add("guard.cl", {"measure_triangles"}, items);
     add("metro.cl", {"find_nearest_triangles"}, kSearch);
     add("guard.cl", {"measure_vertices"}, items);
-    add("snap.cl", {"put_listed_back", "find_bad_around", "put_back"}, items);
+    add("snap.cl", {"put_listed_back"}, rows);
     add("lattice.cl", {"choose_listed_diagonals"}, items);
   }
   add("encode.cl", {"encode_texels"}, items);

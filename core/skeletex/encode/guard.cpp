@@ -8,6 +8,7 @@
 #include <future>
 #include <iterator>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "skeletex/measure/lattice_crossings.h"
@@ -59,18 +60,34 @@ ClRange over(std::size_t count) { return {{count, 1}, {64, 1}}; }
 struct PlacedVertex {
   int patch, point;  // its number among the vertices of DeviceMaps
   float x, y;        // in the cells of the patch
+  int texel;         // whose quad it is measured around
 };
-std::vector<PlacedVertex> place_vertices(std::span<const Chart> charts, std::span<const Patch> patches, const DeviceMaps& maps) {
+/// By lines of the texture.
+struct PlacedVertices {
+  std::vector<PlacedVertex> all;
+  std::vector<int> first_of_line;  // and the end
+};
+PlacedVertices place_vertices(std::span<const Chart> charts, std::span<const Patch> patches, const DeviceMaps& maps, const DeviceLayout& layout) {
   std::vector<PlacedVertex> placed;
+  PlacedVertices by_line;
+  by_line.first_of_line.assign(layout.height + 1, 0);
   for (int bone = 0; bone < static_cast<int>(charts.size()); ++bone) {
     if (patches[bone].method != Method::kVsm) continue;
     const Chart& chart = charts[bone];
-    for (int i = 0; i < static_cast<int>(chart.positions.size()); ++i)
-      if (chart.kinds[i] == ChartVertex::kInner)
-        placed.push_back({bone, maps.first_vertex[bone] + i, static_cast<float>(chart.v[i] * patches[bone].rectangle.width),
-                          static_cast<float>(row_of(patches[bone].row_u, chart.u[i]))});
+    const Rectangle& r = patches[bone].rectangle;
+    for (int i = 0; i < static_cast<int>(chart.positions.size()); ++i) {
+      if (chart.kinds[i] != ChartVertex::kInner) continue;
+      const auto x = static_cast<float>(chart.v[i] * r.width), y = static_cast<float>(row_of(patches[bone].row_u, chart.u[i]));
+      const int column = static_cast<int>(std::floor(x)), line = r.y + std::clamp(static_cast<int>(std::floor(y)), 1, r.height - 3);
+      placed.push_back({bone, maps.first_vertex[bone] + i, x, y, line * layout.width + r.x + (column % r.width + r.width) % r.width});
+      ++by_line.first_of_line[line + 1];
+    }
   }
-  return placed;
+  std::partial_sum(by_line.first_of_line.begin(), by_line.first_of_line.end(), by_line.first_of_line.begin());
+  by_line.all.resize(placed.size());
+  std::vector<int> next = by_line.first_of_line;
+  for (const PlacedVertex& vertex : placed) by_line.all[next[vertex.texel / layout.width]++] = vertex;
+  return by_line;
 }
 
 /// How far a lattice and the original are from each other, measured again where the lattice has changed. What is found from nearby
@@ -83,7 +100,7 @@ class Distances {
         layout_(layout),
         maps_(maps),
         search_(context, std::move(tree)),
-        placed_(place_vertices(sources.charts, sources.model.patches, maps)),
+        placed_(place_vertices(sources.charts, sources.model.patches, maps, layout)),
         normals_(context.allocate<float>(3 * static_cast<std::size_t>(maps.triangle_count))),
         texel_normals_(context.allocate<float>(3 * layout.size())) {
     context.launch({"guard.cl", "find_normals"}, over(maps.triangle_count), maps.triangle_count, maps.corners, maps.x, maps.y, maps.z, normals_);
@@ -166,47 +183,81 @@ class Distances {
   const std::vector<Measured>& faults() const { return faults_; }
 
   /// From the original's vertices that no texel sits on to the lattice.
-  /// \param back, changed  texels that have gone back since the call before, and triangles that have changed: only vertices near them are
-  ///                       looked at again. All in the first call
   /// \param anchors  per texel
   /// \return those that are further than the limit: the triangles that they are nearest to
-  std::vector<int> find_far_vertices(const LatticeMesh& lattice, const SnapFeatures& features, const std::vector<int>& back,
-                                     const std::vector<int>& changed, const std::vector<int>& anchors, float limit) {
-    const bool is_first = vertices_.empty();
-    std::vector<char> is_held(maps_.x.size, 0);
-    for (const int anchor : anchors)
-      if (anchor > 0) is_held[features.vertices[anchor - 1].point] = 1;
-    vertices_.resize(placed_.size());
-    if (!is_first) {
-      is_near_.assign(anchors.size(), 0);
-      for (const int texel : back) add_around(lattice, texel);
+  std::vector<int> find_far_vertices(const LatticeMesh& lattice, const SnapFeatures& features, std::vector<int> anchors, float limit) {
+    anchors_ = std::move(anchors);
+    is_held_.assign(maps_.x.size, 0);
+    for (const int anchor : anchors_)
+      if (anchor > 0) is_held_[features.vertices[anchor - 1].point] = 1;
+    vertices_.resize(placed_.all.size());
+    are_near_.assign(layout_.size(), 0), are_lines_near_.assign(layout_.height, 0);
+    std::vector<int> asked;
+    for (std::size_t i = 0; i < placed_.all.size(); ++i)
+      if (is_held_[placed_.all[i].point] == 0) asked.push_back(static_cast<int>(i));
+    measure_vertices(lattice, asked, limit);
+    return triangles_at_far(lattice, {}, limit);
+  }
+  /// The same after a move: only vertices near texels that have gone back are looked at again.
+  /// \param back, changed  those texels, and triangles that have changed
+  std::vector<int> find_far_vertices(const LatticeMesh& lattice, const SnapFeatures& features, const std::vector<int>& back, const std::vector<int>& changed,
+                                     float limit) {
+    for (const int texel : back) {
+      if (anchors_[texel] > 0) is_held_[features.vertices[anchors_[texel] - 1].point] = 0;
+      anchors_[texel] = 0;
+      add_around(lattice, texel);
     }
-    std::vector<int> points, patches, asked;  // asked: of placed_
+    std::vector<int> asked;
+    for (int line = 0; line < layout_.height; ++line) {
+      if (std::exchange(are_lines_near_[line], 0) == 0) continue;
+      for (int i = placed_.first_of_line[line]; i < placed_.first_of_line[line + 1]; ++i) {
+        if (are_near_[placed_.all[i].texel] == 0) continue;
+        vertices_[i].is_far = false;
+        if (is_held_[placed_.all[i].point] == 0) asked.push_back(i);
+      }
+      std::fill_n(are_near_.begin() + static_cast<std::ptrdiff_t>(line) * layout_.width, layout_.width, 0);
+    }
+    measure_vertices(lattice, asked, limit);
+    return triangles_at_far(lattice, changed, limit);
+  }
+
+ private:
+  /// A vertex of the original as it was measured last, to the quads around it.
+  struct MeasuredVertex {
+    float distance2 = 0;
+    int nearest = -1;
+    bool is_far = false;
+    bool is_compared = false;  ///< to strips and fans as well
+    int nearer = -1;           ///< then the triangle that it is nearest to, -1 if it is not far
+  };
+  /// \param asked  of placed_
+  void measure_vertices(const LatticeMesh& lattice, const std::vector<int>& asked, float limit) {
+    std::erase_if(far_, [&](int i) { return !vertices_[i].is_far; });
+    if (asked.empty()) return;
+    std::vector<int> points, patches;
     std::vector<float> places;
-    for (std::size_t i = 0; i < placed_.size(); ++i) {
-      const PlacedVertex& vertex = placed_[i];
-      if (!is_first && is_near_[texel_of(vertex)] == 0) continue;
-      vertices_[i].is_far = false;
-      if (is_held[vertex.point]) continue;
-      asked.push_back(static_cast<int>(i));
+    for (const int i : asked) {
+      const PlacedVertex& vertex = placed_.all[i];
       points.push_back(vertex.point), patches.push_back(vertex.patch);
       places.push_back(vertex.x), places.push_back(vertex.y);
     }
-    if (!points.empty()) {
-      auto device_distances = context_.allocate<float>(points.size());
-      auto device_nearest = context_.allocate<int>(points.size());
-      context_.launch({"guard.cl", "measure_vertices"}, over(points.size()), static_cast<int>(points.size()), layout_.width, limit * limit,
-                      context_.upload(points), context_.upload(patches), context_.upload(places), layout_.patches, lattice.device_diagonals(), maps_.x,
-                      maps_.y, maps_.z, lattice.device_points().x, lattice.device_points().y, lattice.device_points().z, device_distances, device_nearest);
-      const std::vector<float> distances2 = context_.download(device_distances);
-      const std::vector<int> nearest = context_.download(device_nearest);
-      for (std::size_t k = 0; k < asked.size(); ++k) vertices_[asked[k]] = {distances2[k], nearest[k], distances2[k] > limit * limit};
+    auto device_distances = context_.allocate<float>(points.size());
+    auto device_nearest = context_.allocate<int>(points.size());
+    context_.launch({"guard.cl", "measure_vertices"}, over(points.size()), static_cast<int>(points.size()), layout_.width, limit * limit,
+                    context_.upload(points), context_.upload(patches), context_.upload(places), layout_.patches, lattice.device_diagonals(), maps_.x,
+                    maps_.y, maps_.z, lattice.device_points().x, lattice.device_points().y, lattice.device_points().z, device_distances, device_nearest);
+    const std::vector<float> distances2 = context_.download(device_distances);
+    const std::vector<int> nearest = context_.download(device_nearest);
+    for (std::size_t k = 0; k < asked.size(); ++k) {
+      vertices_[asked[k]] = {distances2[k], nearest[k], distances2[k] > limit * limit};
+      if (vertices_[asked[k]].is_far) far_.push_back(asked[k]);
     }
+  }
+  std::vector<int> triangles_at_far(const LatticeMesh& lattice, const std::vector<int>& changed, float limit) {
     std::vector<int> far;
-    std::vector<std::size_t> at_ends;
-    for (std::size_t i = 0; i < placed_.size(); ++i) {
-      if (!vertices_[i].is_far) continue;
-      const PlacedVertex& vertex = placed_[i];
+    std::vector<int> at_ends;
+    for (const int i : far_) {
+      const PlacedVertex& vertex = placed_.all[i];
       if (vertex.y < 2 || vertex.y > static_cast<float>(sources_.model.patches[vertex.patch].rectangle.height - 3)) {
         at_ends.push_back(i);
       } else {
@@ -219,7 +270,7 @@ class Distances {
     for_each_block(at_ends.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
       MeasuredVertex& measured = vertices_[at_ends[k]];
       if (measured.is_compared && !have_ends_moved) return;
-      const PlacedVertex& vertex = placed_[at_ends[k]];
+      const PlacedVertex& vertex = placed_.all[at_ends[k]];
       const Vec3& point = sources_.charts[vertex.patch].positions[vertex.point - maps_.first_vertex[vertex.patch]];
       double least2 = measured.distance2;
       measured.is_compared = true, measured.nearer = measured.nearest;
@@ -234,32 +285,18 @@ class Distances {
         if (measured.nearer < 0) return;
       }
     });
-    for (const std::size_t i : at_ends)
+    for (const int i : at_ends)
       if (vertices_[i].nearer >= 0) far.push_back(vertices_[i].nearer);
     return far;
   }
 
- private:
-  /// A vertex of the original as it was measured last, to the quads around it.
-  struct MeasuredVertex {
-    float distance2 = 0;
-    int nearest = -1;
-    bool is_far = false;
-    bool is_compared = false;  ///< to strips and fans as well
-    int nearer = -1;           ///< then the triangle that it is nearest to, -1 if it is not far
-  };
-  /// The texel whose quad a vertex is measured around.
-  int texel_of(const PlacedVertex& vertex) const {
-    const Rectangle& r = sources_.model.patches[vertex.patch].rectangle;
-    const int column = static_cast<int>(std::floor(vertex.x)), row = std::clamp(static_cast<int>(std::floor(vertex.y)), 1, r.height - 3);
-    return (r.y + row) * layout_.width + r.x + (column % r.width + r.width) % r.width;
-  }
   /// Texels whose vertices can be measured to a triangle that changes with one.
   void add_around(const LatticeMesh& lattice, int texel) {
     const Rectangle& r = lattice.model().patches[lattice.patch_of(texel)].rectangle;
     const int row = texel / layout_.width - r.y, column = texel % layout_.width - r.x;
     for (int i = std::max(1, row - kVertexReach); i <= std::min(r.height - 3, row + kVertexReach); ++i) {
-      const auto line = is_near_.begin() + (r.y + i) * static_cast<std::ptrdiff_t>(layout_.width) + r.x;
+      are_lines_near_[r.y + i] = 1;
+      const auto line = are_near_.begin() + (r.y + i) * static_cast<std::ptrdiff_t>(layout_.width) + r.x;
       if (column >= kVertexReach && column + kVertexReach < r.width)
         std::fill_n(line + column - kVertexReach, 2 * kVertexReach + 1, 1);
       else
@@ -368,12 +405,15 @@ class Distances {
   const DeviceLayout& layout_;
   const DeviceMaps& maps_;
   NearestSearch search_;
-  std::vector<PlacedVertex> placed_;
+  PlacedVertices placed_;
   ClBuffer<float> normals_;        // of the maps' triangles
   ClBuffer<float> texel_normals_;  // of those at the texels of the lattice that was measured last
   std::vector<Measured> faults_;
   std::vector<MeasuredVertex> vertices_;  // as placed_
-  std::vector<char> is_near_;             // texels
+  std::vector<int> far_;                  // of these
+  std::vector<int> anchors_;              // per texel
+  std::vector<char> is_held_;             // vertices of the maps that a texel sits on
+  std::vector<char> are_near_, are_lines_near_;  // texels, and lines of the texture that have some
 };
 
 /// A set of texels of inner rows.
@@ -436,7 +476,7 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
   const auto is_pair_near_even_fault = [&](const std::array<int, 2>& pair) { return is_near_even_fault(pair[0]) && is_near_even_fault(pair[1]); };
   bool tolerates_crossing = false, tolerates_turning = false;
   std::vector<int> back, changed;  // texels and triangles, since the pass before
-  std::vector<int> anchors = context.download(positions.anchors);
+  TexelReturns returns(context, layout);
   for (int pass = 0; pass < kPasses; ++pass) {
     marks.clear();
     auto finding = pass == 0 ? std::move(finding_all) : std::async(std::launch::async, [&] { return crossings.find(lattice, changed); });
@@ -444,7 +484,8 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
       distances.measure_suspects(lattice, triangles, limit);
     else
       distances.measure_triangles(lattice, changed, triangles, limit);
-    const std::vector<int> far = distances.find_far_vertices(lattice, features, back, changed, anchors, limit);
+    const std::vector<int> far = pass == 0 ? distances.find_far_vertices(lattice, features, context.download(positions.anchors), limit)
+                                           : distances.find_far_vertices(lattice, features, back, changed, limit);
     const Pairs pairs = finding.get();
     if (pass == 0 && pairs.size() > kManyPairs) {
       const LatticeCrossings::Others evens = crossings.find_between_same(pairs, even_lattice);
@@ -473,10 +514,9 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
 
     // Vertices are given up only when the texels between them have been.
     const bool with_vertices = pass > 0;
-    back = put_back_listed(context, layout, even, filtered, marks.texels(), with_vertices, positions, points);
+    back = put_back_listed(context, layout, even, filtered, marks.texels(), with_vertices, returns, positions, points);
     report.texels_put_back += static_cast<int>(back.size());
     if (back.empty() && with_vertices) break;
-    for (const int texel : back) anchors[texel] = 0;
     changed = lattice.move(back, even_lattice);
   }
   return report;

@@ -20,11 +20,9 @@ constexpr int kEdgeRounds = 2;          // what one round has moved lets texels 
 constexpr double kFlat = 1e-6;          // radians: what rounding may make of a flat edge
 constexpr double kFullDihedral = 0.5;   // radians: edges this sharp attract texels fully
 constexpr int kRoundsBetweenReads = 3;  // of claims, between two looks at how many wait
-constexpr int kRoundsBetweenLooks = 6;  // of quads that fold, between two looks at whether there are any
-constexpr int kAtOnce = 1024;           // work-items for these
+constexpr std::size_t kReturnsAtOnce = 4096;  // texels that have gone back and their number
 constexpr double kLargestOffer = 8;     // cells: what lies further is rounded down to it
 constexpr int kNoOffer = std::numeric_limits<int>::max();  // as in snap.cl
-constexpr int kBack = 2;
 
 /// One work-item per vertex or edge, in groups of one size: PoCL compiles a kernel for every size that it meets.
 ClRange over(int count) { return {{static_cast<std::size_t>(count), 1}, {64, 1}}; }
@@ -232,36 +230,32 @@ void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceM
                  context.upload(vertex_points), context.upload(edge_points), maps.x, maps.y, maps.z, points.x, points.y, points.z);
 }
 
+TexelReturns::TexelReturns(ClContext& context, const DeviceLayout& layout)
+    : marks(context.allocate<int>(layout.size())), back(context.allocate<int>(layout.size() + 1)), bad(context.allocate<int>(layout.size() + 1)) {
+  context.fill(marks, 0);
+}
+
 std::vector<int> put_back_listed(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before,
-                                 const std::vector<int>& texels, bool with_vertices, ReadingPositions& positions, TexelPoints& points) {
+                                 const std::vector<int>& texels, bool with_vertices, TexelReturns& returns, ReadingPositions& positions, TexelPoints& points) {
   if (texels.empty()) return {};
-  auto is_bad = context.allocate<int>(layout.size()), is_back = context.allocate<int>(layout.size());
-  auto bad = context.allocate<int>(layout.size()), changed = context.allocate<int>(layout.size());
-  // How many texels have gone back, quads at them are bad, texels of these have gone back, and so on.
-  std::vector<int> counts(2 * kRoundsBetweenLooks + 1, 0);
-  auto device_counts = context.upload(counts);
-  context.fill(is_bad, 0), context.fill(is_back, 0);
-  context.launch({"snap.cl", "put_listed_back"}, over(static_cast<int>(texels.size())), static_cast<int>(texels.size()), static_cast<int>(with_vertices),
-                 context.upload(texels), before.x, before.y, before.z, positions.home_x, positions.home_y, is_back, positions.anchors, positions.x,
-                 positions.y, points.x, points.y, points.z, changed, device_counts);
-  // Texels only ever go back, so this ends.
-  do {
-    for (int round = 0; round < kRoundsBetweenLooks; ++round) {
-      context.launch({"snap.cl", "find_bad_around"}, over(kAtOnce), 2 * round, layout.width, changed, layout.texel_patches, layout.patches, positions.x,
-                     positions.y, even.x, even.y, even.z, points.x, points.y, points.z, is_bad, bad, device_counts);
-      context.launch({"snap.cl", "put_back"}, over(kAtOnce), 2 * round + 1, layout.width, bad, layout.texel_patches, layout.patches, before.x, before.y,
-                     before.z, positions.home_x, positions.home_y, is_bad, is_back, positions.anchors, positions.x, positions.y, points.x, points.y,
-                     points.z, changed, device_counts);
-    }
-    counts = {context.download(device_counts).back()};
-    counts.resize(device_counts.size, 0);
-    context.write(device_counts, counts);
-  } while (counts[0] > 0);
-  std::vector<int> back;
-  const std::vector<int> marked = context.download(is_back);
-  for (std::size_t i = 0; i < marked.size(); ++i)
-    if (marked[i] == kBack) back.push_back(static_cast<int>(i));
-  return back;
+  std::vector<int> listed{0};
+  context.write(returns.back, listed);
+  // One work-group: on a CPU one work-item.
+  context.launch({"snap.cl", "put_listed_back"}, row_range(context, 1), static_cast<int>(texels.size()), static_cast<int>(with_vertices),
+                 1 << ++returns.calls, layout.width, context.upload(texels), layout.texel_patches, layout.patches, even.x, even.y, even.z, before.x, before.y,
+                 before.z, positions.home_x, positions.home_y, returns.marks, positions.anchors, positions.x, positions.y, points.x, points.y, points.z,
+                 returns.back, returns.bad);
+  // Nearly always all of them at once.
+  listed.resize(std::min(returns.back.size, kReturnsAtOnce));
+  const auto read = [&](std::size_t begin) {
+    context.queue().enqueueReadBuffer(returns.back.memory, CL_TRUE, begin * sizeof(int), (listed.size() - begin) * sizeof(int), listed.data() + begin);
+  };
+  read(0);
+  const std::size_t known = listed.size();
+  listed.resize(1 + listed[0]);
+  if (listed.size() > known) read(known);
+  listed.erase(listed.begin());
+  return listed;
 }
 
 }  // namespace skeletex

@@ -55,13 +55,20 @@ using TexelPoints = DevicePlanes;
 void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps, const SnapFeatures& features,
                    const ReadingPositions& positions, TexelPoints& points);
 
+/// Lists of put_back_listed, for all its calls on one lattice: 30 at most.
+struct TexelReturns {
+  TexelReturns(ClContext& context, const DeviceLayout& layout);
+  ClBuffer<int> marks, back, bad;  ///< see put_listed_back in snap.cl
+  int calls = 0;
+};
+
 /// Texels of inner rows go back to the even lattice, those on vertices only `with_vertices`; and with them the texels of quads at
 /// them that then fold in the map, or in space where the even lattice does not.
 /// \param even    the even lattice's points, the measure of folds
 /// \param before  what texels go back to: these as they would be stored
 /// \param texels  each once
-/// \return the texels that went back, in order
+/// \return the texels that went back, in any order
 std::vector<int> put_back_listed(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before,
-                                 const std::vector<int>& texels, bool with_vertices, ReadingPositions& positions, TexelPoints& points);
+                                 const std::vector<int>& texels, bool with_vertices, TexelReturns& returns, ReadingPositions& positions, TexelPoints& points);
 
 }  // namespace skeletex
