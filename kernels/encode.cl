@@ -250,28 +250,34 @@ kernel void place_points(const int count, global const int* restrict texels, glo
   z[texel] = from_z[i];
 }
 
-// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. The prefilter, of inner rows (lattice_rows); texels that are held stay.
-kernel void prefilter_positions(const int row_count, const int texture_width, global const int* restrict lattice_rows,
+// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. The prefilter, of inner rows; the others, and texels with one of the anchors' bits
+// `held`, stay as they are.
+// in   lattice_rows: all
+kernel void prefilter_positions(const int row_count, const int texture_width, const int held, global const int* restrict lattice_rows,
                                 global const PatchRecord* restrict patches, global const int* restrict anchors, global const float* restrict x,
                                 global const float* restrict y, global const float* restrict z, global float* restrict out_x, global float* restrict out_y,
                                 global float* restrict out_z) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   global const PatchRecord* restrict p = patches + lattice_rows[4 * k];
-  const int width = p->width, texel = (p->y + lattice_rows[4 * k + 1]) * texture_width + p->x;
+  const int row = lattice_rows[4 * k + 1], width = p->width, texel = (p->y + row) * texture_width + p->x;
+  if (row == 0 || row == p->height - 1) {
+    for (int j = get_local_id(0); j < width; j += ROW_ITEMS) out_x[texel + j] = x[texel + j], out_y[texel + j] = y[texel + j], out_z[texel + j] = z[texel + j];
+    return;
+  }
   // What wraps round apart from the rest; see lattice.cl for `one`.
   const int one = min(width, 1);
   for (int j = 1 + get_local_id(0); j < width - 1; j += ROW_ITEMS) {
-    const int own = texel + j, is_held = anchors[own] != 0;
+    const int own = texel + j, is_held = (anchors[own] & held) != 0;
     const FilteredPoint q = prefilter_point(x, y, z, own, own - one, own + one, own - texture_width, own + texture_width);
     const float px = is_held ? x[own] : q.x, py = is_held ? y[own] : q.y, pz = is_held ? z[own] : q.z;
     out_x[own] = px, out_y[own] = py, out_z[own] = pz;
   }
   for (int side = get_local_id(0); side < 2; side += ROW_ITEMS) {
-    const int own = side == 0 ? texel : texel + width - 1;
+    const int own = side == 0 ? texel : texel + width - 1, is_held = (anchors[own] & held) != 0;
     const FilteredPoint q = prefilter_point(x, y, z, own, side == 0 ? texel + width - 1 : own - 1, side == 0 ? texel + 1 : texel, own - texture_width,
                                             own + texture_width);
-    if (anchors[own] == 0) out_x[own] = q.x, out_y[own] = q.y, out_z[own] = q.z;
+    out_x[own] = is_held ? x[own] : q.x, out_y[own] = is_held ? y[own] : q.y, out_z[own] = is_held ? z[own] : q.z;
   }
 }
 

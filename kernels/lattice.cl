@@ -6,7 +6,7 @@
 #include "skeletex_structs.h"
 #include "quad_diagonal.h"
 
-// left, right, beyond: the columns of the 4 x 4 vertices around the quad beside the texel's own, from this one.
+// left, right, beyond: the columns of the 4 x 4 vertices around the quad beside the texel's own, from this one. is_smooth: the rule, known to the compiler.
 __attribute__((always_inline)) int second_diagonal(int texel, int left, int right, int beyond, int texture_width, int has_before, int has_after,
                                                    int is_smooth, global const float* x, global const float* y,
                                                    global const float* z) {
@@ -15,9 +15,7 @@ __attribute__((always_inline)) int second_diagonal(int texel, int left, int righ
                         {texel + left, texel, texel + right, texel + beyond},
                         {texel + above + left, texel + above, texel + above + right, texel + above + beyond},
                         {texel + after + left, texel + after, texel + after + right, texel + after + beyond}};
-  // Both rules, and no branch: the compiler would make a loop for each.
-  const int smoother = smoother_diagonal(at, has_before, has_after, x, y, z), nearer = takes_second_if_nearer(at, has_before, has_after, x, y, z);
-  return is_smooth && smoother >= 0 ? smoother : nearer;
+  return is_smooth ? takes_second_if_smoother(at, has_before, has_after, x, y, z) : takes_second_if_nearer(at, has_before, has_after, x, y, z);
 }
 
 // The same of any column: they wrap round. Compiled once.
@@ -41,8 +39,13 @@ kernel void choose_diagonals(const int row_count, const int texture_width, const
   // What wraps round apart from the rest, whose loads are contiguous. Distances are not written as the numbers that they are, or
   // the compiler pairs loads next to each other and then no longer vectorises the loop.
   const int one = min(width, 1), two = 2 * one;
-  for (int j = 1 + get_local_id(0); j < width - 2; j += ROW_ITEMS)
-    diagonals[texel + j] = second_diagonal(texel + j, -one, one, two, texture_width, has_before, has_after, is_smooth, x, y, z);
+  if (is_smooth) {
+    for (int j = 1 + get_local_id(0); j < width - 2; j += ROW_ITEMS)
+      diagonals[texel + j] = second_diagonal(texel + j, -one, one, two, texture_width, has_before, has_after, 1, x, y, z);
+  } else {
+    for (int j = 1 + get_local_id(0); j < width - 2; j += ROW_ITEMS)
+      diagonals[texel + j] = second_diagonal(texel + j, -one, one, two, texture_width, has_before, has_after, 0, x, y, z);
+  }
   for (int j = max(1, width - 2) + get_local_id(0); j <= width; j += ROW_ITEMS) {
     const int column = j < width ? j : 0;
     diagonals[texel + column] = second_diagonal_at(texel + column, column, width, texture_width, has_before, has_after, is_smooth, x, y, z);

@@ -47,13 +47,15 @@ __attribute__((always_inline)) Normal normal_of(__global const float* x, __globa
   return n;
 }
 
-// The turn from one normal to another as the length of their difference: 2 sin(angle / 2), precise for small angles.
-__attribute__((always_inline)) float turn_between(Normal a, Normal b) {
+// The turn from one normal to another as the length of their difference: 2 sin(angle / 2), precise for small angles. Its square.
+__attribute__((always_inline)) float turn2_between(Normal a, Normal b) {
   const float dx = a.x - b.x, dy = a.y - b.y, dz = a.z - b.z;
-  return sqrt(dx * dx + dy * dy + dz * dz);
+  return dx * dx + dy * dy + dz * dz;
 }
 
-__attribute__((always_inline)) float least_turn(Normal own, Normal first, Normal second) { return fmin(turn_between(own, first), turn_between(own, second)); }
+__attribute__((always_inline)) float least_turn(Normal own, Normal first, Normal second) {
+  return sqrt(fmin(turn2_between(own, first), turn2_between(own, second)));
+}
 
 // The smoother diagonal, for lattices whose texels sit on edges of the surface: the one whose triangles go on more smoothly
 // into the quads around, that is, the smaller sum over the four sides of the turn between the quad's triangle there and the

@@ -379,25 +379,26 @@ int is_bad_quad(global const PatchRecord* restrict p, int texture_width, int col
 // texel does within a round does not depend on others, so that their order is any.
 // in   before_x, before_y, before_z: where they were
 // in and out  marks: per texel bits; `taken`: it has gone back, or was there, set in none before; BAD: its quad, in none
-// out  back: behind their number (0 before), those that have gone back; bad: quads of a round
+//              counts: how many are on these lists, 0 before
+// out  back: those that have gone back; bad: quads of a round
 kernel void put_listed_back(const int count, const int with_vertices, const int taken, const int texture_width, global const int* restrict listed,
                             global const int* restrict texel_patches, global const PatchRecord* restrict patches, global const float* restrict even_x,
                             global const float* restrict even_y, global const float* restrict even_z, global const float* restrict before_x,
                             global const float* restrict before_y, global const float* restrict before_z, global const float* restrict home_x,
                             global const float* restrict home_y, volatile global int* marks, global int* restrict anchors,
                             global float* offset_x, global float* offset_y, global float* x, global float* y, global float* z,
-                            volatile global int* back, volatile global int* bad) {
+                            global int* back, global int* bad, volatile global int* counts) {
   const int own = (int)get_local_id(0);
   for (int begin = 0, end = -1; begin != end;) {
     // The texels of the list in the first round, then those of bad quads.
-    const int is_first = end < 0, candidates = is_first ? count : 4 * bad[0];
+    const int is_first = end < 0, candidates = is_first ? count : 4 * counts[1];
     for (int i = own; i < candidates; i += ROW_ITEMS) {
       int texel;
       if (is_first) {
         texel = listed[i];
         if (anchors[texel] > 0 && !with_vertices) continue;
       } else {
-        const int quad = bad[1 + (i >> 2)];
+        const int quad = bad[i >> 2];
         atomic_and(marks + quad, ~BAD);
         global const PatchRecord* p = patches + texel_patches[quad];
         const int line = quad / texture_width, row = line - p->y + ((i >> 1) & 1);
@@ -410,21 +411,21 @@ kernel void put_listed_back(const int count, const int with_vertices, const int 
       x[texel] = before_x[texel], y[texel] = before_y[texel], z[texel] = before_z[texel];
       offset_x[texel] = home_x[texel], offset_y[texel] = home_y[texel];
       anchors[texel] = 0;
-      back[1 + atomic_inc(back)] = texel;
+      back[atomic_inc(counts)] = texel;
     }
     WAIT_FOR_GROUP();
-    begin = max(end, 0), end = back[0];
-    if (own == 0) bad[0] = 0;
+    begin = max(end, 0), end = counts[0];
+    if (own == 0) counts[1] = 0;
     WAIT_FOR_GROUP();
     for (int i = 4 * begin + own; i < 4 * end; i += ROW_ITEMS) {
-      const int texel = back[1 + (i >> 2)];
+      const int texel = back[i >> 2];
       global const PatchRecord* p = patches + texel_patches[texel];
       const int line = texel / texture_width;
       const int from = texel - line * texture_width - p->x - (i & 1);
       const int column = from < 0 ? from + p->width : from, row = line - p->y - ((i >> 1) & 1);
       const int quad = texel_at(p, texture_width, column, row);
       if (is_bad_quad(p, texture_width, column, row, offset_x, offset_y, even_x, even_y, even_z, x, y, z) && !(atomic_or(marks + quad, BAD) & BAD))
-        bad[1 + atomic_inc(bad)] = quad;
+        bad[atomic_inc(counts + 1)] = quad;
     }
     WAIT_FOR_GROUP();
   }

@@ -458,7 +458,7 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
   const SkeletexModel& model = sources.model;
   auto tree = std::async(std::launch::async, [&] { return build_triangle_tree(sources.mesh); });
   const LatticeMesh even_lattice(context, model, DiagonalRule::kNearest, layout.patches, filtered);
-  LatticeMesh lattice(context, model, model.diagonals, layout.patches, points);
+  LatticeMesh lattice(even_lattice, model.diagonals, points);
   // Crossings are the host's alone: they are found beside distances, which are for the most part the device's.
   using Pairs = std::vector<std::array<int, 2>>;
   LatticeCrossings crossings(lattice);

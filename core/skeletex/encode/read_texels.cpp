@@ -9,6 +9,7 @@ namespace skeletex {
 namespace {
 
 constexpr int kNoTriangle = std::numeric_limits<int>::max();  // as in encode.cl
+constexpr int kAnyHolds = -1, kNoneHolds = 0;                 // bits of anchors that keep a texel from being filtered
 
 /// Distances along the rays of one SPD patch; a missed texel takes the mean of the nearest hits of its column, weighted
 /// by nearness, or of its row where the whole column missed. \return texels filled
@@ -240,21 +241,20 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     }
   }
 
-  const auto prefilter = [&](const TexelPoints& from, const ClBuffer<int>& held) {
-    TexelPoints filtered = copy_points(context, from);
-    context.launch({"encode.cl", "prefilter_positions"}, row_range(context, inner_rows.size), inner_row_count, texture_width, inner_rows, layout.patches, held,
-                   from.x, from.y, from.z, filtered.x, filtered.y, filtered.z);
+  const auto all_rows = context.upload(lattice_rows({sources.patches.begin(), sources.patches.end()}, RowChoice::kAll));
+  const auto prefilter = [&](const TexelPoints& from, const ClBuffer<int>& anchors, int held) {
+    TexelPoints filtered = allocate_points(context, texels);
+    context.launch({"encode.cl", "prefilter_positions"}, row_range(context, all_rows.size), static_cast<int>(all_rows.size), texture_width, held, all_rows,
+                   layout.patches, anchors, from.x, from.y, from.z, filtered.x, filtered.y, filtered.z);
     return filtered;
   };
   if (is_fitted) result.report.fit = fit_points(context, layout, maps, covering, positions, points);
   if (options.has_prefilter && !(is_fitted && !has_spd)) {
     // What is fitted is not filtered as well: with SPD patches beside it, only these are.
-    points = prefilter(points, is_fitted ? context.upload(vsm_texels(sources.patches, texture_width, texture_height)) : positions.anchors);
+    points = prefilter(points, is_fitted ? context.upload(vsm_texels(sources.patches, texture_width, texture_height)) : positions.anchors, kAnyHolds);
   }
   if ((is_snapped || is_fitted) && sources.guard) {
-    auto nothing = context.allocate<int>(texels);
-    context.fill(nothing, 0);
-    const TexelPoints filtered = options.has_prefilter ? prefilter(even, nothing) : even;
+    const TexelPoints filtered = options.has_prefilter ? prefilter(even, positions.anchors, kNoneHolds) : even;
     const GuardReport guard = put_back_faults(context, *sources.guard, layout, maps, features, even_covering, covering, even, filtered, positions, points);
     result.report.turned_triangles = guard.turned_triangles, result.report.even_turned_triangles = guard.even_turned_triangles;
     (is_fitted ? result.report.fit->texels_put_back : put_back) += guard.texels_put_back;

@@ -20,7 +20,6 @@ constexpr int kEdgeRounds = 2;          // what one round has moved lets texels 
 constexpr double kFlat = 1e-6;          // radians: what rounding may make of a flat edge
 constexpr double kFullDihedral = 0.5;   // radians: edges this sharp attract texels fully
 constexpr int kRoundsBetweenReads = 3;  // of claims, between two looks at how many wait
-constexpr std::size_t kReturnsAtOnce = 4096;  // texels that have gone back and their number
 constexpr double kLargestOffer = 8;     // cells: what lies further is rounded down to it
 constexpr int kNoOffer = std::numeric_limits<int>::max();  // as in snap.cl
 
@@ -231,31 +230,25 @@ void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceM
 }
 
 TexelReturns::TexelReturns(ClContext& context, const DeviceLayout& layout)
-    : marks(context.allocate<int>(layout.size())), back(context.allocate<int>(layout.size() + 1)), bad(context.allocate<int>(layout.size() + 1)) {
+    : marks(context.allocate<int>(layout.size())),
+      back(context.allocate<int>(layout.size())),
+      bad(context.allocate<int>(layout.size())),
+      counts(context.allocate<int>(2)) {
   context.fill(marks, 0);
 }
 
 std::vector<int> put_back_listed(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before,
                                  const std::vector<int>& texels, bool with_vertices, TexelReturns& returns, ReadingPositions& positions, TexelPoints& points) {
   if (texels.empty()) return {};
-  std::vector<int> listed{0};
-  context.write(returns.back, listed);
+  context.fill(returns.counts, 0);
   // One work-group: on a CPU one work-item.
   context.launch({"snap.cl", "put_listed_back"}, row_range(context, 1), static_cast<int>(texels.size()), static_cast<int>(with_vertices),
                  1 << ++returns.calls, layout.width, context.upload(texels), layout.texel_patches, layout.patches, even.x, even.y, even.z, before.x, before.y,
                  before.z, positions.home_x, positions.home_y, returns.marks, positions.anchors, positions.x, positions.y, points.x, points.y, points.z,
-                 returns.back, returns.bad);
-  // Nearly always all of them at once.
-  listed.resize(std::min(returns.back.size, kReturnsAtOnce));
-  const auto read = [&](std::size_t begin) {
-    context.queue().enqueueReadBuffer(returns.back.memory, CL_TRUE, begin * sizeof(int), (listed.size() - begin) * sizeof(int), listed.data() + begin);
-  };
-  read(0);
-  const std::size_t known = listed.size();
-  listed.resize(1 + listed[0]);
-  if (listed.size() > known) read(known);
-  listed.erase(listed.begin());
-  return listed;
+                 returns.back, returns.bad, returns.counts);
+  std::vector<int> back(context.download(returns.counts)[0]);
+  if (!back.empty()) context.queue().enqueueReadBuffer(returns.back.memory, CL_TRUE, 0, back.size() * sizeof(int), back.data());
+  return back;
 }
 
 }  // namespace skeletex

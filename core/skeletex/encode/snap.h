@@ -58,7 +58,7 @@ void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceM
 /// Lists of put_back_listed, for all its calls on one lattice: 30 at most.
 struct TexelReturns {
   TexelReturns(ClContext& context, const DeviceLayout& layout);
-  ClBuffer<int> marks, back, bad;  ///< see put_listed_back in snap.cl
+  ClBuffer<int> marks, back, bad, counts;  ///< see put_listed_back in snap.cl
   int calls = 0;
 };
 

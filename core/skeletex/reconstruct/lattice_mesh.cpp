@@ -2,65 +2,87 @@
 #include "skeletex/reconstruct/lattice_mesh.h"
 
 #include <algorithm>
+#include <numeric>
+#include <utility>
 
 #include "skeletex/model/parallel.h"
 
 namespace skeletex {
 
-LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, ClBuffer<PatchRecord> patches, DevicePlanes points)
-    : context_(context),
-      model_(model),
-      rule_(rule),
-      walls_(model.skeleton),
-      lattice_(number_lattice(model)),
-      texel_patches_(static_cast<std::size_t>(model.texture.width) * model.texture.height, -1),
-      positions_(lattice_.vertex_count),
-      points_(std::move(points)),
-      patches_(std::move(patches)) {
+std::shared_ptr<const LatticeMesh::Common> LatticeMesh::make_common(ClContext& context, const SkeletexModel& model, ClBuffer<PatchRecord> patches) {
+  Common common{Walls(model.skeleton), number_lattice(model), {}, {}, {}, std::move(patches)};
   std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kInner);
   std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == model.patches[row[0]].rectangle.height - 2; });
-  rows_ = context.upload(rows);
-  // Before the kernel is queued, so that the host can go on beside it.
-  planes_ = {context.download(points_.x), context.download(points_.y), context.download(points_.z)};
-  device_diagonals_ = context.allocate<int>(texel_patches_.size());
-  context.launch({"lattice.cl", "choose_diagonals"}, row_range(context, rows.size()), static_cast<int>(rows.size()), model.texture.width,
-                 static_cast<int>(rule == DiagonalRule::kSmooth), rows_, patches_, points_.x, points_.y, points_.z, device_diagonals_);
+  common.rows = context.upload(rows);
+  common.texel_patches.assign(static_cast<std::size_t>(model.texture.width) * model.texture.height, -1);
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
     const Rectangle& r = model.patches[bone].rectangle;
     for (int row = 0; row < r.height; ++row)
-      std::fill_n(texel_patches_.begin() + (r.y + row) * static_cast<std::ptrdiff_t>(model.texture.width) + r.x, r.width, static_cast<int>(bone));
+      std::fill_n(common.texel_patches.begin() + (r.y + row) * static_cast<std::ptrdiff_t>(model.texture.width) + r.x, r.width, static_cast<int>(bone));
   }
-  place_seams(model, walls_, lattice_, positions_);
-  for_each_pole(model, lattice_, [&](int vertex, int, int, std::size_t texel) { positions_[vertex] = position(static_cast<int>(texel)); });
+  const Lattice& lattice = common.lattice;
+  std::vector<Vec3> positions(lattice.vertex_count);
+  place_seams(model, common.walls, lattice, positions);
+  common.seams.assign(positions.begin() + (lattice.first_sample.empty() ? lattice.first_corner : lattice.first_sample[0]), positions.end());
+  return std::make_shared<const Common>(std::move(common));
+}
+
+LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, ClBuffer<PatchRecord> patches, DevicePlanes points)
+    : LatticeMesh(context, model, rule, make_common(context, model, std::move(patches)), std::move(points)) {}
+
+LatticeMesh::LatticeMesh(const LatticeMesh& other, DiagonalRule rule, DevicePlanes points)
+    : LatticeMesh(other.context_, other.model_, rule, other.common_, std::move(points)) {}
+
+LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, std::shared_ptr<const Common> common, DevicePlanes points)
+    : context_(context),
+      model_(model),
+      rule_(rule),
+      common_(std::move(common)),
+      positions_(new Vec3[common_->lattice.vertex_count]),
+      points_(std::move(points)) {
+  // Before the kernel is queued, so that the host can go on beside it.
+  planes_ = {context.download(points_.x), context.download(points_.y), context.download(points_.z)};
+  device_diagonals_ = context.allocate<int>(texel_count());
+  const int rows = static_cast<int>(common_->rows.size);
+  context.launch({"lattice.cl", "choose_diagonals"}, row_range(context, rows), rows, model.texture.width, static_cast<int>(rule == DiagonalRule::kSmooth),
+                 common_->rows, common_->patches, points_.x, points_.y, points_.z, device_diagonals_);
+  const Lattice& lattice = common_->lattice;
+  std::copy(common_->seams.begin(), common_->seams.end(), positions_.get() + lattice.vertex_count - common_->seams.size());
+  for_each_pole(model, lattice, [&](int vertex, int, int, std::size_t texel) { positions_[vertex] = position(static_cast<int>(texel)); });
   for (int vertex = texel_count(); vertex < vertex_count(); ++vertex) {
     end_points_.emplace_back(0);
     end_points_.back().head<3>() = (position(vertex) - model.origin).cast<float>();
   }
-  std::vector<std::vector<Triangle>> ends(2 * model.patches.size());
-  for_each_block(ends.size(), 1, [&](std::size_t i, std::size_t, std::size_t) { ends[i] = fill_end(static_cast<int>(i / 2), static_cast<BoneEnd>(i % 2)); });
+  std::vector<int> ends(2 * model.patches.size());
+  std::iota(ends.begin(), ends.end(), 0);
   first_end_.push_back(0);
-  for (const std::vector<Triangle>& end : ends) {
+  for (const std::vector<Triangle>& end : fill_ends(ends)) {
     end_triangles_.insert(end_triangles_.end(), end.begin(), end.end());
     first_end_.push_back(static_cast<int>(end_triangles_.size()));
   }
   diagonals_ = context.download(device_diagonals_);
 }
 
-/// The strip or fan of an end.
-std::vector<Triangle> LatticeMesh::fill_end(int bone, BoneEnd end) {
-  const Rectangle& r = model_.patches[bone].rectangle;
-  const int first_texel = (r.y + (end == BoneEnd::kHead ? 1 : r.height - 2)) * model_.texture.width + r.x;
-  const int first_vertex = end_row(model_, lattice_, bone, end)[0];
-  for (int j = 0; j < r.width; ++j) positions_[first_vertex + j] = position(first_texel + j);
-  std::vector<Triangle> triangles;
-  append_end_triangles(model_, walls_, lattice_, positions_, bone, end, triangles);
-  for (Triangle& triangle : triangles)
-    for (int& vertex : triangle) vertex += vertex < lattice_.inner_count ? first_texel - first_vertex : texel_count() - lattice_.inner_count;
-  return triangles;
+/// The strips or fans of ends, numbered as in first_end_.
+std::vector<std::vector<Triangle>> LatticeMesh::fill_ends(std::span<const int> ends) {
+  std::vector<std::vector<Triangle>> filled(ends.size());
+  for_each_block(ends.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+    const int bone = ends[i] / 2;
+    const auto end = static_cast<BoneEnd>(ends[i] % 2);
+    const Lattice& lattice = common_->lattice;
+    const Rectangle& r = model_.patches[bone].rectangle;
+    const int first_texel = (r.y + (end == BoneEnd::kHead ? 1 : r.height - 2)) * model_.texture.width + r.x;
+    const int first_vertex = end_row(model_, lattice, bone, end)[0];
+    for (int j = 0; j < r.width; ++j) positions_[first_vertex + j] = position(first_texel + j);
+    append_end_triangles(model_, common_->walls, lattice, {positions_.get(), static_cast<std::size_t>(lattice.vertex_count)}, bone, end, filled[i]);
+    for (Triangle& triangle : filled[i])
+      for (int& vertex : triangle) vertex += vertex < lattice.inner_count ? first_texel - first_vertex : texel_count() - lattice.inner_count;
+  });
+  return filled;
 }
 
 int LatticeMesh::beside(int texel, int columns, int rows) const {
-  const Rectangle& r = model_.patches[texel_patches_[texel]].rectangle;
+  const Rectangle& r = model_.patches[patch_of(texel)].rectangle;
   const int column = texel % model_.texture.width - r.x;
   return texel + rows * model_.texture.width + ((column + columns) % r.width + r.width) % r.width - column;
 }
@@ -72,50 +94,55 @@ Triangle LatticeMesh::triangle(int index) const {
 
 std::vector<int> LatticeMesh::move(std::span<const int> texels, const LatticeMesh& home) {
   if (texels.empty()) return {};
-  std::vector<char> is_moved(texel_patches_.size(), 0);
-  std::vector<int> quads;
+  const int width = model_.texture.width;
+  std::vector<char> is_moved(texel_count(), 0), is_asked(texel_count(), 0);
   std::vector<char> has_moved_end(2 * model_.patches.size(), 0);
+  int first_line = model_.texture.height, last_line = 0;
   for (const int texel : texels) {
     is_moved[texel] = 1;
     for (int axis = 0; axis < 3; ++axis) planes_[axis][texel] = home.planes_[axis][texel];
-    const int bone = texel_patches_[texel];
+    const int bone = patch_of(texel);
     const Rectangle& r = model_.patches[bone].rectangle;
-    const int row = texel / model_.texture.width - r.y;
+    const int row = texel / width - r.y, column = texel % width - r.x;
     if (row == 1) has_moved_end[2 * bone] = 1;
     if (row == r.height - 2) has_moved_end[2 * bone + 1] = 1;
     // The diagonal of a quad depends on the 4 x 4 vertices around it.
-    for (int i = std::max(1, row - 2); i <= std::min(r.height - 3, row + 1); ++i)
-      for (int j = -2; j <= 1; ++j) quads.push_back(beside(texel, j, i - row));
+    for (int i = std::max(1, row - 2); i <= std::min(r.height - 3, row + 1); ++i) {
+      char* line = is_asked.data() + static_cast<std::ptrdiff_t>(r.y + i) * width + r.x;
+      for (int j = column - 2; j <= column + 1; ++j) line[j < 0 ? j + r.width : j < r.width ? j : j - r.width] = 1;
+      first_line = std::min(first_line, r.y + i), last_line = std::max(last_line, r.y + i);
+    }
   }
-  std::sort(quads.begin(), quads.end());
-  quads.erase(std::unique(quads.begin(), quads.end()), quads.end());
+  std::vector<int> quads, patches;
+  for (auto at = is_asked.begin() + static_cast<std::ptrdiff_t>(first_line) * width, end = is_asked.begin() + static_cast<std::ptrdiff_t>(last_line + 1) * width;
+       (at = std::find(at, end, 1)) != end; ++at)
+    quads.push_back(static_cast<int>(at - is_asked.begin()));
+  for (const int quad : quads) patches.push_back(patch_of(quad));
 
-  std::vector<int> changed, patches;
-  for (const int quad : quads) patches.push_back(texel_patches_[quad]);
+  std::vector<int> changed;
   auto chosen = context_.allocate<int>(quads.size());
-  context_.launch({"lattice.cl", "choose_listed_diagonals"}, ClRange(quads.size()), static_cast<int>(quads.size()), model_.texture.width,
-                  static_cast<int>(rule_ == DiagonalRule::kSmooth), context_.upload(quads), context_.upload(patches), patches_, points_.x, points_.y,
+  context_.launch({"lattice.cl", "choose_listed_diagonals"}, ClRange(quads.size()), static_cast<int>(quads.size()), width,
+                  static_cast<int>(rule_ == DiagonalRule::kSmooth), context_.upload(quads), context_.upload(patches), common_->patches, points_.x, points_.y,
                   points_.z, device_diagonals_, chosen);
+  std::vector<int> ends;
+  for (int end = 0; end < static_cast<int>(has_moved_end.size()); ++end)
+    if (has_moved_end[end]) ends.push_back(end);
+  const std::vector<std::vector<Triangle>> filled = fill_ends(ends);  // beside the kernel
   const std::vector<int> now = context_.download(chosen);
   for (std::size_t i = 0; i < quads.size(); ++i) {
     const bool is_other = now[i] != diagonals_[quads[i]];
     diagonals_[quads[i]] = now[i];
-    for (const int index : {2 * quads[i], 2 * quads[i] + 1}) {
-      const Triangle t = triangle(index);
-      if (is_other || is_moved[t[0]] || is_moved[t[1]] || is_moved[t[2]]) changed.push_back(index);
-    }
+    const std::array<Triangle, 2> triangles = triangles_of(quads[i], beside(quads[i], 1, 0));
+    for (const int k : {0, 1})
+      if (is_other || is_moved[triangles[k][0]] || is_moved[triangles[k][1]] || is_moved[triangles[k][2]]) changed.push_back(2 * quads[i] + k);
   }
-  for (std::size_t end = 0; end < has_moved_end.size(); ++end) {
-    if (!has_moved_end[end]) continue;
-    const std::vector<Triangle> made = fill_end(static_cast<int>(end / 2), static_cast<BoneEnd>(end % 2));
-    for (std::size_t i = 0; i < made.size(); ++i) {
-      Triangle& triangle = end_triangles_[first_end_[end] + i];
-      const bool is_other = triangle != made[i];
-      triangle = made[i];
-      if (is_other || std::any_of(made[i].begin(), made[i].end(), [&](int vertex) { return is_texel(vertex) && is_moved[vertex]; }))
-        changed.push_back(first_end_triangle() + first_end_[end] + static_cast<int>(i));
+  for (std::size_t k = 0; k < ends.size(); ++k)
+    for (std::size_t i = 0; i < filled[k].size(); ++i) {
+      Triangle& triangle = end_triangles_[first_end_[ends[k]] + i];
+      const bool is_other = std::exchange(triangle, filled[k][i]) != filled[k][i];
+      if (is_other || std::any_of(triangle.begin(), triangle.end(), [&](int vertex) { return is_texel(vertex) && is_moved[vertex]; }))
+        changed.push_back(first_end_triangle() + first_end_[ends[k]] + static_cast<int>(i));
     }
-  }
   return changed;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <array>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -19,15 +20,17 @@ class LatticeMesh {
   /// \param points   x, y, z per texel of the texture, relative to the model's origin; of rows 0 and height-1 only poles count.
   ///                 These planes are kept, not copied: `move` is to be told what changes in them
   LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, ClBuffer<PatchRecord> patches, DevicePlanes points);
+  /// Other points of the same model, with which it has in common what does not depend on them.
+  LatticeMesh(const LatticeMesh& other, DiagonalRule rule, DevicePlanes points);
 
   const SkeletexModel& model() const { return model_; }
-  int texel_count() const { return static_cast<int>(texel_patches_.size()); }
-  int vertex_count() const { return texel_count() + lattice_.vertex_count - lattice_.inner_count; }
+  int texel_count() const { return static_cast<int>(common_->texel_patches.size()); }
+  int vertex_count() const { return texel_count() + common_->lattice.vertex_count - common_->lattice.inner_count; }
   int first_end_triangle() const { return 2 * texel_count(); }
   int triangle_count() const { return first_end_triangle() + static_cast<int>(end_triangles_.size()); }
 
   bool is_texel(int vertex) const { return vertex < texel_count(); }
-  int patch_of(int texel) const { return texel_patches_[texel]; }
+  int patch_of(int texel) const { return common_->texel_patches[texel]; }
   /// The texel some columns and rows beside one of the same patch; columns wrap round.
   int beside(int texel, int columns, int rows) const;
   /// Vertices of a triangle, counter-clockwise from outside.
@@ -48,7 +51,7 @@ class LatticeMesh {
     return {planes_[0][vertex], planes_[1][vertex], planes_[2][vertex], 0};
   }
   Vec3 position(int vertex) const {
-    if (!is_texel(vertex)) return positions_[lattice_.inner_count + vertex - texel_count()];
+    if (!is_texel(vertex)) return positions_[common_->lattice.inner_count + vertex - texel_count()];
     return model_.origin + Vec3(planes_[0][vertex], planes_[1][vertex], planes_[2][vertex]);
   }
   std::array<Vec3, 3> corners(const Triangle& t) const { return {position(t[0]), position(t[1]), position(t[2])}; }
@@ -58,36 +61,43 @@ class LatticeMesh {
     return {first_end_triangle() + first_end_[i], first_end_triangle() + first_end_[i + 1]};
   }
   /// Whether that is a fan around a pole.
-  bool is_pole(int bone, BoneEnd end) const { return lattice_.poles[bone][static_cast<int>(end)] >= 0; }
+  bool is_pole(int bone, BoneEnd end) const { return common_->lattice.poles[bone][static_cast<int>(end)] >= 0; }
 
   const DevicePlanes& device_points() const { return points_; }
   /// Per texel whether its quad takes the second diagonal.
   const ClBuffer<int>& device_diagonals() const { return device_diagonals_; }
-  const ClBuffer<LatticeRow>& device_rows() const { return rows_; }
-  const ClBuffer<PatchRecord>& device_patches() const { return patches_; }
+  const ClBuffer<LatticeRow>& device_rows() const { return common_->rows; }
+  const ClBuffer<PatchRecord>& device_patches() const { return common_->patches; }
 
   /// Some inner texels have the points of another lattice now, on the device already. Quads around them take their diagonals anew,
   /// strips beside them are filled anew. \return the triangles that are not what they were, in order
   std::vector<int> move(std::span<const int> texels, const LatticeMesh& home);
 
  private:
-  std::vector<Triangle> fill_end(int bone, BoneEnd end);
+  /// What does not depend on points.
+  struct Common {
+    Walls walls;
+    Lattice lattice;
+    std::vector<int> texel_patches;
+    std::vector<Vec3> seams;     ///< samples and corners, the vertices behind the poles
+    ClBuffer<LatticeRow> rows;   ///< those that quads begin at
+    ClBuffer<PatchRecord> patches;
+  };
+  static std::shared_ptr<const Common> make_common(ClContext& context, const SkeletexModel& model, ClBuffer<PatchRecord> patches);
+  LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, std::shared_ptr<const Common> common, DevicePlanes points);
+  std::vector<std::vector<Triangle>> fill_ends(std::span<const int> ends);
 
   ClContext& context_;
   const SkeletexModel& model_;
   DiagonalRule rule_;
-  Walls walls_;
-  Lattice lattice_;
-  std::vector<int> texel_patches_;
+  std::shared_ptr<const Common> common_;
   std::array<std::vector<float>, 3> planes_;
   std::vector<Eigen::Array4f> end_points_;  // of vertices behind the texels
-  std::vector<Vec3> positions_;  // numbered as in lattice.h; of inner rows only those next to ends are there
+  std::unique_ptr<Vec3[]> positions_;       // numbered as in lattice.h; of inner rows only those next to ends are there
   std::vector<Triangle> end_triangles_;
   std::vector<int> first_end_;  // per patch and end, in end_triangles_; and the end
   std::vector<int> diagonals_;
   DevicePlanes points_;
-  ClBuffer<LatticeRow> rows_;  // those that quads begin at
-  ClBuffer<PatchRecord> patches_;
   ClBuffer<int> device_diagonals_;
 };
 

@@ -20,7 +20,7 @@ Vec3 sample_point(const Skeleton& skeleton, const Walls& walls, int node, int bo
 
 }  // namespace
 
-void place_seams(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, std::vector<Vec3>& positions) {
+void place_seams(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, std::span<Vec3> positions) {
   for (std::size_t a = 0; a < model.arcs.size(); ++a)
     for (std::size_t i = 0; i < model.arcs[a].samples.size(); ++i)
       positions[lattice.first_sample[a] + i] = sample_point(model.skeleton, walls, model.arcs[a].node, model.arcs[a].bones[0], model.arcs[a].samples[i]);
@@ -81,7 +81,7 @@ std::vector<Triangle> end_triangles(const SkeletexModel& model, const Lattice& l
   return triangles;
 }
 
-void append_end_triangles(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, const std::vector<Vec3>& positions, int bone, BoneEnd end,
+void append_end_triangles(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, std::span<const Vec3> positions, int bone, BoneEnd end,
                           std::vector<Triangle>& triangles) {
   if (lattice.poles[bone][static_cast<int>(end)] >= 0) {
     append_pole_fan(model, lattice, bone, end, triangles);

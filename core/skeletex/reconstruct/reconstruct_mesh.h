@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "skeletex/cl/context.h"
@@ -24,10 +25,10 @@ std::vector<Vec3> lattice_positions(ClContext& context, const SkeletexModel& mod
 std::vector<Triangle> end_triangles(const SkeletexModel& model, const Lattice& lattice, const std::vector<Vec3>& positions);
 
 /// Those of one end, appended.
-void append_end_triangles(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, const std::vector<Vec3>& positions, int bone, BoneEnd end,
+void append_end_triangles(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, std::span<const Vec3> positions, int bone, BoneEnd end,
                           std::vector<Triangle>& triangles);
 /// Seam samples and corners: few, and shared by several patches, so they are made on the host in double.
-void place_seams(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, std::vector<Vec3>& positions);
+void place_seams(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, std::span<Vec3> positions);
 /// Every pole, and the texel that holds it.
 void for_each_pole(const SkeletexModel& model, const Lattice& lattice, const std::function<void(int vertex, int bone, int end, std::size_t texel)>& place);
 

@@ -33,7 +33,7 @@ std::vector<double> seam_turns(const std::vector<Vec3>& points, const std::vecto
   return result;
 }
 
-void append_seam_strip(const std::vector<Vec3>& positions, const Ring& seam, const Ring& row, BoneEnd end, std::vector<Triangle>& triangles) {
+void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, const Ring& row, BoneEnd end, std::vector<Triangle>& triangles) {
   const int m = static_cast<int>(seam.vertices.size()), n = static_cast<int>(row.vertices.size());
   std::vector<Vec3> points;
   for (const int vertex : seam.vertices) points.push_back(positions[vertex]);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <span>
 #include <vector>
 
 #include "skeletex/model/mesh.h"
@@ -17,7 +18,7 @@ struct Ring {
 /// edge of exactly one triangle, and no edge between the rings occurs twice, whatever the rings are. Among the merges
 /// whose cross edges stay within about a cell of v the one with the smallest sum of squared lengths is taken.
 /// \pre seam has at least 3 vertices, row at least 4
-void append_seam_strip(const std::vector<Vec3>& positions, const Ring& seam, const Ring& row, BoneEnd end, std::vector<Triangle>& triangles);
+void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, const Ring& row, BoneEnd end, std::vector<Triangle>& triangles);
 
 /// v of a seam's vertices: that of its loop (loop_turns), the first in [0,1), with no step above 0.45 of a turn; evenly
 /// spread when the points do not wind once around the bone.
