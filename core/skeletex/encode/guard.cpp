@@ -267,6 +267,7 @@ class Distances {
     // Where these are not what they were, all are compared to them again.
     const bool have_ends_moved = std::any_of(changed.begin(), changed.end(), [&](int triangle) { return triangle >= lattice.first_end_triangle(); });
     // Strips and fans can be nearer: nearly always their own, those across the seam else.
+    const auto margin = static_cast<float>(1e-6 * sources_.model.diagonal);  // more than rounding
     for_each_block(at_ends.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
       MeasuredVertex& measured = vertices_[at_ends[k]];
       if (measured.is_compared && !have_ends_moved) return;
@@ -275,9 +276,16 @@ class Distances {
       double least2 = measured.distance2;
       measured.is_compared = true, measured.nearer = measured.nearest;
       const auto [begin, end] = lattice.triangles_of_end(vertex.patch, vertex.y < 2 ? BoneEnd::kHead : BoneEnd::kTail);
+      const Vec3 offset = point - sources_.model.origin;
+      const Eigen::Array4f place(static_cast<float>(offset.x()), static_cast<float>(offset.y()), static_cast<float>(offset.z()), 0);
       for (const auto& [first, last] : {std::pair(begin, end), std::pair(lattice.first_end_triangle(), lattice.triangle_count())}) {
         for (int i = first; i < last; ++i) {
-          const auto [a, b, c] = lattice.corners(lattice.triangle(i));
+          // Of nearly all the box around them tells that they are too far.
+          const Triangle t = lattice.triangle(i);
+          const Eigen::Array4f p = lattice.point(t[0]), q = lattice.point(t[1]), r = lattice.point(t[2]);
+          const Eigen::Array4f gap = (p.min(q).min(r) - place).max(place - p.max(q).max(r)).max(margin) - margin;
+          if (static_cast<double>((gap * gap).sum()) > least2) continue;
+          const auto [a, b, c] = lattice.corners(t);
           const double distance2 = offset_from_triangle(point, a, b, c).squaredNorm();
           if (distance2 < least2) least2 = distance2, measured.nearer = i;
         }

@@ -10,7 +10,7 @@
 namespace skeletex {
 
 std::shared_ptr<const LatticeMesh::Common> LatticeMesh::make_common(ClContext& context, const SkeletexModel& model, ClBuffer<PatchRecord> patches) {
-  Common common{Walls(model.skeleton), number_lattice(model), {}, {}, {}, std::move(patches)};
+  Common common{number_lattice(model), {}, {}, {}, {}, std::move(patches)};
   std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kInner);
   std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == model.patches[row[0]].rectangle.height - 2; });
   common.rows = context.upload(rows);
@@ -20,10 +20,17 @@ std::shared_ptr<const LatticeMesh::Common> LatticeMesh::make_common(ClContext& c
     for (int row = 0; row < r.height; ++row)
       std::fill_n(common.texel_patches.begin() + (r.y + row) * static_cast<std::ptrdiff_t>(model.texture.width) + r.x, r.width, static_cast<int>(bone));
   }
+  const Walls walls(model.skeleton);
   const Lattice& lattice = common.lattice;
-  std::vector<Vec3> positions(lattice.vertex_count);
-  place_seams(model, common.walls, lattice, positions);
-  common.seams.assign(positions.begin() + (lattice.first_sample.empty() ? lattice.first_corner : lattice.first_sample[0]), positions.end());
+  const std::unique_ptr<Vec3[]> memory(new Vec3[lattice.vertex_count]);  // most of it is never touched
+  const std::span<Vec3> positions(memory.get(), lattice.vertex_count);
+  place_seams(model, walls, lattice, positions);
+  const int first = lattice.first_sample.empty() ? lattice.first_corner : lattice.first_sample[0];
+  common.samples.assign(positions.begin() + first, positions.end());
+  common.seams.resize(2 * model.patches.size());
+  for_each_block(common.seams.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+    common.seams[i] = end_seam(model, walls, lattice, positions, static_cast<int>(i / 2), static_cast<BoneEnd>(i % 2));
+  });
   return std::make_shared<const Common>(std::move(common));
 }
 
@@ -47,7 +54,7 @@ LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, Diagona
   context.launch({"lattice.cl", "choose_diagonals"}, row_range(context, rows), rows, model.texture.width, static_cast<int>(rule == DiagonalRule::kSmooth),
                  common_->rows, common_->patches, points_.x, points_.y, points_.z, device_diagonals_);
   const Lattice& lattice = common_->lattice;
-  std::copy(common_->seams.begin(), common_->seams.end(), positions_.get() + lattice.vertex_count - common_->seams.size());
+  std::copy(common_->samples.begin(), common_->samples.end(), positions_.get() + lattice.vertex_count - common_->samples.size());
   for_each_pole(model, lattice, [&](int vertex, int, int, std::size_t texel) { positions_[vertex] = position(static_cast<int>(texel)); });
   for (int vertex = texel_count(); vertex < vertex_count(); ++vertex) {
     end_points_.emplace_back(0);
@@ -74,7 +81,7 @@ std::vector<std::vector<Triangle>> LatticeMesh::fill_ends(std::span<const int> e
     const int first_texel = (r.y + (end == BoneEnd::kHead ? 1 : r.height - 2)) * model_.texture.width + r.x;
     const int first_vertex = end_row(model_, lattice, bone, end)[0];
     for (int j = 0; j < r.width; ++j) positions_[first_vertex + j] = position(first_texel + j);
-    append_end_triangles(model_, common_->walls, lattice, {positions_.get(), static_cast<std::size_t>(lattice.vertex_count)}, bone, end, filled[i]);
+    append_end_triangles(model_, lattice, {positions_.get(), static_cast<std::size_t>(lattice.vertex_count)}, common_->seams[ends[i]], bone, end, filled[i]);
     for (Triangle& triangle : filled[i])
       for (int& vertex : triangle) vertex += vertex < lattice.inner_count ? first_texel - first_vertex : texel_count() - lattice.inner_count;
   });

@@ -76,11 +76,11 @@ class LatticeMesh {
  private:
   /// What does not depend on points.
   struct Common {
-    Walls walls;
     Lattice lattice;
     std::vector<int> texel_patches;
-    std::vector<Vec3> seams;     ///< samples and corners, the vertices behind the poles
-    ClBuffer<LatticeRow> rows;   ///< those that quads begin at
+    std::vector<Vec3> samples;    ///< of seams, and corners: the vertices behind the poles
+    std::vector<EndSeam> seams;   ///< per patch and end
+    ClBuffer<LatticeRow> rows;    ///< those that quads begin at
     ClBuffer<PatchRecord> patches;
   };
   static std::shared_ptr<const Common> make_common(ClContext& context, const SkeletexModel& model, ClBuffer<PatchRecord> patches);

@@ -77,20 +77,33 @@ std::vector<Triangle> end_triangles(const SkeletexModel& model, const Lattice& l
   const Walls walls(model.skeleton);
   std::vector<Triangle> triangles;
   for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
-    for (const BoneEnd which : {BoneEnd::kHead, BoneEnd::kTail}) append_end_triangles(model, walls, lattice, positions, bone, which, triangles);
+    for (const BoneEnd which : {BoneEnd::kHead, BoneEnd::kTail})
+      append_end_triangles(model, lattice, positions, end_seam(model, walls, lattice, positions, bone, which), bone, which, triangles);
   return triangles;
 }
 
-void append_end_triangles(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, std::span<const Vec3> positions, int bone, BoneEnd end,
+EndSeam end_seam(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, std::span<const Vec3> positions, int bone, BoneEnd end) {
+  EndSeam seam;
+  if (lattice.poles[bone][static_cast<int>(end)] >= 0) return seam;
+  seam.ring.vertices = end_loop(model, lattice, bone, end);
+  std::vector<Vec3> points;
+  for (const int vertex : seam.ring.vertices) {
+    points.push_back(positions[vertex]);
+    seam.ring.turns.push_back(walls.turn_of(bone, points.back() - end_position(model.skeleton, bone, end)));
+  }
+  seam.turns = seam_turns(points, seam.ring.turns);
+  return seam;
+}
+
+void append_end_triangles(const SkeletexModel& model, const Lattice& lattice, std::span<const Vec3> positions, const EndSeam& seam, int bone, BoneEnd end,
                           std::vector<Triangle>& triangles) {
-  if (lattice.poles[bone][static_cast<int>(end)] >= 0) {
+  if (seam.ring.vertices.empty()) {
     append_pole_fan(model, lattice, bone, end, triangles);
     return;
   }
-  Ring seam{end_loop(model, lattice, bone, end), {}}, row{end_row(model, lattice, bone, end), {}};
-  for (const int vertex : seam.vertices) seam.turns.push_back(walls.turn_of(bone, positions[vertex] - end_position(model.skeleton, bone, end)));
+  Ring row{end_row(model, lattice, bone, end), {}};
   for (std::size_t j = 0; j < row.vertices.size(); ++j) row.turns.push_back(static_cast<double>(j) / static_cast<double>(row.vertices.size()));
-  append_seam_strip(positions, seam, row, end, triangles);
+  append_seam_strip(positions, seam.ring, seam.turns, row, end, triangles);
 }
 
 DeviceQuads upload_quads(ClContext& context, const SkeletexModel& model, const Walls& walls) {

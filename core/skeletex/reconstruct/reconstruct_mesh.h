@@ -10,6 +10,7 @@
 #include "skeletex/model/texture.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/lattice.h"
+#include "skeletex/reconstruct/seam_strip.h"
 
 namespace skeletex {
 
@@ -24,8 +25,14 @@ std::vector<Vec3> lattice_positions(ClContext& context, const SkeletexModel& mod
 /// Its triangles that touch a pole or a seam: fans and strips. \param positions  of all vertices of the lattice
 std::vector<Triangle> end_triangles(const SkeletexModel& model, const Lattice& lattice, const std::vector<Vec3>& positions);
 
-/// Those of one end, appended.
-void append_end_triangles(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, std::span<const Vec3> positions, int bone, BoneEnd end,
+/// The seam of an end, and its turns as strips take them; empty at a pole. \param positions  at least of seams
+struct EndSeam {
+  Ring ring;
+  std::vector<double> turns;
+};
+EndSeam end_seam(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, std::span<const Vec3> positions, int bone, BoneEnd end);
+/// The triangles of one end, appended.
+void append_end_triangles(const SkeletexModel& model, const Lattice& lattice, std::span<const Vec3> positions, const EndSeam& seam, int bone, BoneEnd end,
                           std::vector<Triangle>& triangles);
 /// Seam samples and corners: few, and shared by several patches, so they are made on the host in double.
 void place_seams(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, std::span<Vec3> positions);

@@ -34,15 +34,19 @@ std::vector<double> seam_turns(const std::vector<Vec3>& points, const std::vecto
 }
 
 void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, const Ring& row, BoneEnd end, std::vector<Triangle>& triangles) {
-  const int m = static_cast<int>(seam.vertices.size()), n = static_cast<int>(row.vertices.size());
   std::vector<Vec3> points;
   for (const int vertex : seam.vertices) points.push_back(positions[vertex]);
-  const std::vector<double> turns = seam_turns(points, seam.turns);
+  append_seam_strip(positions, seam, seam_turns(points, seam.turns), row, end, triangles);
+}
+
+void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::span<const double> turns, const Ring& row, BoneEnd end,
+                       std::vector<Triangle>& triangles) {
+  const int m = static_cast<int>(seam.vertices.size()), n = static_cast<int>(row.vertices.size());
   // Columns in unwrapped numbers: row angles are column / n.
   const auto column_of = [&](int i) { return n * (turns[(i % m + m) % m] + std::floor(static_cast<double>(i) / m)); };
   const auto seam_vertex = [&](int i) { return seam.vertices[i % m]; };
   const auto row_vertex = [&](int j) { return row.vertices[(j % n + n) % n]; };
-  const auto cost = [&](int i, int j) { return (positions[seam_vertex(i)] - positions[row_vertex(j)]).squaredNorm(); };
+  const auto cost = [&](const Vec3& p, int j) { return (p - positions[row_vertex(j)]).squaredNorm(); };
 
   // The columns that a seam vertex may be joined to: those between its neighbours' angles and a little more, but never
   // n + 1 of them, so that no column is met twice from the same vertex.
@@ -56,7 +60,7 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, const 
   int start = 0;
   double shortest = 0;
   for (int i = 0; i < m; ++i) {
-    const double length = cost(i, static_cast<int>(std::lround(column_of(i))));
+    const double length = cost(positions[seam_vertex(i)], static_cast<int>(std::lround(column_of(i))));
     if (i == 0 || length < shortest) {
       start = i;
       shortest = length;
@@ -64,29 +68,30 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, const 
   }
   const int start_column = static_cast<int>(std::lround(column_of(start)));
 
-  // best[k][j - first[k]]: the cheapest merge that joins seam vertex start + k to column j.
-  std::vector<int> first(m + 1);
-  std::vector<std::vector<double>> best(m + 1);
-  std::vector<std::vector<char>> along_row(m + 1);  // the last step went to the next column, not to the next seam vertex
+  // best[place[k] + j - first[k]]: the cheapest merge that joins seam vertex start + k to column j.
+  std::vector<int> first(m + 1), place(m + 2, 0);
+  std::vector<double> best;
+  std::vector<char> along_row;  // the last step went to the next column, not to the next seam vertex
   for (int k = 0; k <= m; ++k) {
     first[k] = std::max(first_column(start + k), start_column);
     const int last = std::min(last_column(start + k), start_column + n);
-    best[k].resize(last - first[k] + 1);
-    along_row[k].resize(best[k].size());
+    place[k + 1] = place[k] + last - first[k] + 1;
+    best.resize(place[k + 1]), along_row.resize(place[k + 1]);
+    const Vec3& point = positions[seam_vertex(start + k)];
     for (int j = first[k]; j <= last; ++j) {
-      const int at = j - first[k];
-      const bool has_column = at > 0;
-      const bool has_seam = k > 0 && j < first[k - 1] + static_cast<int>(best[k - 1].size());
-      const double from_column = has_column ? best[k][at - 1] : 0, from_seam = has_seam ? best[k - 1][j - first[k - 1]] : 0;
-      along_row[k][at] = has_column && (!has_seam || from_column < from_seam);
-      best[k][at] = (along_row[k][at] ? from_column : from_seam) + cost(start + k, j);
+      const int at = place[k] + j - first[k];
+      const int below = k > 0 ? place[k - 1] + j - first[k - 1] : 0;
+      const bool has_column = j > first[k], has_seam = k > 0 && below < place[k];
+      const double from_column = has_column ? best[at - 1] : 0, from_seam = has_seam ? best[below] : 0;
+      along_row[at] = has_column && (!has_seam || from_column < from_seam);
+      best[at] = (along_row[at] ? from_column : from_seam) + cost(point, j);
     }
   }
 
   const std::size_t begin = triangles.size();
   const bool is_head = end == BoneEnd::kHead;
   for (int k = m, j = start_column + n; k > 0 || j > start_column;) {
-    if (along_row[k][j - first[k]]) {
+    if (along_row[place[k] + j - first[k]]) {
       --j;
       const int apex = seam_vertex(start + k), here = row_vertex(j), next = row_vertex(j + 1);
       triangles.push_back(is_head ? Triangle{apex, next, here} : Triangle{here, next, apex});
