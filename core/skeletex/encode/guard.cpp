@@ -32,6 +32,7 @@ constexpr int kVertexReach = 6;           // columns and rows around a texel: di
 constexpr std::size_t kManyPairs = 50;    // from here on it is looked at whether the even lattice intersects itself as much
 constexpr int kTolerance = 2;             // columns and rows around a fault of the even lattice
 constexpr double kMuchWorse = 1.1;        // the number of faults there, against the even lattice's
+constexpr int kEndsInBox = 32;            // triangles of strips and fans that a vertex is compared to at once
 constexpr std::size_t kBlock = 1 << 13;
 // Places of a triangle, as shares of its first two sides: the middle, corners, quarters and middles of the sides, and points
 // between them and the middle. As in guard.cl.
@@ -267,37 +268,60 @@ class Distances {
     // Where these are not what they were, all are compared to them again.
     const bool have_ends_moved = std::any_of(changed.begin(), changed.end(), [&](int triangle) { return triangle >= lattice.first_end_triangle(); });
     // Strips and fans can be nearer: nearly always their own, those across the seam else.
+    std::erase_if(at_ends, [&](int i) { return vertices_[i].is_compared && !have_ends_moved; });
+    compare_to_ends(lattice, at_ends, limit);
+    for (const int i : far_)
+      if (vertices_[i].is_compared && vertices_[i].nearer >= 0) far.push_back(vertices_[i].nearer);
+    return far;
+  }
+  /// Boxes tell which are too far away: nearly all.
+  void compare_to_ends(const LatticeMesh& lattice, const std::vector<int>& asked, float limit) {
+    if (asked.empty()) return;
+    struct Box {
+      Eigen::Array4f least, greatest;
+    };
+    const auto box_of = [&](const Triangle& t) {
+      const Eigen::Array4f a = lattice.point(t[0]), b = lattice.point(t[1]), c = lattice.point(t[2]);
+      return Box{a.min(b).min(c), a.max(b).max(c)};
+    };
+    const int first_end = lattice.first_end_triangle(), all = lattice.triangle_count();
+    std::vector<Box> boxes;
+    for (int i = first_end; i < all; ++i) {
+      const Box box = box_of(lattice.triangle(i));
+      if ((i - first_end) % kEndsInBox == 0) boxes.push_back(box);
+      boxes.back() = {boxes.back().least.min(box.least), boxes.back().greatest.max(box.greatest)};
+    }
     const auto margin = static_cast<float>(1e-6 * sources_.model.diagonal);  // more than rounding
-    for_each_block(at_ends.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
-      MeasuredVertex& measured = vertices_[at_ends[k]];
-      if (measured.is_compared && !have_ends_moved) return;
-      const PlacedVertex& vertex = placed_.all[at_ends[k]];
+    for (const int asked_vertex : asked) {
+      MeasuredVertex& measured = vertices_[asked_vertex];
+      const PlacedVertex& vertex = placed_.all[asked_vertex];
       const Vec3& point = sources_.charts[vertex.patch].positions[vertex.point - maps_.first_vertex[vertex.patch]];
+      Eigen::Array4f place = Eigen::Array4f::Zero();
+      place.head<3>() = (point - sources_.model.origin).cast<float>().array();
       double least2 = measured.distance2;
       measured.is_compared = true, measured.nearer = measured.nearest;
+      const auto is_too_far = [&](const Box& box) {
+        const Eigen::Array4f gap = (box.least - place).max(place - box.greatest).max(margin) - margin;
+        return static_cast<double>((gap * gap).sum()) > least2;
+      };
       const auto [begin, end] = lattice.triangles_of_end(vertex.patch, vertex.y < 2 ? BoneEnd::kHead : BoneEnd::kTail);
-      const Vec3 offset = point - sources_.model.origin;
-      const Eigen::Array4f place(static_cast<float>(offset.x()), static_cast<float>(offset.y()), static_cast<float>(offset.z()), 0);
-      for (const auto& [first, last] : {std::pair(begin, end), std::pair(lattice.first_end_triangle(), lattice.triangle_count())}) {
+      for (const auto& [first, last] : {std::pair(begin, end), std::pair(first_end, all)}) {
         for (int i = first; i < last; ++i) {
-          // Of nearly all the box around them tells that they are too far.
-          const Triangle t = lattice.triangle(i);
-          const Eigen::Array4f p = lattice.point(t[0]), q = lattice.point(t[1]), r = lattice.point(t[2]);
-          const Eigen::Array4f gap = (p.min(q).min(r) - place).max(place - p.max(q).max(r)).max(margin) - margin;
-          if (static_cast<double>((gap * gap).sum()) > least2) continue;
-          const auto [a, b, c] = lattice.corners(t);
+          if (is_too_far(boxes[(i - first_end) / kEndsInBox])) {
+            i += kEndsInBox - 1 - (i - first_end) % kEndsInBox;
+            continue;
+          }
+          const Triangle triangle = lattice.triangle(i);
+          if (is_too_far(box_of(triangle))) continue;
+          const auto [a, b, c] = lattice.corners(triangle);
           const double distance2 = offset_from_triangle(point, a, b, c).squaredNorm();
           if (distance2 < least2) least2 = distance2, measured.nearer = i;
         }
         if (least2 <= static_cast<double>(limit) * limit) measured.nearer = -1;
-        if (measured.nearer < 0) return;
+        if (measured.nearer < 0) break;
       }
-    });
-    for (const int i : at_ends)
-      if (vertices_[i].nearer >= 0) far.push_back(vertices_[i].nearer);
-    return far;
+    }
   }
-
   /// Texels whose vertices can be measured to a triangle that changes with one.
   void add_around(const LatticeMesh& lattice, int texel) {
     const Rectangle& r = lattice.model().patches[lattice.patch_of(texel)].rectangle;
