@@ -2,17 +2,16 @@
 // Where texels read: from the even lattice to the mesh's own vertices and creased edges.
 //   claim_texels, decide_claims  vertices, strongest first, take the nearest texel that is free
 //   relax_texels                 free texels follow their neighbours half way
-//   offer_edges, place_on_edges  free texels go to the nearest point of a creased edge
+//   place_on_edges               free texels go to the nearest point of a creased edge
 //   place_snapped                positions of texels on vertices and edges
 //   put_listed_back              texels of a list, and what then folds in the map or in space, go back to the even lattice
 // A reading position is an offset from the texel's own place in the lattice, in cells: two planes over the texture, x
 // around, y along. Rows 0 and height-1 stay. `anchors` says what holds a texel: 0 nothing, 1 + i vertex i of the list
 // of vertices, -1 - i edge i. Vertices and edges come with their patch and their place (x, y) in its cells, x unwrapped.
-// Texels of one launch never look at each other's offsets where these may change: claims wait for stronger ones next to
-// them, the other kernels run once per colour (see colour_of). So nothing depends on the order of work-items.
+// Texels never look at each other's offsets where these may change: claims wait for stronger ones next to them, the other kernels take
+// even and odd rows apart, and in each of them one colour after the other (see colour_of). So nothing depends on the order of work-items.
 #include "skeletex_structs.h"
 #include "patch_texels.h"
-#include "rounding.h"
 
 #define REACH 0.7f         // cells from where a texel is to where it goes
 #define FURTHEST 1.0f      // cells from a texel's own place, along each axis
@@ -24,7 +23,19 @@
 #define PLACED 5           // states of a vertex: 0 to 3 the candidate it claims, 4 none is left
 #define BAD 1              // a mark of a texel's quad
 #define NO_OFFER 0x7fffffff
-#define AT_ONCE 4          // columns that edges look at together
+#define TURN_BITS 4        // of an edge's entry in a bin
+#define MOST_TURNS 8
+#define EDGE_SIZE 6        // numbers per edge: x, y of its first and of its last point, 1 / length squared, steps of offers per cell
+
+// Rounded to the nearest: rint() would not become one instruction.
+#define NEAREST(x) (((x) + 12582912.0f) - 12582912.0f)
+
+// What a work-item of the row's group has written all of them can read. A group of one has nothing to wait for.
+#if ROW_ITEMS > 1
+#define WAIT_FOR_ROW() barrier(CLK_GLOBAL_MEM_FENCE)
+#else
+#define WAIT_FOR_ROW()
+#endif
 
 // The smallest cross product at the four corners of a quad in the map; 1 in the even lattice.
 float quad_cross(const float x[4], const float y[4]) {
@@ -171,17 +182,12 @@ __attribute__((noinline)) Offset relaxed_at_end(Offset own, int is_held, int tex
   return relaxed(own, is_held, n, height, texture_width, row, offset_x, offset_y);
 }
 
-// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. Free texels of a colour relax.
-// in   rows: patch and row, four numbers each: inner ones, even or odd; first_column: 0 or 1 for every second one up to the last of an odd
-//      width, 2 for that; offset_x, offset_y: the same as own_x, own_y, of which only texels of the colour are read there
-kernel void relax_texels(const int row_count, const int texture_width, const int first_column, global const int* restrict rows,
-                         global const PatchRecord* restrict patches, global const int* restrict anchors, global const float* restrict offset_x,
-                         global const float* restrict offset_y, global float* restrict own_x, global float* restrict own_y) {
-  const int k = get_group_id(0);
-  if (k >= row_count) return;
-  global const PatchRecord* restrict p = patches + rows[4 * k];
-  const int row = rows[4 * k + 1], width = p->width, height = p->height;
-  const int first = (p->y + row) * texture_width + p->x;
+// Free texels of every second column relax.
+// in   first_column: 0 or 1, up to the last of an odd width; 2: that; offset_x, offset_y: the same as own_x, own_y, of which only texels of these columns
+//      are read there
+__attribute__((always_inline)) void relax_columns(const int first_column, const int first, const int width, const int height, const int texture_width,
+                                                  const int row, global const int* restrict anchors, global const float* restrict offset_x,
+                                                  global const float* restrict offset_y, global float* restrict own_x, global float* restrict own_y) {
   const int paired = width & ~1;
   // What wraps round apart from the rest, which becomes vector instructions.
   if (first_column < 2) {
@@ -202,105 +208,156 @@ kernel void relax_texels(const int row_count, const int texture_width, const int
   }
 }
 
-// The point of an edge nearest to (x, y): its parameter.
-float nearest_on_edge(const float ends[4], float x, float y) {
-  const float ex = ends[2] - ends[0], ey = ends[3] - ends[1];
-  const float length2 = ex * ex + ey * ey;
-  return length2 > 0.0f ? clamp(((x - ends[0]) * ex + (y - ends[1]) * ey) / length2, 0.0f, 1.0f) : 0.0f;
-}
-
-// The squared distance of a texel from an edge, whose first point is (x, y) away from it; infinite where something holds the texel.
-__attribute__((always_inline)) float edge_distance2(float x, float y, float ex, float ey, float inverse_length2, int is_held) {
-  const float t = clamp(-(x * ex + y * ey) * inverse_length2, 0.0f, 1.0f);
-  const float dx = x + t * ex, dy = y + t * ey;
-  return is_held ? INFINITY : dx * dx + dy * dy;
-}
-
-// NDRange (edges). Offers every free texel within reach a point of the edge. An offer is the distance divided by the
-// edge's weight, in steps of 1 / offer_scale; the least wins, of two as good the first edge.
-// edge_ends: per edge x, y of its first and of its last point
-// out  offers: (offer << edge_bits) + edge
-kernel void offer_edges(const int edge_count, const int texture_width, const int edge_bits, const float offer_scale, global const int* restrict edge_patches,
-                        global const float* restrict edge_ends, global const float* restrict edge_weights, global const PatchRecord* restrict patches,
-                        global const int* restrict anchors, global const float* restrict offset_x, global const float* restrict offset_y,
-                        global int* restrict offers) {
-  const int e = (int)get_global_id(0);
-  if (e >= edge_count) return;
-  global const PatchRecord* p = patches + edge_patches[e];
-  const int width = p->width, last_inner = p->height - 2, origin = p->y * texture_width + p->x;
-  const float x0 = edge_ends[4 * e], y0 = edge_ends[4 * e + 1], x1 = edge_ends[4 * e + 2], y1 = edge_ends[4 * e + 3];
-  const float ex = x1 - x0, ey = y1 - y0, length2 = ex * ex + ey * ey, inverse = length2 > 0.0f ? 1.0f / length2 : 0.0f;
-  const float margin = REACH + LOOSE, slope = ey == 0.0f ? 0.0f : ex / ey;
-  const float low_y = fmin(y0, y1), high_y = fmax(y0, y1), scale = offer_scale / edge_weights[e];
-  const int largest = (0x7fffffff >> edge_bits) - 1;
-  const int turned = floor_of(x0 / (float)width) * width;
-  const int first_row = max(1, ceil_of(low_y - margin)), last_row = min(last_inner, floor_of(high_y + margin));
-  for (int row = first_row; row <= last_row; ++row) {
-    // The part of the edge near this row.
-    const float a = ey == 0.0f ? x0 : x0 + slope * (clamp((float)row - margin, low_y, high_y) - y0);
-    const float b = ey == 0.0f ? x1 : x0 + slope * (clamp((float)row + margin, low_y, high_y) - y0);
-    const int first = ceil_of(fmin(a, b) - margin), last = min(floor_of(fmax(a, b) + margin), first + width - 1);
-    int wrapped = first - turned;
-    while (wrapped < 0) wrapped += width;
-    while (wrapped >= width) wrapped -= width;
-    const int line = origin + row * texture_width;
-    for (int column = first, count; column <= last; column += count) {
-      const int texel = line + wrapped;
-      float distances2[AT_ONCE];
-      count = wrapped + AT_ONCE <= width ? AT_ONCE : 1;
-      if (count == AT_ONCE) {
-        // Vector instructions. That the last ones are further than `last` their distances tell.
-        for (int i = 0; i < AT_ONCE; ++i)
-          distances2[i] = edge_distance2(x0 - (float)(column + i) - offset_x[texel + i], y0 - (float)row - offset_y[texel + i], ex, ey, inverse,
-                                         anchors[texel + i] != 0);
-      } else {
-        distances2[0] = edge_distance2(x0 - (float)column - offset_x[texel], y0 - (float)row - offset_y[texel], ex, ey, inverse, anchors[texel] != 0);
-      }
-      for (int i = 0; i < count; ++i) {
-        if (distances2[i] > REACH * REACH) continue;
-        const int offer = min((int)(scale * sqrt(distances2[i])), largest);
-        atomic_min(offers + texel + i, (offer << edge_bits) + e);
-      }
-      wrapped = wrapped + count < width ? wrapped + count : 0;
-    }
+// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. Free texels relax, one colour of the row after the other.
+// in   rows: patch, row, number of the first bin, 0: inner ones, even or odd
+kernel void relax_texels(const int row_count, const int texture_width, global const int* restrict rows, global const PatchRecord* restrict patches,
+                         global const int* restrict anchors, global float* offset_x, global float* offset_y) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  global const PatchRecord* restrict p = patches + rows[4 * k];
+  const int row = rows[4 * k + 1], width = p->width, first = (p->y + row) * texture_width + p->x;
+  for (int column = 0; column < 2 + (width & 1); ++column) {
+    relax_columns(column, first, width, p->height, texture_width, row, anchors, offset_x, offset_y, offset_x, offset_y);
+    WAIT_FOR_ROW();
   }
 }
 
-// NDRange and rows as for relax_texels. Free texels of a colour go to the edge that made the least offer.
-// out  parameters: where on its edge a texel is, 0 to 1
-kernel void place_on_edges(const int row_count, const int texture_width, const int first_column, const int edge_bits, global const int* restrict rows,
-                           global const PatchRecord* restrict patches, global const float* restrict edge_ends, global const int* restrict offers,
-                           global int* restrict anchors, global float* restrict parameters, global float* restrict offset_x,
-                           global float* restrict offset_y) {
+float8 gathered(const int8 at, global const float* from) {
+  return (float8)(from[at.s0], from[at.s1], from[at.s2], from[at.s3], from[at.s4], from[at.s5], from[at.s6], from[at.s7]);
+}
+
+// The least of the offers of a bin's edges to eight texels from (column, row) on. An offer is the distance divided by the edge's weight, in steps of
+// its share of the largest, and the number of the edge: of two as near the first one wins.
+int8 least_offers(const int column, const int row, const int width, const float8 offset_x, const float8 offset_y, const int begin, const int end,
+                  const int edge_bits, global const int* restrict bin_edges, global const float* restrict edges) {
+  const int largest = (0x7fffffff >> edge_bits) - 1;
+  const float8 beside = (float8)(0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f);
+  int8 least = (int8)(NO_OFFER);
+  for (int i = begin; i < end; ++i) {
+    const int e = bin_edges[i] >> TURN_BITS, turn = (bin_edges[i] & ((1 << TURN_BITS) - 1)) - MOST_TURNS;
+    global const float* edge = edges + EDGE_SIZE * e;
+    const float x0 = edge[0], y0 = edge[1], ex = edge[2] - x0, ey = edge[3] - y0, inverse = edge[4], scale = edge[5];
+    const float8 x = x0 - ((float)(column + turn * width) + beside) - offset_x, y = y0 - (float)row - offset_y;
+    const float8 t = clamp(-(x * ex + y * ey) * inverse, (float8)(0.0f), (float8)(1.0f));
+    const float8 dx = x + t * ex, dy = y + t * ey, distance2 = dx * dx + dy * dy;
+    const int8 offer = (min(convert_int8(scale * sqrt(distance2)), (int8)(largest)) << edge_bits) + e;
+    least = min(least, distance2 <= REACH * REACH ? offer : (int8)(NO_OFFER));
+  }
+  return least;
+}
+
+// Where a texel goes that an edge has made an offer, and the parameter of that point of the edge.
+typedef struct EdgePlace {
+  float x, y, t;
+} EdgePlace;
+
+// The turn of v at which an edge lies next to a texel is, for short edges, that of its middle.
+int is_long(const float ends[4], float width) { return fabs(ends[2] - ends[0]) > 0.25f * width; }
+
+// in   offset_x, offset_y: of the texel now
+__attribute__((always_inline)) EdgePlace place_at_turn(const float ends[4], int column, int row, float offset_x, float offset_y, float width, float turn) {
+  const float x = (float)column + offset_x + turn * width, y = (float)row + offset_y;
+  const float ex = ends[2] - ends[0], ey = ends[3] - ends[1], length2 = ex * ex + ey * ey;
+  const float t = length2 > 0.0f ? clamp(((x - ends[0]) * ex + (y - ends[1]) * ey) / length2, 0.0f, 1.0f) : 0.0f;
+  const EdgePlace place = {ends[0] + t * (ends[2] - ends[0]) - x, ends[1] + t * (ends[3] - ends[1]) - y, t};
+  return place;
+}
+
+// A texel that wraps round or has a long edge, whose nearest turn is looked for. Compiled once.
+// out  moved_x, moved_y: its offset there
+__attribute__((noinline)) void place_apart(const float ends[4], const int e, const int texel, const int column, const int width, const int height,
+                                           const int texture_width, const int row, global int* restrict anchors, global float* restrict parameters,
+                                           global float* offset_x, global float* offset_y) {
+  const float around = (float)width, own_x = offset_x[texel], own_y = offset_y[texel];
+  const float turn = NEAREST((0.5f * (ends[0] + ends[2]) - ((float)column + own_x)) / around);
+  const float others = around < 16.0f || is_long(ends, around) ? 1.0f : 0.0f;
+  EdgePlace best = {INFINITY, INFINITY, 0.0f};
+  for (float i = turn - others; i <= turn + others; i += 1.0f) {
+    const EdgePlace place = place_at_turn(ends, column, row, own_x, own_y, around, i);
+    if (place.x * place.x + place.y * place.y < best.x * best.x + best.y * best.y) best = place;
+  }
+  const float dx = best.x + own_x, dy = best.y + own_y;
+  if (fabs(dx) > FURTHEST || fabs(dy) > FURTHEST) return;
+  const Neighbours n = {texel, column > 0 ? texel - 1 : texel + width - 1, column + 1 < width ? texel + 1 : texel + 1 - width};
+  if (cross_around(n, height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) return;
+  offset_x[texel] = dx, offset_y[texel] = dy;
+  parameters[texel] = best.t;
+  anchors[texel] = -1 - e;
+}
+
+// Free texels of every second column, as for relax_columns, go to the edge that made the least offer.
+// \return whether there are long edges
+__attribute__((always_inline)) int place_columns(const int first_column, const int first, const int width, const int height, const int texture_width,
+                                                 const int row, const int edge_mask, global const float* restrict edges,
+                                                 global const int* restrict offers, global int* restrict anchors, global float* restrict parameters,
+                                                 global const float* restrict offset_x, global const float* restrict offset_y,
+                                                 global float* restrict own_x, global float* restrict own_y) {
+  const float around = (float)width;
+  int has_long = 0;
+  for (int j = (first_column == 0 ? 2 : 1) + 2 * get_local_id(0); j < width - 1; j += 2 * ROW_ITEMS) {
+    const int texel = first + j, has_offer = offers[texel] != NO_OFFER, e = has_offer ? offers[texel] & edge_mask : 0;
+    const float ends[4] = {edges[EDGE_SIZE * e], edges[EDGE_SIZE * e + 1], edges[EDGE_SIZE * e + 2], edges[EDGE_SIZE * e + 3]};
+    const float from_x = own_x[texel], from_y = own_y[texel];
+    const float turn = NEAREST((0.5f * (ends[0] + ends[2]) - ((float)j + from_x)) / around);
+    const EdgePlace place = place_at_turn(ends, j, row, from_x, from_y, around, turn);
+    const float dx = place.x + from_x, dy = place.y + from_y;
+    const Neighbours n = {texel, texel - 1, texel + 1};
+    const int stands = cross_around(n, height, texture_width, row, dx, dy, offset_x, offset_y) >= LEAST_CROSS;
+    const int is_apart = has_offer & is_long(ends, around);
+    const int moves = has_offer & (is_apart == 0) & (fabs(dx) <= FURTHEST) & (fabs(dy) <= FURTHEST) & stands;
+    has_long |= is_apart;
+    own_x[texel] = moves ? dx : from_x;
+    own_y[texel] = moves ? dy : from_y;
+    parameters[texel] = moves ? place.t : parameters[texel];
+    anchors[texel] = moves ? -1 - e : anchors[texel];
+  }
+  return has_long;
+}
+
+// NDRange and rows as for relax_texels. Edges offer every free texel of a row within reach a point; it goes to the nearest, one colour of the row after the other.
+// A row comes in bins of eight columns, each with a list of the edges near it.
+// in   bin_begins: into bin_edges, which are (number << TURN_BITS) + MOST_TURNS + the turn of v to add to the columns; edges: per edge x, y of its first and
+//      of its last point
+// out  parameters: where on its edge a texel is, 0 to 1; offers: what else the kernel needs per texel
+kernel void place_on_edges(const int row_count, const int texture_width, const int edge_bits, global const int* restrict rows,
+                           global const PatchRecord* restrict patches, global const int* restrict bin_begins, global const int* restrict bin_edges,
+                           global const float* restrict edges, global int* restrict anchors,
+                           global float* restrict parameters, global float* offset_x, global float* offset_y, global int* offers) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   global const PatchRecord* restrict p = patches + rows[4 * k];
   const int row = rows[4 * k + 1], width = p->width, height = p->height, first = (p->y + row) * texture_width + p->x;
-  const int begin = first_column < 2 ? first_column : width & ~1, end = first_column < 2 ? width & ~1 : width;
-  for (int column = begin + 2 * get_local_id(0); column < end; column += 2 * ROW_ITEMS) {
-    const int texel = first + column;
-    if ((offers[texel] == NO_OFFER) | (anchors[texel] != 0)) continue;
-    const int e = offers[texel] & ((1 << edge_bits) - 1);
-    const float ends[4] = {edge_ends[4 * e], edge_ends[4 * e + 1], edge_ends[4 * e + 2], edge_ends[4 * e + 3]};
-    // The turn of v at which the edge lies next to the texel: for short edges that of its middle.
-    const float y = (float)row + offset_y[texel];
-    const float x = (float)column + offset_x[texel];
-    const float around = (float)width;
-    float best = INFINITY, t = 0.0f, dx = 0.0f, dy = 0.0f;
-    const int turn = (int)rint((0.5f * (ends[0] + ends[2]) - x) / around);
-    const int beside = around < 16.0f || fabs(ends[2] - ends[0]) > 0.25f * around;
-    for (int i = turn - beside; i <= turn + beside; ++i) {
-      const float lifted = x + (float)i * around;
-      const float at = nearest_on_edge(ends, lifted, y);
-      const float ex = ends[0] + at * (ends[2] - ends[0]) - lifted, ey = ends[1] + at * (ends[3] - ends[1]) - y;
-      if (ex * ex + ey * ey < best) best = ex * ex + ey * ey, t = at, dx = ex + offset_x[texel], dy = ey + offset_y[texel];
+  for (int column = 8 * get_local_id(0), bin = rows[4 * k + 2] + get_local_id(0); column < width; column += 8 * ROW_ITEMS, bin += ROW_ITEMS) {
+    // The last texels of a row are fewer than eight: each lane beyond them looks at the last one.
+    const int texel = first + column, is_whole = column + 8 <= width;
+    const int8 lanes = texel + min((int8)(0, 1, 2, 3, 4, 5, 6, 7), (int8)(width - 1 - column));
+    const float8 x = is_whole ? vload8(0, offset_x + texel) : gathered(lanes, offset_x), y = is_whole ? vload8(0, offset_y + texel) : gathered(lanes, offset_y);
+    const int8 least = least_offers(column, row, width, x, y, bin_begins[bin], bin_begins[bin + 1], edge_bits, bin_edges, edges);
+    if (is_whole) {
+      vstore8(vload8(0, anchors + texel) == 0 ? least : (int8)(NO_OFFER), 0, offers + texel);
+    } else {
+      int of_lanes[8];
+      vstore8(least, 0, of_lanes);
+      for (int i = 0; column + i < width; ++i) offers[texel + i] = anchors[texel + i] == 0 ? of_lanes[i] : NO_OFFER;
     }
-    if (fabs(dx) > FURTHEST || fabs(dy) > FURTHEST) continue;
-    if (cross_around_one(neighbours_of(p, texture_width, column, row), height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) continue;
-    offset_x[texel] = dx;
-    offset_y[texel] = dy;
-    parameters[texel] = t;
-    anchors[texel] = -1 - e;
+  }
+  WAIT_FOR_ROW();
+  const int edge_mask = (1 << edge_bits) - 1;
+  for (int column = 0; column < 2 + (width & 1); ++column) {
+    int has_long = width < 16;
+    if (column < 2 && !has_long)
+      has_long = place_columns(column, first, width, height, texture_width, row, edge_mask, edges, offers, anchors, parameters, offset_x, offset_y, offset_x,
+                               offset_y);
+    // The rest: what wraps round, and all texels with long edges.
+    const int begin = column < 2 ? column : width - 1, end = column < 2 ? width & ~1 : width;
+    for (int j = begin + 2 * get_local_id(0); j < end; j += 2 * ROW_ITEMS) {
+      const int texel = first + j, offer = offers[texel];
+      if ((has_long == 0 && j > 0 && j < width - 1) || offer == NO_OFFER || anchors[texel] != 0) continue;
+      const int e = offer & edge_mask;
+      const float ends[4] = {edges[EDGE_SIZE * e], edges[EDGE_SIZE * e + 1], edges[EDGE_SIZE * e + 2], edges[EDGE_SIZE * e + 3]};
+      place_apart(ends, e, texel, j, width, height, texture_width, row, anchors, parameters, offset_x, offset_y);
+    }
+    WAIT_FOR_ROW();
   }
 }
 

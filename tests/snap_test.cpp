@@ -66,7 +66,7 @@ struct HostPositions {
 };
 HostPositions snapped(const OnePatch& patch, const SnapFeatures& features) {
   ReadingPositions positions = even_positions(device(), patch.layout);
-  snap_positions(device(), patch.layout, features, positions);
+  snap_positions(device(), patch.layout, tables_of(features, patch.patches), positions);
   return {device().download(positions.x), device().download(positions.y), device().download(positions.parameters), device().download(positions.anchors)};
 }
 

@@ -40,9 +40,7 @@ std::vector<KernelVariant> encoding_kernels(const ClContext& context, const Enco
   const bool can_fit = has_vsm && options.has_fit.value_or(options.has_prefilter && texels <= kMostFittedTexels);
   if (can_snap) {
     add("snap.cl", {"claim_texels", "decide_claims"}, items);
-    add("snap.cl", {"relax_texels"}, rows);
-    add("snap.cl", {"offer_edges"}, items);
-    add("snap.cl", {"place_on_edges"}, rows);
+    add("snap.cl", {"relax_texels", "place_on_edges"}, rows);
     add("encode.cl", {"walk_to_positions"}, items);
     add("snap.cl", {"place_snapped"}, items);
   }

@@ -160,8 +160,15 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
 
   const DeviceMaps maps = upload_maps(context, sources.charts, sources.patches, origin);
   const bool is_snapped = options.has_snap && maps.triangle_count > 0, is_fitted = options.has_fit && maps.triangle_count > 0;
-  std::future<SnapFeatures> finding_features;
-  if (is_snapped) finding_features = std::async(std::launch::async, [&] { return find_features(sources.charts, sources.patches, options.snap_dihedral); });
+  // Beside the device's work until they are needed.
+  SnapFeatures features;
+  SnapTables snap_tables;
+  std::future<void> finding_features;
+  if (is_snapped)
+    finding_features = std::async(std::launch::async, [&] {
+      features = find_features(sources.charts, sources.patches, options.snap_dihedral);
+      snap_tables = tables_of(features, sources.patches);
+    });
   auto covering = context.allocate<int>(texels);
   auto is_read = context.allocate<int>(std::max(1, maps.triangle_count));
   context.fill(is_read, 0);
@@ -221,17 +228,17 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     copy_plane(context, positions.x, positions.home_x), copy_plane(context, positions.y, positions.home_y);
   }
   const TexelPoints even = points;
-  const SnapFeatures features = finding_features.valid() ? finding_features.get() : SnapFeatures{};
+  if (finding_features.valid()) finding_features.get();
   ClBuffer<int> even_covering = covering;
   if (is_snapped || is_fitted) points = copy_points(context, even);
   int put_back = 0;
   if (is_snapped) {
-    snap_positions(context, layout, features, positions);
+    snap_positions(context, layout, snap_tables, positions);
     even_covering = context.allocate<int>(texels);
     copy_plane(context, covering, even_covering);
     walk(covering);
     read(covering);
-    place_snapped(context, layout, maps, features, positions, points);
+    place_snapped(context, layout, maps, snap_tables, positions, points);
   }
   if (maps.triangle_count > 0) {
     const std::vector<int> marks = context.download(is_read);

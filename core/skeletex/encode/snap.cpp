@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -21,7 +20,6 @@ constexpr double kFlat = 1e-6;          // radians: what rounding may make of a 
 constexpr double kFullDihedral = 0.5;   // radians: edges this sharp attract texels fully
 constexpr int kRoundsBetweenReads = 3;  // of claims, between two looks at how many wait
 constexpr double kLargestOffer = 8;     // cells: what lies further is rounded down to it
-constexpr int kNoOffer = std::numeric_limits<int>::max();  // as in snap.cl
 
 /// One work-item per vertex or edge, in groups of one size: PoCL compiles a kernel for every size that it meets.
 ClRange over(int count) { return {{static_cast<std::size_t>(count), 1}, {64, 1}}; }
@@ -110,22 +108,92 @@ ReadingPositions even_positions(ClContext& context, const DeviceLayout& layout) 
 
 namespace {
 
-void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const std::vector<SnapFeatures::Vertex>& vertices, ReadingPositions& positions) {
-  if (vertices.empty()) return;
-  const int count = static_cast<int>(vertices.size());
-  std::vector<std::pair<double, int>> by_strength(count);
-  for (int i = 0; i < count; ++i) by_strength[i] = {vertices[i].strength, i};
-  std::sort(by_strength.begin(), by_strength.end());
-  std::vector<int> ranks(count), vertex_patches(count);
-  std::vector<float> xs(count), ys(count);
-  for (int i = 0; i < count; ++i) {
-    ranks[by_strength[i].second] = i + 1;
-    vertex_patches[i] = vertices[i].patch;
-    xs[i] = static_cast<float>(vertices[i].x);
-    ys[i] = static_cast<float>(vertices[i].y);
+constexpr int kBinWidth = 8, kTurnBits = 4, kMostTurns = 8;  // as in snap.cl
+constexpr double kReach = 0.7 + 0.5;  // cells along each axis from a free texel's own place to an edge that it can go to
+constexpr double kLeastClipped = 3;   // columns that an edge has to span before it pays to look at each row's part alone
+
+/// The even and odd inner rows of VSM patches with their first bins. Two rows apart texels do not look at each other.
+/// \return how many bins there are
+int list_rows(std::span<const Patch> patches, std::array<std::vector<LatticeRow>, 2>& rows) {
+  int bins = 0;
+  for (std::size_t bone = 0; bone < patches.size(); ++bone) {
+    if (patches[bone].method != Method::kVsm) continue;
+    const Rectangle& r = patches[bone].rectangle;
+    for (int row = 1; row < r.height - 1; ++row, bins += (r.width + kBinWidth - 1) / kBinWidth)
+      rows[row % 2].push_back({static_cast<int>(bone), row, bins, 0});
   }
-  const auto patch = context.upload(vertex_patches), rank = context.upload(ranks);
-  const auto x = context.upload(xs), y = context.upload(ys);
+  return bins;
+}
+
+/// std::floor is a call.
+int floor_of(double x) { return static_cast<int>(x) - (x < static_cast<int>(x)); }
+
+/// Calls act(bin, turn of v) for the bins of a patch whose texels an edge can reach; bins count from the patch's first.
+template <class Act>
+void for_each_bin(const SnapFeatures::Edge& edge, int width, int height, const Act& act) {
+  const int bins = (width + kBinWidth - 1) / kBinWidth;
+  const auto for_columns = [&](int first_row, int last_row, double low_x, double high_x) {
+    const int first = -floor_of(kReach - low_x), last = std::min(floor_of(high_x + kReach), first + width - 1);
+    int turn = static_cast<int>(low_x) / width;
+    while (first < turn * width) --turn;
+    while (first >= (turn + 1) * width) ++turn;
+    for (int begin = first - turn * width; turn * width <= last; ++turn, begin = 0) {
+      if (turn < -kMostTurns || turn >= kMostTurns) continue;
+      const int first_bin = begin / kBinWidth, last_bin = std::min(last - turn * width, width - 1) / kBinWidth;
+      for (int row = first_row; row <= last_row; ++row)
+        for (int bin = first_bin; bin <= last_bin; ++bin) act((row - 1) * bins + bin, turn);
+    }
+  };
+  const auto [low_x, high_x] = std::minmax(edge.x[0], edge.x[1]);
+  const auto [low_y, high_y] = std::minmax(edge.y[0], edge.y[1]);
+  const int first_row = std::max(1, -floor_of(kReach - low_y)), last_row = std::min(height - 2, floor_of(high_y + kReach));
+  if (high_x - low_x < kLeastClipped || high_y - low_y < kReach) return for_columns(first_row, last_row, low_x, high_x);
+  // The part of the edge near each row.
+  const double slope = (edge.x[1] - edge.x[0]) / (edge.y[1] - edge.y[0]);
+  for (int row = first_row; row <= last_row; ++row) {
+    const double a = edge.x[0] + slope * (std::max(row - kReach, low_y) - edge.y[0]), b = edge.x[0] + slope * (std::min(row + kReach, high_y) - edge.y[0]);
+    for_columns(row, row, std::min(a, b), std::max(a, b));
+  }
+}
+
+/// Lists the edges of each bin, patch after patch.
+void fill_bins(const std::vector<SnapFeatures::Edge>& edges, std::span<const Patch> patches, int bin_count, SnapTables& tables) {
+  struct Entry {
+    int bin, edge;
+  };
+  std::vector<Entry> entries;
+  tables.bin_edges.reserve(8 * edges.size());
+  std::vector<int>& begins = tables.bin_begins;
+  begins.assign(bin_count + 1, 0);
+  int first_bin = 0;
+  auto edge = edges.begin();
+  for (std::size_t bone = 0; bone < patches.size(); ++bone) {
+    if (patches[bone].method != Method::kVsm) continue;
+    const Rectangle& r = patches[bone].rectangle;
+    const int bins = std::max(0, r.height - 2) * ((r.width + kBinWidth - 1) / kBinWidth);
+    int* const counts = begins.data() + first_bin;
+    entries.clear();
+    for (; edge != edges.end() && edge->patch == static_cast<int>(bone); ++edge)
+      for_each_bin(*edge, r.width, r.height, [&](int bin, int turn) {
+        entries.push_back({bin, (static_cast<int>(edge - edges.begin()) << kTurnBits) + kMostTurns + turn});
+        ++counts[bin];
+      });
+    int begin = static_cast<int>(tables.bin_edges.size());
+    for (int bin = 0; bin < bins; ++bin) begin += std::exchange(counts[bin], begin);
+    tables.bin_edges.resize(begin);
+    for (const Entry& entry : entries) tables.bin_edges[counts[entry.bin]++] = entry.edge;
+    // What was the begin of each bin has become its end.
+    first_bin += bins;
+  }
+  std::copy_backward(begins.begin(), begins.end() - 1, begins.end());
+  begins[0] = 0;
+}
+
+void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const SnapTables& tables, ReadingPositions& positions) {
+  if (tables.vertex_x.empty()) return;
+  const int count = static_cast<int>(tables.vertex_x.size());
+  const auto patch = context.upload(tables.vertex_patches), rank = context.upload(tables.vertex_ranks);
+  const auto x = context.upload(tables.vertex_x), y = context.upload(tables.vertex_y);
   auto states = context.allocate<int>(count), claims = context.allocate<int>(layout.size()), open = context.allocate<int>(1);
   context.fill(states, 0);
   // A claim is more than all of the rounds before, so these need not be taken off.
@@ -143,90 +211,62 @@ void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const std:
     }
 }
 
-/// The rows that texels move in, even and odd ones apart, as in LatticeRow. Two rows and two columns apart texels do not look at each
-/// other: with those of odd widths' last columns on their own these are six colours (colour_of in patch_texels.h).
-struct ColouredRows {
-  std::array<ClBuffer<LatticeRow>, 2> rows;
-  bool has_odd_width = false;
-};
-ColouredRows colour_rows(ClContext& context, const DeviceLayout& layout) {
-  const std::vector<PatchRecord> patches = context.download(layout.patches);
-  ColouredRows coloured;
-  std::array<std::vector<LatticeRow>, 2> rows;
-  for (int patch = 0; patch < static_cast<int>(patches.size()); ++patch) {
-    coloured.has_odd_width |= patches[patch].width % 2 == 1;
-    for (int row = 1; row < patches[patch].height - 1; ++row) rows[row % 2].push_back({patch, row, 0, 0});
-  }
-  for (const int parity : {0, 1}) coloured.rows[parity] = context.upload(rows[parity]);
-  return coloured;
-}
-
-/// Calls launch(rows, first column) for every colour.
-template <class Launch>
-void for_each_colour(const ColouredRows& coloured, const Launch& launch) {
-  for (const auto& rows : coloured.rows)
-    for (int first_column = 0; first_column < (coloured.has_odd_width ? 3 : 2); ++first_column) launch(rows, first_column);
-}
-
-void relax(ClContext& context, const DeviceLayout& layout, const ColouredRows& coloured, int passes, ReadingPositions& positions) {
-  for (int pass = 0; pass < passes; ++pass)
-    for_each_colour(coloured, [&](const ClBuffer<LatticeRow>& rows, int first_column) {
-      context.launch({"snap.cl", "relax_texels"}, row_range(context, rows.size), static_cast<int>(rows.size), layout.width, first_column, rows,
-                     layout.patches, positions.anchors, positions.x, positions.y, positions.x, positions.y);
-    });
-}
-
-struct DeviceEdges {
-  int count = 0;
-  ClBuffer<int> patches;
-  ClBuffer<float> ends, weights;
-};
-DeviceEdges upload_edges(ClContext& context, const std::vector<SnapFeatures::Edge>& edges) {
-  std::vector<int> patches(edges.size());
-  std::vector<float> ends(4 * edges.size()), weights(edges.size());
-  for (std::size_t i = 0; i < edges.size(); ++i) {
-    const SnapFeatures::Edge& edge = edges[i];
-    patches[i] = edge.patch;
-    for (const int k : {0, 1}) ends[4 * i + 2 * k] = static_cast<float>(edge.x[k]), ends[4 * i + 2 * k + 1] = static_cast<float>(edge.y[k]);
-    weights[i] = static_cast<float>(std::sqrt(std::min(1.0, edge.dihedral / kFullDihedral)));
-  }
-  return {static_cast<int>(edges.size()), context.upload(patches), context.upload(ends), context.upload(weights)};
-}
-
-void snap_to_edges(ClContext& context, const DeviceLayout& layout, const ColouredRows& coloured, const DeviceEdges& edges, ReadingPositions& positions) {
-  if (edges.count == 0) return;
-  const int bits = std::bit_width(static_cast<unsigned>(edges.count));
-  const auto scale = static_cast<float>((0x7fffffff >> bits) / kLargestOffer);
-  auto offers = context.allocate<int>(layout.size());
-  context.fill(offers, kNoOffer);
-  context.launch({"snap.cl", "offer_edges"}, over(edges.count), edges.count, layout.width, bits, scale, edges.patches, edges.ends, edges.weights,
-                 layout.patches, positions.anchors, positions.x, positions.y, offers);
-  for_each_colour(coloured, [&](const ClBuffer<LatticeRow>& rows, int first_column) {
-    context.launch({"snap.cl", "place_on_edges"}, row_range(context, rows.size), static_cast<int>(rows.size), layout.width, first_column, bits, rows,
-                   layout.patches, edges.ends, offers, positions.anchors, positions.parameters, positions.x, positions.y);
-  });
-}
-
 }  // namespace
 
-void snap_positions(ClContext& context, const DeviceLayout& layout, const SnapFeatures& features, ReadingPositions& positions) {
-  snap_to_vertices(context, layout, features.vertices, positions);
-  const ColouredRows coloured = colour_rows(context, layout);
-  const DeviceEdges edges = upload_edges(context, features.edges);
-  for (int round = 0; round < kEdgeRounds; ++round) {
-    relax(context, layout, coloured, round == 0 ? kFirstRelaxPasses : kRelaxPasses, positions);
-    snap_to_edges(context, layout, coloured, edges, positions);
+SnapTables tables_of(const SnapFeatures& features, std::span<const Patch> patches) {
+  SnapTables tables;
+  std::vector<std::pair<double, int>> by_strength;
+  by_strength.reserve(features.vertices.size()), tables.edges.reserve(features.edges.size()), tables.edge_points.reserve(features.edges.size());
+  for (const SnapFeatures::Vertex& vertex : features.vertices) {
+    by_strength.emplace_back(vertex.strength, static_cast<int>(by_strength.size()));
+    tables.vertex_patches.push_back(vertex.patch), tables.vertex_points.push_back(vertex.point);
+    tables.vertex_x.push_back(static_cast<float>(vertex.x)), tables.vertex_y.push_back(static_cast<float>(vertex.y));
   }
-  relax(context, layout, coloured, kRelaxPasses, positions);
+  std::sort(by_strength.begin(), by_strength.end());
+  tables.vertex_ranks.resize(by_strength.size());
+  for (std::size_t i = 0; i < by_strength.size(); ++i) tables.vertex_ranks[by_strength[i].second] = static_cast<int>(i) + 1;
+  tables.edge_bits = std::bit_width(static_cast<unsigned>(features.edges.size()));
+  const auto steps = static_cast<float>((0x7fffffff >> tables.edge_bits) / kLargestOffer);
+  for (const SnapFeatures::Edge& edge : features.edges) {
+    tables.edge_points.push_back(edge.points);
+    // In the order of the kernel's own sums.
+    const auto x0 = static_cast<float>(edge.x[0]), y0 = static_cast<float>(edge.y[0]), x1 = static_cast<float>(edge.x[1]), y1 = static_cast<float>(edge.y[1]);
+    const float ex = x1 - x0, ey = y1 - y0, length2 = std::fma(ex, ex, ey * ey);
+    const auto weight = static_cast<float>(std::sqrt(std::min(1.0, edge.dihedral / kFullDihedral)));
+    tables.edges.push_back({x0, y0, x1, y1, length2 > 0 ? 1 / length2 : 0, steps / weight});
+  }
+  const int bins = list_rows(patches, tables.rows);
+  fill_bins(features.edges, patches, bins, tables);
+  return tables;
 }
 
-void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps, const SnapFeatures& features,
-                   const ReadingPositions& positions, TexelPoints& points) {
-  std::vector<int> vertex_points, edge_points;
-  for (const SnapFeatures::Vertex& vertex : features.vertices) vertex_points.push_back(vertex.point);
-  for (const SnapFeatures::Edge& edge : features.edges) edge_points.insert(edge_points.end(), edge.points.begin(), edge.points.end());
+void snap_positions(ClContext& context, const DeviceLayout& layout, const SnapTables& tables, ReadingPositions& positions) {
+  snap_to_vertices(context, layout, tables, positions);
+  const std::array rows{context.upload(tables.rows[0]), context.upload(tables.rows[1])};
+  const auto relax = [&](int passes) {
+    for (int pass = 0; pass < passes; ++pass)
+      for (const int parity : {0, 1})
+        context.launch({"snap.cl", "relax_texels"}, row_range(context, tables.rows[parity].size()), static_cast<int>(tables.rows[parity].size()), layout.width,
+                       rows[parity], layout.patches, positions.anchors, positions.x, positions.y);
+  };
+  const auto begins = context.upload(tables.bin_begins), bin_edges = context.upload(tables.bin_edges);
+  const auto edges = context.upload(tables.edges);
+  auto offers = context.allocate<int>(layout.size());
+  for (int round = 0; round < kEdgeRounds; ++round) {
+    relax(round == 0 ? kFirstRelaxPasses : kRelaxPasses);
+    if (tables.edges.empty()) continue;
+    for (const int parity : {0, 1})
+      context.launch({"snap.cl", "place_on_edges"}, row_range(context, tables.rows[parity].size()), static_cast<int>(tables.rows[parity].size()), layout.width,
+                     tables.edge_bits, rows[parity], layout.patches, begins, bin_edges, edges, positions.anchors, positions.parameters, positions.x,
+                     positions.y, offers);
+  }
+  relax(kRelaxPasses);
+}
+
+void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps, const SnapTables& tables, const ReadingPositions& positions,
+                   TexelPoints& points) {
   context.launch({"snap.cl", "place_snapped"}, layout.range(), layout.width, layout.height, positions.anchors, positions.parameters,
-                 context.upload(vertex_points), context.upload(edge_points), maps.x, maps.y, maps.z, points.x, points.y, points.z);
+                 context.upload(tables.vertex_points), context.upload(tables.edge_points), maps.x, maps.y, maps.z, points.x, points.y, points.z);
 }
 
 TexelReturns::TexelReturns(ClContext& context, const DeviceLayout& layout)

@@ -24,7 +24,7 @@ struct SnapFeatures {
     double dihedral = 0;  ///< radians
   };
   std::vector<Vertex> vertices;  ///< inner ones that are not flat
-  std::vector<Edge> edges;       ///< inner ones whose dihedral angle is above the least
+  std::vector<Edge> edges;       ///< inner ones whose dihedral angle is above the least, patch after patch
 };
 
 /// The row, with fractions, that reads at u.
@@ -33,6 +33,18 @@ double row_of(const std::vector<double>& row_u, double u);
 /// The features of all VSM patches.
 /// \param least_dihedral  radians; flatter edges are left out
 SnapFeatures find_features(std::span<const Chart> charts, std::span<const Patch> patches, double least_dihedral);
+
+/// Features as the kernels take them (snap.cl).
+struct SnapTables {
+  std::vector<int> vertex_patches, vertex_points, vertex_ranks;  ///< ranks by strength, from 1
+  std::vector<float> vertex_x, vertex_y;
+  std::vector<std::array<int, 2>> edge_points;
+  std::vector<std::array<float, 6>> edges;             ///< x and y of both points, 1 / length squared, steps of offers per cell
+  int edge_bits = 0;                                   ///< of an edge's number
+  std::array<std::vector<LatticeRow>, 2> rows;         ///< of VSM patches, inner ones, even and odd: patch, row, first bin, 0
+  std::vector<int> bin_begins, bin_edges;              ///< the edges near each bin of eight columns of a row
+};
+SnapTables tables_of(const SnapFeatures& features, std::span<const Patch> patches);
 
 /// Where each texel reads, a thing of its own between the map and the texel: per texel an offset from its place in the
 /// even lattice, in cells, at most 1 along each axis, and what holds it there.
@@ -46,13 +58,13 @@ struct ReadingPositions {
 ReadingPositions even_positions(ClContext& context, const DeviceLayout& layout);
 
 /// Moves reading positions to vertices, strongest first, and then to creased edges; the map does not fold.
-void snap_positions(ClContext& context, const DeviceLayout& layout, const SnapFeatures& features, ReadingPositions& positions);
+void snap_positions(ClContext& context, const DeviceLayout& layout, const SnapTables& tables, ReadingPositions& positions);
 
 /// Planes of points, one per texel.
 using TexelPoints = DevicePlanes;
 
 /// Puts texels on vertices and edges exactly there.
-void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps, const SnapFeatures& features,
+void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps, const SnapTables& tables,
                    const ReadingPositions& positions, TexelPoints& points);
 
 /// Lists of put_back_listed, for all its calls on one lattice: 30 at most.
