@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // From maps to texels. Positions are planes x, y, z over the whole texture, relative to the model's origin.
 //   cover_texels        triangles of all charts   -> per texel the triangle that covers it (lowest index wins)
-//   walk_to_positions   the same for texels that read beside their place in the lattice
 //   read_surface        that triangle             -> position, and a mark on every triangle that is read
-//   read_listed         both, for a list of texels
+//   read_listed         the same for a list of texels that read beside their place in the lattice
+//   read_snapped        the same for all texels, which may be on vertices and edges of the mesh
 //   place_spd_points    distances along SPD rays  -> position
 //   place_points        a list of texels          -> position (end rows: seams and poles)
 //   prefilter_positions positions                 -> positions moved against their second differences
@@ -93,68 +93,50 @@ kernel void cover_texels(const int triangle_count, global const int* restrict co
   }
 }
 
-// The map's triangle at a reading position, from the one at the texel's place: always across the edge that the point is furthest behind. A walk
-// that does not arrive stays at its last triangle, and read_point at its border. Both read at column + beside and row + above, in cells.
+// A triangle of the map, and the weights there of its corners 1 and 2.
+typedef struct MapPlace {
+  int t;
+  CornerWeights w;
+} MapPlace;
+
+// The place in the map of a reading position, column + beside and row + above in cells, from the triangle that covers the texel's own place: always across the
+// edge that the point is furthest behind. A walk that does not arrive stays at its last triangle, and point_of at its border.
 // across: per triangle the ones behind the edges opposite to its corners, three planes; -1 at the map's border
-int walk_to(int t, const int column, const float beside, const int width, const int row, const float above, const int triangle_count,
-            global const int* restrict corners, global const int* restrict turns, global const int* restrict poles, global const int* restrict across,
-            global const float* restrict u_high, global const float* restrict u_low, global const float* restrict v_high, global const float* restrict v_low,
-            global const float* restrict row_high, global const float* restrict row_low) {
-  for (int steps = 0; steps < 1000; ++steps) {
-    const MapTriangle m = load_triangle(t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
-    const float u = row_offset(m, row_high, row_low, row, above);
-    const float v = turned_offset(m, column, beside, width);
-    const CornerWeights w = weights_at(m, u, v);
-    const float w0 = 1.0f - w.w1 - w.w2;
-    const float least = fmin(w0, fmin(w.w1, w.w2));
-    if (!(least < -1e-6f)) break;
-    const int corner = least == w0 ? 0 : least == w.w1 ? 1 : 2;
-    const int next = across[corner * triangle_count + t];
+MapPlace walk_to(const int covering, const int column, const float beside, const int width, const int row, const float above, const int triangle_count,
+                 global const int* restrict corners, global const int* restrict turns, global const int* restrict poles, global const int* restrict across,
+                 global const float* restrict u_high, global const float* restrict u_low, global const float* restrict v_high, global const float* restrict v_low,
+                 global const float* restrict row_high, global const float* restrict row_low) {
+  const int most_steps = beside != 0.0f || above != 0.0f ? 1000 : 0;
+  MapPlace place;
+  place.t = covering;
+  for (int steps = 0;; ++steps) {
+    const MapTriangle m = load_triangle(place.t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
+    place.w = weights_at(m, row_offset(m, row_high, row_low, row, above), turned_offset(m, column, beside, width));
+    const float w0 = 1.0f - place.w.w1 - place.w.w2;
+    const float least = fmin(w0, fmin(place.w.w1, place.w.w2));
+    if (!(least < -1e-6f) || steps == most_steps) break;
+    const int corner = least == w0 ? 0 : least == place.w.w1 ? 1 : 2;
+    const int next = across[corner * triangle_count + place.t];
     if (next < 0) break;
-    t = next;
+    place.t = next;
   }
-  return t;
+  return place;
 }
 
 typedef struct SurfacePoint {
   float x, y, z;
 } SurfacePoint;
 
-__attribute__((always_inline)) SurfacePoint read_point(const int t, const int column, const float beside, const int width, const int row, const float above,
-                                                       const int triangle_count, global const int* corners, global const int* turns,
-                                                       global const int* poles, global const float* u_high,
-                                                       global const float* u_low, global const float* v_high,
-                                                       global const float* v_low, global const float* vertex_x,
-                                                       global const float* vertex_y, global const float* vertex_z,
-                                                       global const float* row_high, global const float* row_low) {
-  const MapTriangle m = load_triangle(t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
-  const CornerWeights w = weights_at(m, row_offset(m, row_high, row_low, row, above), turned_offset(m, column, beside, width));
+__attribute__((always_inline)) SurfacePoint point_of(const MapPlace place, const int triangle_count, global const int* corners, global const float* vertex_x,
+                                                     global const float* vertex_y, global const float* vertex_z) {
   // Rounding may have put it a little outside.
-  const float inner1 = fmax(0.0f, w.w1), inner2 = fmax(0.0f, w.w2), scale = 1.0f / fmax(1.0f, inner1 + inner2);
+  const float inner1 = fmax(0.0f, place.w.w1), inner2 = fmax(0.0f, place.w.w2), scale = 1.0f / fmax(1.0f, inner1 + inner2);
   const float w1 = inner1 * scale, w2 = inner2 * scale;
-  const int a = corners[t], b = corners[triangle_count + t], c = corners[2 * triangle_count + t];
+  const int a = corners[place.t], b = corners[triangle_count + place.t], c = corners[2 * triangle_count + place.t];
   const SurfacePoint point = {vertex_x[a] + w1 * (vertex_x[b] - vertex_x[a]) + w2 * (vertex_x[c] - vertex_x[a]),
                               vertex_y[a] + w1 * (vertex_y[b] - vertex_y[a]) + w2 * (vertex_y[c] - vertex_y[a]),
                               vertex_z[a] + w1 * (vertex_z[b] - vertex_z[a]) + w2 * (vertex_z[c] - vertex_z[a])};
   return point;
-}
-
-// NDRange (texture width, texture height). Texels that read beside their place in the lattice, and are held by nothing,
-// walk from the triangle that covers their place to the one that covers where they read.
-kernel void walk_to_positions(const int texture_width, const int texture_height, const int triangle_count, global const int* restrict texel_patches,
-                              global const int* restrict corners, global const int* restrict turns, global const int* restrict poles,
-                              global const int* restrict across, global const float* restrict u_high, global const float* restrict u_low,
-                              global const float* restrict v_high, global const float* restrict v_low, global const PatchRecord* restrict patches,
-                              global const float* restrict row_high, global const float* restrict row_low, global const float* restrict offset_x,
-                              global const float* restrict offset_y, global const int* restrict anchors, global int* restrict texel_triangles) {
-  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
-  if (column >= texture_width || line >= texture_height) return;
-  const int texel = line * texture_width + column;
-  const int t = texel_triangles[texel];
-  if (t == NO_TRIANGLE || anchors[texel] != 0 || (offset_x[texel] == 0.0f && offset_y[texel] == 0.0f)) return;
-  global const PatchRecord* p = patches + texel_patches[texel];
-  texel_triangles[texel] = walk_to(t, column - p->x, offset_x[texel], p->width, p->row_begin + line - p->y, offset_y[texel], triangle_count, corners, turns,
-                                   poles, across, u_high, u_low, v_high, v_low, row_high, row_low);
 }
 
 // NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. Every texel of the rows (lattice_rows) reads at its place in the lattice plus its
@@ -174,8 +156,9 @@ kernel void read_surface(const int row_count, const int texture_width, const int
   const int first = (p->y + lattice_rows[4 * k + 1]) * texture_width + p->x;
   for (int j = get_local_id(0); j < width; j += ROW_ITEMS) {
     const int texel = first + j, is_covered = texel_triangles[texel] != NO_TRIANGLE, t = min(texel_triangles[texel], triangle_count - 1);
-    const SurfacePoint point = read_point(t, j, offset_x[texel], width, row, offset_y[texel], triangle_count, corners, turns, poles, u_high, u_low, v_high,
-                                          v_low, vertex_x, vertex_y, vertex_z, row_high, row_low);
+    const MapTriangle m = load_triangle(t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
+    const MapPlace place = {t, weights_at(m, row_offset(m, row_high, row_low, row, offset_y[texel]), turned_offset(m, j, offset_x[texel], width))};
+    const SurfacePoint point = point_of(place, triangle_count, corners, vertex_x, vertex_y, vertex_z);
     const float px = is_covered ? point.x : x[texel], py = is_covered ? point.y : y[texel], pz = is_covered ? point.z : z[texel];
     x[texel] = px, y[texel] = py, z[texel] = pz;
   }
@@ -196,17 +179,53 @@ kernel void read_listed(const int count, const int texture_width, const int tria
   const int i = (int)get_global_id(0);
   if (i >= count) return;
   const int texel = texels[i];
-  int t = texel_triangles[texel];
-  if (t == NO_TRIANGLE) return;
+  if (texel_triangles[texel] == NO_TRIANGLE) return;
   global const PatchRecord* p = patches + texel_patches[texel];
-  const int column = texel % texture_width - p->x, row = p->row_begin + texel / texture_width - p->y;
-  const float beside = offset_x[texel], above = offset_y[texel];
-  if (beside != 0.0f || above != 0.0f)
-    t = walk_to(t, column, beside, p->width, row, above, triangle_count, corners, turns, poles, across, u_high, u_low, v_high, v_low, row_high, row_low);
-  const SurfacePoint point = read_point(t, column, beside, p->width, row, above, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low, vertex_x,
-                                  vertex_y, vertex_z, row_high, row_low);
+  const MapPlace place = walk_to(texel_triangles[texel], texel % texture_width - p->x, offset_x[texel], p->width, p->row_begin + texel / texture_width - p->y,
+                                 offset_y[texel], triangle_count, corners, turns, poles, across, u_high, u_low, v_high, v_low, row_high, row_low);
+  const SurfacePoint point = point_of(place, triangle_count, corners, vertex_x, vertex_y, vertex_z);
   x[texel] = point.x, y[texel] = point.y, z[texel] = point.z;
-  is_triangle_read[t] = 1;
+  is_triangle_read[place.t] = 1;
+}
+
+// NDRange (texture width, texture height). What snapping has made of the even lattice: texels on vertices and edges of the mesh take those points, others that
+// have moved read where they are now, the rest stays.
+// in   home_x, home_y: the even lattice's offsets; vertex_points: number of a vertex' point in the planes; edge_points: two per edge
+// out  texel_triangles: of texels on vertices and edges as they were
+kernel void read_snapped(const int texture_width, const int texture_height, const int triangle_count, global const int* restrict texel_patches,
+                         global const int* restrict even_triangles, global const int* restrict corners, global const int* restrict turns,
+                         global const int* restrict poles, global const int* restrict across, global const float* restrict u_high,
+                         global const float* restrict u_low, global const float* restrict v_high, global const float* restrict v_low,
+                         global const float* restrict vertex_x, global const float* restrict vertex_y, global const float* restrict vertex_z,
+                         global const PatchRecord* restrict patches, global const float* restrict row_high, global const float* restrict row_low,
+                         global const float* restrict home_x, global const float* restrict home_y, global const float* restrict offset_x,
+                         global const float* restrict offset_y, global const int* restrict anchors, global const float* restrict parameters,
+                         global const int* restrict vertex_points, global const int* restrict edge_points, global const float* restrict even_x,
+                         global const float* restrict even_y, global const float* restrict even_z, global int* restrict texel_triangles,
+                         global float* restrict x, global float* restrict y, global float* restrict z, global int* restrict is_triangle_read) {
+  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (column >= texture_width || line >= texture_height) return;
+  const int texel = line * texture_width + column, anchor = anchors[texel];
+  const float beside = offset_x[texel], above = offset_y[texel];
+  int t = even_triangles[texel];
+  SurfacePoint point = {even_x[texel], even_y[texel], even_z[texel]};
+  if (anchor != 0) {
+    const int a = anchor > 0 ? vertex_points[anchor - 1] : edge_points[2 * (-1 - anchor)];
+    const int b = anchor > 0 ? a : edge_points[2 * (-1 - anchor) + 1];
+    const float s = anchor > 0 ? 0.0f : parameters[texel];
+    point.x = vertex_x[a] + s * (vertex_x[b] - vertex_x[a]);
+    point.y = vertex_y[a] + s * (vertex_y[b] - vertex_y[a]);
+    point.z = vertex_z[a] + s * (vertex_z[b] - vertex_z[a]);
+  } else if (t != NO_TRIANGLE && (beside != 0.0f || above != 0.0f || home_x[texel] != 0.0f || home_y[texel] != 0.0f)) {
+    global const PatchRecord* p = patches + texel_patches[texel];
+    const MapPlace place = walk_to(t, column - p->x, beside, p->width, p->row_begin + line - p->y, above, triangle_count, corners, turns, poles, across, u_high,
+                                   u_low, v_high, v_low, row_high, row_low);
+    t = place.t;
+    point = point_of(place, triangle_count, corners, vertex_x, vertex_y, vertex_z);
+    is_triangle_read[t] = 1;
+  }
+  texel_triangles[texel] = t;
+  x[texel] = point.x, y[texel] = point.y, z[texel] = point.z;
 }
 
 // The tangent frame's foot W and its axis `out`, from the tables (model/frame.h).

@@ -3,7 +3,6 @@
 //   claim_texels, decide_claims  vertices, strongest first, take the nearest texel that is free
 //   relax_texels                 free texels follow their neighbours half way
 //   place_on_edges               free texels go to the nearest point of a creased edge
-//   place_snapped                positions of texels on vertices and edges
 //   put_listed_back              texels of a list, and what then folds in the map or in space, go back to the even lattice
 // A reading position is an offset from the texel's own place in the lattice, in cells: two planes over the texture, x
 // around, y along. Rows 0 and height-1 stay. `anchors` says what holds a texel: 0 nothing, 1 + i vertex i of the list
@@ -359,24 +358,6 @@ kernel void place_on_edges(const int row_count, const int texture_width, const i
     }
     WAIT_FOR_ROW();
   }
-}
-
-// NDRange (texture width, texture height). points: number of the vertex' point in the planes; edge_points: two per edge.
-kernel void place_snapped(const int texture_width, const int texture_height, global const int* restrict anchors, global const float* restrict parameters,
-                          global const int* restrict vertex_points, global const int* restrict edge_points, global const float* restrict point_x,
-                          global const float* restrict point_y, global const float* restrict point_z, global float* restrict x, global float* restrict y,
-                          global float* restrict z) {
-  const int across = (int)get_global_id(0), line = (int)get_global_id(1);
-  if (across >= texture_width || line >= texture_height) return;
-  const int texel = line * texture_width + across;
-  const int anchor = anchors[texel];
-  if (anchor == 0) return;
-  const int a = anchor > 0 ? vertex_points[anchor - 1] : edge_points[2 * (-1 - anchor)];
-  const int b = anchor > 0 ? a : edge_points[2 * (-1 - anchor) + 1];
-  const float t = anchor > 0 ? 0.0f : parameters[texel];
-  x[texel] = point_x[a] + t * (point_x[b] - point_x[a]);
-  y[texel] = point_y[a] + t * (point_y[b] - point_y[a]);
-  z[texel] = point_z[a] + t * (point_z[b] - point_z[a]);
 }
 
 void cross_product(const float a[3], const float b[3], const float c[3], float n[3]) {

@@ -41,8 +41,7 @@ std::vector<KernelVariant> encoding_kernels(const ClContext& context, const Enco
   if (can_snap) {
     add("snap.cl", {"claim_texels", "decide_claims"}, items);
     add("snap.cl", {"relax_texels", "place_on_edges"}, rows);
-    add("encode.cl", {"walk_to_positions"}, items);
-    add("snap.cl", {"place_snapped"}, items);
+    add("encode.cl", {"read_snapped"}, items);
   }
   if (can_fit)
     add("fit.cl", {"read_samples", "choose_diagonals", "match_samples", "match_lattice", "assemble", "relax_moves", "move_points"}, items);

@@ -172,16 +172,6 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   auto covering = context.allocate<int>(texels);
   auto is_read = context.allocate<int>(std::max(1, maps.triangle_count));
   context.fill(is_read, 0);
-  const auto read = [&](const ClBuffer<int>& triangles) {
-    context.launch({"encode.cl", "read_surface"}, row_range(context, inner_rows.size), inner_row_count, texture_width, maps.triangle_count, inner_rows, triangles,
-                   maps.corners, maps.turns, maps.poles, maps.u_high, maps.u_low, maps.v_high, maps.v_low, maps.x, maps.y, maps.z, layout.patches,
-                   maps.row_high, maps.row_low, positions.x, positions.y, points.x, points.y, points.z, is_read);
-  };
-  const auto walk = [&](ClBuffer<int>& triangles) {
-    context.launch({"encode.cl", "walk_to_positions"}, layout.range(), texture_width, texture_height, maps.triangle_count, layout.texel_patches, maps.corners,
-                   maps.turns, maps.poles, maps.across, maps.u_high, maps.u_low, maps.v_high, maps.v_low, layout.patches, maps.row_high, maps.row_low,
-                   positions.x, positions.y, positions.anchors, triangles);
-  };
   if (maps.triangle_count > 0) {
     context.fill(covering, kNoTriangle);
     // A CPU looks at each triangle once; a GPU needs more work-items for the rows of tall ones.
@@ -191,7 +181,9 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     std::vector<int> texel_triangles = context.download(covering);
     result.report.missed_texels = fill_uncovered(sources.patches, texture_width, texel_triangles);
     context.write(covering, texel_triangles);
-    read(covering);
+    context.launch({"encode.cl", "read_surface"}, row_range(context, inner_rows.size), inner_row_count, texture_width, maps.triangle_count, inner_rows,
+                   covering, maps.corners, maps.turns, maps.poles, maps.u_high, maps.u_low, maps.v_high, maps.v_low, maps.x, maps.y, maps.z, layout.patches,
+                   maps.row_high, maps.row_low, positions.x, positions.y, points.x, points.y, points.z, is_read);
   }
 
   // Rays.
@@ -229,16 +221,18 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   }
   const TexelPoints even = points;
   if (finding_features.valid()) finding_features.get();
-  ClBuffer<int> even_covering = covering;
-  if (is_snapped || is_fitted) points = copy_points(context, even);
+  const ClBuffer<int> even_covering = covering;
   int put_back = 0;
   if (is_snapped) {
     snap_positions(context, layout, snap_tables, positions);
-    even_covering = context.allocate<int>(texels);
-    copy_plane(context, covering, even_covering);
-    walk(covering);
-    read(covering);
-    place_snapped(context, layout, maps, snap_tables, positions, points);
+    points = allocate_points(context, texels), covering = context.allocate<int>(texels);
+    context.launch({"encode.cl", "read_snapped"}, layout.range(), texture_width, texture_height, maps.triangle_count, layout.texel_patches, even_covering,
+                   maps.corners, maps.turns, maps.poles, maps.across, maps.u_high, maps.u_low, maps.v_high, maps.v_low, maps.x, maps.y, maps.z, layout.patches,
+                   maps.row_high, maps.row_low, positions.home_x, positions.home_y, positions.x, positions.y, positions.anchors, positions.parameters,
+                   context.upload(snap_tables.vertex_points), context.upload(snap_tables.edge_points), even.x, even.y, even.z, covering, points.x, points.y,
+                   points.z, is_read);
+  } else if (is_fitted) {
+    points = copy_points(context, even);
   }
   if (maps.triangle_count > 0) {
     const std::vector<int> marks = context.download(is_read);

@@ -263,12 +263,6 @@ void snap_positions(ClContext& context, const DeviceLayout& layout, const SnapTa
   relax(kRelaxPasses);
 }
 
-void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps, const SnapTables& tables, const ReadingPositions& positions,
-                   TexelPoints& points) {
-  context.launch({"snap.cl", "place_snapped"}, layout.range(), layout.width, layout.height, positions.anchors, positions.parameters,
-                 context.upload(tables.vertex_points), context.upload(tables.edge_points), maps.x, maps.y, maps.z, points.x, points.y, points.z);
-}
-
 TexelReturns::TexelReturns(ClContext& context, const DeviceLayout& layout)
     : marks(context.allocate<int>(layout.size())),
       back(context.allocate<int>(layout.size())),

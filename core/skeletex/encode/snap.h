@@ -63,10 +63,6 @@ void snap_positions(ClContext& context, const DeviceLayout& layout, const SnapTa
 /// Planes of points, one per texel.
 using TexelPoints = DevicePlanes;
 
-/// Puts texels on vertices and edges exactly there.
-void place_snapped(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps, const SnapTables& tables,
-                   const ReadingPositions& positions, TexelPoints& points);
-
 /// Lists of put_back_listed, for all its calls on one lattice: 30 at most.
 struct TexelReturns {
   TexelReturns(ClContext& context, const DeviceLayout& layout);
