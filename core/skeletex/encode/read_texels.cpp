@@ -122,19 +122,18 @@ std::vector<int> vsm_texels(std::span<const Patch> patches, int texture_width, i
   return is_vsm;
 }
 
-SnapReport report_snap(ClContext& context, const SnapFeatures& features, int put_back, const ReadingPositions& positions) {
+SnapReport report_snap(const SnapFeatures& features, int put_back, const std::vector<int>& anchors) {
   SnapReport report;
   report.vertices = static_cast<int>(features.vertices.size());
   report.edges = static_cast<int>(features.edges.size());
   report.texels_put_back = put_back;
-  std::vector<bool> has_texel(features.edges.size(), false);
-  for (const int anchor : context.download(positions.anchors)) {
-    if (anchor > 0) ++report.snapped_vertices;
-    if (anchor >= 0) continue;
-    ++report.texels_on_edges;
-    has_texel[-1 - anchor] = true;
+  // Without branches: what holds a texel follows no pattern. The first flag is that of texels on no edge.
+  std::vector<char> has_texel(features.edges.size() + 1, 0);
+  for (const int anchor : anchors) {
+    report.snapped_vertices += anchor > 0, report.texels_on_edges += anchor < 0;
+    has_texel[std::max(0, -anchor)] = 1;
   }
-  report.snapped_edges = static_cast<int>(std::count(has_texel.begin(), has_texel.end(), true));
+  report.snapped_edges = static_cast<int>(std::count(has_texel.begin() + 1, has_texel.end(), 1));
   return report;
 }
 
@@ -260,10 +259,11 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     result.report.turned_triangles = guard.turned_triangles, result.report.even_turned_triangles = guard.even_turned_triangles;
     (is_fitted ? result.report.fit->texels_put_back : put_back) += guard.texels_put_back;
   }
-  if (is_snapped) result.report.snap = report_snap(context, features, put_back, positions);
+  const std::vector<int> anchors = is_snapped ? context.download(positions.anchors) : std::vector<int>{};
   auto along = context.allocate<float>(texels), around = context.allocate<float>(texels), out = context.allocate<float>(texels);
   context.launch({"encode.cl", "encode_texels"}, layout.range(), texture_width, texture_height, layout.texel_patches, layout.patches, rows, columns, points.x,
                  points.y, points.z, along, around, out);
+  if (is_snapped) result.report.snap = report_snap(features, put_back, anchors);  // beside the device's work
   result.texture = {texture_width, texture_height, context.download(along), context.download(around), context.download(out)};
   return result;
 }

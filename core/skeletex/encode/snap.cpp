@@ -30,8 +30,9 @@ bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind =
 double angle_between(const Vec3& a, const Vec3& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
 
 void add_features(const Chart& chart, const Patch& patch, int bone, int first_point, double least_dihedral, SnapFeatures& features) {
-  const HalfEdgeTable table = link_half_edges(chart.triangles, static_cast<int>(chart.positions.size()));
+  const HalfEdgeTable& table = chart.half_edges;
   std::vector<Vec3> normals;
+  normals.reserve(chart.triangles.size()), features.edges.reserve(3 * chart.triangles.size() / 2), features.vertices.reserve(chart.positions.size());
   for (const Triangle& t : chart.triangles)
     normals.push_back((chart.positions[t[1]] - chart.positions[t[0]]).cross(chart.positions[t[2]] - chart.positions[t[0]]).normalized());
   std::vector<double> rows(chart.u.size());
@@ -91,6 +92,9 @@ SnapFeatures find_features(std::span<const Chart> charts, std::span<const Patch>
     if (patches[bone].method == Method::kVsm) add_features(charts[bone], patches[bone], static_cast<int>(bone), first_points[bone], least_dihedral, parts[bone]);
   });
   SnapFeatures features;
+  std::size_t vertices = 0, edges = 0;
+  for (const SnapFeatures& part : parts) vertices += part.vertices.size(), edges += part.edges.size();
+  features.vertices.reserve(vertices), features.edges.reserve(edges);
   for (std::size_t bone = 0; bone < charts.size(); ++bone) {
     features.vertices.insert(features.vertices.end(), parts[bone].vertices.begin(), parts[bone].vertices.end());
     append_by_row(parts[bone].edges, patches[bone].rectangle.height, features.edges);
@@ -203,7 +207,7 @@ void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const Snap
     for (int i = 0; i < kRoundsBetweenReads; ++i, ++round) {
       const int least = round % rounds_at_once << bits;
       if (least == 0) context.fill(claims, 0);
-      context.fill(open, 0);
+      if (i + 1 == kRoundsBetweenReads) context.fill(open, 0);
       context.launch({"snap.cl", "claim_texels"}, over(count), count, layout.width, least, patch, x, y, rank, layout.patches, positions.anchors, states,
                      claims);
       context.launch({"snap.cl", "decide_claims"}, over(count), count, layout.width, least, patch, x, y, rank, layout.patches, claims, states,
