@@ -95,13 +95,13 @@ PlacedVertices place_vertices(std::span<const Chart> charts, std::span<const Pat
 /// (guard.cl) can be too far; what looks too far is looked at again by a tree.
 class Distances {
  public:
-  Distances(ClContext& context, const GuardSources& sources, const DeviceLayout& layout, const DeviceMaps& maps, TriangleTree tree)
+  Distances(ClContext& context, const GuardSources& sources, const DeviceLayout& layout, const DeviceMaps& maps, TriangleTree tree, PlacedVertices placed)
       : context_(context),
         sources_(sources),
         layout_(layout),
         maps_(maps),
         search_(context, std::move(tree)),
-        placed_(place_vertices(sources.charts, sources.model.patches, maps, layout)),
+        placed_(std::move(placed)),
         normals_(context.allocate<float>(3 * static_cast<std::size_t>(maps.triangle_count))),
         texel_normals_(context.allocate<float>(3 * layout.size())) {
     context.launch({"guard.cl", "find_normals"}, over(maps.triangle_count), maps.triangle_count, maps.corners, maps.x, maps.y, maps.z, normals_);
@@ -221,6 +221,8 @@ class Distances {
     measure_vertices(lattice, asked, limit);
     return triangles_at_far(lattice, changed, limit);
   }
+  /// What holds texels, but for those that have gone back since the last call.
+  std::vector<int> take_anchors() { return std::move(anchors_); }
 
  private:
   /// A vertex of the original as it was measured last, to the quads around it.
@@ -489,13 +491,14 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
   GuardReport report;
   const SkeletexModel& model = sources.model;
   auto tree = std::async(std::launch::async, [&] { return build_triangle_tree(sources.mesh); });
+  auto placed = std::async(std::launch::async, [&] { return place_vertices(sources.charts, model.patches, maps, layout); });
   const LatticeMesh even_lattice(context, model, DiagonalRule::kNearest, layout.patches, filtered);
   LatticeMesh lattice(even_lattice, model.diagonals, points);
   // Crossings are the host's alone: they are found beside distances, which are for the most part the device's.
   using Pairs = std::vector<std::array<int, 2>>;
   LatticeCrossings crossings(lattice);
   std::future<Pairs> finding_all = std::async(std::launch::async, [&] { return crossings.find(lattice); });
-  Distances distances(context, sources, layout, maps, tree.get());
+  Distances distances(context, sources, layout, maps, tree.get(), placed.get());
   std::vector<int> even_turned;
   const float limit = kShareOfFurthest * distances.measure_even(even_lattice, even_triangles, even_turned);
   report.even_turned_triangles = static_cast<int>(even_turned.size());
@@ -551,6 +554,8 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
     if (back.empty() && with_vertices) break;
     changed = lattice.move(back, even_lattice);
   }
+  report.anchors = distances.take_anchors();
+  for (const int texel : back) report.anchors[texel] = 0;
   return report;
 }
 

@@ -16,6 +16,7 @@ struct GuardSources {
 struct GuardReport {
   int texels_put_back = 0;
   int turned_triangles = 0, even_turned_triangles = 0;  ///< that look against the mesh: of the VSM patches' lattice, and of the even one
+  std::vector<int> anchors;  ///< per texel what holds it now, see ReadingPositions
 };
 
 /// Looks at the very mesh that the decoder will make, strips at seams included. Texels go back to the even lattice

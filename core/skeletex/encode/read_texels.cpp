@@ -253,13 +253,15 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     // What is fitted is not filtered as well: with SPD patches beside it, only these are.
     points = prefilter(points, is_fitted ? context.upload(vsm_texels(sources.patches, texture_width, texture_height)) : positions.anchors, kAnyHolds);
   }
+  std::vector<int> anchors;
   if ((is_snapped || is_fitted) && sources.guard) {
     const TexelPoints filtered = options.has_prefilter ? prefilter(even, positions.anchors, kNoneHolds) : even;
-    const GuardReport guard = put_back_faults(context, *sources.guard, layout, maps, features, even_covering, covering, even, filtered, positions, points);
+    GuardReport guard = put_back_faults(context, *sources.guard, layout, maps, features, even_covering, covering, even, filtered, positions, points);
     result.report.turned_triangles = guard.turned_triangles, result.report.even_turned_triangles = guard.even_turned_triangles;
     (is_fitted ? result.report.fit->texels_put_back : put_back) += guard.texels_put_back;
+    anchors = std::move(guard.anchors);
   }
-  const std::vector<int> anchors = is_snapped ? context.download(positions.anchors) : std::vector<int>{};
+  if (is_snapped && anchors.empty()) anchors = context.download(positions.anchors);
   auto along = context.allocate<float>(texels), around = context.allocate<float>(texels), out = context.allocate<float>(texels);
   context.launch({"encode.cl", "encode_texels"}, layout.range(), texture_width, texture_height, layout.texel_patches, layout.patches, rows, columns, points.x,
                  points.y, points.z, along, around, out);
