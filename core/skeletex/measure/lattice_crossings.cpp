@@ -18,6 +18,7 @@ constexpr int kNear = 2;              // nodes: up to here a part of the lattice
 constexpr int kNearQuads = 8;         // quads, likewise
 constexpr float kLeastCosine = 0.2f;  // between a part's normals and their middle
 constexpr double kRounding = 1e-10;   // of a product of lengths: far more than double precision rounds off
+constexpr float kSliver = 16;         // of what rounding moves a vertex by: the least height of a triangle that it does not turn
 constexpr std::size_t kAtOnce = 128;
 constexpr int kTaskLevel = 3;         // nodes up to here are one task
 constexpr std::size_t kTasks = 8;     // at once
@@ -69,10 +70,10 @@ inline bool is_narrow(const Box& normals) {
   return (middle * normals.least).min(middle * normals.greatest).sum() > kLeastCosine * middle.matrix().norm();
 }
 
-inline bool do_share_vertex(const Triangle& a, const Triangle& b) {
-  int shared = 0;
-  for (int k = 0; k < 3; ++k) shared |= static_cast<int>(a[k] == b[0]) | static_cast<int>(a[k] == b[1]) | static_cast<int>(a[k] == b[2]);
-  return shared != 0;
+/// Whether a triangle is so thin that rounding of its corners can turn it.
+inline bool is_sliver(const Four& a, const Four& b, const Four& c, float least_height) {
+  const Eigen::Vector3f u = (b - a).head<3>().matrix(), v = (c - a).head<3>().matrix();
+  return u.cross(v).squaredNorm() <= least_height * least_height * std::max({u.squaredNorm(), v.squaredNorm(), (v - u).squaredNorm()});
 }
 
 using FourPoints = std::array<Four, 3>;
@@ -133,8 +134,10 @@ LatticeCrossings::EndLeaf LatticeCrossings::describe_end(const LatticeMesh& latt
   std::vector<int> samples;
   int least = 0, greatest = 0, first = -1;
   const auto [begin, end] = triangles_of_end(node);
-  for (int i = begin; i < end; ++i)
-    for (const int vertex : lattice.triangle(i)) {
+  for (int i = begin; i < end; ++i) {
+    const Triangle triangle = lattice.triangle(i);
+    leaf.has_sliver = leaf.has_sliver || is_sliver(lattice.point(triangle[0]), lattice.point(triangle[1]), lattice.point(triangle[2]), kSliver * margin_);
+    for (const int vertex : triangle) {
       if (!lattice.is_texel(vertex)) {
         samples.push_back(vertex);
         continue;
@@ -146,6 +149,7 @@ LatticeCrossings::EndLeaf LatticeCrossings::describe_end(const LatticeMesh& latt
       if (2 * offset < -r.width) offset += r.width;
       least = std::min(least, offset), greatest = std::max(greatest, offset);
     }
+  }
   if (first >= 0) {
     leaf.first_column = (first + least + r.width) % r.width;
     leaf.last_column = leaf.first_column + greatest - least;
@@ -305,35 +309,26 @@ void LatticeCrossings::mark(std::span<const int> leaves, std::vector<char>& are_
   }
 }
 
-/// By how little the lattice around two nodes bends, or one.
-LatticeCrossings::Contact LatticeCrossings::contact(const Tree& tree, int a, int b) const {
+/// Whether triangles of two nodes can, or of one: not where the lattice around them bends little, but for slivers of strips.
+bool LatticeCrossings::can_meet(const Tree& tree, int a, int b) const {
   const Node &one = nodes_[a], &other = nodes_[b];
   const Grid &first = grids_[one.grid], &second = grids_[other.grid];
   const bool are_squares = first.end < 0 && second.end < 0;
-  if (!are_squares && !first.is_fan && !second.is_fan && (one.level > 0 || other.level > 0)) return Contact::kAny;
-  const Contact of_smooth = are_squares || first.is_fan || second.is_fan ? Contact::kNone : Contact::kByRounding;
-  if (a == b) return is_narrow(tree.nodes[a].normals) ? of_smooth : Contact::kAny;
-  bool is_smooth = false;
+  if (!are_squares && !first.is_fan && !second.is_fan) {
+    if (one.level > 0 || other.level > 0) return true;
+    const auto has_sliver = [&](int node, const Grid& grid) { return grid.end >= 0 && tree.ends[node - first_of_ends()].has_sliver; };
+    if (has_sliver(a, first) || has_sliver(b, second)) return true;
+  }
+  if (a == b) return !is_narrow(tree.nodes[a].normals);
   if (first.patch == second.patch)
-    for (const int end : {0, 1}) is_smooth = is_smooth || (tree.caps[first.patch][end] >= 0 && is_in_cap(tree, one, end) && is_in_cap(tree, other, end));
-  if (one.grid == other.grid) return is_smooth || is_smooth_within(tree, one, other) ? of_smooth : Contact::kAny;
-  if (are_squares) return Contact::kAny;
-  if (is_smooth) return of_smooth;
-  if (one.level > 0 || other.level > 0) return Contact::kAny;
-  if (first.end >= 0 && second.end >= 0) return is_smooth_over_seam(tree, a, b) ? Contact::kByRounding : Contact::kAny;
-  if (first.patch != second.patch) return Contact::kAny;
+    for (const int end : {0, 1})
+      if (tree.caps[first.patch][end] >= 0 && is_in_cap(tree, one, end) && is_in_cap(tree, other, end)) return false;
+  if (one.grid == other.grid) return !is_smooth_within(tree, one, other);
+  if (are_squares || one.level > 0 || other.level > 0) return true;
+  if (first.end >= 0 && second.end >= 0) return !is_smooth_over_seam(tree, a, b);
+  if (first.patch != second.patch) return true;
   const auto& [strip, square] = first.end >= 0 ? std::pair(one, other) : std::pair(other, one);
-  if (!is_smooth_at_end(tree, strip, square)) return Contact::kAny;
-  return do_share(tree, strip, square) ? of_smooth : Contact::kNone;
-}
-
-/// Whether a leaf of a strip or fan and a square of its patch have vertices in common.
-bool LatticeCrossings::do_share(const Tree& tree, const Node& end, const Node& square) const {
-  const Grid& grid = grids_[square.grid];
-  if (square.row != (grids_[end.grid].end == 0 ? 0 : grid.levels[0].rows - 1)) return false;
-  const EndLeaf& leaf = tree.ends[node_at(grids_[end.grid], 0, 0, end.column) - first_of_ends()];
-  const int width = rectangles_[grid.patch].width, ahead = (kSide * square.column - leaf.first_column + width) % width;
-  return ahead <= leaf.last_column - leaf.first_column || ahead + kSide >= width;
+  return !is_smooth_at_end(tree, strip, square);
 }
 
 bool LatticeCrossings::is_in_cap(const Tree& tree, const Node& node, int end) const {
@@ -508,7 +503,6 @@ void LatticeCrossings::place(const LatticeMesh& lattice, int i, Leaf& leaf) cons
     leaf.numbers[i] = triangles_of_end(node).first + i;
     triangle = lattice.triangle(leaf.numbers[i]);
   }
-  leaf.are_on_seam[i] = std::count_if(triangle.begin(), triangle.end(), [&](int vertex) { return !lattice.is_texel(vertex); }) > 1;
   leaf.corners[i] = lattice.corners(triangle);
   const auto& [a, b, c] = leaf.corners[i];
   leaf.normals[i] = (b - a).cross(c - a);
@@ -531,8 +525,8 @@ bool LatticeCrossings::is_beside(const Leaf& leaf, int i, const Leaf& others, in
 }
 
 /// Triangles of two leaves, or of one.
-void LatticeCrossings::find_between(const LatticeMesh& lattice, int a, int b, const Box& around_b, Contact contact, const std::vector<char>* is_asked,
-                                    Leaves& leaves, std::vector<std::array<int, 2>>& pairs) const {
+void LatticeCrossings::find_between(const LatticeMesh& lattice, int a, int b, const Box& around_b, const std::vector<char>* is_asked, Leaves& leaves,
+                                    std::vector<std::array<int, 2>>& pairs) const {
   // The last one is for two that are kept at the same place.
   const std::size_t places = leaves.size() - 1, place_a = a % places, place_b = a != b && b % places == place_a ? places : b % places;
   Leaf &one = leaf_at(lattice, a, leaves[place_a]), &other = leaf_at(lattice, b, leaves[place_b]);
@@ -543,7 +537,6 @@ void LatticeCrossings::find_between(const LatticeMesh& lattice, int a, int b, co
     const int s = one.numbers[k], t = other.numbers[l];
     if (is_asked && !(*is_asked)[s] && !(*is_asked)[t]) return;
     const Triangle &first = one.triangles[k], &second = other.triangles[l];
-    if (contact == Contact::kByRounding && !(one.are_on_seam[k] && other.are_on_seam[l]) && !do_share_vertex(first, second)) return;
     const auto &first_corners = one.corners[k], &second_corners = other.corners[l];
     if (is_beside(one, k, other, l) || is_beside(other, l, one, k)) return;
     if (!do_triangles_intersect(first, first_corners, second, second_corners)) return;
@@ -576,17 +569,17 @@ LatticeCrossings::Leaves& LatticeCrossings::fresh_leaves() {
   return leaves;
 }
 
-/// What is to be asked in place of a pair of nodes, or a node by itself. \return of leaves, how they can meet
-LatticeCrossings::Contact LatticeCrossings::split(const Search& search, const Task& task, std::vector<Task>& tasks) const {
+/// What is to be asked in place of a pair of nodes, or a node by itself. \return whether they are leaves that can meet
+bool LatticeCrossings::split(const Search& search, const Task& task, std::vector<Task>& tasks) const {
   const auto [a, b] = task;
   if (search.are_asked) {
     const bool is_first = (*search.are_asked)[a] != 0, is_second = (*search.are_asked)[b] != 0;
-    if (!is_first && !is_second) return Contact::kNone;
+    if (!is_first && !is_second) return false;
   }
-  if (a != b && !do_overlap(search.tree.nodes[a].around, search.tree.nodes[b].around)) return Contact::kNone;
-  const Contact how = contact(search.tree, a, b);
+  if (a != b && !do_overlap(search.tree.nodes[a].around, search.tree.nodes[b].around)) return false;
+  if (!can_meet(search.tree, a, b)) return false;
   const Node &one = nodes_[a], &other = nodes_[b];
-  if (how == Contact::kNone || (one.level == 0 && other.level == 0)) return how;
+  if (one.level == 0 && other.level == 0) return true;
   const auto parts_of = [&](const Node& node, std::array<int, 4>& parts) {
     const Grid& grid = grids_[node.grid];
     const Grid::Level& below = grid.levels[node.level - 1];
@@ -600,13 +593,13 @@ LatticeCrossings::Contact LatticeCrossings::split(const Search& search, const Ta
     const int count = parts_of(one, parts);
     for (int i = 0; i < count; ++i)
       for (int j = i; j < count; ++j) tasks.push_back({parts[i], parts[j]});
-    return Contact::kNone;
+    return false;
   }
   // Nodes of one grid keep the same level.
   const int count = one.level >= other.level ? parts_of(one, parts) : 1, other_count = other.level >= one.level ? parts_of(other, others) : 1;
   for (int i = 0; i < count; ++i)
     for (int j = 0; j < other_count; ++j) tasks.push_back({parts[i], others[j]});
-  return Contact::kNone;
+  return false;
 }
 
 std::vector<std::array<int, 2>> LatticeCrossings::find(const Search& search) const {
@@ -629,8 +622,7 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const Search& search) con
     while (!stack.empty()) {
       const Task task = stack.back();
       stack.pop_back();
-      const Contact how = split(search, task, stack);
-      if (how != Contact::kNone) find_between(search.lattice, task[0], task[1], search.tree.nodes[task[1]].around, how, search.is_asked, leaves, found[block]);
+      if (split(search, task, stack)) find_between(search.lattice, task[0], task[1], search.tree.nodes[task[1]].around, search.is_asked, leaves, found[block]);
     }
   });
   std::vector<std::array<int, 2>> pairs;
@@ -674,7 +666,7 @@ LatticeCrossings::Others LatticeCrossings::find_between_same(std::span<const std
     for (std::size_t i = begin; i < end; ++i) {
       const auto [a, b] = tasks[i];
       const Bounds bounds = b < first_of_ends() ? measure_square(other, nodes_[b]) : measure_end(other, nodes_[b]);
-      find_between(other, a, b, bounds.around, contact(tree_, a, b), nullptr, leaves, found[i]);
+      find_between(other, a, b, bounds.around, nullptr, leaves, found[i]);
     }
   });
   Others others;

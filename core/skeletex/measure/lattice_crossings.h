@@ -62,7 +62,6 @@ class LatticeCrossings {
     std::array<bool, kLeafTriangles> is_placed;                  ///< of these the rest is known
     std::array<int, kLeafTriangles> numbers;
     std::array<Triangle, kLeafTriangles> triangles;
-    std::array<bool, kLeafTriangles> are_on_seam;  ///< with a side
     std::array<std::array<Vec3, 3>, kLeafTriangles> corners;
     std::array<Vec3, kLeafTriangles> normals;
     std::array<double, kLeafTriangles> offsets, margins;  ///< of their planes, and how far from them rounding could put a vertex
@@ -72,6 +71,7 @@ class LatticeCrossings {
   struct EndLeaf {
     int first_column = 0, last_column = 0;   ///< of its patch: from the first on, not wrapped
     int first_sample = 0, last_sample = -1;  ///< vertices of the seam, if they are neighbours on an arc
+    bool has_sliver = false;                 ///< a triangle that rounding can turn: its normal tells nothing
   };
   struct Tree {
     std::vector<Bounds> nodes;
@@ -85,10 +85,6 @@ class LatticeCrossings {
     const std::vector<char>* is_asked = nullptr;   ///< triangles; all without
   };
   using Task = std::array<int, 2>;  // nodes
-  /// Where triangles of two nodes can meet. Those in one plane can seem to at vertices that they share, or with sides on one straight seam, by
-  /// rounding: in strips and fans that counts.
-  enum class Contact { kNone, kByRounding, kAny };
-
   int leaf_of(const LatticeMesh& lattice, int triangle) const;
   /// Of a leaf of a strip or fan, the first triangle and that behind the last.
   std::pair<int, int> triangles_of_end(const Node& node) const;
@@ -116,19 +112,18 @@ class LatticeCrossings {
   EndLeaf describe_end(const LatticeMesh& lattice, const Node& node) const;
   int first_of_ends() const { return grids_[rectangles_.size()].levels[0].first; }
 
-  Contact contact(const Tree& tree, int a, int b) const;
-  bool do_share(const Tree& tree, const Node& end, const Node& square) const;
+  bool can_meet(const Tree& tree, int a, int b) const;
   bool is_smooth_within(const Tree& tree, const Node& a, const Node& b) const;
   bool is_smooth_at_end(const Tree& tree, const Node& end, const Node& square) const;
   bool is_smooth_over_seam(const Tree& tree, int a, int b) const;
   bool is_in_cap(const Tree& tree, const Node& node, int end) const;
   bool are_quads_smooth(const LatticeMesh& lattice, int patch, int s, int t) const;
-  Contact split(const Search& search, const Task& task, std::vector<Task>& tasks) const;
+  bool split(const Search& search, const Task& task, std::vector<Task>& tasks) const;
   static Leaves& fresh_leaves();
   Leaf& leaf_at(const LatticeMesh& lattice, int node, Leaf& leaf) const;
   void place(const LatticeMesh& lattice, int i, Leaf& leaf) const;
   static bool is_beside(const Leaf& leaf, int i, const Leaf& others, int k);
-  void find_between(const LatticeMesh& lattice, int a, int b, const Box& around_b, Contact contact, const std::vector<char>* is_asked, Leaves& leaves,
+  void find_between(const LatticeMesh& lattice, int a, int b, const Box& around_b, const std::vector<char>* is_asked, Leaves& leaves,
                     std::vector<std::array<int, 2>>& pairs) const;
   std::vector<std::array<int, 2>> find(const Search& search) const;
 
