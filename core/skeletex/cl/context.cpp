@@ -159,15 +159,41 @@ ClContext::ClContext(const std::string& selector) {
   check(code, "creating an OpenCL queue");
 }
 
+ClContext::ClContext(const ClContext& other, Beside)
+    : info_(other.info_), device_(other.device_), context_(other.context_), programs_(other.programs_) {
+  cl_int code = CL_SUCCESS;
+  queue_ = ::cl::CommandQueue(context_, device_, CL_QUEUE_PROFILING_ENABLE, &code);
+  check(code, "creating an OpenCL queue");
+}
+
 ClContext::~ClContext() = default;
 
-::cl::Buffer ClContext::allocate_bytes(std::size_t bytes) {
+std::unique_ptr<ClContext> ClContext::beside() const { return std::unique_ptr<ClContext>(new ClContext(*this, Beside{})); }
+
+void ClContext::take_profile(ClContext& beside) {
+  beside.collect_events();
+  for (const auto& [kernel, entry] : beside.profile_) {
+    ClProfileEntry& own = profile_[kernel];
+    own.kernel = kernel;
+    own.launches += entry.launches;
+    own.milliseconds += entry.milliseconds;
+  }
+  beside.profile_.clear();
+}
+
+::cl::Buffer ClContext::allocate_bytes(std::size_t bytes, const void* values) {
   if (bytes > info_.max_allocation_bytes)
     throw DeviceError(
         fmt::format("{:.0f} MiB in one buffer are more than {} allows ({:.0f} MiB); ask for a smaller texture, or choose another device",
                     mebibytes(bytes), info_.name, mebibytes(info_.max_allocation_bytes)));
   cl_int code = CL_SUCCESS;
-  ::cl::Buffer buffer(context_, CL_MEM_READ_WRITE, std::max<std::size_t>(bytes, 16), nullptr, &code);
+  constexpr std::size_t kLeast = 16;
+  std::array<std::byte, kLeast> few{};
+  if (values && bytes < kLeast) {
+    if (bytes > 0) std::memcpy(few.data(), values, bytes);
+    values = few.data();
+  }
+  ::cl::Buffer buffer(context_, values ? CL_MEM_READ_WRITE | CL_MEM_COPY_HOST_PTR : CL_MEM_READ_WRITE, std::max(bytes, kLeast), const_cast<void*>(values), &code);
   check(code, fmt::format("allocating {:.1f} MiB on {}", mebibytes(bytes), info_.name));
   return buffer;
 }

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -81,6 +82,12 @@ class ClContext {
   ClContext(const ClContext&) = delete;
   ClContext& operator=(const ClContext&) = delete;
 
+  /// A queue of another thread's own, with the same device, buffers and programs. Neither queue waits for the other: `finish` before the
+  /// other one uses what this one makes.
+  std::unique_ptr<ClContext> beside() const;
+  /// Adds what was launched on such a queue to the profile. Waits for it.
+  void take_profile(ClContext& beside);
+
   const ClDeviceInfo& device() const { return info_; }
 
   /// Memory for `size` values, not initialised.
@@ -90,18 +97,18 @@ class ClContext {
     static_assert(std::is_trivially_copyable_v<T>);
     return {allocate_bytes(size * sizeof(T)), size};
   }
-  /// A device copy of host values. An empty span gives a buffer of one value, as OpenCL has no empty ones.
+  /// A device copy of host values, made with the buffer: it does not wait for the queue. An empty span gives a buffer of one value, as
+  /// OpenCL has no empty ones.
   template <class T>
   ClBuffer<std::remove_const_t<T>> upload(std::span<T> values) {
-    auto buffer = allocate<std::remove_const_t<T>>(values.size());
-    write_bytes(buffer.memory, values.data(), values.size_bytes());
-    return buffer;
+    static_assert(std::is_trivially_copyable_v<T>);
+    return {allocate_bytes(values.size_bytes(), values.data()), values.size()};
   }
   template <class T>
   ClBuffer<T> upload(const std::vector<T>& values) {
     return upload(std::span<const T>(values));
   }
-  /// Copies host values to the front of a buffer. \throw DeviceError when they do not fit
+  /// Waits for the queue and copies host values to the front of a buffer. \throw DeviceError when they do not fit
   template <class T>
   void write(ClBuffer<T>& buffer, const std::vector<T>& values) {
     check_fits(values.size(), buffer.size);
@@ -166,7 +173,7 @@ class ClContext {
   ::cl::Program get_program(const ClKernelName& name);
   static void check_arguments(const BuiltKernel& kernel, const ClKernelName& name, std::span<const ClArgument> given);
   static void check_fits(std::size_t values, std::size_t room);
-  ::cl::Buffer allocate_bytes(std::size_t bytes);
+  ::cl::Buffer allocate_bytes(std::size_t bytes, const void* values = nullptr);
   void write_bytes(const ::cl::Buffer& buffer, const void* data, std::size_t bytes);
   void read_bytes(const ::cl::Buffer& buffer, void* data, std::size_t bytes);
   void fill_bytes(const ::cl::Buffer& buffer, const void* pattern, std::size_t pattern_bytes, std::size_t bytes);
@@ -196,6 +203,9 @@ class ClContext {
     static_assert(sizeof(T) == 4, "pass int, unsigned or float: the kernel's own type");
     check_argument(::clSetKernelArg(kernel(), index, sizeof(T), &value), name, index);
   }
+
+  struct Beside {};
+  ClContext(const ClContext& other, Beside);
 
   struct PendingEvent {
     std::string kernel;

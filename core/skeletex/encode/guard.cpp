@@ -485,33 +485,61 @@ class TexelSet {
 
 }  // namespace
 
-GuardReport put_back_faults(ClContext& context, const GuardSources& sources, const DeviceLayout& layout, const DeviceMaps& maps,
-                            const SnapFeatures& features, const ClBuffer<int>& even_triangles, const ClBuffer<int>& triangles,
-                            const TexelPoints& even, const TexelPoints& filtered, ReadingPositions& positions, TexelPoints& points) {
-  GuardReport report;
-  const SkeletexModel& model = sources.model;
-  auto tree = std::async(std::launch::async, [&] { return build_triangle_tree(sources.mesh); });
-  auto placed = std::async(std::launch::async, [&] { return place_vertices(sources.charts, model.patches, maps, layout); });
-  const LatticeMesh even_lattice(context, model, DiagonalRule::kNearest, layout.patches, filtered);
-  LatticeMesh lattice(even_lattice, model.diagonals, points);
+struct Guard::Even {
+  ClContext& context;
+  const GuardSources& sources;
+  const DeviceLayout& layout;
+  TexelPoints points, filtered;
+  LatticeMesh lattice;
+  LatticeCrossings crossings;
+  Distances distances;
+  std::vector<int> turned;
+  float limit = 0;
+
+  Even(ClContext& own_context, const GuardSources& own_sources, const DeviceLayout& own_layout, const DeviceMaps& maps, TexelPoints own_points, TexelPoints stored,
+       std::future<TriangleTree> tree, std::future<PlacedVertices> placed)
+      : context(own_context),
+        sources(own_sources),
+        layout(own_layout),
+        points(std::move(own_points)),
+        filtered(std::move(stored)),
+        lattice(context, sources.model, DiagonalRule::kNearest, layout.patches, filtered),
+        crossings(lattice),
+        distances(context, sources, layout, maps, tree.get(), placed.get()) {}
+};
+
+Guard::Guard(ClContext& context, const GuardSources& sources, const DeviceLayout& layout, const DeviceMaps& maps, ClBuffer<int> even_triangles, TexelPoints even,
+             TexelPoints filtered)
+    : even_(std::make_unique<Even>(context, sources, layout, maps, std::move(even), std::move(filtered),
+                                   std::async(std::launch::async, [&] { return build_triangle_tree(sources.mesh); }),
+                                   std::async(std::launch::async, [&] { return place_vertices(sources.charts, sources.model.patches, maps, layout); }))) {
+  even_->limit = kShareOfFurthest * even_->distances.measure_even(even_->lattice, even_triangles, even_->turned);
+}
+
+Guard::~Guard() = default;
+
+GuardReport Guard::put_back_faults(const SnapFeatures& features, const ClBuffer<int>& triangles, ReadingPositions& positions, TexelPoints& points) {
+  ClContext& context = even_->context;
+  const LatticeMesh& even_lattice = even_->lattice;
+  LatticeCrossings& crossings = even_->crossings;
+  Distances& distances = even_->distances;
+  const float limit = even_->limit;
+  LatticeMesh lattice(even_lattice, even_->sources.model.diagonals, points);
   // Crossings are the host's alone: they are found beside distances, which are for the most part the device's.
   using Pairs = std::vector<std::array<int, 2>>;
-  LatticeCrossings crossings(lattice);
   std::future<Pairs> finding_all = std::async(std::launch::async, [&] { return crossings.find(lattice); });
-  Distances distances(context, sources, layout, maps, tree.get(), placed.get());
-  std::vector<int> even_turned;
-  const float limit = kShareOfFurthest * distances.measure_even(even_lattice, even_triangles, even_turned);
-  report.even_turned_triangles = static_cast<int>(even_turned.size());
+  GuardReport report;
+  report.even_turned_triangles = static_cast<int>(even_->turned.size());
 
   TexelSet marks(lattice);
   // Where the even lattice is at fault itself there is nothing to go back to, as long as it is not much worse.
   TexelSet even_faults(lattice);
-  for (const int triangle : even_turned) even_faults.add(even_lattice.triangle(triangle), kTolerance);
+  for (const int triangle : even_->turned) even_faults.add(even_lattice.triangle(triangle), kTolerance);
   const auto is_near_even_fault = [&](int triangle) { return even_faults.has(lattice.triangle(triangle)); };
   const auto is_pair_near_even_fault = [&](const std::array<int, 2>& pair) { return is_near_even_fault(pair[0]) && is_near_even_fault(pair[1]); };
   bool tolerates_crossing = false, tolerates_turning = false;
   std::vector<int> back, changed;  // texels and triangles, since the pass before
-  TexelReturns returns(context, layout);
+  TexelReturns returns(context, even_->layout);
   for (int pass = 0; pass < kPasses; ++pass) {
     marks.clear();
     auto finding = pass == 0 ? std::move(finding_all) : std::async(std::launch::async, [&] { return crossings.find(lattice, changed); });
@@ -549,7 +577,7 @@ GuardReport put_back_faults(ClContext& context, const GuardSources& sources, con
 
     // Vertices are given up only when the texels between them have been.
     const bool with_vertices = pass > 0;
-    back = put_back_listed(context, layout, even, filtered, marks.texels(), with_vertices, returns, positions, points);
+    back = put_back_listed(context, even_->layout, even_->points, even_->filtered, marks.texels(), with_vertices, returns, positions, points);
     report.texels_put_back += static_cast<int>(back.size());
     if (back.empty() && with_vertices) break;
     changed = lattice.move(back, even_lattice);

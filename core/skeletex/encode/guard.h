@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <memory>
+
 #include "skeletex/encode/snap.h"
 #include "skeletex/model/mesh.h"
 #include "skeletex/model/texture.h"
@@ -24,11 +26,21 @@ struct GuardReport {
 ///  - where it is further from the original, or the original's vertices from it, than (nearly) the even lattice anywhere,
 /// and with them what then folds. Repeated until nothing is left, so that neither the maximum nor those numbers rise above the even
 /// lattice's. Where the even lattice has the same faults, and not clearly fewer, they are left.
-/// \param even_triangles, triangles  per texel a triangle of the map near it, of the even lattice and of the points
-/// \param even      the even lattice's points
-/// \param filtered  these as they would be stored: what texels go back to
-GuardReport put_back_faults(ClContext& context, const GuardSources& sources, const DeviceLayout& layout, const DeviceMaps& maps,
-                            const SnapFeatures& features, const ClBuffer<int>& even_triangles, const ClBuffer<int>& triangles,
-                            const TexelPoints& even, const TexelPoints& filtered, ReadingPositions& positions, TexelPoints& points);
+class Guard {
+ public:
+  /// Measures the even lattice. All that is given by reference must outlive the guard.
+  /// \param even_triangles  per texel a triangle of the map near it, of the even lattice
+  /// \param even            the even lattice's points
+  /// \param filtered        these as they would be stored: what texels go back to
+  Guard(ClContext& context, const GuardSources& sources, const DeviceLayout& layout, const DeviceMaps& maps, ClBuffer<int> even_triangles, TexelPoints even,
+        TexelPoints filtered);
+  ~Guard();
+  /// \param triangles  as even_triangles, of the points
+  GuardReport put_back_faults(const SnapFeatures& features, const ClBuffer<int>& triangles, ReadingPositions& positions, TexelPoints& points);
+
+ private:
+  struct Even;
+  std::unique_ptr<Even> even_;
+};
 
 }  // namespace skeletex

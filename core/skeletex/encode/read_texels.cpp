@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <future>
 #include <limits>
+#include <memory>
 
 namespace skeletex {
 namespace {
@@ -219,8 +220,26 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     copy_plane(context, positions.x, positions.home_x), copy_plane(context, positions.y, positions.home_y);
   }
   const TexelPoints even = points;
-  if (finding_features.valid()) finding_features.get();
   const ClBuffer<int> even_covering = covering;
+  const auto all_rows = context.upload(lattice_rows({sources.patches.begin(), sources.patches.end()}, RowChoice::kAll));
+  const auto prefilter = [&](ClContext& on, const TexelPoints& from, const ClBuffer<int>& anchors, int held) {
+    TexelPoints filtered = allocate_points(on, texels);
+    on.launch({"encode.cl", "prefilter_positions"}, row_range(on, all_rows.size), static_cast<int>(all_rows.size), texture_width, held, all_rows,
+              layout.patches, anchors, from.x, from.y, from.z, filtered.x, filtered.y, filtered.z);
+    return filtered;
+  };
+  // The even lattice is measured beside the snapping, on a queue of its own.
+  std::unique_ptr<ClContext> beside;
+  std::future<std::unique_ptr<Guard>> measuring_even;
+  if ((is_snapped || is_fitted) && sources.guard) {
+    context.finish();
+    beside = context.beside();
+    measuring_even = std::async(std::launch::async, [&] {
+      const TexelPoints filtered = options.has_prefilter ? prefilter(*beside, even, even_covering, kNoneHolds) : even;
+      return std::make_unique<Guard>(*beside, *sources.guard, layout, maps, even_covering, even, filtered);
+    });
+  }
+  if (finding_features.valid()) finding_features.get();
   int put_back = 0;
   if (is_snapped) {
     snap_positions(context, layout, snap_tables, positions);
@@ -241,22 +260,17 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     }
   }
 
-  const auto all_rows = context.upload(lattice_rows({sources.patches.begin(), sources.patches.end()}, RowChoice::kAll));
-  const auto prefilter = [&](const TexelPoints& from, const ClBuffer<int>& anchors, int held) {
-    TexelPoints filtered = allocate_points(context, texels);
-    context.launch({"encode.cl", "prefilter_positions"}, row_range(context, all_rows.size), static_cast<int>(all_rows.size), texture_width, held, all_rows,
-                   layout.patches, anchors, from.x, from.y, from.z, filtered.x, filtered.y, filtered.z);
-    return filtered;
-  };
   if (is_fitted) result.report.fit = fit_points(context, layout, maps, covering, positions, points);
   if (options.has_prefilter && !(is_fitted && !has_spd)) {
     // What is fitted is not filtered as well: with SPD patches beside it, only these are.
-    points = prefilter(points, is_fitted ? context.upload(vsm_texels(sources.patches, texture_width, texture_height)) : positions.anchors, kAnyHolds);
+    points = prefilter(context, points, is_fitted ? context.upload(vsm_texels(sources.patches, texture_width, texture_height)) : positions.anchors, kAnyHolds);
   }
   std::vector<int> anchors;
-  if ((is_snapped || is_fitted) && sources.guard) {
-    const TexelPoints filtered = options.has_prefilter ? prefilter(even, positions.anchors, kNoneHolds) : even;
-    GuardReport guard = put_back_faults(context, *sources.guard, layout, maps, features, even_covering, covering, even, filtered, positions, points);
+  if (measuring_even.valid()) {
+    const std::unique_ptr<Guard> even_guard = measuring_even.get();
+    context.finish();
+    GuardReport guard = even_guard->put_back_faults(features, covering, positions, points);
+    context.take_profile(*beside);
     result.report.turned_triangles = guard.turned_triangles, result.report.even_turned_triangles = guard.even_turned_triangles;
     (is_fitted ? result.report.fit->texels_put_back : put_back) += guard.texels_put_back;
     anchors = std::move(guard.anchors);

@@ -54,7 +54,64 @@ bool does_segment_meet(const Vec3& p, const Vec3& q, const Corners& t, int plane
   return (ab >= 0 && bc >= 0 && ca >= 0) || (ab <= 0 && bc <= 0 && ca <= 0);
 }
 
+enum class Answer { kNo, kYes, kUnsure };
+
+/// Where two triangles meet the line of both their planes (Moeller 1997), in plain double precision: unsure wherever rounding could
+/// decide, or they are nearly in one plane, or have no area.
+/// \param shared  whether their first vertex is one: then of meeting elsewhere
+Answer meet_on_line(const Corners& s, const Corners& t, bool shared) {
+  constexpr double kRounding = 1e-14;  // of products of differences: some ten times what their last digits add up to
+  constexpr double kLeastSine = 1e-6;
+  struct Cut {
+    double low = 0, high = 0, error = 0;
+  };
+  std::array<Vec3, 3> own, other;  // from the first vertex of s
+  double extent = 0;
+  for (int k = 0; k < 3; ++k) {
+    own[k] = s[k] - s[0], other[k] = t[k] - s[0];
+    extent = std::max({extent, own[k].lpNorm<Eigen::Infinity>(), other[k].lpNorm<Eigen::Infinity>()});
+  }
+  const Vec3 own_normal = own[1].cross(own[2]), other_normal = (other[1] - other[0]).cross(other[2] - other[0]);
+  const Vec3 line = own_normal.cross(other_normal);
+  Eigen::Index axis;
+  const double along = line.cwiseAbs().maxCoeff(&axis);
+  if (along <= kLeastSine * own_normal.lpNorm<1>() * other_normal.lpNorm<1>() || own_normal.isZero() || other_normal.isZero()) return Answer::kUnsure;
+  // A triangle from the other's plane, and the part of the line in it.
+  const auto cut = [&](const std::array<Vec3, 3>& points, const Vec3& normal, const Vec3& origin, Cut& found) {
+    const double error = kRounding * extent * (extent * extent + normal.lpNorm<1>());
+    std::array<double, 3> heights;
+    int above = 0, below = 0;
+    for (int k = shared ? 1 : 0; k < 3; ++k) {
+      heights[k] = normal.dot(points[k] - origin);
+      above += heights[k] > error, below += heights[k] < -error;
+    }
+    if (above + below < (shared ? 2 : 3)) return Answer::kUnsure;
+    if (above == 0 || below == 0) return Answer::kNo;
+    bool is_first = true;
+    for (int k = shared ? 1 : 0; k < (shared ? 2 : 3); ++k) {
+      const int next = (k + 1) % 3;
+      if ((heights[k] > 0) == (heights[next] > 0)) continue;
+      const double span = std::abs(heights[k] - heights[next]);
+      const double at = points[k][axis] + (points[next][axis] - points[k][axis]) * (std::abs(heights[k]) / span);
+      found.low = is_first ? at : std::min(found.low, at), found.high = is_first ? at : std::max(found.high, at);
+      found.error = std::max(found.error, extent * (8 * error / span + kRounding));
+      is_first = false;
+    }
+    return Answer::kYes;
+  };
+  Cut first, second;
+  if (const Answer answer = cut(own, other_normal, other[0], first); answer != Answer::kYes) return answer;
+  if (const Answer answer = cut(other, own_normal, Vec3::Zero(), second); answer != Answer::kYes) return answer;
+  const double error = first.error + second.error;
+  // Both parts begin at a shared vertex: whether they lie on one side of it.
+  const double common = shared ? (std::abs(first.low) > error && std::abs(second.low) > error ? first.low * second.low : 0)
+                               : std::min(first.high, second.high) - std::max(first.low, second.low);
+  if (shared) return common > 0 ? Answer::kYes : common < 0 ? Answer::kNo : Answer::kUnsure;
+  return common > error ? Answer::kYes : common < -error ? Answer::kNo : Answer::kUnsure;
+}
+
 bool do_disjoint_triangles_meet(const Corners& s, const Corners& t) {
+  if (const Answer answer = meet_on_line(s, t, false); answer != Answer::kUnsure) return answer == Answer::kYes;
   const auto is_off = [](const Corners& plane, const Corners& points) {
     const int side = orientation(plane[0], plane[1], plane[2], points[0]);
     return side != 0 && side == orientation(plane[0], plane[1], plane[2], points[1]) && side == orientation(plane[0], plane[1], plane[2], points[2]);
@@ -70,6 +127,7 @@ bool do_disjoint_triangles_meet(const Corners& s, const Corners& t) {
 
 /// Two triangles with their shared vertex first.
 bool do_triangles_at_vertex_meet(const Corners& s, const Corners& t) {
+  if (const Answer answer = meet_on_line(s, t, true); answer != Answer::kUnsure) return answer == Answer::kYes;
   // The rest of one on one side of the other's plane: for most pairs all that needs to be known.
   if (orientation(t[0], t[1], t[2], s[1]) * orientation(t[0], t[1], t[2], s[2]) > 0) return false;
   if (orientation(s[0], s[1], s[2], t[1]) * orientation(s[0], s[1], s[2], t[2]) > 0) return false;
