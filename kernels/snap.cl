@@ -262,11 +262,13 @@ __attribute__((always_inline)) EdgePlace place_at_turn(const float ends[4], int 
   return place;
 }
 
-// A texel that wraps round or has a long edge, whose nearest turn is looked for. Compiled once.
-// out  moved_x, moved_y: its offset there
-__attribute__((noinline)) void place_apart(const float ends[4], const int e, const int texel, const int column, const int width, const int height,
-                                           const int texture_width, const int row, global int* restrict anchors, global float* restrict parameters,
-                                           global float* offset_x, global float* offset_y) {
+// A free texel that wraps round or has a long edge, whose nearest turn is looked for. Compiled once.
+__attribute__((noinline)) void place_apart(const int column, const int texel, const int width, const int height, const int texture_width, const int row,
+                                           const int edge_mask, global const float* restrict edges, global const int* offers, global int* restrict anchors,
+                                           global float* restrict parameters, global float* offset_x, global float* offset_y) {
+  if ((offers[texel] == NO_OFFER) | (anchors[texel] != 0)) return;
+  const int e = offers[texel] & edge_mask;
+  const float ends[4] = {edges[EDGE_SIZE * e], edges[EDGE_SIZE * e + 1], edges[EDGE_SIZE * e + 2], edges[EDGE_SIZE * e + 3]};
   const float around = (float)width, own_x = offset_x[texel], own_y = offset_y[texel];
   const float turn = NEAREST((0.5f * (ends[0] + ends[2]) - ((float)column + own_x)) / around);
   const float others = around < 16.0f || is_long(ends, around) ? 1.0f : 0.0f;
@@ -347,15 +349,12 @@ kernel void place_on_edges(const int row_count, const int texture_width, const i
     if (column < 2 && !has_long)
       has_long = place_columns(column, first, width, height, texture_width, row, edge_mask, edges, offers, anchors, parameters, offset_x, offset_y, offset_x,
                                offset_y);
-    // The rest: what wraps round, and all texels with long edges.
-    const int begin = column < 2 ? column : width - 1, end = column < 2 ? width & ~1 : width;
-    for (int j = begin + 2 * get_local_id(0); j < end; j += 2 * ROW_ITEMS) {
-      const int texel = first + j, offer = offers[texel];
-      if ((has_long == 0 && j > 0 && j < width - 1) || offer == NO_OFFER || anchors[texel] != 0) continue;
-      const int e = offer & edge_mask;
-      const float ends[4] = {edges[EDGE_SIZE * e], edges[EDGE_SIZE * e + 1], edges[EDGE_SIZE * e + 2], edges[EDGE_SIZE * e + 3]};
-      place_apart(ends, e, texel, j, width, height, texture_width, row, anchors, parameters, offset_x, offset_y);
-    }
+    // The rest, by the same work-items: long edges, and what wraps round.
+    for (int j = (column == 0 ? 2 : 1) + 2 * get_local_id(0); has_long && j < width - 1 && column < 2; j += 2 * ROW_ITEMS)
+      place_apart(j, first + j, width, height, texture_width, row, edge_mask, edges, offers, anchors, parameters, offset_x, offset_y);
+    const int at_end = column == 0 ? 0 : width - 1;
+    if (get_local_id(0) == 0 && (column < 2 ? at_end < (width & ~1) : 1))
+      place_apart(at_end, first + at_end, width, height, texture_width, row, edge_mask, edges, offers, anchors, parameters, offset_x, offset_y);
     WAIT_FOR_ROW();
   }
 }
