@@ -67,7 +67,7 @@ __attribute__((always_inline)) float least_cross(float ax, float ay, float bx, f
   return lesser(own, lesser(at_a, at_c));
 }
 
-// The smallest cross product at the corners of the four quads around a texel that depend on its offset, if that were (dx, dy); 0 when it
+// The smallest cross product at the corners of the four quads around a texel that depend on its offset, if that were (dx, dy); at most 0 when it
 // would come too near to a seam, whose own samples are not at the columns.
 __attribute__((always_inline)) float cross_around(Neighbours n, int height, int texture_width, int row, float dx, float dy, global const float* offset_x,
                                                   global const float* offset_y) {
@@ -79,8 +79,9 @@ __attribute__((always_inline)) float cross_around(Neighbours n, int height, int 
   const float left_above = least_cross(ax, ay, -1.0f + offset_x[n.left + above] - dx, 1.0f + offset_y[n.left + above] - dy, lx, ly);
   const float left_below = least_cross(lx, ly, -1.0f + offset_x[n.left + below] - dx, -1.0f + offset_y[n.left + below] - dy, bx, by);
   const float right_below = least_cross(bx, by, 1.0f + offset_x[n.right + below] - dx, -1.0f + offset_y[n.right + below] - dy, rx, ry);
-  const int is_near_end = (float)row + dy < MARGIN || (float)row + dy > (float)(height - 1) - MARGIN;
-  return is_near_end ? 0.0f : lesser(lesser(right_above, left_above), lesser(left_below, right_below));
+  const int is_near_end = ((float)row + dy < MARGIN) | ((float)row + dy > (float)(height - 1) - MARGIN);
+  // No choice between the two: the compiler would put loads of neighbours behind it, each a gather under a mask.
+  return lesser(is_near_end ? 0.0f : INFINITY, lesser(lesser(right_above, left_above), lesser(left_below, right_below)));
 }
 
 // The same, compiled once.
