@@ -199,7 +199,7 @@ void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const Snap
   const auto patch = context.upload(tables.vertex_patches), rank = context.upload(tables.vertex_ranks);
   const auto x = context.upload(tables.vertex_x), y = context.upload(tables.vertex_y);
   auto states = context.allocate<int>(count), claims = context.allocate<int>(layout.size()), open = context.allocate<int>(1);
-  context.fill(states, 0);
+  context.fill(states, 0), context.fill(open, 0);
   // A claim is more than all of the rounds before, so these need not be taken off.
   const int bits = std::bit_width(static_cast<unsigned>(count)), rounds_at_once = 0x7fffffff >> bits;
   // Every round decides at least the strongest claim that is open, so this ends; it takes some ten rounds.
