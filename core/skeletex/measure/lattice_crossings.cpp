@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include "skeletex/measure/self_intersection.h"
@@ -63,11 +64,28 @@ inline Four unit_normal(const Four& u, const Four& v) {
   return normal;
 }
 
-/// Whether all normals of a box lie within a cone.
-template <class Box>
-inline bool is_narrow(const Box& normals) {
-  const Four middle = 0.5f * (normals.least + normals.greatest);
-  return (middle * normals.least).min(middle * normals.greatest).sum() > kLeastCosine * middle.matrix().norm();
+inline Four diagonals_of(const Four& n) { return {n[0] + n[1] + n[2], n[0] + n[1] - n[2], n[0] - n[1] + n[2], n[1] + n[2] - n[0]}; }
+template <class Normals>
+Normals no_normals() {
+  constexpr float k = kInfinity;
+  return {{{k, k, k, 0}, {-k, -k, -k, 0}}, {{k, k, k, k}, {-k, -k, -k, -k}}};
+}
+template <class Normals>
+requires requires(Normals n) { n.diagonals; }
+inline void add(const Normals& other, Normals& normals) {
+  add(other.box, normals.box), add(other.diagonals, normals.diagonals);
+}
+
+/// Whether all normals lie within a cone: around the middle of their box, an axis or a diagonal.
+template <class Normals>
+inline bool is_narrow(const Normals& normals) {
+  const Four &least = normals.box.least, &greatest = normals.box.greatest;
+  const Four middle = 0.5f * (least + greatest);
+  if ((middle * least).min(middle * greatest).sum() > kLeastCosine * middle.matrix().norm()) return true;
+  constexpr float kLeastSum = kLeastCosine * std::numbers::sqrt3_v<float>;
+  // (The fourth coordinate is 0.)
+  return std::max(least.maxCoeff(), -greatest.minCoeff()) > kLeastCosine ||
+         std::max(normals.diagonals.least.maxCoeff(), -normals.diagonals.greatest.minCoeff()) > kLeastSum;
 }
 
 /// Whether a triangle is so thin that rounding of its corners can turn it.
@@ -204,7 +222,9 @@ LatticeCrossings::Bounds LatticeCrossings::measure_square(const LatticeMesh& lat
   view(lattice, node, square);
   const Four none = Four::Constant(kInfinity);
   Four least[3] = {none, none, none}, greatest[3] = {-none, -none, -none};
-  Four least_normals[3] = {none, none, none}, greatest_normals[3] = {-none, -none, -none};
+  // x, y, z, and the diagonals.
+  Four least_normals[7] = {none, none, none, none, none, none, none};
+  Four greatest_normals[7] = {-none, -none, -none, -none, -none, -none, -none};
   for (int row = 0; row < square.rows; ++row) {
     const Four is_second = Eigen::Map<const Eigen::Array4i>(square.diagonals[row]).cast<float>();
     Four u[2][3], v[2][3];
@@ -221,29 +241,37 @@ LatticeCrossings::Bounds LatticeCrossings::measure_square(const LatticeMesh& lat
       const Four x = u[side][1] * v[side][2] - u[side][2] * v[side][1], y = u[side][2] * v[side][0] - u[side][0] * v[side][2],
                  z = u[side][0] * v[side][1] - u[side][1] * v[side][0];
       const Four inverse = 1 / (x * x + y * y + z * z).sqrt().max(std::numeric_limits<float>::min());
-      Four normal[3] = {x * inverse, y * inverse, z * inverse};
-      for (int axis = 0; axis < 3; ++axis) {
+      Four normal[7] = {x * inverse, y * inverse, z * inverse};
+      for (int axis = 0; axis < 3; ++axis)
         for (int k = square.columns; k < kSide; ++k) normal[axis][k] = normal[axis][0];
+      const Four sum = normal[0] + normal[1];
+      normal[3] = sum + normal[2], normal[4] = sum - normal[2], normal[5] = normal[0] - normal[1] + normal[2], normal[6] = normal[1] - normal[0] + normal[2];
+      for (int axis = 0; axis < 7; ++axis) {
         least_normals[axis] = least_normals[axis].min(normal[axis]);
         greatest_normals[axis] = greatest_normals[axis].max(normal[axis]);
       }
     }
   }
   Bounds bounds{{{least[0].minCoeff(), least[1].minCoeff(), least[2].minCoeff(), 0}, {greatest[0].maxCoeff(), greatest[1].maxCoeff(), greatest[2].maxCoeff(), 0}},
-                {{least_normals[0].minCoeff(), least_normals[1].minCoeff(), least_normals[2].minCoeff(), 0},
-                 {greatest_normals[0].maxCoeff(), greatest_normals[1].maxCoeff(), greatest_normals[2].maxCoeff(), 0}}};
+                no_normals<Normals>()};
+  for (int axis = 0; axis < 7; ++axis) {
+    Box& box = axis < 3 ? bounds.normals.box : bounds.normals.diagonals;
+    const int lane = axis < 3 ? axis : axis - 3;
+    box.least[lane] = least_normals[axis].minCoeff(), box.greatest[lane] = greatest_normals[axis].maxCoeff();
+  }
   widen(margin_, bounds.around);
   return bounds;
 }
 
 LatticeCrossings::Bounds LatticeCrossings::measure_end(const LatticeMesh& lattice, const Node& node) const {
-  Bounds bounds{no_box<Box>(), no_box<Box>()};
+  Bounds bounds{no_box<Box>(), no_normals<Normals>()};
   const auto [begin, end] = triangles_of_end(node);
   for (int i = begin; i < end; ++i) {
     const Triangle t = lattice.triangle(i);
     const Four a = lattice.point(t[0]), b = lattice.point(t[1]), c = lattice.point(t[2]);
     for (const Four& point : {a, b, c}) add(point, bounds.around);
-    add(unit_normal(b - a, c - a), bounds.normals);
+    const Four normal = unit_normal(b - a, c - a);
+    add(normal, bounds.normals.box), add(diagonals_of(normal), bounds.normals.diagonals);
   }
   widen(margin_, bounds.around);
   return bounds;
@@ -267,7 +295,7 @@ void LatticeCrossings::join(Tree& tree) const {
       for (int row = 0; row < rows; ++row)
         for (int column = 0; column < columns; ++column) {
           Bounds& all = tree.nodes[first + row * columns + column];
-          all = {no_box<Box>(), no_box<Box>()};
+          all = {no_box<Box>(), no_normals<Normals>()};
           for (int r = 2 * row; r < std::min(2 * row + 2, below.rows); ++r)
             for (int c = 2 * column; c < std::min(2 * column + 2, below.columns); ++c) {
               const Bounds& part = tree.nodes[below.first + r * below.columns + c];
@@ -280,7 +308,7 @@ void LatticeCrossings::join(Tree& tree) const {
   for (std::size_t i = patches; i < grids_.size(); ++i) {
     const Grid &fan = grids_[i], &quads = grids_[fan.patch];
     if (!fan.is_fan) continue;
-    Box normals = tree.nodes[fan.levels.back().first].normals;
+    Normals normals = tree.nodes[fan.levels.back().first].normals;
     const auto [first, columns, rows] = quads.levels[0];
     int& cap = tree.caps[fan.patch][fan.end];
     while (is_narrow(normals) && ++cap < rows)
@@ -346,7 +374,7 @@ bool LatticeCrossings::is_smooth_within(const Tree& tree, const Node& a, const N
   if (std::abs(a.row - b.row) > kNear) return false;
   const auto [first, steps] = between(a.column, b.column, columns);
   if (steps > kNear) return false;
-  Box normals = no_box<Box>();
+  Normals normals = no_normals<Normals>();
   for (int row = std::min(a.row, b.row); row <= std::max(a.row, b.row); ++row)
     for (int step = 0; step <= steps; ++step) add(tree.nodes[node_at(grid, a.level, row, (first + step) % columns)].normals, normals);
   return is_narrow(normals);
@@ -367,7 +395,7 @@ bool LatticeCrossings::is_smooth_at_end(const Tree& tree, const Node& end, const
   const int last = std::max(own, first + kSide), reach = 3 * kSide;
   first = std::min(0, first);
   if (last - first > reach || 2 * reach > width) return false;
-  Box normals = tree.nodes[node_at(strip, 0, 0, end.column)].normals;
+  Normals normals = tree.nodes[node_at(strip, 0, 0, end.column)].normals;
   for (int column = first, at; column < last; column += kSide - at % kSide) {
     at = ((origin + column) % width + width) % width;
     for (int r = 0; r <= row; ++r) add(tree.nodes[node_at(quads, 0, strip.end == 0 ? r : rows - 1 - r, at / kSide)].normals, normals);
@@ -395,7 +423,7 @@ bool LatticeCrossings::is_smooth_over_seam(const Tree& tree, int a, int b) const
     const EndLeaf &first = tree.ends[one - first_of_ends()], &second = tree.ends[other - first_of_ends()];
     return std::min(first.last_sample, second.last_sample) > std::max(first.first_sample, second.first_sample);
   };
-  Box normals = tree.nodes[a].normals;
+  Normals normals = tree.nodes[a].normals;
   add(tree.nodes[b].normals, normals);
   if (!is_narrow(normals)) return false;
   if (do_share_side(a, b)) return true;
@@ -407,7 +435,7 @@ bool LatticeCrossings::is_smooth_over_seam(const Tree& tree, int a, int b) const
     for (const int step : {1, pieces - 1}) {
       const int beside = node_at(grid, 0, 0, (node.column + step) % pieces);
       if (!do_share_side(from, beside)) continue;
-      Box all = normals;
+      Normals all = normals;
       add(tree.nodes[beside].normals, all);
       if (is_narrow(all)) return true;
     }

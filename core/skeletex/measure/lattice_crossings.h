@@ -32,9 +32,14 @@ class LatticeCrossings {
   struct Box {
     Eigen::Array4f least, greatest;
   };
-  /// What is known of a node's triangles: where they lie, rounded outwards, and unit normals.
+  /// Of unit normals their coordinates, and along the four diagonals of space their sums: x + y + z, x + y - z, x - y + z, -x + y + z.
+  struct Normals {
+    Box box, diagonals;
+  };
+  /// What is known of a node's triangles: where they lie, rounded outwards, and their normals.
   struct Bounds {
-    Box around, normals;
+    Box around;
+    Normals normals;
   };
   /// Squares of 4 x 4 quads between a patch's inner rows; or of a strip or fan eight triangles each, counted from the first strip on, as one row. Above
   /// them a tree: each level joins two columns and rows of the one below. Columns wrap round.
