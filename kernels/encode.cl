@@ -300,38 +300,39 @@ kernel void prefilter_positions(const int row_count, const int texture_width, co
   }
 }
 
-// NDRange (texture width, texture height).
-kernel void encode_texels(const int texture_width, const int texture_height, global const int* restrict texel_patches,
-                          global const PatchRecord* restrict patches, global const RowRecord* restrict rows, global const ColumnRecord* restrict columns,
-                          global const float* restrict x, global const float* restrict y, global const float* restrict z, global float* restrict along,
-                          global float* restrict around, global float* restrict out_plane) {
-  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
-  if (column >= texture_width || line >= texture_height) return;
-  const int texel = line * texture_width + column;
-  const int patch = texel_patches[texel];
-  if (patch < 0) {
-    along[texel] = 0.0f, around[texel] = 0.0f, out_plane[texel] = 0.0f;
-    return;
+// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl.
+// in  lattice_rows: all
+kernel void encode_texels(const int row_count, const int texture_width, global const int* restrict lattice_rows, global const PatchRecord* restrict patches,
+                          global const RowRecord* restrict rows, global const ColumnRecord* restrict columns, global const float* restrict x,
+                          global const float* restrict y, global const float* restrict z, global float* restrict along, global float* restrict around,
+                          global float* restrict out_plane) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  global const PatchRecord* restrict p = patches + lattice_rows[4 * k];
+  global const RowRecord* restrict r = rows + p->row_begin + lattice_rows[4 * k + 1];
+  global const ColumnRecord* restrict first_column = columns + p->column_begin;
+  const int first = (p->y + lattice_rows[4 * k + 1]) * texture_width + p->x, width = p->width;
+  for (int j = get_local_id(0); j < width; j += ROW_ITEMS) {
+    const int texel = first + j;
+    const ColumnRecord c = first_column[j];
+    float foot[3], out[3];
+    frame_of(p, *r, c, foot, out);
+    const float dx = x[texel] - foot[0], dy = y[texel] - foot[1], dz = z[texel] - foot[2];
+    // around = o x s' = -sine s + cosine b; along = out x around
+    float around_axis[3];
+    for (int i = 0; i < 3; ++i) around_axis[i] = c.cosine * p->b[i] - c.sine * p->s[i];
+    const float ax = out[1] * around_axis[2] - out[2] * around_axis[1];
+    const float ay = out[2] * around_axis[0] - out[0] * around_axis[2];
+    const float az = out[0] * around_axis[1] - out[1] * around_axis[0];
+    // Distance to the bone segment.
+    const float hx = x[texel] - p->head[0], hy = y[texel] - p->head[1], hz = z[texel] - p->head[2];
+    const float station = clamp(hx * p->axis[0] + hy * p->axis[1] + hz * p->axis[2], 0.0f, p->length);
+    const float ex = hx - station * p->axis[0], ey = hy - station * p->axis[1], ez = hz - station * p->axis[2];
+    const float distance = sqrt(ex * ex + ey * ey + ez * ez);
+    const float length = sqrt(dx * dx + dy * dy + dz * dz);
+    const float scale = length > 0.0f ? distance / length : 0.0f;
+    along[texel] = scale * (dx * ax + dy * ay + dz * az);
+    around[texel] = scale * (dx * around_axis[0] + dy * around_axis[1] + dz * around_axis[2]);
+    out_plane[texel] = scale * (dx * out[0] + dy * out[1] + dz * out[2]);
   }
-  global const PatchRecord* p = patches + patch;
-  const ColumnRecord c = columns[p->column_begin + column - p->x];
-  float foot[3], out[3];
-  frame_of(p, rows[p->row_begin + line - p->y], c, foot, out);
-  const float dx = x[texel] - foot[0], dy = y[texel] - foot[1], dz = z[texel] - foot[2];
-  // around = o x s' = -sine s + cosine b; along = out x around
-  float around_axis[3];
-  for (int i = 0; i < 3; ++i) around_axis[i] = c.cosine * p->b[i] - c.sine * p->s[i];
-  const float ax = out[1] * around_axis[2] - out[2] * around_axis[1];
-  const float ay = out[2] * around_axis[0] - out[0] * around_axis[2];
-  const float az = out[0] * around_axis[1] - out[1] * around_axis[0];
-  // Distance to the bone segment.
-  const float hx = x[texel] - p->head[0], hy = y[texel] - p->head[1], hz = z[texel] - p->head[2];
-  const float station = clamp(hx * p->axis[0] + hy * p->axis[1] + hz * p->axis[2], 0.0f, p->length);
-  const float ex = hx - station * p->axis[0], ey = hy - station * p->axis[1], ez = hz - station * p->axis[2];
-  const float distance = sqrt(ex * ex + ey * ey + ez * ez);
-  const float length = sqrt(dx * dx + dy * dy + dz * dz);
-  const float scale = length > 0.0f ? distance / length : 0.0f;
-  along[texel] = scale * (dx * ax + dy * ay + dz * az);
-  around[texel] = scale * (dx * around_axis[0] + dy * around_axis[1] + dz * around_axis[2]);
-  out_plane[texel] = scale * (dx * out[0] + dy * out[1] + dz * out[2]);
 }

@@ -56,7 +56,7 @@ std::vector<KernelVariant> encoding_kernels(const ClContext& context, const Enco
     add("snap.cl", {"put_listed_back"}, rows);
     add("lattice.cl", {"choose_listed_diagonals"}, items);
   }
-  add("encode.cl", {"encode_texels"}, items);
+  add("encode.cl", {"encode_texels"}, rows);
   return kernels;
 }
 

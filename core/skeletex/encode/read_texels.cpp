@@ -276,9 +276,13 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     anchors = std::move(guard.anchors);
   }
   if (is_snapped && anchors.empty()) anchors = context.download(positions.anchors);
+  std::size_t covered = 0;
+  for (const Patch& patch : sources.patches) covered += static_cast<std::size_t>(patch.rectangle.width) * patch.rectangle.height;
   auto along = context.allocate<float>(texels), around = context.allocate<float>(texels), out = context.allocate<float>(texels);
-  context.launch({"encode.cl", "encode_texels"}, layout.range(), texture_width, texture_height, layout.texel_patches, layout.patches, rows, columns, points.x,
-                 points.y, points.z, along, around, out);
+  for (ClBuffer<float>* plane : {&along, &around, &out})
+    if (covered < texels) context.fill(*plane, 0.f);
+  context.launch({"encode.cl", "encode_texels"}, row_range(context, all_rows.size), static_cast<int>(all_rows.size), texture_width, all_rows, layout.patches,
+                 rows, columns, points.x, points.y, points.z, along, around, out);
   if (is_snapped) result.report.snap = report_snap(features, put_back, anchors);  // beside the device's work
   result.texture = {texture_width, texture_height, context.download(along), context.download(around), context.download(out)};
   return result;
