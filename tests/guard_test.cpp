@@ -186,9 +186,15 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
     const std::vector<int> changed = lattice.move(points.take(model, others, 50), other_lattice);
     const Pairs found_of_changed = crossings.find(lattice, changed);
     Pairs all = LatticeCrossings(lattice).find(lattice);
-    const LatticeCrossings::Others same = crossings.find_between_same(all, lattice), different = crossings.find_between_same(all, other_lattice);
+    const LatticeCrossings::Others same = crossings.find_between_same(all, lattice, 1), different = crossings.find_between_same(all, other_lattice, 1);
     EXPECT_EQ(same.pairs, all) << each.name;
     EXPECT_EQ(same.given_there, all.size()) << each.name;
+    EXPECT_EQ(same.counted, all.size()) << each.name;
+    const LatticeCrossings::Others same_of_some = crossings.find_between_same(all, lattice, 3);
+    EXPECT_EQ(same_of_some.pairs, all) << each.name;
+    EXPECT_EQ(same_of_some.given_there, same_of_some.counted) << each.name;
+    EXPECT_LT(same_of_some.counted, all.size()) << each.name;
+    EXPECT_GT(same_of_some.counted, 0u) << each.name;
     EXPECT_FALSE(different.pairs.empty()) << each.name;
     EXPECT_GT(different.given_there, 0u) << each.name;
     EXPECT_LT(different.given_there, all.size()) << each.name;

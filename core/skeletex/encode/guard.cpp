@@ -30,6 +30,7 @@ constexpr float kWorthAWalk = 0.75f;      // of the limit: how far a quad could 
 constexpr float kEvenWorthALook = 0.5f;   // of the furthest middle, in the even lattice
 constexpr int kVertexReach = 6;           // columns and rows around a texel: diagonals depend on it, vertices are measured to their quads (guard.cl)
 constexpr std::size_t kManyPairs = 50;    // from here on it is looked at whether the even lattice intersects itself as much
+constexpr int kShareOfParts = 4;          // one in so many pairs of parts that intersect tells whether the even lattice does as much
 constexpr int kTolerance = 2;             // columns and rows around a fault of the even lattice
 constexpr double kMuchWorse = 1.1;        // the number of faults there, against the even lattice's
 constexpr int kEndsInBox = 32;            // triangles of strips and fans that a vertex is compared to at once
@@ -551,10 +552,10 @@ GuardReport Guard::put_back_faults(const SnapFeatures& features, const ClBuffer<
                                            : distances.find_far_vertices(lattice, features, back, changed, limit);
     const Pairs pairs = finding.get();
     if (pass == 0 && pairs.size() > kManyPairs) {
-      const LatticeCrossings::Others evens = crossings.find_between_same(pairs, even_lattice);
+      const LatticeCrossings::Others evens = crossings.find_between_same(pairs, even_lattice, kShareOfParts);
       for (const auto& pair : evens.pairs)
         for (const int triangle : pair) even_faults.add(even_lattice.triangle(triangle), kTolerance);
-      tolerates_crossing = evens.pairs.size() > kManyPairs && static_cast<double>(evens.given_there) <= kMuchWorse * static_cast<double>(evens.pairs.size());
+      tolerates_crossing = evens.pairs.size() > kManyPairs && static_cast<double>(evens.given_there) <= kMuchWorse * static_cast<double>(evens.counted);
     }
     for (const auto& pair : pairs)
       if (!tolerates_crossing || !is_pair_near_even_fault(pair))

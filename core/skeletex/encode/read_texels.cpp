@@ -228,13 +228,13 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
               layout.patches, anchors, from.x, from.y, from.z, filtered.x, filtered.y, filtered.z);
     return filtered;
   };
-  // The even lattice is measured beside the snapping, on a queue of its own.
+  // The even lattice is measured beside the snapping, on a queue of its own. (Oclgrind runs one kernel at a time.)
   std::unique_ptr<ClContext> beside;
   std::future<std::unique_ptr<Guard>> measuring_even;
   if ((is_snapped || is_fitted) && sources.guard) {
     context.finish();
     beside = context.beside();
-    measuring_even = std::async(std::launch::async, [&] {
+    measuring_even = std::async(context.device().platform == "Oclgrind" ? std::launch::deferred : std::launch::async, [&] {
       const TexelPoints filtered = options.has_prefilter ? prefilter(*beside, even, even_covering, kNoneHolds) : even;
       return std::make_unique<Guard>(*beside, *sources.guard, layout, maps, even_covering, even, filtered);
     });
@@ -267,8 +267,8 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   }
   std::vector<int> anchors;
   if (measuring_even.valid()) {
-    const std::unique_ptr<Guard> even_guard = measuring_even.get();
     context.finish();
+    const std::unique_ptr<Guard> even_guard = measuring_even.get();
     GuardReport guard = even_guard->put_back_faults(features, covering, positions, points);
     context.take_profile(*beside);
     result.report.turned_triangles = guard.turned_triangles, result.report.even_turned_triangles = guard.even_turned_triangles;

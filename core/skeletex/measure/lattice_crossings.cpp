@@ -679,30 +679,48 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattic
   return find({lattice, tree_, &are_asked, &is_asked});
 }
 
-LatticeCrossings::Others LatticeCrossings::find_between_same(std::span<const std::array<int, 2>> pairs, const LatticeMesh& other) const {
-  std::vector<Task> leaves_of_pairs, tasks;
+LatticeCrossings::Others LatticeCrossings::find_between_same(std::span<const std::array<int, 2>> pairs, const LatticeMesh& other, int share) const {
+  struct Given {
+    Task leaves;
+    std::array<int, 2> pair;
+    auto operator<=>(const Given&) const = default;
+  };
+  std::vector<Given> given;
   for (const auto& [s, t] : pairs) {
     const int a = leaf_of(other, s), b = leaf_of(other, t);
-    leaves_of_pairs.push_back({std::min(a, b), std::max(a, b)});
+    given.push_back({{std::min(a, b), std::max(a, b)}, {s, t}});
   }
-  tasks = leaves_of_pairs;
-  std::sort(tasks.begin(), tasks.end());
-  tasks.erase(std::unique(tasks.begin(), tasks.end()), tasks.end());
-  std::vector<std::vector<std::array<int, 2>>> found(tasks.size());
-  for_each_block(tasks.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
+  std::sort(given.begin(), given.end());
+  std::vector<std::size_t> first;  // per pair of leaves, and the end
+  for (std::size_t i = 0; i <= given.size(); ++i)
+    if (i == 0 || i == given.size() || given[i].leaves != given[i - 1].leaves) first.push_back(i);
+  const std::size_t count = first.size() - 1;
+  std::vector<std::vector<std::array<int, 2>>> found(count);
+  const auto is_whole = [&](std::size_t i) { return i % share == 0; };
+  for_each_block(count, kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
     Leaves& leaves = fresh_leaves();
     for (std::size_t i = begin; i < end; ++i) {
-      const auto [a, b] = tasks[i];
-      const Bounds bounds = b < first_of_ends() ? measure_square(other, nodes_[b]) : measure_end(other, nodes_[b]);
-      find_between(other, a, b, bounds.around, nullptr, leaves, found[i]);
+      if (is_whole(i)) {
+        const auto [a, b] = given[first[i]].leaves;
+        const Bounds bounds = b < first_of_ends() ? measure_square(other, nodes_[b]) : measure_end(other, nodes_[b]);
+        find_between(other, a, b, bounds.around, nullptr, leaves, found[i]);
+        continue;
+      }
+      for (std::size_t k = first[i]; k < first[i + 1]; ++k) {
+        const auto [s, t] = given[k].pair;
+        const Triangle one = other.triangle(s), two = other.triangle(t);
+        if (do_triangles_intersect(one, other.corners(one), two, other.corners(two))) found[i].push_back({s, t});
+      }
     }
   });
   Others others;
-  for (const auto& some : found) others.pairs.insert(others.pairs.end(), some.begin(), some.end());
+  for (std::size_t i = 0; i < count; ++i) {
+    others.pairs.insert(others.pairs.end(), found[i].begin(), found[i].end());
+    if (!is_whole(i) || found[i].empty()) continue;
+    others.counted += found[i].size();
+    others.given_there += first[i + 1] - first[i];
+  }
   std::sort(others.pairs.begin(), others.pairs.end());
-  others.given_there = std::count_if(leaves_of_pairs.begin(), leaves_of_pairs.end(), [&](const Task& task) {
-    return !found[std::lower_bound(tasks.begin(), tasks.end(), task) - tasks.begin()].empty();
-  });
   return others;
 }
 

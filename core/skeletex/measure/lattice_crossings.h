@@ -20,12 +20,14 @@ class LatticeCrossings {
   /// Of the same lattice with some triangles changed: the pairs with one of these.
   std::vector<std::array<int, 2>> find(const LatticeMesh& lattice, std::span<const int> changed);
 
-  /// Of another mesh of this lattice: the pairs between the same parts (4 x 4 quads, or eight triangles at an end) as given ones.
+  /// Of another mesh of this lattice: the same pairs, and all between the same parts (4 x 4 quads, or eight triangles at an end) as given ones
+  /// for one in `share` pairs of parts.
   struct Others {
     std::vector<std::array<int, 2>> pairs;
-    std::size_t given_there = 0;  ///< of the given ones, those between parts where there is any of the others
+    std::size_t counted = 0;      ///< of these, those between such pairs of parts
+    std::size_t given_there = 0;  ///< of the given ones, those between them where there is any of the others
   };
-  Others find_between_same(std::span<const std::array<int, 2>> pairs, const LatticeMesh& other) const;
+  Others find_between_same(std::span<const std::array<int, 2>> pairs, const LatticeMesh& other, int share) const;
 
  private:
   /// Least and greatest coordinates; the fourth does not count.
