@@ -187,10 +187,11 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   }
 
   // Rays.
-  std::vector<float> distances(texels, -1);
+  std::vector<float> distances;
   bool has_spd = false;
   for (int bone = 0; bone < bones; ++bone) {
     if (sources.patches[bone].method != Method::kSpd) continue;
+    if (!has_spd) distances.assign(texels, -1);
     has_spd = true;
     const Rectangle& r = sources.patches[bone].rectangle;
     std::vector<float> filled;
