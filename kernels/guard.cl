@@ -73,8 +73,8 @@ __attribute__((always_inline)) Point normal_at(int texel, int texel_count, globa
   return n;
 }
 
-__attribute__((always_inline)) float suspicion2_of_quad(int texel, int right, int texture_width, int texel_count, int is_second, global const float* texel_normals,
-                         global const float* x, global const float* y, global const float* z) {
+__attribute__((always_inline)) float suspicion2_of_quad(int texel, int right, int texture_width, int texel_count, int is_second,
+                                                         global const float* texel_normals, global const float* x, global const float* y, global const float* z) {
   const int above = texel + texture_width, beyond = right + texture_width;
   const Point a = point_at(x, y, z, texel), b = point_at(x, y, z, right), c = point_at(x, y, z, beyond), d = point_at(x, y, z, above);
   const Point at_a = normal_at(texel, texel_count, texel_normals), at_b = normal_at(right, texel_count, texel_normals);
@@ -127,12 +127,13 @@ __attribute__((always_inline)) Point lattice_point(int vertex, int texel_count, 
 //      where they are as near as that
 // out  distances2: the furthest of the places, squared; what is less than what is enough may be less or more; -1 where no walk can begin
 //      is_turned: whether it looks against the mesh where its middle's walk ends
-kernel void measure_triangles(const int count, const int texel_count, const float middle_enough2, const float worth_a_look2, const float enough2, const int triangle_count,
-                              global const int* restrict listed, global const int* restrict texel_triangles, global const int* restrict corners,
-                              global const int* restrict across, global const float* restrict vertex_x, global const float* restrict vertex_y,
-                              global const float* restrict vertex_z, global const float* restrict x, global const float* restrict y,
-                              global const float* restrict z, global const float* restrict end_x, global const float* restrict end_y,
-                              global const float* restrict end_z, global float* restrict distances2, global int* restrict is_turned) {
+kernel void measure_triangles(const int count, const int texel_count, const float middle_enough2, const float worth_a_look2, const float enough2,
+                              const int triangle_count, global const int* restrict listed, global const int* restrict texel_triangles,
+                              global const int* restrict corners, global const int* restrict across, global const float* restrict vertex_x,
+                              global const float* restrict vertex_y, global const float* restrict vertex_z, global const float* restrict x,
+                              global const float* restrict y, global const float* restrict z, global const float* restrict end_x,
+                              global const float* restrict end_y, global const float* restrict end_z, global float* restrict distances2,
+                              global int* restrict is_turned) {
   const int i = (int)get_global_id(0);
   if (i >= count) return;
   distances2[i] = -1.0f;

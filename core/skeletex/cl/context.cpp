@@ -193,7 +193,8 @@ void ClContext::take_profile(ClContext& beside) {
     if (bytes > 0) std::memcpy(few.data(), values, bytes);
     values = few.data();
   }
-  ::cl::Buffer buffer(context_, values ? CL_MEM_READ_WRITE | CL_MEM_COPY_HOST_PTR : CL_MEM_READ_WRITE, std::max(bytes, kLeast), const_cast<void*>(values), &code);
+  const cl_mem_flags flags = values ? CL_MEM_READ_WRITE | CL_MEM_COPY_HOST_PTR : CL_MEM_READ_WRITE;
+  ::cl::Buffer buffer(context_, flags, std::max(bytes, kLeast), const_cast<void*>(values), &code);
   check(code, fmt::format("allocating {:.1f} MiB on {}", mebibytes(bytes), info_.name));
   return buffer;
 }

@@ -375,7 +375,8 @@ class Distances {
     auto device_distances = context_.allocate<float>(asked.size());
     auto device_turned = context_.allocate<int>(asked.size());
     context_.launch({"guard.cl", "measure_triangles"}, over(asked.size()), static_cast<int>(asked.size()), lattice.texel_count(), enough.middle * enough.middle,
-                    enough.worth_a_look * enough.worth_a_look, enough.places * enough.places, maps_.triangle_count, context_.upload(corners), texel_triangles, maps_.corners, maps_.across, maps_.x, maps_.y, maps_.z,
+                    enough.worth_a_look * enough.worth_a_look, enough.places * enough.places, maps_.triangle_count, context_.upload(corners),
+                    texel_triangles, maps_.corners, maps_.across, maps_.x, maps_.y, maps_.z,
                     lattice.device_points().x, lattice.device_points().y, lattice.device_points().z, context_.upload(ends[0]), context_.upload(ends[1]),
                     context_.upload(ends[2]), device_distances, device_turned);
     const std::vector<float> distances2 = context_.download(device_distances);
@@ -497,8 +498,8 @@ struct Guard::Even {
   std::vector<int> turned;
   float limit = 0;
 
-  Even(ClContext& own_context, const GuardSources& own_sources, const DeviceLayout& own_layout, const DeviceMaps& maps, TexelPoints own_points, TexelPoints stored,
-       std::future<TriangleTree> tree, std::future<PlacedVertices> placed)
+  Even(ClContext& own_context, const GuardSources& own_sources, const DeviceLayout& own_layout, const DeviceMaps& maps, TexelPoints own_points,
+       TexelPoints stored, std::future<TriangleTree> tree, std::future<PlacedVertices> placed)
       : context(own_context),
         sources(own_sources),
         layout(own_layout),
@@ -509,8 +510,8 @@ struct Guard::Even {
         distances(context, sources, layout, maps, tree.get(), placed.get()) {}
 };
 
-Guard::Guard(ClContext& context, const GuardSources& sources, const DeviceLayout& layout, const DeviceMaps& maps, ClBuffer<int> even_triangles, TexelPoints even,
-             TexelPoints filtered)
+Guard::Guard(ClContext& context, const GuardSources& sources, const DeviceLayout& layout, const DeviceMaps& maps, ClBuffer<int> even_triangles,
+             TexelPoints even, TexelPoints filtered)
     : even_(std::make_unique<Even>(context, sources, layout, maps, std::move(even), std::move(filtered),
                                    std::async(std::launch::async, [&] { return build_triangle_tree(sources.mesh); }),
                                    std::async(std::launch::async, [&] { return place_vertices(sources.charts, sources.model.patches, maps, layout); }))) {

@@ -32,8 +32,8 @@ class Guard {
   /// \param even_triangles  per texel a triangle of the map near it, of the even lattice
   /// \param even            the even lattice's points
   /// \param filtered        these as they would be stored: what texels go back to
-  Guard(ClContext& context, const GuardSources& sources, const DeviceLayout& layout, const DeviceMaps& maps, ClBuffer<int> even_triangles, TexelPoints even,
-        TexelPoints filtered);
+  Guard(ClContext& context, const GuardSources& sources, const DeviceLayout& layout, const DeviceMaps& maps, ClBuffer<int> even_triangles,
+        TexelPoints even, TexelPoints filtered);
   ~Guard();
   /// \param triangles  as even_triangles, of the points
   GuardReport put_back_faults(const SnapFeatures& features, const ClBuffer<int>& triangles, ReadingPositions& positions, TexelPoints& points);

@@ -8,8 +8,8 @@
 #include <numeric>
 #include <utility>
 
-#include "skeletex/model/parallel.h"
 #include "skeletex/model/half_edge_table.h"
+#include "skeletex/model/parallel.h"
 
 namespace skeletex {
 namespace {
