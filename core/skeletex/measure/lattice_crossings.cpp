@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -94,16 +96,24 @@ inline bool is_sliver(const Four& a, const Four& b, const Four& c, float least_h
   return u.cross(v).squaredNorm() <= least_height * least_height * std::max({u.squaredNorm(), v.squaredNorm(), (v - u).squaredNorm()});
 }
 
-using FourPoints = std::array<Four, 3>;
 /// \param is_first  1 or 0 of each
 inline Four either(const Four& is_first, const Four& a, const Four& b) { return a * is_first + b * (1 - is_first); }
-inline FourPoints four_times(const Four& point) { return {Four::Constant(point[0]), Four::Constant(point[1]), Four::Constant(point[2])}; }
-/// Four boxes and one: 0 or less of those that overlap it.
-inline Four gaps(const FourPoints& least, const FourPoints& greatest, const FourPoints& other_least, const FourPoints& other_greatest) {
-  return (least[0] - other_greatest[0])
-      .max(other_least[0] - greatest[0])
-      .max((least[1] - other_greatest[1]).max(other_least[1] - greatest[1]))
-      .max((least[2] - other_greatest[2]).max(other_least[2] - greatest[2]));
+
+/// Which of the boxes of a leaf's triangles overlap another one. A compiler that can makes it once more for processors with wider vectors.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+__attribute__((target_clones("avx2", "default")))
+#endif
+void find_overlapping(const std::array<std::array<float, 32>, 3>& least, const std::array<std::array<float, 32>, 3>& greatest, const float* other_least,
+                      const float* other_greatest, std::array<unsigned char, 32>& do_overlap) {
+  const float low_x = other_least[0], low_y = other_least[1], low_z = other_least[2];
+  const float high_x = other_greatest[0], high_y = other_greatest[1], high_z = other_greatest[2];
+  const float *least_x = least[0].data(), *least_y = least[1].data(), *least_z = least[2].data();
+  const float *greatest_x = greatest[0].data(), *greatest_y = greatest[1].data(), *greatest_z = greatest[2].data();
+  std::array<int, 32> all;  // apart from bytes, which could be part of anything
+  for (int i = 0; i < 32; ++i)
+    all[i] = static_cast<int>(least_x[i] <= high_x) & static_cast<int>(low_x <= greatest_x[i]) & static_cast<int>(least_y[i] <= high_y) &
+             static_cast<int>(low_y <= greatest_y[i]) & static_cast<int>(least_z[i] <= high_z) & static_cast<int>(low_z <= greatest_z[i]);
+  for (int i = 0; i < 32; ++i) do_overlap[i] = static_cast<unsigned char>(all[i]);
 }
 
 /// From a to b round a circle, the shorter way: where it starts, and its steps.
@@ -467,21 +477,22 @@ bool LatticeCrossings::are_quads_smooth(const LatticeMesh& lattice, int patch, i
 
 LatticeCrossings::Leaf& LatticeCrossings::leaf_at(const LatticeMesh& lattice, int number, Leaf& leaf) const {
   if (leaf.node == number) return leaf;
-  leaf.node = number, leaf.fours = 0;
+  leaf.node = number;
   leaf.is_placed.fill(false);
+  for (auto& plane : leaf.least) plane.fill(kInfinity);
+  for (auto& plane : leaf.greatest) plane.fill(-kInfinity);
   const Node& node = nodes_[number];
   const Grid& grid = grids_[node.grid];
+  int fours = 0;
   const auto add_four = [&](const auto& coordinates_of, int count) {
-    FourPoints &least = leaf.least[leaf.fours], &greatest = leaf.greatest[leaf.fours];
     for (int axis = 0; axis < 3; ++axis) {
       Four a, b, c;
       coordinates_of(axis, a, b, c);
-      least[axis] = a.min(b).min(c) - margin_, greatest[axis] = a.max(b).max(c) + margin_;
-      leaf.least_of_fours[leaf.fours / 4][axis][leaf.fours % 4] = least[axis].minCoeff();
-      leaf.greatest_of_fours[leaf.fours / 4][axis][leaf.fours % 4] = greatest[axis].maxCoeff();
+      const Four least = a.min(b).min(c) - margin_, greatest = a.max(b).max(c) + margin_;
+      std::copy_n(least.data(), count, leaf.least[axis].begin() + 4 * fours);
+      std::copy_n(greatest.data(), count, leaf.greatest[axis].begin() + 4 * fours);
     }
-    for (int k = count; k < 4; ++k) least[0][k] = kInfinity;
-    ++leaf.fours;
+    ++fours;
   };
   if (grid.end < 0) {
     SquareVertices square;
@@ -571,21 +582,19 @@ void LatticeCrossings::find_between(const LatticeMesh& lattice, int a, int b, co
     if (is_of_one_patch && are_quads_smooth(lattice, grids_[nodes_[a].grid].patch, s, t)) return;
     pairs.push_back({std::min(s, t), std::max(s, t)});
   };
-  const FourPoints least = four_times(around_b.least), greatest = four_times(around_b.greatest);
-  for (int i = 0; i < one.fours; ++i) {
-    const Four near = gaps(one.least[i], one.greatest[i], least, greatest);
-    for (int m = 0; m < 4; ++m) {
-      if (near[m] > 0) continue;
-      const FourPoints own_least = four_times({one.least[i][0][m], one.least[i][1][m], one.least[i][2][m], 0});
-      const FourPoints own_greatest = four_times({one.greatest[i][0][m], one.greatest[i][1][m], one.greatest[i][2][m], 0});
-      std::array<Four, 2> of_fours;
-      for (int half = 0; half < 2; ++half) of_fours[half] = gaps(other.least_of_fours[half], other.greatest_of_fours[half], own_least, own_greatest);
-      for (int j = a == b ? i : 0; j < other.fours; ++j) {
-        if (of_fours[j / 4][j % 4] > 0) continue;
-        const Four gap = gaps(other.least[j], other.greatest[j], own_least, own_greatest);
-        for (int n = a == b && i == j ? m + 1 : 0; n < 4; ++n)
-          if (gap[n] <= 0) look_at(4 * i + m, 4 * j + n);
-      }
+  std::array<unsigned char, kLeafTriangles> are_near, do_overlap;
+  find_overlapping(one.least, one.greatest, around_b.least.data(), around_b.greatest.data(), are_near);
+  for (int i = 0; i < kLeafTriangles; ++i) {
+    if (are_near[i] == 0) continue;
+    const std::array<float, 3> least{one.least[0][i], one.least[1][i], one.least[2][i]}, greatest{one.greatest[0][i], one.greatest[1][i], one.greatest[2][i]};
+    find_overlapping(other.least, other.greatest, least.data(), greatest.data(), do_overlap);
+    for (int first = 0; first < kLeafTriangles; first += 8) {
+      // Nearly all of them do not.
+      std::uint64_t any;
+      std::memcpy(&any, do_overlap.data() + first, sizeof any);
+      if (any == 0) continue;
+      for (int k = std::max(first, a == b ? i + 1 : 0); k < first + 8; ++k)
+        if (do_overlap[k] != 0) look_at(i, k);
     }
   }
 }

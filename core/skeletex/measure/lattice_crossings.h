@@ -58,14 +58,12 @@ class LatticeCrossings {
   struct Node {
     int grid, level, row, column;
   };
-  using FourPoints = std::array<Eigen::Array4f, 3>;  ///< by coordinate
   static constexpr int kSide = 4;  ///< quads along a side of a square
   static constexpr int kLeafTriangles = 32;
-  /// A leaf as it is when its triangles are looked at one by one, by fours: of a square the lower or upper ones in a row of quads.
+  /// A leaf as it is when its triangles are looked at one by one: of a square four lower and four upper ones in turns, row by row.
   struct Leaf {
-    int node = -1, fours = 0;
-    std::array<FourPoints, kLeafTriangles / 4> least, greatest;  ///< infinite where there is no triangle
-    std::array<FourPoints, 2> least_of_fours, greatest_of_fours;
+    int node = -1;
+    std::array<std::array<float, kLeafTriangles>, 3> least, greatest;  ///< by coordinate; infinite where there is no triangle
     std::array<bool, kLeafTriangles> is_placed;                  ///< of these the rest is known
     std::array<int, kLeafTriangles> numbers;
     std::array<Triangle, kLeafTriangles> triangles;
