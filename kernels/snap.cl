@@ -29,11 +29,11 @@
 // Rounded to the nearest: rint() would not become one instruction.
 #define NEAREST(x) (((x) + 12582912.0f) - 12582912.0f)
 
-// What a work-item of the row's group has written all of them can read. A group of one has nothing to wait for.
+// What a work-item of a group of ROW_ITEMS has written all of them can read. A group of one has nothing to wait for.
 #if ROW_ITEMS > 1
-#define WAIT_FOR_ROW() barrier(CLK_GLOBAL_MEM_FENCE)
+#define WAIT_FOR_GROUP() barrier(CLK_GLOBAL_MEM_FENCE)
 #else
-#define WAIT_FOR_ROW()
+#define WAIT_FOR_GROUP()
 #endif
 
 // The smallest cross product at the four corners of a quad in the map; 1 in the even lattice.
@@ -105,8 +105,8 @@ void candidate_of(float x, float y, int k, int* column, int* row, float* dx, flo
 
 // NDRange (vertices). A vertex that is not placed claims the first of its candidates that it can still have.
 // in   ranks: by strength, from 1; least: 0 or more than all claims of rounds before
-kernel void claim_texels(const int vertex_count, const int texture_width, const int least, global const int* restrict vertex_patches, global const float* restrict vertex_x,
-                         global const float* restrict vertex_y, global const int* restrict ranks, global const PatchRecord* restrict patches,
+kernel void claim_texels(const int vertex_count, const int texture_width, const int least, global const int* restrict vertex_patches,
+                         global const float* restrict vertex_x, global const float* restrict vertex_y, global const int* restrict ranks, global const PatchRecord* restrict patches,
                          global const int* restrict anchors, global int* restrict states, global int* restrict claims) {
   const int v = (int)get_global_id(0);
   if (v >= vertex_count) return;
@@ -127,8 +127,8 @@ kernel void claim_texels(const int vertex_count, const int texture_width, const 
 
 // NDRange (vertices). A claim that is the strongest on its texel and the eight around is decided: it stands when the map
 // does not fold. `open_count` counts the vertices that wait.
-kernel void decide_claims(const int vertex_count, const int texture_width, const int least, global const int* restrict vertex_patches, global const float* restrict vertex_x,
-                          global const float* restrict vertex_y, global const int* restrict ranks, global const PatchRecord* restrict patches,
+kernel void decide_claims(const int vertex_count, const int texture_width, const int least, global const int* restrict vertex_patches,
+                          global const float* restrict vertex_x, global const float* restrict vertex_y, global const int* restrict ranks, global const PatchRecord* restrict patches,
                           global const int* restrict claims, global int* restrict states, global int* restrict anchors, global float* restrict offset_x,
                           global float* restrict offset_y, global int* restrict open_count) {
   const int v = (int)get_global_id(0);
@@ -218,7 +218,7 @@ kernel void relax_texels(const int row_count, const int texture_width, global co
   const int row = rows[4 * k + 1], width = p->width, first = (p->y + row) * texture_width + p->x;
   for (int column = 0; column < 2 + (width & 1); ++column) {
     relax_columns(column, first, width, p->height, texture_width, row, anchors, offset_x, offset_y, offset_x, offset_y);
-    WAIT_FOR_ROW();
+    WAIT_FOR_GROUP();
   }
 }
 
@@ -343,7 +343,7 @@ kernel void place_on_edges(const int row_count, const int texture_width, const i
       for (int i = 0; column + i < width; ++i) offers[texel + i] = anchors[texel + i] == 0 ? of_lanes[i] : NO_OFFER;
     }
   }
-  WAIT_FOR_ROW();
+  WAIT_FOR_GROUP();
   const int edge_mask = (1 << edge_bits) - 1;
   for (int column = 0; column < 2 + (width & 1); ++column) {
     int has_long = width < 16;
@@ -356,7 +356,7 @@ kernel void place_on_edges(const int row_count, const int texture_width, const i
     const int at_end = column == 0 ? 0 : width - 1;
     if (get_local_id(0) == 0 && (column < 2 ? at_end < (width & ~1) : 1))
       place_apart(at_end, first + at_end, width, height, texture_width, row, edge_mask, edges, offers, anchors, parameters, offset_x, offset_y);
-    WAIT_FOR_ROW();
+    WAIT_FOR_GROUP();
   }
 }
 
@@ -405,12 +405,6 @@ int is_bad_quad(global const PatchRecord* restrict p, int texture_width, int col
   return (is_turned(now[0], now[1], now[3], normal) && !is_turned(even[0], even[1], even[3], normal)) ||
          (is_turned(now[1], now[2], now[3], normal) && !is_turned(even[1], even[2], even[3], normal));
 }
-
-#if ROW_ITEMS > 1
-#define WAIT_FOR_GROUP() barrier(CLK_GLOBAL_MEM_FENCE)
-#else
-#define WAIT_FOR_GROUP()
-#endif
 
 // NDRange: one work-group of ROW_ITEMS. Texels of a list go back, those on vertices only `with_vertices`; and in rounds those of bad quads at texels that
 // have gone back in the round before. Rounds are many, but soon of few texels, and a launch takes longer than most of them. What a

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "skeletex/model/error.h"
 #include "skeletex/model/half_edge_table.h"
 #include "skeletex/model/parallel.h"
 
@@ -285,7 +286,8 @@ std::vector<int> put_back_listed(ClContext& context, const DeviceLayout& layout,
                  before.z, positions.home_x, positions.home_y, returns.marks, positions.anchors, positions.x, positions.y, points.x, points.y, points.z,
                  returns.back, returns.bad, returns.counts);
   std::vector<int> back(context.download(returns.counts)[0]);
-  if (!back.empty()) context.queue().enqueueReadBuffer(returns.back.memory, CL_TRUE, 0, back.size() * sizeof(int), back.data());
+  if (!back.empty() && context.queue().enqueueReadBuffer(returns.back.memory, CL_TRUE, 0, back.size() * sizeof(int), back.data()) != CL_SUCCESS)
+    throw DeviceError("reading from the device what has gone back to the even lattice");
   return back;
 }
 

@@ -37,13 +37,14 @@ SnapFeatures find_features(std::span<const Chart> charts, std::span<const Patch>
 /// Features as the kernels take them (snap.cl).
 struct SnapTables {
   std::vector<int> vertex_patches, vertex_points, vertex_ranks;  ///< ranks by strength, from 1
-  std::vector<float> vertex_x, vertex_y;
+  std::vector<float> vertex_x, vertex_y;                         ///< cells
   std::vector<std::array<int, 2>> edge_points;
-  std::vector<std::array<float, 6>> edges;             ///< x and y of both points, 1 / length squared, steps of offers per cell
+  std::vector<std::array<float, 6>> edges;             ///< x and y of both points in cells, 1 / length squared, steps of offers per cell
   int edge_bits = 0;                                   ///< of an edge's number
   std::array<std::vector<LatticeRow>, 2> rows;         ///< of VSM patches, inner ones, even and odd: patch, row, first bin, 0
   std::vector<int> bin_begins, bin_edges;              ///< the edges near each bin of eight columns of a row
 };
+/// \param patches  with their rectangles in the texture, as for find_features
 SnapTables tables_of(const SnapFeatures& features, std::span<const Patch> patches);
 
 /// Where each texel reads, a thing of its own between the map and the texel: per texel an offset from its place in the
@@ -75,7 +76,7 @@ struct TexelReturns {
 /// \param even    the even lattice's points, the measure of folds
 /// \param before  what texels go back to: these as they would be stored
 /// \param texels  each once
-/// \return the texels that went back, in any order
+/// \return the texels that went back, in any order. \throw DeviceError
 std::vector<int> put_back_listed(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before,
                                  const std::vector<int>& texels, bool with_vertices, TexelReturns& returns, ReadingPositions& positions, TexelPoints& points);
 
