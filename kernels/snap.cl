@@ -3,10 +3,12 @@
 //   claim_texels, decide_claims  vertices, strongest first, take the nearest texel that is free
 //   relax_texels                 free texels follow their neighbours half way
 //   place_on_edges               free texels go to the nearest point of a creased edge
+//   part_colours, join_colours  rows by colour, and back, see below
 //   put_listed_back              texels of a list, and what then folds in the map or in space, go back to the even lattice
 // A reading position is an offset from the texel's own place in the lattice, in cells: two planes over the texture, x
 // around, y along. Rows 0 and height-1 stay. `anchors` says what holds a texel: 0 nothing, 1 + i vertex i of the list
 // of vertices, -1 - i edge i. Vertices and edges come with their patch and their place (x, y) in its cells, x unwrapped.
+// While texels snap, each row of a patch has its even columns first, then its odd ones: those of a colour and their neighbours lie side by side.
 // Texels never look at each other's offsets where these may change: claims wait for stronger ones next to them, the other kernels take
 // even and odd rows apart, and in each of them one colour after the other (see colour_of). So nothing depends on the order of work-items.
 #include "skeletex_structs.h"
@@ -21,13 +23,7 @@
 #define LEAST_MOVE 0.01f   // cells: shorter steps of free texels are not worth their test
 #define PLACED 5           // states of a vertex: 0 to 3 the candidate it claims, 4 none is left
 #define BAD 1              // a mark of a texel's quad
-#define NO_OFFER 0x7fffffff
-#define TURN_BITS 4        // of an edge's entry in a bin
-#define MOST_TURNS 8
-#define EDGE_SIZE 6        // numbers per edge: x, y of its first and of its last point, 1 / length squared, steps of offers per cell
-
-// Rounded to the nearest: rint() would not become one instruction.
-#define NEAREST(x) (((x) + 12582912.0f) - 12582912.0f)
+#define NONE -1            // of a bin's edges
 
 // What a work-item of a group of ROW_ITEMS has written all of them can read. A group of one has nothing to wait for.
 #if ROW_ITEMS > 1
@@ -47,14 +43,20 @@ float quad_cross(const float x[4], const float y[4]) {
   return least;
 }
 
+// A texel among its row's by colour; columns one beyond either end wrap round.
+int coloured_at(global const PatchRecord* restrict p, int texture_width, int column, int row) {
+  const int wrapped = column < 0 ? column + p->width : column < p->width ? column : column - p->width;
+  return (p->y + row) * texture_width + p->x + (wrapped >> 1) + ((wrapped & 1) ? (p->width + 1) >> 1 : 0);
+}
+
 // A texel and its eight neighbours.
 typedef struct Neighbours {
   int own, left, right;  // those below and above them are a line of the texture away
 } Neighbours;
 
 Neighbours neighbours_of(global const PatchRecord* restrict p, int texture_width, int column, int row) {
-  const int own = (p->y + row) * texture_width + p->x + column;
-  const Neighbours n = {own, column > 0 ? own - 1 : own + p->width - 1, column + 1 < p->width ? own + 1 : own + 1 - p->width};
+  const Neighbours n = {coloured_at(p, texture_width, column, row), coloured_at(p, texture_width, column - 1, row),
+                        coloured_at(p, texture_width, column + 1, row)};
   return n;
 }
 
@@ -117,7 +119,7 @@ kernel void claim_texels(const int vertex_count, const int texture_width, const 
     float dx, dy;
     candidate_of(vertex_x[v], vertex_y[v], state, &column, &row, &dx, &dy);
     if (row < 1 || row > p->height - 2 || dx * dx + dy * dy > REACH * REACH) continue;
-    const int texel = texel_at(p, texture_width, (column % p->width + p->width) % p->width, row);
+    const int texel = coloured_at(p, texture_width, (column % p->width + p->width) % p->width, row);
     if (anchors[texel] != 0) continue;
     atomic_max(claims + texel, least + ranks[v]);
     break;
@@ -140,7 +142,7 @@ kernel void decide_claims(const int vertex_count, const int texture_width, const
   column = (column % p->width + p->width) % p->width;
   int is_strongest = 1;
   for (int i = -1; i <= 1; ++i)
-    for (int j = -1; j <= 1; ++j) is_strongest &= claims[texel_at(p, texture_width, column + j, row + i)] <= least + ranks[v];
+    for (int j = -1; j <= 1; ++j) is_strongest &= claims[coloured_at(p, texture_width, column + j, row + i)] <= least + ranks[v];
   if (!is_strongest) {
     atomic_inc(open_count);
     return;
@@ -175,37 +177,44 @@ __attribute__((always_inline)) Offset relaxed(Offset own, int is_held, Neighbour
   return now;
 }
 
-// The same where columns wrap round. Compiled once.
-__attribute__((noinline)) Offset relaxed_at_end(Offset own, int is_held, int texel, int column, int width, int height, int texture_width, int row,
-                                                global const float* offset_x, global const float* offset_y) {
-  const Neighbours n = {texel, column > 0 ? texel - 1 : texel + width - 1, column + 1 < width ? texel + 1 : texel + 1 - width};
-  return relaxed(own, is_held, n, height, texture_width, row, offset_x, offset_y);
+// Texels of one colour of a row with a neighbour on either side, `first` to `end`, and the left one of the first. The right one is the next after it.
+typedef struct RowColour {
+  int first, end, left;
+} RowColour;
+
+// Columns that wrap round are left out: what is done for the others becomes vector instructions.
+RowColour row_colour(int is_odd, int first, int width) {
+  const int odd = first + ((width + 1) >> 1);
+  const RowColour colour = {is_odd ? odd : first + 1, is_odd ? odd + ((width - 1) >> 1) : first + (width >> 1), is_odd ? first : odd};
+  return colour;
 }
 
-// Free texels of every second column relax.
-// in   first_column: 0 or 1, up to the last of an odd width; 2: that; offset_x, offset_y: the same as own_x, own_y, of which only texels of these columns
-//      are read there
-__attribute__((always_inline)) void relax_columns(const int first_column, const int first, const int width, const int height, const int texture_width,
-                                                  const int row, global const int* restrict anchors, global const float* restrict offset_x,
-                                                  global const float* restrict offset_y, global float* restrict own_x, global float* restrict own_y) {
-  const int paired = width & ~1;
-  // What wraps round apart from the rest, which becomes vector instructions.
-  if (first_column < 2) {
-    for (int j = (first_column == 0 ? 2 : 1) + 2 * get_local_id(0); j < width - 1; j += 2 * ROW_ITEMS) {
-      const Offset own = {own_x[first + j], own_y[first + j]};
-      const Neighbours n = {first + j, first + j - 1, first + j + 1};
-      const Offset now = relaxed(own, anchors[first + j] != 0, n, height, texture_width, row, offset_x, offset_y);
-      own_x[first + j] = now.x;
-      own_y[first + j] = now.y;
-    }
+// The column at an end of a row that comes with a colour; of an odd width the last one comes by itself. -1: none.
+int end_of_colour(int colour, int width) { return colour == 0 ? (width > 1 ? 0 : -1) : colour == 1 ? ((width & 1) ? -1 : width - 1) : width - 1; }
+
+// Texels of one colour relax.
+// in   offset_x, offset_y: the same as own_x, own_y, of which only texels of this colour are read there
+__attribute__((always_inline)) void relax_colour(const RowColour colour, const int height, const int texture_width, const int row,
+                                                 global const int* restrict anchors, global const float* restrict offset_x,
+                                                 global const float* restrict offset_y, global float* restrict own_x, global float* restrict own_y) {
+  for (int i = get_local_id(0); i < colour.end - colour.first; i += ROW_ITEMS) {
+    const int texel = colour.first + i;
+    const Offset own = {own_x[texel], own_y[texel]};
+    const Neighbours n = {texel, colour.left + i, colour.left + i + 1};
+    const Offset now = relaxed(own, anchors[texel] != 0, n, height, texture_width, row, offset_x, offset_y);
+    own_x[texel] = now.x;
+    own_y[texel] = now.y;
   }
-  const int at_end = first_column == 0 ? 0 : width - 1;
-  if (get_local_id(0) == 0 && (first_column < 2 ? at_end < paired : paired < width)) {
-    const Offset own = {own_x[first + at_end], own_y[first + at_end]};
-    const Offset now = relaxed_at_end(own, anchors[first + at_end] != 0, first + at_end, at_end, width, height, texture_width, row, offset_x, offset_y);
-    own_x[first + at_end] = now.x;
-    own_y[first + at_end] = now.y;
-  }
+}
+
+// Compiled once.
+__attribute__((noinline)) void relax_at_end(global const PatchRecord* restrict p, const int texture_width, const int column, const int row,
+                                            global const int* restrict anchors, global float* offset_x, global float* offset_y) {
+  const Neighbours n = neighbours_of(p, texture_width, column, row);
+  const Offset own = {offset_x[n.own], offset_y[n.own]};
+  const Offset now = relaxed(own, anchors[n.own] != 0, n, p->height, texture_width, row, offset_x, offset_y);
+  offset_x[n.own] = now.x;
+  offset_y[n.own] = now.y;
 }
 
 // NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. Free texels relax, one colour of the row after the other.
@@ -216,148 +225,168 @@ kernel void relax_texels(const int row_count, const int texture_width, global co
   if (k >= row_count) return;
   global const PatchRecord* restrict p = patches + rows[4 * k];
   const int row = rows[4 * k + 1], width = p->width, first = (p->y + row) * texture_width + p->x;
-  for (int column = 0; column < 2 + (width & 1); ++column) {
-    relax_columns(column, first, width, p->height, texture_width, row, anchors, offset_x, offset_y, offset_x, offset_y);
+  for (int colour = 0; colour < 2 + (width & 1); ++colour) {
+    const int at_end = end_of_colour(colour, width);
+    if (colour < 2) relax_colour(row_colour(colour, first, width), p->height, texture_width, row, anchors, offset_x, offset_y, offset_x, offset_y);
+    if (get_local_id(0) == 0 && at_end >= 0) relax_at_end(p, texture_width, at_end, row, anchors, offset_x, offset_y);
     WAIT_FOR_GROUP();
   }
 }
+
+// An edge at one turn of v.
+typedef struct EdgeRecord {
+  float x, y;            // its first point
+  float ex, ey;          // from there to its last one
+  float over_x, over_y;  // that / -length squared
+  float flatness;        // 1 / the square of its weight
+  int number;
+} EdgeRecord;
 
 float8 gathered(const int8 at, global const float* from) {
   return (float8)(from[at.s0], from[at.s1], from[at.s2], from[at.s3], from[at.s4], from[at.s5], from[at.s6], from[at.s7]);
 }
 
-// The least of the offers of a bin's edges to eight texels from (column, row) on. An offer is the distance divided by the edge's weight, in steps of
-// its share of the largest, and the number of the edge: of two as near the first one wins.
-int8 least_offers(const int column, const int row, const int width, const float8 offset_x, const float8 offset_y, const int begin, const int end,
-                  const int edge_bits, global const int* restrict bin_edges, global const float* restrict edges) {
-  const int largest = (0x7fffffff >> edge_bits) - 1;
-  const float8 beside = (float8)(0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f);
-  int8 least = (int8)(NO_OFFER);
+// Of a bin's edges those that are nearest to eight texels, by distance / weight, and within reach; of two as near the first one.
+int8 nearest_edges(const float8 x, const float8 y, const int begin, const int end, global const int* restrict bin_edges,
+                   global const EdgeRecord* restrict edges) {
+  float8 least = (float8)(INFINITY);
+  int8 nearest = (int8)(NONE);
   for (int i = begin; i < end; ++i) {
-    const int e = bin_edges[i] >> TURN_BITS, turn = (bin_edges[i] & ((1 << TURN_BITS) - 1)) - MOST_TURNS;
-    global const float* edge = edges + EDGE_SIZE * e;
-    const float x0 = edge[0], y0 = edge[1], ex = edge[2] - x0, ey = edge[3] - y0, inverse = edge[4], scale = edge[5];
-    const float8 x = x0 - ((float)(column + turn * width) + beside) - offset_x, y = y0 - (float)row - offset_y;
-    const float8 t = clamp(-(x * ex + y * ey) * inverse, (float8)(0.0f), (float8)(1.0f));
-    const float8 dx = x + t * ex, dy = y + t * ey, distance2 = dx * dx + dy * dy;
-    const int8 offer = (min(convert_int8(scale * sqrt(distance2)), (int8)(largest)) << edge_bits) + e;
-    least = min(least, distance2 <= REACH * REACH ? offer : (int8)(NO_OFFER));
+    const int e = bin_edges[i];
+    global const EdgeRecord* restrict edge = edges + e;
+    const float8 to_x = edge->x - x, to_y = edge->y - y;
+    const float8 t = clamp(to_x * edge->over_x + to_y * edge->over_y, (float8)(0.0f), (float8)(1.0f));
+    const float8 dx = to_x + t * edge->ex, dy = to_y + t * edge->ey, distance2 = dx * dx + dy * dy, offer = distance2 * edge->flatness;
+    const int8 is_nearer = (offer < least) & (distance2 <= REACH * REACH);
+    least = is_nearer ? offer : least;
+    nearest = is_nearer ? (int8)(e) : nearest;
   }
-  return least;
+  return nearest;
 }
 
-// Where a texel goes that an edge has made an offer, and the parameter of that point of the edge.
+// Where a texel goes that an edge is near, and the parameter of that point of the edge.
 typedef struct EdgePlace {
-  float x, y, t;
+  float dx, dy, t;
 } EdgePlace;
 
-// The turn of v at which an edge lies next to a texel is, for short edges, that of its middle.
-int is_long(const float ends[4], float width) { return fabs(ends[2] - ends[0]) > 0.25f * width; }
-
 // in   offset_x, offset_y: of the texel now
-__attribute__((always_inline)) EdgePlace place_at_turn(const float ends[4], int column, int row, float offset_x, float offset_y, float width, float turn) {
-  const float x = (float)column + offset_x + turn * width, y = (float)row + offset_y;
-  const float ex = ends[2] - ends[0], ey = ends[3] - ends[1], length2 = ex * ex + ey * ey;
-  const float t = length2 > 0.0f ? clamp(((x - ends[0]) * ex + (y - ends[1]) * ey) / length2, 0.0f, 1.0f) : 0.0f;
-  const EdgePlace place = {ends[0] + t * (ends[2] - ends[0]) - x, ends[1] + t * (ends[3] - ends[1]) - y, t};
+__attribute__((always_inline)) EdgePlace place_on(global const EdgeRecord* edge, int column, int row, float offset_x, float offset_y) {
+  const float to_x = edge->x - ((float)column + offset_x), to_y = edge->y - ((float)row + offset_y);
+  const float t = clamp(to_x * edge->over_x + to_y * edge->over_y, 0.0f, 1.0f);
+  const EdgePlace place = {to_x + t * edge->ex + offset_x, to_y + t * edge->ey + offset_y, t};
   return place;
 }
 
-// A free texel that wraps round or has a long edge, whose nearest turn is looked for. Compiled once.
-__attribute__((noinline)) void place_apart(const int column, const int texel, const int width, const int height, const int texture_width, const int row,
-                                           const int edge_mask, global const float* restrict edges, global const int* offers, global int* restrict anchors,
-                                           global float* restrict parameters, global float* offset_x, global float* offset_y) {
-  if ((offers[texel] == NO_OFFER) | (anchors[texel] != 0)) return;
-  const int e = offers[texel] & edge_mask;
-  const float ends[4] = {edges[EDGE_SIZE * e], edges[EDGE_SIZE * e + 1], edges[EDGE_SIZE * e + 2], edges[EDGE_SIZE * e + 3]};
-  const float around = (float)width, own_x = offset_x[texel], own_y = offset_y[texel];
-  const float turn = NEAREST((0.5f * (ends[0] + ends[2]) - ((float)column + own_x)) / around);
-  const float others = around < 16.0f || is_long(ends, around) ? 1.0f : 0.0f;
-  EdgePlace best = {INFINITY, INFINITY, 0.0f};
-  for (float i = turn - others; i <= turn + others; i += 1.0f) {
-    const EdgePlace place = place_at_turn(ends, column, row, own_x, own_y, around, i);
-    if (place.x * place.x + place.y * place.y < best.x * best.x + best.y * best.y) best = place;
-  }
-  const float dx = best.x + own_x, dy = best.y + own_y;
-  if (fabs(dx) > FURTHEST || fabs(dy) > FURTHEST) return;
-  const Neighbours n = {texel, column > 0 ? texel - 1 : texel + width - 1, column + 1 < width ? texel + 1 : texel + 1 - width};
-  if (cross_around(n, height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) return;
-  offset_x[texel] = dx, offset_y[texel] = dy;
-  parameters[texel] = best.t;
-  anchors[texel] = -1 - e;
+// A free texel where columns wrap round. Compiled once.
+__attribute__((noinline)) void place_at_end(global const PatchRecord* restrict p, const int texture_width, const int column, const int row,
+                                            global const EdgeRecord* restrict edges, global const int* offers, global int* restrict anchors,
+                                            global float* restrict parameters, global float* offset_x, global float* offset_y) {
+  const Neighbours n = neighbours_of(p, texture_width, column, row);
+  const int texel = n.own, e = offers[texel];
+  if (e == NONE) return;
+  const EdgePlace place = place_on(edges + e, column, row, offset_x[texel], offset_y[texel]);
+  if (fmax(fabs(place.dx), fabs(place.dy)) > FURTHEST) return;
+  if (cross_around(n, p->height, texture_width, row, place.dx, place.dy, offset_x, offset_y) < LEAST_CROSS) return;
+  offset_x[texel] = place.dx, offset_y[texel] = place.dy;
+  parameters[texel] = place.t;
+  anchors[texel] = -1 - edges[e].number;
 }
 
-// Free texels of every second column, as for relax_columns, go to the edge that made the least offer.
-// \return whether there are long edges
-__attribute__((always_inline)) int place_columns(const int first_column, const int first, const int width, const int height, const int texture_width,
-                                                 const int row, const int edge_mask, global const float* restrict edges,
-                                                 global const int* restrict offers, global int* restrict anchors, global float* restrict parameters,
-                                                 global const float* restrict offset_x, global const float* restrict offset_y,
-                                                 global float* restrict own_x, global float* restrict own_y) {
-  const float around = (float)width;
-  int has_long = 0;
-  for (int j = (first_column == 0 ? 2 : 1) + 2 * get_local_id(0); j < width - 1; j += 2 * ROW_ITEMS) {
-    const int texel = first + j, has_offer = offers[texel] != NO_OFFER, e = has_offer ? offers[texel] & edge_mask : 0;
-    const float ends[4] = {edges[EDGE_SIZE * e], edges[EDGE_SIZE * e + 1], edges[EDGE_SIZE * e + 2], edges[EDGE_SIZE * e + 3]};
+// Texels of one colour, as for relax_colour, go to the edge that is nearest.
+// in   odd: 1 where their columns are odd
+__attribute__((always_inline)) void place_colour(const RowColour colour, const int odd, const int height, const int texture_width, const int row,
+                                                 global const EdgeRecord* restrict edges, global const int* restrict offers, global int* restrict anchors,
+                                                 global float* restrict parameters, global const float* restrict offset_x,
+                                                 global const float* restrict offset_y, global float* restrict own_x, global float* restrict own_y) {
+  for (int i = get_local_id(0); i < colour.end - colour.first; i += ROW_ITEMS) {
+    const int texel = colour.first + i, has_offer = offers[texel] != NONE, e = has_offer ? offers[texel] : 0;
     const float from_x = own_x[texel], from_y = own_y[texel];
-    const float turn = NEAREST((0.5f * (ends[0] + ends[2]) - ((float)j + from_x)) / around);
-    const EdgePlace place = place_at_turn(ends, j, row, from_x, from_y, around, turn);
-    const float dx = place.x + from_x, dy = place.y + from_y;
-    const Neighbours n = {texel, texel - 1, texel + 1};
-    const int stands = cross_around(n, height, texture_width, row, dx, dy, offset_x, offset_y) >= LEAST_CROSS;
-    const int is_apart = has_offer & is_long(ends, around);
-    const int moves = has_offer & (is_apart == 0) & (fabs(dx) <= FURTHEST) & (fabs(dy) <= FURTHEST) & stands;
-    has_long |= is_apart;
-    own_x[texel] = moves ? dx : from_x;
-    own_y[texel] = moves ? dy : from_y;
-    parameters[texel] = moves ? place.t : parameters[texel];
-    anchors[texel] = moves ? -1 - e : anchors[texel];
+    const EdgePlace place = place_on(edges + e, odd ? 2 * i + 1 : 2 * i + 2, row, from_x, from_y);
+    const Neighbours n = {texel, colour.left + i, colour.left + i + 1};
+    const int stands = cross_around(n, height, texture_width, row, place.dx, place.dy, offset_x, offset_y) >= LEAST_CROSS;
+    const int moves = has_offer & (fabs(place.dx) <= FURTHEST) & (fabs(place.dy) <= FURTHEST) & stands;
+    const float to_x = moves ? place.dx : from_x, to_y = moves ? place.dy : from_y, t = moves ? place.t : parameters[texel];
+    const int anchor = moves ? -1 - edges[e].number : anchors[texel];
+    own_x[texel] = to_x, own_y[texel] = to_y, parameters[texel] = t, anchors[texel] = anchor;
   }
-  return has_long;
 }
 
-// NDRange and rows as for relax_texels. Edges offer every free texel of a row within reach a point; it goes to the nearest, one colour of the row after the other.
-// A row comes in bins of eight columns, each with a list of the edges near it.
-// in   bin_begins: into bin_edges, which are (number << TURN_BITS) + MOST_TURNS + the turn of v to add to the columns; edges: per edge x, y of its first and
-//      of its last point
+// NDRange and rows as for relax_texels. Free texels of a row go to the nearest edge within reach, one colour of the row after the other. A row comes in bins of
+// eight columns, each with a list of the edges near it, which look for theirs together.
+// in   bin_begins: into bin_edges, numbers of edges
 // out  parameters: where on its edge a texel is, 0 to 1; offers: what else the kernel needs per texel
-kernel void place_on_edges(const int row_count, const int texture_width, const int edge_bits, global const int* restrict rows,
-                           global const PatchRecord* restrict patches, global const int* restrict bin_begins, global const int* restrict bin_edges,
-                           global const float* restrict edges, global int* restrict anchors,
-                           global float* restrict parameters, global float* offset_x, global float* offset_y, global int* offers) {
+kernel void place_on_edges(const int row_count, const int texture_width, global const int* restrict rows, global const PatchRecord* restrict patches,
+                           global const int* restrict bin_begins, global const int* restrict bin_edges, global const EdgeRecord* restrict edges,
+                           global int* restrict anchors, global float* restrict parameters, global float* offset_x, global float* offset_y,
+                           global int* restrict offers) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   global const PatchRecord* restrict p = patches + rows[4 * k];
   const int row = rows[4 * k + 1], width = p->width, height = p->height, first = (p->y + row) * texture_width + p->x;
+  const int odd = first + ((width + 1) >> 1);
   for (int column = 8 * get_local_id(0), bin = rows[4 * k + 2] + get_local_id(0); column < width; column += 8 * ROW_ITEMS, bin += ROW_ITEMS) {
-    // The last texels of a row are fewer than eight: each lane beyond them looks at the last one.
-    const int texel = first + column, is_whole = column + 8 <= width;
-    const int8 lanes = texel + min((int8)(0, 1, 2, 3, 4, 5, 6, 7), (int8)(width - 1 - column));
-    const float8 x = is_whole ? vload8(0, offset_x + texel) : gathered(lanes, offset_x), y = is_whole ? vload8(0, offset_y + texel) : gathered(lanes, offset_y);
-    const int8 least = least_offers(column, row, width, x, y, bin_begins[bin], bin_begins[bin + 1], edge_bits, bin_edges, edges);
+    // Even columns, then odd ones. The last texels of a row are fewer than eight: each lane beyond them looks at the last one.
+    const int8 columns = min(column + (int8)(0, 2, 4, 6, 1, 3, 5, 7), (int8)(width - 1));
+    const int8 texels = (columns >> 1) + ((columns & 1) == 0 ? (int8)(first) : (int8)(odd));
+    const int is_whole = column + 8 <= width, at_even = first + column / 2, at_odd = odd + column / 2;
+    const float8 x = is_whole ? (float8)(vload4(0, offset_x + at_even), vload4(0, offset_x + at_odd)) : gathered(texels, offset_x);
+    const float8 y = is_whole ? (float8)(vload4(0, offset_y + at_even), vload4(0, offset_y + at_odd)) : gathered(texels, offset_y);
+    const int8 nearest = nearest_edges(convert_float8(columns) + x, (float)row + y, bin_begins[bin], bin_begins[bin + 1], bin_edges, edges);
     if (is_whole) {
-      vstore8(vload8(0, anchors + texel) == 0 ? least : (int8)(NO_OFFER), 0, offers + texel);
+      vstore4(vload4(0, anchors + at_even) == 0 ? nearest.lo : (int4)(NONE), 0, offers + at_even);
+      vstore4(vload4(0, anchors + at_odd) == 0 ? nearest.hi : (int4)(NONE), 0, offers + at_odd);
     } else {
-      int of_lanes[8];
-      vstore8(least, 0, of_lanes);
-      for (int i = 0; column + i < width; ++i) offers[texel + i] = anchors[texel + i] == 0 ? of_lanes[i] : NO_OFFER;
+      int of_lanes[8], at[8];
+      vstore8(nearest, 0, of_lanes);
+      vstore8(texels, 0, at);
+      // What several lanes look at is the same.
+      for (int i = 0; i < 8; ++i) offers[at[i]] = anchors[at[i]] == 0 ? of_lanes[i] : NONE;
     }
   }
   WAIT_FOR_GROUP();
-  const int edge_mask = (1 << edge_bits) - 1;
-  for (int column = 0; column < 2 + (width & 1); ++column) {
-    int has_long = width < 16;
-    if (column < 2 && !has_long)
-      has_long = place_columns(column, first, width, height, texture_width, row, edge_mask, edges, offers, anchors, parameters, offset_x, offset_y, offset_x,
-                               offset_y);
-    // The rest, by the same work-items: long edges, and what wraps round.
-    for (int j = (column == 0 ? 2 : 1) + 2 * get_local_id(0); has_long && j < width - 1 && column < 2; j += 2 * ROW_ITEMS)
-      place_apart(j, first + j, width, height, texture_width, row, edge_mask, edges, offers, anchors, parameters, offset_x, offset_y);
-    const int at_end = column == 0 ? 0 : width - 1;
-    if (get_local_id(0) == 0 && (column < 2 ? at_end < (width & ~1) : 1))
-      place_apart(at_end, first + at_end, width, height, texture_width, row, edge_mask, edges, offers, anchors, parameters, offset_x, offset_y);
+  for (int colour = 0; colour < 2 + (width & 1); ++colour) {
+    const int at_end = end_of_colour(colour, width);
+    if (colour < 2)
+      place_colour(row_colour(colour, first, width), colour, height, texture_width, row, edges, offers, anchors, parameters, offset_x, offset_y, offset_x,
+                   offset_y);
+    if (get_local_id(0) == 0 && at_end >= 0) place_at_end(p, texture_width, at_end, row, edges, offers, anchors, parameters, offset_x, offset_y);
     WAIT_FOR_GROUP();
   }
+}
+
+// NDRange and rows as for relax_texels. Offsets with their rows by colour, from `home`, where columns follow each other.
+kernel void part_colours(const int row_count, const int texture_width, global const int* restrict rows, global const PatchRecord* restrict patches,
+                         global const float* restrict home_x, global const float* restrict home_y, global float* restrict offset_x,
+                         global float* restrict offset_y) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  global const PatchRecord* restrict p = patches + rows[4 * k];
+  const int width = p->width, first = (p->y + rows[4 * k + 1]) * texture_width + p->x, odd = first + ((width + 1) >> 1);
+  for (int i = get_local_id(0); i < width >> 1; i += ROW_ITEMS) {
+    offset_x[first + i] = home_x[first + 2 * i], offset_x[odd + i] = home_x[first + 2 * i + 1];
+    offset_y[first + i] = home_y[first + 2 * i], offset_y[odd + i] = home_y[first + 2 * i + 1];
+  }
+  if (get_local_id(0) == 0 && (width & 1)) offset_x[odd - 1] = home_x[first + width - 1], offset_y[odd - 1] = home_y[first + width - 1];
+}
+
+void join_row(const int first, const int width, global const int* restrict from, global int* restrict to) {
+  const int odd = first + ((width + 1) >> 1);
+  for (int i = get_local_id(0); i < width >> 1; i += ROW_ITEMS) to[first + 2 * i] = from[first + i], to[first + 2 * i + 1] = from[odd + i];
+  if (get_local_id(0) == 0 && (width & 1)) to[first + width - 1] = from[odd - 1];
+  WAIT_FOR_GROUP();
+}
+
+// NDRange and rows as for relax_texels. Columns one after the other again, each plane's in the plane before. What is in them does not matter.
+kernel void join_colours(const int row_count, const int texture_width, global const int* restrict rows, global const PatchRecord* restrict patches,
+                         global int* spare, global int* first_plane, global int* second_plane, global int* third_plane, global int* fourth_plane) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  global const PatchRecord* restrict p = patches + rows[4 * k];
+  const int width = p->width, first = (p->y + rows[4 * k + 1]) * texture_width + p->x;
+  join_row(first, width, first_plane, spare);
+  join_row(first, width, second_plane, first_plane);
+  join_row(first, width, third_plane, second_plane);
+  join_row(first, width, fourth_plane, third_plane);
 }
 
 void cross_product(const float a[3], const float b[3], const float c[3], float n[3]) {

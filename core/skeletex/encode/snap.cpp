@@ -20,7 +20,6 @@ constexpr int kEdgeRounds = 2;          // what one round has moved lets texels 
 constexpr double kFlat = 1e-6;          // radians: what rounding may make of a flat edge
 constexpr double kFullDihedral = 0.5;   // radians: edges this sharp attract texels fully
 constexpr int kRoundsBetweenReads = 3;  // of claims, between two looks at how many wait
-constexpr double kLargestOffer = 8;     // cells: what lies further is rounded down to it
 
 /// One work-item per vertex or edge, in groups of one size: PoCL compiles a kernel for every size that it meets.
 ClRange over(int count) { return {{static_cast<std::size_t>(count), 1}, {64, 1}}; }
@@ -113,7 +112,8 @@ ReadingPositions even_positions(ClContext& context, const DeviceLayout& layout) 
 
 namespace {
 
-constexpr int kBinWidth = 8, kTurnBits = 4, kMostTurns = 8;  // as in snap.cl
+constexpr int kBinWidth = 8;  // as in snap.cl
+constexpr int kMostTurns = 8;
 constexpr double kReach = 0.7 + 0.5;  // cells along each axis from a free texel's own place to an edge that it can go to
 constexpr double kLeastClipped = 3;   // columns that an edge has to span before it pays to look at each row's part alone
 
@@ -161,13 +161,20 @@ void for_each_bin(const SnapFeatures::Edge& edge, int width, int height, const A
   }
 }
 
-/// Lists the edges of each bin, patch after patch.
+SnapTables::Edge edge_record(const SnapFeatures::Edge& edge, int number, int turn, int width) {
+  const auto x0 = static_cast<float>(edge.x[0] - turn * width), y0 = static_cast<float>(edge.y[0]);
+  const auto ex = static_cast<float>(edge.x[1] - edge.x[0]), ey = static_cast<float>(edge.y[1] - edge.y[0]);
+  const float length2 = ex * ex + ey * ey, inverse = length2 > 0 ? -1 / length2 : 0;
+  return {x0, y0, ex, ey, inverse * ex, inverse * ey, static_cast<float>(std::max(1.0, kFullDihedral / edge.dihedral)), number};
+}
+
+/// Lists the edges of each bin, patch after patch, once for each turn of v at which it lies next to texels.
 void fill_bins(const std::vector<SnapFeatures::Edge>& edges, std::span<const Patch> patches, int bin_count, SnapTables& tables) {
   struct Entry {
     int bin, edge;
   };
   std::vector<Entry> entries;
-  tables.bin_edges.reserve(8 * edges.size());
+  tables.bin_edges.reserve(8 * edges.size()), tables.edges.reserve(edges.size() + edges.size() / 8);
   std::vector<int>& begins = tables.bin_begins;
   begins.assign(bin_count + 1, 0);
   int first_bin = 0;
@@ -178,11 +185,19 @@ void fill_bins(const std::vector<SnapFeatures::Edge>& edges, std::span<const Pat
     const int bins = std::max(0, r.height - 2) * ((r.width + kBinWidth - 1) / kBinWidth);
     int* const counts = begins.data() + first_bin;
     entries.clear();
-    for (; edge != edges.end() && edge->patch == static_cast<int>(bone); ++edge)
+    for (; edge != edges.end() && edge->patch == static_cast<int>(bone); ++edge) {
+      std::array<int, 2 * kMostTurns> records;
+      records.fill(-1);
       for_each_bin(*edge, r.width, r.height, [&](int bin, int turn) {
-        entries.push_back({bin, (static_cast<int>(edge - edges.begin()) << kTurnBits) + kMostTurns + turn});
+        int& record = records[kMostTurns + turn];
+        if (record < 0) {
+          record = static_cast<int>(tables.edges.size());
+          tables.edges.push_back(edge_record(*edge, static_cast<int>(edge - edges.begin()), turn, r.width));
+        }
+        entries.push_back({bin, record});
         ++counts[bin];
       });
+    }
     int begin = static_cast<int>(tables.bin_edges.size());
     for (int bin = 0; bin < bins; ++bin) begin += std::exchange(counts[bin], begin);
     tables.bin_edges.resize(begin);
@@ -194,12 +209,13 @@ void fill_bins(const std::vector<SnapFeatures::Edge>& edges, std::span<const Pat
   begins[0] = 0;
 }
 
-void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const SnapTables& tables, ReadingPositions& positions) {
+/// \param claims  0
+void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const SnapTables& tables, ClBuffer<int>& claims, ReadingPositions& positions) {
   if (tables.vertex_x.empty()) return;
   const int count = static_cast<int>(tables.vertex_x.size());
   const auto patch = context.upload(tables.vertex_patches), rank = context.upload(tables.vertex_ranks);
   const auto x = context.upload(tables.vertex_x), y = context.upload(tables.vertex_y);
-  auto states = context.allocate<int>(count), claims = context.allocate<int>(layout.size()), open = context.allocate<int>(1);
+  auto states = context.allocate<int>(count), open = context.allocate<int>(1);
   context.fill(states, 0), context.fill(open, 0);
   // A claim is more than all of the rounds before, so these need not be taken off.
   const int bits = std::bit_width(static_cast<unsigned>(count)), rounds_at_once = 0x7fffffff >> bits;
@@ -207,7 +223,7 @@ void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const Snap
   for (int round = 0, waiting = count; waiting > 0; waiting = context.download(open)[0])
     for (int i = 0; i < kRoundsBetweenReads; ++i, ++round) {
       const int least = round % rounds_at_once << bits;
-      if (least == 0) context.fill(claims, 0);
+      if (least == 0 && round > 0) context.fill(claims, 0);
       if (i + 1 == kRoundsBetweenReads) context.fill(open, 0);
       context.launch({"snap.cl", "claim_texels"}, over(count), count, layout.width, least, patch, x, y, rank, layout.patches, positions.anchors, states,
                      claims);
@@ -221,7 +237,7 @@ void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const Snap
 SnapTables tables_of(const SnapFeatures& features, std::span<const Patch> patches) {
   SnapTables tables;
   std::vector<std::pair<double, int>> by_strength;
-  by_strength.reserve(features.vertices.size()), tables.edges.reserve(features.edges.size()), tables.edge_points.reserve(features.edges.size());
+  by_strength.reserve(features.vertices.size()), tables.edge_points.reserve(features.edges.size());
   for (const SnapFeatures::Vertex& vertex : features.vertices) {
     by_strength.emplace_back(vertex.strength, static_cast<int>(by_strength.size()));
     tables.vertex_patches.push_back(vertex.patch), tables.vertex_points.push_back(vertex.point);
@@ -230,42 +246,40 @@ SnapTables tables_of(const SnapFeatures& features, std::span<const Patch> patche
   std::sort(by_strength.begin(), by_strength.end());
   tables.vertex_ranks.resize(by_strength.size());
   for (std::size_t i = 0; i < by_strength.size(); ++i) tables.vertex_ranks[by_strength[i].second] = static_cast<int>(i) + 1;
-  tables.edge_bits = std::bit_width(static_cast<unsigned>(features.edges.size()));
-  const auto steps = static_cast<float>((0x7fffffff >> tables.edge_bits) / kLargestOffer);
-  for (const SnapFeatures::Edge& edge : features.edges) {
-    tables.edge_points.push_back(edge.points);
-    // In the order of the kernel's own sums.
-    const auto x0 = static_cast<float>(edge.x[0]), y0 = static_cast<float>(edge.y[0]), x1 = static_cast<float>(edge.x[1]), y1 = static_cast<float>(edge.y[1]);
-    const float ex = x1 - x0, ey = y1 - y0, length2 = std::fma(ex, ex, ey * ey);
-    const auto weight = static_cast<float>(std::sqrt(std::min(1.0, edge.dihedral / kFullDihedral)));
-    tables.edges.push_back({x0, y0, x1, y1, length2 > 0 ? 1 / length2 : 0, steps / weight});
-  }
+  for (const SnapFeatures::Edge& edge : features.edges) tables.edge_points.push_back(edge.points);
   const int bins = list_rows(patches, tables.rows);
   fill_bins(features.edges, patches, bins, tables);
   return tables;
 }
 
 void snap_positions(ClContext& context, const DeviceLayout& layout, const SnapTables& tables, ReadingPositions& positions) {
-  snap_to_vertices(context, layout, tables, positions);
+  auto spare = context.allocate<int>(layout.size());
+  context.fill(spare, 0);
   const std::array rows{context.upload(tables.rows[0]), context.upload(tables.rows[1])};
+  const auto for_rows = [&](const char* kernel, int parity, const auto&... arguments) {
+    const std::size_t count = tables.rows[parity].size();
+    context.launch({"snap.cl", kernel}, row_range(context, count), static_cast<int>(count), layout.width, arguments...);
+  };
   const auto relax = [&](int passes) {
     for (int pass = 0; pass < passes; ++pass)
-      for (const int parity : {0, 1})
-        context.launch({"snap.cl", "relax_texels"}, row_range(context, tables.rows[parity].size()), static_cast<int>(tables.rows[parity].size()), layout.width,
-                       rows[parity], layout.patches, positions.anchors, positions.x, positions.y);
+      for (const int parity : {0, 1}) for_rows("relax_texels", parity, rows[parity], layout.patches, positions.anchors, positions.x, positions.y);
   };
+  for (const int parity : {0, 1}) for_rows("part_colours", parity, rows[parity], layout.patches, positions.home_x, positions.home_y, positions.x, positions.y);
+  snap_to_vertices(context, layout, tables, spare, positions);
   const auto begins = context.upload(tables.bin_begins), bin_edges = context.upload(tables.bin_edges);
   const auto edges = context.upload(tables.edges);
-  auto offers = context.allocate<int>(layout.size());
   for (int round = 0; round < kEdgeRounds; ++round) {
     relax(round == 0 ? kFirstRelaxPasses : kRelaxPasses);
     if (tables.edges.empty()) continue;
     for (const int parity : {0, 1})
-      context.launch({"snap.cl", "place_on_edges"}, row_range(context, tables.rows[parity].size()), static_cast<int>(tables.rows[parity].size()), layout.width,
-                     tables.edge_bits, rows[parity], layout.patches, begins, bin_edges, edges, positions.anchors, positions.parameters, positions.x,
-                     positions.y, offers);
+      for_rows("place_on_edges", parity, rows[parity], layout.patches, begins, bin_edges, edges, positions.anchors, positions.parameters, positions.x,
+               positions.y, spare);
   }
   relax(kRelaxPasses);
+  for (const int parity : {0, 1})
+    for_rows("join_colours", parity, rows[parity], layout.patches, spare, positions.x, positions.y, positions.anchors, positions.parameters);
+  std::swap(positions.parameters.memory, positions.anchors.memory), std::swap(positions.anchors.memory, positions.y.memory);
+  std::swap(positions.y.memory, positions.x.memory), std::swap(positions.x.memory, spare.memory);
 }
 
 TexelReturns::TexelReturns(ClContext& context, const DeviceLayout& layout)

@@ -36,11 +36,15 @@ SnapFeatures find_features(std::span<const Chart> charts, std::span<const Patch>
 
 /// Features as the kernels take them (snap.cl).
 struct SnapTables {
+  /// An edge at one turn of v, as EdgeRecord of snap.cl.
+  struct Edge {
+    float x, y, ex, ey, over_x, over_y, flatness;
+    int number;
+  };
   std::vector<int> vertex_patches, vertex_points, vertex_ranks;  ///< ranks by strength, from 1
   std::vector<float> vertex_x, vertex_y;                         ///< cells
   std::vector<std::array<int, 2>> edge_points;
-  std::vector<std::array<float, 6>> edges;             ///< x and y of both points in cells, 1 / length squared, steps of offers per cell
-  int edge_bits = 0;                                   ///< of an edge's number
+  std::vector<Edge> edges;
   std::array<std::vector<LatticeRow>, 2> rows;         ///< of VSM patches, inner ones, even and odd: patch, row, first bin, 0
   std::vector<int> bin_begins, bin_edges;              ///< the edges near each bin of eight columns of a row
 };
