@@ -9,26 +9,26 @@
 #include "map_triangle.h"
 #include "patch_texels.h"
 
-#define LEAST_COSINE 0.1f      // between a triangle and the surface
-#define LEAST_AGREEMENT 0.8f   // squared length of the mean of the normals around; less is an edge of the surface, no fold of the lattice
-#define CLEAR_COSINE 0.9f      // between a quad's triangles and the surface at its first texel: then the others need no look
-#define FURTHEST 1.0f          // cells from a texel's own place, along each axis
-#define LARGEST_STEP 0.4f      // cells
-#define MARGIN 0.3f            // cells that the rows next to a seam or pole keep from it
+#define LEAST_SURFACE_COSINE 0.1f  // between a triangle and the surface
+#define LEAST_AGREEMENT 0.8f       // squared length of the mean of the normals around; less is an edge of the surface, no fold of the lattice
+#define CLEAR_COSINE 0.9f          // between a quad's triangles and the surface at its first texel: then the others need no look
+#define FURTHEST_UNFOLDED 1.0f     // cells from a texel's own place, along each axis
+#define LARGEST_FOLD_STEP 0.4f     // cells
+#define FOLD_MARGIN 0.3f           // cells that the rows next to a seam or pole keep from it
 
-float3 point_at(global const float* restrict x, global const float* restrict y, global const float* restrict z, int i) { return (float3)(x[i], y[i], z[i]); }
+float3 vector_at(global const float* restrict x, global const float* restrict y, global const float* restrict z, int i) { return (float3)(x[i], y[i], z[i]); }
 
 // Whether a triangle looks further from a direction than a cosine says.
 int is_off(float3 a, float3 b, float3 c, float3 direction, float least_cosine) {
   const float3 n = cross(b - a, c - a);
   return dot(n, direction) < least_cosine * sqrt(dot(n, n) * dot(direction, direction));
 }
-int is_turned(float3 a, float3 b, float3 c, float3 direction) { return is_off(a, b, c, direction, LEAST_COSINE); }
+int is_turned_from(float3 a, float3 b, float3 c, float3 direction) { return is_off(a, b, c, direction, LEAST_SURFACE_COSINE); }
 
 float3 normal_of_map(int t, int triangle_count, global const int* restrict corners, global const float* restrict vertex_x, global const float* restrict vertex_y,
                      global const float* restrict vertex_z) {
-  const float3 a = point_at(vertex_x, vertex_y, vertex_z, corners[t]);
-  return cross(point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + t]) - a, point_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + t]) - a);
+  const float3 a = vector_at(vertex_x, vertex_y, vertex_z, corners[t]);
+  return cross(vector_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + t]) - a, vector_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + t]) - a);
 }
 
 // Appends what is not on the list. `is_listed` has a flag for all that can be.
@@ -54,7 +54,7 @@ kernel void find_folds(const int texture_width, const int triangle_count, global
   const int column = texel % texture_width - p->x, row = texel / texture_width - p->y;
   const int at[4] = {texel, texel_at(p, texture_width, column + 1, row), texel_at(p, texture_width, column + 1, row + 1), texel + texture_width};
   float3 normal = (float3)(0.0f), q[4];
-  for (int k = 0; k < 4; ++k) q[k] = point_at(x, y, z, at[k]);
+  for (int k = 0; k < 4; ++k) q[k] = vector_at(x, y, z, at[k]);
   if (row > 0 && texel_triangles[texel] != NO_TRIANGLE) {
     // Normals that agree as below are within 48 degrees of their mean.
     const float3 first = normal_of_map(texel_triangles[texel], triangle_count, corners, vertex_x, vertex_y, vertex_z);
@@ -69,8 +69,8 @@ kernel void find_folds(const int texture_width, const int triangle_count, global
     if (length2 > 0.0f) normal += n / sqrt(length2), normals += 1.0f;
   }
   if (normals == 0.0f || dot(normal, normal) < LEAST_AGREEMENT * normals * normals) return;
-  if (!is_turned(q[0], q[1], q[2], normal) && !is_turned(q[0], q[2], q[3], normal)) return;
-  if (!is_turned(q[0], q[1], q[3], normal) && !is_turned(q[1], q[2], q[3], normal)) return;
+  if (!is_turned_from(q[0], q[1], q[2], normal) && !is_turned_from(q[0], q[2], q[3], normal)) return;
+  if (!is_turned_from(q[0], q[1], q[3], normal) && !is_turned_from(q[1], q[2], q[3], normal)) return;
   atomic_inc(found);
   for (int r = -1; r <= 2; ++r)
     for (int c = -1; c <= 2; ++c)
@@ -99,17 +99,17 @@ kernel void relax_folds(const int texture_width, const int marked_count, const i
     offset_x[texel] = 0.0f, offset_y[texel] = 0.0f;
     return;
   }
-  const float3 left = point_at(x, y, z, texel_at(p, texture_width, column - 1, row)), right = point_at(x, y, z, texel_at(p, texture_width, column + 1, row));
-  const float3 below = point_at(x, y, z, texel - texture_width), above = point_at(x, y, z, texel + texture_width);
-  const float3 wanted = 0.25f * (left + right + below + above) - point_at(x, y, z, texel);
+  const float3 left = vector_at(x, y, z, texel_at(p, texture_width, column - 1, row)), right = vector_at(x, y, z, texel_at(p, texture_width, column + 1, row));
+  const float3 below = vector_at(x, y, z, texel - texture_width), above = vector_at(x, y, z, texel + texture_width);
+  const float3 wanted = 0.25f * (left + right + below + above) - vector_at(x, y, z, texel);
   const float3 dx = 0.5f * (right - left), dy = 0.5f * (above - below);
   const float damping = 0.01f * (dot(dx, dx) + dot(dy, dy));
   const float xx = dot(dx, dx) + damping, yy = dot(dy, dy) + damping, xy = dot(dx, dy), wx = dot(dx, wanted), wy = dot(dy, wanted);
   const float determinant = xx * yy - xy * xy;
   if (!(determinant > 0.0f)) return;
-  const float step_x = clamp((wx * yy - wy * xy) / determinant, -LARGEST_STEP, LARGEST_STEP);
-  const float step_y = clamp((wy * xx - wx * xy) / determinant, -LARGEST_STEP, LARGEST_STEP);
-  offset_x[texel] = clamp(offset_x[texel] + step_x, -FURTHEST, FURTHEST);
-  const float place = (float)row + clamp(offset_y[texel] + step_y, -FURTHEST, FURTHEST);
-  offset_y[texel] = clamp(place, MARGIN, (float)(p->height - 1) - MARGIN) - (float)row;
+  const float step_x = clamp((wx * yy - wy * xy) / determinant, -LARGEST_FOLD_STEP, LARGEST_FOLD_STEP);
+  const float step_y = clamp((wy * xx - wx * xy) / determinant, -LARGEST_FOLD_STEP, LARGEST_FOLD_STEP);
+  offset_x[texel] = clamp(offset_x[texel] + step_x, -FURTHEST_UNFOLDED, FURTHEST_UNFOLDED);
+  const float place = (float)row + clamp(offset_y[texel] + step_y, -FURTHEST_UNFOLDED, FURTHEST_UNFOLDED);
+  offset_y[texel] = clamp(place, FOLD_MARGIN, (float)(p->height - 1) - FOLD_MARGIN) - (float)row;
 }

@@ -116,7 +116,7 @@ int longest_row(global const int* restrict row_length, int first) {
 }
 
 #ifdef VSM_SINGLE
-VSM_ONCE void measure_triangles(int begin, int end, int count, global const int* restrict corners, global const char* restrict jumps,
+VSM_ONCE void measure_mapped(int begin, int end, int count, global const int* restrict corners, global const char* restrict jumps,
                                 global const float4* restrict map, global float* restrict areas) {
   for (int t = begin; t < end; ++t) areas[t] = texture_area(t, count, corners, jumps, map);
 }
@@ -686,7 +686,7 @@ kernel VSM_GROUP void map_charts(int iterations, float intermediate_tolerance, f
         substitute(record.front_begin, record.front_end, fronts, boundary_rows, roots, matrices, vectors, solution, map);
       }
       if (is_last) break;
-      measure_triangles(record.triangle_begin, record.triangle_end, triangles, corners, corner_jumps, (global const float4*)map, areas);
+      measure_mapped(record.triangle_begin, record.triangle_end, triangles, corners, corner_jumps, (global const float4*)map, areas);
     }
   }
 }

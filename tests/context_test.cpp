@@ -132,15 +132,16 @@ TEST(Context, BuildsEveryKernelFileOfTheLibraryAsItStands) {
 }
 
 TEST(Context, BuildsFilesOfOneProgramTogetherAndEachHeaderOnce) {
-  const auto files = files_of_program("encode.cl");
-  EXPECT_EQ(files, files_of_program("vsm.cl"));
-  EXPECT_EQ(files_of_program("fit.cl"), std::vector<std::string_view>{"fit.cl"});
+  const auto files = programs_with("encode.cl").front();
+  EXPECT_EQ(files, programs_with("vsm.cl").front());
+  EXPECT_EQ(programs_with("fit.cl"), std::vector<std::vector<std::string_view>>{{"fit.cl"}});
   const std::string text = kernel_source(files);
   for (const std::string_view file : files) expect_contains(text, "#line 1 \"" + std::string(file) + "\"");
   for (const EmbeddedKernelFile& file : embedded_kernel_files())
-    if (file.name != files_of_program(file.name).back()) {
-      EXPECT_EQ(file.text.find("#pragma OPENCL"), std::string_view::npos) << file.name << ": the pragma would hold for the files after it";
-    }
+    for (const auto& program : programs_with(file.name))
+      if (file.name != program.back()) {
+        EXPECT_EQ(file.text.find("#pragma OPENCL"), std::string_view::npos) << file.name << ": the pragma would hold for the files after it";
+      }
   const std::string header = "#line 1 \"skeletex_structs.h\"";
   expect_contains(text, header);
   EXPECT_EQ(text.find(header), text.rfind(header));

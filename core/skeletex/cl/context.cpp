@@ -220,10 +220,12 @@ void ClContext::fill_bytes(const ::cl::Buffer& buffer, const void* pattern, std:
 }
 
 ::cl::Program ClContext::get_program(const ClKernelName& name) {
-  const auto files = name.options.empty() ? files_of_program(name.file) : std::vector<std::string_view>{name.file};
-  const std::string program_key = fmt::format("{}|{}", files.front(), name.options);
-  if (const auto it = programs_.find(program_key); it != programs_.end()) return it->second;
+  const auto candidates = name.options.empty() ? programs_with(name.file) : std::vector<std::vector<std::string_view>>{{name.file}};
+  const auto key_of = [&](const std::vector<std::string_view>& files) { return fmt::format("{}|{}", files.front(), name.options); };
+  for (const auto& files : candidates)
+    if (const auto it = programs_.find(key_of(files)); it != programs_.end()) return it->second;
 
+  const std::vector<std::string_view>& files = candidates.front();
   const std::string options = fmt::format("-cl-std=CL1.2 -cl-kernel-arg-info -DROW_ITEMS={} {}", row_items(), name.options);
   // The hash guards against drivers whose kernel cache overlooks a change of options.
   const std::string body = kernel_source(files);
@@ -237,7 +239,7 @@ void ClContext::fill_bytes(const ::cl::Buffer& buffer, const void* pattern, std:
     built.getBuildInfo(device_, CL_PROGRAM_BUILD_LOG, &log);
     throw DeviceError(fmt::format("{}: {} on {}\n{}", name.file, describe(code), info_.name, quote_kernel_lines(log)));
   }
-  return programs_.emplace(program_key, built).first->second;
+  return programs_.emplace(key_of(files), built).first->second;
 }
 
 const ClContext::BuiltKernel& ClContext::get_kernel(const ClKernelName& name) {

@@ -9,6 +9,7 @@
 #include <charconv>
 #include <cstdlib>
 #include <fstream>
+#include <iterator>
 #include <optional>
 #include <sstream>
 #include <vector>
@@ -18,11 +19,12 @@
 namespace skeletex {
 namespace {
 
-// A pragma of a file holds for those after it, so spd.cl, which has one, is last.
-const std::vector<std::vector<std::string_view>> kPrograms{{"segment.cl", "vsm.cl", "encode.cl", "unfold.cl", "spd.cl"},
-                                                           {"snap.cl", "guard.cl", "lattice.cl", "metro.cl"},
-                                                           {"reconstruct.cl", "pose.cl", "even.cl", "blend.cl", "transfer.cl"},
-                                                           {"filter.cl", "orientation.cl"}};
+// A pragma of a file holds for those after it, so spd.cl, which has one, is last. Closest points are looked for alone as well.
+const std::vector<std::vector<std::string_view>> kPrograms{
+    {"metro.cl"},
+    {"segment.cl", "vsm.cl", "encode.cl", "unfold.cl", "snap.cl", "guard.cl", "lattice.cl", "metro.cl", "spd.cl"},
+    {"reconstruct.cl", "pose.cl", "even.cl", "blend.cl", "transfer.cl"},
+    {"filter.cl", "orientation.cl"}};
 
 std::string load(std::string_view file) {
   if (const char* folder = std::getenv("SKELETEX_KERNEL_DIR"); folder && *folder) {
@@ -108,10 +110,12 @@ std::optional<Place> place_in(const std::string& log_line) {
 
 }  // namespace
 
-std::vector<std::string_view> files_of_program(std::string_view file) {
-  for (const auto& program : kPrograms)
-    if (std::find(program.begin(), program.end(), file) != program.end()) return program;
-  return {file};
+std::vector<std::vector<std::string_view>> programs_with(std::string_view file) {
+  std::vector<std::vector<std::string_view>> found;
+  std::copy_if(kPrograms.begin(), kPrograms.end(), std::back_inserter(found),
+               [&](const auto& program) { return std::find(program.begin(), program.end(), file) != program.end(); });
+  if (found.empty()) found.push_back({file});
+  return found;
 }
 
 std::string kernel_source(std::span<const std::string_view> files) {

@@ -15,9 +15,9 @@ struct EmbeddedKernelFile {
 /// The files of `kernels/` as they were when the library was built.
 std::span<const EmbeddedKernelFile> embedded_kernel_files();
 
-/// The kernel files that make one program with a file; that alone where none do. A program costs PoCL 26 ms of processor time at every start and
-/// 120 ms at the first, whatever is in it, and each further file 2 and 40: so there is one for each part of the work.
-std::vector<std::string_view> files_of_program(std::string_view file);
+/// The sets of kernel files with this one that make one program each, the one to be built where none is there first. A program costs PoCL 30 ms
+/// at every start and 120 ms at the first, whatever is in it, and each further file 2 and 40: so there is one for each part of the work.
+std::vector<std::vector<std::string_view>> programs_with(std::string_view file);
 
 /// Text of kernel files, one after the other: each from the folder that SKELETEX_KERNEL_DIR names when it is set, else the embedded copy.
 /// Lines `#include "x.h"` are replaced by the file x.h (in turn), the first time, so that a program is one text on every
