@@ -93,9 +93,7 @@ std::vector<int> end_row(const SkeletexModel& model, const Lattice& lattice, int
   return row;
 }
 
-void append_pole_fan(const SkeletexModel& model, const Lattice& lattice, int bone, BoneEnd end, std::vector<Triangle>& triangles) {
-  const std::vector<int> row = end_row(model, lattice, bone, end);
-  const int pole = lattice.poles[bone][static_cast<int>(end)];
+void append_pole_fan(std::span<const int> row, int pole, BoneEnd end, std::vector<Triangle>& triangles) {
   for (std::size_t j = 0; j < row.size(); ++j) {
     const int here = row[j], next = row[(j + 1) % row.size()];
     if (end == BoneEnd::kHead)
@@ -103,6 +101,10 @@ void append_pole_fan(const SkeletexModel& model, const Lattice& lattice, int bon
     else
       triangles.push_back({here, next, pole});
   }
+}
+
+void append_pole_fan(const SkeletexModel& model, const Lattice& lattice, int bone, BoneEnd end, std::vector<Triangle>& triangles) {
+  append_pole_fan(end_row(model, lattice, bone, end), lattice.poles[bone][static_cast<int>(end)], end, triangles);
 }
 
 }  // namespace skeletex

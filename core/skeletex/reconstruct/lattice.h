@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <array>
+#include <span>
 #include <vector>
 
 #include "skeletex/model/texture.h"
@@ -30,7 +31,9 @@ Lattice number_lattice(const SkeletexModel& model);
 std::vector<int> end_loop(const SkeletexModel& model, const Lattice& lattice, int bone, BoneEnd end);
 /// Vertices of the inner row next to an end, by column.
 std::vector<int> end_row(const SkeletexModel& model, const Lattice& lattice, int bone, BoneEnd end);
-/// The triangles between a pole and the inner row next to it, outward.
+/// The triangles between a pole and the inner row next to it, outward, of any numbering.
+void append_pole_fan(std::span<const int> row, int pole, BoneEnd end, std::vector<Triangle>& triangles);
+/// Those of a lattice.
 void append_pole_fan(const SkeletexModel& model, const Lattice& lattice, int bone, BoneEnd end, std::vector<Triangle>& triangles);
 
 }  // namespace skeletex

@@ -9,8 +9,21 @@
 
 namespace skeletex {
 
+namespace {
+
+/// Poles, samples of seams and corners of a lattice alone, which has no more vertices.
+Lattice without_rows(Lattice lattice) {
+  for (std::array<int, 2>& poles : lattice.poles)
+    for (int& pole : poles) pole = pole < 0 ? pole : pole - lattice.inner_count;
+  for (int& sample : lattice.first_sample) sample -= lattice.inner_count;
+  lattice.first_corner -= lattice.inner_count, lattice.vertex_count -= lattice.inner_count, lattice.inner_count = 0;
+  return lattice;
+}
+
+}  // namespace
+
 std::shared_ptr<const LatticeMesh::Common> LatticeMesh::make_common(ClContext& context, const SkeletexModel& model, ClBuffer<PatchRecord> patches) {
-  Common common{number_lattice(model), {}, {}, {}, {}, std::move(patches)};
+  Common common{without_rows(number_lattice(model)), {}, {}, {}, {}, std::move(patches)};
   std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kInner);
   std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == model.patches[row[0]].rectangle.height - 2; });
   common.rows = context.upload(rows);
@@ -21,15 +34,11 @@ std::shared_ptr<const LatticeMesh::Common> LatticeMesh::make_common(ClContext& c
       std::fill_n(common.texel_patches.begin() + (r.y + row) * static_cast<std::ptrdiff_t>(model.texture.width) + r.x, r.width, static_cast<int>(bone));
   }
   const Walls walls(model.skeleton);
-  const Lattice& lattice = common.lattice;
-  const std::unique_ptr<Vec3[]> memory(new Vec3[lattice.vertex_count]);  // most of it is never touched
-  const std::span<Vec3> positions(memory.get(), lattice.vertex_count);
-  place_seams(model, walls, lattice, positions);
-  const int first = lattice.first_sample.empty() ? lattice.first_corner : lattice.first_sample[0];
-  common.samples.assign(positions.begin() + first, positions.end());
+  common.positions.resize(common.ends.vertex_count);
+  place_seams(model, walls, common.ends, common.positions);
   common.seams.resize(2 * model.patches.size());
   for_each_block(common.seams.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-    common.seams[i] = end_seam(model, walls, lattice, positions, static_cast<int>(i / 2), static_cast<BoneEnd>(i % 2));
+    common.seams[i] = end_seam(model, walls, common.ends, common.positions, static_cast<int>(i / 2), static_cast<BoneEnd>(i % 2));
   });
   return std::make_shared<const Common>(std::move(common));
 }
@@ -45,7 +54,7 @@ LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, Diagona
       model_(model),
       rule_(rule),
       common_(std::move(common)),
-      positions_(new Vec3[common_->lattice.vertex_count]),
+      end_positions_(common_->positions),
       points_(std::move(points)) {
   // Before the kernel is queued, so that the host can go on beside it.
   planes_ = {context.download(points_.x), context.download(points_.y), context.download(points_.z)};
@@ -53,12 +62,10 @@ LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, Diagona
   const int rows = static_cast<int>(common_->rows.size);
   context.launch({"lattice.cl", "choose_diagonals"}, row_range(context, rows), rows, model.texture.width, static_cast<int>(rule == DiagonalRule::kSmooth),
                  common_->rows, common_->patches, points_.x, points_.y, points_.z, device_diagonals_);
-  const Lattice& lattice = common_->lattice;
-  std::copy(common_->samples.begin(), common_->samples.end(), positions_.get() + lattice.vertex_count - common_->samples.size());
-  for_each_pole(model, lattice, [&](int vertex, int, int, std::size_t texel) { positions_[vertex] = position(static_cast<int>(texel)); });
-  for (int vertex = texel_count(); vertex < vertex_count(); ++vertex) {
+  for_each_pole(model, common_->ends, [&](int vertex, int, int, std::size_t texel) { end_positions_[vertex] = position(static_cast<int>(texel)); });
+  for (const Vec3& place : end_positions_) {
     end_points_.emplace_back(0);
-    end_points_.back().head<3>() = (position(vertex) - model.origin).cast<float>();
+    end_points_.back().head<3>() = (place - model.origin).cast<float>();
   }
   std::vector<int> ends(2 * model.patches.size());
   std::iota(ends.begin(), ends.end(), 0);
@@ -76,14 +83,22 @@ std::vector<std::vector<Triangle>> LatticeMesh::fill_ends(std::span<const int> e
   for_each_block(ends.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
     const int bone = ends[i] / 2;
     const auto end = static_cast<BoneEnd>(ends[i] % 2);
-    const Lattice& lattice = common_->lattice;
     const Rectangle& r = model_.patches[bone].rectangle;
     const int first_texel = (r.y + (end == BoneEnd::kHead ? 1 : r.height - 2)) * model_.texture.width + r.x;
-    const int first_vertex = end_row(model_, lattice, bone, end)[0];
-    for (int j = 0; j < r.width; ++j) positions_[first_vertex + j] = position(first_texel + j);
-    append_end_triangles(model_, lattice, {positions_.get(), static_cast<std::size_t>(lattice.vertex_count)}, common_->seams[ends[i]], bone, end, filled[i]);
+    std::vector<int> vertices(r.width);  // the row next to the end
+    std::iota(vertices.begin(), vertices.end(), first_texel);
+    const EndSeam& seam = common_->seams[ends[i]];
+    if (seam.ring.vertices.empty()) return append_pole_fan(vertices, texel_count() + common_->ends.poles[bone][ends[i] % 2], end, filled[i]);
+    for (const int vertex : seam.ring.vertices) vertices.push_back(texel_count() + vertex);
+    std::vector<Vec3> positions;
+    for (const int vertex : vertices) positions.push_back(position(vertex));
+    Ring own_seam = seam.ring, row;
+    row.vertices.resize(r.width);
+    std::iota(row.vertices.begin(), row.vertices.end(), 0);
+    std::iota(own_seam.vertices.begin(), own_seam.vertices.end(), r.width);
+    append_seam_strip(positions, own_seam, seam.turns, row, end, filled[i]);
     for (Triangle& triangle : filled[i])
-      for (int& vertex : triangle) vertex += vertex < lattice.inner_count ? first_texel - first_vertex : texel_count() - lattice.inner_count;
+      for (int& vertex : triangle) vertex = vertices[vertex];
   });
   return filled;
 }

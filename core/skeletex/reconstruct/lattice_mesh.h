@@ -25,7 +25,7 @@ class LatticeMesh {
 
   const SkeletexModel& model() const { return model_; }
   int texel_count() const { return static_cast<int>(common_->texel_patches.size()); }
-  int vertex_count() const { return texel_count() + common_->lattice.vertex_count - common_->lattice.inner_count; }
+  int vertex_count() const { return texel_count() + static_cast<int>(end_points_.size()); }
   int first_end_triangle() const { return 2 * texel_count(); }
   int triangle_count() const { return first_end_triangle() + static_cast<int>(end_triangles_.size()); }
 
@@ -51,7 +51,7 @@ class LatticeMesh {
     return {planes_[0][vertex], planes_[1][vertex], planes_[2][vertex], 0};
   }
   Vec3 position(int vertex) const {
-    if (!is_texel(vertex)) return positions_[common_->lattice.inner_count + vertex - texel_count()];
+    if (!is_texel(vertex)) return end_positions_[vertex - texel_count()];
     return model_.origin + Vec3(planes_[0][vertex], planes_[1][vertex], planes_[2][vertex]);
   }
   std::array<Vec3, 3> corners(const Triangle& t) const { return {position(t[0]), position(t[1]), position(t[2])}; }
@@ -61,7 +61,7 @@ class LatticeMesh {
     return {first_end_triangle() + first_end_[i], first_end_triangle() + first_end_[i + 1]};
   }
   /// Whether that is a fan around a pole.
-  bool is_pole(int bone, BoneEnd end) const { return common_->lattice.poles[bone][static_cast<int>(end)] >= 0; }
+  bool is_pole(int bone, BoneEnd end) const { return common_->ends.poles[bone][static_cast<int>(end)] >= 0; }
 
   const DevicePlanes& device_points() const { return points_; }
   /// Per texel whether its quad takes the second diagonal.
@@ -76,9 +76,9 @@ class LatticeMesh {
  private:
   /// What does not depend on points.
   struct Common {
-    Lattice lattice;
+    Lattice ends;                 ///< poles, samples and corners alone, numbered from 0
     std::vector<int> texel_patches;
-    std::vector<Vec3> samples;    ///< of seams, and corners: the vertices behind the poles
+    std::vector<Vec3> positions;  ///< of samples and corners
     std::vector<EndSeam> seams;   ///< per patch and end
     ClBuffer<LatticeRow> rows;    ///< those that quads begin at
     ClBuffer<PatchRecord> patches;
@@ -93,7 +93,7 @@ class LatticeMesh {
   std::shared_ptr<const Common> common_;
   std::array<std::vector<float>, 3> planes_;
   std::vector<Eigen::Array4f> end_points_;  // of vertices behind the texels
-  std::unique_ptr<Vec3[]> positions_;       // numbered as in lattice.h; of inner rows only those next to ends are there
+  std::vector<Vec3> end_positions_;         // the same in double precision, not from the model's origin
   std::vector<Triangle> end_triangles_;
   std::vector<int> first_end_;  // per patch and end, in end_triangles_; and the end
   std::vector<int> diagonals_;
