@@ -103,8 +103,7 @@ class Distances {
         maps_(maps),
         search_(context, std::move(tree)),
         placed_(std::move(placed)),
-        normals_(context.allocate<float>(3 * static_cast<std::size_t>(maps.triangle_count))),
-        texel_normals_(context.allocate<float>(3 * layout.size())) {
+        normals_(context.allocate<float>(3 * static_cast<std::size_t>(maps.triangle_count))) {
     context.launch({"guard.cl", "find_normals"}, over(maps.triangle_count), maps.triangle_count, maps.corners, maps.x, maps.y, maps.z, normals_);
   }
 
@@ -187,11 +186,11 @@ class Distances {
   /// From the original's vertices that no texel sits on to the lattice.
   /// \param anchors  per texel
   /// \return those that are further than the limit: the triangles that they are nearest to
-  std::vector<int> find_far_vertices(const LatticeMesh& lattice, const SnapFeatures& features, std::vector<int> anchors, float limit) {
+  std::vector<int> find_far_vertices(const LatticeMesh& lattice, std::span<const int> vertex_points, std::vector<int> anchors, float limit) {
     anchors_ = std::move(anchors);
     is_held_.assign(maps_.x.size, 0);
     for (const int anchor : anchors_)
-      if (anchor > 0) is_held_[features.vertices[anchor - 1].point] = 1;
+      if (anchor > 0) is_held_[vertex_points[anchor - 1]] = 1;
     vertices_.resize(placed_.all.size());
     are_near_.assign(layout_.size(), 0), are_lines_near_.assign(layout_.height, 0);
     std::vector<int> asked;
@@ -202,10 +201,10 @@ class Distances {
   }
   /// The same after a move: only vertices near texels that have gone back are looked at again.
   /// \param back, changed  those texels, and triangles that have changed
-  std::vector<int> find_far_vertices(const LatticeMesh& lattice, const SnapFeatures& features, const std::vector<int>& back, const std::vector<int>& changed,
+  std::vector<int> find_far_vertices(const LatticeMesh& lattice, std::span<const int> vertex_points, const std::vector<int>& back, const std::vector<int>& changed,
                                      float limit) {
     for (const int texel : back) {
-      if (anchors_[texel] > 0) is_held_[features.vertices[anchors_[texel] - 1].point] = 0;
+      if (anchors_[texel] > 0) is_held_[vertex_points[anchors_[texel] - 1]] = 0;
       anchors_[texel] = 0;
       add_around(lattice, texel);
     }
@@ -341,11 +340,12 @@ class Distances {
   /// Per texel the square of how far its quad could be.
   std::vector<float> suspect(const LatticeMesh& lattice, const ClBuffer<int>& texel_triangles) {
     const int rows = static_cast<int>(lattice.device_rows().size), texels = lattice.texel_count();
-    context_.launch({"guard.cl", "normals_of_texels"}, over(texels), texels, maps_.triangle_count, texel_triangles, normals_, texel_normals_);
+    auto texel_normals = context_.allocate<float>(3 * layout_.size());
+    context_.launch({"guard.cl", "normals_of_texels"}, over(texels), texels, maps_.triangle_count, texel_triangles, normals_, texel_normals);
     auto suspicions2 = context_.allocate<float>(layout_.size());
     context_.fill(suspicions2, 0.f);
     context_.launch({"guard.cl", "suspect_quads"}, row_range(context_, rows), rows, layout_.width, texels, lattice.device_rows(), layout_.patches,
-                    lattice.device_diagonals(), texel_triangles, texel_normals_, lattice.device_points().x, lattice.device_points().y,
+                    lattice.device_diagonals(), texel_triangles, texel_normals, lattice.device_points().x, lattice.device_points().y,
                     lattice.device_points().z, suspicions2);
     return context_.download(suspicions2);
   }
@@ -442,8 +442,7 @@ class Distances {
   const DeviceMaps& maps_;
   NearestSearch search_;
   PlacedVertices placed_;
-  ClBuffer<float> normals_;        // of the maps' triangles
-  ClBuffer<float> texel_normals_;  // of those at the texels of the lattice that was measured last
+  ClBuffer<float> normals_;  // of the maps' triangles
   std::vector<Measured> faults_;
   std::vector<MeasuredVertex> vertices_;  // as placed_
   std::vector<int> far_;                  // of these
@@ -520,7 +519,7 @@ Guard::Guard(ClContext& context, const GuardSources& sources, const DeviceLayout
 
 Guard::~Guard() = default;
 
-GuardReport Guard::put_back_faults(const SnapFeatures& features, const ClBuffer<int>& triangles, ReadingPositions& positions, TexelPoints& points) {
+GuardReport Guard::put_back_faults(std::span<const int> vertex_points, const ClBuffer<int>& triangles, ReadingPositions& positions, TexelPoints& points) {
   ClContext& context = even_->context;
   const LatticeMesh& even_lattice = even_->lattice;
   LatticeCrossings& crossings = even_->crossings;
@@ -549,8 +548,8 @@ GuardReport Guard::put_back_faults(const SnapFeatures& features, const ClBuffer<
       distances.measure_suspects(lattice, triangles, limit);
     else
       distances.measure_triangles(lattice, changed, triangles, limit);
-    const std::vector<int> far = pass == 0 ? distances.find_far_vertices(lattice, features, context.download(positions.anchors), limit)
-                                           : distances.find_far_vertices(lattice, features, back, changed, limit);
+    const std::vector<int> far = pass == 0 ? distances.find_far_vertices(lattice, vertex_points, context.download(positions.anchors), limit)
+                                           : distances.find_far_vertices(lattice, vertex_points, back, changed, limit);
     const Pairs pairs = finding.get();
     if (pass == 0 && pairs.size() > kManyPairs) {
       const LatticeCrossings::Others evens = crossings.find_between_same(pairs, even_lattice, kShareOfParts);

@@ -35,8 +35,9 @@ class Guard {
   Guard(ClContext& context, const GuardSources& sources, const DeviceLayout& layout, const DeviceMaps& maps, ClBuffer<int> even_triangles,
         TexelPoints even, TexelPoints filtered);
   ~Guard();
-  /// \param triangles  as even_triangles, of the points
-  GuardReport put_back_faults(const SnapFeatures& features, const ClBuffer<int>& triangles, ReadingPositions& positions, TexelPoints& points);
+  /// \param vertex_points  of the features' vertices, see SnapFeatures; none where nothing is snapped
+  /// \param triangles      as even_triangles, of the points
+  GuardReport put_back_faults(std::span<const int> vertex_points, const ClBuffer<int>& triangles, ReadingPositions& positions, TexelPoints& points);
 
  private:
   struct Even;

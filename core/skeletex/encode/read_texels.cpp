@@ -123,13 +123,13 @@ std::vector<int> vsm_texels(std::span<const Patch> patches, int texture_width, i
   return is_vsm;
 }
 
-SnapReport report_snap(const SnapFeatures& features, int put_back, const std::vector<int>& anchors) {
+SnapReport report_snap(int vertices, int edges, int put_back, const std::vector<int>& anchors) {
   SnapReport report;
-  report.vertices = static_cast<int>(features.vertices.size());
-  report.edges = static_cast<int>(features.edges.size());
+  report.vertices = vertices;
+  report.edges = edges;
   report.texels_put_back = put_back;
   // Without branches: what holds a texel follows no pattern. The first flag is that of texels on no edge.
-  std::vector<char> has_texel(features.edges.size() + 1, 0);
+  std::vector<char> has_texel(edges + 1, 0);
   for (const int anchor : anchors) {
     report.snapped_vertices += anchor > 0, report.texels_on_edges += anchor < 0;
     has_texel[std::max(0, -anchor)] = 1;
@@ -161,14 +161,10 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   const DeviceMaps maps = upload_maps(context, sources.charts, sources.patches, origin);
   const bool is_snapped = options.has_snap && maps.triangle_count > 0, is_fitted = options.has_fit && maps.triangle_count > 0;
   // Beside the device's work until they are needed.
-  SnapFeatures features;
-  SnapTables snap_tables;
-  std::future<void> finding_features;
+  std::future<SnapTables> listing_features;
   if (is_snapped)
-    finding_features = std::async(std::launch::async, [&] {
-      features = find_features(sources.charts, sources.patches, options.snap_dihedral);
-      snap_tables = tables_of(features, sources.patches);
-    });
+    listing_features =
+        std::async(std::launch::async, [&] { return tables_of(find_features(sources.charts, sources.patches, options.snap_dihedral), sources.patches); });
   auto covering = context.allocate<int>(texels);
   auto is_read = context.allocate<int>(std::max(1, maps.triangle_count));
   context.fill(is_read, 0);
@@ -240,9 +236,10 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
       return std::make_unique<Guard>(*beside, *sources.guard, layout, maps, even_covering, even, filtered);
     });
   }
-  if (finding_features.valid()) finding_features.get();
-  int put_back = 0;
+  int put_back = 0, edges = 0;
+  std::vector<int> vertex_points;
   if (is_snapped) {
+    SnapTables snap_tables = listing_features.get();
     snap_positions(context, layout, snap_tables, positions);
     points = allocate_points(context, texels), covering = context.allocate<int>(texels);
     context.launch({"encode.cl", "read_snapped"}, layout.range(), texture_width, texture_height, maps.triangle_count, layout.texel_patches, even_covering,
@@ -250,6 +247,8 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
                    maps.row_high, maps.row_low, positions.home_x, positions.home_y, positions.x, positions.y, positions.anchors, positions.parameters,
                    context.upload(snap_tables.vertex_points), context.upload(snap_tables.edge_points), even.x, even.y, even.z, covering, points.x, points.y,
                    points.z, is_read);
+    positions.parameters = {};
+    vertex_points = std::move(snap_tables.vertex_points), edges = static_cast<int>(snap_tables.edge_points.size());
   } else if (is_fitted) {
     points = copy_points(context, even);
   }
@@ -270,7 +269,7 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   if (measuring_even.valid()) {
     context.finish();
     const std::unique_ptr<Guard> even_guard = measuring_even.get();
-    GuardReport guard = even_guard->put_back_faults(features, covering, positions, points);
+    GuardReport guard = even_guard->put_back_faults(vertex_points, covering, positions, points);
     context.take_profile(*beside);
     result.report.turned_triangles = guard.turned_triangles, result.report.even_turned_triangles = guard.even_turned_triangles;
     (is_fitted ? result.report.fit->texels_put_back : put_back) += guard.texels_put_back;
@@ -284,7 +283,7 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     if (covered < texels) context.fill(*plane, 0.f);
   context.launch({"encode.cl", "encode_texels"}, row_range(context, all_rows.size), static_cast<int>(all_rows.size), texture_width, all_rows, layout.patches,
                  rows, columns, points.x, points.y, points.z, along, around, out);
-  if (is_snapped) result.report.snap = report_snap(features, put_back, anchors);  // beside the device's work
+  if (is_snapped) result.report.snap = report_snap(static_cast<int>(vertex_points.size()), edges, put_back, anchors);  // beside the device's work
   result.texture = {texture_width, texture_height, context.download(along), context.download(around), context.download(out)};
   return result;
 }
