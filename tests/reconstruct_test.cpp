@@ -249,6 +249,31 @@ TEST(SeamStrip, BetweenEqualRingsIsALadder) {
   for (int i = 0; i < n; ++i) EXPECT_TRUE(rungs.count({i, i})) << i;
 }
 
+TEST(SeamStrip, HasNoCapsWhereAMergeWithoutIsAboutAsShort) {
+  // A sample on the line between two columns, as where all three sit on one edge of the mesh.
+  const int m = 48, n = 24;
+  Ring seam, row;
+  std::vector<Vec3> positions;
+  const auto place = [](double turn, double height) {
+    const double angle = 2 * 3.14159265358979 * turn;
+    return Vec3(std::cos(angle), std::sin(angle), height);
+  };
+  for (int i = 0; i < m; ++i) positions.push_back(place((i + 0.5) / m, -0.1)), seam.vertices.push_back(i), seam.turns.push_back((i + 0.5) / m);
+  for (int j = 0; j < n; ++j) positions.push_back(place(1.0 * j / n, 0)), row.vertices.push_back(m + j), row.turns.push_back(1.0 * j / n);
+  for (const int column : {0, 7, 22}) {
+    positions[2 * column + 1] = 0.5 * (positions[m + column] + positions[m + column + 1]);
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
+      std::vector<Triangle> triangles;
+      append_seam_strip(positions, seam, row, end, triangles);
+      EXPECT_EQ(static_cast<int>(triangles.size()), m + n);
+      for (const Triangle& t : triangles) {
+        const Vec3 a = positions[t[0]], b = positions[t[1]], c = positions[t[2]];
+        EXPECT_GT((b - a).cross(c - a).norm(), 0.01 * std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()})) << column;
+      }
+    }
+  }
+}
+
 TEST(SeamStrip, AnglesUnwrapToOneTurnThatNeverGoesBack) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(0, 1);

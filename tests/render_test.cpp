@@ -155,6 +155,15 @@ TEST(Render, NormalsOfARoundShapeAreRadial) {
   EXPECT_LT(largest, 0.05);
 }
 
+TEST(Render, NormalsInTheFlatCornerOfACapAreThoseAroundIt) {
+  // A plane, and in it between A and B a triangle that stands on edge: at the third vertex its angle is nearly half a turn.
+  TriangleMesh mesh{{Vec3(0, 0, 0), Vec3(2, 0, 0), Vec3(1, 0, 1e-3), Vec3(1, 1, 0), Vec3(1, -1, 0)}, {{0, 2, 3}, {2, 1, 3}, {0, 1, 2}, {0, 4, 1}}};
+  const GpuSurface surface = upload_surface(gl(), mesh);
+  std::vector<float> normals(3 * mesh.positions.size());
+  surface.normals.read(normals.size() * sizeof(float), normals.data());
+  EXPECT_GT(normals[3 * 2 + 2], 0.999);
+}
+
 TEST(Render, APartInShadowIsDarkerThanTheSamePartInTheOpen) {
   // A plate below the camera's light, with and without a smaller plate between.
   const auto plate = [](double size, double z, TriangleMesh& mesh) {

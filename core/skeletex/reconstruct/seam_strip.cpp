@@ -2,6 +2,7 @@
 #include "skeletex/reconstruct/seam_strip.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -12,6 +13,19 @@ namespace {
 
 constexpr double kLargestStep = 0.45;  // with 4 columns still 1.2 columns of overlap between neighbouring ranges
 constexpr double kSlackColumns = 1.5;
+constexpr double kCapCosine2 = 0.9924;  // 175 degrees
+constexpr double kCapCost = 1;          // times the square of its longest side
+
+/// What it costs that a triangle is a cap, one with hardly an area and a direction of its own: a texel or sample lies between two others that
+/// sit on the same edge of the mesh.
+double cap_cost(const Vec3& a, const Vec3& b, const Vec3& c) {
+  std::array<Vec3, 3> sides{c - b, a - c, b - a};
+  std::array<double, 3> lengths2{sides[0].squaredNorm(), sides[1].squaredNorm(), sides[2].squaredNorm()};
+  const auto longest = static_cast<int>(std::max_element(lengths2.begin(), lengths2.end()) - lengths2.begin());
+  const int next = (longest + 1) % 3, last = (longest + 2) % 3;
+  const double along = sides[next].dot(sides[last]);
+  return along > 0 && along * along > kCapCosine2 * lengths2[next] * lengths2[last] ? kCapCost * lengths2[longest] : 0;
+}
 
 }  // namespace
 
@@ -68,40 +82,53 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::s
   }
   const int start_column = static_cast<int>(std::lround(column_of(start)));
 
-  // best[place[k] + j - first[k]]: the cheapest merge that joins seam vertex start + k to column j.
   std::vector<int> first(m + 1), place(m + 2, 0);
-  std::vector<double> best;
+  std::vector<double> best;     // best[place[k] + j - first[k]]: the cheapest merge that joins seam vertex start + k to column j
   std::vector<char> along_row;  // the last step went to the next column, not to the next seam vertex
-  for (int k = 0; k <= m; ++k) {
-    first[k] = std::max(first_column(start + k), start_column);
-    const int last = std::min(last_column(start + k), start_column + n);
-    place[k + 1] = place[k] + last - first[k] + 1;
-    best.resize(place[k + 1]), along_row.resize(place[k + 1]);
-    const Vec3& point = positions[seam_vertex(start + k)];
-    for (int j = first[k]; j <= last; ++j) {
-      const int at = place[k] + j - first[k];
-      const int below = k > 0 ? place[k - 1] + j - first[k - 1] : 0;
-      const bool has_column = j > first[k], has_seam = k > 0 && below < place[k];
-      const double from_column = has_column ? best[at - 1] : 0, from_seam = has_seam ? best[below] : 0;
-      along_row[at] = has_column && (!has_seam || from_column < from_seam);
-      best[at] = (along_row[at] ? from_column : from_seam) + cost(point, j);
+  const auto find_cheapest = [&](bool avoids_caps) {
+    const auto cap_of = [&](const Vec3& a, const Vec3& b, const Vec3& c) { return avoids_caps ? cap_cost(a, b, c) : 0; };
+    for (int k = 0; k <= m; ++k) {
+      first[k] = std::max(first_column(start + k), start_column);
+      const int last = std::min(last_column(start + k), start_column + n);
+      place[k + 1] = place[k] + last - first[k] + 1;
+      best.resize(place[k + 1]), along_row.resize(place[k + 1]);
+      const Vec3& point = positions[seam_vertex(start + k)];
+      for (int j = first[k]; j <= last; ++j) {
+        const int at = place[k] + j - first[k];
+        const int below = k > 0 ? place[k - 1] + j - first[k - 1] : 0;
+        const bool has_column = j > first[k], has_seam = k > 0 && below < place[k];
+        const double from_column = has_column ? best[at - 1] + cap_of(point, positions[row_vertex(j - 1)], positions[row_vertex(j)]) : 0;
+        const double from_seam = has_seam ? best[below] + cap_of(positions[seam_vertex(start + k - 1)], point, positions[row_vertex(j)]) : 0;
+        along_row[at] = has_column && (!has_seam || from_column < from_seam);
+        best[at] = (along_row[at] ? from_column : from_seam) + cost(point, j);
+      }
     }
-  }
-
+  };
   const std::size_t begin = triangles.size();
   const bool is_head = end == BoneEnd::kHead;
-  for (int k = m, j = start_column + n; k > 0 || j > start_column;) {
-    if (along_row[place[k] + j - first[k]]) {
-      --j;
-      const int apex = seam_vertex(start + k), here = row_vertex(j), next = row_vertex(j + 1);
-      triangles.push_back(is_head ? Triangle{apex, next, here} : Triangle{here, next, apex});
-    } else {
-      --k;
-      const int apex = row_vertex(j), here = seam_vertex(start + k), next = seam_vertex(start + k + 1);
-      triangles.push_back(is_head ? Triangle{here, next, apex} : Triangle{apex, next, here});
+  const auto take_cheapest = [&] {
+    triangles.resize(begin);
+    for (int k = m, j = start_column + n; k > 0 || j > start_column;) {
+      if (along_row[place[k] + j - first[k]]) {
+        --j;
+        const int apex = seam_vertex(start + k), here = row_vertex(j), next = row_vertex(j + 1);
+        triangles.push_back(is_head ? Triangle{apex, next, here} : Triangle{here, next, apex});
+      } else {
+        --k;
+        const int apex = row_vertex(j), here = seam_vertex(start + k), next = seam_vertex(start + k + 1);
+        triangles.push_back(is_head ? Triangle{here, next, apex} : Triangle{apex, next, here});
+      }
     }
+  };
+  find_cheapest(false);
+  take_cheapest();
+  // Few strips have one.
+  const auto is_cap = [&](const Triangle& t) { return cap_cost(positions[t[0]], positions[t[1]], positions[t[2]]) > 0; };
+  if (std::any_of(triangles.begin() + static_cast<std::ptrdiff_t>(begin), triangles.end(), is_cap)) {
+    find_cheapest(true);
+    take_cheapest();
   }
-  std::reverse(triangles.begin() + begin, triangles.end());
+  std::reverse(triangles.begin() + static_cast<std::ptrdiff_t>(begin), triangles.end());
 }
 
 }  // namespace skeletex
