@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Points moved in space so that the flat triangles between them are nearer to the mesh: Gauss-Newton on distances.
-//   read_samples      maps -> per quad of the lattice FIT_SAMPLES points of the mesh, and its normals there
-//   choose_diagonals  points -> the decoder's diagonal of every quad
-//   match_samples     samples -> their nearest points of the lattice
-//   match_lattice     the middle of every triangle of the lattice -> its nearest point of the mesh
-//   assemble          both -> per texel its row of the linear system
-//   relax_moves       one sweep of the solver over the texels of a colour
-//   move_points       points a step nearer
+//   read_samples             maps -> per quad of the lattice FIT_SAMPLES points of the mesh, and its normals there
+//   choose_fitted_diagonals  points -> the decoder's diagonal of every quad
+//   match_samples            samples -> their nearest points of the lattice
+//   match_lattice            the middle of every triangle of the lattice -> its nearest point of the mesh
+//   assemble                 both -> per texel its row of the linear system
+//   relax_moves              one sweep of the solver over the texels of a colour
+//   move_points              points a step nearer
 // The quad of a texel lies to the right of it and above it; its corners are numbered 0 (the texel), 1 (right), 2 (right
 // above), 3 (above). Its triangles are 0 1 2 and 0 2 3 with the first diagonal, 0 1 3 and 1 2 3 with the second.
 // A residual is a distance along a normal, linear in the three corners of one triangle: r + n . sum of weight x move. So a
@@ -111,7 +111,7 @@ kernel void read_samples(const int texture_width, const int texture_height, cons
 
 // NDRange (texture width, texture height). The decoder's choice; next to seams and poles, where it makes strips, the shorter
 // diagonal.
-kernel void choose_diagonals(const int texture_width, const int texture_height, global const int* restrict texel_patches,
+kernel void choose_fitted_diagonals(const int texture_width, const int texture_height, global const int* restrict texel_patches,
                              global const PatchRecord* restrict patches, global const float* restrict x, global const float* restrict y,
                              global const float* restrict z, global int* restrict diagonals) {
   const int column = (int)get_global_id(0), line = (int)get_global_id(1);

@@ -134,7 +134,7 @@ TEST(Context, BuildsEveryKernelFileOfTheLibraryAsItStands) {
 TEST(Context, BuildsFilesOfOneProgramTogetherAndEachHeaderOnce) {
   const auto files = programs_with("encode.cl").front();
   EXPECT_EQ(files, programs_with("vsm.cl").front());
-  EXPECT_EQ(programs_with("fit.cl"), std::vector<std::vector<std::string_view>>{{"fit.cl"}});
+  EXPECT_EQ(programs_with("diffusion.cl"), std::vector<std::vector<std::string_view>>{{"diffusion.cl"}});
   const std::string text = kernel_source(files);
   for (const std::string_view file : files) expect_contains(text, "#line 1 \"" + std::string(file) + "\"");
   for (const EmbeddedKernelFile& file : embedded_kernel_files())

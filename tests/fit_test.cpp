@@ -88,7 +88,7 @@ Solved solve(const RandomPatch& patch, int sweeps, std::size_t group, float damp
   auto weights = c.allocate<float>(8 * size), residuals = c.allocate<float>(4 * size), costs = c.allocate<float>(size), areas = c.allocate<float>(size);
   auto lattice = c.allocate<float>(10 * size), system = c.allocate<float>(36 * size);
   c.fill(lattice, 0.f), c.fill(system, 0.f), c.fill(weights, 0.f), c.fill(residuals, 0.f);
-  c.launch({"fit.cl", "choose_diagonals"}, range, kTextureWidth, kTextureHeight, layout.texel_patches, layout.patches, x, y, z, diagonals);
+  c.launch({"fit.cl", "choose_fitted_diagonals"}, range, kTextureWidth, kTextureHeight, layout.texel_patches, layout.patches, x, y, z, diagonals);
   c.launch({"fit.cl", "match_samples"}, range, kTextureWidth, kTextureHeight, layout.texel_patches, layout.patches, samples, diagonals, x, y, z, matches,
            weights, residuals, costs, areas);
   c.launch({"fit.cl", "assemble"}, range, kTextureWidth, kTextureHeight, least_residual, layout.texel_patches, layout.patches, samples, diagonals, matches,

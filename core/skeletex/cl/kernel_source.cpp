@@ -22,7 +22,7 @@ namespace {
 // A pragma of a file holds for those after it, so spd.cl, which has one, is last. Closest points are looked for alone as well.
 const std::vector<std::vector<std::string_view>> kPrograms{
     {"metro.cl"},
-    {"segment.cl", "vsm.cl", "encode.cl", "unfold.cl", "snap.cl", "guard.cl", "lattice.cl", "metro.cl", "spd.cl"},
+    {"segment.cl", "vsm.cl", "encode.cl", "unfold.cl", "snap.cl", "fit.cl", "guard.cl", "lattice.cl", "metro.cl", "spd.cl"},
     {"reconstruct.cl", "pose.cl", "even.cl", "blend.cl", "transfer.cl"},
     {"filter.cl", "orientation.cl"}};
 

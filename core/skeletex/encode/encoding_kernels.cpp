@@ -44,7 +44,7 @@ std::vector<KernelVariant> encoding_kernels(const ClContext& context, const Enco
     add("encode.cl", {"read_snapped"}, items);
   }
   if (can_fit)
-    add("fit.cl", {"read_samples", "choose_diagonals", "match_samples", "match_lattice", "assemble", "relax_moves", "move_points"}, items);
+    add("fit.cl", {"read_samples", "choose_fitted_diagonals", "match_samples", "match_lattice", "assemble", "relax_moves", "move_points"}, items);
   if (options.has_prefilter) add("encode.cl", {"prefilter_positions"}, rows);
   if (can_snap || can_fit) {
     add("lattice.cl", {"choose_diagonals"}, rows);

@@ -18,7 +18,7 @@ TexelPoints allocate_points(ClContext& context, std::size_t size) {
 }
 
 void choose_diagonals(ClContext& context, const DeviceLayout& layout, const TexelPoints& points, ClBuffer<int>& diagonals) {
-  context.launch({"fit.cl", "choose_diagonals"}, layout.range(), layout.width, layout.height, layout.texel_patches, layout.patches, points.x, points.y,
+  context.launch({"fit.cl", "choose_fitted_diagonals"}, layout.range(), layout.width, layout.height, layout.texel_patches, layout.patches, points.x, points.y,
                  points.z, diagonals);
 }
 
