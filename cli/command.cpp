@@ -76,8 +76,8 @@ TriangleMesh load_mesh(const std::filesystem::path& path) {
   return std::move(file.mesh);
 }
 
-void require_valid(TriangleMesh& mesh, const Skeleton& skeleton) {
-  const std::vector<Finding> findings = validate_before_segmentation(mesh, skeleton);
+void require_valid(TriangleMesh& mesh, const Skeleton& skeleton, std::optional<TriangleTree>* tree) {
+  const std::vector<Finding> findings = validate_before_segmentation(mesh, skeleton, tree);
   int errors = 0;
   for (const Finding& finding : findings) {
     const std::string text = finding.message + (finding.remedy.empty() ? "" : "\n  remedy: " + finding.remedy);

@@ -4,11 +4,13 @@
 #include <chrono>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "skeletex/cl/context.h"
+#include "skeletex/measure/triangle_tree.h"
 #include "skeletex/model/mesh.h"
 #include "skeletex/model/skeleton.h"
 
@@ -60,7 +62,7 @@ void check_json_target(const std::string& target);
 TriangleMesh load_mesh(const std::filesystem::path& path);
 /// Checks that mesh and skeleton fit (validate_before_segmentation, which turns a mesh that is inside out) and prints every finding to
 /// standard error. \throw CLI::RuntimeError(kExitBad) when one is an error
-void require_valid(TriangleMesh& mesh, const Skeleton& skeleton);
+void require_valid(TriangleMesh& mesh, const Skeleton& skeleton, std::optional<TriangleTree>* tree = nullptr);
 
 /// Milliseconds since it was made or last read.
 class Stopwatch {

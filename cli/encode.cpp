@@ -185,13 +185,14 @@ std::string report_text(const EncodeReport& report, const EncodeOptions& options
 
 struct Input {
   TriangleMesh mesh;
+  std::optional<TriangleTree> tree;
   Skeleton skeleton;
 };
 
 Input read_input(const Arguments& arguments, const EncodeOptions& options) {
-  Input input{load_mesh(arguments.mesh), read_skeleton(arguments.skeleton)};
+  Input input{load_mesh(arguments.mesh), {}, read_skeleton(arguments.skeleton)};
   check_bone_names(arguments, options, input.skeleton);
-  require_valid(input.mesh, input.skeleton);
+  require_valid(input.mesh, input.skeleton, &input.tree);
   return input;
 }
 
@@ -239,6 +240,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
   const Input input = reading.get();
   if (no_device) std::rethrow_exception(no_device);
   ClContext& context = *loaded;
+  options.tree = input.tree ? &*input.tree : nullptr;
   options.progress = [&](const std::string& stage, double done) {
     bar->show(stage, done);
     return true;

@@ -337,6 +337,8 @@ TEST(Metro, TheHilbertCurveVisitsEveryCellFromANeighbour) {
   for (int i = 0; i < 4096; ++i) order[i] = i;
   std::sort(order.begin(), order.end(), [&](int i, int j) { return keys[i] < keys[j]; });
   for (int i = 1; i < 4096; ++i) EXPECT_EQ((cells[order[i]] - cells[order[i - 1]]).lpNorm<1>(), 1);
+  const std::vector<int> all = hilbert_order(cells);
+  for (int i = 1; i < 4096; ++i) EXPECT_EQ((cells[all[i]] - cells[all[i - 1]]).lpNorm<1>(), 1);
   Random random(2);
   std::vector<Vec3> points;
   for (int i = 0; i < 10000; ++i) points.push_back(random.in_box());

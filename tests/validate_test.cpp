@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <cstdio>
 #include <limits>
+#include <optional>
 #include <regex>
 #include <set>
 
+#include "skeletex/encode/encode_model.h"
 #include "skeletex/measure/manifold.h"
 #include "skeletex/validate/findings.h"
 #include "skeletex/validate/surface_probe.h"
@@ -110,6 +112,29 @@ TEST(Validate, AMeshInsideOutIsTurnedAndSaidSo) {
   EXPECT_EQ(findings[0].severity, Severity::kNote);
   EXPECT_MENTIONS(findings[0].message, "inside out");
   EXPECT_NEAR(signed_volume(shape.mesh), signed_volume(outward), 1e-12);
+}
+
+TEST(Validate, TheTreeItHandsOverIsThatOfTheMeshAsItIsThen) {
+  Shape shape = two_bones();
+  for (Triangle& t : shape.mesh.triangles) std::swap(t[0], t[2]);
+  std::optional<TriangleTree> tree;
+  validate_before_segmentation(shape.mesh, shape.skeleton, &tree);
+  ASSERT_TRUE(tree);
+  const TriangleTree expected = build_triangle_tree(shape.mesh);
+  EXPECT_EQ(tree->order, expected.order);
+  EXPECT_EQ(tree->blocks, expected.blocks);
+  EXPECT_EQ(tree->boxes, expected.boxes);
+
+  const TestModel bear = load_standard_model("bear");
+  const TriangleTree of_bear = build_triangle_tree(bear.mesh);
+  EncodeOptions options;
+  options.width = options.height = 40, options.has_snap = true;
+  const DisplacementTexture texels = encode_model(context(), bear.mesh, bear.skeleton, options).model.texture;
+  options.tree = &of_bear;
+  const DisplacementTexture same = encode_model(context(), bear.mesh, bear.skeleton, options).model.texture;
+  EXPECT_EQ(same.along, texels.along);
+  EXPECT_EQ(same.around, texels.around);
+  EXPECT_EQ(same.out, texels.out);
 }
 
 TEST(Validate, AHoleIsFoundWithItsPlace) {

@@ -246,7 +246,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
     }
   progress("encoding", 0.8);
   model.texture.width = options.width, model.texture.height = options.height;
-  const GuardSources guard{model, mesh, charts};
+  const GuardSources guard{model, mesh, options.tree, charts};
   TexelResult texels = read_texels(context, skeleton, walls, {charts, model.patches, hits, end_points, &guard}, options.width, options.height, model.origin,
                                    texel_options);
   model.texture = std::move(texels.texture);

@@ -7,6 +7,7 @@
 
 #include "skeletex/cl/context.h"
 #include "skeletex/encode/read_texels.h"
+#include "skeletex/measure/triangle_tree.h"
 #include "skeletex/model/texture.h"
 #include "skeletex/parameterize/spd.h"
 #include "skeletex/parameterize/vsm.h"
@@ -42,6 +43,8 @@ struct EncodeOptions {
   std::optional<bool> has_fit;
   std::optional<DiagonalRule> diagonals;  ///< default: smooth with snapping or fit, else nearest
   std::optional<TexelShare> texel_share;  ///< default: area for all-SPD models, triangles otherwise
+  /// Of the mesh, as validate_before_segmentation has built it; without, it is built where it is needed.
+  const TriangleTree* tree = nullptr;
   /// Called with a stage's name and the share of work done; returning false cancels by throwing Error.
   std::function<bool(const std::string& stage, double done)> progress;
 };

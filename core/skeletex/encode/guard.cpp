@@ -96,12 +96,12 @@ PlacedVertices place_vertices(std::span<const Chart> charts, std::span<const Pat
 /// (guard.cl) can be too far; what looks too far is looked at again by a tree.
 class Distances {
  public:
-  Distances(ClContext& context, const GuardSources& sources, const DeviceLayout& layout, const DeviceMaps& maps, TriangleTree tree, PlacedVertices placed)
+  Distances(ClContext& context, const GuardSources& sources, const DeviceLayout& layout, const DeviceMaps& maps, NearestSearch search, PlacedVertices placed)
       : context_(context),
         sources_(sources),
         layout_(layout),
         maps_(maps),
-        search_(context, std::move(tree)),
+        search_(std::move(search)),
         placed_(std::move(placed)),
         normals_(context.allocate<float>(3 * static_cast<std::size_t>(maps.triangle_count))) {
     context.launch({"guard.cl", "find_normals"}, over(maps.triangle_count), maps.triangle_count, maps.corners, maps.x, maps.y, maps.z, normals_);
@@ -498,7 +498,7 @@ struct Guard::Even {
   float limit = 0;
 
   Even(ClContext& own_context, const GuardSources& own_sources, const DeviceLayout& own_layout, const DeviceMaps& maps, TexelPoints own_points,
-       TexelPoints stored, std::future<TriangleTree> tree, std::future<PlacedVertices> placed)
+       TexelPoints stored, std::future<TriangleTree> own_tree, std::future<PlacedVertices> placed)
       : context(own_context),
         sources(own_sources),
         layout(own_layout),
@@ -506,13 +506,14 @@ struct Guard::Even {
         filtered(std::move(stored)),
         lattice(context, sources.model, DiagonalRule::kNearest, layout.patches, filtered),
         crossings(lattice),
-        distances(context, sources, layout, maps, tree.get(), placed.get()) {}
+        distances(context, sources, layout, maps, own_tree.valid() ? NearestSearch(context, own_tree.get()) : NearestSearch(context, *sources.tree),
+                  placed.get()) {}
 };
 
 Guard::Guard(ClContext& context, const GuardSources& sources, const DeviceLayout& layout, const DeviceMaps& maps, ClBuffer<int> even_triangles,
              TexelPoints even, TexelPoints filtered)
     : even_(std::make_unique<Even>(context, sources, layout, maps, std::move(even), std::move(filtered),
-                                   std::async(std::launch::async, [&] { return build_triangle_tree(sources.mesh); }),
+                                   sources.tree ? std::future<TriangleTree>() : std::async(std::launch::async, [&] { return build_triangle_tree(sources.mesh); }),
                                    std::async(std::launch::async, [&] { return place_vertices(sources.charts, sources.model.patches, maps, layout); }))) {
   even_->limit = kShareOfFurthest * even_->distances.measure_even(even_->lattice, even_triangles, even_->turned);
 }

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "skeletex/encode/snap.h"
+#include "skeletex/measure/triangle_tree.h"
 #include "skeletex/model/mesh.h"
 #include "skeletex/model/texture.h"
 
@@ -12,6 +13,7 @@ namespace skeletex {
 struct GuardSources {
   const SkeletexModel& model;     ///< all but its texels: layout, seams, rule of diagonals
   const TriangleMesh& mesh;       ///< the original
+  const TriangleTree* tree;       ///< of its triangles; null: it is built
   std::span<const Chart> charts;  ///< its maps
 };
 

@@ -14,13 +14,15 @@ constexpr ClKernelName kFindNearest{"metro.cl", "find_nearest_triangles"};
 
 }  // namespace
 
-NearestSearch::NearestSearch(ClContext& context, TriangleTree tree) : context_(context), tree_(std::move(tree)) {
-  boxes_ = context.upload(tree_.boxes);
-  blocks_ = context.upload(tree_.blocks);
-  level_begin_ = context.upload(tree_.level_begin);
-  tree_.boxes = std::vector<float>();
-  tree_.blocks = std::vector<float>();
-}
+NearestSearch::NearestSearch(ClContext& context, const TriangleTree& tree)
+    : context_(context),
+      origin_(tree.origin),
+      scale_(tree.scale),
+      top_level_(tree.top_level()),
+      order_(tree.order),
+      boxes_(context.upload(tree.boxes)),
+      blocks_(context.upload(tree.blocks)),
+      level_begin_(context.upload(tree.level_begin)) {}
 
 void NearestSearch::find(std::span<const Vec3> points, std::span<int> triangles, std::span<float> distances) {
   const std::size_t count = points.size();
@@ -28,7 +30,7 @@ void NearestSearch::find(std::span<const Vec3> points, std::span<int> triangles,
   for (std::vector<float>* plane : {&x_, &y_, &z_}) plane->resize(count);
   for_each_block(count, kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const Vec3 p = (points[i] - tree_.origin) / tree_.scale;
+      const Vec3 p = (points[i] - origin_) / scale_;
       x_[i] = static_cast<float>(p.x());
       y_[i] = static_cast<float>(p.y());
       z_[i] = static_cast<float>(p.z());
@@ -44,12 +46,12 @@ void NearestSearch::find(std::span<const Vec3> points, std::span<int> triangles,
   constexpr int kRun = 16;
   const std::size_t items = block_count(count, kRun);
   context_.launch(kFindNearest, ClRange({items, 1}, {context_.work_group_size(kFindNearest, 32), 1}), px_, py_, pz_, static_cast<int>(count), kRun, boxes_,
-                  blocks_, level_begin_, tree_.top_level(), nearest_, nearest_squared_);
+                  blocks_, level_begin_, top_level_, nearest_, nearest_squared_);
   const std::vector<int> places = context_.download(nearest_);
-  for (std::size_t i = 0; i < count; ++i) triangles[i] = tree_.order[places[i]];
+  for (std::size_t i = 0; i < count; ++i) triangles[i] = order_[places[i]];
   if (distances.empty()) return;
   const std::vector<float> squared = context_.download(nearest_squared_);
-  for (std::size_t i = 0; i < count; ++i) distances[i] = static_cast<float>(tree_.scale) * std::sqrt(std::max(0.0f, squared[i]));
+  for (std::size_t i = 0; i < count; ++i) distances[i] = static_cast<float>(scale_) * std::sqrt(std::max(0.0f, squared[i]));
 }
 
 }  // namespace skeletex

@@ -9,12 +9,12 @@
 
 namespace skeletex {
 
-/// The triangles of a mesh on the device, for nearest points. The tree's boxes and blocks live there alone.
+/// The triangles of a mesh on the device, for nearest points. Of the tree it keeps what it needs.
 class NearestSearch {
  public:
-  NearestSearch(ClContext& context, TriangleTree tree);
+  NearestSearch(ClContext& context, const TriangleTree& tree);
   /// Places along the curve -> triangles.
-  const std::vector<int>& order() const { return tree_.order; }
+  const std::vector<int>& order() const { return order_; }
 
   /// Per point the nearest triangle, found in single precision. Points that follow each other in space are found fastest.
   /// \param distances  when given, those of the device: float32's resolution of the mesh's extent; world units
@@ -22,7 +22,10 @@ class NearestSearch {
 
  private:
   ClContext& context_;
-  TriangleTree tree_;
+  Vec3 origin_;
+  double scale_;
+  int top_level_;
+  std::vector<int> order_;
   ClBuffer<float> boxes_, blocks_, px_, py_, pz_, nearest_squared_;
   ClBuffer<int> level_begin_, nearest_;
   std::vector<float> x_, y_, z_;

@@ -7,7 +7,6 @@
 #include <cstddef>
 
 #include "skeletex/measure/predicates.h"
-#include "skeletex/measure/triangle_tree.h"
 #include "skeletex/model/parallel.h"
 
 namespace skeletex {
@@ -222,7 +221,10 @@ bool do_triangles_intersect(const Triangle& i, const std::array<Vec3, 3>& s, con
 
 std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh) {
   if (mesh.triangles.empty()) return {};
-  const TriangleTree tree = build_triangle_tree(mesh);
+  return find_self_intersections(mesh, build_triangle_tree(mesh));
+}
+
+std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh, const TriangleTree& tree) {
   constexpr int kWidth = TriangleTree::kWidth;
   const std::size_t count = tree.order.size();
   // Boxes of the triangles as the tree has them for its blocks: by place, six planes of eight per block.

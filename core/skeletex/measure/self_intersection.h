@@ -3,6 +3,7 @@
 #include <array>
 #include <vector>
 
+#include "skeletex/measure/triangle_tree.h"
 #include "skeletex/model/mesh.h"
 
 namespace skeletex {
@@ -20,6 +21,8 @@ bool do_triangles_intersect(const Triangle& first, const std::array<Vec3, 3>& fi
 /// \pre indices in range, coordinates finite
 /// Cost: all processors; well below a second for 70 000 triangles.
 std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh);
+/// \param tree  of the mesh
+std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh, const TriangleTree& tree);
 /// How many there are.
 long count_self_intersections(const TriangleMesh& mesh);
 

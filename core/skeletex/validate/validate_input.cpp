@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "skeletex/measure/self_intersection.h"
 #include "skeletex/model/error.h"
@@ -24,7 +25,7 @@ Finding finding_of(const Error& error) {
 
 }  // namespace
 
-std::vector<Finding> validate_before_segmentation(TriangleMesh& mesh, const Skeleton& skeleton) {
+std::vector<Finding> validate_before_segmentation(TriangleMesh& mesh, const Skeleton& skeleton, std::optional<TriangleTree>* tree) {
   std::vector<Finding> findings;
   const ManifoldReport report = measure_manifold(mesh);
   find_in_mesh(mesh, report, findings);
@@ -40,7 +41,9 @@ std::vector<Finding> validate_before_segmentation(TriangleMesh& mesh, const Skel
       findings.push_back({Severity::kNote, "orientation", fmt::format("the mesh was inside out (volume {:.6g}); all its triangles were turned", volume),
                           "nothing to do; a file with counter-clockwise triangles avoids this note"});
     }
-    const auto pairs = find_self_intersections(mesh);
+    TriangleTree own = build_triangle_tree(mesh);
+    const auto pairs = find_self_intersections(mesh, own);
+    if (tree) *tree = std::move(own);
     if (!pairs.empty()) {
       const auto& [a, b] = pairs.front();
       const Vec3 place = (mesh.positions[mesh.triangles[a][0]] + mesh.positions[mesh.triangles[a][1]] + mesh.positions[mesh.triangles[a][2]]) / 3;

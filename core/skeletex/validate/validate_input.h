@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "skeletex/cl/context.h"
+#include "skeletex/measure/triangle_tree.h"
 #include "skeletex/model/mesh.h"
 #include "skeletex/model/skeleton.h"
 
@@ -28,7 +30,8 @@ struct Finding {
 /// too. Accepts any input, NaN and bad indices included.
 std::vector<Finding> validate_input(ClContext& context, TriangleMesh& mesh, const Skeleton& skeleton);
 /// The same without that trial, for callers that segment next anyway (and catch what it throws).
-std::vector<Finding> validate_before_segmentation(TriangleMesh& mesh, const Skeleton& skeleton);
+/// \param tree  out: of the mesh's triangles, for what is next; not of one with errors
+std::vector<Finding> validate_before_segmentation(TriangleMesh& mesh, const Skeleton& skeleton, std::optional<TriangleTree>* tree = nullptr);
 bool has_errors(const std::vector<Finding>& findings);
 
 }  // namespace skeletex
