@@ -111,7 +111,9 @@ MapPlace walk_to(const int covering, const int column, const float beside, const
   place.t = covering;
   for (int steps = 0;; ++steps) {
     const MapTriangle m = load_triangle(place.t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
-    place.w = weights_at(m, row_offset(m, row_high, row_low, row, above), turned_offset(m, column, beside, width));
+    const float u = row_offset(m, row_high, row_low, row, above), v = turned_offset(m, column, beside, width);
+    if (m.pole == 0) place.w = plain_weights_at(m, u, v);  // most are
+    else place.w = weights_at(m, u, v);
     const float w0 = 1.0f - place.w.w1 - place.w.w2;
     const float least = fmin(w0, fmin(place.w.w1, place.w.w2));
     if (!(least < -1e-6f) || steps == most_steps) break;

@@ -50,32 +50,39 @@ typedef struct CornerWeights {
   float w1, w2;
 } CornerWeights;
 
-// Where a map's triangle has a point at (u, v), both from the triangle's base. Weights are negative, or their sum is above 1, outside
-// the triangle. Without branches: loops around it become vector instructions.
-__attribute__((always_inline)) CornerWeights weights_at(MapTriangle m, float u, float v) {
+// Where a map's triangle without a pole has a point at (u, v), both from the triangle's base. Weights are negative, or their sum is above 1, outside
+// the triangle.
+__attribute__((always_inline)) CornerWeights plain_weights_at(MapTriangle m, float u, float v) {
   // Scaled by the extents, so that products of tiny differences stay in range.
   const float scale_u = 1.0f / fmax(fmax(fabs(m.du1), fabs(m.du2)), 1e-30f), scale_v = 1.0f / fmax(fmax(fabs(m.dv1), fabs(m.dv2)), 1e-30f);
   const float a1 = m.du1 * scale_u, b1 = m.dv1 * scale_v, a2 = m.du2 * scale_u, b2 = m.dv2 * scale_v;
   const float pu = u * scale_u, pv = v * scale_v;
   const float determinant = a1 * b2 - a2 * b1;
   const float inverse = determinant == 0.0f ? 0.0f : 1.0f / determinant;
+  const CornerWeights w = {(pu * b2 - a2 * pv) * inverse, (a1 * pv - pu * b1) * inverse};
+  return w;
+}
+
+// The same of any. Without branches: loops around it become vector instructions.
+__attribute__((always_inline)) CornerWeights weights_at(MapTriangle m, float u, float v) {
+  const CornerWeights plain = plain_weights_at(m, u, v);
   // The trapezoid between the edge 0-1 and the pole's row.
   const float lambda = m.dv1 == 0.0f ? 0.0f : v / m.dv1;
   const float edge = lambda * m.du1;
   const float rest = m.du2 - edge;
   const float tau = rest == 0.0f ? 1.0f : (u - edge) / rest;
   const int is_plain = m.pole == 0;
-  const CornerWeights w = {is_plain ? (pu * b2 - a2 * pv) * inverse : (1.0f - tau) * lambda, is_plain ? (a1 * pv - pu * b1) * inverse : tau};
+  const CornerWeights w = {is_plain ? plain.w1 : (1.0f - tau) * lambda, is_plain ? plain.w2 : tau};
   return w;
 }
 
 // v from the triangle's base of a reading position, at the turn that lies nearest to the triangle's middle.
 __attribute__((always_inline)) float turned_offset(MapTriangle m, int column, float share, int width) {
   const float middle = m.pole == 0 ? (m.dv1 + m.dv2) / 3.0f : 0.5f * m.dv1;
-  const float beside = share / (float)width;
+  const float beside = share / (float)width, offset = column_offset(m, column, width) + beside;
   // Rounded to the nearest: rint() would not become one instruction.
-  const int lift = (int)(((middle - (column_offset(m, column, width) + beside)) + 12582912.0f) - 12582912.0f);
-  return column_offset(m, column + lift * width, width) + beside;
+  const int lift = (int)(((middle - offset) + 12582912.0f) - 12582912.0f);
+  return lift == 0 ? offset : column_offset(m, column + lift * width, width) + beside;
 }
 
 #endif
