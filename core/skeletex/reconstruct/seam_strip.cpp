@@ -15,6 +15,7 @@ constexpr double kLargestStep = 0.45;  // with 4 columns still 1.2 columns of ov
 constexpr double kSlackColumns = 1.5;
 constexpr double kCapCosine2 = 0.9924;  // 175 degrees
 constexpr double kCapCost = 1;          // times the square of its longest side
+constexpr int kAroundCap = 3;           // seam vertices where caps are charged, before and behind one
 
 /// What it costs that a triangle is a cap, one with hardly an area and a direction of its own: a texel or sample lies between two others that
 /// sit on the same edge of the mesh.
@@ -85,9 +86,9 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::s
   std::vector<int> first(m + 1), place(m + 2, 0);
   std::vector<double> best;     // best[place[k] + j - first[k]]: the cheapest merge that joins seam vertex start + k to column j
   std::vector<char> along_row;  // the last step went to the next column, not to the next seam vertex
-  const auto find_cheapest = [&](bool avoids_caps) {
-    const auto cap_of = [&](const Vec3& a, const Vec3& b, const Vec3& c) { return avoids_caps ? cap_cost(a, b, c) : 0; };
-    for (int k = 0; k <= m; ++k) {
+  std::vector<char> charges_caps(m + 1, 0);
+  const auto find_cheapest = [&](int from) {
+    for (int k = from; k <= m; ++k) {
       first[k] = std::max(first_column(start + k), start_column);
       const int last = std::min(last_column(start + k), start_column + n);
       place[k + 1] = place[k] + last - first[k] + 1;
@@ -97,8 +98,9 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::s
         const int at = place[k] + j - first[k];
         const int below = k > 0 ? place[k - 1] + j - first[k - 1] : 0;
         const bool has_column = j > first[k], has_seam = k > 0 && below < place[k];
-        const double from_column = has_column ? best[at - 1] + cap_of(point, positions[row_vertex(j - 1)], positions[row_vertex(j)]) : 0;
-        const double from_seam = has_seam ? best[below] + cap_of(positions[seam_vertex(start + k - 1)], point, positions[row_vertex(j)]) : 0;
+        double from_column = has_column ? best[at - 1] : 0, from_seam = has_seam ? best[below] : 0;
+        if (charges_caps[k] && has_column) from_column += cap_cost(point, positions[row_vertex(j - 1)], positions[row_vertex(j)]);
+        if (charges_caps[k] && has_seam) from_seam += cap_cost(positions[seam_vertex(start + k - 1)], point, positions[row_vertex(j)]);
         along_row[at] = has_column && (!has_seam || from_column < from_seam);
         best[at] = (along_row[at] ? from_column : from_seam) + cost(point, j);
       }
@@ -106,26 +108,32 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::s
   };
   const std::size_t begin = triangles.size();
   const bool is_head = end == BoneEnd::kHead;
+  /// \return the first seam vertex from start on where the merge is to be looked for again, m + 1 if none
   const auto take_cheapest = [&] {
-    triangles.resize(begin);
+    int again = m + 1;
     for (int k = m, j = start_column + n; k > 0 || j > start_column;) {
+      Triangle triangle;
       if (along_row[place[k] + j - first[k]]) {
         --j;
         const int apex = seam_vertex(start + k), here = row_vertex(j), next = row_vertex(j + 1);
-        triangles.push_back(is_head ? Triangle{apex, next, here} : Triangle{here, next, apex});
+        triangle = is_head ? Triangle{apex, next, here} : Triangle{here, next, apex};
       } else {
         --k;
         const int apex = row_vertex(j), here = seam_vertex(start + k), next = seam_vertex(start + k + 1);
-        triangles.push_back(is_head ? Triangle{here, next, apex} : Triangle{apex, next, here});
+        triangle = is_head ? Triangle{here, next, apex} : Triangle{apex, next, here};
+      }
+      triangles.push_back(triangle);
+      if (cap_cost(positions[triangle[0]], positions[triangle[1]], positions[triangle[2]]) > 0) {
+        again = std::max(0, k - kAroundCap);
+        std::fill(charges_caps.begin() + again, charges_caps.begin() + std::min(m, k + kAroundCap) + 1, 1);
       }
     }
+    return again;
   };
-  find_cheapest(false);
-  take_cheapest();
-  // Few strips have one.
-  const auto is_cap = [&](const Triangle& t) { return cap_cost(positions[t[0]], positions[t[1]], positions[t[2]]) > 0; };
-  if (std::any_of(triangles.begin() + static_cast<std::ptrdiff_t>(begin), triangles.end(), is_cap)) {
-    find_cheapest(true);
+  find_cheapest(0);
+  if (const int again = take_cheapest(); again <= m) {
+    triangles.resize(begin);
+    find_cheapest(again);
     take_cheapest();
   }
   std::reverse(triangles.begin() + static_cast<std::ptrdiff_t>(begin), triangles.end());
