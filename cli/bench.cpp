@@ -24,7 +24,7 @@ struct Arguments {
 };
 
 bool is_one_of(const std::string& name, std::initializer_list<const char*> names) { return std::find(names.begin(), names.end(), name) != names.end(); }
-bool needs_mesh(const std::string& stage) { return is_one_of(stage, {"vsm", "spd_rays", "metro", "segment", "encode"}); }
+bool needs_mesh(const std::string& stage) { return is_one_of(stage, {"vsm", "spd_rays", "metro", "segment", "encode", "snap"}); }
 bool needs_two(const std::string& stage) { return is_one_of(stage, {"morph", "transfer"}); }
 bool is_config(const std::string& path) { return path.ends_with(".json"); }
 
@@ -85,7 +85,8 @@ Stage make_stage(const std::string& name, ClContext& context, Inputs& inputs, co
   if (name == "spd_rays") return spd_rays_stage(context, inputs.mesh(0), size);
   if (name == "metro") return metro_stage(context, inputs.mesh(0));
   if (name == "segment") return segment_stage(context, inputs.mesh(0));
-  return encode_stage(inputs.mesh(0), size, program_path(), arguments.device);
+  if (name == "encode") return encode_stage(inputs.mesh(0), size, program_path(), arguments.device);
+  return snap_stage(inputs.mesh(0), size, program_path(), arguments.device);
 }
 
 /// The stages asked for, else all that the models allow, in the order of a report.
@@ -179,8 +180,8 @@ void add_bench_command(CLI::App& program) {
       "  skeletex bench\n"
       "  skeletex bench bear.skx.exr bear_bis.skx.exr --size 2048 --stage pose,morph\n"
       "  skeletex bench configs/models/bunny00.json --stage vsm,encode\n"
-      "Stages: reconstruct, pose, morph, transfer, filter; of a mesh also vsm, spd_rays, metro, segment, encode. The first five count the kernels' time,\n"
-      "beside a device copy that moves the bytes that they must; the others all time, beside another library's on the same data.");
+      "Stages: reconstruct, pose, morph, transfer, filter; of a mesh also vsm, spd_rays, metro, segment, encode, snap. The first five count the kernels' time,\n"
+      "beside a device copy that moves the bytes that they must; the others all time, beside another library's on the same data, snap beside the parameterization.");
   command.callback([arguments] { run(*arguments); });
 }
 

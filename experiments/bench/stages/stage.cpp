@@ -33,7 +33,7 @@ StageSample run_once(ClContext& context, const Stage& stage) {
     sample.device_ms += entry.milliseconds;
     sample.launches += entry.launches;
   }
-  sample.ms = stage.is_device_time ? sample.device_ms : sample.wall_ms;
+  sample.ms = stage.counted_ms ? stage.counted_ms() : stage.is_device_time ? sample.device_ms : sample.wall_ms;
   return sample;
 }
 

@@ -12,7 +12,8 @@
 namespace skeletex {
 
 /// Their names, in the order of a report.
-inline const std::vector<std::string> kStageNames{"reconstruct", "pose", "morph", "transfer", "filter", "vsm", "spd_rays", "metro", "segment", "encode"};
+inline const std::vector<std::string> kStageNames{"reconstruct", "pose", "morph", "transfer", "filter", "vsm", "spd_rays", "metro", "segment", "encode",
+                                                  "snap"};
 
 // On textures; against a device copy of as many bytes. Frames end with all vertices of the lattice on the device.
 
@@ -42,5 +43,7 @@ Stage segment_stage(ClContext& context, MeshInputPointer input);
 /// The command `skeletex encode`, process and files included; against OpenMesh reading the mesh file and OpenEXR writing as many texels.
 /// \param program  skeletex    \param device  selector for it
 Stage encode_stage(MeshInputPointer input, int size, const std::string& program, const std::string& device = "");
+/// What snapping and fit, as they are by default, add to that command's encoding; against its whole parameterization. Parameters as above.
+Stage snap_stage(MeshInputPointer input, int size, const std::string& program, const std::string& device = "");
 
 }  // namespace skeletex
