@@ -451,6 +451,15 @@ class Distances {
   std::vector<char> are_near_, are_lines_near_;  // texels, and lines of the texture that have some
 };
 
+/// Each once, in order.
+std::vector<int> triangles_in(const std::vector<std::array<int, 2>>& pairs) {
+  std::vector<int> triangles;
+  for (const auto& pair : pairs) triangles.insert(triangles.end(), pair.begin(), pair.end());
+  std::sort(triangles.begin(), triangles.end());
+  triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
+  return triangles;
+}
+
 /// A set of texels of inner rows.
 class TexelSet {
  public:
@@ -461,13 +470,14 @@ class TexelSet {
   }
   /// The texels of a triangle and all that are up to `reach` columns or rows from them.
   void add(const Triangle& triangle, int reach) {
+    const int width = lattice_.model().texture.width;
     for (const int vertex : triangle) {
       if (!lattice_.is_texel(vertex)) continue;
       const Rectangle& r = lattice_.model().patches[lattice_.patch_of(vertex)].rectangle;
-      const int row = vertex / lattice_.model().texture.width - r.y;
+      const int line = vertex / width, row = line - r.y, column = vertex - line * width - r.x;
       for (int i = std::max(1, row - reach); i <= std::min(r.height - 2, row + reach); ++i)
-        for (int j = -reach; j <= reach; ++j) {
-          const int texel = lattice_.beside(vertex, j, i - row);
+        for (int j = column - reach; j <= column + reach; ++j) {
+          const int texel = (r.y + i) * width + r.x + (j < 0 ? j + r.width : j < r.width ? j : j - r.width);
           if (std::exchange(is_in_[texel], 1) == 0) texels_.push_back(texel);
         }
     }
@@ -554,8 +564,7 @@ GuardReport Guard::put_back_faults(std::span<const int> vertex_points, const ClB
     const Pairs pairs = finding.get();
     if (pass == 0 && pairs.size() > kManyPairs) {
       const LatticeCrossings::Others evens = crossings.find_between_same(pairs, even_lattice, kShareOfParts);
-      for (const auto& pair : evens.pairs)
-        for (const int triangle : pair) even_faults.add(even_lattice.triangle(triangle), kTolerance);
+      for (const int triangle : triangles_in(evens.pairs)) even_faults.add(even_lattice.triangle(triangle), kTolerance);
       tolerates_crossing = evens.pairs.size() > kManyPairs && static_cast<double>(evens.given_there) <= kMuchWorse * static_cast<double>(evens.counted);
     }
     for (const auto& pair : pairs)

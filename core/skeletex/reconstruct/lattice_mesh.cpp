@@ -103,15 +103,14 @@ std::vector<std::vector<Triangle>> LatticeMesh::fill_ends(std::span<const int> e
   return filled;
 }
 
-int LatticeMesh::beside(int texel, int columns, int rows) const {
+int LatticeMesh::right_of(int texel) const {
   const Rectangle& r = model_.patches[patch_of(texel)].rectangle;
-  const int column = texel % model_.texture.width - r.x;
-  return texel + rows * model_.texture.width + ((column + columns) % r.width + r.width) % r.width - column;
+  return texel % model_.texture.width + 1 < r.x + r.width ? texel + 1 : texel + 1 - r.width;
 }
 
 Triangle LatticeMesh::triangle(int index) const {
   if (index >= first_end_triangle()) return end_triangles_[index - first_end_triangle()];
-  return triangles_of(index / 2, beside(index / 2, 1, 0))[index % 2];
+  return triangles_of(index / 2, right_of(index / 2))[index % 2];
 }
 
 std::vector<int> LatticeMesh::move(std::span<const int> texels, const LatticeMesh& home) {
@@ -154,7 +153,7 @@ std::vector<int> LatticeMesh::move(std::span<const int> texels, const LatticeMes
   for (std::size_t i = 0; i < quads.size(); ++i) {
     const bool is_other = now[i] != diagonals_[quads[i]];
     diagonals_[quads[i]] = now[i];
-    const std::array<Triangle, 2> triangles = triangles_of(quads[i], beside(quads[i], 1, 0));
+    const std::array<Triangle, 2> triangles = triangles_of(quads[i], right_of(quads[i]));
     for (const int k : {0, 1})
       if (is_other || is_moved[triangles[k][0]] || is_moved[triangles[k][1]] || is_moved[triangles[k][2]]) changed.push_back(2 * quads[i] + k);
   }

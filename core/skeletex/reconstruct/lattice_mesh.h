@@ -31,8 +31,8 @@ class LatticeMesh {
 
   bool is_texel(int vertex) const { return vertex < texel_count(); }
   int patch_of(int texel) const { return common_->texel_patches[texel]; }
-  /// The texel some columns and rows beside one of the same patch; columns wrap round.
-  int beside(int texel, int columns, int rows) const;
+  /// The texel beside one of the same patch, around it.
+  int right_of(int texel) const;
   /// Vertices of a triangle, counter-clockwise from outside.
   Triangle triangle(int index) const;
   bool takes_second(int texel) const { return diagonals_[texel] != 0; }
