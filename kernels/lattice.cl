@@ -5,6 +5,10 @@
 //   choose_listed_diagonals  of some
 #include "skeletex_structs.h"
 #include "quad_diagonal.h"
+#include "row_group.h"
+
+#define BAND_COLUMNS 64  // of a band that a group is at
+#define BAND_LINE (BAND_COLUMNS + 2)
 
 // left, right, beyond: the columns of the 4 x 4 vertices around the quad beside the texel's own, from this one. is_smooth: the rule, known to the compiler.
 __attribute__((always_inline)) int second_diagonal(int texel, int left, int right, int beyond, int texture_width, int has_before, int has_after,
@@ -19,36 +23,84 @@ __attribute__((always_inline)) int second_diagonal(int texel, int left, int righ
 }
 
 // The same of any column: they wrap round. Compiled once.
-__attribute__((noinline)) int second_diagonal_at(int texel, int column, int width, int texture_width, int has_before, int has_after, int is_smooth, global const float* restrict x,
-                       global const float* restrict y, global const float* restrict z) {
+__attribute__((noinline)) int second_diagonal_at(int texel, int column, int width, int texture_width, int has_before, int has_after, int is_smooth,
+                                                  global const float* restrict x, global const float* restrict y, global const float* restrict z) {
   return second_diagonal(texel, column > 0 ? -1 : width - 1, column + 1 < width ? 1 : 1 - width, column + 2 < width ? 2 : 2 - width, texture_width,
                          has_before, has_after, is_smooth, x, y, z);
 }
 
-// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl; lattice_rows: the rows that quads begin at.
+__attribute__((always_inline)) void keep_normal(local float* restrict kept, Normal n) {
+  kept[0] = n.x, kept[BAND_LINE] = n.y, kept[2 * BAND_LINE] = n.z;
+}
+
+__attribute__((always_inline)) Normal kept_normal(local const float* restrict kept) {
+  const Normal n = {kept[0], kept[BAND_LINE], kept[2 * BAND_LINE]};
+  return n;
+}
+
+// Smoother diagonals of columns of a band of rows, -1 where neither is. Normals of each quad are worked out once, and kept of three rows: twelve numbers each, one
+// after the other for all quads of a row.
+__attribute__((always_inline)) void choose_smoother(const int column, const int count, const int first_row, const int rows, const int texture_width,
+                                                    const int one, global const PatchRecord* restrict patch, local float* restrict kept,
+                                                    global const float* restrict x, global const float* restrict y, global const float* restrict z,
+                                                    global int* restrict diagonals) {
+  const int height = patch->height, a = 1, b = 3 * BAND_LINE + 1, c = 6 * BAND_LINE + 1, d = 9 * BAND_LINE + 1;
+  for (int line = max(first_row - 1, 1); line <= first_row + rows; ++line) {
+    const int above = (patch->y + line) * texture_width + patch->x + column;
+    local float* restrict own = kept + line % 3 * 12 * BAND_LINE;
+    for (int i = get_local_id(0); i < (line < height - 2 ? count + 2 : 0); i += ROW_ITEMS) {
+      const int texel = above + i - 1;
+      const QuadNormals q = normals_of_quad(texel, texel + one, texel + texture_width, texel + texture_width + one, x, y, z);
+      keep_normal(own + i, q.a), keep_normal(own + 3 * BAND_LINE + i, q.b);
+      keep_normal(own + 6 * BAND_LINE + i, q.c), keep_normal(own + 9 * BAND_LINE + i, q.d);
+    }
+    WAIT_FOR_GROUP(CLK_LOCAL_MEM_FENCE);
+    // The row before has now all neighbours.
+    const int row = line - 1, texel = above - texture_width, has_before = row > 1, has_after = line < height - 2;
+    local const float* restrict before = kept + (has_before ? row - 1 : row) % 3 * 12 * BAND_LINE;
+    local const float* restrict here = kept + row % 3 * 12 * BAND_LINE;
+    local const float* restrict after = kept + (has_after ? line : row) % 3 * 12 * BAND_LINE;
+    for (int i = get_local_id(0); i < (row < first_row ? 0 : count); i += ROW_ITEMS) {
+      const QuadNormals q = {kept_normal(here + a + i), kept_normal(here + b + i), kept_normal(here + c + i), kept_normal(here + d + i)};
+      diagonals[texel + i] =
+          smoother_of(q, kept_normal(before + b + i), kept_normal(before + d + i), kept_normal(after + a + i), kept_normal(after + c + i),
+                      kept_normal(here + b + i + one), kept_normal(here + c + i + one), kept_normal(here + a + i - one), kept_normal(here + d + i - one),
+                      has_before, has_after, texel + i, texel + i + texture_width + one, x, y, z);
+    }
+    WAIT_FOR_GROUP(CLK_LOCAL_MEM_FENCE);
+  }
+}
+
+// NDRange: one work-group of ROW_ITEMS per band of rows.
+// in   lattice_rows: the rows that quads begin at, of each patch one after the other; band: how many of them a group takes
 // out  diagonals: per texel 1 for the second
-kernel void choose_diagonals(const int row_count, const int texture_width, const int is_smooth, global const int* restrict lattice_rows,
+kernel void choose_diagonals(const int row_count, const int band, const int texture_width, const int is_smooth, global const int* restrict lattice_rows,
                              global const PatchRecord* restrict patches, global const float* restrict x, global const float* restrict y,
                              global const float* restrict z, global int* restrict diagonals) {
-  const int k = get_group_id(0);
-  if (k >= row_count) return;
-  global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
-  const int row = lattice_rows[4 * k + 1], width = patch->width;
-  const int texel = (patch->y + row) * texture_width + patch->x;
-  const int has_before = row > 1, has_after = row + 2 < patch->height - 1;
-  // What wraps round apart from the rest, whose loads are contiguous. Distances are not written as the numbers that they are, or
-  // the compiler pairs loads next to each other and then no longer vectorises the loop.
-  const int one = min(width, 1), two = 2 * one;
-  if (is_smooth) {
-    for (int j = 1 + get_local_id(0); j < width - 2; j += ROW_ITEMS)
-      diagonals[texel + j] = second_diagonal(texel + j, -one, one, two, texture_width, has_before, has_after, 1, x, y, z);
-  } else {
-    for (int j = 1 + get_local_id(0); j < width - 2; j += ROW_ITEMS)
-      diagonals[texel + j] = second_diagonal(texel + j, -one, one, two, texture_width, has_before, has_after, 0, x, y, z);
-  }
-  for (int j = max(1, width - 2) + get_local_id(0); j <= width; j += ROW_ITEMS) {
-    const int column = j < width ? j : 0;
-    diagonals[texel + column] = second_diagonal_at(texel + column, column, width, texture_width, has_before, has_after, is_smooth, x, y, z);
+  local float kept[36 * BAND_LINE];
+  const int band_end = min((int)(get_group_id(0) + 1) * band, row_count);
+  for (int begin = get_group_id(0) * band, end; begin < band_end; begin = end) {
+    for (end = begin + 1; end < band_end && lattice_rows[4 * end] == lattice_rows[4 * begin];) ++end;
+    global const PatchRecord* restrict patch = patches + lattice_rows[4 * begin];
+    const int first_row = lattice_rows[4 * begin + 1], rows = end - begin, width = patch->width;
+    // What wraps round apart from the rest, whose loads are contiguous. Distances are not written as the numbers that they are, or
+    // the compiler pairs loads next to each other and then no longer vectorises the loop.
+    const int one = min(width, 1);
+    for (int column = 1; is_smooth && column < width - 2; column += BAND_COLUMNS)
+      choose_smoother(column, min(BAND_COLUMNS, width - 2 - column), first_row, rows, texture_width, one, patch, kept, x, y, z, diagonals);
+    WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
+    for (int row = first_row; row < first_row + rows; ++row) {
+      const int texel = (patch->y + row) * texture_width + patch->x, has_before = row > 1, has_after = row + 2 < patch->height - 1;
+      for (int j = 1 + get_local_id(0); j < width - 2; j += ROW_ITEMS) {
+        const int smoother = diagonals[texel + j];
+        const int nearer = second_diagonal(texel + j, -one, one, 2 * one, texture_width, has_before, has_after, 0, x, y, z);
+        diagonals[texel + j] = !is_smooth ? nearer : smoother < 0 ? nearer : smoother;
+      }
+      for (int j = max(1, width - 2) + get_local_id(0); j <= width; j += ROW_ITEMS) {
+        const int column = j < width ? j : 0;
+        diagonals[texel + column] = second_diagonal_at(texel + column, column, width, texture_width, has_before, has_after, is_smooth, x, y, z);
+      }
+    }
   }
 }
 

@@ -64,40 +64,47 @@ __attribute__((always_inline)) float least_turn(Normal own, Normal first, Normal
 // (less than CLEARLY of the other's turns), as where the lattice sits on nothing, it is the nearer one.
 #define CLEARLY 0.8f
 
-// 1 for the second, 0 for the first, -1 where neither is much smoother.
-__attribute__((always_inline)) int smoother_diagonal(const int at[4][4], int has_before, int has_after, __global const float* x, __global const float* y,
-                             __global const float* z) {
+// Of the triangles that a quad can have: of the first diagonal the one at its first row and the other, then of the second diagonal.
+typedef struct QuadNormals {
+  Normal a, b, c, d;
+} QuadNormals;
+
+__attribute__((always_inline)) QuadNormals normals_of_quad(int v00, int v01, int v10, int v11, __global const float* x, __global const float* y,
+                                                           __global const float* z) {
+  const QuadNormals q = {normal_of(x, y, z, v00, v01, v11), normal_of(x, y, z, v00, v11, v10), normal_of(x, y, z, v00, v01, v10),
+                         normal_of(x, y, z, v01, v11, v10)};
+  return q;
+}
+
+// 1 for the second, 0 for the first, -1 where neither is much smoother. Of the quads around those triangles that can be at the side between.
+__attribute__((always_inline)) int smoother_of(QuadNormals q, Normal before_b, Normal before_d, Normal after_a, Normal after_c, Normal right_b, Normal right_c,
+                                               Normal left_a, Normal left_d, int has_before, int has_after, int v00, int v11, __global const float* x,
+                                               __global const float* y, __global const float* z) {
   const float w_before = has_before ? 1.0f : 0.0f, w_after = has_after ? 1.0f : 0.0f;
-  const int v00 = at[1][1], v01 = at[1][2], v10 = at[2][1], v11 = at[2][2];
-  const Normal a = normal_of(x, y, z, v00, v01, v11), b = normal_of(x, y, z, v00, v11, v10);
-  const Normal c = normal_of(x, y, z, v00, v01, v10), d = normal_of(x, y, z, v01, v11, v10);
   float first = 0.0f, second = 0.0f;
-  {
-    const Normal m = normal_of(x, y, z, at[0][1], v01, v00), n = normal_of(x, y, z, at[0][2], v01, v00);
-    first += w_before * least_turn(a, m, n);
-    second += w_before * least_turn(c, m, n);
-  }
-  {
-    const Normal m = normal_of(x, y, z, v10, v11, at[3][2]), n = normal_of(x, y, z, v10, v11, at[3][1]);
-    first += w_after * least_turn(b, m, n);
-    second += w_after * least_turn(d, m, n);
-  }
-  {
-    const Normal m = normal_of(x, y, z, v01, at[2][3], v11), n = normal_of(x, y, z, v01, at[1][3], v11);
-    first += least_turn(a, m, n);
-    second += least_turn(d, m, n);
-  }
-  {
-    const Normal m = normal_of(x, y, z, at[1][0], v00, v10), n = normal_of(x, y, z, v00, v10, at[2][0]);
-    first += least_turn(b, m, n);
-    second += least_turn(c, m, n);
-  }
-  first += a.x * b.x + a.y * b.y + a.z * b.z < 0.0f ? 9.0f : 0.0f;
-  second += c.x * d.x + c.y * d.y + c.z * d.z < 0.0f ? 9.0f : 0.0f;
+  first += w_before * least_turn(q.a, before_b, before_d);
+  second += w_before * least_turn(q.c, before_b, before_d);
+  first += w_after * least_turn(q.b, after_a, after_c);
+  second += w_after * least_turn(q.d, after_a, after_c);
+  first += least_turn(q.a, right_b, right_c);
+  second += least_turn(q.d, right_b, right_c);
+  first += least_turn(q.b, left_a, left_d);
+  second += least_turn(q.c, left_a, left_d);
+  first += q.a.x * q.b.x + q.a.y * q.b.y + q.a.z * q.b.z < 0.0f ? 9.0f : 0.0f;
+  second += q.c.x * q.d.x + q.c.y * q.d.y + q.c.z * q.d.z < 0.0f ? 9.0f : 0.0f;
   // Rounding of the points turns normals by about this much; where it could decide, the first diagonal is taken.
   const float fx = x[v11] - x[v00], fy = y[v11] - y[v00], fz = z[v11] - z[v00];
   const float blur = 1e-6f * (fabs(x[v00]) + fabs(y[v00]) + fabs(z[v00])) * rsqrt(fmax(fx * fx + fy * fy + fz * fz, 1e-37f));
   return second < CLEARLY * first - blur ? 1 : first < CLEARLY * second - blur ? 0 : -1;
+}
+
+__attribute__((always_inline)) int smoother_diagonal(const int at[4][4], int has_before, int has_after, __global const float* x, __global const float* y,
+                             __global const float* z) {
+  const int v00 = at[1][1], v01 = at[1][2], v10 = at[2][1], v11 = at[2][2];
+  return smoother_of(normals_of_quad(v00, v01, v10, v11, x, y, z), normal_of(x, y, z, at[0][1], v01, v00), normal_of(x, y, z, at[0][2], v01, v00),
+                     normal_of(x, y, z, v10, v11, at[3][2]), normal_of(x, y, z, v10, v11, at[3][1]), normal_of(x, y, z, v01, at[2][3], v11),
+                     normal_of(x, y, z, v01, at[1][3], v11), normal_of(x, y, z, at[1][0], v00, v10), normal_of(x, y, z, v00, v10, at[2][0]), has_before,
+                     has_after, v00, v11, x, y, z);
 }
 
 __attribute__((always_inline)) int takes_second_if_smoother(const int at[4][4], int has_before, int has_after, __global const float* x,

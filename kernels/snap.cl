@@ -13,6 +13,7 @@
 // even and odd rows apart, and in each of them one colour after the other (see colour_of). So nothing depends on the order of work-items.
 #include "skeletex_structs.h"
 #include "patch_texels.h"
+#include "row_group.h"
 
 #define REACH 0.7f         // cells from where a texel is to where it goes
 #define FURTHEST 1.0f      // cells from a texel's own place, along each axis
@@ -24,13 +25,6 @@
 #define PLACED 5           // states of a vertex: 0 to 3 the candidate it claims, 4 none is left
 #define BAD 1              // a mark of a texel's quad
 #define NONE -1            // of a bin's edges
-
-// What a work-item of a group of ROW_ITEMS has written all of them can read. A group of one has nothing to wait for.
-#if ROW_ITEMS > 1
-#define WAIT_FOR_GROUP() barrier(CLK_GLOBAL_MEM_FENCE)
-#else
-#define WAIT_FOR_GROUP()
-#endif
 
 // The smallest cross product at the four corners of a quad in the map; 1 in the even lattice.
 float quad_cross(const float x[4], const float y[4]) {
@@ -229,7 +223,7 @@ kernel void relax_texels(const int row_count, const int texture_width, global co
     const int at_end = end_of_colour(colour, width);
     if (colour < 2) relax_colour(row_colour(colour, first, width), p->height, texture_width, row, anchors, offset_x, offset_y, offset_x, offset_y);
     if (get_local_id(0) == 0 && at_end >= 0) relax_at_end(p, texture_width, at_end, row, anchors, offset_x, offset_y);
-    WAIT_FOR_GROUP();
+    WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
   }
 }
 
@@ -343,14 +337,14 @@ kernel void place_on_edges(const int row_count, const int texture_width, global 
       for (int i = 0; i < 8; ++i) offers[at[i]] = anchors[at[i]] == 0 ? of_lanes[i] : NONE;
     }
   }
-  WAIT_FOR_GROUP();
+  WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
   for (int colour = 0; colour < 2 + (width & 1); ++colour) {
     const int at_end = end_of_colour(colour, width);
     if (colour < 2)
       place_colour(row_colour(colour, first, width), colour, height, texture_width, row, edges, offers, anchors, parameters, offset_x, offset_y, offset_x,
                    offset_y);
     if (get_local_id(0) == 0 && at_end >= 0) place_at_end(p, texture_width, at_end, row, edges, offers, anchors, parameters, offset_x, offset_y);
-    WAIT_FOR_GROUP();
+    WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
   }
 }
 
@@ -373,7 +367,7 @@ void join_row(const int first, const int width, global const int* restrict from,
   const int odd = first + ((width + 1) >> 1);
   for (int i = get_local_id(0); i < width >> 1; i += ROW_ITEMS) to[first + 2 * i] = from[first + i], to[first + 2 * i + 1] = from[odd + i];
   if (get_local_id(0) == 0 && (width & 1)) to[first + width - 1] = from[odd - 1];
-  WAIT_FOR_GROUP();
+  WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
 }
 
 // NDRange and rows as for relax_texels. Columns one after the other again, each plane's in the plane before. What is in them does not matter.
@@ -474,10 +468,10 @@ kernel void put_listed_back(const int count, const int with_vertices, const int 
       anchors[texel] = 0;
       back[atomic_inc(counts)] = texel;
     }
-    WAIT_FOR_GROUP();
+    WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
     begin = max(end, 0), end = counts[0];
     if (own == 0) counts[1] = 0;
-    WAIT_FOR_GROUP();
+    WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
     for (int i = 4 * begin + own; i < 4 * end; i += ROW_ITEMS) {
       const int texel = back[i >> 2];
       global const PatchRecord* p = patches + texel_patches[texel];
@@ -488,6 +482,6 @@ kernel void put_listed_back(const int count, const int with_vertices, const int 
       if (is_bad_quad(p, texture_width, column, row, offset_x, offset_y, even_x, even_y, even_z, x, y, z) && !(atomic_or(marks + quad, BAD) & BAD))
         bad[atomic_inc(counts + 1)] = quad;
     }
-    WAIT_FOR_GROUP();
+    WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
   }
 }
