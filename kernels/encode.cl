@@ -11,7 +11,15 @@
 #include "skeletex_structs.h"
 #include "map_triangle.h"
 #include "prefilter.h"
+#include "row_group.h"
 #include "rounding.h"
+
+// A number that no other work-item of the group gets.
+#if ROW_ITEMS > 1
+#define NEXT_OF(counter) atomic_inc(&counter)
+#else
+#define NEXT_OF(counter) counter++
+#endif
 
 // v at which the edge from (ua, va) to (ub, vb) crosses u; the caller has checked that it does.
 float crossing(float ua, float va, float ub, float vb, float u) {
@@ -99,6 +107,9 @@ typedef struct MapPlace {
   CornerWeights w;
 } MapPlace;
 
+// With a margin for rounding.
+__attribute__((always_inline)) int is_outside(CornerWeights w) { return fmin(1.0f - w.w1 - w.w2, fmin(w.w1, w.w2)) < -1e-6f; }
+
 // The place in the map of a reading position, column + beside and row + above in cells, from the triangle that covers the texel's own place: always across the
 // edge that the point is furthest behind. A walk that does not arrive stays at its last triangle, and point_of at its border.
 // across: per triangle the ones behind the edges opposite to its corners, three planes; -1 at the map's border
@@ -114,9 +125,8 @@ MapPlace walk_to(const int covering, const int column, const float beside, const
     const float u = row_offset(m, row_high, row_low, row, above), v = turned_offset(m, column, beside, width);
     if (m.pole == 0) place.w = plain_weights_at(m, u, v);  // most are
     else place.w = weights_at(m, u, v);
-    const float w0 = 1.0f - place.w.w1 - place.w.w2;
-    const float least = fmin(w0, fmin(place.w.w1, place.w.w2));
-    if (!(least < -1e-6f) || steps == most_steps) break;
+    if (!is_outside(place.w) || steps == most_steps) break;
+    const float w0 = 1.0f - place.w.w1 - place.w.w2, least = fmin(w0, fmin(place.w.w1, place.w.w2));
     const int corner = least == w0 ? 0 : least == place.w.w1 ? 1 : 2;
     const int next = across[corner * triangle_count + place.t];
     if (next < 0) break;
@@ -159,7 +169,7 @@ kernel void read_surface(const int row_count, const int texture_width, const int
   for (int j = get_local_id(0); j < width; j += ROW_ITEMS) {
     const int texel = first + j, is_covered = texel_triangles[texel] != NO_TRIANGLE, t = min(texel_triangles[texel], triangle_count - 1);
     const MapTriangle m = load_triangle(t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
-    const MapPlace place = {t, weights_at(m, row_offset(m, row_high, row_low, row, offset_y[texel]), turned_offset(m, j, offset_x[texel], width))};
+    const MapPlace place = {t, weights_at(m, inner_row_offset(m, row_high, row_low, row, offset_y[texel]), turned_offset(m, j, offset_x[texel], width))};
     const SurfacePoint point = point_of(place, triangle_count, corners, vertex_x, vertex_y, vertex_z);
     const float px = is_covered ? point.x : x[texel], py = is_covered ? point.y : y[texel], pz = is_covered ? point.z : z[texel];
     x[texel] = px, y[texel] = py, z[texel] = pz;
@@ -190,11 +200,13 @@ kernel void read_listed(const int count, const int texture_width, const int tria
   is_triangle_read[place.t] = 1;
 }
 
-// NDRange (texture width, texture height). What snapping has made of the even lattice: texels on vertices and edges of the mesh take those points, others that
-// have moved read where they are now, the rest stays.
-// in   home_x, home_y: the even lattice's offsets; vertex_points: number of a vertex' point in the planes; edge_points: two per edge
+#define SNAPPED_COLUMNS 256  // of a row that a group looks at together
+
+// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. What snapping has made of the even lattice: texels on vertices and edges of the mesh
+// take those points, others that have moved read where they are now, the rest stays.
+// in   lattice_rows: all; home_x, home_y: the even lattice's offsets; vertex_points: number of a vertex' point in the planes; edge_points: two per edge
 // out  texel_triangles: of texels on vertices and edges as they were
-kernel void read_snapped(const int texture_width, const int texture_height, const int triangle_count, global const int* restrict texel_patches,
+kernel void read_snapped(const int row_count, const int texture_width, const int triangle_count, global const int* restrict lattice_rows,
                          global const int* restrict even_triangles, global const int* restrict corners, global const int* restrict turns,
                          global const int* restrict poles, global const int* restrict across, global const float* restrict u_high,
                          global const float* restrict u_low, global const float* restrict v_high, global const float* restrict v_low,
@@ -205,29 +217,59 @@ kernel void read_snapped(const int texture_width, const int texture_height, cons
                          global const int* restrict vertex_points, global const int* restrict edge_points, global const float* restrict even_x,
                          global const float* restrict even_y, global const float* restrict even_z, global int* restrict texel_triangles,
                          global float* restrict x, global float* restrict y, global float* restrict z, global int* restrict is_triangle_read) {
-  const int column = (int)get_global_id(0), line = (int)get_global_id(1);
-  if (column >= texture_width || line >= texture_height) return;
-  const int texel = line * texture_width + column, anchor = anchors[texel];
-  const float beside = offset_x[texel], above = offset_y[texel];
-  int t = even_triangles[texel];
-  SurfacePoint point = {even_x[texel], even_y[texel], even_z[texel]};
-  if (anchor != 0) {
-    const int a = anchor > 0 ? vertex_points[anchor - 1] : edge_points[2 * (-1 - anchor)];
-    const int b = anchor > 0 ? a : edge_points[2 * (-1 - anchor) + 1];
-    const float s = anchor > 0 ? 0.0f : parameters[texel];
-    point.x = vertex_x[a] + s * (vertex_x[b] - vertex_x[a]);
-    point.y = vertex_y[a] + s * (vertex_y[b] - vertex_y[a]);
-    point.z = vertex_z[a] + s * (vertex_z[b] - vertex_z[a]);
-  } else if (t != NO_TRIANGLE && (beside != 0.0f || above != 0.0f || home_x[texel] != 0.0f || home_y[texel] != 0.0f)) {
-    global const PatchRecord* p = patches + texel_patches[texel];
-    const MapPlace place = walk_to(t, column - p->x, beside, p->width, p->row_begin + line - p->y, above, triangle_count, corners, turns, poles, across, u_high,
-                                   u_low, v_high, v_low, row_high, row_low);
-    t = place.t;
-    point = point_of(place, triangle_count, corners, vertex_x, vertex_y, vertex_z);
-    is_triangle_read[t] = 1;
+  local int listed[SNAPPED_COLUMNS], is_beyond[SNAPPED_COLUMNS], listed_count;
+  local float point_x[SNAPPED_COLUMNS], point_y[SNAPPED_COLUMNS], point_z[SNAPPED_COLUMNS];
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  global const PatchRecord* restrict p = patches + lattice_rows[4 * k];
+  const int width = p->width, row = p->row_begin + lattice_rows[4 * k + 1], first = (p->y + lattice_rows[4 * k + 1]) * texture_width + p->x;
+  for (int begin = 0; begin < width; begin += SNAPPED_COLUMNS) {
+    if (get_local_id(0) == 0) listed_count = 0;
+    WAIT_FOR_GROUP(CLK_LOCAL_MEM_FENCE);
+    for (int j = begin + get_local_id(0); j < min(begin + SNAPPED_COLUMNS, width); j += ROW_ITEMS) {
+      const int texel = first + j, anchor = anchors[texel], t = even_triangles[texel];
+      SurfacePoint point = {even_x[texel], even_y[texel], even_z[texel]};
+      if (anchor != 0) {
+        const int a = anchor > 0 ? vertex_points[anchor - 1] : edge_points[2 * (-1 - anchor)];
+        const int b = anchor > 0 ? a : edge_points[2 * (-1 - anchor) + 1];
+        const float s = anchor > 0 ? 0.0f : parameters[texel];
+        point.x = vertex_x[a] + s * (vertex_x[b] - vertex_x[a]);
+        point.y = vertex_y[a] + s * (vertex_y[b] - vertex_y[a]);
+        point.z = vertex_z[a] + s * (vertex_z[b] - vertex_z[a]);
+      } else if (t != NO_TRIANGLE && (offset_x[texel] != 0.0f || offset_y[texel] != 0.0f || home_x[texel] != 0.0f || home_y[texel] != 0.0f)) {
+        listed[NEXT_OF(listed_count)] = j;
+      }
+      texel_triangles[texel] = t;
+      x[texel] = point.x, y[texel] = point.y, z[texel] = point.z;
+    }
+    WAIT_FOR_GROUP(CLK_LOCAL_MEM_FENCE);
+    // Most are still in the triangle that covers their place: all look there first, as vector instructions.
+    const int count = listed_count;
+    for (int i = get_local_id(0); i < count; i += ROW_ITEMS) {
+      const int j = listed[i], texel = first + j, t = even_triangles[texel];
+      const MapTriangle m = load_triangle(t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
+      const MapPlace place = {t, weights_at(m, inner_row_offset(m, row_high, row_low, row, offset_y[texel]), turned_offset(m, j, offset_x[texel], width))};
+      const SurfacePoint point = point_of(place, triangle_count, corners, vertex_x, vertex_y, vertex_z);
+      is_beyond[i] = is_outside(place.w);
+      point_x[i] = point.x, point_y[i] = point.y, point_z[i] = point.z;
+    }
+    WAIT_FOR_GROUP(CLK_LOCAL_MEM_FENCE);
+    for (int i = get_local_id(0); i < count; i += ROW_ITEMS) {
+      const int j = listed[i], texel = first + j;
+      SurfacePoint point = {point_x[i], point_y[i], point_z[i]};
+      int t = even_triangles[texel];
+      if (is_beyond[i]) {
+        const MapPlace place = walk_to(t, j, offset_x[texel], width, row, offset_y[texel], triangle_count, corners, turns, poles, across, u_high, u_low, v_high,
+                                       v_low, row_high, row_low);
+        t = place.t;
+        point = point_of(place, triangle_count, corners, vertex_x, vertex_y, vertex_z);
+        texel_triangles[texel] = t;
+      }
+      x[texel] = point.x, y[texel] = point.y, z[texel] = point.z;
+      is_triangle_read[t] = 1;
+    }
+    WAIT_FOR_GROUP(CLK_LOCAL_MEM_FENCE);
   }
-  texel_triangles[texel] = t;
-  x[texel] = point.x, y[texel] = point.y, z[texel] = point.z;
 }
 
 // The tangent frame's foot W and its axis `out`, from the tables (model/frame.h).

@@ -45,6 +45,13 @@ __attribute__((always_inline)) float row_offset(MapTriangle m, global const floa
   return ((row_high[row] - m.u_base_high) + (row_low[row] - m.u_base_low)) + fabs(share) * span;
 }
 
+// The same of an inner row: where texels of one row look together, nothing of it is gathered.
+__attribute__((always_inline)) float inner_row_offset(MapTriangle m, global const float* row_high, global const float* row_low, int row, float share) {
+  const float before = (row_high[row - 1] - row_high[row]) + (row_low[row - 1] - row_low[row]);
+  const float after = (row_high[row + 1] - row_high[row]) + (row_low[row + 1] - row_low[row]);
+  return ((row_high[row] - m.u_base_high) + (row_low[row] - m.u_base_low)) + fabs(share) * (share < 0.0f ? before : after);
+}
+
 // Weights of corners 1 and 2. (By value: see prefilter.h.)
 typedef struct CornerWeights {
   float w1, w2;

@@ -41,7 +41,7 @@ std::vector<KernelVariant> encoding_kernels(const ClContext& context, const Enco
   if (can_snap) {
     add("snap.cl", {"claim_texels", "decide_claims"}, items);
     add("snap.cl", {"part_colours", "relax_texels", "place_on_edges", "join_colours"}, rows);
-    add("encode.cl", {"read_snapped"}, items);
+    add("encode.cl", {"read_snapped"}, rows);
   }
   if (can_fit)
     add("fit.cl", {"read_samples", "choose_fitted_diagonals", "match_samples", "match_lattice", "assemble", "relax_moves", "move_points"}, items);

@@ -152,6 +152,9 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   const std::size_t texels = layout.size();
   const auto rows = context.upload(tables.rows);
   const auto columns = context.upload(tables.columns);
+  std::size_t in_patches = 0;
+  for (const Patch& patch : sources.patches) in_patches += static_cast<std::size_t>(patch.rectangle.width) * patch.rectangle.height;
+  const bool has_gaps = in_patches < texels;
   const auto inner_rows = context.upload(lattice_rows({sources.patches.begin(), sources.patches.end()}, RowChoice::kInner));
   const int inner_row_count = static_cast<int>(inner_rows.size);
   TexelPoints points = allocate_points(context, texels);
@@ -242,9 +245,10 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     SnapTables snap_tables = listing_features.get();
     snap_positions(context, layout, snap_tables, positions);
     points = allocate_points(context, texels), covering = context.allocate<int>(texels);
-    context.launch({"encode.cl", "read_snapped"}, layout.range(), texture_width, texture_height, maps.triangle_count, layout.texel_patches, even_covering,
-                   maps.corners, maps.turns, maps.poles, maps.across, maps.u_high, maps.u_low, maps.v_high, maps.v_low, maps.x, maps.y, maps.z, layout.patches,
-                   maps.row_high, maps.row_low, positions.home_x, positions.home_y, positions.x, positions.y, positions.anchors, positions.parameters,
+    if (has_gaps) context.fill(covering, kNoTriangle);
+    context.launch({"encode.cl", "read_snapped"}, row_range(context, all_rows.size), static_cast<int>(all_rows.size), texture_width, maps.triangle_count,
+                   all_rows, even_covering, maps.corners, maps.turns, maps.poles, maps.across, maps.u_high, maps.u_low, maps.v_high, maps.v_low, maps.x, maps.y,
+                   maps.z, layout.patches, maps.row_high, maps.row_low, positions.home_x, positions.home_y, positions.x, positions.y, positions.anchors, positions.parameters,
                    context.upload(snap_tables.vertex_points), context.upload(snap_tables.edge_points), even.x, even.y, even.z, covering, points.x, points.y,
                    points.z, is_read);
     positions.parameters = {};
@@ -276,11 +280,9 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     anchors = std::move(guard.anchors);
   }
   if (is_snapped && anchors.empty()) anchors = context.download(positions.anchors);
-  std::size_t covered = 0;
-  for (const Patch& patch : sources.patches) covered += static_cast<std::size_t>(patch.rectangle.width) * patch.rectangle.height;
   auto along = context.allocate<float>(texels), around = context.allocate<float>(texels), out = context.allocate<float>(texels);
   for (ClBuffer<float>* plane : {&along, &around, &out})
-    if (covered < texels) context.fill(*plane, 0.f);
+    if (has_gaps) context.fill(*plane, 0.f);
   context.launch({"encode.cl", "encode_texels"}, row_range(context, all_rows.size), static_cast<int>(all_rows.size), texture_width, all_rows, layout.patches,
                  rows, columns, points.x, points.y, points.z, along, around, out);
   if (is_snapped) result.report.snap = report_snap(static_cast<int>(vertex_points.size()), edges, put_back, anchors);  // beside the device's work
