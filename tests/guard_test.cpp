@@ -208,6 +208,62 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
   }
 }
 
+TEST(TriangleBlock, LeavesOutOnlyPairsThatDoNotMeet) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::uniform_int_distribution<int> vertex(0, 39);
+  int met = 0, overlapping = 0, unsettled = 0;
+  for (int run = 0; run < 60; ++run) {
+    // Few vertices, some of them in one plane, so that many triangles share some.
+    std::vector<Vec3> points(40);
+    for (Vec3& p : points) p = Vec3(unit(random), unit(random), unit(random) < 0.3 ? 0.5 : unit(random));
+    std::array<TriangleBlock, 2> blocks;
+    std::array<std::array<float, 3>, 2> least, greatest;
+    for (int b : {0, 1}) {
+      TriangleBlock& block = blocks[b];
+      least[b].fill(2), greatest[b].fill(-2);
+      for (int i = 0; i < TriangleBlock::kSize; ++i) {
+        const int first = vertex(random), second = (first + 1 + vertex(random) % 13) % 40, third = (second + 1 + vertex(random) % 13) % 40;
+        const Triangle triangle{first, second, third};
+        block.numbers[i] = i, block.is_asked[i] = unit(random) < 0.7 ? 1 : 0;
+        for (int axis = 0; axis < 3; ++axis) {
+          for (int corner = 0; corner < 3; ++corner) block.vertices[corner][i] = triangle[corner], block.corners[corner][axis][i] = points[triangle[corner]][axis];
+          const auto [low, high] = std::minmax({points[first][axis], points[second][axis], points[third][axis]});
+          block.least[axis][i] = static_cast<float>(low) - 1e-6f, block.greatest[axis][i] = static_cast<float>(high) + 1e-6f;
+          least[b][axis] = std::min(least[b][axis], block.least[axis][i]), greatest[b][axis] = std::max(greatest[b][axis], block.greatest[axis][i]);
+        }
+      }
+      find_planes(1e-10, block);
+    }
+    for (const int b : {0, 1}) {
+      const TriangleBlock &one = blocks[0], &other = blocks[b];
+      BlockOverlaps overlaps;
+      find_overlaps(one, other, least[b].data(), greatest[b].data(), overlaps);
+      BlockPairs pairs;
+      const int count = find_unsettled(one, other, overlaps, pairs);
+      const std::set<std::array<unsigned char, 2>> found(pairs.begin(), pairs.begin() + count);
+      EXPECT_EQ(static_cast<int>(found.size()), count);
+      for (int i = 0; i < TriangleBlock::kSize; ++i)
+        for (int j = 0; j < TriangleBlock::kSize; ++j) {
+          const bool is_found = found.contains({static_cast<unsigned char>(i), static_cast<unsigned char>(j)});
+          bool is_asked = one.is_asked[i] != 0 || other.is_asked[j] != 0;
+          if (b == 0) is_asked = is_asked && i < j;
+          for (int axis = 0; axis < 3; ++axis)
+            is_asked = is_asked && one.least[axis][i] <= other.greatest[axis][j] && other.least[axis][j] <= one.greatest[axis][i];
+          overlapping += is_asked, unsettled += is_found;
+          if (!is_asked) {
+            EXPECT_FALSE(is_found);
+          } else if (do_triangles_intersect(one.triangle(i), one.corners_of(i), other.triangle(j), other.corners_of(j))) {
+            EXPECT_TRUE(is_found);
+            ++met;
+          }
+        }
+    }
+  }
+  EXPECT_GT(met, 1000);
+  EXPECT_LT(unsettled, overlapping);
+}
+
 /// A tube whose vertices are moved at random, with a vertex or two on top of others, and a lattice beside it.
 struct TubeAndLattice {
   static constexpr int kAround = 9, kRings = 7, kWidth = 15, kHeight = 12;

@@ -4,8 +4,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <cstring>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -66,6 +64,13 @@ inline Four unit_normal(const Four& u, const Four& v) {
   return normal;
 }
 
+/// Of four triangles.
+inline std::array<Four, 3> unit_normals(const Four (&u)[3], const Four (&v)[3]) {
+  const Four x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2], z = u[0] * v[1] - u[1] * v[0];
+  const Four inverse = 1 / (x * x + y * y + z * z).sqrt().max(std::numeric_limits<float>::min());
+  return {x * inverse, y * inverse, z * inverse};
+}
+
 inline Four diagonals_of(const Four& n) { return {n[0] + n[1] + n[2], n[0] + n[1] - n[2], n[0] - n[1] + n[2], n[1] + n[2] - n[0]}; }
 template <class Normals>
 Normals no_normals() {
@@ -99,21 +104,60 @@ inline bool is_sliver(const Four& a, const Four& b, const Four& c, float least_h
 /// \param is_first  1 or 0 of each
 inline Four either(const Four& is_first, const Four& a, const Four& b) { return a * is_first + b * (1 - is_first); }
 
-/// Which of the boxes of a leaf's triangles overlap another one. A compiler that can makes it once more for processors with wider vectors.
+/// Of x, y and z, of normals and of their sums along diagonals (see LatticeCrossings::Normals).
+constexpr int kAxes = 10, kSquaresAtOnce = 4, kColumnsAtOnce = 16;
+template <int kCount>
+struct Ranges {
+  std::array<std::array<float, kCount>, kAxes> least, greatest;
+};
+
+/// Adds those of sixteen quads side by side. Loops over them are vector instructions, and a compiler that can makes them once more for processors with
+/// wider ones.
+/// \param planes, take_second  at the first vertex of all
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 __attribute__((target_clones("avx2", "default")))
 #endif
-void find_overlapping(const std::array<std::array<float, 32>, 3>& least, const std::array<std::array<float, 32>, 3>& greatest, const float* other_least,
-                      const float* other_greatest, std::array<unsigned char, 32>& do_overlap) {
-  const float low_x = other_least[0], low_y = other_least[1], low_z = other_least[2];
-  const float high_x = other_greatest[0], high_y = other_greatest[1], high_z = other_greatest[2];
-  const float *least_x = least[0].data(), *least_y = least[1].data(), *least_z = least[2].data();
-  const float *greatest_x = greatest[0].data(), *greatest_y = greatest[1].data(), *greatest_z = greatest[2].data();
-  std::array<int, 32> all;  // apart from bytes, which could be part of anything
-  for (int i = 0; i < 32; ++i)
-    all[i] = static_cast<int>(least_x[i] <= high_x) & static_cast<int>(low_x <= greatest_x[i]) & static_cast<int>(least_y[i] <= high_y) &
-             static_cast<int>(low_y <= greatest_y[i]) & static_cast<int>(least_z[i] <= high_z) & static_cast<int>(low_z <= greatest_z[i]);
-  for (int i = 0; i < 32; ++i) do_overlap[i] = static_cast<unsigned char>(all[i]);
+void add_quads(const std::array<const float*, 3>& planes, const int* __restrict take_second, int stride, Ranges<kColumnsAtOnce>& __restrict ranges) {
+  using Lanes = std::array<float, kColumnsAtOnce>;
+  const float *__restrict x = planes[0], *__restrict y = planes[1], *__restrict z = planes[2];
+  const float *__restrict x_above = x + stride, *__restrict y_above = y + stride, *__restrict z_above = z + stride;
+  std::array<Lanes, 3> normals[2];
+  Lanes lengths[2];
+  for (int k = 0; k < kColumnsAtOnce; ++k) {
+    const auto second = static_cast<float>(take_second[k]), first = 1 - second;
+    const float ax = x[k], ay = y[k], az = z[k], bx = x[k + 1], by = y[k + 1], bz = z[k + 1];
+    const float cx = x_above[k], cy = y_above[k], cz = z_above[k], dx = x_above[k + 1], dy = y_above[k + 1], dz = z_above[k + 1];
+    const auto add_normal = [&](int side, float ux, float uy, float uz, float vx, float vy, float vz) {
+      const float nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
+      normals[side][0][k] = nx, normals[side][1][k] = ny, normals[side][2][k] = nz;
+      lengths[side][k] = nx * nx + ny * ny + nz * nz;
+    };
+    add_normal(0, bx - ax, by - ay, bz - az, cx * second + dx * first - ax, cy * second + dy * first - ay, cz * second + dz * first - az);
+    add_normal(1, dx - (cx * second + ax * first), dy - (cy * second + ay * first), dz - (cz * second + az * first), cx - (bx * second + ax * first),
+               cy - (by * second + ay * first), cz - (bz * second + az * first));
+  }
+  // By value: references to what is in memory are branches. Square roots are, too, but for Eigen's.
+  const auto lesser = [](float a, float b) { return a < b ? a : b; };
+  const auto greater = [](float a, float b) { return a < b ? b : a; };
+  for (const int side : {0, 1}) {
+    Eigen::Map<Eigen::Array<float, kColumnsAtOnce, 1>> inverse(lengths[side].data());
+    inverse = 1 / inverse.sqrt().max(std::numeric_limits<float>::min());
+    for (int k = 0; k < kColumnsAtOnce; ++k) {
+      const float nx = normals[side][0][k] * inverse[k], ny = normals[side][1][k] * inverse[k], nz = normals[side][2][k] * inverse[k], sum = nx + ny;
+      const auto add = [&](int axis, float value) {
+        ranges.least[axis][k] = lesser(ranges.least[axis][k], value), ranges.greatest[axis][k] = greater(ranges.greatest[axis][k], value);
+      };
+      add(3, nx), add(4, ny), add(5, nz), add(6, sum + nz), add(7, sum - nz), add(8, nx - ny + nz), add(9, ny - nx + nz);
+    }
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    const float *__restrict own = planes[axis], *__restrict above = own + stride;
+    for (int k = 0; k < kColumnsAtOnce; ++k) {
+      const float a = own[k], b = own[k + 1], c = above[k], d = above[k + 1];
+      ranges.least[axis][k] = lesser(lesser(ranges.least[axis][k], lesser(a, b)), lesser(c, d));
+      ranges.greatest[axis][k] = greater(greater(ranges.greatest[axis][k], greater(a, b)), greater(c, d));
+    }
+  }
 }
 
 /// From a to b round a circle, the shorter way: where it starts, and its steps.
@@ -248,10 +292,8 @@ LatticeCrossings::Bounds LatticeCrossings::measure_square(const LatticeMesh& lat
       u[1][axis] = beyond - either(is_second, above, own), v[1][axis] = above - either(is_second, right, own);
     }
     for (int side = 0; side < 2; ++side) {
-      const Four x = u[side][1] * v[side][2] - u[side][2] * v[side][1], y = u[side][2] * v[side][0] - u[side][0] * v[side][2],
-                 z = u[side][0] * v[side][1] - u[side][1] * v[side][0];
-      const Four inverse = 1 / (x * x + y * y + z * z).sqrt().max(std::numeric_limits<float>::min());
-      Four normal[7] = {x * inverse, y * inverse, z * inverse};
+      const auto [x, y, z] = unit_normals(u[side], v[side]);
+      Four normal[7] = {x, y, z};
       for (int axis = 0; axis < 3; ++axis)
         for (int k = square.columns; k < kSide; ++k) normal[axis][k] = normal[axis][0];
       const Four sum = normal[0] + normal[1];
@@ -326,12 +368,49 @@ void LatticeCrossings::join(Tree& tree) const {
   }
 }
 
+/// Squares that follow each other in a row, their numbers as well.
+void LatticeCrossings::measure_squares(const LatticeMesh& lattice, int first, Tree& tree) const {
+  SquareVertices square;
+  view(lattice, nodes_[first], square);
+  Ranges<kColumnsAtOnce> ranges;
+  for (auto& lanes : ranges.least) lanes.fill(kInfinity);
+  for (auto& lanes : ranges.greatest) lanes.fill(-kInfinity);
+  for (int row = 0; row < square.rows; ++row) {
+    const int at = row * texture_width_;
+    add_quads({square.axes[0] + at, square.axes[1] + at, square.axes[2] + at}, square.diagonals[row], texture_width_, ranges);
+  }
+  for (int i = 0; i < kSquaresAtOnce; ++i) {
+    Bounds& bounds = tree.nodes[first + i];
+    bounds = {no_box<Box>(), no_normals<Normals>()};
+    for (int axis = 0; axis < kAxes; ++axis) {
+      Box& box = axis < 3 ? bounds.around : axis < 6 ? bounds.normals.box : bounds.normals.diagonals;
+      const int lane = axis < 6 ? axis % 3 : axis - 6;
+      box.least[lane] = Eigen::Map<const Four>(ranges.least[axis].data() + kSide * i).minCoeff();
+      box.greatest[lane] = Eigen::Map<const Four>(ranges.greatest[axis].data() + kSide * i).maxCoeff();
+    }
+    widen(margin_, bounds.around);
+  }
+}
+
 /// Some leaves, and what they are parts of.
 void LatticeCrossings::measure(const LatticeMesh& lattice, std::span<const int> leaves, Tree& tree) const {
   tree.nodes.resize(nodes_.size());
   tree.ends.resize(nodes_.size() - first_of_ends());
   for_each_block(leaves.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) measure(lattice, leaves[i], tree);
+    const auto begins_squares = [&](std::size_t i) {
+      if (i + kSquaresAtOnce > end || leaves[i + kSquaresAtOnce - 1] != leaves[i] + kSquaresAtOnce - 1) return false;
+      const Node &first = nodes_[leaves[i]], &last = nodes_[leaves[i + kSquaresAtOnce - 1]];
+      return grids_[first.grid].end < 0 && first.grid == last.grid && first.row == last.row &&
+             kSide * first.column + kColumnsAtOnce < rectangles_[grids_[first.grid].patch].width;
+    };
+    for (std::size_t i = begin; i < end;) {
+      const bool are_several = begins_squares(i);
+      if (are_several)
+        measure_squares(lattice, leaves[i], tree);
+      else
+        measure(lattice, leaves[i], tree);
+      i += are_several ? kSquaresAtOnce : 1;
+    }
   });
   join(tree);
 }
@@ -461,106 +540,125 @@ bool LatticeCrossings::are_quads_smooth(const LatticeMesh& lattice, int patch, i
   const int row = std::min(row_of(s), row_of(t)), end = std::max(row_of(s), row_of(t)) + 1;
   const auto [column, steps] = between(column_of(s), column_of(t), r.width);
   if (end - 1 - row > kNearQuads || steps > kNearQuads) return false;
-  std::array<Four, 2 * (kNearQuads + 1) * (kNearQuads + 1)> normals;
-  int count = 0;
-  Four middle = Four::Zero();
-  for (int i = row; i < end; ++i)
-    for (int j = column; j < std::min(column + steps + 1, column + r.width); ++j)
-      for (const Triangle& triangle : lattice.triangles_of(texel_of(patch, j < r.width ? j : j - r.width, i), texel_of(patch, (j + 1) % r.width, i))) {
-        const Four a = lattice.point(triangle[0]), b = lattice.point(triangle[1]), c = lattice.point(triangle[2]);
-        middle += normals[count++] = unit_normal(b - a, c - a);
-      }
-  float least = kInfinity;
-  for (int k = 0; k < count; ++k) least = std::min(least, (normals[k] * middle).sum());
-  return least > kLeastCosine * middle.matrix().norm();
-}
-
-LatticeCrossings::Leaf& LatticeCrossings::leaf_at(const LatticeMesh& lattice, int number, Leaf& leaf) const {
-  if (leaf.node == number) return leaf;
-  leaf.node = number;
-  leaf.is_placed.fill(false);
-  for (auto& plane : leaf.least) plane.fill(kInfinity);
-  for (auto& plane : leaf.greatest) plane.fill(-kInfinity);
-  const Node& node = nodes_[number];
-  const Grid& grid = grids_[node.grid];
-  int fours = 0;
-  const auto add_four = [&](const auto& coordinates_of, int count) {
+  // Four columns at a time; those of none are 0.
+  constexpr int kMost = kNearQuads + 1, kAcross = (kMost + kSide - 1) / kSide * kSide;
+  const int columns = std::min(steps + 1, r.width);
+  using Row = std::array<std::array<float, kAcross + 1>, 3>;
+  Row own, above;
+  const auto load = [&](int i, Row& points) {
     for (int axis = 0; axis < 3; ++axis) {
-      Four a, b, c;
-      coordinates_of(axis, a, b, c);
-      const Four least = a.min(b).min(c) - margin_, greatest = a.max(b).max(c) + margin_;
-      std::copy_n(least.data(), count, leaf.least[axis].begin() + 4 * fours);
-      std::copy_n(greatest.data(), count, leaf.greatest[axis].begin() + 4 * fours);
+      points[axis].fill(0);
+      for (int k = 0; k <= columns; ++k) points[axis][k] = lattice.planes()[axis][texel_of(patch, column + k, i)];
     }
-    ++fours;
   };
-  if (grid.end < 0) {
-    SquareVertices square;
-    view(lattice, node, square);
-    for (int i = 0; i < 2 * square.rows; ++i) {
-      const Four is_second = Eigen::Map<const Eigen::Array4i>(square.diagonals[i / 2]).cast<float>();
-      add_four(
-          [&](int axis, Four& a, Four& b, Four& c) {
-            const float* at = square.axes[axis] + i / 2 * square.stride;
-            const Four own = Eigen::Map<const Four>(at), right = Eigen::Map<const Four>(at + 1);
-            const Four above = Eigen::Map<const Four>(at + square.stride), beyond = Eigen::Map<const Four>(at + square.stride + 1);
-            a = i % 2 == 0 ? own : above, b = i % 2 == 0 ? right : beyond;
-            c = i % 2 == 0 ? either(is_second, above, beyond) : either(is_second, right, own);
-          },
-          square.columns);
+  load(row, above);
+  std::array<std::array<Four, 3>, 2 * kMost * kAcross / kSide> normals;
+  std::array<Four, kAcross / kSide> is_any;
+  std::array<Four, 3> sums{Four::Zero(), Four::Zero(), Four::Zero()};
+  int count = 0;
+  for (int k = 0; k < kAcross; ++k) is_any[k / kSide][k % kSide] = k < columns ? 1.0f : 0.0f;
+  for (int i = row; i < end; ++i) {
+    own = above;
+    load(i + 1, above);
+    for (int first = 0; first < columns; first += kSide) {
+      Four is_second;
+      for (int k = 0; k < kSide; ++k) is_second[k] = first + k < columns && lattice.takes_second(texel_of(patch, column + first + k, i)) ? 1.0f : 0.0f;
+      Four u[2][3], v[2][3];
+      for (int axis = 0; axis < 3; ++axis) {
+        const Eigen::Map<const Four> a(own[axis].data() + first), b(own[axis].data() + first + 1), c(above[axis].data() + first), d(above[axis].data() + first + 1);
+        u[0][axis] = b - a, v[0][axis] = either(is_second, c, d) - a;
+        u[1][axis] = d - either(is_second, c, a), v[1][axis] = c - either(is_second, b, a);
+      }
+      for (int side = 0; side < 2; ++side, ++count) {
+        normals[count] = unit_normals(u[side], v[side]);
+        for (int axis = 0; axis < 3; ++axis) sums[axis] += normals[count][axis] *= is_any[first / kSide];
+      }
     }
-    return leaf;
   }
-  const auto [begin, end] = triangles_of_end(node);
-  for (int first = begin; first < end; first += 4) {
-    std::array<std::array<Four, 4>, 3> points;
-    for (int k = 0; k < 4; ++k) {
-      const Triangle t = lattice.triangle(std::min(first + k, end - 1));
-      for (int corner = 0; corner < 3; ++corner) points[corner][k] = lattice.point(t[corner]);
-    }
-    add_four(
-        [&](int axis, Four& a, Four& b, Four& c) {
-          for (int k = 0; k < 4; ++k) a[k] = points[0][k][axis], b[k] = points[1][k][axis], c[k] = points[2][k][axis];
-        },
-        std::min(4, end - first));
+  const float x = sums[0].sum(), y = sums[1].sum(), z = sums[2].sum();
+  Four least = Four::Constant(kInfinity);
+  for (int k = 0, chunks = (columns + kSide - 1) / kSide; k < count; ++k) {
+    const Four none = 1 - is_any[k / 2 % chunks];
+    least = least.min(x * normals[k][0] + y * normals[k][1] + z * normals[k][2] + std::numeric_limits<float>::max() * none);
   }
-  return leaf;
+  return least.minCoeff() > kLeastCosine * std::sqrt(x * x + y * y + z * z);
 }
 
-/// All about a triangle of a leaf.
-void LatticeCrossings::place(const LatticeMesh& lattice, int i, Leaf& leaf) const {
-  leaf.is_placed[i] = true;
-  const Node& node = nodes_[leaf.node];
-  const Grid& grid = grids_[node.grid];
-  Triangle& triangle = leaf.triangles[i];
-  if (grid.end < 0) {
-    const int column = kSide * node.column + i % 4, row = kSide * node.row + i / 8, side = i / 4 % 2;
-    const int texel = texel_of(grid.patch, column, row);
-    triangle = lattice.triangles_of(texel, texel_of(grid.patch, column + 1, row))[side];
-    leaf.numbers[i] = 2 * texel + side;
+/// \param columns, rows  out: that there are; others are again the last of these
+QuadBlock LatticeCrossings::quads_of(const LatticeMesh& lattice, const Node& node, int& columns, int& rows) const {
+  SquareVertices square;
+  view(lattice, node, square);
+  columns = square.columns, rows = square.rows;
+  const int patch = grids_[node.grid].patch, column = kSide * node.column;
+  QuadBlock quads;
+  quads.row_step = texture_width_;
+  for (int row = 0; row < kSide; ++row) {
+    const int own_row = std::min(row, rows - 1), first = kSide * row;
+    const int texel = texel_of(patch, column, kSide * node.row + own_row);
+    for (int axis = 0; axis < 3; ++axis) {
+      const float* at = square.axes[axis] + own_row * square.stride;
+      for (const int vertex : {0, 1, 2, 3}) std::copy_n(at + vertex % 2 + vertex / 2 * square.stride, kSide, quads.points[axis][vertex].begin() + first);
+    }
+    std::copy_n(square.diagonals[own_row], kSide, quads.take_second.begin() + first);
+    for (int k = 0; k < kSide; ++k) quads.own[first + k] = texel + k, quads.right[first + k] = texel + k + 1;
+    if (column + columns == rectangles_[patch].width) quads.right[first + columns - 1] = texel - column;
+  }
+  return quads;
+}
+
+const TriangleBlock& LatticeCrossings::boxes_of(const LatticeMesh& lattice, int number, const std::vector<char>* is_asked, Leaf& leaf) const {
+  TriangleBlock& block = leaf.triangles;
+  if (leaf.node == number) return block;
+  leaf.node = number, leaf.has_planes = false;
+  const Node& node = nodes_[number];
+  block.is_asked.fill(1);
+  if (grids_[node.grid].end < 0) {
+    int columns, rows;
+    const QuadBlock quads = quads_of(lattice, node, columns, rows);
+    fill_boxes(quads, margin_, block);
+    for (int i = 0; i < TriangleBlock::kSize; ++i) {
+      const int quad = i % QuadBlock::kSize;
+      block.numbers[i] = 2 * quads.own[quad] + i / QuadBlock::kSize;
+      if (quad % kSide < columns && quad / kSide < rows) continue;
+      for (int axis = 0; axis < 3; ++axis) block.least[axis][i] = kInfinity, block.greatest[axis][i] = -kInfinity;
+    }
   } else {
-    leaf.numbers[i] = triangles_of_end(node).first + i;
-    triangle = lattice.triangle(leaf.numbers[i]);
+    for (auto& plane : block.least) plane.fill(kInfinity);
+    for (auto& plane : block.greatest) plane.fill(-kInfinity);
+    const auto [begin, end] = triangles_of_end(node);
+    for (int i = 0; i < end - begin; ++i) {
+      block.numbers[i] = begin + i;
+      Box box = no_box<Box>();
+      for (const int vertex : lattice.triangle(begin + i)) add(lattice.point(vertex), box);
+      widen(margin_, box);
+      for (int axis = 0; axis < 3; ++axis) block.least[axis][i] = box.least[axis], block.greatest[axis][i] = box.greatest[axis];
+    }
   }
-  leaf.corners[i] = lattice.corners(triangle);
-  const auto& [a, b, c] = leaf.corners[i];
-  leaf.normals[i] = (b - a).cross(c - a);
-  leaf.offsets[i] = leaf.normals[i].dot(a);
-  leaf.margins[i] = kRounding * extent_ * leaf.normals[i].lpNorm<1>();
+  if (is_asked)
+    for (int i = 0; i < TriangleBlock::kSize; ++i)
+      if (block.least[0][i] <= block.greatest[0][i]) block.is_asked[i] = (*is_asked)[block.numbers[i]];
+  return block;
 }
 
-/// Whether what two triangles do not share of the second one lies on one side of the first one's plane, further than rounding could
-/// put it: then they do not meet. So it is with nearly all neighbours, and this is far cheaper than do_triangles_intersect.
-bool LatticeCrossings::is_beside(const Leaf& leaf, int i, const Leaf& others, int k) {
-  const Triangle &own = leaf.triangles[i], &other = others.triangles[k];
-  const Vec3& normal = leaf.normals[i];
-  int free = 0, above = 0, below = 0;
-  for (int c = 0; c < 3; ++c) {
-    const int is_free = static_cast<int>(other[c] != own[0]) & static_cast<int>(other[c] != own[1]) & static_cast<int>(other[c] != own[2]);
-    const double height = normal.dot(others.corners[k][c]) - leaf.offsets[i];
-    free += is_free, above += is_free & static_cast<int>(height > leaf.margins[i]), below += is_free & static_cast<int>(height < -leaf.margins[i]);
+void LatticeCrossings::find_planes_of(const LatticeMesh& lattice, Leaf& leaf) const {
+  if (std::exchange(leaf.has_planes, true)) return;
+  TriangleBlock& block = leaf.triangles;
+  const Node& node = nodes_[leaf.node];
+  if (grids_[node.grid].end < 0) {
+    int columns, rows;
+    fill_corners(quads_of(lattice, node, columns, rows), lattice.model().origin, block);
+  } else {
+    const auto [begin, end] = triangles_of_end(node);
+    for (int i = 0; i < end - begin; ++i) {
+      const Triangle triangle = lattice.triangle(begin + i);
+      for (int corner = 0; corner < 3; ++corner) {
+        const Vec3 position = lattice.position(triangle[corner]);
+        block.vertices[corner][i] = triangle[corner];
+        for (int axis = 0; axis < 3; ++axis) block.corners[corner][axis][i] = position[axis];
+      }
+    }
   }
-  return free > 0 && (above == free || below == free);
+  find_planes(kRounding * extent_, block);
 }
 
 /// Triangles of two leaves, or of one.
@@ -568,34 +666,20 @@ void LatticeCrossings::find_between(const LatticeMesh& lattice, int a, int b, co
                                     std::vector<std::array<int, 2>>& pairs) const {
   // The last one is for two that are kept at the same place.
   const std::size_t places = leaves.size() - 1, place_a = a % places, place_b = a != b && b % places == place_a ? places : b % places;
-  Leaf &one = leaf_at(lattice, a, leaves[place_a]), &other = leaf_at(lattice, b, leaves[place_b]);
+  const TriangleBlock &one = boxes_of(lattice, a, is_asked, leaves[place_a]), &other = boxes_of(lattice, b, is_asked, leaves[place_b]);
+  BlockOverlaps overlaps;
+  find_overlaps(one, other, around_b.least.data(), around_b.greatest.data(), overlaps);
+  if (overlaps.group_count == 0) return;
+  find_planes_of(lattice, leaves[place_a]), find_planes_of(lattice, leaves[place_b]);
+  BlockPairs unsettled;
+  const int count = find_unsettled(one, other, overlaps, unsettled);
   const bool is_of_one_patch = nodes_[a].grid == nodes_[b].grid && grids_[nodes_[a].grid].end < 0;
-  const auto look_at = [&](int k, int l) {
-    if (!one.is_placed[k]) place(lattice, k, one);
-    if (!other.is_placed[l]) place(lattice, l, other);
+  for (int i = 0; i < count; ++i) {
+    const auto [k, l] = unsettled[i];
     const int s = one.numbers[k], t = other.numbers[l];
-    if (is_asked && !(*is_asked)[s] && !(*is_asked)[t]) return;
-    const Triangle &first = one.triangles[k], &second = other.triangles[l];
-    const auto &first_corners = one.corners[k], &second_corners = other.corners[l];
-    if (is_beside(one, k, other, l) || is_beside(other, l, one, k)) return;
-    if (!do_triangles_intersect(first, first_corners, second, second_corners)) return;
-    if (is_of_one_patch && are_quads_smooth(lattice, grids_[nodes_[a].grid].patch, s, t)) return;
+    if (!do_triangles_intersect(one.triangle(k), one.corners_of(k), other.triangle(l), other.corners_of(l))) continue;
+    if (is_of_one_patch && are_quads_smooth(lattice, grids_[nodes_[a].grid].patch, s, t)) continue;
     pairs.push_back({std::min(s, t), std::max(s, t)});
-  };
-  std::array<unsigned char, kLeafTriangles> are_near, do_overlap;
-  find_overlapping(one.least, one.greatest, around_b.least.data(), around_b.greatest.data(), are_near);
-  for (int i = 0; i < kLeafTriangles; ++i) {
-    if (are_near[i] == 0) continue;
-    const std::array<float, 3> least{one.least[0][i], one.least[1][i], one.least[2][i]}, greatest{one.greatest[0][i], one.greatest[1][i], one.greatest[2][i]};
-    find_overlapping(other.least, other.greatest, least.data(), greatest.data(), do_overlap);
-    for (int first = 0; first < kLeafTriangles; first += 8) {
-      // Nearly all of them do not.
-      std::uint64_t any;
-      std::memcpy(&any, do_overlap.data() + first, sizeof any);
-      if (any == 0) continue;
-      for (int k = std::max(first, a == b ? i + 1 : 0); k < first + 8; ++k)
-        if (do_overlap[k] != 0) look_at(i, k);
-    }
   }
 }
 

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "skeletex/measure/triangle_block.h"
 #include "skeletex/reconstruct/lattice_mesh.h"
 
 namespace skeletex {
@@ -59,17 +60,11 @@ class LatticeCrossings {
     int grid, level, row, column;
   };
   static constexpr int kSide = 4;  ///< quads along a side of a square
-  static constexpr int kLeafTriangles = 32;
   /// A leaf as it is when its triangles are looked at one by one: of a square four lower and four upper ones in turns, row by row.
   struct Leaf {
     int node = -1;
-    std::array<std::array<float, kLeafTriangles>, 3> least, greatest;  ///< by coordinate; infinite where there is no triangle
-    std::array<bool, kLeafTriangles> is_placed;                  ///< of these the rest is known
-    std::array<int, kLeafTriangles> numbers;
-    std::array<Triangle, kLeafTriangles> triangles;
-    std::array<std::array<Vec3, 3>, kLeafTriangles> corners;
-    std::array<Vec3, kLeafTriangles> normals;
-    std::array<double, kLeafTriangles> offsets, margins;  ///< of their planes, and how far from them rounding could put a vertex
+    bool has_planes = false;  ///< and corners; else boxes and numbers alone
+    TriangleBlock triangles;
   };
   using Leaves = std::vector<Leaf>;
   /// What a strip's or fan's triangles share with others.
@@ -109,6 +104,7 @@ class LatticeCrossings {
   };
   void view(const LatticeMesh& lattice, const Node& node, SquareVertices& square) const;
   Bounds measure_square(const LatticeMesh& lattice, const Node& node) const;
+  void measure_squares(const LatticeMesh& lattice, int first, Tree& tree) const;
   Bounds measure_end(const LatticeMesh& lattice, const Node& node) const;
   void measure(const LatticeMesh& lattice, int node, Tree& tree) const;
   void measure(const LatticeMesh& lattice, std::span<const int> leaves, Tree& tree) const;
@@ -125,9 +121,9 @@ class LatticeCrossings {
   bool are_quads_smooth(const LatticeMesh& lattice, int patch, int s, int t) const;
   bool split(const Search& search, const Task& task, std::vector<Task>& tasks) const;
   static Leaves& fresh_leaves();
-  Leaf& leaf_at(const LatticeMesh& lattice, int node, Leaf& leaf) const;
-  void place(const LatticeMesh& lattice, int i, Leaf& leaf) const;
-  static bool is_beside(const Leaf& leaf, int i, const Leaf& others, int k);
+  QuadBlock quads_of(const LatticeMesh& lattice, const Node& node, int& columns, int& rows) const;
+  const TriangleBlock& boxes_of(const LatticeMesh& lattice, int node, const std::vector<char>* is_asked, Leaf& leaf) const;
+  void find_planes_of(const LatticeMesh& lattice, Leaf& leaf) const;
   void find_between(const LatticeMesh& lattice, int a, int b, const Box& around_b, const std::vector<char>* is_asked, Leaves& leaves,
                     std::vector<std::array<int, 2>>& pairs) const;
   std::vector<std::array<int, 2>> find(const Search& search) const;
