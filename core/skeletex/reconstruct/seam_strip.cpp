@@ -83,49 +83,51 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::s
   }
   const int start_column = static_cast<int>(std::lround(column_of(start)));
 
-  std::vector<int> first(m + 1), place(m + 2, 0);
-  std::vector<double> best;     // best[place[k] + j - first[k]]: the cheapest merge that joins seam vertex start + k to column j
-  std::vector<char> along_row;  // the last step went to the next column, not to the next seam vertex
+  // From here on both rings begin there, and end where they began.
+  std::vector<Vec3> seam_points, row_points;
+  for (int k = 0; k <= m; ++k) seam_points.push_back(positions[seam_vertex(start + k)]);
+  for (int j = 0; j <= n; ++j) row_points.push_back(positions[row_vertex(start_column + j)]);
+  std::vector<int> first(m + 1), last(m + 1), place(m + 2, 0);
+  for (int k = 0; k <= m; ++k) {
+    first[k] = std::max(first_column(start + k) - start_column, 0), last[k] = std::min(last_column(start + k) - start_column, n);
+    place[k + 1] = place[k] + last[k] - first[k] + 1;
+  }
+  std::vector<double> best(place[m + 1]);     // best[place[k] + j - first[k]]: the cheapest merge that joins seam vertex k to column j
+  std::vector<char> along_row(place[m + 1]);  // the last step went to the next column, not to the next seam vertex
   std::vector<char> charges_caps(m + 1, 0);
   const auto find_cheapest = [&](int from) {
-    for (int k = from; k <= m; ++k) {
-      first[k] = std::max(first_column(start + k), start_column);
-      const int last = std::min(last_column(start + k), start_column + n);
-      place[k + 1] = place[k] + last - first[k] + 1;
-      best.resize(place[k + 1]), along_row.resize(place[k + 1]);
-      const Vec3& point = positions[seam_vertex(start + k)];
-      for (int j = first[k]; j <= last; ++j) {
+    for (int k = from; k <= m; ++k)
+      for (int j = first[k]; j <= last[k]; ++j) {
         const int at = place[k] + j - first[k];
-        const int below = k > 0 ? place[k - 1] + j - first[k - 1] : 0;
-        const bool has_column = j > first[k], has_seam = k > 0 && below < place[k];
-        double from_column = has_column ? best[at - 1] : 0, from_seam = has_seam ? best[below] : 0;
-        if (charges_caps[k] && has_column) from_column += cap_cost(point, positions[row_vertex(j - 1)], positions[row_vertex(j)]);
-        if (charges_caps[k] && has_seam) from_seam += cap_cost(positions[seam_vertex(start + k - 1)], point, positions[row_vertex(j)]);
+        const bool has_column = j > first[k], has_seam = k > 0 && j <= last[k - 1];
+        double from_column = has_column ? best[at - 1] : 0, from_seam = has_seam ? best[place[k - 1] + j - first[k - 1]] : 0;
+        if (charges_caps[k] && has_column) from_column += cap_cost(seam_points[k], row_points[j - 1], row_points[j]);
+        if (charges_caps[k] && has_seam) from_seam += cap_cost(seam_points[k - 1], seam_points[k], row_points[j]);
         along_row[at] = has_column && (!has_seam || from_column < from_seam);
-        best[at] = (along_row[at] ? from_column : from_seam) + cost(point, j);
+        best[at] = (along_row[at] ? from_column : from_seam) + (seam_points[k] - row_points[j]).squaredNorm();
       }
-    }
   };
   const std::size_t begin = triangles.size();
   const bool is_head = end == BoneEnd::kHead;
-  /// \return the first seam vertex from start on where the merge is to be looked for again, m + 1 if none
+  /// \return the first seam vertex where the merge is to be looked for again, m + 1 if none
   const auto take_cheapest = [&] {
     int again = m + 1;
-    for (int k = m, j = start_column + n; k > 0 || j > start_column;) {
-      Triangle triangle;
+    const auto look_again = [&](int k) {
+      const int low = std::max(0, k - kAroundCap);
+      std::fill(charges_caps.begin() + low, charges_caps.begin() + std::min(m, k + kAroundCap) + 1, 1);
+      again = std::min(again, low);
+    };
+    for (int k = m, j = n; k > 0 || j > 0;) {
       if (along_row[place[k] + j - first[k]]) {
         --j;
-        const int apex = seam_vertex(start + k), here = row_vertex(j), next = row_vertex(j + 1);
-        triangle = is_head ? Triangle{apex, next, here} : Triangle{here, next, apex};
+        const int apex = seam_vertex(start + k), here = row_vertex(start_column + j), next = row_vertex(start_column + j + 1);
+        triangles.push_back(is_head ? Triangle{apex, next, here} : Triangle{here, next, apex});
+        if (cap_cost(seam_points[k], row_points[j], row_points[j + 1]) > 0) look_again(k);
       } else {
         --k;
-        const int apex = row_vertex(j), here = seam_vertex(start + k), next = seam_vertex(start + k + 1);
-        triangle = is_head ? Triangle{here, next, apex} : Triangle{apex, next, here};
-      }
-      triangles.push_back(triangle);
-      if (cap_cost(positions[triangle[0]], positions[triangle[1]], positions[triangle[2]]) > 0) {
-        again = std::max(0, k - kAroundCap);
-        std::fill(charges_caps.begin() + again, charges_caps.begin() + std::min(m, k + kAroundCap) + 1, 1);
+        const int apex = row_vertex(start_column + j), here = seam_vertex(start + k), next = seam_vertex(start + k + 1);
+        triangles.push_back(is_head ? Triangle{here, next, apex} : Triangle{apex, next, here});
+        if (cap_cost(seam_points[k], seam_points[k + 1], row_points[j]) > 0) look_again(k);
       }
     }
     return again;
