@@ -29,6 +29,10 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 using Four = Eigen::Array4f;
 
+/// (Eigen's are loops here.)
+inline float least_of(const Four& v) { return std::min(std::min(v[0], v[1]), std::min(v[2], v[3])); }
+inline float greatest_of(const Four& v) { return std::max(std::max(v[0], v[1]), std::max(v[2], v[3])); }
+
 template <class Box>
 Box no_box() {
   return {{kInfinity, kInfinity, kInfinity, 0}, {-kInfinity, -kInfinity, -kInfinity, 0}};
@@ -52,7 +56,7 @@ void widen(float margin, Box& box) {
 template <class Box>
 inline bool do_overlap(const Box& a, const Box& b) {
   const Four gaps = (a.least - b.greatest).max(b.least - a.greatest);
-  return gaps.maxCoeff() <= 0;
+  return greatest_of(gaps) <= 0;
 }
 
 /// 0 of a triangle without area: it may look anywhere.
@@ -91,8 +95,8 @@ inline bool is_narrow(const Normals& normals) {
   if ((middle * least).min(middle * greatest).sum() > kLeastCosine * middle.matrix().norm()) return true;
   constexpr float kLeastSum = kLeastCosine * std::numbers::sqrt3_v<float>;
   // (The fourth coordinate is 0.)
-  return std::max(least.maxCoeff(), -greatest.minCoeff()) > kLeastCosine ||
-         std::max(normals.diagonals.least.maxCoeff(), -normals.diagonals.greatest.minCoeff()) > kLeastSum;
+  return std::max(greatest_of(least), -least_of(greatest)) > kLeastCosine ||
+         std::max(greatest_of(normals.diagonals.least), -least_of(normals.diagonals.greatest)) > kLeastSum;
 }
 
 /// Whether a triangle is so thin that rounding of its corners can turn it.
@@ -304,12 +308,12 @@ LatticeCrossings::Bounds LatticeCrossings::measure_square(const LatticeMesh& lat
       }
     }
   }
-  Bounds bounds{{{least[0].minCoeff(), least[1].minCoeff(), least[2].minCoeff(), 0}, {greatest[0].maxCoeff(), greatest[1].maxCoeff(), greatest[2].maxCoeff(), 0}},
+  Bounds bounds{{{least_of(least[0]), least_of(least[1]), least_of(least[2]), 0}, {greatest_of(greatest[0]), greatest_of(greatest[1]), greatest_of(greatest[2]), 0}},
                 no_normals<Normals>()};
   for (int axis = 0; axis < 7; ++axis) {
     Box& box = axis < 3 ? bounds.normals.box : bounds.normals.diagonals;
     const int lane = axis < 3 ? axis : axis - 3;
-    box.least[lane] = least_normals[axis].minCoeff(), box.greatest[lane] = greatest_normals[axis].maxCoeff();
+    box.least[lane] = least_of(least_normals[axis]), box.greatest[lane] = greatest_of(greatest_normals[axis]);
   }
   widen(margin_, bounds.around);
   return bounds;
@@ -385,8 +389,8 @@ void LatticeCrossings::measure_squares(const LatticeMesh& lattice, int first, Tr
     for (int axis = 0; axis < kAxes; ++axis) {
       Box& box = axis < 3 ? bounds.around : axis < 6 ? bounds.normals.box : bounds.normals.diagonals;
       const int lane = axis < 6 ? axis % 3 : axis - 6;
-      box.least[lane] = Eigen::Map<const Four>(ranges.least[axis].data() + kSide * i).minCoeff();
-      box.greatest[lane] = Eigen::Map<const Four>(ranges.greatest[axis].data() + kSide * i).maxCoeff();
+      box.least[lane] = least_of(Eigen::Map<const Four>(ranges.least[axis].data() + kSide * i));
+      box.greatest[lane] = greatest_of(Eigen::Map<const Four>(ranges.greatest[axis].data() + kSide * i));
     }
     widen(margin_, bounds.around);
   }
@@ -581,7 +585,7 @@ bool LatticeCrossings::are_quads_smooth(const LatticeMesh& lattice, int patch, i
     const Four none = 1 - is_any[k / 2 % chunks];
     least = least.min(x * normals[k][0] + y * normals[k][1] + z * normals[k][2] + std::numeric_limits<float>::max() * none);
   }
-  return least.minCoeff() > kLeastCosine * std::sqrt(x * x + y * y + z * z);
+  return least_of(least) > kLeastCosine * std::sqrt(x * x + y * y + z * z);
 }
 
 /// \param columns, rows  out: that there are; others are again the last of these
