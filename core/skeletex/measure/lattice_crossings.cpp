@@ -588,16 +588,12 @@ bool LatticeCrossings::are_quads_smooth(const LatticeMesh& lattice, int patch, i
   return least_of(least) > kLeastCosine * std::sqrt(x * x + y * y + z * z);
 }
 
-/// \param columns, rows  out: that there are; others are again the last of these
-QuadBlock LatticeCrossings::quads_of(const LatticeMesh& lattice, const Node& node, int& columns, int& rows) const {
-  SquareVertices square;
-  view(lattice, node, square);
-  columns = square.columns, rows = square.rows;
+/// Where there are fewer the last row counts again.
+void LatticeCrossings::copy_quads(const Node& node, const SquareVertices& square, QuadBlock& quads) const {
   const int patch = grids_[node.grid].patch, column = kSide * node.column;
-  QuadBlock quads;
   quads.row_step = texture_width_;
   for (int row = 0; row < kSide; ++row) {
-    const int own_row = std::min(row, rows - 1), first = kSide * row;
+    const int own_row = std::min(row, square.rows - 1), first = kSide * row;
     const int texel = texel_of(patch, column, kSide * node.row + own_row);
     for (int axis = 0; axis < 3; ++axis) {
       const float* at = square.axes[axis] + own_row * square.stride;
@@ -605,9 +601,8 @@ QuadBlock LatticeCrossings::quads_of(const LatticeMesh& lattice, const Node& nod
     }
     std::copy_n(square.diagonals[own_row], kSide, quads.take_second.begin() + first);
     for (int k = 0; k < kSide; ++k) quads.own[first + k] = texel + k, quads.right[first + k] = texel + k + 1;
-    if (column + columns == rectangles_[patch].width) quads.right[first + columns - 1] = texel - column;
+    if (column + square.columns == rectangles_[patch].width) quads.right[first + square.columns - 1] = texel - column;
   }
-  return quads;
 }
 
 const TriangleBlock& LatticeCrossings::boxes_of(const LatticeMesh& lattice, int number, const std::vector<char>* is_asked, Leaf& leaf) const {
@@ -617,13 +612,15 @@ const TriangleBlock& LatticeCrossings::boxes_of(const LatticeMesh& lattice, int 
   const Node& node = nodes_[number];
   block.is_asked.fill(1);
   if (grids_[node.grid].end < 0) {
-    int columns, rows;
-    const QuadBlock quads = quads_of(lattice, node, columns, rows);
+    SquareVertices square;
+    view(lattice, node, square);
+    QuadBlock& quads = leaf.quads;
+    copy_quads(node, square, quads);
     fill_boxes(quads, margin_, block);
     for (int i = 0; i < TriangleBlock::kSize; ++i) {
       const int quad = i % QuadBlock::kSize;
       block.numbers[i] = 2 * quads.own[quad] + i / QuadBlock::kSize;
-      if (quad % kSide < columns && quad / kSide < rows) continue;
+      if (quad % kSide < square.columns && quad / kSide < square.rows) continue;
       for (int axis = 0; axis < 3; ++axis) block.least[axis][i] = kInfinity, block.greatest[axis][i] = -kInfinity;
     }
   } else {
@@ -649,8 +646,7 @@ void LatticeCrossings::find_planes_of(const LatticeMesh& lattice, Leaf& leaf) co
   TriangleBlock& block = leaf.triangles;
   const Node& node = nodes_[leaf.node];
   if (grids_[node.grid].end < 0) {
-    int columns, rows;
-    fill_corners(quads_of(lattice, node, columns, rows), lattice.model().origin, block);
+    fill_corners(leaf.quads, lattice.model().origin, block);
   } else {
     const auto [begin, end] = triangles_of_end(node);
     for (int i = 0; i < end - begin; ++i) {

@@ -64,6 +64,7 @@ class LatticeCrossings {
   struct Leaf {
     int node = -1;
     bool has_planes = false;  ///< and corners; else boxes and numbers alone
+    QuadBlock quads;  ///< of a square
     TriangleBlock triangles;
   };
   using Leaves = std::vector<Leaf>;
@@ -121,7 +122,7 @@ class LatticeCrossings {
   bool are_quads_smooth(const LatticeMesh& lattice, int patch, int s, int t) const;
   bool split(const Search& search, const Task& task, std::vector<Task>& tasks) const;
   static Leaves& fresh_leaves();
-  QuadBlock quads_of(const LatticeMesh& lattice, const Node& node, int& columns, int& rows) const;
+  void copy_quads(const Node& node, const SquareVertices& square, QuadBlock& quads) const;
   const TriangleBlock& boxes_of(const LatticeMesh& lattice, int node, const std::vector<char>* is_asked, Leaf& leaf) const;
   void find_planes_of(const LatticeMesh& lattice, Leaf& leaf) const;
   void find_between(const LatticeMesh& lattice, int a, int b, const Box& around_b, const std::vector<char>* is_asked, Leaves& leaves,
