@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Where texels read: from the even lattice to the mesh's own vertices and creased edges.
-//   claim_texels, decide_claims  vertices, strongest first, take the nearest texel that is free
+//   claim_texels, decide_claims, decide_the_rest  vertices, strongest first, take the nearest texel that is free
 //   relax_texels                 free texels follow their neighbours half way
 //   place_on_edges               free texels go to the nearest point of a creased edge
 //   part_colours, join_colours  rows by colour, and back, see below
@@ -99,58 +99,105 @@ void candidate_of(float x, float y, int k, int* column, int* row, float* dx, flo
   *dx = fx - (float)right, *dy = fy - (float)up;
 }
 
-// NDRange (vertices). A vertex that is not placed claims the first of its candidates that it can still have.
-// in   ranks: by strength, from 1; least: 0 or more than all claims of rounds before
-kernel void claim_texels(const int vertex_count, const int texture_width, const int least, global const int* restrict vertex_patches,
-                         global const float* restrict vertex_x, global const float* restrict vertex_y, global const int* restrict ranks, global const PatchRecord* restrict patches,
-                         global const int* restrict anchors, global int* restrict states, global int* restrict claims) {
-  const int v = (int)get_global_id(0);
-  if (v >= vertex_count) return;
-  global const PatchRecord* p = patches + vertex_patches[v];
+// A vertex that is not placed claims the first of its candidates that it can still have.
+// in   least: more than all claims of rounds before; rank: its own by strength, from 1
+__attribute__((always_inline)) void claim_texel(int v, int least, int rank, global const PatchRecord* restrict p, int texture_width, float x, float y,
+                                                global const int* anchors, global int* states, volatile global int* claims) {
   int state = states[v];
   for (; state < 4; ++state) {
     int column, row;
     float dx, dy;
-    candidate_of(vertex_x[v], vertex_y[v], state, &column, &row, &dx, &dy);
+    candidate_of(x, y, state, &column, &row, &dx, &dy);
     if (row < 1 || row > p->height - 2 || dx * dx + dy * dy > REACH * REACH) continue;
     const int texel = coloured_at(p, texture_width, (column % p->width + p->width) % p->width, row);
     if (anchors[texel] != 0) continue;
-    atomic_max(claims + texel, least + ranks[v]);
+    atomic_max(claims + texel, least + rank);
     break;
   }
   states[v] = state;
 }
 
-// NDRange (vertices). A claim that is the strongest on its texel and the eight around is decided: it stands when the map
-// does not fold. `open_count` counts the vertices that wait.
-kernel void decide_claims(const int vertex_count, const int texture_width, const int least, global const int* restrict vertex_patches,
-                          global const float* restrict vertex_x, global const float* restrict vertex_y, global const int* restrict ranks, global const PatchRecord* restrict patches,
-                          global const int* restrict claims, global int* restrict states, global int* restrict anchors, global float* restrict offset_x,
-                          global float* restrict offset_y, global int* restrict open_count) {
-  const int v = (int)get_global_id(0);
-  if (v >= vertex_count || states[v] >= 4) return;
-  global const PatchRecord* p = patches + vertex_patches[v];
+// A claim that is the strongest on its texel and the eight around is decided: it stands when the map does not fold, else the next candidate's turn has come.
+__attribute__((always_inline)) void decide_claim(int v, int least, int rank, global const PatchRecord* restrict p, int texture_width, float x, float y,
+                                                 volatile global const int* claims, global int* states, global int* anchors, global float* offset_x,
+                                                 global float* offset_y) {
   int column, row;
   float dx, dy;
-  candidate_of(vertex_x[v], vertex_y[v], states[v], &column, &row, &dx, &dy);
+  candidate_of(x, y, states[v], &column, &row, &dx, &dy);
   column = (column % p->width + p->width) % p->width;
   int is_strongest = 1;
   for (int i = -1; i <= 1; ++i)
-    for (int j = -1; j <= 1; ++j) is_strongest &= claims[coloured_at(p, texture_width, column + j, row + i)] <= least + ranks[v];
-  if (!is_strongest) {
-    atomic_inc(open_count);
-    return;
-  }
+    for (int j = -1; j <= 1; ++j) is_strongest &= claims[coloured_at(p, texture_width, column + j, row + i)] <= least + rank;
+  if (!is_strongest) return;
   const Neighbours n = neighbours_of(p, texture_width, column, row);
   if (cross_around_one(n, p->height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) {
     states[v] += 1;
-    if (states[v] < 4) atomic_inc(open_count);
     return;
   }
   offset_x[n.own] = dx;
   offset_y[n.own] = dy;
   anchors[n.own] = 1 + v;
   states[v] = PLACED;
+}
+
+// NDRange (vertices). One round: claims.
+kernel void claim_texels(const int vertex_count, const int texture_width, const int least, global const int* restrict vertex_patches,
+                         global const float* restrict vertex_x, global const float* restrict vertex_y, global const int* restrict ranks, global const PatchRecord* restrict patches,
+                         global const int* restrict anchors, global int* restrict states, global int* restrict claims) {
+  const int v = (int)get_global_id(0);
+  if (v < vertex_count)
+    claim_texel(v, least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v], anchors, states, claims);
+}
+
+// NDRange (vertices). One round: decisions.
+kernel void decide_claims(const int vertex_count, const int texture_width, const int least, global const int* restrict vertex_patches,
+                          global const float* restrict vertex_x, global const float* restrict vertex_y, global const int* restrict ranks, global const PatchRecord* restrict patches,
+                          global const int* restrict claims, global int* restrict states, global int* restrict anchors, global float* restrict offset_x,
+                          global float* restrict offset_y) {
+  const int v = (int)get_global_id(0);
+  if (v < vertex_count && states[v] < 4)
+    decide_claim(v, least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v], claims, states, anchors, offset_x, offset_y);
+}
+
+// NDRange: one work-group of ROW_ITEMS. All further rounds, which are of few vertices. Every round decides at least the strongest claim that is open.
+// in   least: of the first of them; step: from one round's to the next
+// out  open: what else the kernel needs, two numbers per vertex
+kernel void decide_the_rest(const int vertex_count, const int texture_width, const int texel_count, const int least, const int step,
+                            global const int* restrict vertex_patches, global const float* restrict vertex_x, global const float* restrict vertex_y,
+                            global const int* restrict ranks, global const PatchRecord* restrict patches, volatile global int* claims, global int* states,
+                            global int* anchors, global float* offset_x, global float* offset_y, global int* open) {
+  local int counts[2];
+  const int own = (int)get_local_id(0);
+  if (own == 0) counts[0] = counts[1] = 0;
+  WAIT_FOR_GROUP(CLK_LOCAL_MEM_FENCE);
+  for (int v = own; v < vertex_count; v += ROW_ITEMS)
+    if (states[v] < 4) open[atomic_inc(counts)] = v;
+  int round_least = least;
+  for (int list = 0;; list = !list) {
+    WAIT_FOR_GROUP(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
+    const int count = counts[list];
+    if (count == 0) break;
+    global const int* from = open + list * vertex_count;
+    global int* to = open + !list * vertex_count;
+    if (round_least > 0x7fffffff - 2 * step) {
+      for (int i = own; i < texel_count; i += ROW_ITEMS) claims[i] = 0;
+      round_least = 0;
+      WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
+    }
+    for (int i = own; i < count; i += ROW_ITEMS) {
+      const int v = from[i];
+      claim_texel(v, round_least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v], anchors, states, claims);
+    }
+    WAIT_FOR_GROUP(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
+    if (own == 0) counts[list] = 0;
+    for (int i = own; i < count; i += ROW_ITEMS) {
+      const int v = from[i];
+      if (states[v] < 4)
+        decide_claim(v, round_least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v], claims, states, anchors, offset_x, offset_y);
+      if (states[v] < 4) to[atomic_inc(counts + !list)] = v;
+    }
+    round_least += step;
+  }
 }
 
 typedef struct Offset {

@@ -19,7 +19,7 @@ constexpr int kFirstRelaxPasses = 3, kRelaxPasses = 1;
 constexpr int kEdgeRounds = 2;          // what one round has moved lets texels through that the fold test had stopped
 constexpr double kFlat = 1e-6;          // radians: what rounding may make of a flat edge
 constexpr double kFullDihedral = 0.5;   // radians: edges this sharp attract texels fully
-constexpr int kRoundsBetweenReads = 3;  // of claims, between two looks at how many wait
+constexpr int kWideRounds = 3;          // of claims with a work-item per vertex; hardly any are open after them
 
 /// One work-item per vertex or edge, in groups of one size: PoCL compiles a kernel for every size that it meets.
 ClRange over(int count) { return {{static_cast<std::size_t>(count), 1}, {64, 1}}; }
@@ -215,21 +215,19 @@ void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const Snap
   const int count = static_cast<int>(tables.vertex_x.size());
   const auto patch = context.upload(tables.vertex_patches), rank = context.upload(tables.vertex_ranks);
   const auto x = context.upload(tables.vertex_x), y = context.upload(tables.vertex_y);
-  auto states = context.allocate<int>(count), open = context.allocate<int>(1);
-  context.fill(states, 0), context.fill(open, 0);
+  auto states = context.allocate<int>(count), open = context.allocate<int>(2 * static_cast<std::size_t>(count));
+  context.fill(states, 0);
   // A claim is more than all of the rounds before, so these need not be taken off.
-  const int bits = std::bit_width(static_cast<unsigned>(count)), rounds_at_once = 0x7fffffff >> bits;
-  // Every round decides at least the strongest claim that is open, so this ends; it takes some ten rounds.
-  for (int round = 0, waiting = count; waiting > 0; waiting = context.download(open)[0])
-    for (int i = 0; i < kRoundsBetweenReads; ++i, ++round) {
-      const int least = round % rounds_at_once << bits;
-      if (least == 0 && round > 0) context.fill(claims, 0);
-      if (i + 1 == kRoundsBetweenReads) context.fill(open, 0);
-      context.launch({"snap.cl", "claim_texels"}, over(count), count, layout.width, least, patch, x, y, rank, layout.patches, positions.anchors, states,
-                     claims);
-      context.launch({"snap.cl", "decide_claims"}, over(count), count, layout.width, least, patch, x, y, rank, layout.patches, claims, states,
-                     positions.anchors, positions.x, positions.y, open);
-    }
+  const int step = 1 << std::bit_width(static_cast<unsigned>(count));
+  for (int round = 0; round < kWideRounds; ++round) {
+    context.launch({"snap.cl", "claim_texels"}, over(count), count, layout.width, round * step, patch, x, y, rank, layout.patches, positions.anchors, states,
+                   claims);
+    context.launch({"snap.cl", "decide_claims"}, over(count), count, layout.width, round * step, patch, x, y, rank, layout.patches, claims, states,
+                   positions.anchors, positions.x, positions.y);
+  }
+  // One work-group: on a CPU one work-item.
+  context.launch({"snap.cl", "decide_the_rest"}, row_range(context, 1), count, layout.width, static_cast<int>(layout.size()), kWideRounds * step, step, patch,
+                 x, y, rank, layout.patches, claims, states, positions.anchors, positions.x, positions.y, open);
 }
 
 }  // namespace
