@@ -8,6 +8,7 @@
 // The last two can only find too large a distance, where the nearest point lies elsewhere. Vertices of the lattice are texels; triangles
 // 2 t and 2 t + 1 are those of the quad to the right of and above texel t, by the diagonals that lattice.cl chooses.
 #include "skeletex_structs.h"
+#include "extremes.h"
 #include "map_triangle.h"
 #include "mesh_walk.h"
 #include "patch_texels.h"
@@ -57,15 +58,12 @@ __attribute__((always_inline)) float rise(Point side, Point normal) { return sum
 // half the larger rise and the smaller one, and nothing where the side lies in either plane, as sides of triangles at snapped edges do.
 __attribute__((always_inline)) float suspicion_of_side(Point side, Point normal, Point other_normal) {
   const float p = rise(side, normal), q = rise(side, other_normal);
-  return p * q / fmax(p + q, FLT_MIN);
+  return p * q / greater(p + q, FLT_MIN);
 }
 
-// The square of how far a triangle could be; infinite where it looks against the mesh at a corner.
-__attribute__((always_inline)) float suspicion2_of(Point a, Point b, Point c, Point at_a, Point at_b, Point at_c) {
-  const Point ab = minus(b, a), ac = minus(c, a), bc = minus(c, b);
-  const Point own = cross_of(ab, ac);
-  const float most = fmax(suspicion_of_side(ab, at_a, at_b), fmax(suspicion_of_side(ac, at_a, at_c), suspicion_of_side(bc, at_b, at_c)));
-  return fmin(product(own, at_a), fmin(product(own, at_b), product(own, at_c))) < 0.0f ? INFINITY : most * most;
+__attribute__((always_inline)) int looks_against(Point a, Point b, Point c, Point at_a, Point at_b, Point at_c) {
+  const Point own = cross_of(minus(b, a), minus(c, a));
+  return lesser(product(own, at_a), lesser(product(own, at_b), product(own, at_c))) < 0.0f;
 }
 
 __attribute__((always_inline)) Point normal_at(int texel, int texel_count, global const float* texel_normals) {
@@ -79,8 +77,13 @@ __attribute__((always_inline)) float suspicion2_of_quad(int texel, int right, in
   const Point a = point_at(x, y, z, texel), b = point_at(x, y, z, right), c = point_at(x, y, z, beyond), d = point_at(x, y, z, above);
   const Point at_a = normal_at(texel, texel_count, texel_normals), at_b = normal_at(right, texel_count, texel_normals);
   const Point at_c = normal_at(beyond, texel_count, texel_normals), at_d = normal_at(above, texel_count, texel_normals);
-  return fmax(suspicion2_of(a, b, either(is_second, d, c), at_a, at_b, either(is_second, at_d, at_c)),
-              suspicion2_of(either(is_second, b, a), c, d, either(is_second, at_b, at_a), at_c, at_d));
+  // Its sides, and the diagonal, which both triangles share.
+  const Point from = either(is_second, b, a), to = either(is_second, d, c), at_from = either(is_second, at_b, at_a), at_to = either(is_second, at_d, at_c);
+  const float rows = greater(suspicion_of_side(minus(b, a), at_a, at_b), suspicion_of_side(minus(d, c), at_c, at_d));
+  const float columns = greater(suspicion_of_side(minus(d, a), at_a, at_d), suspicion_of_side(minus(c, b), at_b, at_c));
+  const float most = greater(suspicion_of_side(minus(to, from), at_from, at_to), greater(rows, columns));
+  const int is_turned = looks_against(a, b, to, at_a, at_b, at_to) | looks_against(from, c, d, at_from, at_c, at_d);
+  return is_turned ? INFINITY : most * most;
 }
 
 // The same, compiled once.

@@ -12,6 +12,7 @@
 // Texels never look at each other's offsets where these may change: claims wait for stronger ones next to them, the other kernels take
 // even and odd rows apart, and in each of them one colour after the other (see colour_of). So nothing depends on the order of work-items.
 #include "skeletex_structs.h"
+#include "extremes.h"
 #include "patch_texels.h"
 #include "row_group.h"
 
@@ -53,9 +54,6 @@ Neighbours neighbours_of(global const PatchRecord* restrict p, int texture_width
                         coloured_at(p, texture_width, column + 1, row)};
   return n;
 }
-
-// Without fmin's care for NaN, which takes three instructions.
-__attribute__((always_inline)) float lesser(float a, float b) { return a < b ? a : b; }
 
 // The three corners of the quad (0, 0), a, b, c, counter-clockwise, whose cross product depends on (0, 0).
 __attribute__((always_inline)) float least_cross(float ax, float ay, float bx, float by, float cx, float cy) {
