@@ -131,7 +131,7 @@ void run(const Arguments& arguments) {
   if (arguments.models.size() > 2) throw CLI::ValidationError("one model, or two that correspond");
   check_json_target(arguments.json);
   const std::vector<std::string> names = stages_of(arguments);
-  ClContext context(arguments.device);
+  ClContext& context = open_device(arguments.device);
   Inputs inputs(context, arguments);
   Repeats repeats;
   if (arguments.repeats > 0) repeats = {.most = arguments.repeats, .least = arguments.repeats};

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <memory>
 
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/mesh_file.h"
@@ -95,6 +96,11 @@ double Stopwatch::lap_ms() {
   const double ms = std::chrono::duration<double, std::milli>(now - begin_).count();
   begin_ = now;
   return ms;
+}
+
+ClContext& open_device(const std::string& selector) {
+  static std::vector<std::unique_ptr<ClContext>> open;
+  return *open.emplace_back(std::make_unique<ClContext>(selector));
 }
 
 Json profile_json(ClContext& context) {

@@ -73,6 +73,10 @@ class Stopwatch {
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
+/// A device until the process ends, which does not take its driver apart (main.cpp).
+/// \param selector  as of ClContext    \throw DeviceError
+ClContext& open_device(const std::string& selector);
+
 /// Time on the device by kernel, for the JSON.
 Json profile_json(ClContext& context);
 

@@ -229,10 +229,10 @@ void run(const Arguments& arguments, const CLI::App& command) {
   bar->show("reading and checking the input", 0);
   // A driver takes as long to load as the input. It stays on this thread, as some keep state per thread.
   auto reading = std::async(std::launch::async, [&] { return read_input(arguments, options); });
-  std::unique_ptr<ClContext> loaded;
+  ClContext* loaded = nullptr;
   std::exception_ptr no_device;
   try {
-    loaded = std::make_unique<ClContext>(arguments.device);
+    loaded = &open_device(arguments.device);
     prepare_encoding(*loaded, options, second);
   } catch (...) {
     no_device = std::current_exception();

@@ -64,7 +64,7 @@ void run_curvature(const Arguments& arguments) {
   if (!arguments.output.ends_with(".ply")) throw IoError(fmt::format("{}: curvature is written as a mesh with values: .ply", arguments.output));
   check_output(arguments.output);
   const SkeletexModel stored = read_model(arguments.model);
-  ClContext context(arguments.device);
+  ClContext& context = open_device(arguments.device);
   Stopwatch watch;
   const SkeletexModel model = even_lattice(context, stored);  // as for filters: slivers slow the solver down
   const ModelSurface surface = upload_surface(context, model);
@@ -110,7 +110,7 @@ void run(const Arguments& arguments) {
   }
   check_result(arguments.output);
   const SkeletexModel model = read_model(arguments.model);
-  ClContext context(arguments.device);
+  ClContext& context = open_device(arguments.device);
   Stopwatch watch;
   const FilterResult result = apply_filter(context, model, arguments);
   const double filter_ms = watch.lap_ms();

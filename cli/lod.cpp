@@ -26,7 +26,7 @@ void run(const Arguments& arguments) {
   if (arguments.has_levels && !arguments.output.ends_with(".exr"))
     throw IoError(fmt::format("{}: levels are written as one model with several parts: .skx.exr", arguments.output));
   const SkeletexModel model = read_model(arguments.model);
-  ClContext context(arguments.device);
+  ClContext& context = open_device(arguments.device);
   Stopwatch watch;
   Json json;
   std::string text;

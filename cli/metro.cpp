@@ -66,7 +66,7 @@ void run(const Arguments& arguments) {
   if (!arguments.ply.empty() && !arguments.ply.ends_with(".ply"))
     throw CLI::ValidationError("--ply", "\"" + arguments.ply + "\" does not end in .ply");
   const TriangleMesh a = load_surface(arguments.a), b = load_surface(arguments.b);
-  ClContext context(arguments.device);
+  ClContext& context = open_device(arguments.device);
   MetroReport report;
   {
     ProgressBar bar;

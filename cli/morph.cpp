@@ -78,7 +78,7 @@ void run(const Arguments& arguments) {
     models.push_back(read_model(path));
     if (models.size() > 1) from_first.push_back(correspond(arguments.models[0], models[0].skeleton, path, models.back().skeleton, given));
   }
-  ClContext context(arguments.device);
+  ClContext& context = open_device(arguments.device);
   MorphOptions options;
   if (arguments.layout > 0) options.layout = arguments.layout - 1;
   options.size = arguments.size;

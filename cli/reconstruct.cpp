@@ -49,7 +49,7 @@ void run(const Arguments& arguments) {
     posed = apply_pose(model.skeleton, pose_at(model.skeleton, animation, arguments.time.value_or(animation.frames.front().time)));
   }
   const double read_ms = watch.lap_ms();
-  ClContext context(arguments.device);
+  ClContext& context = open_device(arguments.device);
   const double start_ms = watch.lap_ms();
   double resample_ms = 0, reconstruct_ms = 0, write_ms = 0;
   TriangleMesh mesh;

@@ -215,7 +215,7 @@ void run(Arguments arguments) {
     write_json(arguments.json, {{"picture", arguments.output}, {"mode", arguments.mode}, {"size", {model.texture.width, model.texture.height}}});
     return;
   }
-  ClContext context(arguments.device);
+  ClContext& context = open_device(arguments.device);
   ProgressBar bar;
   bar.show("reading", 0.05);
   Subject subject = load_subject(arguments, context);

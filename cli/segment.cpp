@@ -27,7 +27,7 @@ void run(const Arguments& arguments) {
   check_json_target(arguments.json);
   TriangleMesh mesh = load_mesh(arguments.mesh);
   const Skeleton skeleton = read_skeleton(arguments.skeleton);
-  ClContext context(arguments.device);
+  ClContext& context = open_device(arguments.device);
   Segmentation segmentation;
   double half_edge_ms = 0, segmentation_ms = 0;
   {

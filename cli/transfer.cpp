@@ -90,7 +90,7 @@ void run(const Arguments& arguments) {
     check_bone(arguments.target, target.skeleton, to);
   }
   if (arguments.is_mirrored) source = mirrored(source);
-  ClContext context(arguments.device);
+  ClContext& context = open_device(arguments.device);
   Json json;
   std::vector<TransferredPart> parts;
   {

@@ -27,7 +27,7 @@ void run(const Arguments& arguments) {
   check_json_target(arguments.json);
   TriangleMesh mesh = load_mesh(arguments.mesh);
   const Skeleton skeleton = read_skeleton(arguments.skeleton);
-  ClContext context(arguments.device);
+  ClContext& context = open_device(arguments.device);
   std::vector<Finding> findings;
   {
     ProgressBar bar;
