@@ -71,34 +71,33 @@ __attribute__((always_inline)) void choose_smoother(const int column, const int 
   }
 }
 
-// NDRange: one work-group of ROW_ITEMS per band of rows.
+// NDRange: one work-group of ROW_ITEMS per band of rows and BAND_COLUMNS of the widest one's columns: many, so that none is behind for long.
 // in   lattice_rows: the rows that quads begin at, of each patch one after the other; band: how many of them a group takes
 // out  diagonals: per texel 1 for the second
 kernel void choose_diagonals(const int row_count, const int band, const int texture_width, const int is_smooth, global const int* restrict lattice_rows,
                              global const PatchRecord* restrict patches, global const float* restrict x, global const float* restrict y,
                              global const float* restrict z, global int* restrict diagonals) {
   local float kept[36 * BAND_LINE];
-  const int band_end = min((int)(get_group_id(0) + 1) * band, row_count);
+  const int band_end = min((int)(get_group_id(0) + 1) * band, row_count), column = 1 + BAND_COLUMNS * get_group_id(1);
   for (int begin = get_group_id(0) * band, end; begin < band_end; begin = end) {
     for (end = begin + 1; end < band_end && lattice_rows[4 * end] == lattice_rows[4 * begin];) ++end;
     global const PatchRecord* restrict patch = patches + lattice_rows[4 * begin];
-    const int first_row = lattice_rows[4 * begin + 1], rows = end - begin, width = patch->width;
+    const int first_row = lattice_rows[4 * begin + 1], rows = end - begin, width = patch->width, column_end = min(column + BAND_COLUMNS, width - 2);
     // What wraps round apart from the rest, whose loads are contiguous. Distances are not written as the numbers that they are, or
     // the compiler pairs loads next to each other and then no longer vectorises the loop.
     const int one = min(width, 1);
-    for (int column = 1; is_smooth && column < width - 2; column += BAND_COLUMNS)
-      choose_smoother(column, min(BAND_COLUMNS, width - 2 - column), first_row, rows, texture_width, one, patch, kept, x, y, z, diagonals);
+    if (is_smooth && column < column_end) choose_smoother(column, column_end - column, first_row, rows, texture_width, one, patch, kept, x, y, z, diagonals);
     WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
     for (int row = first_row; row < first_row + rows; ++row) {
       const int texel = (patch->y + row) * texture_width + patch->x, has_before = row > 1, has_after = row + 2 < patch->height - 1;
-      for (int j = 1 + get_local_id(0); j < width - 2; j += ROW_ITEMS) {
+      for (int j = column + get_local_id(0); j < column_end; j += ROW_ITEMS) {
         const int smoother = diagonals[texel + j];
         const int nearer = second_diagonal(texel + j, -one, one, 2 * one, texture_width, has_before, has_after, 0, x, y, z);
         diagonals[texel + j] = !is_smooth ? nearer : smoother < 0 ? nearer : smoother;
       }
-      for (int j = max(1, width - 2) + get_local_id(0); j <= width; j += ROW_ITEMS) {
-        const int column = j < width ? j : 0;
-        diagonals[texel + column] = second_diagonal_at(texel + column, column, width, texture_width, has_before, has_after, is_smooth, x, y, z);
+      for (int j = max(1, width - 2) + get_local_id(0); get_group_id(1) == 0 && j <= width; j += ROW_ITEMS) {
+        const int at_end = j < width ? j : 0;
+        diagonals[texel + at_end] = second_diagonal_at(texel + at_end, at_end, width, texture_width, has_before, has_after, is_smooth, x, y, z);
       }
     }
   }

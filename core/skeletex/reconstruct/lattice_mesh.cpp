@@ -11,7 +11,7 @@ namespace skeletex {
 
 namespace {
 
-constexpr int kBandRows = 16;  // of choose_diagonals: each group works out the normals of two rows more
+constexpr int kBandRows = 16, kBandColumns = 64;  // of choose_diagonals, columns as in lattice.cl: each group works out the normals of two rows more
 
 /// Poles, samples of seams and corners of a lattice alone, which has no more vertices.
 Lattice without_rows(Lattice lattice) {
@@ -62,7 +62,11 @@ LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, Diagona
   planes_ = {context.download(points_.x), context.download(points_.y), context.download(points_.z)};
   device_diagonals_ = context.allocate<int>(texel_count());
   const int rows = static_cast<int>(common_->rows.size);
-  context.launch({"lattice.cl", "choose_diagonals"}, row_range(context, (rows + kBandRows - 1) / kBandRows), rows, kBandRows, model.texture.width, static_cast<int>(rule == DiagonalRule::kSmooth),
+  int widest = 0;
+  for (const Patch& patch : model.patches) widest = std::max(widest, patch.rectangle.width);
+  ClRange groups = row_range(context, (rows + kBandRows - 1) / kBandRows);
+  groups.global[1] = (widest + kBandColumns - 1) / kBandColumns;
+  context.launch({"lattice.cl", "choose_diagonals"}, groups, rows, kBandRows, model.texture.width, static_cast<int>(rule == DiagonalRule::kSmooth),
                  common_->rows, common_->patches, points_.x, points_.y, points_.z, device_diagonals_);
   for_each_pole(model, common_->ends, [&](int vertex, int, int, std::size_t texel) { end_positions_[vertex] = position(static_cast<int>(texel)); });
   for (const Vec3& place : end_positions_) {
