@@ -129,7 +129,7 @@ class ClContext {
   }
 
   /// Queues a kernel. Arguments: ClBuffer, ClLocal, or trivially copyable scalars of the kernel's own types (int,
-  /// unsigned, float). Programs are built on first use and kept, see files_of_program.
+  /// unsigned, float). Programs are built on first use and kept, see programs_with.
   /// \throw DeviceError naming the kernel, the failing call and its code in words; the argument whose number or kind is
   ///        not the kernel's own (kinds where the driver tells them); for a build the log with the kernel file's lines
   template <class... Args>
