@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Where texels read: from the even lattice to the mesh's own vertices and creased edges.
-//   claim_texels, decide_claims, decide_the_rest  vertices, strongest first, take the nearest texel that is free
-//   relax_texels                 free texels follow their neighbours half way
-//   place_on_edges               free texels go to the nearest point of a creased edge
+//   claim_texels, decide_claims, decide_the_rest
+//                               vertices, strongest first, take the nearest texel that is free
+//   relax_texels                free texels follow their neighbours half way
+//   place_on_edges              free texels go to the nearest point of a creased edge
 //   part_colours, join_colours  rows by colour, and back, see below
-//   put_listed_back              texels of a list, and what then folds in the map or in space, go back to the even lattice
+//   put_listed_back             texels of a list, and what then folds in the map or in space, go back to the even lattice
 // A reading position is an offset from the texel's own place in the lattice, in cells: two planes over the texture, x
 // around, y along. Rows 0 and height-1 stay. `anchors` says what holds a texel: 0 nothing, 1 + i vertex i of the list
 // of vertices, -1 - i edge i. Vertices and edges come with their patch and their place (x, y) in its cells, x unwrapped.
@@ -140,7 +141,8 @@ __attribute__((always_inline)) void decide_claim(int v, int least, int rank, glo
 
 // NDRange (vertices). One round: claims.
 kernel void claim_texels(const int vertex_count, const int texture_width, const int least, global const int* restrict vertex_patches,
-                         global const float* restrict vertex_x, global const float* restrict vertex_y, global const int* restrict ranks, global const PatchRecord* restrict patches,
+                         global const float* restrict vertex_x, global const float* restrict vertex_y, global const int* restrict ranks,
+                         global const PatchRecord* restrict patches,
                          global const int* restrict anchors, global int* restrict states, global int* restrict claims) {
   const int v = (int)get_global_id(0);
   if (v < vertex_count)
@@ -149,7 +151,8 @@ kernel void claim_texels(const int vertex_count, const int texture_width, const 
 
 // NDRange (vertices). One round: decisions.
 kernel void decide_claims(const int vertex_count, const int texture_width, const int least, global const int* restrict vertex_patches,
-                          global const float* restrict vertex_x, global const float* restrict vertex_y, global const int* restrict ranks, global const PatchRecord* restrict patches,
+                          global const float* restrict vertex_x, global const float* restrict vertex_y, global const int* restrict ranks,
+                          global const PatchRecord* restrict patches,
                           global const int* restrict claims, global int* restrict states, global int* restrict anchors, global float* restrict offset_x,
                           global float* restrict offset_y) {
   const int v = (int)get_global_id(0);
