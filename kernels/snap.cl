@@ -11,7 +11,7 @@
 // of vertices, -1 - i edge i. Vertices and edges come with their patch and their place (x, y) in its cells, x unwrapped.
 // While texels snap, each row of a patch has its even columns first, then its odd ones: those of a colour and their neighbours lie side by side.
 // Texels never look at each other's offsets where these may change: claims wait for stronger ones next to them, the other kernels take
-// even and odd rows apart, and in each of them one colour after the other (see colour_of). So nothing depends on the order of work-items.
+// even and odd rows apart, and in each of them one colour after the other (see row_colour). So nothing depends on the order of work-items.
 #include "skeletex_structs.h"
 #include "extremes.h"
 #include "patch_texels.h"
