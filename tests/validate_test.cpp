@@ -11,6 +11,7 @@
 #include <set>
 
 #include "skeletex/encode/encode_model.h"
+#include "skeletex/model/error.h"
 #include "skeletex/measure/manifold.h"
 #include "skeletex/validate/findings.h"
 #include "skeletex/validate/surface_probe.h"
@@ -135,6 +136,8 @@ TEST(Validate, TheTreeItHandsOverIsThatOfTheMeshAsItIsThen) {
   EXPECT_EQ(same.along, texels.along);
   EXPECT_EQ(same.around, texels.around);
   EXPECT_EQ(same.out, texels.out);
+  options.tree = &expected;
+  EXPECT_THROW(encode_model(context(), bear.mesh, bear.skeleton, options), InputError);
 }
 
 TEST(Validate, AHoleIsFoundWithItsPlace) {

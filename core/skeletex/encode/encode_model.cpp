@@ -140,6 +140,8 @@ int pole_of(const Chart& chart, ChartVertex kind) {
 
 EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& input_skeleton, const EncodeOptions& options) {
   check_options(options, input_skeleton);
+  if (options.tree && options.tree->order.size() != mesh.triangles.size())
+    throw InputError(fmt::format("the tree is of {} triangles, the mesh has {}; give the mesh's own, or none", options.tree->order.size(), mesh.triangles.size()));
   const auto progress = [&](const char* stage, double done) {
     if (options.progress && !options.progress(stage, done)) throw Error("cancelled");
   };

@@ -43,7 +43,7 @@ struct EncodeOptions {
   std::optional<bool> has_fit;
   std::optional<DiagonalRule> diagonals;  ///< default: smooth with snapping or fit, else nearest
   std::optional<TexelShare> texel_share;  ///< default: area for all-SPD models, triangles otherwise
-  /// Of the mesh, as validate_before_segmentation has built it; without, it is built where it is needed.
+  /// Of the mesh, as validate_before_segmentation has built it; without, it is built where it is needed. Another mesh's is an error.
   const TriangleTree* tree = nullptr;
   /// Called with a stage's name and the share of work done; returning false cancels by throwing Error.
   std::function<bool(const std::string& stage, double done)> progress;

@@ -276,6 +276,7 @@ void snap_positions(ClContext& context, const DeviceLayout& layout, const SnapTa
   relax(kRelaxPasses);
   for (const int parity : {0, 1})
     for_rows("join_colours", parity, rows[parity], layout.patches, spare, positions.x, positions.y, positions.anchors, positions.parameters);
+  // Each plane is now in the memory of the one before, where it is as large and 0 outside of those rows.
   std::swap(positions.parameters.memory, positions.anchors.memory), std::swap(positions.anchors.memory, positions.y.memory);
   std::swap(positions.y.memory, positions.x.memory), std::swap(positions.x.memory, spare.memory);
 }

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 
+#include "skeletex/measure/wide_too.h"
 #include "skeletex/model/parallel.h"
 
 namespace skeletex {
@@ -29,11 +30,8 @@ std::uint64_t spread(std::uint64_t bits) {
 constexpr int kLanes = 8;
 using Cells = std::array<std::array<std::uint32_t, kLanes>, 3>;  // by coordinate
 
-/// Of eight cells at a time: loops over these are vector instructions. A compiler that can makes them once more for processors with wider ones.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-__attribute__((target_clones("avx2", "default")))
-#endif
-std::array<std::uint64_t, kLanes> keys_of(const Cells& cells) {
+/// Positions of eight cells along the curve (Skilling 2004).
+SKELETEX_WIDE_TOO std::array<std::uint64_t, kLanes> keys_of(const Cells& cells) {
   std::array<std::uint32_t, kLanes> x = cells[0], y = cells[1], z = cells[2];
   constexpr std::uint32_t kTop = 1u << (kBits - 1);
   const auto turn = [&](std::array<std::uint32_t, kLanes>& axis, std::uint32_t q) {
@@ -71,12 +69,6 @@ void sort_by_key(std::vector<KeyAndIndex>& items) {
 }
 
 }  // namespace
-
-std::uint64_t hilbert_key(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
-  Cells cells{};
-  cells[0][0] = x, cells[1][0] = y, cells[2][0] = z;
-  return keys_of(cells)[0];
-}
 
 std::vector<int> hilbert_order(std::span<const Vec3> points) {
   std::vector<int> order(points.size());

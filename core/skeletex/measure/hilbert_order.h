@@ -13,7 +13,4 @@ namespace skeletex {
 /// \pre all coordinates are finite
 std::vector<int> hilbert_order(std::span<const Vec3> points);
 
-/// Position of a cell along the Hilbert curve (Skilling 2004); coordinates below 2^16.
-std::uint64_t hilbert_key(std::uint32_t x, std::uint32_t y, std::uint32_t z);
-
 }  // namespace skeletex

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "skeletex/measure/self_intersection.h"
+#include "skeletex/measure/wide_too.h"
 #include "skeletex/model/parallel.h"
 
 namespace skeletex {
@@ -115,13 +116,10 @@ struct Ranges {
   std::array<std::array<float, kCount>, kAxes> least, greatest;
 };
 
-/// Adds those of sixteen quads side by side. Loops over them are vector instructions, and a compiler that can makes them once more for processors with
-/// wider ones.
+/// Adds those of sixteen quads side by side.
 /// \param planes, take_second  at the first vertex of all
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-__attribute__((target_clones("avx2", "default")))
-#endif
-void add_quads(const std::array<const float*, 3>& planes, const int* __restrict take_second, int stride, Ranges<kColumnsAtOnce>& __restrict ranges) {
+SKELETEX_WIDE_TOO void add_quads(const std::array<const float*, 3>& planes, const int* __restrict take_second, int stride,
+                                 Ranges<kColumnsAtOnce>& __restrict ranges) {
   using Lanes = std::array<float, kColumnsAtOnce>;
   const float *__restrict x = planes[0], *__restrict y = planes[1], *__restrict z = planes[2];
   const float *__restrict x_above = x + stride, *__restrict y_above = y + stride, *__restrict z_above = z + stride;

@@ -4,12 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-// A compiler that can makes functions once more for processors with wider vectors.
-#if defined(__x86_64__) && defined(__GNUC__) && __GNUC__ >= 12 && !defined(__clang__)
-#define SKELETEX_WIDE_TOO __attribute__((target_clones("arch=x86-64-v3", "default")))
-#else
-#define SKELETEX_WIDE_TOO
-#endif
+#include "skeletex/measure/wide_too.h"
 
 namespace skeletex {
 namespace {
