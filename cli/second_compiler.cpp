@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <cstdlib>
 
 namespace skeletex::cli {
 
@@ -24,6 +25,7 @@ SecondCompiler::SecondCompiler(const std::function<void(const std::function<bool
   close(ends[1]);
   char order = 0;
   if (read(ends[0], &order, 1) != 1) _exit(0);
+  unsetenv("POCL_AFFINITY");  // not on the processor where the first process compiles
   // Nobody shall wait for this process to close what it has inherited.
   const int nowhere = open("/dev/null", O_RDWR);
   for (const int stream : {0, 1, 2}) dup2(nowhere, stream);

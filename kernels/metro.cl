@@ -7,6 +7,7 @@
 //       blocks           nine vectors per block of eight triangles: first vertex, edge to the second, edge to the third
 //       level_begin      per level of the tree, its first node in `boxes`; level 0 are the blocks
 //                        (layout: core/skeletex/measure/triangle_tree.h)
+//       enough_squared   a triangle so near need not be the nearest; 0: always the nearest
 // Out:  nearest          per point, the nearest triangle's place in the tree
 //       nearest_squared  per point, its squared distance, as exact as float32 allows
 // NDRange: one item per `run` consecutive points.
@@ -72,7 +73,7 @@ inline float8 squared_to_boxes(global const float8* restrict node, const float p
 
 kernel void find_nearest_triangles(global const float* restrict px, global const float* restrict py, global const float* restrict pz,
                                    const int count, const int run, global const float8* restrict boxes, global const float8* restrict blocks,
-                                   constant int* restrict level_begin, const int top_level, global int* restrict nearest,
+                                   constant int* restrict level_begin, const int top_level, const float enough_squared, global int* restrict nearest,
                                    global float* restrict nearest_squared) {
   const int begin = (int)get_global_id(0) * run;
   const int end = min(begin + run, count);
@@ -91,7 +92,7 @@ kernel void find_nearest_triangles(global const float* restrict px, global const
     float stack_squared[STACK_SIZE];
     int size = 0;
     int level = top_level, index = 0;
-    while (true) {
+    while (best > enough_squared) {
       if (level > 0) {
         const float8 squared = squared_to_boxes(boxes + 6 * (level_begin[level] + index), x, y, z);
         uint lanes = bits_of(squared < (float8)(best));

@@ -154,7 +154,7 @@ class Distances {
     std::vector<int> nearest;
     for (float limit = kEvenWorthALook * furthest; furthest > 0; limit = furthest) {
       furthest = 0;
-      for (const float distance : measure_exactly(lattice, above(limit), nearest)) furthest = std::max(furthest, distance);
+      for (const float distance : measure_exactly(lattice, above(limit), 0, nearest)) furthest = std::max(furthest, distance);
       if (furthest >= limit) break;
     }
     return furthest;
@@ -172,7 +172,7 @@ class Distances {
     std::vector<int> suspects, nearest;
     for (const Measured& each : measured)
       if (each.distance > limit) suspects.push_back(each.triangle);
-    const std::vector<float> exact = measure_exactly(lattice, suspects, nearest);
+    const std::vector<float> exact = measure_exactly(lattice, suspects, limit, nearest);
     std::size_t next = 0;
     for (Measured& each : measured)
       if (each.distance > limit) each.distance = exact[next++];
@@ -387,7 +387,7 @@ class Distances {
       else if (asked[k] >= lattice.first_end_triangle()) unmapped.push_back(asked[k]);
     }
     std::vector<int> nearest;
-    const std::vector<float> exact = measure_exactly(lattice, unmapped, nearest);
+    const std::vector<float> exact = measure_exactly(lattice, unmapped, 0, nearest);
     for (std::size_t k = 0; k < unmapped.size(); ++k) measured.push_back({unmapped[k], exact[k], looks_against(lattice, unmapped[k], nearest[k])});
     return measured;
   }
@@ -401,7 +401,7 @@ class Distances {
     for (const Measured& each : measured)
       if (each.is_turned) suspects.push_back(each.triangle);
     std::vector<float> distances;
-    find(lattice, suspects, kMiddle, nearest, distances);
+    find(lattice, suspects, kMiddle, 0, nearest, distances);
     std::size_t next = 0;
     for (Measured& each : measured) {
       if (!each.is_turned) continue;
@@ -410,11 +410,12 @@ class Distances {
     }
     return turned;
   }
-  /// \param nearest  out: to their middles
-  std::vector<float> measure_exactly(const LatticeMesh& lattice, const std::vector<int>& asked, std::vector<int>& nearest) {
+  /// \param enough   what is nearer need not be exact
+  /// \param nearest  out: to their middles, where exact
+  std::vector<float> measure_exactly(const LatticeMesh& lattice, const std::vector<int>& asked, float enough, std::vector<int>& nearest) {
     std::vector<float> most(asked.size(), 0), distances;
     std::vector<int> triangles;
-    find(lattice, asked, kPlaces, triangles, distances);
+    find(lattice, asked, kPlaces, enough, triangles, distances);
     nearest.resize(asked.size());
     for (std::size_t k = 0; k < distances.size(); ++k) {
       most[k / kPlaces.size()] = std::max(most[k / kPlaces.size()], distances[k]);
@@ -423,8 +424,8 @@ class Distances {
     return most;
   }
   template <std::size_t kCount>
-  void find(const LatticeMesh& lattice, const std::vector<int>& asked, const std::array<std::array<double, 2>, kCount>& places, std::vector<int>& nearest,
-            std::vector<float>& distances) {
+  void find(const LatticeMesh& lattice, const std::vector<int>& asked, const std::array<std::array<double, 2>, kCount>& places, float enough,
+            std::vector<int>& nearest, std::vector<float>& distances) {
     std::vector<Vec3> points(asked.size() * kCount);
     for_each_block(asked.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
@@ -433,7 +434,7 @@ class Distances {
       }
     });
     nearest.resize(points.size()), distances.resize(points.size());
-    search_.find(points, nearest, distances);
+    search_.find(points, nearest, distances, enough);
   }
 
   ClContext& context_;

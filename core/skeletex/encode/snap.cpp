@@ -15,6 +15,8 @@
 namespace skeletex {
 namespace {
 
+constexpr int kBinWidth = 8;  // as in snap.cl
+
 constexpr int kFirstRelaxPasses = 3, kRelaxPasses = 1;
 constexpr int kEdgeRounds = 2;          // what one round has moved lets texels through that the fold test had stopped
 constexpr double kFlat = 1e-6;          // radians: what rounding may make of a flat edge
@@ -62,15 +64,19 @@ void add_features(const Chart& chart, const Patch& patch, int bone, int first_po
       features.vertices.push_back({bone, first_point + i, chart.v[i] * patch.rectangle.width, rows[i], strengths[i]});
 }
 
-/// Edges that are near each other in the texture one after the other: the kernels read less of it at a time.
-void append_by_row(const std::vector<SnapFeatures::Edge>& edges, int height, std::vector<SnapFeatures::Edge>& sorted) {
-  const auto row = [&](const SnapFeatures::Edge& edge) { return std::clamp(static_cast<int>(edge.y[0]), 0, height - 1); };
-  std::vector<std::size_t> next(height + 1, 0);
-  for (const SnapFeatures::Edge& edge : edges) ++next[row(edge) + 1];
+/// Edges that are near each other in the texture one after the other, by rows and along them: the kernels come by them in nearly that order.
+void append_by_place(const std::vector<SnapFeatures::Edge>& edges, int width, int height, std::vector<SnapFeatures::Edge>& sorted) {
+  const int bins = (width + kBinWidth - 1) / kBinWidth;
+  const auto place = [&](const SnapFeatures::Edge& edge) {
+    const int x = static_cast<int>(std::min(edge.x[0], edge.x[1]) + 16 * width) % width;
+    return std::clamp(static_cast<int>(std::min(edge.y[0], edge.y[1])), 0, height - 1) * bins + x / kBinWidth;
+  };
+  std::vector<int> next(static_cast<std::size_t>(height) * bins + 1, 0);
+  for (const SnapFeatures::Edge& edge : edges) ++next[place(edge) + 1];
   std::partial_sum(next.begin(), next.end(), next.begin());
   const std::size_t begin = sorted.size();
   sorted.resize(begin + edges.size());
-  for (const SnapFeatures::Edge& edge : edges) sorted[begin + next[row(edge)]++] = edge;
+  for (const SnapFeatures::Edge& edge : edges) sorted[begin + next[place(edge)]++] = edge;
 }
 
 }  // namespace
@@ -97,7 +103,7 @@ SnapFeatures find_features(std::span<const Chart> charts, std::span<const Patch>
   features.vertices.reserve(vertices), features.edges.reserve(edges);
   for (std::size_t bone = 0; bone < charts.size(); ++bone) {
     features.vertices.insert(features.vertices.end(), parts[bone].vertices.begin(), parts[bone].vertices.end());
-    append_by_row(parts[bone].edges, patches[bone].rectangle.height, features.edges);
+    append_by_place(parts[bone].edges, patches[bone].rectangle.width, patches[bone].rectangle.height, features.edges);
   }
   return features;
 }
@@ -112,7 +118,6 @@ ReadingPositions even_positions(ClContext& context, const DeviceLayout& layout) 
 
 namespace {
 
-constexpr int kBinWidth = 8;  // as in snap.cl
 constexpr int kMostTurns = 8;
 constexpr double kReach = 0.7 + 0.5;  // cells along each axis from a free texel's own place to an edge that it can go to
 constexpr double kLeastClipped = 3;   // columns that an edge has to span before it pays to look at each row's part alone

@@ -341,14 +341,17 @@ void LatticeCrossings::measure(const LatticeMesh& lattice, int node, Tree& tree)
 }
 
 /// Levels above the leaves, and caps.
-void LatticeCrossings::join(Tree& tree) const {
+/// \param are_asked  nodes; all without
+void LatticeCrossings::join(Tree& tree, const std::vector<char>* are_asked) const {
   for (const Grid& grid : grids_)
     for (std::size_t level = 1; level < grid.levels.size(); ++level) {
       const auto [first, columns, rows] = grid.levels[level];
       const Grid::Level& below = grid.levels[level - 1];
       for (int row = 0; row < rows; ++row)
         for (int column = 0; column < columns; ++column) {
-          Bounds& all = tree.nodes[first + row * columns + column];
+          const int node = first + row * columns + column;
+          if (are_asked && (*are_asked)[node] == 0) continue;
+          Bounds& all = tree.nodes[node];
           all = {no_box<Box>(), no_normals<Normals>()};
           for (int r = 2 * row; r < std::min(2 * row + 2, below.rows); ++r)
             for (int c = 2 * column; c < std::min(2 * column + 2, below.columns); ++c) {
@@ -395,7 +398,8 @@ void LatticeCrossings::measure_squares(const LatticeMesh& lattice, int first, Tr
 }
 
 /// Some leaves, and what they are parts of.
-void LatticeCrossings::measure(const LatticeMesh& lattice, std::span<const int> leaves, Tree& tree) const {
+/// \param are_asked  these nodes; all without
+void LatticeCrossings::measure(const LatticeMesh& lattice, std::span<const int> leaves, const std::vector<char>* are_asked, Tree& tree) const {
   tree.nodes.resize(nodes_.size());
   tree.ends.resize(nodes_.size() - first_of_ends());
   for_each_block(leaves.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
@@ -414,7 +418,7 @@ void LatticeCrossings::measure(const LatticeMesh& lattice, std::span<const int> 
       i += are_several ? kSquaresAtOnce : 1;
     }
   });
-  join(tree);
+  join(tree, are_asked);
 }
 
 /// Leaves, and all that they are parts of.
@@ -751,7 +755,7 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const Search& search) con
 }
 
 std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattice) {
-  measure(lattice, leaves_, tree_);
+  measure(lattice, leaves_, nullptr, tree_);
   return find({lattice, tree_});
 }
 
@@ -765,8 +769,8 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattic
   }
   std::sort(leaves.begin(), leaves.end());
   leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
-  measure(lattice, leaves, tree_);
   mark(leaves, are_asked);
+  measure(lattice, leaves, &are_asked, tree_);
   return find({lattice, tree_, &are_asked, &is_asked});
 }
 

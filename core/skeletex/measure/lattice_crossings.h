@@ -108,8 +108,8 @@ class LatticeCrossings {
   void measure_squares(const LatticeMesh& lattice, int first, Tree& tree) const;
   Bounds measure_end(const LatticeMesh& lattice, const Node& node) const;
   void measure(const LatticeMesh& lattice, int node, Tree& tree) const;
-  void measure(const LatticeMesh& lattice, std::span<const int> leaves, Tree& tree) const;
-  void join(Tree& tree) const;
+  void measure(const LatticeMesh& lattice, std::span<const int> leaves, const std::vector<char>* are_asked, Tree& tree) const;
+  void join(Tree& tree, const std::vector<char>* are_asked) const;
   void mark(std::span<const int> leaves, std::vector<char>& are_asked) const;
   EndLeaf describe_end(const LatticeMesh& lattice, const Node& node) const;
   int first_of_ends() const { return grids_[rectangles_.size()].levels[0].first; }

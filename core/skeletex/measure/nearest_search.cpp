@@ -24,7 +24,7 @@ NearestSearch::NearestSearch(ClContext& context, const TriangleTree& tree)
       blocks_(context.upload(tree.blocks)),
       level_begin_(context.upload(tree.level_begin)) {}
 
-void NearestSearch::find(std::span<const Vec3> points, std::span<int> triangles, std::span<float> distances) {
+void NearestSearch::find(std::span<const Vec3> points, std::span<int> triangles, std::span<float> distances, float enough) {
   const std::size_t count = points.size();
   if (count == 0) return;
   for (std::vector<float>* plane : {&x_, &y_, &z_}) plane->resize(count);
@@ -45,8 +45,9 @@ void NearestSearch::find(std::span<const Vec3> points, std::span<int> triangles,
   context_.write(pz_, z_);
   constexpr int kRun = 16;
   const std::size_t items = block_count(count, kRun);
+  const float scaled_enough = enough / static_cast<float>(scale_);
   context_.launch(kFindNearest, ClRange({items, 1}, {context_.work_group_size(kFindNearest, 32), 1}), px_, py_, pz_, static_cast<int>(count), kRun, boxes_,
-                  blocks_, level_begin_, top_level_, nearest_, nearest_squared_);
+                  blocks_, level_begin_, top_level_, scaled_enough * scaled_enough, nearest_, nearest_squared_);
   const std::vector<int> places = context_.download(nearest_);
   for (std::size_t i = 0; i < count; ++i) triangles[i] = order_[places[i]];
   if (distances.empty()) return;

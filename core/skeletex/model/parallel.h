@@ -7,8 +7,24 @@
 #include <mutex>
 #include <thread>
 #include <vector>
+#ifdef __linux__
+#include <sched.h>
+#endif
 
 namespace skeletex {
+
+/// Has the calling thread go on on another processor than a given one, as long as it may. A new thread can be put on the processor of the one that made it,
+/// and Linux takes up to tens of milliseconds to move one of two threads to a processor that is idle meanwhile.
+inline void leave_processor([[maybe_unused]] int processor) {
+#ifdef __linux__
+  cpu_set_t allowed, others;
+  if (processor < 0 || processor >= CPU_SETSIZE || sched_getaffinity(0, sizeof allowed, &allowed) != 0) return;
+  others = allowed;
+  CPU_CLR(processor, &others);
+  if (CPU_COUNT(&others) == 0 || sched_setaffinity(0, sizeof others, &others) != 0) return;
+  sched_setaffinity(0, sizeof allowed, &allowed);
+#endif
+}
 
 /// Calls act(block, begin, end) for consecutive blocks of [0, size) on all processors. Blocks depend on the sizes
 /// alone, so results kept per block and combined in their order are the same whatever the number of threads.
@@ -29,8 +45,17 @@ void for_each_block(std::size_t size, std::size_t block_size, const Act& act) {
       next = blocks;
     }
   };
+#ifdef __linux__
+  const int processor = sched_getcpu();
+#else
+  const int processor = -1;
+#endif
   std::vector<std::jthread> others;
-  for (std::size_t i = 1; i < threads; ++i) others.emplace_back(work);
+  for (std::size_t i = 1; i < threads; ++i)
+    others.emplace_back([&] {
+      leave_processor(processor);
+      work();
+    });
   work();
   others.clear();
   if (failure) std::rethrow_exception(failure);
