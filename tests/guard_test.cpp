@@ -125,8 +125,8 @@ TEST(LatticeMesh, IsTheModelsAndWithMovedPointsWhatTheyWouldMake) {
     for (std::size_t i = 0; i < expected.positions.size(); ++i)
       EXPECT_LT((before.positions[i] - expected.positions[i]).norm(), 1e-6 * model.diagonal);
 
-    const std::vector<int> moved = points.take(model, others, 20);
-    const std::vector<int> changed = lattice.move(moved, others.lattice(model, rule));
+    lattice.release();
+    const std::vector<int> changed = lattice.move(points.take(model, others, 20));
     const LatticeMesh made = points.lattice(model, rule);
     const TriangleMesh now = whole(lattice, numbers), remade = whole(made, numbers);
     EXPECT_EQ(now.positions, remade.positions);
@@ -183,7 +183,8 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
     EXPECT_NEAR(static_cast<double>(found.size()), static_cast<double>(expected.size()), 2 + 0.05 * static_cast<double>(expected.size()))
         << each.name;
 
-    const std::vector<int> changed = lattice.move(points.take(model, others, 50), other_lattice);
+    lattice.release();
+    const std::vector<int> changed = lattice.move(points.take(model, others, 50));
     const Pairs found_of_changed = crossings.find(lattice, changed);
     Pairs all = LatticeCrossings(lattice).find(lattice);
     const LatticeCrossings::Others same = crossings.find_between_same(all, lattice, 1), different = crossings.find_between_same(all, other_lattice, 1);

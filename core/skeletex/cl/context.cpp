@@ -207,6 +207,14 @@ void ClContext::read_bytes(const ::cl::Buffer& buffer, void* data, std::size_t b
   if (bytes > 0) check(queue_.enqueueReadBuffer(buffer, CL_TRUE, 0, bytes, data), "reading from the device");
 }
 
+const void* ClContext::map_bytes(const ::cl::Buffer& buffer, std::size_t bytes) {
+  if (bytes == 0) return nullptr;
+  cl_int code = CL_SUCCESS;
+  const void* values = queue_.enqueueMapBuffer(buffer, CL_TRUE, CL_MAP_READ, 0, bytes, nullptr, nullptr, &code);
+  check(code, "reading from the device");
+  return values;
+}
+
 void ClContext::fill_bytes(const ::cl::Buffer& buffer, const void* pattern, std::size_t pattern_bytes, std::size_t bytes) {
   if (bytes == 0) return;
   // Drivers write one pattern after the other: the longest that OpenCL takes, where that divides the size.

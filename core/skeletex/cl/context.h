@@ -10,6 +10,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace skeletex {
@@ -36,6 +37,33 @@ template <class T>
 struct ClBuffer {
   ::cl::Buffer memory;
   std::size_t size = 0;
+};
+
+/// What a buffer holds, for the host to read as long as this lives: no copy where device and host share memory. Nothing may write to the buffer meanwhile.
+template <class T>
+class ClMapping {
+ public:
+  ClMapping() = default;
+  ClMapping(::cl::CommandQueue queue, ::cl::Buffer memory, const void* values, std::size_t size)
+      : queue_(std::move(queue)), memory_(std::move(memory)), values_(static_cast<const T*>(values)), size_(size) {}
+  ClMapping(ClMapping&& other) noexcept { *this = std::move(other); }
+  ClMapping& operator=(ClMapping&& other) noexcept {
+    std::swap(queue_, other.queue_), std::swap(memory_, other.memory_), std::swap(values_, other.values_), std::swap(size_, other.size_);
+    return *this;
+  }
+  ~ClMapping() {
+    if (values_) ::clEnqueueUnmapMemObject(queue_(), memory_(), const_cast<T*>(values_), 0, nullptr, nullptr);
+  }
+
+  const T* data() const { return values_; }
+  std::size_t size() const { return size_; }
+  const T& operator[](std::size_t i) const { return values_[i]; }
+
+ private:
+  ::cl::CommandQueue queue_;
+  ::cl::Buffer memory_;
+  const T* values_ = nullptr;
+  std::size_t size_ = 0;
 };
 
 /// Work-group local memory of `bytes`, as a kernel argument.
@@ -121,6 +149,11 @@ class ClContext {
     read_bytes(buffer.memory, values.data(), values.size() * sizeof(T));
     return values;
   }
+  /// Waits for the queue and lets the host read the whole buffer where it is.
+  template <class T>
+  ClMapping<T> map(const ClBuffer<T>& buffer) {
+    return {queue_, buffer.memory, map_bytes(buffer.memory, buffer.size * sizeof(T)), buffer.size};
+  }
   /// Sets every byte of the buffer to that of a repeated 4-byte pattern.
   template <class T>
   void fill(ClBuffer<T>& buffer, std::type_identity_t<T> value) {
@@ -176,6 +209,7 @@ class ClContext {
   ::cl::Buffer allocate_bytes(std::size_t bytes, const void* values = nullptr);
   void write_bytes(const ::cl::Buffer& buffer, const void* data, std::size_t bytes);
   void read_bytes(const ::cl::Buffer& buffer, void* data, std::size_t bytes);
+  const void* map_bytes(const ::cl::Buffer& buffer, std::size_t bytes);
   void fill_bytes(const ::cl::Buffer& buffer, const void* pattern, std::size_t pattern_bytes, std::size_t bytes);
   void enqueue(const ::cl::Kernel& kernel, const ClKernelName& name, const ClRange& range);
   static void check_argument(cl_int code, const ClKernelName& name, unsigned index);

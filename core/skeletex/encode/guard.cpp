@@ -9,6 +9,7 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "skeletex/measure/lattice_crossings.h"
@@ -552,7 +553,7 @@ GuardReport Guard::put_back_faults(std::span<const int> vertex_points, const ClB
   const auto is_pair_near_even_fault = [&](const std::array<int, 2>& pair) { return is_near_even_fault(pair[0]) && is_near_even_fault(pair[1]); };
   bool tolerates_crossing = false, tolerates_turning = false;
   std::vector<int> back, changed;  // texels and triangles, since the pass before
-  TexelReturns returns(context, even_->layout);
+  std::optional<TexelReturns> returns;  // in memory that measuring has given back
   for (int pass = 0; pass < kPasses; ++pass) {
     marks.clear();
     auto finding = pass == 0 ? std::move(finding_all) : std::async(std::launch::async, [&] { return crossings.find(lattice, changed); });
@@ -589,10 +590,12 @@ GuardReport Guard::put_back_faults(std::span<const int> vertex_points, const ClB
 
     // Vertices are given up only when the texels between them have been.
     const bool with_vertices = pass > 0;
-    back = put_back_listed(context, even_->layout, even_->points, even_->filtered, marks.texels(), with_vertices, returns, positions, points);
+    lattice.release();
+    if (!returns) returns.emplace(context, even_->layout);
+    back = put_back_listed(context, even_->layout, even_->points, even_->filtered, marks.texels(), with_vertices, *returns, positions, points);
     report.texels_put_back += static_cast<int>(back.size());
     if (back.empty() && with_vertices) break;
-    changed = lattice.move(back, even_lattice);
+    changed = lattice.move(back);
   }
   report.anchors = distances.take_anchors();
   for (const int texel : back) report.anchors[texel] = 0;

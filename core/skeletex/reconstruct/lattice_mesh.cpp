@@ -59,7 +59,7 @@ LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, Diagona
       end_positions_(common_->positions),
       points_(std::move(points)) {
   // Before the kernel is queued, so that the host can go on beside it.
-  planes_ = {context.download(points_.x), context.download(points_.y), context.download(points_.z)};
+  read_points();
   device_diagonals_ = context.allocate<int>(texel_count());
   const int rows = static_cast<int>(common_->rows.size);
   int widest = 0;
@@ -82,6 +82,8 @@ LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, Diagona
   }
   diagonals_ = context.download(device_diagonals_);
 }
+
+void LatticeMesh::read_points() { planes_ = {context_.map(points_.x), context_.map(points_.y), context_.map(points_.z)}; }
 
 /// The strips or fans of ends, numbered as in first_end_.
 std::vector<std::vector<Triangle>> LatticeMesh::fill_ends(std::span<const int> ends) {
@@ -119,7 +121,8 @@ Triangle LatticeMesh::triangle(int index) const {
   return triangles_of(index / 2, right_of(index / 2))[index % 2];
 }
 
-std::vector<int> LatticeMesh::move(std::span<const int> texels, const LatticeMesh& home) {
+std::vector<int> LatticeMesh::move(std::span<const int> texels) {
+  read_points();
   if (texels.empty()) return {};
   const int width = model_.texture.width;
   std::vector<char> is_moved(texel_count(), 0), is_asked(texel_count(), 0);
@@ -127,7 +130,6 @@ std::vector<int> LatticeMesh::move(std::span<const int> texels, const LatticeMes
   int first_line = model_.texture.height, last_line = 0;
   for (const int texel : texels) {
     is_moved[texel] = 1;
-    for (int axis = 0; axis < 3; ++axis) planes_[axis][texel] = home.planes_[axis][texel];
     const int bone = patch_of(texel);
     const Rectangle& r = model_.patches[bone].rectangle;
     const int row = texel / width - r.y, column = texel % width - r.x;

@@ -18,7 +18,7 @@ class LatticeMesh {
   /// \param rule     of its diagonals, in place of the model's
   /// \param patches  see frame_tables
   /// \param points   x, y, z per texel of the texture, relative to the model's origin; of rows 0 and height-1 only poles count.
-  ///                 These planes are kept, not copied: `move` is to be told what changes in them
+  ///                 These planes are kept, not copied, and read by the host: see `release` for what changes in them
   LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, ClBuffer<PatchRecord> patches, DevicePlanes points);
   /// Other points of the same model, with which it has in common what does not depend on them.
   LatticeMesh(const LatticeMesh& other, DiagonalRule rule, DevicePlanes points);
@@ -45,7 +45,7 @@ class LatticeMesh {
     return {{{texel, right, beyond}, {texel, beyond, above}}};
   }
   /// From the model's origin, in single precision: x, y and z per texel, and of any vertex.
-  const std::array<std::vector<float>, 3>& planes() const { return planes_; }
+  const std::array<ClMapping<float>, 3>& planes() const { return planes_; }
   Eigen::Array4f point(int vertex) const {
     if (!is_texel(vertex)) return end_points_[vertex - texel_count()];
     return {planes_[0][vertex], planes_[1][vertex], planes_[2][vertex], 0};
@@ -69,9 +69,11 @@ class LatticeMesh {
   const ClBuffer<LatticeRow>& device_rows() const { return common_->rows; }
   const ClBuffer<PatchRecord>& device_patches() const { return common_->patches; }
 
-  /// Some inner texels have the points of another lattice now, on the device already. Quads around them take their diagonals anew,
-  /// strips beside them are filled anew. \return the triangles that are not what they were, in order
-  std::vector<int> move(std::span<const int> texels, const LatticeMesh& home);
+  /// Before anything writes to its points on the device: until `move` no vertex' place can be asked for.
+  void release() { planes_ = {}; }
+  /// These inner texels, and no others, have other points since `release`. Quads around them take their diagonals anew, strips beside them are filled
+  /// anew. \return the triangles that are not what they were, in order
+  std::vector<int> move(std::span<const int> texels);
 
  private:
   /// What does not depend on points.
@@ -85,13 +87,14 @@ class LatticeMesh {
   };
   static std::shared_ptr<const Common> make_common(ClContext& context, const SkeletexModel& model, ClBuffer<PatchRecord> patches);
   LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, std::shared_ptr<const Common> common, DevicePlanes points);
+  void read_points();
   std::vector<std::vector<Triangle>> fill_ends(std::span<const int> ends);
 
   ClContext& context_;
   const SkeletexModel& model_;
   DiagonalRule rule_;
   std::shared_ptr<const Common> common_;
-  std::array<std::vector<float>, 3> planes_;
+  std::array<ClMapping<float>, 3> planes_;
   std::vector<Eigen::Array4f> end_points_;  // of vertices behind the texels
   std::vector<Vec3> end_positions_;         // the same in double precision, not from the model's origin
   std::vector<Triangle> end_triangles_;
