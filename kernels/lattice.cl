@@ -103,17 +103,15 @@ kernel void choose_diagonals(const int row_count, const int band, const int text
   }
 }
 
-// NDRange (count). out  diagonals, at their places; listed_diagonals: the same one after the other
+// NDRange (count). Those of some texels anew.
 kernel void choose_listed_diagonals(const int count, const int texture_width, const int is_smooth, global const int* restrict listed,
                                     global const int* restrict listed_patches, global const PatchRecord* restrict patches,
                                     global const float* restrict x, global const float* restrict y, global const float* restrict z,
-                                    global int* restrict diagonals, global int* restrict listed_diagonals) {
+                                    global int* restrict diagonals) {
   const int i = (int)get_global_id(0);
   if (i >= count) return;
   global const PatchRecord* restrict p = patches + listed_patches[i];
   const int texel = listed[i], line = texel / texture_width, row = line - p->y;
-  const int is_second =
+  diagonals[texel] =
       second_diagonal_at(texel, texel - line * texture_width - p->x, p->width, texture_width, row > 1, row + 2 < p->height - 1, is_smooth, x, y, z);
-  diagonals[texel] = is_second;
-  listed_diagonals[i] = is_second;
 }

@@ -117,7 +117,7 @@ class Distances {
 
   /// Of the even lattice, the triangles that look most suspicious. \return the furthest of them
   float measure_even(const LatticeMesh& lattice, const ClBuffer<int>& texel_triangles, std::vector<int>& turned) {
-    const std::vector<float> suspicions2 = suspect(lattice, texel_triangles);
+    const ClMapping<float> suspicions2 = suspect(lattice, texel_triangles);
     std::vector<float> some;  // enough to tell how large the largest are
     for (std::size_t i = 0; i < suspicions2.size(); i += 7) some.push_back(suspicions2[i]);
     const auto least_of = [&](double share) {
@@ -339,7 +339,7 @@ class Distances {
     }
   }
   /// Per texel the square of how far its quad could be.
-  std::vector<float> suspect(const LatticeMesh& lattice, const ClBuffer<int>& texel_triangles) {
+  ClMapping<float> suspect(const LatticeMesh& lattice, const ClBuffer<int>& texel_triangles) {
     const int rows = static_cast<int>(lattice.device_rows().size), texels = lattice.texel_count();
     auto texel_normals = context_.allocate<float>(3 * layout_.size());
     context_.launch({"guard.cl", "normals_of_texels"}, over(texels), texels, maps_.triangle_count, texel_triangles, normals_, texel_normals);
@@ -348,10 +348,10 @@ class Distances {
     context_.launch({"guard.cl", "suspect_quads"}, row_range(context_, rows), rows, layout_.width, texels, lattice.device_rows(), layout_.patches,
                     lattice.device_diagonals(), texel_triangles, texel_normals, lattice.device_points().x, lattice.device_points().y,
                     lattice.device_points().z, suspicions2);
-    return context_.download(suspicions2);
+    return context_.map(suspicions2);
   }
   /// Those of quads that are more suspicious than that or look against the mesh, and all at ends.
-  static std::vector<int> triangles_above(const LatticeMesh& lattice, const std::vector<float>& suspicions2, float least) {
+  static std::vector<int> triangles_above(const LatticeMesh& lattice, const ClMapping<float>& suspicions2, float least) {
     std::vector<int> triangles;
     for (int texel = 0; texel < static_cast<int>(suspicions2.size()); ++texel)
       if (suspicions2[texel] > least || std::isinf(suspicions2[texel])) triangles.push_back(2 * texel), triangles.push_back(2 * texel + 1);

@@ -80,7 +80,7 @@ LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, Diagona
     end_triangles_.insert(end_triangles_.end(), end.begin(), end.end());
     first_end_.push_back(static_cast<int>(end_triangles_.size()));
   }
-  diagonals_ = context.download(device_diagonals_);
+  diagonals_ = context.map(device_diagonals_);
 }
 
 void LatticeMesh::read_points() { planes_ = {context_.map(points_.x), context_.map(points_.y), context_.map(points_.z)}; }
@@ -148,19 +148,19 @@ std::vector<int> LatticeMesh::move(std::span<const int> texels) {
     quads.push_back(static_cast<int>(at - is_asked.begin()));
   for (const int quad : quads) patches.push_back(patch_of(quad));
 
-  std::vector<int> changed;
-  auto chosen = context_.allocate<int>(quads.size());
+  std::vector<int> before, changed;
+  for (const int quad : quads) before.push_back(diagonals_[quad]);
+  diagonals_ = {};
   context_.launch({"lattice.cl", "choose_listed_diagonals"}, ClRange(quads.size()), static_cast<int>(quads.size()), width,
                   static_cast<int>(rule_ == DiagonalRule::kSmooth), context_.upload(quads), context_.upload(patches), common_->patches, points_.x, points_.y,
-                  points_.z, device_diagonals_, chosen);
+                  points_.z, device_diagonals_);
   std::vector<int> ends;
   for (int end = 0; end < static_cast<int>(has_moved_end.size()); ++end)
     if (has_moved_end[end]) ends.push_back(end);
   const std::vector<std::vector<Triangle>> filled = fill_ends(ends);  // beside the kernel
-  const std::vector<int> now = context_.download(chosen);
+  diagonals_ = context_.map(device_diagonals_);
   for (std::size_t i = 0; i < quads.size(); ++i) {
-    const bool is_other = now[i] != diagonals_[quads[i]];
-    diagonals_[quads[i]] = now[i];
+    const bool is_other = diagonals_[quads[i]] != before[i];
     const std::array<Triangle, 2> triangles = triangles_of(quads[i], right_of(quads[i]));
     for (const int k : {0, 1})
       if (is_other || is_moved[triangles[k][0]] || is_moved[triangles[k][1]] || is_moved[triangles[k][2]]) changed.push_back(2 * quads[i] + k);

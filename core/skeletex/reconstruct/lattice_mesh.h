@@ -36,7 +36,7 @@ class LatticeMesh {
   /// Vertices of a triangle, counter-clockwise from outside.
   Triangle triangle(int index) const;
   bool takes_second(int texel) const { return diagonals_[texel] != 0; }
-  const std::vector<int>& diagonals() const { return diagonals_; }
+  const ClMapping<int>& diagonals() const { return diagonals_; }
   /// The two of a texel's quad. \param right  the texel beside it
   std::array<Triangle, 2> triangles_of(int texel, int right) const {
     // As write_quad in reconstruct.cl.
@@ -99,7 +99,7 @@ class LatticeMesh {
   std::vector<Vec3> end_positions_;         // the same in double precision, not from the model's origin
   std::vector<Triangle> end_triangles_;
   std::vector<int> first_end_;  // per patch and end, in end_triangles_; and the end
-  std::vector<int> diagonals_;
+  ClMapping<int> diagonals_;
   DevicePlanes points_;
   ClBuffer<int> device_diagonals_;
 };
