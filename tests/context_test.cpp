@@ -90,6 +90,28 @@ TEST(Context, UploadsAndDownloadsUnchanged) {
   EXPECT_EQ(context.download(context.upload(values)), values);
 }
 
+TEST(Context, MapsWhatABufferHoldsUntilTheMappingEnds) {
+  ClContext context;
+  std::vector<int> values(1000);
+  for (int i = 0; i < 1000; ++i) values[i] = 7 * i - 3;
+  auto buffer = context.upload(values);
+  const auto is_equal = [&](const ClMapping<int>& mapping) {
+    return mapping.size() == values.size() && std::equal(values.begin(), values.end(), mapping.data());
+  };
+  ClMapping<int> mapping = context.map(buffer);
+  EXPECT_TRUE(is_equal(mapping));
+  EXPECT_EQ(mapping[999], 7 * 999 - 3);
+  ClMapping<int> other = std::move(mapping);
+  EXPECT_TRUE(is_equal(other));
+  other = {};
+  EXPECT_EQ(other.data(), nullptr);
+  // What has been queued before it is done.
+  context.fill(buffer, 42);
+  values.assign(values.size(), 42);
+  mapping = context.map(buffer);
+  EXPECT_TRUE(is_equal(mapping));
+}
+
 TEST(Context, TakesEmptyVectors) {
   ClContext context;
   const auto buffer = context.upload(std::vector<float>{});
