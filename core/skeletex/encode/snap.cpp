@@ -31,6 +31,9 @@ bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind =
 /// Angle between unit normals, precise for small ones too.
 double angle_between(const Vec3& a, const Vec3& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
 
+/// std::floor is a call.
+int floor_of(double x) { return static_cast<int>(x) - (x < static_cast<int>(x)); }
+
 void add_features(const Chart& chart, const Patch& patch, int bone, int first_point, double least_dihedral, SnapFeatures& features) {
   const HalfEdgeTable& table = chart.half_edges;
   std::vector<Vec3> normals;
@@ -68,8 +71,8 @@ void add_features(const Chart& chart, const Patch& patch, int bone, int first_po
 void append_by_place(const std::vector<SnapFeatures::Edge>& edges, int width, int height, std::vector<SnapFeatures::Edge>& sorted) {
   const int bins = (width + kBinWidth - 1) / kBinWidth;
   const auto place = [&](const SnapFeatures::Edge& edge) {
-    const int x = static_cast<int>(std::min(edge.x[0], edge.x[1]) + 16 * width) % width;
-    return std::clamp(static_cast<int>(std::min(edge.y[0], edge.y[1])), 0, height - 1) * bins + x / kBinWidth;
+    const int column = floor_of(std::min(edge.x[0], edge.x[1])) % width, row = std::clamp(static_cast<int>(std::min(edge.y[0], edge.y[1])), 0, height - 1);
+    return row * bins + (column < 0 ? column + width : column) / kBinWidth;
   };
   std::vector<int> next(static_cast<std::size_t>(height) * bins + 1, 0);
   for (const SnapFeatures::Edge& edge : edges) ++next[place(edge) + 1];
@@ -134,9 +137,6 @@ int list_rows(std::span<const Patch> patches, std::array<std::vector<LatticeRow>
   }
   return bins;
 }
-
-/// std::floor is a call.
-int floor_of(double x) { return static_cast<int>(x) - (x < static_cast<int>(x)); }
 
 /// Calls act(bin, turn of v) for the bins of a patch whose texels an edge can reach; bins count from the patch's first.
 template <class Act>
