@@ -39,7 +39,8 @@ struct ClBuffer {
   std::size_t size = 0;
 };
 
-/// What a buffer holds, for the host to read as long as this lives: no copy where device and host share memory. Nothing may write to the buffer meanwhile.
+/// What a buffer holds, for the host to read as long as this lives: no copy where device and host share memory. Nothing may write to the buffer
+/// meanwhile.
 template <class T>
 class ClMapping {
  public:

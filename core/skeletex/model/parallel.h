@@ -13,8 +13,8 @@
 
 namespace skeletex {
 
-/// Has the calling thread go on on another processor than a given one, as long as it may. A new thread can be put on the processor of the one that made it,
-/// and Linux takes up to tens of milliseconds to move one of two threads to a processor that is idle meanwhile.
+/// Has the calling thread go on on another processor than a given one, as long as it may. A new thread can be put on the processor of the one that
+/// made it, and Linux takes up to tens of milliseconds to move one of two threads to a processor that is idle meanwhile.
 inline void leave_processor([[maybe_unused]] int processor) {
 #ifdef __linux__
   cpu_set_t allowed, others;
