@@ -69,12 +69,21 @@ void keep_freed_memory() {
 #endif
 }
 
-/// PoCL's threads stay on processors of their own, where this process may use all there are: left to Linux, two of them share one for milliseconds
-/// while the other is idle. Anybody's own choice comes first.
+/// PoCL's threads stay on processors of their own: left to Linux, two of them share one for milliseconds while the other is idle. Only where
+/// this process may use all processors and the number of threads is PoCL's own choice: its n-th thread takes the n-th processor, or it aborts.
 void keep_device_threads_apart() {
 #ifdef __linux__
-  cpu_set_t allowed;
-  if (sched_getaffinity(0, sizeof allowed, &allowed) == 0 && CPU_COUNT(&allowed) == sysconf(_SC_NPROCESSORS_CONF)) setenv("POCL_AFFINITY", "1", 0);
+  for (const char* number_of_threads : {"POCL_MAX_PTHREAD_COUNT", "POCL_CPU_MAX_CU_COUNT"})
+    if (std::getenv(number_of_threads)) return;
+  const long processors = sysconf(_SC_NPROCESSORS_CONF);
+  cpu_set_t allowed, last;
+  if (processors < 2 || processors > CPU_SETSIZE || sched_getaffinity(0, sizeof allowed, &allowed) != 0) return;
+  for (long i = 0; i < processors; ++i)
+    if (!CPU_ISSET(i, &allowed)) return;
+  // Whether a thread may choose at all.
+  CPU_ZERO(&last);
+  CPU_SET(processors - 1, &last);
+  if (sched_setaffinity(0, sizeof last, &last) == 0 && sched_setaffinity(0, sizeof allowed, &allowed) == 0) setenv("POCL_AFFINITY", "1", 0);
 #endif
 }
 

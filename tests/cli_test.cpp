@@ -12,6 +12,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <thread>
 
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/skeleton_file.h"
@@ -432,6 +433,18 @@ TEST_F(Program, GivesTheSameBytesTwice) {
   ASSERT_EQ(run({"encode", "y.ply", "y.skeleton.json", "-o", "twin.skx.exr", "--size", "64"}).code, 0);
   EXPECT_TRUE(text_of(folder_ / "twin.skx.exr") == text_of(folder_ / "y.skx.exr"));
   fs::remove(folder_ / "twin.skx.exr");
+}
+
+TEST_F(Program, RunsWithAnyNumberOfDeviceThreads) {
+  const char* const variable = "POCL_MAX_PTHREAD_COUNT";
+  for (const unsigned threads : {1u, std::thread::hardware_concurrency() + 3}) {
+    ::setenv(variable, std::to_string(threads).c_str(), 1);
+    const Outcome outcome = run({"encode", "y.ply", "y.skeleton.json", "-o", "twin.skx.exr", "--size", "64"});
+    ::unsetenv(variable);
+    EXPECT_EQ(outcome.code, 0) << threads << ": " << outcome.err;
+    EXPECT_TRUE(text_of(folder_ / "twin.skx.exr") == text_of(folder_ / "y.skx.exr")) << threads;
+    fs::remove(folder_ / "twin.skx.exr");
+  }
 }
 
 TEST_F(Program, CompilesEachKernelOnceAndNothingInASecondProcess) {
