@@ -45,8 +45,8 @@ def draw_recipe(results, folder):
         axes[0][j].set_title(f"{size} x {size}")
         axes[0][j].grid(axis="x", visible=False)
     axes[0][0].set_ylabel("symmetric mean / diagonal")
-    axes[0][-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
     figure.tight_layout()
+    axes[0][-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))  # beside what is laid out, which would make room for it
     return [style.save(figure, folder, "recipe")]
 
 
@@ -66,8 +66,8 @@ def draw_simplification(results, folder):
         axes[0][j].set_title(model)
         axes[0][j].set_xlabel("vertices")
     axes[0][0].set_ylabel("symmetric mean / diagonal")
-    axes[0][-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
     figure.tight_layout()
+    axes[0][-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))  # beside what is laid out, which would make room for it
     return [style.save(figure, folder, "simplification")]
 
 
@@ -88,6 +88,6 @@ def draw_bytes(results, folder):
         axes[0][j].set_title(model)
         axes[0][j].set_xlabel("bytes")
     axes[0][0].set_ylabel("symmetric mean / diagonal")
-    axes[0][-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
     figure.tight_layout()
+    axes[0][-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))  # beside what is laid out, which would make room for it
     return [style.save(figure, folder, "bytes")]

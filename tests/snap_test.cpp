@@ -112,6 +112,27 @@ TEST(SnapFeatures, OfASquareTubeAreItsFourEdgesAndTheVerticesOnThem) {
   for (const SnapFeatures::Vertex& vertex : features.vertices) EXPECT_NEAR(vertex.strength, std::numbers::pi / 2 * 0.5, 1e-12);
 }
 
+TEST(SnapFeatures, ComeByRowsAndAlongThemWhateverTheOrderOfTrianglesAndTheTurn) {
+  const OnePatch patch({3, 2, 20, 13});
+  for (const int turn : {0, -1, -20, 30}) {
+    Chart chart = square_tube(7);
+    std::reverse(chart.triangles.begin(), chart.triangles.end());
+    std::reverse(chart.turns.begin(), chart.turns.end());
+    for (auto& turns : chart.turns)
+      for (std::int8_t& corner : turns) corner = static_cast<std::int8_t>(corner + turn);
+    chart.half_edges = link_half_edges(chart.triangles, static_cast<int>(chart.positions.size()));
+    const SnapFeatures features = find_features(std::vector{chart}, patch.patches, 0.1);
+    ASSERT_EQ(features.edges.size(), 4u * 6);
+    std::pair<int, int> before{0, 0};  // row, bin of eight columns
+    for (const SnapFeatures::Edge& edge : features.edges) {
+      const int column = static_cast<int>(std::floor(std::min(edge.x[0], edge.x[1]))) - 20 * turn;
+      const std::pair<int, int> now{static_cast<int>(std::min(edge.y[0], edge.y[1])), column % 20 / 8};
+      EXPECT_LE(before, now) << turn;
+      before = now;
+    }
+  }
+}
+
 TEST(Snap, PutsTexelsWhereItsTwinDoes) {
   for (unsigned seed = 1; seed <= 12; ++seed) {
     SCOPED_TRACE(seed);

@@ -150,7 +150,7 @@ class ClContext {
     read_bytes(buffer.memory, values.data(), values.size() * sizeof(T));
     return values;
   }
-  /// Waits for the queue and lets the host read the whole buffer where it is.
+  /// Waits for the queue and lets the host read the whole buffer where it is. \throw DeviceError when the driver does not
   template <class T>
   ClMapping<T> map(const ClBuffer<T>& buffer) {
     return {queue_, buffer.memory, map_bytes(buffer.memory, buffer.size * sizeof(T)), buffer.size};

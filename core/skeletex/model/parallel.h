@@ -13,6 +13,15 @@
 
 namespace skeletex {
 
+/// The one that the calling thread is on now; -1: not known.
+inline int current_processor() {
+#ifdef __linux__
+  return sched_getcpu();
+#else
+  return -1;
+#endif
+}
+
 /// Has the calling thread go on on another processor than a given one, as long as it may. A new thread can be put on the processor of the one that
 /// made it, and Linux takes up to tens of milliseconds to move one of two threads to a processor that is idle meanwhile.
 inline void leave_processor([[maybe_unused]] int processor) {
@@ -45,11 +54,7 @@ void for_each_block(std::size_t size, std::size_t block_size, const Act& act) {
       next = blocks;
     }
   };
-#ifdef __linux__
-  const int processor = sched_getcpu();
-#else
-  const int processor = -1;
-#endif
+  const int processor = current_processor();
   std::vector<std::jthread> others;
   for (std::size_t i = 1; i < threads; ++i)
     others.emplace_back([&] {
