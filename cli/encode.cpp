@@ -29,7 +29,7 @@ struct Arguments {
   std::string mesh, skeleton, output, device, json, size = "512", method = "vsm";
   int iterations = 4;
   double alpha = 0.5, stop_spread = 0, hybrid_threshold = EncodeOptions{}.hybrid_unseen_threshold;
-  std::string rows = "surface", spd_hit = "last", share, diagonals, compression = "auto";
+  std::string rows = "surface", spd_hit = "last", share, diagonals, compression = "auto", rounding = "surface";
   bool has_no_prefilter = false, has_no_unfold = false, is_snapped = false, is_fitted = false, is_paper_recipe = false, is_half = false;
   std::vector<std::string> bone_methods;
 };
@@ -90,6 +90,8 @@ EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command
   if (is_given("--fit")) options.has_fit = arguments.is_fitted;
   if (is_given("--diagonals")) options.diagonals = arguments.diagonals == "smooth" ? DiagonalRule::kSmooth : DiagonalRule::kNearest;
   options.spd_hit = arguments.spd_hit == "first" ? SpdHit::kFirst : SpdHit::kLast;
+  if (is_given("--rounding") && !arguments.is_half) throw CLI::ValidationError("--rounding", "needs --half");
+  options.has_half_texels = arguments.is_half && arguments.rounding == "surface";
   if (is_given("--share")) options.texel_share = arguments.share == "area" ? TexelShare::kArea : TexelShare::kTriangles;
   return options;
 }
@@ -148,6 +150,7 @@ Json report_json(const EncodeReport& report, const EncodeOptions& options, doubl
     for (const double residual : report.fit->residuals) residuals.push_back(residual / report.diagonal);
     json["fit"] = {{"residuals", std::move(residuals)}, {"texels_put_back", report.fit->texels_put_back}};
   }
+  if (report.rounding) json["rounding"] = {{"nearest", report.rounding->nearest / report.diagonal}, {"chosen", report.rounding->chosen / report.diagonal}};
   if (report.snap || report.fit) json["turned_triangles"] = {{"lattice", report.turned_triangles}, {"even", report.even_turned_triangles}};
   return json;
 }
@@ -172,6 +175,9 @@ std::string report_text(const EncodeReport& report, const EncodeOptions& options
       fit += fmt::format("{} {:.3e}", i == 0 ? "" : " ->", report.fit->residuals[i] / report.diagonal);
     fit += fmt::format("; {} texels put back\n", report.fit->texels_put_back);
   }
+  if (report.rounding)
+    fit += fmt::format("rounded to half floats: points leave the lattice's planes by {:.1e} of the diagonal, with the nearest ones by {:.1e} (root mean squares)\n",
+                       report.rounding->chosen / report.diagonal, report.rounding->nearest / report.diagonal);
   if (report.snap || report.fit)
     fit += fmt::format("{} triangles look against the mesh, {} of the even lattice\n", report.turned_triangles, report.even_turned_triangles);
   std::error_code ignored;
@@ -324,7 +330,9 @@ void add_encode_command(CLI::App& program) {
       .add_flag("--paper-recipe", a.is_paper_recipe,
                 "as the paper: --rows uniform --alpha 0 --iterations 1 --no-unfold --no-prefilter --no-snap --no-fit (unfold and prefilter stay off, the others can still be given)")
       ->group("Texels");
-  command.add_flag("--half", a.is_half, "16 bits a channel: half the file, but an error of some 2e-5 of the diagonal; for drafts")->group("File");
+  command.add_flag("--half", a.is_half, "16 bits a channel: half the file, or a third, for an error of some 2e-6 of the diagonal more")->group("File");
+  take_one_of(add("File", "--rounding", a.rounding, "with --half, which half floats: those near a texel whose point stays nearest to the surface, or the nearest ones"),
+              {"surface", "nearest"});
   take_one_of(add("File", "--compression", a.compression, "lossless compression of the file; auto: zip where it saves a sixteenth or more, else none"), {"auto", "none", "zip", "piz"});
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);

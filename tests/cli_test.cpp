@@ -190,6 +190,26 @@ TEST_F(Program, EncodesAndReportsWhatTheContractNames) {
   fs::remove(folder_ / "contract.skx.exr");
 }
 
+TEST_F(Program, WritesHalfFloatsNearTheSurface) {
+  std::map<std::string, nlohmann::json> of;
+  std::map<std::string, double> means;
+  for (const std::string rounding : {"surface", "nearest", "none"}) {
+    std::vector<std::string> arguments{"encode", "y.ply", "y.skeleton.json", "-o", "half.skx.exr", "--size", "128"};
+    if (rounding != "none") arguments.insert(arguments.end(), {"--half", "--rounding", rounding});
+    of[rounding] = json_of(arguments);
+    EXPECT_EQ(run({"reconstruct", "half.skx.exr", "-o", "half.ply"}).code, 0);
+    means[rounding] = json_of({"metro", "y.ply", "half.ply"})["forward"]["mean"];
+    const nlohmann::json file = json_of({"inspect", "half.skx.exr"});
+    EXPECT_EQ(file["encoder"].contains("rounded"), rounding == "surface");
+  }
+  EXPECT_LT(of["surface"]["rounding"]["chosen"].get<double>(), 0.5 * of["surface"]["rounding"]["nearest"].get<double>());
+  EXPECT_FALSE(of["nearest"].contains("rounding"));
+  EXPECT_LT(means["none"], means["surface"]);
+  EXPECT_LT(means["surface"], means["nearest"]);
+  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--rounding", "nearest"}, {"--rounding", "needs --half"});
+  for (const char* name : {"half.skx.exr", "half.ply"}) fs::remove(folder_ / name);
+}
+
 TEST_F(Program, ReconstructsAndReportsWhatTheContractNames) {
   for (const char* size : {"64", "32", "100"}) {
     const nlohmann::json json = json_of({"reconstruct", "y.skx.exr", "-o", "again.ply", "--size", size});

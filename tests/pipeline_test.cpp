@@ -110,6 +110,7 @@ TEST(Pipeline, LaunchesNoKernelThatIsNotListedForIt) {
       options.method = method;
       options.width = options.height = 96;
       options.has_snap = options.has_fit = is_snapped;
+      options.has_half_texels = true;
       ClContext context;
       std::set<std::string> listed;
       for (const KernelVariant& kernel : encoding_kernels(context, options)) listed.insert(std::string(kernel.name.file) + ":" + std::string(kernel.name.kernel));
@@ -123,7 +124,7 @@ TEST(Pipeline, KernelsCompiledAheadDoNothing) {
   ClContext context;
   EncodeOptions options;
   options.method = EncodeMethod::kHybrid;
-  options.has_snap = options.has_fit = true;
+  options.has_snap = options.has_fit = options.has_half_texels = true;
   for (const KernelVariant& kernel : encoding_kernels(context, options)) EXPECT_NO_THROW(context.compile(kernel.name, kernel.range)) << kernel.name.kernel;
   EXPECT_TRUE(context.profile().empty());
 }

@@ -26,7 +26,7 @@ PROGRAM, SOURCE, WORK, OCLGRIND, SHIM = (pathlib.Path(argument) for argument in 
 LEFT_OUT = ("filter.cl:pick_vertices", "diffusion.cl:restrict_field", "diffusion.cl:add_coarse_field", "vsm.cl:map_charts")
 
 MODELS = [("spd", "encode c.off c.skeleton.json -o s.skx.exr --size 12 --method spd"),
-          ("vsm", "encode rough.off c.skeleton.json -o v.skx.exr --size 12 --iterations 1 --no-snap --no-fit --diagonals smooth"),
+          ("vsm", "encode rough.off c.skeleton.json -o v.skx.exr --size 12 --iterations 1 --no-snap --no-fit --diagonals smooth --half"),
           ("snap", "encode rough.off c.skeleton.json -o n.skx.exr --size 9 --iterations 1 --snap --fit"),
           ("metro", "metro c.off rough.off --samples 300")]
 RESULTS = [("smooth", "filter s.skx.exr smooth -o f.ply --scale 0.00001"),

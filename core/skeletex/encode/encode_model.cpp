@@ -116,7 +116,7 @@ nlohmann::json settings_json(const EncodeOptions& options, const TexelOptions& t
   return json;
 }
 
-/// What snapping and fit did, for the record.
+/// What snapping, fit and rounding did, for the record.
 void add_results(const TexelReport& report, double diagonal, nlohmann::json& json) {
   const auto share = [](int part, int whole) { return whole > 0 ? static_cast<double>(part) / whole : 1.0; };
   if (report.snap)
@@ -128,6 +128,7 @@ void add_results(const TexelReport& report, double diagonal, nlohmann::json& jso
     for (const double residual : report.fit->residuals) residuals.push_back(residual / diagonal);
     json["fitted"] = {{"residuals", std::move(residuals)}, {"texels_put_back", report.fit->texels_put_back}};
   }
+  if (report.rounding) json["rounded"] = {{"nearest", report.rounding->nearest / diagonal}, {"chosen", report.rounding->chosen / diagonal}};
   if (report.snap || report.fit) json["turned_triangles"] = {{"lattice", report.turned_triangles}, {"even", report.even_turned_triangles}};
 }
 
@@ -217,8 +218,9 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
                                                                     : spread_rows_uniformly(patch.rectangle.height);
     model.patches.push_back(std::move(patch));
   }
-  const TexelOptions texel_options = choose_texel_options(options, mesh, is_all_spd);
+  TexelOptions texel_options = choose_texel_options(options, mesh, is_all_spd);
   model.diagonals = options.diagonals.value_or(texel_options.has_snap || texel_options.has_fit ? DiagonalRule::kSmooth : DiagonalRule::kNearest);
+  if (options.has_half_texels) texel_options.half_rule = model.diagonals;
   Seams seams = sample_seams(segmentation, skeleton, walls, layout.rectangles, texel_options.has_snap ? SeamSampling::kSnapped : SeamSampling::kEven);
   model.arcs = std::move(seams.arcs);
   model.corners = std::move(seams.corners);
@@ -266,6 +268,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   report.unfold = texels.report.unfold;
   report.snap = texels.report.snap;
   report.fit = texels.report.fit;
+  report.rounding = texels.report.rounding;
   report.turned_triangles = texels.report.turned_triangles;
   report.even_turned_triangles = texels.report.even_turned_triangles;
   report.device = context.device().name;

@@ -42,6 +42,8 @@ struct EncodeOptions {
   /// Default: with the prefilter, up to 256 x 256 texels.
   std::optional<bool> has_fit;
   std::optional<DiagonalRule> diagonals;  ///< default: smooth with snapping or fit, else nearest
+  /// Texels come as half floats hold them (docs/encoding.md): write_model stores them as such without loss.
+  bool has_half_texels = false;
   std::optional<TexelShare> texel_share;  ///< default: area for all-SPD models, triangles otherwise
   /// Of the mesh, as validate_before_segmentation has built it; without, it is built where it is needed. Another mesh's is an error.
   const TriangleTree* tree = nullptr;
@@ -71,6 +73,7 @@ struct EncodeReport {
   std::optional<UnfoldReport> unfold;  ///< when it was on
   std::optional<SnapReport> snap;  ///< when it was on
   std::optional<FitReport> fit;    ///< when it was on
+  std::optional<RoundingReport> rounding;  ///< to half floats, when it was on
   int turned_triangles = 0, even_turned_triangles = 0;  ///< with snapping or fit: see GuardReport
   double half_edge_ms = 0, segmentation_ms = 0, parameterization_ms = 0, encoding_ms = 0;
   std::string device;

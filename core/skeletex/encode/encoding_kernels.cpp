@@ -57,6 +57,10 @@ std::vector<KernelVariant> encoding_kernels(const ClContext& context, const Enco
     add("lattice.cl", {"choose_listed_diagonals"}, items);
   }
   add("encode.cl", {"encode_texels"}, rows);
+  if (options.has_half_texels) {
+    if (!can_snap && !can_fit) add("lattice.cl", {"choose_diagonals"}, rows);
+    add("half.cl", {"round_texels"}, rows);
+  }
   return kernels;
 }
 

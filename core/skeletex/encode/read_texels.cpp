@@ -280,13 +280,15 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     anchors = std::move(guard.anchors);
   }
   if (is_snapped && anchors.empty()) anchors = context.download(positions.anchors);
-  auto along = context.allocate<float>(texels), around = context.allocate<float>(texels), out = context.allocate<float>(texels);
-  for (ClBuffer<float>* plane : {&along, &around, &out})
+  TexelPoints stored = allocate_points(context, texels);  // along, around, out
+  for (ClBuffer<float>* plane : {&stored.x, &stored.y, &stored.z})
     if (has_gaps) context.fill(*plane, 0.f);
   context.launch({"encode.cl", "encode_texels"}, row_range(context, all_rows.size), static_cast<int>(all_rows.size), texture_width, all_rows, layout.patches,
-                 rows, columns, points.x, points.y, points.z, along, around, out);
+                 rows, columns, points.x, points.y, points.z, stored.x, stored.y, stored.z);
+  if (options.half_rule)
+    result.report.rounding = round_to_half(context, *options.half_rule, {sources.patches.begin(), sources.patches.end()}, layout, rows, columns, points, stored);
   if (is_snapped) result.report.snap = report_snap(static_cast<int>(vertex_points.size()), edges, put_back, anchors);  // beside the device's work
-  result.texture = {texture_width, texture_height, context.download(along), context.download(around), context.download(out)};
+  result.texture = {texture_width, texture_height, context.download(stored.x), context.download(stored.y), context.download(stored.z)};
   return result;
 }
 

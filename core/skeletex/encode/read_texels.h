@@ -8,6 +8,7 @@
 #include "skeletex/cl/context.h"
 #include "skeletex/encode/fit.h"
 #include "skeletex/encode/guard.h"
+#include "skeletex/encode/half_texels.h"
 #include "skeletex/encode/snap.h"
 #include "skeletex/encode/unfold.h"
 #include "skeletex/model/frame.h"
@@ -33,6 +34,7 @@ struct TexelOptions {
   bool has_snap = false;        ///< texels of VSM patches move to vertices and creased edges
   double snap_dihedral = 0.004;  ///< radians: edges flatter than this are no creases
   bool has_fit = false;         ///< points of VSM patches are fitted to the mesh, instead of the prefilter
+  std::optional<DiagonalRule> half_rule = {};  ///< inner rows come as half floats, see round_to_half; the rule of the lattice's diagonals
 };
 
 /// What snapping did; of VSM patches.
@@ -49,6 +51,7 @@ struct TexelReport {
   std::optional<SnapReport> snap;
   std::optional<UnfoldReport> unfold;
   std::optional<FitReport> fit;
+  std::optional<RoundingReport> rounding;  ///< to half floats
   int turned_triangles = 0, even_turned_triangles = 0;  ///< with snapping or fit: see GuardReport
 };
 

@@ -24,11 +24,26 @@ Lattice without_rows(Lattice lattice) {
 
 }  // namespace
 
+std::vector<LatticeRow> quad_rows(const std::vector<Patch>& patches) {
+  std::vector<LatticeRow> rows = lattice_rows(patches, RowChoice::kInner);
+  std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == patches[row[0]].rectangle.height - 2; });
+  return rows;
+}
+
+void choose_diagonals(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches, int texture_width, const ClBuffer<LatticeRow>& rows,
+                      const ClBuffer<PatchRecord>& records, const DevicePlanes& points, ClBuffer<int>& diagonals) {
+  const int count = static_cast<int>(rows.size);
+  int widest = 0;
+  for (const Patch& patch : patches) widest = std::max(widest, patch.rectangle.width);
+  ClRange groups = row_range(context, (count + kBandRows - 1) / kBandRows);
+  groups.global[1] = (widest + kBandColumns - 1) / kBandColumns;
+  context.launch({"lattice.cl", "choose_diagonals"}, groups, count, kBandRows, texture_width, static_cast<int>(rule == DiagonalRule::kSmooth), rows, records,
+                 points.x, points.y, points.z, diagonals);
+}
+
 std::shared_ptr<const LatticeMesh::Common> LatticeMesh::make_common(ClContext& context, const SkeletexModel& model, ClBuffer<PatchRecord> patches) {
   Common common{without_rows(number_lattice(model)), {}, {}, {}, {}, std::move(patches)};
-  std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kInner);
-  std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == model.patches[row[0]].rectangle.height - 2; });
-  common.rows = context.upload(rows);
+  common.rows = context.upload(quad_rows(model.patches));
   common.texel_patches.assign(static_cast<std::size_t>(model.texture.width) * model.texture.height, -1);
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
     const Rectangle& r = model.patches[bone].rectangle;
@@ -61,13 +76,7 @@ LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, Diagona
   // Before the kernel is queued, so that the host can go on beside it.
   read_points();
   device_diagonals_ = context.allocate<int>(texel_count());
-  const int rows = static_cast<int>(common_->rows.size);
-  int widest = 0;
-  for (const Patch& patch : model.patches) widest = std::max(widest, patch.rectangle.width);
-  ClRange groups = row_range(context, (rows + kBandRows - 1) / kBandRows);
-  groups.global[1] = (widest + kBandColumns - 1) / kBandColumns;
-  context.launch({"lattice.cl", "choose_diagonals"}, groups, rows, kBandRows, model.texture.width, static_cast<int>(rule == DiagonalRule::kSmooth),
-                 common_->rows, common_->patches, points_.x, points_.y, points_.z, device_diagonals_);
+  choose_diagonals(context, rule, model.patches, model.texture.width, common_->rows, common_->patches, points_, device_diagonals_);
   for_each_pole(model, common_->ends, [&](int vertex, int, int, std::size_t texel) { end_positions_[vertex] = position(static_cast<int>(texel)); });
   for (const Vec3& place : end_positions_) {
     end_points_.emplace_back(0);

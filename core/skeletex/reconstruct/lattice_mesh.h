@@ -9,6 +9,16 @@
 
 namespace skeletex {
 
+/// The lattice rows that quads between inner rows begin at, of each patch one after the other.
+std::vector<LatticeRow> quad_rows(const std::vector<Patch>& patches);
+/// Queues which diagonals the decoder takes (one launch): per texel whether the quad to the right of and above it takes the second one.
+/// \param rows       quad_rows
+/// \param records    see frame_tables
+/// \param points     x, y, z per texel of the texture; those of rows 0 and height-1 do not count
+/// \param diagonals  out, per texel; of others than those of quads nothing is written
+void choose_diagonals(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches, int texture_width, const ClBuffer<LatticeRow>& rows,
+                      const ClBuffer<PatchRecord>& records, const DevicePlanes& points, ClBuffer<int>& diagonals);
+
 /// The mesh that a model would reconstruct to whose texels decode to given points; its own texture is not looked at. Points
 /// can move, and what stands on them follows. Numbers are those of texels, so that most of it is never written down:
 ///  - vertex: its texel; poles, samples of seams and corners follow behind all texels in the order of lattice.h;

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/encode/half_texels.h"
+
+#include <cmath>
+
+#include "skeletex/reconstruct/lattice_mesh.h"
+
+namespace skeletex {
+namespace {
+
+/// Over those that are not 0.
+double root_mean_square(const ClMapping<float>& squares) {
+  double sum = 0;
+  int count = 0;
+  for (std::size_t i = 0; i < squares.size(); ++i) sum += squares.data()[i], count += squares.data()[i] > 0;
+  return count > 0 ? std::sqrt(sum / count) : 0;
+}
+
+}  // namespace
+
+RoundingReport round_to_half(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches, const DeviceLayout& layout, const ClBuffer<RowRecord>& rows,
+                             const ClBuffer<ColumnRecord>& columns, const DevicePlanes& points, DevicePlanes& texels) {
+  auto diagonals = context.allocate<int>(layout.size());
+  context.fill(diagonals, 0);
+  choose_diagonals(context, rule, patches, layout.width, context.upload(quad_rows(patches)), layout.patches, points, diagonals);
+  auto nearest2 = context.allocate<float>(layout.size()), chosen2 = context.allocate<float>(layout.size());
+  context.fill(nearest2, 0.f), context.fill(chosen2, 0.f);
+  const auto inner_rows = context.upload(lattice_rows(patches, RowChoice::kInner));
+  context.launch({"half.cl", "round_texels"}, row_range(context, inner_rows.size), static_cast<int>(inner_rows.size), layout.width, inner_rows, layout.patches,
+                 rows, columns, points.x, points.y, points.z, diagonals, texels.x, texels.y, texels.z, nearest2, chosen2);
+  return {root_mean_square(context.map(nearest2)), root_mean_square(context.map(chosen2))};
+}
+
+}  // namespace skeletex
