@@ -126,16 +126,23 @@ class Distances {
       return *last;
     };
     std::vector<Measured> measured;
-    const auto furthest_of = [&] {
-      float furthest = 0;
-      for (const Measured& each : measured) furthest = std::max(furthest, each.distance);
-      return furthest;
-    };
+    std::vector<int> nearest;
     const auto above = [&](float least) {
       std::vector<int> triangles;
       for (const Measured& each : measured)
         if (each.distance >= least) triangles.push_back(each.triangle);
       return triangles;
+    };
+    // The furthest is at least that of any, and it is among those that seem further: walks can end too far away.
+    const auto furthest_of = [&](const auto& places) {
+      float furthest = 0;
+      for (const Measured& each : measured) furthest = std::max(furthest, each.distance);
+      for (float limit = kEvenWorthALook * furthest; furthest > 0; limit = furthest) {
+        furthest = 0;
+        for (const float distance : measure_exactly(lattice, above(limit), places, 0, nearest)) furthest = std::max(furthest, distance);
+        if (furthest >= limit) break;
+      }
+      return furthest;
     };
     // A few tell what the others need not be asked for.
     constexpr float kNever = std::numeric_limits<float>::max();
@@ -144,21 +151,13 @@ class Distances {
     for (int texel = 0; texel < static_cast<int>(suspicions2.size()); ++texel)
       if (suspicions2[texel] > least_of_few && !std::isinf(suspicions2[texel])) few.push_back(2 * texel), few.push_back(2 * texel + 1);
     measured = measure_near(lattice, few, texel_triangles, {0, kNever, 0});
-    float least = kEvenWorthALook * furthest_of();
+    float least = kEvenWorthALook * furthest_of(kMiddle);
     measured = measure_near(lattice, triangles_above(lattice, suspicions2, least_of(kShareOfEven)), texel_triangles, {least, kNever, 0});
     for (const int triangle : look_again_at_turned(lattice, measured)) turned.push_back(triangle);
     // Places beside the middle, where these could be the furthest.
-    least = kEvenWorthALook * furthest_of();
+    least = kEvenWorthALook * furthest_of(kMiddle);
     measured = measure_near(lattice, above(least), texel_triangles, {0, 0, least});
-    // The furthest is at least that of any, and it is among those that seem further.
-    float furthest = furthest_of();
-    std::vector<int> nearest;
-    for (float limit = kEvenWorthALook * furthest; furthest > 0; limit = furthest) {
-      furthest = 0;
-      for (const float distance : measure_exactly(lattice, above(limit), 0, nearest)) furthest = std::max(furthest, distance);
-      if (furthest >= limit) break;
-    }
-    return furthest;
+    return furthest_of(kPlaces);
   }
   /// All triangles of a lattice that look suspicious.
   void measure_suspects(const LatticeMesh& lattice, const ClBuffer<int>& texel_triangles, float limit) {
@@ -173,7 +172,7 @@ class Distances {
     std::vector<int> suspects, nearest;
     for (const Measured& each : measured)
       if (each.distance > limit) suspects.push_back(each.triangle);
-    const std::vector<float> exact = measure_exactly(lattice, suspects, limit, nearest);
+    const std::vector<float> exact = measure_exactly(lattice, suspects, kPlaces, limit, nearest);
     std::size_t next = 0;
     for (Measured& each : measured)
       if (each.distance > limit) each.distance = exact[next++];
@@ -388,7 +387,7 @@ class Distances {
       else if (asked[k] >= lattice.first_end_triangle()) unmapped.push_back(asked[k]);
     }
     std::vector<int> nearest;
-    const std::vector<float> exact = measure_exactly(lattice, unmapped, 0, nearest);
+    const std::vector<float> exact = measure_exactly(lattice, unmapped, kPlaces, 0, nearest);
     for (std::size_t k = 0; k < unmapped.size(); ++k) measured.push_back({unmapped[k], exact[k], looks_against(lattice, unmapped[k], nearest[k])});
     return measured;
   }
@@ -413,14 +412,16 @@ class Distances {
   }
   /// \param enough   what is nearer need not be exact
   /// \param nearest  out: to their middles, where exact
-  std::vector<float> measure_exactly(const LatticeMesh& lattice, const std::vector<int>& asked, float enough, std::vector<int>& nearest) {
+  template <std::size_t kCount>
+  std::vector<float> measure_exactly(const LatticeMesh& lattice, const std::vector<int>& asked, const std::array<std::array<double, 2>, kCount>& places,
+                                     float enough, std::vector<int>& nearest) {
     std::vector<float> most(asked.size(), 0), distances;
     std::vector<int> triangles;
-    find(lattice, asked, kPlaces, enough, triangles, distances);
+    find(lattice, asked, places, enough, triangles, distances);
     nearest.resize(asked.size());
     for (std::size_t k = 0; k < distances.size(); ++k) {
-      most[k / kPlaces.size()] = std::max(most[k / kPlaces.size()], distances[k]);
-      if (k % kPlaces.size() == 0) nearest[k / kPlaces.size()] = triangles[k];
+      most[k / kCount] = std::max(most[k / kCount], distances[k]);
+      if (k % kCount == 0) nearest[k / kCount] = triangles[k];
     }
     return most;
   }
