@@ -61,6 +61,8 @@ std::vector<std::pair<std::string, Method>> parse_bone_methods(const std::vector
   return methods;
 }
 
+TexelShare share_of(const std::string& name) { return name == "area" ? TexelShare::kArea : name == "triangles" ? TexelShare::kTriangles : TexelShare::kError; }
+
 EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command) {
   EncodeOptions options;
   const auto size = parse_size(arguments.size);
@@ -78,6 +80,7 @@ EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command
     options.has_unfold = false;
     options.has_snap = false;
     options.has_fit = false;
+    if (options.method != EncodeMethod::kSpd) options.texel_share = TexelShare::kTriangles;
   }
   const auto is_given = [&](const char* name) { return command.count(name) > 0; };
   if (is_given("--iterations")) options.vsm.iterations = arguments.iterations;
@@ -92,7 +95,7 @@ EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command
   options.spd_hit = arguments.spd_hit == "first" ? SpdHit::kFirst : SpdHit::kLast;
   if (is_given("--rounding") && !arguments.is_half) throw CLI::ValidationError("--rounding", "needs --half");
   options.has_half_texels = arguments.is_half && arguments.rounding == "surface";
-  if (is_given("--share")) options.texel_share = arguments.share == "area" ? TexelShare::kArea : TexelShare::kTriangles;
+  if (is_given("--share")) options.texel_share = share_of(arguments.share);
   return options;
 }
 
@@ -309,8 +312,8 @@ void add_encode_command(CLI::App& program) {
   take_one_of(add("Texels", "--rows", a.rows, "where rows lie along a bone: evenly in surface length, or uniform in the map (the paper)"),
               {"surface", "uniform"});
   take_one_of(
-      add("Texels", "--share", a.share, "what a bone's share of the texels follows; unless given: area with --method spd, triangles otherwise"),
-      {"triangles", "area"});
+      add("Texels", "--share", a.share, "what a bone's share of the texels follows, and by error its columns per row as well; unless given: area with --method spd, error otherwise"),
+      {"error", "triangles", "area"});
   command.add_flag("--no-unfold", a.has_no_unfold, "the even lattice as it is, also where it folds in space");
   command.add_flag("--no-prefilter", a.has_no_prefilter, "texels exactly on the mesh, so that flat triangles lie inside its curved parts")
       ->group("Texels");
@@ -328,7 +331,7 @@ void add_encode_command(CLI::App& program) {
               {"nearest", "smooth"});
   command
       .add_flag("--paper-recipe", a.is_paper_recipe,
-                "as the paper: --rows uniform --alpha 0 --iterations 1 --no-unfold --no-prefilter --no-snap --no-fit (unfold and prefilter stay off, the others can still be given)")
+                "as the paper: --rows uniform --share triangles --alpha 0 --iterations 1 --no-unfold --no-prefilter --no-snap --no-fit (unfold and prefilter stay off, the others can still be given)")
       ->group("Texels");
   command.add_flag("--half", a.is_half, "16 bits a channel: half the file, or a third, for an error of some 2e-6 of the diagonal more")->group("File");
   take_one_of(add("File", "--rounding", a.rounding, "with --half, which half floats: those near a texel whose point stays nearest to the surface, or the nearest ones"),

@@ -198,17 +198,18 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
                                            ? std::vector<RowProfile>(bones)
                                            : spd_profiles(context, skeleton, walls, charts, options.spd_hit);
   const bool is_all_spd = std::find(methods.begin(), methods.end(), Method::kVsm) == methods.end();
-  const TexelShare share = options.texel_share.value_or(is_all_spd ? TexelShare::kArea : TexelShare::kTriangles);
   std::vector<RowProfile> profiles(bones);
   for_each_block(profiles.size(), 1, [&](std::size_t i, std::size_t, std::size_t) { profiles[i] = methods[i] == Method::kVsm ? row_profile(charts[i]) : rays[i]; });
-  std::vector<PatchDemand> demands;
+  std::vector<PatchSource> sources;
   std::vector<double> areas;
   for (int bone = 0; bone < bones; ++bone) {
-    areas.push_back(surface_area(segmentation.segments[bone].mesh));
-    const double length = std::max(profiles[bone].length, 1e-9 * model.diagonal);
-    const double texels = share == TexelShare::kTriangles ? static_cast<double>(segmentation.segments[bone].mesh.triangles.size()) : areas[bone];
-    demands.push_back({texels, areas[bone] / (length * length)});
+    const TriangleMesh& part = segmentation.segments[bone].mesh;
+    areas.push_back(surface_area(part));
+    sources.push_back({methods[bone], &charts[bone], static_cast<double>(part.triangles.size()), areas[bone], std::max(profiles[bone].length, 1e-9 * model.diagonal)});
   }
+  const bool has_even_rows = options.row_spacing == RowSpacing::kUniform;
+  const std::vector<PatchDemand> demands = patch_demands(sources, has_even_rows ? std::span<const RowProfile>() : profiles,
+                                                         options.texel_share.value_or(is_all_spd ? TexelShare::kArea : TexelShare::kError));
   const AtlasLayout layout = pack_atlas(demands, options.width, options.height);
   report.used_fraction = layout.used_fraction;
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "skeletex/cl/context.h"
+#include "skeletex/encode/patch_demands.h"
 #include "skeletex/encode/read_texels.h"
 #include "skeletex/measure/triangle_tree.h"
 #include "skeletex/model/texture.h"
@@ -17,9 +18,6 @@ namespace skeletex {
 enum class EncodeMethod { kSpd, kVsm, kHybrid };
 /// How rows are spread along a bone: evenly in surface length (the default), or evenly in the map's u (the paper).
 enum class RowSpacing { kSurfaceLength, kUniform };
-/// What a patch's share of the texels follows.
-enum class TexelShare { kTriangles, kArea };
-
 /// Up to here the fit is the default: beyond it gains little, and takes longest.
 inline constexpr std::size_t kMostFittedTexels = 256 * 256;
 
@@ -44,7 +42,7 @@ struct EncodeOptions {
   std::optional<DiagonalRule> diagonals;  ///< default: smooth with snapping or fit, else nearest
   /// Texels come as half floats hold them (docs/encoding.md): write_model stores them as such without loss.
   bool has_half_texels = false;
-  std::optional<TexelShare> texel_share;  ///< default: area for all-SPD models, triangles otherwise
+  std::optional<TexelShare> texel_share;  ///< and of the side ratio; default: area for all-SPD models, error otherwise
   /// Of the mesh, as validate_before_segmentation has built it; without, it is built where it is needed. Another mesh's is an error.
   const TriangleTree* tree = nullptr;
   /// Called with a stage's name and the share of work done; returning false cancels by throwing Error.

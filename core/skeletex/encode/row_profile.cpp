@@ -142,6 +142,13 @@ RowProfile row_profile(std::span<const Vec3> positions, int rows, int columns) {
   return finish(std::move(bins));
 }
 
+double share_below(const RowProfile& profile, double u) {
+  const auto above = std::upper_bound(profile.u.begin() + 1, profile.u.end() - 1, u);
+  const std::size_t i = above - profile.u.begin();
+  const double span = profile.u[i] - profile.u[i - 1];
+  return profile.share[i - 1] + (span > 0 ? (u - profile.u[i - 1]) / span : 0) * (profile.share[i] - profile.share[i - 1]);
+}
+
 std::vector<double> spread_rows_by_length(const RowProfile& profile, int height) {
   std::vector<double> rows(height);
   std::size_t bin = 0;

@@ -22,6 +22,9 @@ RowProfile row_profile(const Chart& chart);
 /// u = r / (rows - 1), the columns at any angles.
 RowProfile row_profile(std::span<const Vec3> positions, int rows, int columns);
 
+/// g(u), with what lies between its places.
+double share_below(const RowProfile& profile, double u);
+
 /// Where `height` rows are read: evenly in surface length, u_r = g^-1(r / (height - 1)).
 std::vector<double> spread_rows_by_length(const RowProfile& profile, int height);
 /// Evenly in u (the paper's recipe).
