@@ -49,7 +49,7 @@ SECTIONS = [
     ("Beyond the paper: other ways to as many vertices", "simplification", sweeps.draw_simplification,
      "A texture is about as good as a uniform remesh. A simplification puts its vertices where the surface bends, which an even lattice cannot."),
     ("Beyond the paper: error against bytes", "bytes", sweeps.draw_bytes,
-     "Draco codes the input mesh alone and needs far fewer bytes. The texture pays for being editable: every texel is a displacement that can be posed, morphed and filtered."),
+     "Half floats are those near the texels whose points stay nearest to the surface, or the nearest ones. Draco codes the input mesh alone and needs far fewer bytes. The texture pays for being editable: every texel is a displacement that can be posed, morphed and filtered."),
     ("Beyond the paper: time and memory against the number of triangles", "scale", scale.draw,
      "encode as a whole command, files included, at 512 x 512, even lattice: the armadillo remeshed or decimated, and subdivided. The dotted line is n log n through the fewest triangles beyond 100 000."),
 ]

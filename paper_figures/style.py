@@ -11,7 +11,8 @@ import matplotlib.pyplot as plt  # noqa: E402
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 # Colours differ in lightness too, and every series has its own marker and dash, so that a grey print can be read.
-SERIES = [("#1b3a6b", "o", "-"), ("#c8553d", "s", "--"), ("#3f8f5f", "^", "-."), ("#8a6bb1", "D", ":"), ("#d9a441", "v", "-"), ("#5b5b5b", "P", "--")]
+SERIES = [("#1b3a6b", "o", "-"), ("#c8553d", "s", "--"), ("#3f8f5f", "^", "-."), ("#8a6bb1", "D", ":"), ("#d9a441", "v", "-"), ("#5b5b5b", "P", "--"),
+          ("#6fb1c7", "X", "-.")]
 
 plt.rcParams.update({
     "font.family": "sans-serif", "font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": "#dddddd",

@@ -16,10 +16,10 @@ BoneEnd end_at(const Skeleton& skeleton, int bone, int node) { return skeleton.b
 double wrapped(double turn) { return turn - std::round(turn); }
 
 /// Moves evenly spread places along a polyline to its bends, the sharpest first, each to the nearest place that is free
-/// and within 0.7 of a step; their order stays.
+/// and within 0.7 of a step; their order stays, and no gap gets wider than 1.5 steps.
 /// \param reached  length up to each of the points
 void snap_places(const std::vector<Vec3>& points, const std::vector<double>& reached, std::vector<double>& places) {
-  constexpr double kReach = 0.7, kLeastGap = 0.1, kLeastBend = 1e-3;  // steps, steps, radians
+  constexpr double kReach = 0.7, kLeastGap = 0.1, kMostGap = 1.5, kLeastBend = 1e-3;  // steps, steps, steps, radians
   const double step = reached.back() / static_cast<double>(places.size() + 1);
   std::vector<std::pair<double, int>> bends;
   for (int i = 1; i + 1 < static_cast<int>(points.size()); ++i) {
@@ -35,7 +35,9 @@ void snap_places(const std::vector<Vec3>& points, const std::vector<double>& rea
     for (const int k : {right - 1, right}) {
       if (k < 0 || k >= static_cast<int>(places.size()) || is_taken[k] || std::abs(places[k] - reached[i]) > kReach * step) continue;
       const double low = k > 0 ? places[k - 1] : 0, high = k + 1 < static_cast<int>(places.size()) ? places[k + 1] : reached.back();
-      if (reached[i] - low < kLeastGap * step || high - reached[i] < kLeastGap * step) continue;
+      const double nearer = std::min(reached[i] - low, high - reached[i]), wider = std::max(reached[i] - low, high - reached[i]);
+      // A wide gap cuts a corner of the surface, which no texel can make up for.
+      if (nearer < kLeastGap * step || wider > std::max(kMostGap * step, std::max(places[k] - low, high - places[k]))) continue;
       if (best < 0 || std::abs(places[k] - reached[i]) < std::abs(places[best] - reached[i])) best = k;
     }
     if (best < 0) continue;

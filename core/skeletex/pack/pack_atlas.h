@@ -10,7 +10,7 @@ namespace skeletex {
 /// What one patch asks for.
 struct PatchDemand {
   double share = 1;             ///< of the texels; any positive unit, the sum is normalised
-  double columns_per_row = 1;   ///< wanted width / height of the rectangle: girth / length
+  double columns_per_row = 1;   ///< wanted width / height of the rectangle
 };
 
 struct AtlasLayout {
