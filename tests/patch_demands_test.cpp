@@ -106,7 +106,7 @@ TEST(PatchDemands, GiveAnotherModelTheSameWhateverItsSize) {
 TEST(PatchDemands, OfWhatBendsAroundTheBoneAloneStayNearGirthToLength) {
   const Chart cylinder = tube(20, 64, 4, [](double) { return 0.2; });
   const std::vector<PatchDemand> demands = patch_demands(std::vector<PatchSource>{{Method::kVsm, &cylinder, 2432, 5, 4}}, {}, TexelShare::kError);
-  EXPECT_DOUBLE_EQ(demands[0].columns_per_row, 4 * 5.0 / 16);
+  EXPECT_DOUBLE_EQ(demands[0].columns_per_row, 2 * 5.0 / 16);
   EXPECT_TRUE(std::isfinite(demands[0].share) && demands[0].share > 0);
 }
 

@@ -10,7 +10,7 @@
 namespace skeletex {
 namespace {
 
-constexpr double kMostOff = 4;  // of a side ratio, from that of girth to length: where a patch bends in one direction alone
+constexpr double kMostOff = 2;  // of a side ratio, from that of girth to length: where a patch bends in one direction alone
 
 bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind == ChartVertex::kTailPole; }
 
