@@ -47,7 +47,7 @@ SECTIONS = [
      "The paper's weights w A even out areas in the texture; divided by a power of the surface area they even out the texels on the surface."),
     ("Beyond the paper: what the recipe's parts bring", "recipe", sweeps.draw_recipe, "The paper's own recipe, the default, the default on an even lattice, and that with one part taken back."),
     ("Beyond the paper: other ways to as many vertices", "simplification", sweeps.draw_simplification,
-     "A texture is about as good as a uniform remesh. A simplification puts its vertices where the surface bends, which an even lattice cannot."),
+     "A texture is better than a uniform remesh. A simplification puts its vertices where the surface bends, which a lattice can where it has texels enough."),
     ("Beyond the paper: error against bytes", "bytes", sweeps.draw_bytes,
      "Half floats are those near the texels whose points stay nearest to the surface, or the nearest ones. Draco codes the input mesh alone and needs far fewer bytes. The texture pays for being editable: every texel is a displacement that can be posed, morphed and filtered."),
     ("Beyond the paper: time and memory against the number of triangles", "scale", scale.draw,
