@@ -6,6 +6,7 @@
 
 #include "command.h"
 #include "result_file.h"
+#include "skeletex/encode/half_texels.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/levels.h"
@@ -17,7 +18,7 @@ namespace {
 struct Arguments {
   std::string model, output, device, json;
   int size = 0, smallest = 32;
-  bool has_levels = false;
+  bool has_levels = false, is_half = false;
 };
 
 void run(const Arguments& arguments) {
@@ -25,24 +26,34 @@ void run(const Arguments& arguments) {
   check_result(arguments.output);
   if (arguments.has_levels && !arguments.output.ends_with(".exr"))
     throw IoError(fmt::format("{}: levels are written as one model with several parts: .skx.exr", arguments.output));
+  if (arguments.is_half && !arguments.output.ends_with(".exr")) throw IoError(fmt::format("{}: half floats are those of a model: .skx.exr", arguments.output));
   const SkeletexModel model = read_model(arguments.model);
   ClContext& context = open_device(arguments.device);
   Stopwatch watch;
   Json json;
   std::string text;
+  const auto round = [&](SkeletexModel& level) {
+    RoundedModel rounded = round_to_half(context, level);
+    json["rounding"].push_back({{"nearest", rounded.report.nearest / model.diagonal}, {"chosen", rounded.report.chosen / model.diagonal}});
+    level = std::move(rounded.model);
+  };
+  const ModelFileOptions file{.format = arguments.is_half ? TexelFormat::kHalf : TexelFormat::kFloat};
   if (arguments.has_levels) {
-    const std::vector<SkeletexModel> levels = make_levels(context, model, arguments.smallest);
+    std::vector<SkeletexModel> levels = make_levels(context, model, arguments.smallest);
     json["times_ms"]["resample"] = watch.lap_ms();
-    write_model_levels(arguments.output, levels);
+    if (arguments.is_half)
+      for (SkeletexModel& level : levels) round(level);
+    write_model_levels(arguments.output, levels, file);
     json["output"] = {{"path", arguments.output}, {"kind", "model"}};
     for (const SkeletexModel& level : levels) {
       json["levels"].push_back({level.texture.width, level.texture.height});
       text += fmt::format("level {}: {} x {}\n", json["levels"].size() - 1, level.texture.width, level.texture.height);
     }
   } else {
-    const SkeletexModel small = resample_model(context, model, arguments.size);
+    SkeletexModel small = resample_model(context, model, arguments.size);
     json["times_ms"]["resample"] = watch.lap_ms();
-    json["output"] = write_result(context, small, arguments.output);
+    if (arguments.is_half) round(small);
+    json["output"] = write_result(context, small, arguments.output, file);
     text = fmt::format("{} x {} texels from {} x {}\n", small.texture.width, small.texture.height, model.texture.width, model.texture.height);
   }
   json["times_ms"]["write"] = watch.lap_ms();
@@ -69,12 +80,14 @@ void add_lod_command(CLI::App& program) {
       ->capture_default_str()
       ->type_name("N")
       ->needs(levels);
+  command.add_flag("--half", arguments->is_half, "16 bits a channel, rounded so that points stay near the surface; at the model's own size all else stays");
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(
       "Examples:\n"
       "  skeletex lod bear.skx.exr --size 128 -o small.skx.exr\n"
       "  skeletex lod bear.skx.exr --levels -o levels.skx.exr\n"
+      "  skeletex lod bear.skx.exr --size 512 --half -o half.skx.exr\n"
       "  skeletex reconstruct levels.skx.exr --level 3 -o coarse.ply\n"
       "Seams are kept at every level, so every level reconstructs to a closed mesh. A file of levels is a multi-part OpenEXR image;\n"
       "commands that take a model read its finest level.");

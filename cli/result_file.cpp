@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include "skeletex/io/mesh_file.h"
-#include "skeletex/io/model_file.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 
@@ -25,10 +24,10 @@ void check_result(const std::string& path) {
   check_output(path);
 }
 
-Json write_result(ClContext& context, const SkeletexModel& model, const std::string& path) {
+Json write_result(ClContext& context, const SkeletexModel& model, const std::string& path, const ModelFileOptions& options) {
   Json json{{"path", path}, {"kind", is_model(path) ? "model" : "mesh"}, {"size", {model.texture.width, model.texture.height}}};
   if (is_model(path)) {
-    write_model(path, model);
+    write_model(path, model, options);
   } else {
     const TriangleMesh mesh = reconstruct_mesh(context, model);
     write_mesh(path, mesh);

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "command.h"
-#include "skeletex/model/texture.h"
+#include "skeletex/io/model_file.h"
 
 namespace skeletex::cli {
 
@@ -13,7 +13,8 @@ void add_result_option(CLI::App& command, std::string& path);
 /// Fails before the work: another ending, a folder that is missing or not writable. \throw IoError
 void check_result(const std::string& path);
 /// Writes the model, or reconstructs it in its bind pose and writes the mesh. \throw IoError, DeviceError
+/// \param options  of a model's file
 /// \return for the JSON: path, kind ("model" or "mesh"), size, and of a mesh vertices and triangles
-Json write_result(ClContext& context, const SkeletexModel& model, const std::string& path);
+Json write_result(ClContext& context, const SkeletexModel& model, const std::string& path, const ModelFileOptions& options = {});
 
 }  // namespace skeletex::cli

@@ -207,7 +207,15 @@ TEST_F(Program, WritesHalfFloatsNearTheSurface) {
   EXPECT_LT(means["none"], means["surface"]);
   EXPECT_LT(means["surface"], means["nearest"]);
   expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--rounding", "nearest"}, {"--rounding", "needs --half"});
-  for (const char* name : {"half.skx.exr", "half.ply"}) fs::remove(folder_ / name);
+  // The last one is not rounded: it is made so, alone and with its levels.
+  const nlohmann::json later = json_of({"lod", "half.skx.exr", "--size", "128", "--half", "-o", "later.skx.exr"});
+  EXPECT_NEAR(later["rounding"][0]["chosen"].get<double>(), of["surface"]["rounding"]["chosen"].get<double>(), 0.05 * later["rounding"][0]["chosen"].get<double>());
+  EXPECT_LT(fs::file_size(folder_ / "later.skx.exr"), 0.6 * static_cast<double>(fs::file_size(folder_ / "half.skx.exr")));
+  EXPECT_EQ(json_of({"lod", "half.skx.exr", "--levels", "--half", "-o", "levels.skx.exr"})["rounding"].size(), 3u);
+  EXPECT_EQ(run({"reconstruct", "levels.skx.exr", "--level", "2", "-o", "half.ply"}).code, 0);
+  EXPECT_EQ(json_of({"inspect", "half.ply"})["closed_manifold"], true);
+  expect_refused(1, {"lod", "half.skx.exr", "--size", "64", "--half", "-o", "no.ply"}, {"no.ply", ".skx.exr"});
+  for (const char* name : {"half.skx.exr", "later.skx.exr", "levels.skx.exr", "half.ply"}) fs::remove(folder_ / name);
 }
 
 TEST_F(Program, ReconstructsAndReportsWhatTheContractNames) {
@@ -504,7 +512,7 @@ TEST_F(Program, CompilesEachKernelOnceAndNothingInASecondProcess) {
 TEST_F(Program, TakesThePapersRecipeAndItsPartsAlike) {
   ASSERT_EQ(run({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64", "--paper-recipe"}).code, 0);
   ASSERT_EQ(run({"encode", "y.ply", "y.skeleton.json", "-o", "b.skx.exr", "--size", "64", "--rows", "uniform", "--alpha", "0", "--iterations", "1",
-                 "--no-unfold", "--no-prefilter"})
+                 "--share", "triangles", "--no-unfold", "--no-prefilter"})
                 .code,
             0);
   EXPECT_TRUE(text_of(folder_ / "a.skx.exr") == text_of(folder_ / "b.skx.exr"));

@@ -151,5 +151,29 @@ TEST(HalfTexels, OfSpdPatchesStayOnTheirRays) {
   });
 }
 
+TEST(HalfTexels, OfAFinishedModelAreThoseOfTheEncoder) {
+  for (const EncodeMethod method : {EncodeMethod::kVsm, EncodeMethod::kSpd}) {
+    const Encoded encoded = encode("bear", method, 128);
+    const RoundedModel again = round_to_half(device(), encoded.exact);
+    const Planes own = planes_of(encoded.rounded.texture), other = planes_of(again.model.texture);
+    int same = 0, all = 0;
+    for_each_inner(encoded.exact, encoded.lattice, [&](std::size_t texel, int, bool) {
+      for (int i = 0; i < 3; ++i) {
+        EXPECT_TRUE(is_half(other[i][texel]));
+        same += own[i][texel] == other[i][texel], ++all;
+      }
+    });
+    // Its points are those of the texels in single precision, so that a choice can fall the other way.
+    EXPECT_GT(same, 0.97 * all);
+    EXPECT_NEAR(again.report.nearest, encoded.report.nearest, 0.01 * encoded.report.nearest);
+    EXPECT_NEAR(again.report.chosen, encoded.report.chosen, 0.02 * encoded.report.chosen);
+    // What is rounded stays.
+    const Planes twice = planes_of(round_to_half(device(), again.model).model.texture);
+    for_each_inner(encoded.exact, encoded.lattice, [&](std::size_t texel, int, bool) {
+      for (int i = 0; i < 3; ++i) EXPECT_EQ(other[i][texel], twice[i][texel]);
+    });
+  }
+}
+
 }  // namespace
 }  // namespace skeletex

@@ -31,4 +31,23 @@ RoundingReport round_to_half(ClContext& context, DiagonalRule rule, const std::v
   return {root_mean_square(context.map(nearest2)), root_mean_square(context.map(chosen2))};
 }
 
+RoundedModel round_to_half(ClContext& context, const SkeletexModel& model) {
+  const DisplacementTexture& texture = model.texture;
+  const FrameTables tables = frame_tables(model.skeleton, Walls(model.skeleton), model.patches, model.origin);
+  const DeviceLayout layout = upload_layout(context, model.patches, tables, texture.width, texture.height);
+  // Rows whose points come at the places of their texels.
+  DeviceLattice lattice = upload_lattice(context, tables, model.patches, texture, RowChoice::kAll);
+  std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kAll);
+  for (LatticeRow& row : rows) row[2] = (model.patches[row[0]].rectangle.y + row[1]) * texture.width + model.patches[row[0]].rectangle.x;
+  lattice.rows = context.upload(rows);
+  DevicePlanes points = allocate_planes(context, layout.size());
+  context.fill(points.x, 0.f), context.fill(points.y, 0.f), context.fill(points.z, 0.f);
+  displace(context, lattice, points);
+  const RoundingReport report =
+      round_to_half(context, model.diagonals, model.patches, layout, context.upload(tables.rows), context.upload(tables.columns), points, lattice.texels);
+  RoundedModel rounded{model, report};
+  rounded.model.texture = {texture.width, texture.height, context.download(lattice.texels.x), context.download(lattice.texels.y), context.download(lattice.texels.z)};
+  return rounded;
+}
+
 }  // namespace skeletex

@@ -4,6 +4,7 @@
 
 #include "skeletex/cl/context.h"
 #include "skeletex/encode/device_maps.h"
+#include "skeletex/model/texture.h"
 #include "skeletex/reconstruct/displace.h"
 
 namespace skeletex {
@@ -23,5 +24,12 @@ struct RoundingReport {
 /// \param texels   in and out: along, around, out
 RoundingReport round_to_half(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches, const DeviceLayout& layout, const ClBuffer<RowRecord>& rows,
                              const ClBuffer<ColumnRecord>& columns, const DevicePlanes& points, DevicePlanes& texels);
+
+struct RoundedModel {
+  SkeletexModel model;
+  RoundingReport report;
+};
+/// The same for a model's texels as they are. \throw DeviceError
+RoundedModel round_to_half(ClContext& context, const SkeletexModel& model);
 
 }  // namespace skeletex
