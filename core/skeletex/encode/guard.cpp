@@ -26,6 +26,7 @@ constexpr int kReach = 1;                 // columns and rows around a triangle 
 constexpr float kShareOfFurthest = 0.9f;  // what is measured is not all that there is
 constexpr float kWorthALook = 0.15f;      // of the limit, at the middle of a triangle: then it is measured more densely
 constexpr double kShareOfFew = 0.001;     // of the even lattice's quads, the most suspicious: they tell which of the others matter
+constexpr std::size_t kAskedOfFew = 32;    // of their triangles, those that seem furthest
 constexpr double kShareOfEven = 0.02;     // of the even lattice's quads, the most suspicious: among them is its furthest
 constexpr float kWorthAWalk = 0.75f;      // of the limit: how far a quad could be
 constexpr float kEvenWorthALook = 0.5f;   // of the furthest middle, in the even lattice
@@ -133,31 +134,31 @@ class Distances {
         if (each.distance >= least) triangles.push_back(each.triangle);
       return triangles;
     };
-    // The furthest is at least that of any, and it is among those that seem further: walks can end too far away.
-    const auto furthest_of = [&](const auto& places) {
-      float furthest = 0;
-      for (const Measured& each : measured) furthest = std::max(furthest, each.distance);
-      for (float limit = kEvenWorthALook * furthest; furthest > 0; limit = furthest) {
-        furthest = 0;
-        for (const float distance : measure_exactly(lattice, above(limit), places, 0, nearest)) furthest = std::max(furthest, distance);
-        if (furthest >= limit) break;
-      }
-      return furthest;
-    };
-    // A few tell what the others need not be asked for.
+    // A few tell what the others need not be asked for; walks can end too far away, so the tree says how far those that seem furthest are.
     constexpr float kNever = std::numeric_limits<float>::max();
     std::vector<int> few;
     const float least_of_few = least_of(kShareOfFew);
     for (int texel = 0; texel < static_cast<int>(suspicions2.size()); ++texel)
       if (suspicions2[texel] > least_of_few && !std::isinf(suspicions2[texel])) few.push_back(2 * texel), few.push_back(2 * texel + 1);
     measured = measure_near(lattice, few, texel_triangles, {0, kNever, 0});
-    float least = kEvenWorthALook * furthest_of(kMiddle);
+    std::sort(measured.begin(), measured.end(), [](const Measured& one, const Measured& other) { return one.distance > other.distance; });
+    measured.resize(std::min(measured.size(), kAskedOfFew));
+    float known = 0;
+    for (const float distance : measure_exactly(lattice, above(0), kMiddle, 0, nearest)) known = std::max(known, distance);
+    const float least = kEvenWorthALook * known;
     measured = measure_near(lattice, triangles_above(lattice, suspicions2, least_of(kShareOfEven)), texel_triangles, {least, kNever, 0});
     for (const int triangle : look_again_at_turned(lattice, measured)) turned.push_back(triangle);
     // Places beside the middle, where these could be the furthest.
-    least = kEvenWorthALook * furthest_of(kMiddle);
     measured = measure_near(lattice, above(least), texel_triangles, {0, 0, least});
-    return furthest_of(kPlaces);
+    // The furthest is at least that of any, and it is among those that seem further.
+    float furthest = 0;
+    for (const Measured& each : measured) furthest = std::max(furthest, each.distance);
+    for (float limit = kEvenWorthALook * furthest; furthest > 0; limit = furthest) {
+      furthest = 0;
+      for (const float distance : measure_exactly(lattice, above(limit), kPlaces, 0, nearest)) furthest = std::max(furthest, distance);
+      if (furthest >= limit) break;
+    }
+    return furthest;
   }
   /// All triangles of a lattice that look suspicious.
   void measure_suspects(const LatticeMesh& lattice, const ClBuffer<int>& texel_triangles, float limit) {
