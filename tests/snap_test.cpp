@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <numbers>
+#include <numeric>
 #include <random>
 
 #include "skeletex/encode/encode_model.h"
@@ -316,6 +317,31 @@ TEST(Snap, AndFitAreOnWhereTheyPayUnlessToldOtherwise) {
   EXPECT_EQ(reported(128, few, [](EncodeOptions& o) { o.has_snap = true, o.has_fit = false; }), std::pair(true, false));
   EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.has_prefilter = false; }), std::pair(true, false));  // texels on the mesh were asked for
   EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.method = EncodeMethod::kSpd; }), std::pair(false, false));
+}
+
+TEST(Snap, LeavesNoWideGapsBetweenSeamSamples) {
+  const TestModel model = load_standard_model("bunny00");
+  EncodeOptions options;
+  options.width = options.height = 256;
+  double widest_snapped = 0;
+  for (const bool is_snapped : {false, true}) {
+    options.has_snap = is_snapped;
+    const SkeletexModel encoded = encode_model(device(), model.mesh, model.skeleton, options).model;
+    const std::vector<Vec3> positions = lattice_positions(device(), encoded);
+    const Lattice lattice = number_lattice(encoded);
+    for (std::size_t arc = 0; arc < encoded.arcs.size(); ++arc) {
+      std::vector<double> gaps;
+      for (std::size_t i = 1; i < encoded.arcs[arc].samples.size(); ++i)
+        gaps.push_back((positions[lattice.first_sample[arc] + i] - positions[lattice.first_sample[arc] + i - 1]).norm());
+      if (gaps.size() < 20) continue;
+      const double mean = std::accumulate(gaps.begin(), gaps.end(), 0.0) / static_cast<double>(gaps.size());
+      const double widest = *std::max_element(gaps.begin(), gaps.end()) / mean;
+      // Chords of bends are shorter than the arc.
+      EXPECT_LT(widest, is_snapped ? 1.6 : 1.1) << arc;
+      if (is_snapped) widest_snapped = std::max(widest_snapped, widest);
+    }
+  }
+  EXPECT_GT(widest_snapped, 1.3);  // they do move
 }
 
 }  // namespace skeletex
