@@ -27,7 +27,7 @@ constexpr float kShareOfFurthest = 0.9f;  // what is measured is not all that th
 constexpr float kWorthALook = 0.15f;      // of the limit, at the middle of a triangle: then it is measured more densely
 constexpr double kShareOfFew = 0.001;     // of the even lattice's quads, the most suspicious: they tell which of the others matter
 constexpr std::size_t kAskedOfFew = 32;    // of their triangles, those that seem furthest
-constexpr double kShareOfEven = 0.02;     // of the even lattice's quads, the most suspicious: among them is its furthest
+constexpr double kShareOfEven = 0.005;    // of the even lattice's quads, the most suspicious: among them is its furthest
 constexpr float kWorthAWalk = 0.75f;      // of the limit: how far a quad could be
 constexpr float kEvenWorthALook = 0.5f;   // of the furthest middle, in the even lattice
 constexpr int kVertexReach = 6;           // columns and rows around a texel: diagonals depend on it, vertices are measured to their quads (guard.cl)
@@ -119,8 +119,10 @@ class Distances {
   /// Of the even lattice, the triangles that look most suspicious. \return the furthest of them
   float measure_even(const LatticeMesh& lattice, const ClBuffer<int>& texel_triangles, std::vector<int>& turned) {
     const ClMapping<float> suspicions2 = suspect(lattice, texel_triangles);
-    std::vector<float> some;  // enough to tell how large the largest are
-    for (std::size_t i = 0; i < suspicions2.size(); i += 7) some.push_back(suspicions2[i]);
+    std::vector<float> some;  // enough to tell how large the largest are, but for those that look against the mesh
+    for (std::size_t i = 0; i < suspicions2.size(); i += 7)
+      if (!std::isinf(suspicions2[i])) some.push_back(suspicions2[i]);
+    if (some.empty()) some.push_back(0);
     const auto least_of = [&](double share) {
       const auto last = some.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(some.size()));
       std::nth_element(some.begin(), last, some.end(), std::greater<>());
@@ -146,7 +148,9 @@ class Distances {
     float known = 0;
     for (const float distance : measure_exactly(lattice, above(0), kMiddle, 0, nearest)) known = std::max(known, distance);
     const float least = kEvenWorthALook * known;
-    measured = measure_near(lattice, triangles_above(lattice, suspicions2, least_of(kShareOfEven)), texel_triangles, {least, kNever, 0});
+    std::vector<int> asked = triangles_above(suspicions2, least_of(kShareOfEven));
+    add_ends(lattice, asked);
+    measured = measure_near(lattice, asked, texel_triangles, {least, kNever, 0});
     for (const int triangle : look_again_at_turned(lattice, measured)) turned.push_back(triangle);
     // Places beside the middle, where these could be the furthest.
     measured = measure_near(lattice, above(least), texel_triangles, {0, 0, least});
@@ -160,11 +164,15 @@ class Distances {
     }
     return furthest;
   }
-  /// All triangles of a lattice that look suspicious.
-  void measure_suspects(const LatticeMesh& lattice, const ClBuffer<int>& texel_triangles, float limit) {
+  /// All triangles of a lattice that look suspicious, and all at ends.
+  /// \param suspects  told as soon as they are known: the former
+  void measure_suspects(const LatticeMesh& lattice, const ClBuffer<int>& texel_triangles, float limit, std::promise<std::vector<int>> suspects) {
     const float least = kWorthAWalk * limit;
+    std::vector<int> asked = triangles_above(suspect(lattice, texel_triangles), least * least);
+    suspects.set_value(asked);
+    add_ends(lattice, asked);
     faults_.clear();
-    measure_triangles(lattice, triangles_above(lattice, suspect(lattice, texel_triangles), least * least), texel_triangles, limit);
+    measure_triangles(lattice, asked, texel_triangles, limit);
   }
   /// Some of them again: at their middles, and more densely where these are further than a share of the limit.
   /// \param asked  in order
@@ -350,13 +358,15 @@ class Distances {
                     lattice.device_points().z, suspicions2);
     return context_.map(suspicions2);
   }
-  /// Those of quads that are more suspicious than that or look against the mesh, and all at ends.
-  static std::vector<int> triangles_above(const LatticeMesh& lattice, const ClMapping<float>& suspicions2, float least) {
+  /// Those of quads that are more suspicious than that or look against the mesh.
+  static std::vector<int> triangles_above(const ClMapping<float>& suspicions2, float least) {
     std::vector<int> triangles;
     for (int texel = 0; texel < static_cast<int>(suspicions2.size()); ++texel)
       if (suspicions2[texel] > least || std::isinf(suspicions2[texel])) triangles.push_back(2 * texel), triangles.push_back(2 * texel + 1);
-    for (int i = lattice.first_end_triangle(); i < lattice.triangle_count(); ++i) triangles.push_back(i);
     return triangles;
+  }
+  static void add_ends(const LatticeMesh& lattice, std::vector<int>& triangles) {
+    for (int i = lattice.first_end_triangle(); i < lattice.triangle_count(); ++i) triangles.push_back(i);
   }
   /// How near walks need not come nearer: from middles, and from other places, where middles are further than worth a look.
   struct Enough {
@@ -543,7 +553,12 @@ GuardReport Guard::put_back_faults(std::span<const int> vertex_points, const ClB
   LatticeMesh lattice(even_lattice, even_->sources.model.diagonals, points);
   // Crossings are the host's alone: they are found beside distances, which are for the most part the device's.
   using Pairs = std::vector<std::array<int, 2>>;
-  std::future<Pairs> finding_all = std::async(std::launch::async, [&] { return crossings.find(lattice); });
+  // Where the lattice lies on the original it intersects itself no more than that does.
+  std::promise<std::vector<int>> suspects;
+  std::future<Pairs> finding_all = std::async(std::launch::async, [&, listed = suspects.get_future()]() mutable {
+    crossings.measure(lattice);
+    return crossings.find(lattice, listed.get());
+  });
   GuardReport report;
   report.even_turned_triangles = static_cast<int>(even_->turned.size());
 
@@ -558,9 +573,12 @@ GuardReport Guard::put_back_faults(std::span<const int> vertex_points, const ClB
   std::optional<TexelReturns> returns;  // in memory that measuring has given back
   for (int pass = 0; pass < kPasses; ++pass) {
     marks.clear();
-    auto finding = pass == 0 ? std::move(finding_all) : std::async(std::launch::async, [&] { return crossings.find(lattice, changed); });
+    auto finding = pass == 0 ? std::move(finding_all) : std::async(std::launch::async, [&] {
+      crossings.measure(lattice, changed);
+      return crossings.find(lattice, changed);
+    });
     if (pass == 0)
-      distances.measure_suspects(lattice, triangles, limit);
+      distances.measure_suspects(lattice, triangles, limit, std::move(suspects));
     else
       distances.measure_triangles(lattice, changed, triangles, limit);
     const std::vector<int> far = pass == 0 ? distances.find_far_vertices(lattice, vertex_points, context.download(positions.anchors), limit)

@@ -341,8 +341,8 @@ void LatticeCrossings::measure(const LatticeMesh& lattice, int node, Tree& tree)
 }
 
 /// Levels above the leaves, and caps.
-/// \param are_asked  nodes; all without
-void LatticeCrossings::join(Tree& tree, const std::vector<char>* are_asked) const {
+/// \param asked  these nodes; all without
+void LatticeCrossings::join(Tree& tree, const Asked* asked) const {
   for (const Grid& grid : grids_)
     for (std::size_t level = 1; level < grid.levels.size(); ++level) {
       const auto [first, columns, rows] = grid.levels[level];
@@ -350,7 +350,7 @@ void LatticeCrossings::join(Tree& tree, const std::vector<char>* are_asked) cons
       for (int row = 0; row < rows; ++row)
         for (int column = 0; column < columns; ++column) {
           const int node = first + row * columns + column;
-          if (are_asked && (*are_asked)[node] == 0) continue;
+          if (asked && !asked->has(node)) continue;
           Bounds& all = tree.nodes[node];
           all = {no_box<Box>(), no_normals<Normals>()};
           for (int r = 2 * row; r < std::min(2 * row + 2, below.rows); ++r)
@@ -398,8 +398,8 @@ void LatticeCrossings::measure_squares(const LatticeMesh& lattice, int first, Tr
 }
 
 /// Some leaves, and what they are parts of.
-/// \param are_asked  these nodes; all without
-void LatticeCrossings::measure(const LatticeMesh& lattice, std::span<const int> leaves, const std::vector<char>* are_asked, Tree& tree) const {
+/// \param asked  these nodes; all without
+void LatticeCrossings::measure(const LatticeMesh& lattice, std::span<const int> leaves, const Asked* asked, Tree& tree) const {
   tree.nodes.resize(nodes_.size());
   tree.ends.resize(nodes_.size() - first_of_ends());
   for_each_block(leaves.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
@@ -418,18 +418,35 @@ void LatticeCrossings::measure(const LatticeMesh& lattice, std::span<const int> 
       i += are_several ? kSquaresAtOnce : 1;
     }
   });
-  join(tree, are_asked);
+  join(tree, asked);
 }
 
-/// Leaves, and all that they are parts of.
-void LatticeCrossings::mark(std::span<const int> leaves, std::vector<char>& are_asked) const {
-  are_asked.assign(nodes_.size(), 0);
-  for (const int leaf : leaves) {
+LatticeCrossings::Asked LatticeCrossings::ask(const LatticeMesh& lattice, std::span<const int> triangles) const {
+  Asked asked;
+  asked.triangles.assign(lattice.triangle_count(), 0), asked.nodes.assign(nodes_.size(), 0);
+  for (const int number : triangles) {
+    asked.triangles[number] = 1;
+    const int leaf = leaf_of(lattice, number);
+    int& box_number = asked.nodes[leaf];
+    if (box_number == 0) {
+      asked.leaves.push_back(leaf), asked.boxes.push_back(no_box<Box>());
+      box_number = static_cast<int>(asked.boxes.size());
+    }
+    for (const int vertex : lattice.triangle(number)) add(lattice.point(vertex), asked.boxes[box_number - 1]);
+  }
+  for (Box& box : asked.boxes) widen(margin_, box);
+  std::sort(asked.leaves.begin(), asked.leaves.end());
+  for (const int leaf : asked.leaves) {
     const Node& node = nodes_[leaf];
     const Grid& grid = grids_[node.grid];
-    for (int level = 0; level < static_cast<int>(grid.levels.size()); ++level)
-      if (std::exchange(are_asked[node_at(grid, level, node.row >> level, node.column >> level)], 1) != 0) break;
+    const Box box = asked.box(leaf);
+    for (int level = 1; level < static_cast<int>(grid.levels.size()); ++level) {
+      int& box_number = asked.nodes[node_at(grid, level, node.row >> level, node.column >> level)];
+      if (box_number == 0) asked.boxes.push_back(no_box<Box>()), box_number = static_cast<int>(asked.boxes.size());
+      add(box, asked.boxes[box_number - 1]);
+    }
   }
+  return asked;
 }
 
 /// Whether triangles of two nodes can, or of one: not where the lattice around them bends little, but for slivers of strips.
@@ -607,7 +624,7 @@ void LatticeCrossings::copy_quads(const Node& node, const SquareVertices& square
   }
 }
 
-const TriangleBlock& LatticeCrossings::boxes_of(const LatticeMesh& lattice, int number, const std::vector<char>* is_asked, Leaf& leaf) const {
+const TriangleBlock& LatticeCrossings::boxes_of(const LatticeMesh& lattice, int number, const Asked* asked, Leaf& leaf) const {
   TriangleBlock& block = leaf.triangles;
   if (leaf.node == number) return block;
   leaf.node = number, leaf.has_planes = false;
@@ -637,9 +654,9 @@ const TriangleBlock& LatticeCrossings::boxes_of(const LatticeMesh& lattice, int 
       for (int axis = 0; axis < 3; ++axis) block.least[axis][i] = box.least[axis], block.greatest[axis][i] = box.greatest[axis];
     }
   }
-  if (is_asked)
+  if (asked)
     for (int i = 0; i < TriangleBlock::kSize; ++i)
-      if (block.least[0][i] <= block.greatest[0][i]) block.is_asked[i] = (*is_asked)[block.numbers[i]];
+      if (block.least[0][i] <= block.greatest[0][i]) block.is_asked[i] = asked->triangles[block.numbers[i]];
   return block;
 }
 
@@ -664,11 +681,11 @@ void LatticeCrossings::find_planes_of(const LatticeMesh& lattice, Leaf& leaf) co
 }
 
 /// Triangles of two leaves, or of one.
-void LatticeCrossings::find_between(const LatticeMesh& lattice, int a, int b, const Box& around_b, const std::vector<char>* is_asked, Leaves& leaves,
+void LatticeCrossings::find_between(const LatticeMesh& lattice, int a, int b, const Box& around_b, const Asked* asked, Leaves& leaves,
                                     std::vector<std::array<int, 2>>& pairs) const {
   // The last one is for two that are kept at the same place.
   const std::size_t places = leaves.size() - 1, place_a = a % places, place_b = a != b && b % places == place_a ? places : b % places;
-  const TriangleBlock &one = boxes_of(lattice, a, is_asked, leaves[place_a]), &other = boxes_of(lattice, b, is_asked, leaves[place_b]);
+  const TriangleBlock &one = boxes_of(lattice, a, asked, leaves[place_a]), &other = boxes_of(lattice, b, asked, leaves[place_b]);
   BlockOverlaps overlaps;
   find_overlaps(one, other, around_b.least.data(), around_b.greatest.data(), overlaps);
   if (overlaps.group_count == 0) return;
@@ -695,11 +712,15 @@ LatticeCrossings::Leaves& LatticeCrossings::fresh_leaves() {
 /// What is to be asked in place of a pair of nodes, or a node by itself. \return whether they are leaves that can meet
 bool LatticeCrossings::split(const Search& search, const Task& task, std::vector<Task>& tasks) const {
   const auto [a, b] = task;
-  if (search.are_asked) {
-    const bool is_first = (*search.are_asked)[a] != 0, is_second = (*search.are_asked)[b] != 0;
+  const Box &around_a = search.tree.nodes[a].around, &around_b = search.tree.nodes[b].around;
+  if (search.asked) {
+    // What is asked for of either has to lie at the other.
+    const Asked& asked = *search.asked;
+    const bool is_first = asked.has(a) && do_overlap(asked.box(a), around_b), is_second = asked.has(b) && do_overlap(around_a, asked.box(b));
     if (!is_first && !is_second) return false;
+  } else if (a != b && !do_overlap(around_a, around_b)) {
+    return false;
   }
-  if (a != b && !do_overlap(search.tree.nodes[a].around, search.tree.nodes[b].around)) return false;
   if (!can_meet(search.tree, a, b)) return false;
   const Node &one = nodes_[a], &other = nodes_[b];
   if (one.level == 0 && other.level == 0) return true;
@@ -745,7 +766,7 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const Search& search) con
     while (!stack.empty()) {
       const Task task = stack.back();
       stack.pop_back();
-      if (split(search, task, stack)) find_between(search.lattice, task[0], task[1], search.tree.nodes[task[1]].around, search.is_asked, leaves, found[block]);
+      if (split(search, task, stack)) find_between(search.lattice, task[0], task[1], search.tree.nodes[task[1]].around, search.asked, leaves, found[block]);
     }
   });
   std::vector<std::array<int, 2>> pairs;
@@ -754,24 +775,18 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const Search& search) con
   return pairs;
 }
 
-std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattice) {
-  measure(lattice, leaves_, nullptr, tree_);
-  return find({lattice, tree_});
+void LatticeCrossings::measure(const LatticeMesh& lattice) { measure(lattice, leaves_, nullptr, tree_); }
+
+void LatticeCrossings::measure(const LatticeMesh& lattice, std::span<const int> changed) {
+  const Asked asked = ask(lattice, changed);
+  measure(lattice, asked.leaves, &asked, tree_);
 }
 
-std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattice, std::span<const int> changed) {
-  if (changed.empty()) return {};
-  std::vector<char> is_asked(lattice.triangle_count(), 0), are_asked;
-  std::vector<int> leaves;
-  for (const int triangle : changed) {
-    is_asked[triangle] = 1;
-    leaves.push_back(leaf_of(lattice, triangle));
-  }
-  std::sort(leaves.begin(), leaves.end());
-  leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
-  mark(leaves, are_asked);
-  measure(lattice, leaves, &are_asked, tree_);
-  return find({lattice, tree_, &are_asked, &is_asked});
+std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattice) const { return find({lattice, tree_}); }
+
+std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattice, std::span<const int> triangles) const {
+  const Asked asked = ask(lattice, triangles);
+  return find({lattice, tree_, &asked});
 }
 
 LatticeCrossings::Others LatticeCrossings::find_between_same(std::span<const std::array<int, 2>> pairs, const LatticeMesh& other, int share) const {

@@ -16,10 +16,13 @@ class LatticeCrossings {
  public:
   explicit LatticeCrossings(const LatticeMesh& lattice);
 
-  /// All pairs of triangles that intersect, the smaller index first, sorted. Cost: some 10 ns per triangle, all processors.
-  std::vector<std::array<int, 2>> find(const LatticeMesh& lattice);
-  /// Of the same lattice with some triangles changed: the pairs with one of these.
-  std::vector<std::array<int, 2>> find(const LatticeMesh& lattice, std::span<const int> changed);
+  /// Where the lattice's parts lie and how they bend; of the same lattice with some triangles changed, the parts with these.
+  void measure(const LatticeMesh& lattice);
+  void measure(const LatticeMesh& lattice, std::span<const int> changed);
+  /// Of a lattice as it was measured last: all pairs of triangles that intersect, or those with one that is asked for, the smaller index first, sorted.
+  /// Cost with the measuring: some 10 ns per triangle, all processors.
+  std::vector<std::array<int, 2>> find(const LatticeMesh& lattice) const;
+  std::vector<std::array<int, 2>> find(const LatticeMesh& lattice, std::span<const int> asked) const;
 
   /// Of another mesh of this lattice: the same pairs, and all between the same parts (4 x 4 quads, or eight triangles at an end) as given ones
   /// for one in `share` pairs of parts.
@@ -79,11 +82,19 @@ class LatticeCrossings {
     std::vector<EndLeaf> ends;             ///< per node behind those of patches
     std::vector<std::array<int, 2>> caps;  ///< per patch and end: how many rows of squares bend little together with the fan there; -1: none
   };
+  /// Some triangles, the nodes that have any of them, and boxes around those that each has.
+  struct Asked {
+    std::vector<char> triangles;
+    std::vector<int> nodes;  ///< 1 + number of its box, 0 where there are none
+    std::vector<Box> boxes;
+    std::vector<int> leaves;  ///< sorted
+    bool has(int node) const { return nodes[node] != 0; }
+    const Box& box(int node) const { return boxes[nodes[node] - 1]; }
+  };
   struct Search {
     const LatticeMesh& lattice;
     const Tree& tree;
-    const std::vector<char>* are_asked = nullptr;  ///< nodes; all without
-    const std::vector<char>* is_asked = nullptr;   ///< triangles; all without
+    const Asked* asked = nullptr;  ///< all without
   };
   using Task = std::array<int, 2>;  // nodes
   int leaf_of(const LatticeMesh& lattice, int triangle) const;
@@ -108,9 +119,9 @@ class LatticeCrossings {
   void measure_squares(const LatticeMesh& lattice, int first, Tree& tree) const;
   Bounds measure_end(const LatticeMesh& lattice, const Node& node) const;
   void measure(const LatticeMesh& lattice, int node, Tree& tree) const;
-  void measure(const LatticeMesh& lattice, std::span<const int> leaves, const std::vector<char>* are_asked, Tree& tree) const;
-  void join(Tree& tree, const std::vector<char>* are_asked) const;
-  void mark(std::span<const int> leaves, std::vector<char>& are_asked) const;
+  void measure(const LatticeMesh& lattice, std::span<const int> leaves, const Asked* asked, Tree& tree) const;
+  void join(Tree& tree, const Asked* asked) const;
+  Asked ask(const LatticeMesh& lattice, std::span<const int> triangles) const;
   EndLeaf describe_end(const LatticeMesh& lattice, const Node& node) const;
   int first_of_ends() const { return grids_[rectangles_.size()].levels[0].first; }
 
@@ -123,9 +134,9 @@ class LatticeCrossings {
   bool split(const Search& search, const Task& task, std::vector<Task>& tasks) const;
   static Leaves& fresh_leaves();
   void copy_quads(const Node& node, const SquareVertices& square, QuadBlock& quads) const;
-  const TriangleBlock& boxes_of(const LatticeMesh& lattice, int node, const std::vector<char>* is_asked, Leaf& leaf) const;
+  const TriangleBlock& boxes_of(const LatticeMesh& lattice, int node, const Asked* asked, Leaf& leaf) const;
   void find_planes_of(const LatticeMesh& lattice, Leaf& leaf) const;
-  void find_between(const LatticeMesh& lattice, int a, int b, const Box& around_b, const std::vector<char>* is_asked, Leaves& leaves,
+  void find_between(const LatticeMesh& lattice, int a, int b, const Box& around_b, const Asked* asked, Leaves& leaves,
                     std::vector<std::array<int, 2>>& pairs) const;
   std::vector<std::array<int, 2>> find(const Search& search) const;
 
