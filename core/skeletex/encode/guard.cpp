@@ -174,20 +174,16 @@ class Distances {
     faults_.clear();
     measure_triangles(lattice, asked, texel_triangles, limit);
   }
-  /// Some of them again: at their middles, and more densely where these are further than a share of the limit.
-  /// \param asked  in order
-  void measure_triangles(const LatticeMesh& lattice, const std::vector<int>& asked, const ClBuffer<int>& texel_triangles, float limit) {
-    std::vector<Measured> measured = measure_near(lattice, asked, texel_triangles, {kWorthALook * limit, kWorthALook * limit, limit});
-    std::vector<int> suspects, nearest;
-    for (const Measured& each : measured)
-      if (each.distance > limit) suspects.push_back(each.triangle);
-    const std::vector<float> exact = measure_exactly(lattice, suspects, kPlaces, limit, nearest);
-    std::size_t next = 0;
-    for (Measured& each : measured)
-      if (each.distance > limit) each.distance = exact[next++];
-    look_again_at_turned(lattice, measured);
+  /// Some of them again.
+  /// \param asked     in order
+  /// \param suspects  as above, of these
+  void measure_changed(const LatticeMesh& lattice, const std::vector<int>& asked, const ClBuffer<int>& texel_triangles, float limit,
+                       std::promise<std::vector<int>> suspects) {
     std::erase_if(faults_, [&](const Measured& each) { return std::binary_search(asked.begin(), asked.end(), each.triangle); });
-    std::copy_if(measured.begin(), measured.end(), std::back_inserter(faults_), [&](const Measured& each) { return each.distance > limit || each.is_turned; });
+    std::vector<int> far;
+    for (const Measured& each : measure_triangles(lattice, asked, texel_triangles, limit))
+      if (each.distance > kWorthAWalk * limit || each.is_turned) far.push_back(each.triangle);
+    suspects.set_value(std::move(far));
   }
   /// Triangles that are further than the limit, or look against the original.
   const std::vector<Measured>& faults() const { return faults_; }
@@ -234,6 +230,20 @@ class Distances {
   std::vector<int> take_anchors() { return std::move(anchors_); }
 
  private:
+  /// Triangles of a list: at their middles, and more densely where these are further than a share of the limit.
+  std::vector<Measured> measure_triangles(const LatticeMesh& lattice, const std::vector<int>& asked, const ClBuffer<int>& texel_triangles, float limit) {
+    std::vector<Measured> measured = measure_near(lattice, asked, texel_triangles, {kWorthALook * limit, kWorthALook * limit, limit});
+    std::vector<int> suspects, nearest;
+    for (const Measured& each : measured)
+      if (each.distance > limit) suspects.push_back(each.triangle);
+    const std::vector<float> exact = measure_exactly(lattice, suspects, kPlaces, limit, nearest);
+    std::size_t next = 0;
+    for (Measured& each : measured)
+      if (each.distance > limit) each.distance = exact[next++];
+    look_again_at_turned(lattice, measured);
+    std::copy_if(measured.begin(), measured.end(), std::back_inserter(faults_), [&](const Measured& each) { return each.distance > limit || each.is_turned; });
+    return measured;
+  }
   /// A vertex of the original as it was measured last, to the quads around it.
   struct MeasuredVertex {
     float distance2 = 0;
@@ -551,14 +561,7 @@ GuardReport Guard::put_back_faults(std::span<const int> vertex_points, const ClB
   Distances& distances = even_->distances;
   const float limit = even_->limit;
   LatticeMesh lattice(even_lattice, even_->sources.model.diagonals, points);
-  // Crossings are the host's alone: they are found beside distances, which are for the most part the device's.
   using Pairs = std::vector<std::array<int, 2>>;
-  // Where the lattice lies on the original it intersects itself no more than that does.
-  std::promise<std::vector<int>> suspects;
-  std::future<Pairs> finding_all = std::async(std::launch::async, [&, listed = suspects.get_future()]() mutable {
-    crossings.measure(lattice);
-    return crossings.find(lattice, listed.get());
-  });
   GuardReport report;
   report.even_turned_triangles = static_cast<int>(even_->turned.size());
 
@@ -573,14 +576,17 @@ GuardReport Guard::put_back_faults(std::span<const int> vertex_points, const ClB
   std::optional<TexelReturns> returns;  // in memory that measuring has given back
   for (int pass = 0; pass < kPasses; ++pass) {
     marks.clear();
-    auto finding = pass == 0 ? std::move(finding_all) : std::async(std::launch::async, [&] {
-      crossings.measure(lattice, changed);
-      return crossings.find(lattice, changed);
+    // Crossings are the host's alone: they are found beside distances, which are for the most part the device's. Where the lattice lies on the original it
+    // intersects itself no more than that does.
+    std::promise<std::vector<int>> suspects;
+    std::future<Pairs> finding = std::async(std::launch::async, [&, listed = suspects.get_future()]() mutable {
+      pass == 0 ? crossings.measure(lattice) : crossings.measure(lattice, changed);
+      return crossings.find(lattice, listed.get());
     });
     if (pass == 0)
       distances.measure_suspects(lattice, triangles, limit, std::move(suspects));
     else
-      distances.measure_triangles(lattice, changed, triangles, limit);
+      distances.measure_changed(lattice, changed, triangles, limit, std::move(suspects));
     const std::vector<int> far = pass == 0 ? distances.find_far_vertices(lattice, vertex_points, context.download(positions.anchors), limit)
                                            : distances.find_far_vertices(lattice, vertex_points, back, changed, limit);
     const Pairs pairs = finding.get();
