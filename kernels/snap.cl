@@ -355,10 +355,10 @@ __attribute__((always_inline)) void place_colour(const RowColour colour, const i
 
 // NDRange and rows as for relax_texels. Free texels of a row go to the nearest edge within reach, one colour of the row after the other. A row comes in bins of
 // eight columns, each with a list of the edges near it, which look for theirs together.
-// in   bin_begins: into bin_edges, numbers of edges
+// in   bin_begins: into bin_edges, numbers of edges; is_again: only bins where a texel could not go to its edge the time before
 // out  parameters: where on its edge a texel is, 0 to 1; offers: what else the kernel needs per texel
-kernel void place_on_edges(const int row_count, const int texture_width, global const int* restrict rows, global const PatchRecord* restrict patches,
-                           global const int* restrict bin_begins, global const int* restrict bin_edges, global const EdgeRecord* restrict edges,
+kernel void place_on_edges(const int row_count, const int texture_width, const int is_again, global const int* restrict rows,
+                           global const PatchRecord* restrict patches, global const int* restrict bin_begins, global const int* restrict bin_edges, global const EdgeRecord* restrict edges,
                            global int* restrict anchors, global float* restrict parameters, global float* offset_x, global float* offset_y,
                            global int* restrict offers) {
   const int k = get_group_id(0);
@@ -371,6 +371,15 @@ kernel void place_on_edges(const int row_count, const int texture_width, global 
     const int8 columns = min(column + (int8)(0, 2, 4, 6, 1, 3, 5, 7), (int8)(width - 1));
     const int8 texels = (columns >> 1) + ((columns & 1) == 0 ? (int8)(first) : (int8)(odd));
     const int is_whole = column + 8 <= width, at_even = first + column / 2, at_odd = odd + column / 2;
+    if (is_again && is_whole) {
+      const int8 held = (int8)(vload4(0, anchors + at_even), vload4(0, anchors + at_odd));
+      const int8 offered = (int8)(vload4(0, offers + at_even), vload4(0, offers + at_odd));
+      if (!any((held == 0) & (offered != NONE))) {
+        vstore4((int4)(NONE), 0, offers + at_even);
+        vstore4((int4)(NONE), 0, offers + at_odd);
+        continue;
+      }
+    }
     const float8 x = is_whole ? (float8)(vload4(0, offset_x + at_even), vload4(0, offset_x + at_odd)) : gathered(texels, offset_x);
     const float8 y = is_whole ? (float8)(vload4(0, offset_y + at_even), vload4(0, offset_y + at_odd)) : gathered(texels, offset_y);
     const int8 nearest = nearest_edges(convert_float8(columns) + x, (float)row + y, bin_begins[bin], bin_begins[bin + 1], bin_edges, edges);

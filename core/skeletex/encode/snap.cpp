@@ -275,8 +275,8 @@ void snap_positions(ClContext& context, const DeviceLayout& layout, const SnapTa
     relax(round == 0 ? kFirstRelaxPasses : kRelaxPasses);
     if (tables.edges.empty()) continue;
     for (const int parity : {0, 1})
-      for_rows("place_on_edges", parity, rows[parity], layout.patches, begins, bin_edges, edges, positions.anchors, positions.parameters, positions.x,
-               positions.y, spare);
+      for_rows("place_on_edges", parity, static_cast<int>(round > 0), rows[parity], layout.patches, begins, bin_edges, edges, positions.anchors,
+               positions.parameters, positions.x, positions.y, spare);
   }
   relax(kRelaxPasses);
   for (const int parity : {0, 1})
