@@ -13,6 +13,7 @@
 
 #include "command.h"
 #include "progress_bar.h"
+#include "memory_ahead.h"
 #include "second_compiler.h"
 #include "skeletex/encode/encode_model.h"
 #include "skeletex/encode/encoding_kernels.h"
@@ -192,6 +193,9 @@ std::string report_text(const EncodeReport& report, const EncodeOptions& options
       static_cast<double>(std::filesystem::file_size(output, ignored)) / (1 << 20));
 }
 
+// What texels take where they snap, and the heap can hold without growing (keep_freed_memory).
+constexpr std::size_t kBytesPerTexel = 160, kMostMemoryAhead = 192 << 20;
+
 struct Input {
   TriangleMesh mesh;
   std::optional<TriangleTree> tree;
@@ -238,6 +242,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
   bar->show("reading and checking the input", 0);
   // A driver takes as long to load as the input. It stays on this thread, as some keep state per thread.
   auto reading = std::async(std::launch::async, [&] { return read_input(arguments, options); });
+  std::optional<MemoryAhead> memory(std::in_place, std::min(kMostMemoryAhead, kBytesPerTexel * options.width * options.height));
   ClContext* loaded = nullptr;
   std::exception_ptr no_device;
   try {
@@ -248,6 +253,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
   }
   const Input input = reading.get();
   if (no_device) std::rethrow_exception(no_device);
+  memory.reset();
   ClContext& context = *loaded;
   options.tree = input.tree ? &*input.tree : nullptr;
   options.progress = [&](const std::string& stage, double done) {
