@@ -25,9 +25,8 @@ constexpr int kPasses = 7;                // it takes some four
 constexpr int kReach = 1;                 // columns and rows around a triangle that is too far that go back with it
 constexpr float kShareOfFurthest = 0.9f;  // what is measured is not all that there is
 constexpr float kWorthALook = 0.15f;      // of the limit, at the middle of a triangle: then it is measured more densely
-constexpr double kShareOfFew = 0.001;     // of the even lattice's quads, the most suspicious: they tell which of the others matter
-constexpr std::size_t kAskedOfFew = 32;    // of their triangles, those that seem furthest
 constexpr double kShareOfEven = 0.005;    // of the even lattice's quads, the most suspicious: among them is its furthest
+constexpr std::size_t kAskedOfEven = 32;  // of their triangles, those that seem furthest
 constexpr float kWorthAWalk = 0.75f;      // of the limit: how far a quad could be
 constexpr float kEvenWorthALook = 0.5f;   // of the furthest middle, in the even lattice
 constexpr int kVertexReach = 6;           // columns and rows around a texel: diagonals depend on it, vertices are measured to their quads (guard.cl)
@@ -123,35 +122,34 @@ class Distances {
     for (std::size_t i = 0; i < suspicions2.size(); i += 7)
       if (!std::isinf(suspicions2[i])) some.push_back(suspicions2[i]);
     if (some.empty()) some.push_back(0);
-    const auto least_of = [&](double share) {
-      const auto last = some.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(some.size()));
-      std::nth_element(some.begin(), last, some.end(), std::greater<>());
-      return *last;
-    };
-    std::vector<Measured> measured;
-    std::vector<int> nearest;
+    const auto last = some.begin() + static_cast<std::ptrdiff_t>(kShareOfEven * static_cast<double>(some.size()));
+    std::nth_element(some.begin(), last, some.end(), std::greater<>());
+    std::vector<int> asked = triangles_above(suspicions2, *last);
+    add_ends(lattice, asked);
+    constexpr float kNever = std::numeric_limits<float>::max();
+    std::vector<Measured> measured = measure_near(lattice, asked, texel_triangles, {0, kNever, 0});
     const auto above = [&](float least) {
       std::vector<int> triangles;
       for (const Measured& each : measured)
         if (each.distance >= least) triangles.push_back(each.triangle);
       return triangles;
     };
-    // A few tell what the others need not be asked for; walks can end too far away, so the tree says how far those that seem furthest are.
-    constexpr float kNever = std::numeric_limits<float>::max();
-    std::vector<int> few;
-    const float least_of_few = least_of(kShareOfFew);
-    for (int texel = 0; texel < static_cast<int>(suspicions2.size()); ++texel)
-      if (suspicions2[texel] > least_of_few && !std::isinf(suspicions2[texel])) few.push_back(2 * texel), few.push_back(2 * texel + 1);
-    measured = measure_near(lattice, few, texel_triangles, {0, kNever, 0});
-    std::sort(measured.begin(), measured.end(), [](const Measured& one, const Measured& other) { return one.distance > other.distance; });
-    measured.resize(std::min(measured.size(), kAskedOfFew));
-    float known = 0;
-    for (const float distance : measure_exactly(lattice, above(0), kMiddle, 0, nearest)) known = std::max(known, distance);
-    const float least = kEvenWorthALook * known;
-    std::vector<int> asked = triangles_above(suspicions2, least_of(kShareOfEven));
-    add_ends(lattice, asked);
-    measured = measure_near(lattice, asked, texel_triangles, {least, kNever, 0});
-    for (const int triangle : look_again_at_turned(lattice, measured)) turned.push_back(triangle);
+    // Walks can end too far away, so the tree says how far those that seem furthest are: they tell which of the others matter.
+    std::vector<Measured> front = measured;
+    const auto end_of_front = front.begin() + static_cast<std::ptrdiff_t>(std::min(front.size(), kAskedOfEven));
+    std::nth_element(front.begin(), end_of_front, front.end(), [](const Measured& one, const Measured& other) { return one.distance > other.distance; });
+    std::vector<int> again;
+    for (auto each = front.begin(); each != end_of_front; ++each) again.push_back(each->triangle);
+    const std::size_t front_count = again.size();
+    for (const Measured& each : measured)
+      if (each.is_turned) again.push_back(each.triangle);
+    std::vector<int> nearest;
+    std::vector<float> distances;
+    find(lattice, again, kMiddle, 0, nearest, distances);
+    for (std::size_t k = front_count; k < again.size(); ++k)
+      if (looks_against(lattice, again[k], nearest[k])) turned.push_back(again[k]);
+    const float least = kEvenWorthALook * std::accumulate(distances.begin(), distances.begin() + static_cast<std::ptrdiff_t>(front_count), 0.f,
+                                                          [](float one, float other) { return std::max(one, other); });
     // Places beside the middle, where these could be the furthest.
     measured = measure_near(lattice, above(least), texel_triangles, {0, 0, least});
     // The furthest is at least that of any, and it is among those that seem further.
