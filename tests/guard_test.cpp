@@ -166,6 +166,7 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
     // Pairs of the lattice as pairs of the mesh, and sorted as these.
     std::vector<int> places(lattice.triangle_count());
     for (std::size_t i = 0; i < numbers.size(); ++i) places[numbers[i]] = static_cast<int>(i);
+    crossings.measure(lattice);
     Pairs found = crossings.find(lattice);
     EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
     for (auto& pair : found) pair = {std::min(places[pair[0]], places[pair[1]]), std::max(places[pair[0]], places[pair[1]])};
@@ -185,8 +186,27 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
 
     lattice.release();
     const std::vector<int> changed = lattice.move(points.take(model, others, 50));
+    crossings.measure(lattice, changed);
     const Pairs found_of_changed = crossings.find(lattice, changed);
-    Pairs all = LatticeCrossings(lattice).find(lattice);
+    const auto all_of = [](const LatticeMesh& measured) {
+      LatticeCrossings anew(measured);
+      anew.measure(measured);
+      return anew.find(measured);
+    };
+    Pairs all = all_of(lattice);
+    // Measured again where it has changed, it is known as a whole; and any triangles can be asked for.
+    EXPECT_EQ(crossings.find(lattice), all) << each.name;
+    std::vector<int> some;
+    std::mt19937 choice(7);
+    for (const int triangle : numbers)
+      if (choice() % 7 == 0) some.push_back(triangle);
+    std::sort(some.begin(), some.end());
+    Pairs with_some = all;
+    std::erase_if(with_some, [&](const auto& pair) {
+      return !std::binary_search(some.begin(), some.end(), pair[0]) && !std::binary_search(some.begin(), some.end(), pair[1]);
+    });
+    EXPECT_FALSE(with_some.empty()) << each.name;
+    EXPECT_EQ(crossings.find(lattice, some), with_some) << each.name;
     const LatticeCrossings::Others same = crossings.find_between_same(all, lattice, 1), different = crossings.find_between_same(all, other_lattice, 1);
     EXPECT_EQ(same.pairs, all) << each.name;
     EXPECT_EQ(same.given_there, all.size()) << each.name;
@@ -200,7 +220,7 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
     EXPECT_GT(different.given_there, 0u) << each.name;
     EXPECT_LT(different.given_there, all.size()) << each.name;
     if (each.noise < 0.05) {
-      const Pairs all_of_other = LatticeCrossings(other_lattice).find(other_lattice);
+      const Pairs all_of_other = all_of(other_lattice);
       EXPECT_TRUE(std::includes(all_of_other.begin(), all_of_other.end(), different.pairs.begin(), different.pairs.end())) << each.name;
     }
     const std::set<int> is_changed(changed.begin(), changed.end());

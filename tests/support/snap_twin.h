@@ -111,7 +111,16 @@ struct SnapLattice {
           }
   }
 
-  void snap_to_edges(const std::vector<SnapFeatures::Edge>& edges) {
+  /// \param before  what each texel has chosen the time before; none: the first time
+  std::vector<int> snap_to_edges(const std::vector<SnapFeatures::Edge>& edges, const std::vector<int>& before) {
+    // The second time only bins of eight columns where a texel could not go to its edge.
+    const auto is_looked_at = [&](int column, int row) {
+      const int first = column / 8 * 8;
+      if (before.empty() || first + 8 > width) return true;
+      for (int j = first; j < first + 8; ++j)
+        if (anchors[at(j, row)] == 0 && before[at(j, row)] >= 0) return true;
+      return false;
+    };
     const auto nearest = [&](const SnapFeatures::Edge& edge, int column, int row, double& dx, double& dy) {
       double best = 1e300;
       for (int turn = -2; turn <= 2; ++turn) {
@@ -128,7 +137,7 @@ struct SnapLattice {
     std::vector<int> chosen(x.size(), -1);
     for (int row = 1; row + 1 < height; ++row)
       for (int j = 0; j < width; ++j) {
-        if (anchors[at(j, row)] != 0) continue;
+        if (anchors[at(j, row)] != 0 || !is_looked_at(j, row)) continue;
         long best = 1L << 40;
         for (int e = 0; e < static_cast<int>(edges.size()); ++e) {
           double dx = 0, dy = 0;
@@ -146,13 +155,15 @@ struct SnapLattice {
           nearest(edges[e], j, row, dx, dy);
           if (std::abs(dx) <= 1 && std::abs(dy) <= 1 && move(j, row, dx, dy)) anchors[at(j, row)] = -1 - e;
         }
+    return chosen;
   }
 
   void snap(const SnapFeatures& features) {
     snap_to_vertices(features.vertices);
+    std::vector<int> chosen;
     for (int round = 0; round < 2; ++round) {
       relax(round == 0 ? 3 : 1);
-      snap_to_edges(features.edges);
+      chosen = snap_to_edges(features.edges, chosen);
     }
     relax(1);
   }
