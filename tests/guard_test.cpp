@@ -582,5 +582,18 @@ TEST(Guard, DoesNotTakeTheEvenLatticeForNearerThanItIs) {
   }
 }
 
+TEST(Guard, LeavesNoPairsOfTrianglesThatSnappingHasMadeIntersect) {
+  for (const char* name : {"bear", "diplodocus"}) {
+    const TestModel model = load_standard_model(name);
+    EncodeOptions options;
+    options.width = options.height = 512;
+    options.has_snap = options.has_fit = false;
+    const auto pairs = [&] { return count_self_intersections(reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model)); };
+    const auto even = pairs();
+    options.has_snap = true;
+    EXPECT_LE(pairs(), even) << name;
+  }
+}
+
 }  // namespace
 }  // namespace skeletex

@@ -151,7 +151,7 @@ TEST(Snap, PutsTexelsWhereItsTwinDoes) {
         different += got.anchors[texel] != expected.anchors[expected.at(j, r)] || std::abs(got.x[texel] - expected.x[expected.at(j, r)]) > 1e-4 ||
                      std::abs(got.y[texel] - expected.y[expected.at(j, r)]) > 1e-4;
       }
-    EXPECT_LE(different, expected.width * expected.height / 20);
+    EXPECT_LE(different, expected.width * expected.height / 200);
   }
 }
 
