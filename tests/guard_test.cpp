@@ -167,7 +167,7 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
     std::vector<int> places(lattice.triangle_count());
     for (std::size_t i = 0; i < numbers.size(); ++i) places[numbers[i]] = static_cast<int>(i);
     crossings.measure(lattice);
-    Pairs found = crossings.find(lattice);
+    Pairs found = crossings.find(lattice, numbers);
     EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
     for (auto& pair : found) pair = {std::min(places[pair[0]], places[pair[1]]), std::max(places[pair[0]], places[pair[1]])};
     std::sort(found.begin(), found.end());
@@ -188,14 +188,14 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
     const std::vector<int> changed = lattice.move(points.take(model, others, 50));
     crossings.measure(lattice, changed);
     const Pairs found_of_changed = crossings.find(lattice, changed);
-    const auto all_of = [](const LatticeMesh& measured) {
+    const auto all_of = [&](const LatticeMesh& measured) {
       LatticeCrossings anew(measured);
       anew.measure(measured);
-      return anew.find(measured);
+      return anew.find(measured, numbers);
     };
     Pairs all = all_of(lattice);
     // Measured again where it has changed, it is known as a whole; and any triangles can be asked for.
-    EXPECT_EQ(crossings.find(lattice), all) << each.name;
+    EXPECT_EQ(crossings.find(lattice, numbers), all) << each.name;
     std::vector<int> some;
     std::mt19937 choice(7);
     for (const int triangle : numbers)

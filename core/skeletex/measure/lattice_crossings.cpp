@@ -16,7 +16,8 @@ namespace skeletex {
 namespace {
 
 constexpr int kEndTriangles = 8;      // of a leaf of a strip or fan
-constexpr int kNear = 2;              // nodes: up to here a part of the lattice is looked at as a whole
+constexpr int kNear = 2;              // squares: up to here a part of the lattice is looked at as a whole
+constexpr int kNearAtEnds = 4;        // along a strip or fan, with what of it lies at them
 constexpr int kNearQuads = 8;         // quads, likewise
 constexpr float kLeastCosine = 0.2f;  // between a part's normals and their middle
 constexpr double kRounding = 1e-10;   // of a product of lengths: far more than double precision rounds off
@@ -160,6 +161,19 @@ SKELETEX_WIDE_TOO void add_quads(const std::array<const float*, 3>& planes, cons
       ranges.greatest[axis][k] = greater(greater(ranges.greatest[axis][k], greater(a, b)), greater(c, d));
     }
   }
+}
+
+/// Of the vertices of sixteen quads side by side, one coordinate, by columns.
+struct VertexRange {
+  std::array<float, kColumnsAtOnce + 1> least, greatest;
+};
+SKELETEX_WIDE_TOO void find_range(const float* __restrict plane, int stride, int rows, VertexRange& __restrict range) {
+  for (int k = 0; k <= kColumnsAtOnce; ++k) range.least[k] = range.greatest[k] = plane[k];
+  for (int row = 1; row < rows; ++row)
+    for (int k = 0; k <= kColumnsAtOnce; ++k) {
+      const float value = plane[row * stride + k], least = range.least[k], greatest = range.greatest[k];
+      range.least[k] = value < least ? value : least, range.greatest[k] = greatest < value ? value : greatest;
+    }
 }
 
 /// From a to b round a circle, the shorter way: where it starts, and its steps.
@@ -332,15 +346,15 @@ LatticeCrossings::Bounds LatticeCrossings::measure_end(const LatticeMesh& lattic
 }
 
 void LatticeCrossings::measure(const LatticeMesh& lattice, int node, Tree& tree) const {
-  if (node < first_of_ends()) {
-    tree.nodes[node] = measure_square(lattice, nodes_[node]);
-  } else {
-    tree.nodes[node] = measure_end(lattice, nodes_[node]);
+  const bool is_square = node < first_of_ends();
+  const Bounds bounds = is_square ? measure_square(lattice, nodes_[node]) : measure_end(lattice, nodes_[node]);
+  tree.boxes[node] = bounds.around, tree.normals[node] = bounds.normals;
+  if (!is_square) {
     tree.ends[node - first_of_ends()] = describe_end(lattice, nodes_[node]);
   }
 }
 
-/// Levels above the leaves, and caps.
+/// Boxes of levels above the leaves.
 /// \param asked  these nodes; all without
 void LatticeCrossings::join(Tree& tree, const Asked* asked) const {
   for (const Grid& grid : grids_)
@@ -351,26 +365,12 @@ void LatticeCrossings::join(Tree& tree, const Asked* asked) const {
         for (int column = 0; column < columns; ++column) {
           const int node = first + row * columns + column;
           if (asked && !asked->has(node)) continue;
-          Bounds& all = tree.nodes[node];
-          all = {no_box<Box>(), no_normals<Normals>()};
+          Box& all = tree.boxes[node];
+          all = no_box<Box>();
           for (int r = 2 * row; r < std::min(2 * row + 2, below.rows); ++r)
-            for (int c = 2 * column; c < std::min(2 * column + 2, below.columns); ++c) {
-              const Bounds& part = tree.nodes[below.first + r * below.columns + c];
-              add(part.around, all.around), add(part.normals, all.normals);
-            }
+            for (int c = 2 * column; c < std::min(2 * column + 2, below.columns); ++c) add(tree.boxes[below.first + r * below.columns + c], all);
         }
     }
-  const std::size_t patches = rectangles_.size();
-  tree.caps.assign(patches, {-1, -1});
-  for (std::size_t i = patches; i < grids_.size(); ++i) {
-    const Grid &fan = grids_[i], &quads = grids_[fan.patch];
-    if (!fan.is_fan) continue;
-    Normals normals = tree.nodes[fan.levels.back().first].normals;
-    const auto [first, columns, rows] = quads.levels[0];
-    int& cap = tree.caps[fan.patch][fan.end];
-    while (is_narrow(normals) && ++cap < rows)
-      for (int column = 0; column < columns; ++column) add(tree.nodes[first + (fan.end == 0 ? cap : rows - 1 - cap) * columns + column].normals, normals);
-  }
 }
 
 /// Squares that follow each other in a row, their numbers as well.
@@ -385,32 +385,48 @@ void LatticeCrossings::measure_squares(const LatticeMesh& lattice, int first, Tr
     add_quads({square.axes[0] + at, square.axes[1] + at, square.axes[2] + at}, square.diagonals[row], texture_width_, ranges);
   }
   for (int i = 0; i < kSquaresAtOnce; ++i) {
-    Bounds& bounds = tree.nodes[first + i];
-    bounds = {no_box<Box>(), no_normals<Normals>()};
+    Box& around = tree.boxes[first + i];
+    Normals& normals = tree.normals[first + i];
+    around = no_box<Box>(), normals = no_normals<Normals>();
     for (int axis = 0; axis < kAxes; ++axis) {
-      Box& box = axis < 3 ? bounds.around : axis < 6 ? bounds.normals.box : bounds.normals.diagonals;
+      Box& box = axis < 3 ? around : axis < 6 ? normals.box : normals.diagonals;
       const int lane = axis < 6 ? axis % 3 : axis - 6;
       box.least[lane] = least_of(Eigen::Map<const Four>(ranges.least[axis].data() + kSide * i));
       box.greatest[lane] = greatest_of(Eigen::Map<const Four>(ranges.greatest[axis].data() + kSide * i));
     }
-    widen(margin_, bounds.around);
+    widen(margin_, around);
   }
 }
 
-/// Some leaves, and what they are parts of.
-/// \param asked  these nodes; all without
-void LatticeCrossings::measure(const LatticeMesh& lattice, std::span<const int> leaves, const Asked* asked, Tree& tree) const {
-  tree.nodes.resize(nodes_.size());
-  tree.ends.resize(nodes_.size() - first_of_ends());
+/// The boxes alone.
+void LatticeCrossings::box_squares(const LatticeMesh& lattice, int first, Tree& tree) const {
+  SquareVertices square;
+  view(lattice, nodes_[first], square);
+  for (int axis = 0; axis < 3; ++axis) {
+    VertexRange range;
+    find_range(square.axes[axis], texture_width_, square.rows + 1, range);
+    for (int i = 0; i < kSquaresAtOnce; ++i) {
+      const float *least = range.least.data() + kSide * i, *greatest = range.greatest.data() + kSide * i;
+      Box& box = tree.boxes[first + i];
+      box.least[axis] = std::min(least_of(Eigen::Map<const Four>(least)), least[kSide]) - margin_;
+      box.greatest[axis] = std::max(greatest_of(Eigen::Map<const Four>(greatest)), greatest[kSide]) + margin_;
+    }
+  }
+}
+
+/// Whether these are squares that follow each other in a row, away from where columns wrap round.
+bool LatticeCrossings::are_together(std::span<const int> leaves) const {
+  if (leaves.size() < kSquaresAtOnce || leaves[kSquaresAtOnce - 1] != leaves[0] + kSquaresAtOnce - 1) return false;
+  const Node &first = nodes_[leaves[0]], &last = nodes_[leaves[kSquaresAtOnce - 1]];
+  return grids_[first.grid].end < 0 && first.grid == last.grid && first.row == last.row &&
+         kSide * first.column + kColumnsAtOnce < rectangles_[grids_[first.grid].patch].width;
+}
+
+/// Boxes and normals of some leaves.
+void LatticeCrossings::measure(const LatticeMesh& lattice, std::span<const int> leaves, Tree& tree) const {
   for_each_block(leaves.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
-    const auto begins_squares = [&](std::size_t i) {
-      if (i + kSquaresAtOnce > end || leaves[i + kSquaresAtOnce - 1] != leaves[i] + kSquaresAtOnce - 1) return false;
-      const Node &first = nodes_[leaves[i]], &last = nodes_[leaves[i + kSquaresAtOnce - 1]];
-      return grids_[first.grid].end < 0 && first.grid == last.grid && first.row == last.row &&
-             kSide * first.column + kColumnsAtOnce < rectangles_[grids_[first.grid].patch].width;
-    };
     for (std::size_t i = begin; i < end;) {
-      const bool are_several = begins_squares(i);
+      const bool are_several = are_together(leaves.subspan(i, end - i));
       if (are_several)
         measure_squares(lattice, leaves[i], tree);
       else
@@ -418,7 +434,6 @@ void LatticeCrossings::measure(const LatticeMesh& lattice, std::span<const int> 
       i += are_several ? kSquaresAtOnce : 1;
     }
   });
-  join(tree, asked);
 }
 
 LatticeCrossings::Asked LatticeCrossings::ask(const LatticeMesh& lattice, std::span<const int> triangles) const {
@@ -449,46 +464,34 @@ LatticeCrossings::Asked LatticeCrossings::ask(const LatticeMesh& lattice, std::s
   return asked;
 }
 
-/// Whether triangles of two nodes can, or of one: not where the lattice around them bends little, but for slivers of strips.
+/// Whether triangles of two leaves can, or of one: not where the lattice around them bends little, but for slivers of strips.
 bool LatticeCrossings::can_meet(const Tree& tree, int a, int b) const {
   const Node &one = nodes_[a], &other = nodes_[b];
   const Grid &first = grids_[one.grid], &second = grids_[other.grid];
   const bool are_squares = first.end < 0 && second.end < 0;
   if (!are_squares && !first.is_fan && !second.is_fan) {
-    if (one.level > 0 || other.level > 0) return true;
     const auto has_sliver = [&](int node, const Grid& grid) { return grid.end >= 0 && tree.ends[node - first_of_ends()].has_sliver; };
     if (has_sliver(a, first) || has_sliver(b, second)) return true;
   }
-  if (a == b) return !is_narrow(tree.nodes[a].normals);
-  if (first.patch == second.patch)
-    for (const int end : {0, 1})
-      if (tree.caps[first.patch][end] >= 0 && is_in_cap(tree, one, end) && is_in_cap(tree, other, end)) return false;
+  if (a == b) return !is_narrow(tree.normals[a]);
   if (one.grid == other.grid) return !is_smooth_within(tree, one, other);
-  if (are_squares || one.level > 0 || other.level > 0) return true;
+  if (are_squares) return true;
   if (first.end >= 0 && second.end >= 0) return !is_smooth_over_seam(tree, a, b);
   if (first.patch != second.patch) return true;
   const auto& [strip, square] = first.end >= 0 ? std::pair(one, other) : std::pair(other, one);
   return !is_smooth_at_end(tree, strip, square);
 }
 
-bool LatticeCrossings::is_in_cap(const Tree& tree, const Node& node, int end) const {
-  const Grid& grid = grids_[node.grid];
-  const int cap = tree.caps[grid.patch][end];
-  if (grid.end >= 0) return grid.end == end;
-  const int rows = grid.levels[0].rows, first = node.row << node.level, last = std::min(rows, (node.row + 1) << node.level);
-  return end == 0 ? last <= cap : first >= rows - cap;
-}
-
-/// Two nodes of one grid and level.
+/// Two leaves of one grid.
 bool LatticeCrossings::is_smooth_within(const Tree& tree, const Node& a, const Node& b) const {
   const Grid& grid = grids_[a.grid];
-  const int columns = grid.levels[a.level].columns;
+  const int columns = grid.levels[0].columns;
   if (std::abs(a.row - b.row) > kNear) return false;
   const auto [first, steps] = between(a.column, b.column, columns);
   if (steps > kNear) return false;
   Normals normals = no_normals<Normals>();
   for (int row = std::min(a.row, b.row); row <= std::max(a.row, b.row); ++row)
-    for (int step = 0; step <= steps; ++step) add(tree.nodes[node_at(grid, a.level, row, (first + step) % columns)].normals, normals);
+    for (int step = 0; step <= steps; ++step) add(tree.normals[node_at(grid, 0, row, (first + step) % columns)], normals);
   return is_narrow(normals);
 }
 
@@ -507,23 +510,23 @@ bool LatticeCrossings::is_smooth_at_end(const Tree& tree, const Node& end, const
   const int last = std::max(own, first + kSide), reach = 3 * kSide;
   first = std::min(0, first);
   if (last - first > reach || 2 * reach > width) return false;
-  Normals normals = tree.nodes[node_at(strip, 0, 0, end.column)].normals;
+  Normals normals = tree.normals[node_at(strip, 0, 0, end.column)];
   for (int column = first, at; column < last; column += kSide - at % kSide) {
     at = ((origin + column) % width + width) % width;
-    for (int r = 0; r <= row; ++r) add(tree.nodes[node_at(quads, 0, strip.end == 0 ? r : rows - 1 - r, at / kSide)].normals, normals);
+    for (int r = 0; r <= row; ++r) add(tree.normals[node_at(quads, 0, strip.end == 0 ? r : rows - 1 - r, at / kSide)], normals);
   }
   // On both sides of the leaf.
   const auto step_between = [&](int from, int to) { return ((to - from) % width + width) % width; };
   for (int piece = end.column, at = own; at < last; ++piece) {
     const int step = step_between(leaf_at(piece).last_column, leaf_at(piece + 1).last_column);
     if (piece - end.column > 3) return false;
-    add(tree.nodes[node_at(strip, 0, 0, (piece + 1) % pieces)].normals, normals);
+    add(tree.normals[node_at(strip, 0, 0, (piece + 1) % pieces)], normals);
     at += step;
   }
   for (int piece = end.column, at = 0; at > first; --piece) {
     const int step = step_between(leaf_at(piece - 1).first_column, leaf_at(piece).first_column);
     if (end.column - piece > 3) return false;
-    add(tree.nodes[node_at(strip, 0, 0, ((piece - 1) % pieces + pieces) % pieces)].normals, normals);
+    add(tree.normals[node_at(strip, 0, 0, ((piece - 1) % pieces + pieces) % pieces)], normals);
     at -= step;
   }
   return is_narrow(normals);
@@ -535,8 +538,8 @@ bool LatticeCrossings::is_smooth_over_seam(const Tree& tree, int a, int b) const
     const EndLeaf &first = tree.ends[one - first_of_ends()], &second = tree.ends[other - first_of_ends()];
     return std::min(first.last_sample, second.last_sample) > std::max(first.first_sample, second.first_sample);
   };
-  Normals normals = tree.nodes[a].normals;
-  add(tree.nodes[b].normals, normals);
+  Normals normals = tree.normals[a];
+  add(tree.normals[b], normals);
   if (!is_narrow(normals)) return false;
   if (do_share_side(a, b)) return true;
   // By way of a neighbour.
@@ -548,7 +551,7 @@ bool LatticeCrossings::is_smooth_over_seam(const Tree& tree, int a, int b) const
       const int beside = node_at(grid, 0, 0, (node.column + step) % pieces);
       if (!do_share_side(from, beside)) continue;
       Normals all = normals;
-      add(tree.nodes[beside].normals, all);
+      add(tree.normals[beside], all);
       if (is_narrow(all)) return true;
     }
   }
@@ -709,21 +712,34 @@ LatticeCrossings::Leaves& LatticeCrossings::fresh_leaves() {
   return leaves;
 }
 
-/// What is to be asked in place of a pair of nodes, or a node by itself. \return whether they are leaves that can meet
-bool LatticeCrossings::split(const Search& search, const Task& task, std::vector<Task>& tasks) const {
-  const auto [a, b] = task;
-  const Box &around_a = search.tree.nodes[a].around, &around_b = search.tree.nodes[b].around;
-  if (search.asked) {
-    // What is asked for of either has to lie at the other.
-    const Asked& asked = *search.asked;
-    const bool is_first = asked.has(a) && do_overlap(asked.box(a), around_b), is_second = asked.has(b) && do_overlap(around_a, asked.box(b));
-    if (!is_first && !is_second) return false;
-  } else if (a != b && !do_overlap(around_a, around_b)) {
-    return false;
+/// Squares whose normals tell whether triangles asked for can meet others near them.
+std::vector<int> LatticeCrossings::squares_near(const Asked& asked) const {
+  std::vector<char> are_near(first_of_ends(), 0);
+  for (const int leaf : asked.leaves) {
+    const Node& node = nodes_[leaf];
+    const Grid &own = grids_[node.grid], &quads = grids_[own.patch];
+    const auto [first, columns, rows] = quads.levels[0];
+    const bool is_end = own.end >= 0;
+    const int row = !is_end ? node.row : own.end == 0 ? 0 : rows - 1;
+    const int begin = is_end ? tree_.ends[leaf - first_of_ends()].first_column / kSide : node.column;
+    const int end = is_end ? tree_.ends[leaf - first_of_ends()].last_column / kSide : node.column;
+    const int reach = row <= 1 || row >= rows - 2 ? kNearAtEnds : kNear;
+    for (int r = std::max(0, row - kNear); r <= std::min(rows - 1, row + kNear); ++r)
+      for (int c = begin - reach; c <= end + reach; ++c) are_near[first + r * columns + (c % columns + columns) % columns] = 1;
   }
-  if (!can_meet(search.tree, a, b)) return false;
+  std::vector<int> squares;
+  for (int square = 0; square < first_of_ends(); ++square)
+    if (are_near[square] != 0) squares.push_back(square);
+  return squares;
+}
+
+/// What is to be asked in place of a pair of nodes, or a node by itself. \return whether they are leaves that can meet
+bool LatticeCrossings::split(const Asked& asked, const Task& task, std::vector<Task>& tasks) const {
+  const auto [a, b] = task;
+  // What is asked for of either has to lie at the other.
+  if (!(asked.has(a) && do_overlap(asked.box(a), tree_.boxes[b])) && !(asked.has(b) && do_overlap(tree_.boxes[a], asked.box(b)))) return false;
   const Node &one = nodes_[a], &other = nodes_[b];
-  if (one.level == 0 && other.level == 0) return true;
+  if (one.level == 0 && other.level == 0) return can_meet(tree_, a, b);
   const auto parts_of = [&](const Node& node, std::array<int, 4>& parts) {
     const Grid& grid = grids_[node.grid];
     const Grid::Level& below = grid.levels[node.level - 1];
@@ -746,7 +762,33 @@ bool LatticeCrossings::split(const Search& search, const Task& task, std::vector
   return false;
 }
 
-std::vector<std::array<int, 2>> LatticeCrossings::find(const Search& search) const {
+void LatticeCrossings::measure(const LatticeMesh& lattice) {
+  const Four wide{1, 1, 1, 0}, wide_diagonals = Four::Constant(std::numbers::sqrt3_v<float>);
+  tree_.boxes.resize(nodes_.size()), tree_.ends.resize(nodes_.size() - first_of_ends());
+  tree_.normals.assign(nodes_.size(), {{-wide, wide}, {-wide_diagonals, wide_diagonals}});
+  for_each_block(leaves_.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end;) {
+      const bool are_several = are_together(std::span(leaves_).subspan(i, end - i));
+      if (are_several)
+        box_squares(lattice, leaves_[i], tree_);
+      else
+        measure(lattice, leaves_[i], tree_);
+      i += are_several ? kSquaresAtOnce : 1;
+    }
+  });
+  join(tree_, nullptr);
+}
+
+void LatticeCrossings::measure(const LatticeMesh& lattice, std::span<const int> changed) {
+  const Asked asked = ask(lattice, changed);
+  measure(lattice, asked.leaves, tree_);
+  join(tree_, &asked);
+}
+
+std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattice, std::span<const int> triangles) {
+  if (triangles.empty()) return {};
+  const Asked asked = ask(lattice, triangles);
+  measure(lattice, squares_near(asked), tree_);
   // Large nodes first, so that there are tasks for all processors.
   std::vector<Task> large, tasks;
   for (std::size_t i = 0; i < grids_.size(); ++i)
@@ -757,7 +799,7 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const Search& search) con
     if (std::max(nodes_[task[0]].level, nodes_[task[1]].level) <= kTaskLevel)
       tasks.push_back(task);
     else
-      split(search, task, large);
+      split(asked, task, large);
   }
   std::vector<std::vector<std::array<int, 2>>> found(block_count(tasks.size(), kTasks));
   for_each_block(tasks.size(), kTasks, [&](std::size_t block, std::size_t begin, std::size_t end) {
@@ -766,27 +808,13 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const Search& search) con
     while (!stack.empty()) {
       const Task task = stack.back();
       stack.pop_back();
-      if (split(search, task, stack)) find_between(search.lattice, task[0], task[1], search.tree.nodes[task[1]].around, search.asked, leaves, found[block]);
+      if (split(asked, task, stack)) find_between(lattice, task[0], task[1], tree_.boxes[task[1]], &asked, leaves, found[block]);
     }
   });
   std::vector<std::array<int, 2>> pairs;
   for (const auto& some : found) pairs.insert(pairs.end(), some.begin(), some.end());
   std::sort(pairs.begin(), pairs.end());
   return pairs;
-}
-
-void LatticeCrossings::measure(const LatticeMesh& lattice) { measure(lattice, leaves_, nullptr, tree_); }
-
-void LatticeCrossings::measure(const LatticeMesh& lattice, std::span<const int> changed) {
-  const Asked asked = ask(lattice, changed);
-  measure(lattice, asked.leaves, &asked, tree_);
-}
-
-std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattice) const { return find({lattice, tree_}); }
-
-std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattice, std::span<const int> triangles) const {
-  const Asked asked = ask(lattice, triangles);
-  return find({lattice, tree_, &asked});
 }
 
 LatticeCrossings::Others LatticeCrossings::find_between_same(std::span<const std::array<int, 2>> pairs, const LatticeMesh& other, int share) const {

@@ -16,13 +16,11 @@ class LatticeCrossings {
  public:
   explicit LatticeCrossings(const LatticeMesh& lattice);
 
-  /// Where the lattice's parts lie and how they bend; of the same lattice with some triangles changed, the parts with these.
+  /// Where the lattice's parts lie; of the same lattice with some triangles changed, the parts with these.
   void measure(const LatticeMesh& lattice);
   void measure(const LatticeMesh& lattice, std::span<const int> changed);
-  /// Of a lattice as it was measured last: all pairs of triangles that intersect, or those with one that is asked for, the smaller index first, sorted.
-  /// Cost with the measuring: some 10 ns per triangle, all processors.
-  std::vector<std::array<int, 2>> find(const LatticeMesh& lattice) const;
-  std::vector<std::array<int, 2>> find(const LatticeMesh& lattice, std::span<const int> asked) const;
+  /// Of a lattice as it was measured last: the pairs of triangles that intersect with one that is asked for, the smaller index first, sorted.
+  std::vector<std::array<int, 2>> find(const LatticeMesh& lattice, std::span<const int> triangles);
 
   /// Of another mesh of this lattice: the same pairs, and all between the same parts (4 x 4 quads, or eight triangles at an end) as given ones
   /// for one in `share` pairs of parts.
@@ -78,9 +76,9 @@ class LatticeCrossings {
     bool has_sliver = false;                 ///< a triangle that rounding can turn: its normal tells nothing
   };
   struct Tree {
-    std::vector<Bounds> nodes;
-    std::vector<EndLeaf> ends;             ///< per node behind those of patches
-    std::vector<std::array<int, 2>> caps;  ///< per patch and end: how many rows of squares bend little together with the fan there; -1: none
+    std::vector<Box> boxes;        ///< of nodes
+    std::vector<Normals> normals;  ///< of leaves; of squares that are not near what was asked for any
+    std::vector<EndLeaf> ends;     ///< per node behind those of patches
   };
   /// Some triangles, the nodes that have any of them, and boxes around those that each has.
   struct Asked {
@@ -90,11 +88,6 @@ class LatticeCrossings {
     std::vector<int> leaves;  ///< sorted
     bool has(int node) const { return nodes[node] != 0; }
     const Box& box(int node) const { return boxes[nodes[node] - 1]; }
-  };
-  struct Search {
-    const LatticeMesh& lattice;
-    const Tree& tree;
-    const Asked* asked = nullptr;  ///< all without
   };
   using Task = std::array<int, 2>;  // nodes
   int leaf_of(const LatticeMesh& lattice, int triangle) const;
@@ -117,9 +110,11 @@ class LatticeCrossings {
   void view(const LatticeMesh& lattice, const Node& node, SquareVertices& square) const;
   Bounds measure_square(const LatticeMesh& lattice, const Node& node) const;
   void measure_squares(const LatticeMesh& lattice, int first, Tree& tree) const;
+  void box_squares(const LatticeMesh& lattice, int first, Tree& tree) const;
   Bounds measure_end(const LatticeMesh& lattice, const Node& node) const;
   void measure(const LatticeMesh& lattice, int node, Tree& tree) const;
-  void measure(const LatticeMesh& lattice, std::span<const int> leaves, const Asked* asked, Tree& tree) const;
+  bool are_together(std::span<const int> leaves) const;
+  void measure(const LatticeMesh& lattice, std::span<const int> leaves, Tree& tree) const;
   void join(Tree& tree, const Asked* asked) const;
   Asked ask(const LatticeMesh& lattice, std::span<const int> triangles) const;
   EndLeaf describe_end(const LatticeMesh& lattice, const Node& node) const;
@@ -129,16 +124,15 @@ class LatticeCrossings {
   bool is_smooth_within(const Tree& tree, const Node& a, const Node& b) const;
   bool is_smooth_at_end(const Tree& tree, const Node& end, const Node& square) const;
   bool is_smooth_over_seam(const Tree& tree, int a, int b) const;
-  bool is_in_cap(const Tree& tree, const Node& node, int end) const;
   bool are_quads_smooth(const LatticeMesh& lattice, int patch, int s, int t) const;
-  bool split(const Search& search, const Task& task, std::vector<Task>& tasks) const;
+  std::vector<int> squares_near(const Asked& asked) const;
+  bool split(const Asked& asked, const Task& task, std::vector<Task>& tasks) const;
   static Leaves& fresh_leaves();
   void copy_quads(const Node& node, const SquareVertices& square, QuadBlock& quads) const;
   const TriangleBlock& boxes_of(const LatticeMesh& lattice, int node, const Asked* asked, Leaf& leaf) const;
   void find_planes_of(const LatticeMesh& lattice, Leaf& leaf) const;
   void find_between(const LatticeMesh& lattice, int a, int b, const Box& around_b, const Asked* asked, Leaves& leaves,
                     std::vector<std::array<int, 2>>& pairs) const;
-  std::vector<std::array<int, 2>> find(const Search& search) const;
 
   float margin_;
   int texture_width_;
