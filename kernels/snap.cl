@@ -358,9 +358,9 @@ __attribute__((always_inline)) void place_colour(const RowColour colour, const i
 // in   bin_begins: into bin_edges, numbers of edges; is_again: only bins where a texel could not go to its edge the time before
 // out  parameters: where on its edge a texel is, 0 to 1; offers: what else the kernel needs per texel
 kernel void place_on_edges(const int row_count, const int texture_width, const int is_again, global const int* restrict rows,
-                           global const PatchRecord* restrict patches, global const int* restrict bin_begins, global const int* restrict bin_edges, global const EdgeRecord* restrict edges,
-                           global int* restrict anchors, global float* restrict parameters, global float* offset_x, global float* offset_y,
-                           global int* restrict offers) {
+                           global const PatchRecord* restrict patches, global const int* restrict bin_begins, global const int* restrict bin_edges,
+                           global const EdgeRecord* restrict edges, global int* restrict anchors, global float* restrict parameters, global float* offset_x,
+                           global float* offset_y, global int* restrict offers) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   global const PatchRecord* restrict p = patches + rows[4 * k];
@@ -372,9 +372,9 @@ kernel void place_on_edges(const int row_count, const int texture_width, const i
     const int8 texels = (columns >> 1) + ((columns & 1) == 0 ? (int8)(first) : (int8)(odd));
     const int is_whole = column + 8 <= width, at_even = first + column / 2, at_odd = odd + column / 2;
     if (is_again && is_whole) {
-      const int8 held = (int8)(vload4(0, anchors + at_even), vload4(0, anchors + at_odd));
-      const int8 offered = (int8)(vload4(0, offers + at_even), vload4(0, offers + at_odd));
-      if (!any((held == 0) & (offered != NONE))) {
+      const int4 at_even_open = (vload4(0, anchors + at_even) == 0) & (vload4(0, offers + at_even) != NONE);
+      const int4 at_odd_open = (vload4(0, anchors + at_odd) == 0) & (vload4(0, offers + at_odd) != NONE);
+      if (!any(at_even_open | at_odd_open)) {
         vstore4((int4)(NONE), 0, offers + at_even);
         vstore4((int4)(NONE), 0, offers + at_odd);
         continue;

@@ -173,7 +173,7 @@ TEST(Morph, DoesNotCareAboutNamesOrderAndDirectionsOfBones) {
   const TriangleMesh mesh = reconstruct_mesh(device(), at(morph_of(a, b), 0.4));
   EXPECT_LT(mean_distance(source.mesh, mesh), 2 * mean_distance(source.mesh, reconstruct_mesh(device(), a)));
   const Distortion distortion = measure_distortion(reconstruct_mesh(device(), a), map_surface(device(), a, b, find_correspondence(a.skeleton, b.skeleton)));
-  EXPECT_LT(distortion.dirichlet_median, 1.2);
+  EXPECT_LT(distortion.dirichlet_median, 1.25);
 }
 
 TEST(Morph, IsTheSameFromEitherSide) {
