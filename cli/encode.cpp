@@ -193,8 +193,8 @@ std::string report_text(const EncodeReport& report, const EncodeOptions& options
       static_cast<double>(std::filesystem::file_size(output, ignored)) / (1 << 20));
 }
 
-// What texels take where they snap, and the heap can hold without growing (keep_freed_memory).
-constexpr std::size_t kBytesPerTexel = 160, kMostMemoryAhead = 192 << 20;
+// What texels take, with snapping and without, and the most that the heap can hold without growing (keep_freed_memory).
+constexpr std::size_t kBytesPerSnappedTexel = 160, kBytesPerTexel = 104, kMostMemoryAhead = 192 << 20;
 
 struct Input {
   TriangleMesh mesh;
@@ -242,7 +242,8 @@ void run(const Arguments& arguments, const CLI::App& command) {
   bar->show("reading and checking the input", 0);
   // A driver takes as long to load as the input. It stays on this thread, as some keep state per thread.
   auto reading = std::async(std::launch::async, [&] { return read_input(arguments, options); });
-  std::optional<MemoryAhead> memory(std::in_place, std::min(kMostMemoryAhead, kBytesPerTexel * options.width * options.height));
+  const std::size_t bytes_per_texel = options.has_snap.value_or(true) ? kBytesPerSnappedTexel : kBytesPerTexel;
+  std::optional<MemoryAhead> memory(std::in_place, std::min(kMostMemoryAhead, bytes_per_texel * options.width * options.height));
   ClContext* loaded = nullptr;
   std::exception_ptr no_device;
   try {
