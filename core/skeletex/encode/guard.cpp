@@ -414,20 +414,15 @@ class Distances {
     const auto [a, b, c] = lattice.corners(lattice.triangle(triangle));
     return (b - a).cross(c - a).dot(area_vector(sources_.mesh, sources_.mesh.triangles[nearest])) < 0;
   }
-  /// \return those that do
-  std::vector<int> look_again_at_turned(const LatticeMesh& lattice, std::vector<Measured>& measured) {
-    std::vector<int> suspects, nearest, turned;
+  void look_again_at_turned(const LatticeMesh& lattice, std::vector<Measured>& measured) {
+    std::vector<int> suspects, nearest;
     for (const Measured& each : measured)
       if (each.is_turned) suspects.push_back(each.triangle);
     std::vector<float> distances;
     find(lattice, suspects, kMiddle, 0, nearest, distances);
     std::size_t next = 0;
-    for (Measured& each : measured) {
-      if (!each.is_turned) continue;
-      each.is_turned = looks_against(lattice, each.triangle, nearest[next++]);
-      if (each.is_turned) turned.push_back(each.triangle);
-    }
-    return turned;
+    for (Measured& each : measured)
+      if (each.is_turned) each.is_turned = looks_against(lattice, each.triangle, nearest[next++]);
   }
   /// \param enough   what is nearer need not be exact
   /// \param nearest  out: to their middles, where exact

@@ -345,18 +345,18 @@ LatticeCrossings::Bounds LatticeCrossings::measure_end(const LatticeMesh& lattic
   return bounds;
 }
 
-void LatticeCrossings::measure(const LatticeMesh& lattice, int node, Tree& tree) const {
+void LatticeCrossings::measure_leaf(const LatticeMesh& lattice, int node) {
   const bool is_square = node < first_of_ends();
   const Bounds bounds = is_square ? measure_square(lattice, nodes_[node]) : measure_end(lattice, nodes_[node]);
-  tree.boxes[node] = bounds.around, tree.normals[node] = bounds.normals;
+  boxes_[node] = bounds.around, normals_[node] = bounds.normals;
   if (!is_square) {
-    tree.ends[node - first_of_ends()] = describe_end(lattice, nodes_[node]);
+    ends_[node - first_of_ends()] = describe_end(lattice, nodes_[node]);
   }
 }
 
 /// Boxes of levels above the leaves.
 /// \param asked  these nodes; all without
-void LatticeCrossings::join(Tree& tree, const Asked* asked) const {
+void LatticeCrossings::join(const Asked* asked) {
   for (const Grid& grid : grids_)
     for (std::size_t level = 1; level < grid.levels.size(); ++level) {
       const auto [first, columns, rows] = grid.levels[level];
@@ -365,16 +365,16 @@ void LatticeCrossings::join(Tree& tree, const Asked* asked) const {
         for (int column = 0; column < columns; ++column) {
           const int node = first + row * columns + column;
           if (asked && !asked->has(node)) continue;
-          Box& all = tree.boxes[node];
+          Box& all = boxes_[node];
           all = no_box<Box>();
           for (int r = 2 * row; r < std::min(2 * row + 2, below.rows); ++r)
-            for (int c = 2 * column; c < std::min(2 * column + 2, below.columns); ++c) add(tree.boxes[below.first + r * below.columns + c], all);
+            for (int c = 2 * column; c < std::min(2 * column + 2, below.columns); ++c) add(boxes_[below.first + r * below.columns + c], all);
         }
     }
 }
 
 /// Squares that follow each other in a row, their numbers as well.
-void LatticeCrossings::measure_squares(const LatticeMesh& lattice, int first, Tree& tree) const {
+void LatticeCrossings::measure_squares(const LatticeMesh& lattice, int first) {
   SquareVertices square;
   view(lattice, nodes_[first], square);
   Ranges<kColumnsAtOnce> ranges;
@@ -385,8 +385,8 @@ void LatticeCrossings::measure_squares(const LatticeMesh& lattice, int first, Tr
     add_quads({square.axes[0] + at, square.axes[1] + at, square.axes[2] + at}, square.diagonals[row], texture_width_, ranges);
   }
   for (int i = 0; i < kSquaresAtOnce; ++i) {
-    Box& around = tree.boxes[first + i];
-    Normals& normals = tree.normals[first + i];
+    Box& around = boxes_[first + i];
+    Normals& normals = normals_[first + i];
     around = no_box<Box>(), normals = no_normals<Normals>();
     for (int axis = 0; axis < kAxes; ++axis) {
       Box& box = axis < 3 ? around : axis < 6 ? normals.box : normals.diagonals;
@@ -399,7 +399,7 @@ void LatticeCrossings::measure_squares(const LatticeMesh& lattice, int first, Tr
 }
 
 /// The boxes alone.
-void LatticeCrossings::box_squares(const LatticeMesh& lattice, int first, Tree& tree) const {
+void LatticeCrossings::box_squares(const LatticeMesh& lattice, int first) {
   SquareVertices square;
   view(lattice, nodes_[first], square);
   for (int axis = 0; axis < 3; ++axis) {
@@ -407,7 +407,7 @@ void LatticeCrossings::box_squares(const LatticeMesh& lattice, int first, Tree& 
     find_range(square.axes[axis], texture_width_, square.rows + 1, range);
     for (int i = 0; i < kSquaresAtOnce; ++i) {
       const float *least = range.least.data() + kSide * i, *greatest = range.greatest.data() + kSide * i;
-      Box& box = tree.boxes[first + i];
+      Box& box = boxes_[first + i];
       box.least[axis] = std::min(least_of(Eigen::Map<const Four>(least)), least[kSide]) - margin_;
       box.greatest[axis] = std::max(greatest_of(Eigen::Map<const Four>(greatest)), greatest[kSide]) + margin_;
     }
@@ -422,15 +422,17 @@ bool LatticeCrossings::are_together(std::span<const int> leaves) const {
          kSide * first.column + kColumnsAtOnce < rectangles_[grids_[first.grid].patch].width;
 }
 
-/// Boxes and normals of some leaves.
-void LatticeCrossings::measure(const LatticeMesh& lattice, std::span<const int> leaves, Tree& tree) const {
+/// Boxes of some leaves and their normals, those of squares only if asked for. (Squares by themselves have them all the same.)
+void LatticeCrossings::measure_leaves(const LatticeMesh& lattice, std::span<const int> leaves, bool has_normals) {
   for_each_block(leaves.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end;) {
       const bool are_several = are_together(leaves.subspan(i, end - i));
-      if (are_several)
-        measure_squares(lattice, leaves[i], tree);
+      if (!are_several)
+        measure_leaf(lattice, leaves[i]);
+      else if (has_normals)
+        measure_squares(lattice, leaves[i]);
       else
-        measure(lattice, leaves[i], tree);
+        box_squares(lattice, leaves[i]);
       i += are_several ? kSquaresAtOnce : 1;
     }
   });
@@ -465,25 +467,25 @@ LatticeCrossings::Asked LatticeCrossings::ask(const LatticeMesh& lattice, std::s
 }
 
 /// Whether triangles of two leaves can, or of one: not where the lattice around them bends little, but for slivers of strips.
-bool LatticeCrossings::can_meet(const Tree& tree, int a, int b) const {
+bool LatticeCrossings::can_meet(int a, int b) const {
   const Node &one = nodes_[a], &other = nodes_[b];
   const Grid &first = grids_[one.grid], &second = grids_[other.grid];
   const bool are_squares = first.end < 0 && second.end < 0;
   if (!are_squares && !first.is_fan && !second.is_fan) {
-    const auto has_sliver = [&](int node, const Grid& grid) { return grid.end >= 0 && tree.ends[node - first_of_ends()].has_sliver; };
+    const auto has_sliver = [&](int node, const Grid& grid) { return grid.end >= 0 && ends_[node - first_of_ends()].has_sliver; };
     if (has_sliver(a, first) || has_sliver(b, second)) return true;
   }
-  if (a == b) return !is_narrow(tree.normals[a]);
-  if (one.grid == other.grid) return !is_smooth_within(tree, one, other);
+  if (a == b) return !is_narrow(normals_[a]);
+  if (one.grid == other.grid) return !is_smooth_within(one, other);
   if (are_squares) return true;
-  if (first.end >= 0 && second.end >= 0) return !is_smooth_over_seam(tree, a, b);
+  if (first.end >= 0 && second.end >= 0) return !is_smooth_over_seam(a, b);
   if (first.patch != second.patch) return true;
   const auto& [strip, square] = first.end >= 0 ? std::pair(one, other) : std::pair(other, one);
-  return !is_smooth_at_end(tree, strip, square);
+  return !is_smooth_at_end(strip, square);
 }
 
 /// Two leaves of one grid.
-bool LatticeCrossings::is_smooth_within(const Tree& tree, const Node& a, const Node& b) const {
+bool LatticeCrossings::is_smooth_within(const Node& a, const Node& b) const {
   const Grid& grid = grids_[a.grid];
   const int columns = grid.levels[0].columns;
   if (std::abs(a.row - b.row) > kNear) return false;
@@ -491,18 +493,18 @@ bool LatticeCrossings::is_smooth_within(const Tree& tree, const Node& a, const N
   if (steps > kNear) return false;
   Normals normals = no_normals<Normals>();
   for (int row = std::min(a.row, b.row); row <= std::max(a.row, b.row); ++row)
-    for (int step = 0; step <= steps; ++step) add(tree.normals[node_at(grid, 0, row, (first + step) % columns)], normals);
+    for (int step = 0; step <= steps; ++step) add(normals_[node_at(grid, 0, row, (first + step) % columns)], normals);
   return is_narrow(normals);
 }
 
 /// A leaf of a strip or fan and a square of the patch: all squares up to that, and what of the end lies at them.
-bool LatticeCrossings::is_smooth_at_end(const Tree& tree, const Node& end, const Node& square) const {
+bool LatticeCrossings::is_smooth_at_end(const Node& end, const Node& square) const {
   const Grid &strip = grids_[end.grid], &quads = grids_[square.grid];
   const auto [first_square, columns, rows] = quads.levels[0];
   const int row = strip.end == 0 ? square.row : rows - 1 - square.row;
   if (row > 1) return false;
   const int width = rectangles_[strip.patch].width, pieces = strip.levels[0].columns;
-  const auto leaf_at = [&](int column) -> const EndLeaf& { return tree.ends[node_at(strip, 0, 0, (column % pieces + pieces) % pieces) - first_of_ends()]; };
+  const auto leaf_at = [&](int column) -> const EndLeaf& { return ends_[node_at(strip, 0, 0, (column % pieces + pieces) % pieces) - first_of_ends()]; };
   // In columns from the strip's first one on.
   const int origin = leaf_at(end.column).first_column, own = leaf_at(end.column).last_column - origin;
   int first = ((kSide * square.column - origin) % width + width) % width;
@@ -510,36 +512,36 @@ bool LatticeCrossings::is_smooth_at_end(const Tree& tree, const Node& end, const
   const int last = std::max(own, first + kSide), reach = 3 * kSide;
   first = std::min(0, first);
   if (last - first > reach || 2 * reach > width) return false;
-  Normals normals = tree.normals[node_at(strip, 0, 0, end.column)];
+  Normals normals = normals_[node_at(strip, 0, 0, end.column)];
   for (int column = first, at; column < last; column += kSide - at % kSide) {
     at = ((origin + column) % width + width) % width;
-    for (int r = 0; r <= row; ++r) add(tree.normals[node_at(quads, 0, strip.end == 0 ? r : rows - 1 - r, at / kSide)], normals);
+    for (int r = 0; r <= row; ++r) add(normals_[node_at(quads, 0, strip.end == 0 ? r : rows - 1 - r, at / kSide)], normals);
   }
   // On both sides of the leaf.
   const auto step_between = [&](int from, int to) { return ((to - from) % width + width) % width; };
   for (int piece = end.column, at = own; at < last; ++piece) {
     const int step = step_between(leaf_at(piece).last_column, leaf_at(piece + 1).last_column);
     if (piece - end.column > 3) return false;
-    add(tree.normals[node_at(strip, 0, 0, (piece + 1) % pieces)], normals);
+    add(normals_[node_at(strip, 0, 0, (piece + 1) % pieces)], normals);
     at += step;
   }
   for (int piece = end.column, at = 0; at > first; --piece) {
     const int step = step_between(leaf_at(piece - 1).first_column, leaf_at(piece).first_column);
     if (end.column - piece > 3) return false;
-    add(tree.normals[node_at(strip, 0, 0, ((piece - 1) % pieces + pieces) % pieces)], normals);
+    add(normals_[node_at(strip, 0, 0, ((piece - 1) % pieces + pieces) % pieces)], normals);
     at -= step;
   }
   return is_narrow(normals);
 }
 
 /// Two leaves of strips on both sides of a seam.
-bool LatticeCrossings::is_smooth_over_seam(const Tree& tree, int a, int b) const {
+bool LatticeCrossings::is_smooth_over_seam(int a, int b) const {
   const auto do_share_side = [&](int one, int other) {
-    const EndLeaf &first = tree.ends[one - first_of_ends()], &second = tree.ends[other - first_of_ends()];
+    const EndLeaf &first = ends_[one - first_of_ends()], &second = ends_[other - first_of_ends()];
     return std::min(first.last_sample, second.last_sample) > std::max(first.first_sample, second.first_sample);
   };
-  Normals normals = tree.normals[a];
-  add(tree.normals[b], normals);
+  Normals normals = normals_[a];
+  add(normals_[b], normals);
   if (!is_narrow(normals)) return false;
   if (do_share_side(a, b)) return true;
   // By way of a neighbour.
@@ -551,7 +553,7 @@ bool LatticeCrossings::is_smooth_over_seam(const Tree& tree, int a, int b) const
       const int beside = node_at(grid, 0, 0, (node.column + step) % pieces);
       if (!do_share_side(from, beside)) continue;
       Normals all = normals;
-      add(tree.normals[beside], all);
+      add(normals_[beside], all);
       if (is_narrow(all)) return true;
     }
   }
@@ -721,8 +723,8 @@ std::vector<int> LatticeCrossings::squares_near(const Asked& asked) const {
     const auto [first, columns, rows] = quads.levels[0];
     const bool is_end = own.end >= 0;
     const int row = !is_end ? node.row : own.end == 0 ? 0 : rows - 1;
-    const int begin = is_end ? tree_.ends[leaf - first_of_ends()].first_column / kSide : node.column;
-    const int end = is_end ? tree_.ends[leaf - first_of_ends()].last_column / kSide : node.column;
+    const int begin = is_end ? ends_[leaf - first_of_ends()].first_column / kSide : node.column;
+    const int end = is_end ? ends_[leaf - first_of_ends()].last_column / kSide : node.column;
     const int reach = row <= 1 || row >= rows - 2 ? kNearAtEnds : kNear;
     for (int r = std::max(0, row - kNear); r <= std::min(rows - 1, row + kNear); ++r)
       for (int c = begin - reach; c <= end + reach; ++c) are_near[first + r * columns + (c % columns + columns) % columns] = 1;
@@ -737,9 +739,9 @@ std::vector<int> LatticeCrossings::squares_near(const Asked& asked) const {
 bool LatticeCrossings::split(const Asked& asked, const Task& task, std::vector<Task>& tasks) const {
   const auto [a, b] = task;
   // What is asked for of either has to lie at the other.
-  if (!(asked.has(a) && do_overlap(asked.box(a), tree_.boxes[b])) && !(asked.has(b) && do_overlap(tree_.boxes[a], asked.box(b)))) return false;
+  if (!(asked.has(a) && do_overlap(asked.box(a), boxes_[b])) && !(asked.has(b) && do_overlap(boxes_[a], asked.box(b)))) return false;
   const Node &one = nodes_[a], &other = nodes_[b];
-  if (one.level == 0 && other.level == 0) return can_meet(tree_, a, b);
+  if (one.level == 0 && other.level == 0) return can_meet(a, b);
   const auto parts_of = [&](const Node& node, std::array<int, 4>& parts) {
     const Grid& grid = grids_[node.grid];
     const Grid::Level& below = grid.levels[node.level - 1];
@@ -764,31 +766,22 @@ bool LatticeCrossings::split(const Asked& asked, const Task& task, std::vector<T
 
 void LatticeCrossings::measure(const LatticeMesh& lattice) {
   const Four wide{1, 1, 1, 0}, wide_diagonals = Four::Constant(std::numbers::sqrt3_v<float>);
-  tree_.boxes.resize(nodes_.size()), tree_.ends.resize(nodes_.size() - first_of_ends());
-  tree_.normals.assign(nodes_.size(), {{-wide, wide}, {-wide_diagonals, wide_diagonals}});
-  for_each_block(leaves_.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end;) {
-      const bool are_several = are_together(std::span(leaves_).subspan(i, end - i));
-      if (are_several)
-        box_squares(lattice, leaves_[i], tree_);
-      else
-        measure(lattice, leaves_[i], tree_);
-      i += are_several ? kSquaresAtOnce : 1;
-    }
-  });
-  join(tree_, nullptr);
+  boxes_.resize(nodes_.size()), ends_.resize(nodes_.size() - first_of_ends());
+  normals_.assign(nodes_.size(), {{-wide, wide}, {-wide_diagonals, wide_diagonals}});
+  measure_leaves(lattice, leaves_, false);
+  join(nullptr);
 }
 
 void LatticeCrossings::measure(const LatticeMesh& lattice, std::span<const int> changed) {
   const Asked asked = ask(lattice, changed);
-  measure(lattice, asked.leaves, tree_);
-  join(tree_, &asked);
+  measure_leaves(lattice, asked.leaves, true);
+  join(&asked);
 }
 
 std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattice, std::span<const int> triangles) {
   if (triangles.empty()) return {};
   const Asked asked = ask(lattice, triangles);
-  measure(lattice, squares_near(asked), tree_);
+  measure_leaves(lattice, squares_near(asked), true);
   // Large nodes first, so that there are tasks for all processors.
   std::vector<Task> large, tasks;
   for (std::size_t i = 0; i < grids_.size(); ++i)
@@ -808,7 +801,7 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattic
     while (!stack.empty()) {
       const Task task = stack.back();
       stack.pop_back();
-      if (split(asked, task, stack)) find_between(lattice, task[0], task[1], tree_.boxes[task[1]], &asked, leaves, found[block]);
+      if (split(asked, task, stack)) find_between(lattice, task[0], task[1], boxes_[task[1]], &asked, leaves, found[block]);
     }
   });
   std::vector<std::array<int, 2>> pairs;

@@ -75,11 +75,6 @@ class LatticeCrossings {
     int first_sample = 0, last_sample = -1;  ///< vertices of the seam, if they are neighbours on an arc
     bool has_sliver = false;                 ///< a triangle that rounding can turn: its normal tells nothing
   };
-  struct Tree {
-    std::vector<Box> boxes;        ///< of nodes
-    std::vector<Normals> normals;  ///< of leaves; of squares that are not near what was asked for any
-    std::vector<EndLeaf> ends;     ///< per node behind those of patches
-  };
   /// Some triangles, the nodes that have any of them, and boxes around those that each has.
   struct Asked {
     std::vector<char> triangles;
@@ -109,21 +104,21 @@ class LatticeCrossings {
   };
   void view(const LatticeMesh& lattice, const Node& node, SquareVertices& square) const;
   Bounds measure_square(const LatticeMesh& lattice, const Node& node) const;
-  void measure_squares(const LatticeMesh& lattice, int first, Tree& tree) const;
-  void box_squares(const LatticeMesh& lattice, int first, Tree& tree) const;
+  void measure_squares(const LatticeMesh& lattice, int first);
+  void box_squares(const LatticeMesh& lattice, int first);
   Bounds measure_end(const LatticeMesh& lattice, const Node& node) const;
-  void measure(const LatticeMesh& lattice, int node, Tree& tree) const;
+  void measure_leaf(const LatticeMesh& lattice, int node);
   bool are_together(std::span<const int> leaves) const;
-  void measure(const LatticeMesh& lattice, std::span<const int> leaves, Tree& tree) const;
-  void join(Tree& tree, const Asked* asked) const;
+  void measure_leaves(const LatticeMesh& lattice, std::span<const int> leaves, bool has_normals);
+  void join(const Asked* asked);
   Asked ask(const LatticeMesh& lattice, std::span<const int> triangles) const;
   EndLeaf describe_end(const LatticeMesh& lattice, const Node& node) const;
   int first_of_ends() const { return grids_[rectangles_.size()].levels[0].first; }
 
-  bool can_meet(const Tree& tree, int a, int b) const;
-  bool is_smooth_within(const Tree& tree, const Node& a, const Node& b) const;
-  bool is_smooth_at_end(const Tree& tree, const Node& end, const Node& square) const;
-  bool is_smooth_over_seam(const Tree& tree, int a, int b) const;
+  bool can_meet(int a, int b) const;
+  bool is_smooth_within(const Node& a, const Node& b) const;
+  bool is_smooth_at_end(const Node& end, const Node& square) const;
+  bool is_smooth_over_seam(int a, int b) const;
   bool are_quads_smooth(const LatticeMesh& lattice, int patch, int s, int t) const;
   std::vector<int> squares_near(const Asked& asked) const;
   bool split(const Asked& asked, const Task& task, std::vector<Task>& tasks) const;
@@ -141,7 +136,9 @@ class LatticeCrossings {
   std::vector<Grid> grids_;            // of patches, then of their ends
   std::vector<Node> nodes_;
   std::vector<int> leaves_;
-  Tree tree_;
+  std::vector<Box> boxes_;        // of nodes
+  std::vector<Normals> normals_;  // of leaves; of squares that are not near what was asked for any
+  std::vector<EndLeaf> ends_;     // per node behind those of patches
 };
 
 }  // namespace skeletex
