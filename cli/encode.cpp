@@ -193,8 +193,16 @@ std::string report_text(const EncodeReport& report, const EncodeOptions& options
       static_cast<double>(std::filesystem::file_size(output, ignored)) / (1 << 20));
 }
 
-// What texels take, with snapping and without, and the most that the heap can hold without growing (keep_freed_memory).
-constexpr std::size_t kBytesPerSnappedTexel = 160, kBytesPerTexel = 104, kMostMemoryAhead = 192 << 20;
+// What texels take, with snapping and without, and a mesh by its file; and the most that the heap can hold without growing (keep_freed_memory).
+constexpr std::size_t kBytesPerSnappedTexel = 160, kBytesPerTexel = 104, kBytesPerByteOfMesh = 16, kMostMemoryAhead = 192 << 20;
+
+std::size_t memory_for(const Arguments& arguments, const EncodeOptions& options) {
+  const std::size_t per_texel = options.has_snap.value_or(true) ? kBytesPerSnappedTexel : kBytesPerTexel;
+  std::error_code not_there;  // which is told by whoever reads it
+  const std::uintmax_t file = std::filesystem::file_size(arguments.mesh, not_there);
+  const std::size_t mesh = not_there ? 0 : std::min<std::uintmax_t>(file, kMostMemoryAhead) * kBytesPerByteOfMesh;
+  return std::min(kMostMemoryAhead, per_texel * options.width * options.height + mesh);
+}
 
 struct Input {
   TriangleMesh mesh;
@@ -242,8 +250,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
   bar->show("reading and checking the input", 0);
   // A driver takes as long to load as the input. It stays on this thread, as some keep state per thread.
   auto reading = std::async(std::launch::async, [&] { return read_input(arguments, options); });
-  const std::size_t bytes_per_texel = options.has_snap.value_or(true) ? kBytesPerSnappedTexel : kBytesPerTexel;
-  std::optional<MemoryAhead> memory(std::in_place, std::min(kMostMemoryAhead, bytes_per_texel * options.width * options.height));
+  std::optional<MemoryAhead> memory(std::in_place, memory_for(arguments, options));
   ClContext* loaded = nullptr;
   std::exception_ptr no_device;
   try {
