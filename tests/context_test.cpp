@@ -112,6 +112,22 @@ TEST(Context, MapsWhatABufferHoldsUntilTheMappingEnds) {
   EXPECT_TRUE(is_equal(mapping));
 }
 
+TEST(Context, DownloadsAndMapsSeveralBuffersAfterWhatWasQueued) {
+  ClContext context;
+  auto numbers = context.allocate<int>(100000);
+  const auto values = context.upload(std::vector<float>{1, 2, 3.5f});
+  const auto none = context.upload(std::vector<int>{});
+  context.fill(numbers, 9);
+  const auto [all, few, empty] = context.download(numbers, values, none);
+  EXPECT_EQ(all, std::vector<int>(100000, 9));
+  EXPECT_EQ(few, (std::vector<float>{1, 2, 3.5f}));
+  EXPECT_TRUE(empty.empty());
+  context.fill(numbers, -9);
+  const auto [mapped, mapped_few] = context.map(numbers, values);
+  EXPECT_EQ(std::vector<int>(mapped.data(), mapped.data() + mapped.size()), std::vector<int>(100000, -9));
+  EXPECT_EQ(mapped_few[2], 3.5f);
+}
+
 TEST(Context, TakesEmptyVectors) {
   ClContext context;
   const auto buffer = context.upload(std::vector<float>{});

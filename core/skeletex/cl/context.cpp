@@ -207,10 +207,18 @@ void ClContext::read_bytes(const ::cl::Buffer& buffer, void* data, std::size_t b
   if (bytes > 0) check(queue_.enqueueReadBuffer(buffer, CL_TRUE, 0, bytes, data), "reading from the device");
 }
 
+void ClContext::read_all(std::initializer_list<Read> reads) {
+  cl_int code = CL_SUCCESS;
+  for (const Read& read : reads)
+    if (code == CL_SUCCESS && read.bytes > 0) code = queue_.enqueueReadBuffer(*read.from, CL_FALSE, 0, read.bytes, read.to);
+  finish();  // whatever has failed: what is queued writes to the host's memory
+  check(code, "reading from the device");
+}
+
 const void* ClContext::map_bytes(const ::cl::Buffer& buffer, std::size_t bytes) {
   if (bytes == 0) return nullptr;
   cl_int code = CL_SUCCESS;
-  const void* values = queue_.enqueueMapBuffer(buffer, CL_TRUE, CL_MAP_READ, 0, bytes, nullptr, nullptr, &code);
+  const void* values = queue_.enqueueMapBuffer(buffer, CL_FALSE, CL_MAP_READ, 0, bytes, nullptr, nullptr, &code);
   check(code, "reading from the device");
   return values;
 }

@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <initializer_list>
 #include <map>
 #include <memory>
 #include <span>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -114,6 +116,8 @@ class ClContext {
   /// A queue of another thread's own, with the same device, buffers and programs. Neither queue waits for the other: `finish` before the
   /// other one uses what this one makes.
   std::unique_ptr<ClContext> beside() const;
+  /// Whether another thread may use that queue while this one is used, as OpenCL has it: Oclgrind runs one kernel at a time.
+  bool can_run_beside() const { return info_.platform != "Oclgrind"; }
   /// Adds what was launched on such a queue to the profile. Waits for it.
   void take_profile(ClContext& beside);
 
@@ -150,10 +154,24 @@ class ClContext {
     read_bytes(buffer.memory, values.data(), values.size() * sizeof(T));
     return values;
   }
+  /// The same of several buffers, waiting once.
+  template <class... T>
+  requires(sizeof...(T) > 1)
+  std::tuple<std::vector<T>...> download(const ClBuffer<T>&... buffers) {
+    std::tuple<std::vector<T>...> all{std::vector<T>(buffers.size)...};
+    std::apply([&](auto&... values) { read_all({{&buffers.memory, values.data(), values.size() * sizeof(T)}...}); }, all);
+    return all;
+  }
   /// Waits for the queue and lets the host read the whole buffer where it is. \throw DeviceError when the driver does not
   template <class T>
   ClMapping<T> map(const ClBuffer<T>& buffer) {
-    return {queue_, buffer.memory, map_bytes(buffer.memory, buffer.size * sizeof(T)), buffer.size};
+    return std::get<0>(map_all(buffer));
+  }
+  /// The same of several buffers, waiting once.
+  template <class... T>
+  requires(sizeof...(T) > 1)
+  std::tuple<ClMapping<T>...> map(const ClBuffer<T>&... buffers) {
+    return map_all(buffers...);
   }
   /// Sets every byte of the buffer to that of a repeated 4-byte pattern.
   template <class T>
@@ -210,7 +228,19 @@ class ClContext {
   ::cl::Buffer allocate_bytes(std::size_t bytes, const void* values = nullptr);
   void write_bytes(const ::cl::Buffer& buffer, const void* data, std::size_t bytes);
   void read_bytes(const ::cl::Buffer& buffer, void* data, std::size_t bytes);
-  const void* map_bytes(const ::cl::Buffer& buffer, std::size_t bytes);
+  struct Read {
+    const ::cl::Buffer* from;
+    void* to;
+    std::size_t bytes;
+  };
+  void read_all(std::initializer_list<Read> reads);
+  const void* map_bytes(const ::cl::Buffer& buffer, std::size_t bytes);  ///< read once the queue has come by
+  template <class... T>
+  std::tuple<ClMapping<T>...> map_all(const ClBuffer<T>&... buffers) {
+    std::tuple<ClMapping<T>...> all{ClMapping<T>(queue_, buffers.memory, map_bytes(buffers.memory, buffers.size * sizeof(T)), buffers.size)...};
+    finish();
+    return all;
+  }
   void fill_bytes(const ::cl::Buffer& buffer, const void* pattern, std::size_t pattern_bytes, std::size_t bytes);
   void enqueue(const ::cl::Kernel& kernel, const ClKernelName& name, const ClRange& range);
   static void check_argument(cl_int code, const ClKernelName& name, unsigned index);

@@ -266,8 +266,7 @@ class Distances {
     context_.launch({"guard.cl", "measure_vertices"}, over(points.size()), static_cast<int>(points.size()), layout_.width, limit * limit,
                     context_.upload(points), context_.upload(patches), context_.upload(places), layout_.patches, lattice.device_diagonals(), maps_.x,
                     maps_.y, maps_.z, lattice.device_points().x, lattice.device_points().y, lattice.device_points().z, device_distances, device_nearest);
-    const std::vector<float> distances2 = context_.download(device_distances);
-    const std::vector<int> nearest = context_.download(device_nearest);
+    const auto [distances2, nearest] = context_.download(device_distances, device_nearest);
     for (std::size_t k = 0; k < asked.size(); ++k) {
       vertices_[asked[k]] = {distances2[k], nearest[k], distances2[k] > limit * limit};
       if (vertices_[asked[k]].is_far) far_.push_back(asked[k]);
@@ -293,7 +292,7 @@ class Distances {
       if (vertices_[i].is_compared && vertices_[i].nearer >= 0) far.push_back(vertices_[i].nearer);
     return far;
   }
-  /// Boxes tell which are too far away: nearly all.
+  /// Boxes tell which are too far away: nearly all. Most vertices need those of their own end alone.
   void compare_to_ends(const LatticeMesh& lattice, const std::vector<int>& asked, float limit) {
     if (asked.empty()) return;
     struct Box {
@@ -304,12 +303,19 @@ class Distances {
       return Box{a.min(b).min(c), a.max(b).max(c)};
     };
     const int first_end = lattice.first_end_triangle(), all = lattice.triangle_count();
-    std::vector<Box> boxes;
-    for (int i = first_end; i < all; ++i) {
-      const Box box = box_of(lattice.triangle(i));
-      if ((i - first_end) % kEndsInBox == 0) boxes.push_back(box);
-      boxes.back() = {boxes.back().least.min(box.least), boxes.back().greatest.max(box.greatest)};
-    }
+    std::vector<std::optional<Box>> boxes((all - first_end + kEndsInBox - 1) / kEndsInBox);
+    const auto box_with = [&](int triangle) -> const Box& {
+      const int number = (triangle - first_end) / kEndsInBox, first = first_end + number * kEndsInBox;
+      if (!boxes[number]) {
+        Box around = box_of(lattice.triangle(first));
+        for (int i = first + 1; i < std::min(first + kEndsInBox, all); ++i) {
+          const Box box = box_of(lattice.triangle(i));
+          around = {around.least.min(box.least), around.greatest.max(box.greatest)};
+        }
+        boxes[number] = around;
+      }
+      return *boxes[number];
+    };
     const auto margin = static_cast<float>(1e-6 * sources_.model.diagonal);  // more than rounding
     for (const int asked_vertex : asked) {
       MeasuredVertex& measured = vertices_[asked_vertex];
@@ -326,7 +332,7 @@ class Distances {
       const auto [begin, end] = lattice.triangles_of_end(vertex.patch, vertex.y < 2 ? BoneEnd::kHead : BoneEnd::kTail);
       for (const auto& [first, last] : {std::pair(begin, end), std::pair(first_end, all)}) {
         for (int i = first; i < last; ++i) {
-          if (is_too_far(boxes[(i - first_end) / kEndsInBox])) {
+          if (is_too_far(box_with(i))) {
             i += kEndsInBox - 1 - (i - first_end) % kEndsInBox;
             continue;
           }
@@ -398,8 +404,7 @@ class Distances {
                     texel_triangles, maps_.corners, maps_.across, maps_.x, maps_.y, maps_.z,
                     lattice.device_points().x, lattice.device_points().y, lattice.device_points().z, context_.upload(ends[0]), context_.upload(ends[1]),
                     context_.upload(ends[2]), device_distances, device_turned);
-    const std::vector<float> distances2 = context_.download(device_distances);
-    const std::vector<int> turned = context_.download(device_turned);
+    const auto [distances2, turned] = context_.download(device_distances, device_turned);
     std::vector<int> unmapped;
     for (std::size_t k = 0; k < asked.size(); ++k) {
       if (distances2[k] >= 0) measured.push_back({asked[k], std::sqrt(distances2[k]), turned[k] != 0});

@@ -36,22 +36,15 @@ void NearestSearch::find(std::span<const Vec3> points, std::span<int> triangles,
       z_[i] = static_cast<float>(p.z());
     }
   });
-  if (px_.size < count) {
-    for (ClBuffer<float>* plane : {&px_, &py_, &pz_, &nearest_squared_}) *plane = context_.allocate<float>(count);
-    nearest_ = context_.allocate<int>(count);
-  }
-  context_.write(px_, x_);
-  context_.write(py_, y_);
-  context_.write(pz_, z_);
+  if (nearest_.size != count) nearest_ = context_.allocate<int>(count), nearest_squared_ = context_.allocate<float>(count);
   constexpr int kRun = 16;
   const std::size_t items = block_count(count, kRun);
   const float scaled_enough = enough / static_cast<float>(scale_);
-  context_.launch(kFindNearest, ClRange({items, 1}, {context_.work_group_size(kFindNearest, 32), 1}), px_, py_, pz_, static_cast<int>(count), kRun, boxes_,
+  context_.launch(kFindNearest, ClRange({items, 1}, {context_.work_group_size(kFindNearest, 32), 1}), context_.upload(x_), context_.upload(y_), context_.upload(z_), static_cast<int>(count), kRun, boxes_,
                   blocks_, level_begin_, top_level_, scaled_enough * scaled_enough, nearest_, nearest_squared_);
-  const std::vector<int> places = context_.download(nearest_);
+  const auto [places, squared] = context_.download(nearest_, nearest_squared_);
   for (std::size_t i = 0; i < count; ++i) triangles[i] = order_[places[i]];
   if (distances.empty()) return;
-  const std::vector<float> squared = context_.download(nearest_squared_);
   for (std::size_t i = 0; i < count; ++i) distances[i] = static_cast<float>(scale_) * std::sqrt(std::max(0.0f, squared[i]));
 }
 

@@ -27,7 +27,7 @@ class NearestSearch {
   double scale_;
   int top_level_;
   std::vector<int> order_;
-  ClBuffer<float> boxes_, blocks_, px_, py_, pz_, nearest_squared_;
+  ClBuffer<float> boxes_, blocks_, nearest_squared_;
   ClBuffer<int> level_begin_, nearest_;
   std::vector<float> x_, y_, z_;
 };

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <tuple>
 #include <utility>
 
 #include "skeletex/model/parallel.h"
@@ -92,7 +93,7 @@ LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, Diagona
   diagonals_ = context.map(device_diagonals_);
 }
 
-void LatticeMesh::read_points() { planes_ = {context_.map(points_.x), context_.map(points_.y), context_.map(points_.z)}; }
+void LatticeMesh::read_points() { std::tie(planes_[0], planes_[1], planes_[2]) = context_.map(points_.x, points_.y, points_.z); }
 
 /// The strips or fans of ends, numbered as in first_end_.
 std::vector<std::vector<Triangle>> LatticeMesh::fill_ends(std::span<const int> ends) {
