@@ -47,7 +47,7 @@ SnapFeatures random_features(const Rectangle& r, std::mt19937& random) {
   SnapFeatures features;
   const int count = r.width * r.height / 3;
   for (int i = 0; i < count; ++i)
-    features.vertices.push_back({0, i, (1.4 * unit(random) - 0.2) * r.width, unit(random) * (r.height - 1), unit(random)});
+    features.vertices.push_back({0, i, (1.4 * unit(random) - 0.2) * r.width, unit(random) * (r.height - 1), 1 + i});
   for (int i = 0; i < count; ++i) {
     const double x = (1.4 * unit(random) - 0.2) * r.width, y = unit(random) * (r.height - 1);
     const double angle = 7 * unit(random), length = i % 10 == 0 ? 8 : 2 * unit(random);
@@ -67,7 +67,7 @@ struct HostPositions {
 };
 HostPositions snapped(const OnePatch& patch, const SnapFeatures& features) {
   ReadingPositions positions = even_positions(device(), patch.layout);
-  snap_positions(device(), patch.layout, tables_of(features, patch.patches), positions);
+  snap_positions(device(), patch.layout, upload_tables(device(), tables_of(features, patch.patches)), positions);
   return {device().download(positions.x), device().download(positions.y), device().download(positions.parameters), device().download(positions.anchors)};
 }
 
@@ -101,7 +101,9 @@ Chart square_tube(int rows) {
 
 TEST(SnapFeatures, OfASquareTubeAreItsFourEdgesAndTheVerticesOnThem) {
   const OnePatch patch({3, 2, 20, 13});
-  const SnapFeatures features = find_features(std::vector{square_tube(7)}, patch.patches, 0.1);
+  const std::vector charts{square_tube(7)};
+  const MapFeatures found = find_features(charts, std::vector{Method::kVsm}, 0.1);
+  const SnapFeatures features = place_features(found, charts, patch.patches);
   EXPECT_EQ(features.edges.size(), 4u * 6);
   for (const SnapFeatures::Edge& edge : features.edges) {
     EXPECT_NEAR(edge.dihedral, std::numbers::pi / 2, 1e-12);
@@ -110,7 +112,25 @@ TEST(SnapFeatures, OfASquareTubeAreItsFourEdgesAndTheVerticesOnThem) {
     EXPECT_NEAR(std::fmod(edge.x[0], 5), 2.5, 1e-12) << "8 columns over 20 cells";
   }
   EXPECT_EQ(features.vertices.size(), 4u * 5);
-  for (const SnapFeatures::Vertex& vertex : features.vertices) EXPECT_NEAR(vertex.strength, std::numbers::pi / 2 * 0.5, 1e-12);
+  ASSERT_EQ(found.vertices[0].size(), features.vertices.size());
+  for (const SnapFeatures::Vertex& vertex : features.vertices) EXPECT_NEAR(std::fmod(vertex.x, 5), 2.5, 1e-12);
+  for (const MapFeatures::Vertex& vertex : found.vertices[0]) EXPECT_NEAR(vertex.strength, std::numbers::pi / 2 * 0.5, 1e-12);
+}
+
+TEST(SnapFeatures, RankVerticesOfAllPatchesByStrength) {
+  std::vector charts{square_tube(7), square_tube(4)};
+  for (Chart& chart : charts)
+    for (std::size_t i = 0; i < chart.positions.size(); ++i) chart.positions[i] *= 1 + 0.3 * std::sin(3.0 * static_cast<double>(i));
+  const MapFeatures features = find_features(charts, std::vector{Method::kVsm, Method::kVsm}, 0.1);
+  std::vector<std::pair<int, double>> by_rank;
+  for (const auto& vertices : features.vertices)
+    for (const MapFeatures::Vertex& vertex : vertices) by_rank.emplace_back(vertex.rank, vertex.strength);
+  std::sort(by_rank.begin(), by_rank.end());
+  ASSERT_EQ(by_rank.size(), 8u * 5 + 8 * 2);
+  for (std::size_t i = 0; i < by_rank.size(); ++i) {
+    EXPECT_EQ(by_rank[i].first, static_cast<int>(i) + 1);
+    if (i > 0) { EXPECT_GE(by_rank[i].second, by_rank[i - 1].second); }
+  }
 }
 
 TEST(SnapFeatures, ComeByRowsAndAlongThemWhateverTheOrderOfTrianglesAndTheTurn) {
@@ -122,15 +142,16 @@ TEST(SnapFeatures, ComeByRowsAndAlongThemWhateverTheOrderOfTrianglesAndTheTurn) 
     for (auto& turns : chart.turns)
       for (std::int8_t& corner : turns) corner = static_cast<std::int8_t>(corner + turn);
     chart.half_edges = link_half_edges(chart.triangles, static_cast<int>(chart.positions.size()));
-    const SnapFeatures features = find_features(std::vector{chart}, patch.patches, 0.1);
+    const std::vector charts{chart};
+    const SnapFeatures features = place_features(find_features(charts, std::vector{Method::kVsm}, 0.1), charts, patch.patches);
     ASSERT_EQ(features.edges.size(), 4u * 6);
-    std::pair<int, int> before{0, 0};  // row, bin of eight columns
-    for (const SnapFeatures::Edge& edge : features.edges) {
-      const int column = static_cast<int>(std::floor(std::min(edge.x[0], edge.x[1]))) - 20 * turn;
-      const std::pair<int, int> now{static_cast<int>(std::min(edge.y[0], edge.y[1])), column % 20 / 8};
-      EXPECT_LE(before, now) << turn;
-      before = now;
-    }
+    using Place = std::pair<int, int>;  // row, bin of eight columns
+    const auto place_of = [](double x, double y) { return Place(static_cast<int>(y), (static_cast<int>(std::floor(x)) % 20 + 20) % 20 / 8); };
+    std::vector<Place> of_edges, of_vertices;
+    for (const SnapFeatures::Edge& edge : features.edges) of_edges.push_back(place_of(std::min(edge.x[0], edge.x[1]), std::min(edge.y[0], edge.y[1])));
+    for (const SnapFeatures::Vertex& vertex : features.vertices) of_vertices.push_back(place_of(vertex.x, vertex.y));
+    EXPECT_TRUE(std::is_sorted(of_edges.begin(), of_edges.end())) << turn;
+    EXPECT_TRUE(std::is_sorted(of_vertices.begin(), of_vertices.end())) << turn;
   }
 }
 

@@ -53,10 +53,8 @@ struct SnapLattice {
       int column, row;
     };
     const int count = static_cast<int>(vertices.size());
-    std::vector<int> rank(count), order(count), state(count, 0);
-    for (int i = 0; i < count; ++i) order[i] = i;
-    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return vertices[a].strength < vertices[b].strength; });
-    for (int i = 0; i < count; ++i) rank[order[i]] = i + 1;
+    std::vector<int> rank, state(count, 0);
+    for (const SnapFeatures::Vertex& vertex : vertices) rank.push_back(vertex.rank);
     const auto candidates = [&](int v) {
       std::vector<Candidate> found;
       const double bx = std::floor(vertices[v].x), by = std::floor(vertices[v].y);

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <future>
 #include <map>
 
 #include <nlohmann/json.hpp>
@@ -23,6 +24,7 @@ namespace {
 
 // With fewer, vertices pull texels about without making edges between them; the fit makes up for some of that.
 constexpr double kSnapTexelsPerVertex = 2, kFittedSnapTexelsPerVertex = 1.5;
+constexpr double kLeastDihedral = 0.004;  // radians: flatter edges are no creases to snap to
 
 class Stopwatch {
  public:
@@ -60,12 +62,15 @@ std::vector<Method> choose_methods(const EncodeOptions& options, const Skeleton&
 }
 
 /// SPD patches are neither snapped nor fitted.
-TexelOptions choose_texel_options(const EncodeOptions& options, const TriangleMesh& mesh, bool is_all_spd) {
+struct TexelPlacing {
+  bool has_snap = false, has_fit = false;
+};
+TexelPlacing choose_placing(const EncodeOptions& options, const TriangleMesh& mesh, bool is_all_spd) {
+  if (is_all_spd) return {};
   const auto texels = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
-  const bool has_fit = !is_all_spd && options.has_fit.value_or(options.has_prefilter && texels <= kMostFittedTexels);
+  const bool has_fit = options.has_fit.value_or(options.has_prefilter && texels <= kMostFittedTexels);
   const double least_texels = (has_fit ? kFittedSnapTexelsPerVertex : kSnapTexelsPerVertex) * static_cast<double>(mesh.positions.size());
-  const bool has_snap = !is_all_spd && options.has_snap.value_or(static_cast<double>(texels) >= least_texels);
-  return {.has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_snap = has_snap, .has_fit = has_fit};
+  return {options.has_snap.value_or(static_cast<double>(texels) >= least_texels), has_fit};
 }
 
 /// The rays' own points on an even lattice in u: how surface length grows along an SPD patch.
@@ -100,16 +105,16 @@ std::vector<RowProfile> spd_profiles(ClContext& context, const Skeleton& skeleto
   return profiles;
 }
 
-nlohmann::json settings_json(const EncodeOptions& options, const TexelOptions& texel_options, const std::vector<double>& unseen) {
+nlohmann::json settings_json(const EncodeOptions& options, const TexelPlacing& placing, const std::vector<double>& unseen) {
   const char* method = options.method == EncodeMethod::kSpd ? "spd" : options.method == EncodeMethod::kVsm ? "vsm" : "hybrid";
   nlohmann::json json{{"method", method},
                       {"size", {options.width, options.height}},
                       {"vsm", {{"iterations", options.vsm.iterations}, {"alpha", options.vsm.alpha}, {"stop_spread_change", options.vsm.stop_spread_change}}},
                       {"rows", options.row_spacing == RowSpacing::kSurfaceLength ? "surface" : "uniform"},
-                      {"prefilter", texel_options.has_prefilter},
-                      {"unfold", texel_options.has_unfold},
-                      {"snap", texel_options.has_snap},
-                      {"fit", texel_options.has_fit},
+                      {"prefilter", options.has_prefilter},
+                      {"unfold", options.has_unfold},
+                      {"snap", placing.has_snap},
+                      {"fit", placing.has_fit},
                       {"spd_hit", options.spd_hit == SpdHit::kFirst ? "first" : "last"}};
   if (options.method == EncodeMethod::kHybrid) json["hybrid_unseen_threshold"] = options.hybrid_unseen_threshold;
   if (!unseen.empty()) json["unseen_area_fractions"] = unseen;
@@ -210,6 +215,10 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   const bool has_even_rows = options.row_spacing == RowSpacing::kUniform;
   const std::vector<PatchDemand> demands = patch_demands(sources, has_even_rows ? std::span<const RowProfile>() : profiles,
                                                          options.texel_share.value_or(is_all_spd ? TexelShare::kArea : TexelShare::kError));
+  const TexelPlacing placing = choose_placing(options, mesh, is_all_spd);
+  // Packing is one processor's work, and so is most of what comes before the device reads texels.
+  std::future<MapFeatures> finding_features;
+  if (placing.has_snap) finding_features = run_beside([&] { return find_features(charts, methods, kLeastDihedral); });
   const AtlasLayout layout = pack_atlas(demands, options.width, options.height);
   report.used_fraction = layout.used_fraction;
 
@@ -219,10 +228,15 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
                                                                     : spread_rows_uniformly(patch.rectangle.height);
     model.patches.push_back(std::move(patch));
   }
-  TexelOptions texel_options = choose_texel_options(options, mesh, is_all_spd);
-  model.diagonals = options.diagonals.value_or(texel_options.has_snap || texel_options.has_fit ? DiagonalRule::kSmooth : DiagonalRule::kNearest);
-  if (options.has_half_texels) texel_options.half_rule = model.diagonals;
-  Seams seams = sample_seams(segmentation, skeleton, walls, layout.rectangles, texel_options.has_snap ? SeamSampling::kSnapped : SeamSampling::kEven);
+  std::future<DeviceSnapTables> listing_features;
+  if (placing.has_snap) {
+    auto list = [&, on = context.beside()] {
+      return upload_tables(*on, tables_of(place_features(finding_features.get(), charts, model.patches), model.patches));
+    };
+    listing_features = context.can_run_beside() ? run_beside(std::move(list)) : std::async(std::launch::deferred, std::move(list));
+  }
+  model.diagonals = options.diagonals.value_or(placing.has_snap || placing.has_fit ? DiagonalRule::kSmooth : DiagonalRule::kNearest);
+  Seams seams = sample_seams(segmentation, skeleton, walls, layout.rectangles, placing.has_snap ? SeamSampling::kSnapped : SeamSampling::kEven);
   model.arcs = std::move(seams.arcs);
   model.corners = std::move(seams.corners);
   model.ends = std::move(seams.ends);
@@ -252,11 +266,13 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   progress("encoding", 0.8);
   model.texture.width = options.width, model.texture.height = options.height;
   const GuardSources guard{model, mesh, options.tree, charts};
-  TexelResult texels = read_texels(context, skeleton, walls, {charts, model.patches, hits, end_points, &guard}, options.width, options.height, model.origin,
-                                   texel_options);
+  TexelOptions texel_options{.has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_fit = placing.has_fit};
+  if (options.has_half_texels) texel_options.half_rule = model.diagonals;
+  TexelResult texels = read_texels(context, skeleton, walls, {charts, model.patches, hits, end_points, &guard, placing.has_snap ? &listing_features : nullptr},
+                                   options.width, options.height, model.origin, texel_options);
   model.texture = std::move(texels.texture);
   {
-    nlohmann::json settings = settings_json(options, texel_options, unseen);
+    nlohmann::json settings = settings_json(options, placing, unseen);
     add_results(texels.report, model.diagonal, settings);
     model.encoder_settings = settings.dump();
   }

@@ -162,12 +162,7 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   ReadingPositions positions = even_positions(context, layout);
 
   const DeviceMaps maps = upload_maps(context, sources.charts, sources.patches, origin);
-  const bool is_snapped = options.has_snap && maps.triangle_count > 0, is_fitted = options.has_fit && maps.triangle_count > 0;
-  // Beside the device's work until they are needed.
-  std::future<SnapTables> listing_features;
-  if (is_snapped)
-    listing_features =
-        std::async(std::launch::async, [&] { return tables_of(find_features(sources.charts, sources.patches, options.snap_dihedral), sources.patches); });
+  const bool is_snapped = sources.features && maps.triangle_count > 0, is_fitted = options.has_fit && maps.triangle_count > 0;
   auto covering = context.allocate<int>(texels);
   auto is_read = context.allocate<int>(std::max(1, maps.triangle_count));
   context.fill(is_read, 0);
@@ -228,13 +223,13 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
               layout.patches, anchors, from.x, from.y, from.z, filtered.x, filtered.y, filtered.z);
     return filtered;
   };
-  // The even lattice is measured beside the snapping, on a queue of its own. (Oclgrind runs one kernel at a time.)
+  // The even lattice is measured beside the snapping, on a queue of its own.
   std::unique_ptr<ClContext> beside;
   std::future<std::unique_ptr<Guard>> measuring_even;
   if ((is_snapped || is_fitted) && sources.guard) {
     context.finish();
     beside = context.beside();
-    measuring_even = std::async(context.device().platform == "Oclgrind" ? std::launch::deferred : std::launch::async, [&] {
+    measuring_even = std::async(context.can_run_beside() ? std::launch::async : std::launch::deferred, [&] {
       const TexelPoints filtered = options.has_prefilter ? prefilter(*beside, even, even_covering, kNoneHolds) : even;
       return std::make_unique<Guard>(*beside, *sources.guard, layout, maps, even_covering, even, filtered);
     });
@@ -242,17 +237,16 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   int put_back = 0, edges = 0;
   std::vector<int> vertex_points;
   if (is_snapped) {
-    SnapTables snap_tables = listing_features.get();
-    snap_positions(context, layout, snap_tables, positions);
+    const DeviceSnapTables features = sources.features->get();
+    vertex_points = context.download(features.vertex_points), edges = static_cast<int>(features.edge_points.size);
+    snap_positions(context, layout, features, positions);
     points = allocate_points(context, texels), covering = context.allocate<int>(texels);
     if (has_gaps) context.fill(covering, kNoTriangle);
     context.launch({"encode.cl", "read_snapped"}, row_range(context, all_rows.size), static_cast<int>(all_rows.size), texture_width, maps.triangle_count,
                    all_rows, even_covering, maps.corners, maps.turns, maps.poles, maps.across, maps.u_high, maps.u_low, maps.v_high, maps.v_low, maps.x, maps.y,
                    maps.z, layout.patches, maps.row_high, maps.row_low, positions.home_x, positions.home_y, positions.x, positions.y, positions.anchors, positions.parameters,
-                   context.upload(snap_tables.vertex_points), context.upload(snap_tables.edge_points), even.x, even.y, even.z, covering, points.x, points.y,
-                   points.z, is_read);
+                   features.vertex_points, features.edge_points, even.x, even.y, even.z, covering, points.x, points.y, points.z, is_read);
     positions.parameters = {};
-    vertex_points = std::move(snap_tables.vertex_points), edges = static_cast<int>(snap_tables.edge_points.size());
   } else if (is_fitted) {
     points = copy_points(context, even);
   }
@@ -288,7 +282,8 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   if (options.half_rule)
     result.report.rounding = round_to_half(context, *options.half_rule, {sources.patches.begin(), sources.patches.end()}, layout, rows, columns, points, stored);
   if (is_snapped) result.report.snap = report_snap(static_cast<int>(vertex_points.size()), edges, put_back, anchors);  // beside the device's work
-  result.texture = {texture_width, texture_height, context.download(stored.x), context.download(stored.y), context.download(stored.z)};
+  auto [along, around, out] = context.download(stored.x, stored.y, stored.z);
+  result.texture = {texture_width, texture_height, std::move(along), std::move(around), std::move(out)};
   return result;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <array>
+#include <future>
 #include <optional>
 #include <span>
 #include <vector>
@@ -26,13 +27,13 @@ struct TexelSources {
   std::span<const std::array<std::vector<Vec3>, 2>> end_points;
   /// With snapping or fit, what the finished lattice is compared with; without it there is no such guard.
   const GuardSources* guard = nullptr;
+  /// With snapping, what texels of VSM patches move to; waited for when the even lattice has been read.
+  std::future<DeviceSnapTables>* features = nullptr;
 };
 
 struct TexelOptions {
   bool has_prefilter = true;
   bool has_unfold = true;
-  bool has_snap = false;        ///< texels of VSM patches move to vertices and creased edges
-  double snap_dihedral = 0.004;  ///< radians: edges flatter than this are no creases
   bool has_fit = false;         ///< points of VSM patches are fitted to the mesh, instead of the prefilter
   std::optional<DiagonalRule> half_rule = {};  ///< inner rows come as half floats, see round_to_half; the rule of the lattice's diagonals
 };

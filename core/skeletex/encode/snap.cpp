@@ -34,14 +34,13 @@ double angle_between(const Vec3& a, const Vec3& b) { return std::atan2(a.cross(b
 /// std::floor is a call.
 int floor_of(double x) { return static_cast<int>(x) - (x < static_cast<int>(x)); }
 
-void add_features(const Chart& chart, const Patch& patch, int bone, int first_point, double least_dihedral, SnapFeatures& features) {
+/// \param vertices  out, without ranks
+void add_features(const Chart& chart, double least_dihedral, std::vector<MapFeatures::Vertex>& vertices, std::vector<MapFeatures::Edge>& edges) {
   const HalfEdgeTable& table = chart.half_edges;
   std::vector<Vec3> normals;
-  normals.reserve(chart.triangles.size()), features.edges.reserve(3 * chart.triangles.size() / 2), features.vertices.reserve(chart.positions.size());
+  normals.reserve(chart.triangles.size()), edges.reserve(3 * chart.triangles.size() / 2), vertices.reserve(chart.positions.size());
   for (const Triangle& t : chart.triangles)
     normals.push_back((chart.positions[t[1]] - chart.positions[t[0]]).cross(chart.positions[t[2]] - chart.positions[t[0]]).normalized());
-  std::vector<double> rows(chart.u.size());
-  for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = row_of(patch.row_u, chart.u[i]);
 
   std::vector<double> strengths(chart.positions.size(), 0);
   for (int h = 0; h < static_cast<int>(table.twins.size()); ++h) {
@@ -54,32 +53,27 @@ void add_features(const Chart& chart, const Patch& patch, int bone, int first_po
     const double weight = dihedral * (chart.positions[b] - chart.positions[a]).norm();
     strengths[a] += weight;
     strengths[b] += weight;
-    if (dihedral <= least_dihedral) continue;
-    const double width = patch.rectangle.width;
-    features.edges.push_back({bone,
-                              {first_point + a, first_point + b},
-                              {(chart.v[a] + chart.turns[t][c]) * width, (chart.v[b] + chart.turns[t][d]) * width},
-                              {rows[a], rows[b]},
-                              dihedral});
+    if (dihedral > least_dihedral) edges.push_back({{a, b}, {chart.turns[t][c], chart.turns[t][d]}, dihedral});
   }
   for (int i = 0; i < static_cast<int>(chart.positions.size()); ++i)
-    if (chart.kinds[i] == ChartVertex::kInner && strengths[i] > 0)
-      features.vertices.push_back({bone, first_point + i, chart.v[i] * patch.rectangle.width, rows[i], strengths[i]});
+    if (chart.kinds[i] == ChartVertex::kInner && strengths[i] > 0) vertices.push_back({i, strengths[i]});
 }
 
-/// Edges that are near each other in the texture one after the other, by rows and along them: the kernels come by them in nearly that order.
-void append_by_place(const std::vector<SnapFeatures::Edge>& edges, int width, int height, std::vector<SnapFeatures::Edge>& sorted) {
-  const int bins = (width + kBinWidth - 1) / kBinWidth;
-  const auto place = [&](const SnapFeatures::Edge& edge) {
-    const int column = floor_of(std::min(edge.x[0], edge.x[1])) % width, row = std::clamp(static_cast<int>(std::min(edge.y[0], edge.y[1])), 0, height - 1);
-    return row * bins + (column < 0 ? column + width : column) / kBinWidth;
-  };
-  std::vector<int> next(static_cast<std::size_t>(height) * bins + 1, 0);
-  for (const SnapFeatures::Edge& edge : edges) ++next[place(edge) + 1];
+/// The order of things by the bins that they lie in, and there as they come: kernels come by texels in nearly that order.
+/// \param x, y  cells of the patch
+template <class X, class Y>
+std::vector<int> order_by_place(int count, const Rectangle& r, const X& x, const Y& y) {
+  const int bins = (r.width + kBinWidth - 1) / kBinWidth;
+  std::vector<int> places, next(static_cast<std::size_t>(r.height) * bins + 1, 0), order(count);
+  places.reserve(count);
+  for (int i = 0; i < count; ++i) {
+    const int column = floor_of(x(i)) % r.width, row = std::clamp(static_cast<int>(y(i)), 0, r.height - 1);
+    places.push_back(row * bins + (column < 0 ? column + r.width : column) / kBinWidth);
+    ++next[places.back() + 1];
+  }
   std::partial_sum(next.begin(), next.end(), next.begin());
-  const std::size_t begin = sorted.size();
-  sorted.resize(begin + edges.size());
-  for (const SnapFeatures::Edge& edge : edges) sorted[begin + next[place(edge)]++] = edge;
+  for (int i = 0; i < count; ++i) order[next[places[i]]++] = i;
+  return order;
 }
 
 }  // namespace
@@ -90,25 +84,56 @@ double row_of(const std::vector<double>& row_u, double u) {
   return static_cast<double>(above - 1 - row_u.begin()) + (high > low ? (u - low) / (high - low) : 0);
 }
 
-SnapFeatures find_features(std::span<const Chart> charts, std::span<const Patch> patches, double least_dihedral) {
-  std::vector<SnapFeatures> parts(charts.size());
-  std::vector<int> first_points(charts.size());
-  for (std::size_t bone = 0, points = 0; bone < charts.size(); ++bone) {
-    first_points[bone] = static_cast<int>(points);
-    if (patches[bone].method == Method::kVsm) points += charts[bone].positions.size();
+MapFeatures find_features(std::span<const Chart> charts, std::span<const Method> methods, double least_dihedral) {
+  MapFeatures features;
+  features.vertices.resize(charts.size()), features.edges.resize(charts.size());
+  struct Strength {
+    double strength;
+    int bone, number;
+    auto operator<=>(const Strength&) const = default;
+  };
+  std::vector<Strength> strengths;
+  for (int bone = 0; bone < static_cast<int>(charts.size()); ++bone) {
+    if (methods[bone] != Method::kVsm) continue;
+    add_features(charts[bone], least_dihedral, features.vertices[bone], features.edges[bone]);
+    for (const MapFeatures::Vertex& vertex : features.vertices[bone])
+      strengths.push_back({vertex.strength, bone, static_cast<int>(&vertex - features.vertices[bone].data())});
   }
-  for_each_block(charts.size(), 1, [&](std::size_t bone, std::size_t, std::size_t) {
-    if (patches[bone].method == Method::kVsm) add_features(charts[bone], patches[bone], static_cast<int>(bone), first_points[bone], least_dihedral, parts[bone]);
-  });
-  SnapFeatures features;
-  std::size_t vertices = 0, edges = 0;
-  for (const SnapFeatures& part : parts) vertices += part.vertices.size(), edges += part.edges.size();
-  features.vertices.reserve(vertices), features.edges.reserve(edges);
-  for (std::size_t bone = 0; bone < charts.size(); ++bone) {
-    features.vertices.insert(features.vertices.end(), parts[bone].vertices.begin(), parts[bone].vertices.end());
-    append_by_place(parts[bone].edges, patches[bone].rectangle.width, patches[bone].rectangle.height, features.edges);
-  }
+  std::sort(strengths.begin(), strengths.end());
+  for (std::size_t i = 0; i < strengths.size(); ++i) features.vertices[strengths[i].bone][strengths[i].number].rank = static_cast<int>(i) + 1;
   return features;
+}
+
+SnapFeatures place_features(const MapFeatures& features, std::span<const Chart> charts, std::span<const Patch> patches) {
+  SnapFeatures placed;
+  std::size_t vertex_count = 0, edge_count = 0;
+  for (const auto& vertices : features.vertices) vertex_count += vertices.size();
+  for (const auto& edges : features.edges) edge_count += edges.size();
+  placed.vertices.reserve(vertex_count), placed.edges.reserve(edge_count);
+  int first_point = 0;
+  for (int bone = 0; bone < static_cast<int>(charts.size()); ++bone) {
+    if (patches[bone].method != Method::kVsm) continue;
+    const Chart& chart = charts[bone];
+    const Rectangle& r = patches[bone].rectangle;
+    std::vector<double> rows;
+    rows.reserve(chart.u.size());
+    for (const double u : chart.u) rows.push_back(row_of(patches[bone].row_u, u));
+    const std::span<const MapFeatures::Vertex> vertices = features.vertices[bone];
+    for (const int i : order_by_place(static_cast<int>(vertices.size()), r, [&](int i) { return chart.v[vertices[i].vertex] * r.width; },
+                                      [&](int i) { return rows[vertices[i].vertex]; })) {
+      const int at = vertices[i].vertex;
+      placed.vertices.push_back({bone, first_point + at, chart.v[at] * r.width, rows[at], vertices[i].rank});
+    }
+    const std::span<const MapFeatures::Edge> edges = features.edges[bone];
+    const auto x_of = [&](int i, int end) { return (chart.v[edges[i].vertices[end]] + edges[i].turns[end]) * r.width; };
+    for (const int i : order_by_place(static_cast<int>(edges.size()), r, [&](int i) { return std::min(x_of(i, 0), x_of(i, 1)); },
+                                      [&](int i) { return std::min(rows[edges[i].vertices[0]], rows[edges[i].vertices[1]]); })) {
+      const auto [a, b] = edges[i].vertices;
+      placed.edges.push_back({bone, {first_point + a, first_point + b}, {x_of(i, 0), x_of(i, 1)}, {rows[a], rows[b]}, edges[i].dihedral});
+    }
+    first_point += static_cast<int>(chart.positions.size());
+  }
+  return placed;
 }
 
 ReadingPositions even_positions(ClContext& context, const DeviceLayout& layout) {
@@ -215,11 +240,11 @@ void fill_bins(const std::vector<SnapFeatures::Edge>& edges, std::span<const Pat
 }
 
 /// \param claims  0
-void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const SnapTables& tables, ClBuffer<int>& claims, ReadingPositions& positions) {
-  if (tables.vertex_x.empty()) return;
-  const int count = static_cast<int>(tables.vertex_x.size());
-  const auto patch = context.upload(tables.vertex_patches), rank = context.upload(tables.vertex_ranks);
-  const auto x = context.upload(tables.vertex_x), y = context.upload(tables.vertex_y);
+void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables, ClBuffer<int>& claims, ReadingPositions& positions) {
+  if (tables.vertex_x.size == 0) return;
+  const int count = static_cast<int>(tables.vertex_x.size);
+  const auto &patch = tables.vertex_patches, &rank = tables.vertex_ranks;
+  const auto &x = tables.vertex_x, &y = tables.vertex_y;
   auto states = context.allocate<int>(count), open = context.allocate<int>(2 * static_cast<std::size_t>(count));
   context.fill(states, 0);
   // A claim is more than all of the rounds before, so these need not be taken off.
@@ -239,28 +264,36 @@ void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const Snap
 
 SnapTables tables_of(const SnapFeatures& features, std::span<const Patch> patches) {
   SnapTables tables;
-  std::vector<std::pair<double, int>> by_strength;
-  by_strength.reserve(features.vertices.size()), tables.edge_points.reserve(features.edges.size());
+  tables.edge_points.reserve(features.edges.size());
   for (const SnapFeatures::Vertex& vertex : features.vertices) {
-    by_strength.emplace_back(vertex.strength, static_cast<int>(by_strength.size()));
-    tables.vertex_patches.push_back(vertex.patch), tables.vertex_points.push_back(vertex.point);
+    tables.vertex_patches.push_back(vertex.patch), tables.vertex_points.push_back(vertex.point), tables.vertex_ranks.push_back(vertex.rank);
     tables.vertex_x.push_back(static_cast<float>(vertex.x)), tables.vertex_y.push_back(static_cast<float>(vertex.y));
   }
-  std::sort(by_strength.begin(), by_strength.end());
-  tables.vertex_ranks.resize(by_strength.size());
-  for (std::size_t i = 0; i < by_strength.size(); ++i) tables.vertex_ranks[by_strength[i].second] = static_cast<int>(i) + 1;
   for (const SnapFeatures::Edge& edge : features.edges) tables.edge_points.push_back(edge.points);
   const int bins = list_rows(patches, tables.rows);
   fill_bins(features.edges, patches, bins, tables);
   return tables;
 }
 
-void snap_positions(ClContext& context, const DeviceLayout& layout, const SnapTables& tables, ReadingPositions& positions) {
+DeviceSnapTables upload_tables(ClContext& context, const SnapTables& tables) {
+  return {context.upload(tables.vertex_patches),
+          context.upload(tables.vertex_points),
+          context.upload(tables.vertex_ranks),
+          context.upload(tables.vertex_x),
+          context.upload(tables.vertex_y),
+          context.upload(tables.edge_points),
+          context.upload(tables.edges),
+          {context.upload(tables.rows[0]), context.upload(tables.rows[1])},
+          context.upload(tables.bin_begins),
+          context.upload(tables.bin_edges)};
+}
+
+void snap_positions(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables, ReadingPositions& positions) {
   auto spare = context.allocate<int>(layout.size());
   context.fill(spare, 0);
-  const std::array rows{context.upload(tables.rows[0]), context.upload(tables.rows[1])};
+  const auto& rows = tables.rows;
   const auto for_rows = [&](const char* kernel, int parity, const auto&... arguments) {
-    const std::size_t count = tables.rows[parity].size();
+    const std::size_t count = rows[parity].size;
     context.launch({"snap.cl", kernel}, row_range(context, count), static_cast<int>(count), layout.width, arguments...);
   };
   const auto relax = [&](int passes) {
@@ -269,13 +302,11 @@ void snap_positions(ClContext& context, const DeviceLayout& layout, const SnapTa
   };
   for (const int parity : {0, 1}) for_rows("part_colours", parity, rows[parity], layout.patches, positions.home_x, positions.home_y, positions.x, positions.y);
   snap_to_vertices(context, layout, tables, spare, positions);
-  const auto begins = context.upload(tables.bin_begins), bin_edges = context.upload(tables.bin_edges);
-  const auto edges = context.upload(tables.edges);
   for (int round = 0; round < kEdgeRounds; ++round) {
     relax(round == 0 ? kFirstRelaxPasses : kRelaxPasses);
-    if (tables.edges.empty()) continue;
+    if (tables.edges.size == 0) continue;
     for (const int parity : {0, 1})
-      for_rows("place_on_edges", parity, static_cast<int>(round > 0), rows[parity], layout.patches, begins, bin_edges, edges, positions.anchors,
+      for_rows("place_on_edges", parity, static_cast<int>(round > 0), rows[parity], layout.patches, tables.bin_begins, tables.bin_edges, tables.edges, positions.anchors,
                positions.parameters, positions.x, positions.y, spare);
   }
   relax(kRelaxPasses);
@@ -289,24 +320,21 @@ void snap_positions(ClContext& context, const DeviceLayout& layout, const SnapTa
 TexelReturns::TexelReturns(ClContext& context, const DeviceLayout& layout)
     : marks(context.allocate<int>(layout.size())),
       back(context.allocate<int>(layout.size())),
-      bad(context.allocate<int>(layout.size())),
-      counts(context.allocate<int>(2)) {
+      bad(context.allocate<int>(layout.size())) {
   context.fill(marks, 0);
 }
 
 std::vector<int> put_back_listed(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before,
                                  const std::vector<int>& texels, bool with_vertices, TexelReturns& returns, ReadingPositions& positions, TexelPoints& points) {
   if (texels.empty()) return {};
-  context.fill(returns.counts, 0);
+  const auto device_counts = context.upload(std::vector{0, 0});
   // One work-group: on a CPU one work-item.
   context.launch({"snap.cl", "put_listed_back"}, row_range(context, 1), static_cast<int>(texels.size()), static_cast<int>(with_vertices),
                  1 << ++returns.calls, layout.width, context.upload(texels), layout.texel_patches, layout.patches, even.x, even.y, even.z, before.x, before.y,
                  before.z, positions.home_x, positions.home_y, returns.marks, positions.anchors, positions.x, positions.y, points.x, points.y, points.z,
-                 returns.back, returns.bad, returns.counts);
-  std::vector<int> back(context.download(returns.counts)[0]);
-  if (!back.empty() && context.queue().enqueueReadBuffer(returns.back.memory, CL_TRUE, 0, back.size() * sizeof(int), back.data()) != CL_SUCCESS)
-    throw DeviceError("reading from the device what has gone back to the even lattice");
-  return back;
+                 returns.back, returns.bad, device_counts);
+  const auto [counts, back] = context.map(device_counts, returns.back);
+  return {back.data(), back.data() + counts[0]};
 }
 
 }  // namespace skeletex

@@ -8,14 +8,34 @@
 
 namespace skeletex {
 
-/// Points and edges of the maps that texels should sit on, in the cells of their patch: x = v width, unwrapped;
-/// y the row, with fractions, by the patch's row table.
+/// Vertices and edges of the maps that texels should sit on, whatever the layout.
+struct MapFeatures {
+  struct Vertex {
+    int vertex = -1;      ///< of the chart
+    double strength = 0;  ///< sum over its edges of dihedral angle (radians) x length
+    int rank = 0;         ///< by strength, from 1, among those of all patches
+  };
+  struct Edge {
+    std::array<int, 2> vertices{-1, -1};  ///< of the chart
+    std::array<int, 2> turns{0, 0};       ///< that its ends are from their v
+    double dihedral = 0;                  ///< radians
+  };
+  std::vector<std::vector<Vertex>> vertices;  ///< per patch: inner ones that are not flat
+  std::vector<std::vector<Edge>> edges;       ///< per patch: inner ones whose dihedral angle is above the least
+};
+
+/// The features of all VSM patches.
+/// \param methods         per chart
+/// \param least_dihedral  radians; flatter edges are left out
+MapFeatures find_features(std::span<const Chart> charts, std::span<const Method> methods, double least_dihedral);
+
+/// Features where they lie in the cells of their patch: x = v width, unwrapped; y the row, with fractions, by the patch's row table.
 struct SnapFeatures {
   struct Vertex {
     int patch = -1;
     int point = -1;  ///< its number among the vertices of DeviceMaps
     double x = 0, y = 0;
-    double strength = 0;  ///< sum over its edges of dihedral angle (radians) x length
+    int rank = 0;  ///< the stronger, the higher
   };
   struct Edge {
     int patch = -1;
@@ -23,16 +43,16 @@ struct SnapFeatures {
     std::array<double, 2> x{0, 0}, y{0, 0};
     double dihedral = 0;  ///< radians
   };
-  std::vector<Vertex> vertices;  ///< inner ones that are not flat
-  std::vector<Edge> edges;       ///< inner ones whose dihedral angle is above the least, patch after patch
+  std::vector<Vertex> vertices;
+  std::vector<Edge> edges;  ///< patch after patch; both there by rows and along them
 };
 
 /// The row, with fractions, that reads at u.
 double row_of(const std::vector<double>& row_u, double u);
 
-/// The features of all VSM patches.
-/// \param least_dihedral  radians; flatter edges are left out
-SnapFeatures find_features(std::span<const Chart> charts, std::span<const Patch> patches, double least_dihedral);
+/// \param charts   as for find_features
+/// \param patches  with their sizes and row tables
+SnapFeatures place_features(const MapFeatures& features, std::span<const Chart> charts, std::span<const Patch> patches);
 
 /// Features as the kernels take them (snap.cl).
 struct SnapTables {
@@ -41,14 +61,14 @@ struct SnapTables {
     float x, y, ex, ey, over_x, over_y, flatness;
     int number;
   };
-  std::vector<int> vertex_patches, vertex_points, vertex_ranks;  ///< ranks by strength, from 1
+  std::vector<int> vertex_patches, vertex_points, vertex_ranks;
   std::vector<float> vertex_x, vertex_y;                         ///< cells
   std::vector<std::array<int, 2>> edge_points;
   std::vector<Edge> edges;
   std::array<std::vector<LatticeRow>, 2> rows;         ///< of VSM patches, inner ones, even and odd: patch, row, first bin, 0
   std::vector<int> bin_begins, bin_edges;              ///< the edges near each bin of eight columns of a row
 };
-/// \param patches  with their rectangles in the texture, as for find_features
+/// \param patches  as for place_features
 SnapTables tables_of(const SnapFeatures& features, std::span<const Patch> patches);
 
 /// Where each texel reads, a thing of its own between the map and the texel: per texel an offset from its place in the
@@ -62,8 +82,19 @@ struct ReadingPositions {
 /// The even lattice.
 ReadingPositions even_positions(ClContext& context, const DeviceLayout& layout);
 
+/// SnapTables on the device.
+struct DeviceSnapTables {
+  ClBuffer<int> vertex_patches, vertex_points, vertex_ranks;
+  ClBuffer<float> vertex_x, vertex_y;
+  ClBuffer<std::array<int, 2>> edge_points;
+  ClBuffer<SnapTables::Edge> edges;
+  std::array<ClBuffer<LatticeRow>, 2> rows;
+  ClBuffer<int> bin_begins, bin_edges;
+};
+DeviceSnapTables upload_tables(ClContext& context, const SnapTables& tables);
+
 /// Moves reading positions to vertices, strongest first, and then to creased edges; the map does not fold.
-void snap_positions(ClContext& context, const DeviceLayout& layout, const SnapTables& tables, ReadingPositions& positions);
+void snap_positions(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables, ReadingPositions& positions);
 
 /// Planes of points, one per texel.
 using TexelPoints = DevicePlanes;
@@ -71,7 +102,7 @@ using TexelPoints = DevicePlanes;
 /// Lists of put_back_listed, for all its calls on one lattice: 30 at most.
 struct TexelReturns {
   TexelReturns(ClContext& context, const DeviceLayout& layout);
-  ClBuffer<int> marks, back, bad, counts;  ///< see put_listed_back in snap.cl
+  ClBuffer<int> marks, back, bad;  ///< see put_listed_back in snap.cl
   int calls = 0;
 };
 

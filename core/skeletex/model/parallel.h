@@ -4,8 +4,10 @@
 #include <atomic>
 #include <cstddef>
 #include <exception>
+#include <future>
 #include <mutex>
 #include <thread>
+#include <utility>
 #include <vector>
 #ifdef __linux__
 #include <sched.h>
@@ -33,6 +35,15 @@ inline void leave_processor([[maybe_unused]] int processor) {
   if (CPU_COUNT(&others) == 0 || sched_setaffinity(0, sizeof others, &others) != 0) return;
   sched_setaffinity(0, sizeof allowed, &allowed);
 #endif
+}
+
+/// Calls act() on a thread of its own. The future's destructor waits for it.
+template <class Act>
+auto run_beside(Act act) {
+  return std::async(std::launch::async, [processor = current_processor(), act = std::move(act)]() mutable {
+    leave_processor(processor);
+    return act();
+  });
 }
 
 /// Calls act(block, begin, end) for consecutive blocks of [0, size) on all processors. Blocks depend on the sizes
