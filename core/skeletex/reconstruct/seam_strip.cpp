@@ -57,9 +57,14 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, const 
 void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::span<const double> turns, const Ring& row, BoneEnd end,
                        std::vector<Triangle>& triangles) {
   const int m = static_cast<int>(seam.vertices.size()), n = static_cast<int>(row.vertices.size());
-  // Columns in unwrapped numbers: row angles are column / n.
-  const auto column_of = [&](int i) { return n * (turns[(i % m + m) % m] + std::floor(static_cast<double>(i) / m)); };
-  const auto seam_vertex = [&](int i) { return seam.vertices[i % m]; };
+  // Columns of seam vertices -1 to 2 m in unwrapped numbers: row angles are column / n.
+  std::vector<double> columns;
+  columns.reserve(2 * m + 2);
+  columns.push_back(n * (turns[m - 1] - 1));
+  for (const int turn : {0, 1})
+    for (const double own : turns) columns.push_back(n * (own + turn));
+  columns.push_back(n * (turns[0] + 2));
+  const auto column_of = [&](int i) { return columns[i + 1]; };
   const auto row_vertex = [&](int j) { return row.vertices[(j % n + n) % n]; };
   const auto cost = [&](const Vec3& p, int j) { return (p - positions[row_vertex(j)]).squaredNorm(); };
 
@@ -75,7 +80,7 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::s
   int start = 0;
   double shortest = 0;
   for (int i = 0; i < m; ++i) {
-    const double length = cost(positions[seam_vertex(i)], static_cast<int>(std::lround(column_of(i))));
+    const double length = cost(positions[seam.vertices[i]], static_cast<int>(std::lround(column_of(i))));
     if (i == 0 || length < shortest) {
       start = i;
       shortest = length;
@@ -84,9 +89,12 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::s
   const int start_column = static_cast<int>(std::lround(column_of(start)));
 
   // From here on both rings begin there, and end where they began.
+  std::vector<int> seam_vertices, row_vertices;
+  for (int k = 0; k <= m; ++k) seam_vertices.push_back(seam.vertices[start + k < m ? start + k : start + k - m]);
+  for (int j = 0, at = (start_column % n + n) % n; j <= n; ++j, at = at + 1 < n ? at + 1 : 0) row_vertices.push_back(row.vertices[at]);
   std::vector<Vec3> seam_points, row_points;
-  for (int k = 0; k <= m; ++k) seam_points.push_back(positions[seam_vertex(start + k)]);
-  for (int j = 0; j <= n; ++j) row_points.push_back(positions[row_vertex(start_column + j)]);
+  for (const int vertex : seam_vertices) seam_points.push_back(positions[vertex]);
+  for (const int vertex : row_vertices) row_points.push_back(positions[vertex]);
   std::vector<int> first(m + 1), last(m + 1), place(m + 2, 0);
   for (int k = 0; k <= m; ++k) {
     first[k] = std::max(first_column(start + k) - start_column, 0), last[k] = std::min(last_column(start + k) - start_column, n);
@@ -120,12 +128,12 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::s
     for (int k = m, j = n; k > 0 || j > 0;) {
       if (along_row[place[k] + j - first[k]]) {
         --j;
-        const int apex = seam_vertex(start + k), here = row_vertex(start_column + j), next = row_vertex(start_column + j + 1);
+        const int apex = seam_vertices[k], here = row_vertices[j], next = row_vertices[j + 1];
         triangles.push_back(is_head ? Triangle{apex, next, here} : Triangle{here, next, apex});
         if (cap_cost(seam_points[k], row_points[j], row_points[j + 1]) > 0) look_again(k);
       } else {
         --k;
-        const int apex = row_vertex(start_column + j), here = seam_vertex(start + k), next = seam_vertex(start + k + 1);
+        const int apex = row_vertices[j], here = seam_vertices[k], next = seam_vertices[k + 1];
         triangles.push_back(is_head ? Triangle{here, next, apex} : Triangle{apex, next, here});
         if (cap_cost(seam_points[k], seam_points[k + 1], row_points[j]) > 0) look_again(k);
       }
