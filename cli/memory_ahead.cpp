@@ -13,8 +13,7 @@ constexpr std::size_t kBlock = 8 << 20;  // less than what the allocator would g
 
 MemoryAhead::MemoryAhead(std::size_t bytes) {
   while (blocks_.size() * kBlock < bytes) blocks_.push_back(std::make_unique_for_overwrite<char[]>(kBlock));
-  touching_ = std::async(std::launch::async, [&, processor = current_processor()] {
-    leave_processor(processor);
+  touching_ = run_beside([&] {
     for (const auto& block : blocks_)
       for (std::size_t i = 0; i < kBlock && !is_needed_; i += kPage) static_cast<volatile char*>(block.get())[i] = 0;
   });

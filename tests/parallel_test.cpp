@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <future>
 #include <stdexcept>
 #include <string>
 
@@ -32,6 +33,25 @@ TEST(ForEachBlock, ThrowsWhatABlockThrows) {
     FAIL() << "nothing thrown";
   } catch (const std::runtime_error& error) {
     EXPECT_EQ(error.what(), std::string("block 40"));
+  }
+}
+
+TEST(RunBeside, IsAThreadOfItsOwnThatHandsOverItsResult) {
+  std::promise<int> given;
+  // Deferred, it would wait for ever.
+  std::future<int> doubled = run_beside([value = given.get_future()]() mutable { return 2 * value.get(); });
+  given.set_value(21);
+  EXPECT_EQ(doubled.get(), 42);
+}
+
+TEST(RunBeside, ThrowsWhatItsThreadThrowsWhereTheResultIsTaken) {
+  std::future<void> failing = run_beside([] { throw std::runtime_error("beside"); });
+  failing.wait();
+  try {
+    failing.get();
+    FAIL() << "nothing thrown";
+  } catch (const std::runtime_error& error) {
+    EXPECT_EQ(error.what(), std::string("beside"));
   }
 }
 
