@@ -61,10 +61,11 @@ std::vector<Method> choose_methods(const EncodeOptions& options, const Skeleton&
   return methods;
 }
 
-/// SPD patches are neither snapped nor fitted.
+/// Where texels read, and where their points lie.
 struct TexelPlacing {
   bool has_snap = false, has_fit = false;
 };
+/// SPD patches are neither snapped nor fitted.
 TexelPlacing choose_placing(const EncodeOptions& options, const TriangleMesh& mesh, bool is_all_spd) {
   if (is_all_spd) return {};
   const auto texels = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);

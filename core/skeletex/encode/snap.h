@@ -50,8 +50,9 @@ struct SnapFeatures {
 /// The row, with fractions, that reads at u.
 double row_of(const std::vector<double>& row_u, double u);
 
+/// Those near each other in the texture come one after the other.
 /// \param charts   as for find_features
-/// \param patches  with their sizes and row tables
+/// \param patches  per chart, with its size and row table
 SnapFeatures place_features(const MapFeatures& features, std::span<const Chart> charts, std::span<const Patch> patches);
 
 /// Features as the kernels take them (snap.cl).
@@ -62,11 +63,11 @@ struct SnapTables {
     int number;
   };
   std::vector<int> vertex_patches, vertex_points, vertex_ranks;
-  std::vector<float> vertex_x, vertex_y;                         ///< cells
+  std::vector<float> vertex_x, vertex_y;  ///< cells
   std::vector<std::array<int, 2>> edge_points;
   std::vector<Edge> edges;
-  std::array<std::vector<LatticeRow>, 2> rows;         ///< of VSM patches, inner ones, even and odd: patch, row, first bin, 0
-  std::vector<int> bin_begins, bin_edges;              ///< the edges near each bin of eight columns of a row
+  std::array<std::vector<LatticeRow>, 2> rows;  ///< of VSM patches, inner ones, even and odd: patch, row, first bin, 0
+  std::vector<int> bin_begins, bin_edges;       ///< the edges near each bin of eight columns of a row
 };
 /// \param patches  as for place_features
 SnapTables tables_of(const SnapFeatures& features, std::span<const Patch> patches);
@@ -82,7 +83,7 @@ struct ReadingPositions {
 /// The even lattice.
 ReadingPositions even_positions(ClContext& context, const DeviceLayout& layout);
 
-/// SnapTables on the device.
+/// SnapTables on the device; lists that are empty are buffers of size 0.
 struct DeviceSnapTables {
   ClBuffer<int> vertex_patches, vertex_points, vertex_ranks;
   ClBuffer<float> vertex_x, vertex_y;
@@ -91,6 +92,7 @@ struct DeviceSnapTables {
   std::array<ClBuffer<LatticeRow>, 2> rows;
   ClBuffer<int> bin_begins, bin_edges;
 };
+/// \throw DeviceError when there is no room
 DeviceSnapTables upload_tables(ClContext& context, const SnapTables& tables);
 
 /// Moves reading positions to vertices, strongest first, and then to creased edges; the map does not fold.

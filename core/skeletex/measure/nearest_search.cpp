@@ -40,8 +40,9 @@ void NearestSearch::find(std::span<const Vec3> points, std::span<int> triangles,
   constexpr int kRun = 16;
   const std::size_t items = block_count(count, kRun);
   const float scaled_enough = enough / static_cast<float>(scale_);
-  context_.launch(kFindNearest, ClRange({items, 1}, {context_.work_group_size(kFindNearest, 32), 1}), context_.upload(x_), context_.upload(y_), context_.upload(z_), static_cast<int>(count), kRun, boxes_,
-                  blocks_, level_begin_, top_level_, scaled_enough * scaled_enough, nearest_, nearest_squared_);
+  context_.launch(kFindNearest, ClRange({items, 1}, {context_.work_group_size(kFindNearest, 32), 1}), context_.upload(x_), context_.upload(y_),
+                  context_.upload(z_), static_cast<int>(count), kRun, boxes_, blocks_, level_begin_, top_level_, scaled_enough * scaled_enough, nearest_,
+                  nearest_squared_);
   const auto [places, squared] = context_.download(nearest_, nearest_squared_);
   for (std::size_t i = 0; i < count; ++i) triangles[i] = order_[places[i]];
   if (distances.empty()) return;
