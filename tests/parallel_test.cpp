@@ -7,6 +7,7 @@
 #include <future>
 #include <stdexcept>
 #include <string>
+#include <thread>
 
 namespace skeletex {
 namespace {
@@ -37,11 +38,15 @@ TEST(ForEachBlock, ThrowsWhatABlockThrows) {
 }
 
 TEST(RunBeside, IsAThreadOfItsOwnThatHandsOverItsResult) {
-  std::promise<int> given;
-  // Deferred, it would wait for ever.
-  std::future<int> doubled = run_beside([value = given.get_future()]() mutable { return 2 * value.get(); });
-  given.set_value(21);
-  EXPECT_EQ(doubled.get(), 42);
+  std::promise<std::thread::id> begun;
+  std::future<std::thread::id> own = begun.get_future();
+  std::future<int> result = run_beside([&] {
+    begun.set_value(std::this_thread::get_id());
+    return 42;
+  });
+  ASSERT_EQ(own.wait_for(std::chrono::seconds(10)), std::future_status::ready) << "not before its result is asked for";
+  EXPECT_NE(own.get(), std::this_thread::get_id());
+  EXPECT_EQ(result.get(), 42);
 }
 
 TEST(RunBeside, ThrowsWhatItsThreadThrowsWhereTheResultIsTaken) {
