@@ -2,8 +2,7 @@
 // Where texels read: from the even lattice to the mesh's own vertices and creased edges.
 //   claim_texels, decide_claims, decide_the_rest
 //                               vertices, strongest first, take the nearest texel that is free
-//   relax_texels                free texels follow their neighbours half way
-//   place_on_edges              free texels go to the nearest point of a creased edge
+//   place_on_edges              free texels follow their neighbours half way, then go to the nearest point of a creased edge
 //   part_colours, join_colours  rows by colour, and back, see below
 //   put_listed_back             texels of a list, and what then folds in the map or in space, go back to the even lattice
 // A reading position is an offset from the texel's own place in the lattice, in cells: two planes over the texture, x
@@ -259,14 +258,10 @@ __attribute__((noinline)) void relax_at_end(global const PatchRecord* restrict p
   offset_y[n.own] = now.y;
 }
 
-// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. Free texels relax, one colour of the row after the other.
-// in   rows: patch, row, number of the first bin, 0: inner ones, even or odd
-kernel void relax_texels(const int row_count, const int texture_width, global const int* restrict rows, global const PatchRecord* restrict patches,
-                         global const int* restrict anchors, global float* offset_x, global float* offset_y) {
-  const int k = get_group_id(0);
-  if (k >= row_count) return;
-  global const PatchRecord* restrict p = patches + rows[4 * k];
-  const int row = rows[4 * k + 1], width = p->width, first = (p->y + row) * texture_width + p->x;
+// The free texels of a row relax, one colour after the other.
+__attribute__((always_inline)) void relax_row(global const PatchRecord* restrict p, const int texture_width, const int row,
+                                              global const int* restrict anchors, global float* offset_x, global float* offset_y) {
+  const int width = p->width, first = (p->y + row) * texture_width + p->x;
   for (int colour = 0; colour < 2 + (width & 1); ++colour) {
     const int at_end = end_of_colour(colour, width);
     if (colour < 2) relax_colour(row_colour(colour, first, width), p->height, texture_width, row, anchors, offset_x, offset_y, offset_x, offset_y);
@@ -353,9 +348,10 @@ __attribute__((always_inline)) void place_colour(const RowColour colour, const i
   }
 }
 
-// NDRange and rows as for relax_texels. Free texels of a row go to the nearest edge within reach, one colour of the row after the other. A row comes in bins of
-// eight columns, each with a list of the edges near it, which look for theirs together.
-// in   bin_begins: into bin_edges, numbers of edges; is_again: only bins where a texel could not go to its edge the time before
+// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. Free texels of a row relax, then go to the nearest edge within reach, one colour of the row after
+// the other. A row comes in bins of eight columns, each with a list of the edges near it, which look for theirs together.
+// in   rows: patch, row, number of the first bin, 0: inner ones, even or odd; bin_begins: into bin_edges, numbers of edges
+//      is_again: to edges only in bins where a texel could not go to its own the time before
 // out  parameters: where on its edge a texel is, 0 to 1; offers: what else the kernel needs per texel
 kernel void place_on_edges(const int row_count, const int texture_width, const int is_again, global const int* restrict rows,
                            global const PatchRecord* restrict patches, global const int* restrict bin_begins, global const int* restrict bin_edges,
@@ -366,6 +362,7 @@ kernel void place_on_edges(const int row_count, const int texture_width, const i
   global const PatchRecord* restrict p = patches + rows[4 * k];
   const int row = rows[4 * k + 1], width = p->width, height = p->height, first = (p->y + row) * texture_width + p->x;
   const int odd = first + ((width + 1) >> 1);
+  relax_row(p, texture_width, row, anchors, offset_x, offset_y);
   for (int column = 8 * get_local_id(0), bin = rows[4 * k + 2] + get_local_id(0); column < width; column += 8 * ROW_ITEMS, bin += ROW_ITEMS) {
     // Even columns, then odd ones. The last texels of a row are fewer than eight: each lane beyond them looks at the last one.
     const int8 columns = min(column + (int8)(0, 2, 4, 6, 1, 3, 5, 7), (int8)(width - 1));
@@ -405,7 +402,7 @@ kernel void place_on_edges(const int row_count, const int texture_width, const i
   }
 }
 
-// NDRange and rows as for relax_texels. Offsets with their rows by colour, from `home`, where columns follow each other.
+// NDRange and rows as for place_on_edges. Offsets with their rows by colour, from `home`, where columns follow each other.
 kernel void part_colours(const int row_count, const int texture_width, global const int* restrict rows, global const PatchRecord* restrict patches,
                          global const float* restrict home_x, global const float* restrict home_y, global float* restrict offset_x,
                          global float* restrict offset_y) {
@@ -427,7 +424,7 @@ void join_row(const int first, const int width, global const int* restrict from,
   WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
 }
 
-// NDRange and rows as for relax_texels. Columns one after the other again, each plane's in the plane before. What is in them does not matter.
+// NDRange and rows as for place_on_edges. Columns one after the other again, each plane's in the plane before. What is in them does not matter.
 kernel void join_colours(const int row_count, const int texture_width, global const int* restrict rows, global const PatchRecord* restrict patches,
                          global int* spare, global int* first_plane, global int* second_plane, global int* third_plane, global int* fourth_plane) {
   const int k = get_group_id(0);

@@ -94,28 +94,30 @@ struct SnapLattice {
     }
   }
 
-  void relax(int passes) {
-    for (int pass = 0; pass < passes; ++pass)
-      for (int c = 0; c < 6; ++c)
-        for (int row = 1; row + 1 < height; ++row)
-          for (int j = 0; j < width; ++j) {
-            const int texel = at(j, row);
-            if (anchors[texel] != 0 || colour(j, row) != c) continue;
-            const int around[4] = {at(j - 1, row), at(j + 1, row), at(j, row - 1), at(j, row + 1)};
-            double mean_x = 0, mean_y = 0;
-            for (const int n : around) mean_x += x[n] / 4, mean_y += y[n] / 4;
-            const double dx = (x[texel] + mean_x) / 2, dy = (y[texel] + mean_y) / 2;
-            if (std::abs(dx - x[texel]) + std::abs(dy - y[texel]) >= 0.01 && std::max(std::abs(dx), std::abs(dy)) <= 0.5) move(j, row, dx, dy);
-          }
+  /// \param first  row of those that are looked at, of every other one
+  void relax(int first) {
+    for (int c = 0; c < 6; ++c)
+      for (int row = first; row + 1 < height; row += 2)
+        for (int j = 0; j < width; ++j) {
+          const int texel = at(j, row);
+          if (anchors[texel] != 0 || colour(j, row) != c) continue;
+          const int around[4] = {at(j - 1, row), at(j + 1, row), at(j, row - 1), at(j, row + 1)};
+          double mean_x = 0, mean_y = 0;
+          for (const int n : around) mean_x += x[n] / 4, mean_y += y[n] / 4;
+          const double dx = (x[texel] + mean_x) / 2, dy = (y[texel] + mean_y) / 2;
+          if (std::abs(dx - x[texel]) + std::abs(dy - y[texel]) >= 0.01 && std::max(std::abs(dx), std::abs(dy)) <= 0.5) move(j, row, dx, dy);
+        }
   }
 
-  /// \param before  what each texel has chosen the time before; none: the first time
-  std::vector<int> snap_to_edges(const std::vector<SnapFeatures::Edge>& edges, const std::vector<int>& before) {
+  /// \param first   as above
+  /// \param chosen  in and out, per texel: what it chooses; the time before, -1 there for none
+  void snap_to_edges(int first, const std::vector<SnapFeatures::Edge>& edges, bool is_again, std::vector<int>& chosen) {
     // The second time only bins of eight columns where a texel could not go to its edge.
+    const std::vector<int> before = chosen;
     const auto is_looked_at = [&](int column, int row) {
-      const int first = column / 8 * 8;
-      if (before.empty() || first + 8 > width) return true;
-      for (int j = first; j < first + 8; ++j)
+      const int first_column = column / 8 * 8;
+      if (!is_again || first_column + 8 > width) return true;
+      for (int j = first_column; j < first_column + 8; ++j)
         if (anchors[at(j, row)] == 0 && before[at(j, row)] >= 0) return true;
       return false;
     };
@@ -132,9 +134,9 @@ struct SnapLattice {
       }
       return best;
     };
-    std::vector<int> chosen(x.size(), -1);
-    for (int row = 1; row + 1 < height; ++row)
+    for (int row = first; row + 1 < height; row += 2)
       for (int j = 0; j < width; ++j) {
+        chosen[at(j, row)] = -1;
         if (anchors[at(j, row)] != 0 || !is_looked_at(j, row)) continue;
         long best = 1L << 40;
         for (int e = 0; e < static_cast<int>(edges.size()); ++e) {
@@ -145,7 +147,7 @@ struct SnapLattice {
         }
       }
     for (int c = 0; c < 6; ++c)
-      for (int row = 1; row + 1 < height; ++row)
+      for (int row = first; row + 1 < height; row += 2)
         for (int j = 0; j < width; ++j) {
           const int e = chosen[at(j, row)];
           if (e < 0 || colour(j, row) != c) continue;
@@ -153,17 +155,16 @@ struct SnapLattice {
           nearest(edges[e], j, row, dx, dy);
           if (std::abs(dx) <= 1 && std::abs(dy) <= 1 && move(j, row, dx, dy)) anchors[at(j, row)] = -1 - e;
         }
-    return chosen;
   }
 
   void snap(const SnapFeatures& features) {
     snap_to_vertices(features.vertices);
-    std::vector<int> chosen;
-    for (int round = 0; round < 2; ++round) {
-      relax(round == 0 ? 3 : 1);
-      chosen = snap_to_edges(features.edges, chosen);
-    }
-    relax(1);
+    std::vector<int> chosen(x.size(), -1);
+    for (const bool is_again : {false, true})
+      for (const int first : {2, 1}) {
+        relax(first);
+        snap_to_edges(first, features.edges, is_again, chosen);
+      }
   }
 };
 

@@ -17,7 +17,6 @@ namespace {
 
 constexpr int kBinWidth = 8;  // as in snap.cl
 
-constexpr int kFirstRelaxPasses = 3, kRelaxPasses = 1;
 constexpr int kEdgeRounds = 2;          // what one round has moved lets texels through that the fold test had stopped
 constexpr double kFlat = 1e-6;          // radians: what rounding may make of a flat edge
 constexpr double kFullDihedral = 0.5;   // radians: edges this sharp attract texels fully
@@ -296,20 +295,12 @@ void snap_positions(ClContext& context, const DeviceLayout& layout, const Device
     const std::size_t count = rows[parity].size;
     context.launch({"snap.cl", kernel}, row_range(context, count), static_cast<int>(count), layout.width, arguments...);
   };
-  const auto relax = [&](int passes) {
-    for (int pass = 0; pass < passes; ++pass)
-      for (const int parity : {0, 1}) for_rows("relax_texels", parity, rows[parity], layout.patches, positions.anchors, positions.x, positions.y);
-  };
   for (const int parity : {0, 1}) for_rows("part_colours", parity, rows[parity], layout.patches, positions.home_x, positions.home_y, positions.x, positions.y);
   snap_to_vertices(context, layout, tables, spare, positions);
-  for (int round = 0; round < kEdgeRounds; ++round) {
-    relax(round == 0 ? kFirstRelaxPasses : kRelaxPasses);
-    if (tables.edges.size == 0) continue;
+  for (int round = 0; round < (tables.edges.size == 0 ? 0 : kEdgeRounds); ++round)
     for (const int parity : {0, 1})
       for_rows("place_on_edges", parity, static_cast<int>(round > 0), rows[parity], layout.patches, tables.bin_begins, tables.bin_edges, tables.edges, positions.anchors,
                positions.parameters, positions.x, positions.y, spare);
-  }
-  relax(kRelaxPasses);
   for (const int parity : {0, 1})
     for_rows("join_colours", parity, rows[parity], layout.patches, spare, positions.x, positions.y, positions.anchors, positions.parameters);
   // Each plane is now in the memory of the one before, where it is as large and 0 outside of those rows.
