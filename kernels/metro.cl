@@ -8,6 +8,7 @@
 //       level_begin      per level of the tree, its first node in `boxes`; level 0 are the blocks
 //                        (layout: core/skeletex/measure/triangle_tree.h)
 //       enough_squared   a triangle so near need not be the nearest; 0: always the nearest
+//       bounds_squared   with has_bounds per point how far, squared, the nearest triangle is at most; a point with nothing so near is looked at without
 // Out:  nearest          per point, the nearest triangle's place in the tree
 //       nearest_squared  per point, its squared distance, as exact as float32 allows
 // NDRange: one item per `run` consecutive points.
@@ -16,6 +17,7 @@
 // the registers of a CPU and is plain scalar code on a GPU. At most 8 levels above the blocks (134 million triangles).
 
 #define STACK_SIZE 64
+#define BEYOND_ALL 1e30f  // less than to the places past the end
 #define LEVEL_SHIFT 27
 #define INDEX_MASK ((1 << LEVEL_SHIFT) - 1)
 
@@ -73,67 +75,74 @@ inline float8 squared_to_boxes(global const float8* restrict node, const float p
 
 kernel void find_nearest_triangles(global const float* restrict px, global const float* restrict py, global const float* restrict pz,
                                    const int count, const int run, global const float8* restrict boxes, global const float8* restrict blocks,
-                                   constant int* restrict level_begin, const int top_level, const float enough_squared, global int* restrict nearest,
-                                   global float* restrict nearest_squared) {
+                                   constant int* restrict level_begin, const int top_level, const float enough_squared, const int has_bounds,
+                                   global const float* restrict bounds_squared, global int* restrict nearest, global float* restrict nearest_squared) {
   const int begin = (int)get_global_id(0) * run;
   const int end = min(begin + run, count);
   int block = -1;  // the previous point's
   for (int i = begin; i < end; ++i) {
     const float x = px[i], y = py[i], z = pz[i];
-    float best = 1e30f;  // less than to the places past the end
-    int best_place = 0;
     const int first_block = block;
-    if (first_block >= 0) {
-      const float8 squared = squared_to_block(blocks + 9 * first_block, x, y, z);
-      best = least_of(squared);
-      best_place = 8 * first_block + (int)lowest_bit(bits_of(squared <= (float8)(best)));
-    }
-    int stack_node[STACK_SIZE];
-    float stack_squared[STACK_SIZE];
-    int size = 0;
-    int level = top_level, index = 0;
-    while (best > enough_squared) {
-      if (level > 0) {
-        const float8 squared = squared_to_boxes(boxes + 6 * (level_begin[level] + index), x, y, z);
-        uint lanes = bits_of(squared < (float8)(best));
-        if (lanes != 0u) {
-          // The nearest child next, the others later.
-          float lane_squared[8];
-          vstore8(squared, 0, lane_squared);
-          uint next = lowest_bit(lanes);
-          lanes &= lanes - 1u;
-          while (lanes != 0u) {
-            uint other = lowest_bit(lanes);
-            lanes &= lanes - 1u;
-            if (lane_squared[other] < lane_squared[next]) {
-              const uint swapped = next;
-              next = other;
-              other = swapped;
-            }
-            stack_node[size] = ((level - 1) << LEVEL_SHIFT) | (8 * index + (int)other);
-            stack_squared[size] = lane_squared[other];
-            ++size;
-          }
-          index = 8 * index + (int)next;
-          --level;
-          continue;
-        }
-      } else if (index != first_block) {
-        const float8 squared = squared_to_block(blocks + 9 * index, x, y, z);
+    float best = BEYOND_ALL;
+    int best_place = -1;
+    // Again where there is nothing within the bound.
+    for (int round = has_bounds ? 0 : 1; round < 2 && best_place < 0; ++round) {
+      best = round == 0 ? bounds_squared[i] : BEYOND_ALL;
+      if (first_block >= 0) {
+        const float8 squared = squared_to_block(blocks + 9 * first_block, x, y, z);
         const float least = least_of(squared);
         if (least < best) {
           best = least;
-          block = index;
-          best_place = 8 * index + (int)lowest_bit(bits_of(squared <= (float8)(best)));
+          best_place = 8 * first_block + (int)lowest_bit(bits_of(squared <= (float8)(best)));
         }
       }
-      while (size > 0 && stack_squared[size - 1] >= best) --size;
-      if (size == 0) break;
-      --size;
-      level = stack_node[size] >> LEVEL_SHIFT;
-      index = stack_node[size] & INDEX_MASK;
+      int stack_node[STACK_SIZE];
+      float stack_squared[STACK_SIZE];
+      int size = 0;
+      int level = top_level, index = 0;
+      while (best > enough_squared) {
+        if (level > 0) {
+          const float8 squared = squared_to_boxes(boxes + 6 * (level_begin[level] + index), x, y, z);
+          uint lanes = bits_of(squared < (float8)(best));
+          if (lanes != 0u) {
+            // The nearest child next, the others later.
+            float lane_squared[8];
+            vstore8(squared, 0, lane_squared);
+            uint next = lowest_bit(lanes);
+            lanes &= lanes - 1u;
+            while (lanes != 0u) {
+              uint other = lowest_bit(lanes);
+              lanes &= lanes - 1u;
+              if (lane_squared[other] < lane_squared[next]) {
+                const uint swapped = next;
+                next = other;
+                other = swapped;
+              }
+              stack_node[size] = ((level - 1) << LEVEL_SHIFT) | (8 * index + (int)other);
+              stack_squared[size] = lane_squared[other];
+              ++size;
+            }
+            index = 8 * index + (int)next;
+            --level;
+            continue;
+          }
+        } else if (index != first_block) {
+          const float8 squared = squared_to_block(blocks + 9 * index, x, y, z);
+          const float least = least_of(squared);
+          if (least < best) {
+            best = least;
+            block = index;
+            best_place = 8 * index + (int)lowest_bit(bits_of(squared <= (float8)(best)));
+          }
+        }
+        while (size > 0 && stack_squared[size - 1] >= best) --size;
+        if (size == 0) break;
+        --size;
+        level = stack_node[size] >> LEVEL_SHIFT;
+        index = stack_node[size] & INDEX_MASK;
+      }
     }
-    nearest[i] = best_place;
+    nearest[i] = max(best_place, 0);
     nearest_squared[i] = best;
   }
 }
