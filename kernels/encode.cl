@@ -302,11 +302,11 @@ kernel void place_points(const int count, global const int* restrict texels, glo
   z[texel] = from_z[i];
 }
 
-// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. The prefilter, of inner rows; the others, and texels with one of the anchors' bits
-// `held`, stay as they are.
+// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. The prefilter, of inner rows; the others, and texels with one of the bits `kept`,
+// stay as they are.
 // in   lattice_rows: all
-kernel void prefilter_positions(const int row_count, const int texture_width, const int held, global const int* restrict lattice_rows,
-                                global const PatchRecord* restrict patches, global const int* restrict anchors, global const float* restrict x,
+kernel void prefilter_positions(const int row_count, const int texture_width, const int kept, global const int* restrict lattice_rows,
+                                global const PatchRecord* restrict patches, global const int* restrict are_kept, global const float* restrict x,
                                 global const float* restrict y, global const float* restrict z, global float* restrict out_x, global float* restrict out_y,
                                 global float* restrict out_z) {
   const int k = get_group_id(0);
@@ -320,16 +320,16 @@ kernel void prefilter_positions(const int row_count, const int texture_width, co
   // What wraps round apart from the rest; see lattice.cl for `one`.
   const int one = min(width, 1);
   for (int j = 1 + get_local_id(0); j < width - 1; j += ROW_ITEMS) {
-    const int own = texel + j, is_held = (anchors[own] & held) != 0;
+    const int own = texel + j, is_kept = (are_kept[own] & kept) != 0;
     const FilteredPoint q = prefilter_point(x, y, z, own, own - one, own + one, own - texture_width, own + texture_width);
-    const float px = is_held ? x[own] : q.x, py = is_held ? y[own] : q.y, pz = is_held ? z[own] : q.z;
+    const float px = is_kept ? x[own] : q.x, py = is_kept ? y[own] : q.y, pz = is_kept ? z[own] : q.z;
     out_x[own] = px, out_y[own] = py, out_z[own] = pz;
   }
   for (int side = get_local_id(0); side < 2; side += ROW_ITEMS) {
-    const int own = side == 0 ? texel : texel + width - 1, is_held = (anchors[own] & held) != 0;
+    const int own = side == 0 ? texel : texel + width - 1, is_kept = (are_kept[own] & kept) != 0;
     const FilteredPoint q = prefilter_point(x, y, z, own, side == 0 ? texel + width - 1 : own - 1, side == 0 ? texel + 1 : texel, own - texture_width,
                                             own + texture_width);
-    out_x[own] = is_held ? x[own] : q.x, out_y[own] = is_held ? y[own] : q.y, out_z[own] = is_held ? z[own] : q.z;
+    out_x[own] = is_kept ? x[own] : q.x, out_y[own] = is_kept ? y[own] : q.y, out_z[own] = is_kept ? z[own] : q.z;
   }
 }
 

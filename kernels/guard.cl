@@ -3,6 +3,8 @@
 //   find_normals       normals of the mesh's triangles
 //   normals_of_texels  normals of the mesh at texels
 //   suspect_quads      quads of the lattice -> how far they could be from the mesh, by its planes at their corners
+//   suspect_any_quads  the same before diagonals are chosen
+//   suspect_listed_quads  of some
 //   measure_triangles  triangles of the lattice -> the mesh, by a walk over it
 //   measure_vertices   vertices of the mesh -> the lattice, among the quads around their place in the map
 // The last two can only find too large a distance, where the nearest point lies elsewhere. Vertices of the lattice are texels; triangles
@@ -14,6 +16,7 @@
 #include "patch_texels.h"
 
 #define PLACES 15  // of a triangle, beside its middle
+#define NEAR2 0.0025f  // of the square of a triangle's side: a walk from its middle that ends as near has hardly gone astray
 
 // Corners, quarters and middles of the sides, and points between them and the middle.
 constant float place_s[PLACES] = {0.0f, 1.0f, 0.0f, 0.25f, 0.5f, 0.75f, 0.0f, 0.0f, 0.0f, 0.75f, 0.5f, 0.25f, 0.6f, 0.2f, 0.2f};
@@ -117,6 +120,57 @@ kernel void suspect_quads(const int row_count, const int texture_width, const in
         suspicion2_at_end(texel + width - 1, texel, texture_width, texel_count, diagonals[texel + width - 1], texel_normals, x, y, z);
 }
 
+// NDRange (count). Those of some quads, by their texels. 0 where nothing is known.
+kernel void suspect_listed_quads(const int count, const int texture_width, const int texel_count, global const int* restrict listed,
+                                 global const int* restrict texel_patches, global const PatchRecord* restrict patches, global const int* restrict diagonals,
+                                 global const int* restrict texel_triangles, global const float* restrict texel_normals, global const float* restrict x,
+                                 global const float* restrict y, global const float* restrict z, global float* restrict suspicions2) {
+  const int i = (int)get_global_id(0);
+  if (i >= count) return;
+  const int texel = listed[i], line = texel / texture_width;
+  global const PatchRecord* p = patches + texel_patches[texel];
+  const int right = texel_at(p, texture_width, texel - line * texture_width - p->x + 1, line - p->y);
+  suspicions2[i] = texel_triangles[texel] == NO_TRIANGLE
+                       ? 0.0f
+                       : suspicion2_at_end(texel, right, texture_width, texel_count, diagonals[texel], texel_normals, x, y, z);
+}
+
+// As suspicion2_of_quad where the diagonal is not known: the sides from its texel on, and the triangles by either diagonal.
+__attribute__((always_inline)) float suspicion2_of_any(int texel, int right, int texture_width, int texel_count, global const float* texel_normals,
+                                                       global const float* x, global const float* y, global const float* z) {
+  const int above = texel + texture_width, beyond = right + texture_width;
+  const Point a = point_at(x, y, z, texel), b = point_at(x, y, z, right), c = point_at(x, y, z, beyond), d = point_at(x, y, z, above);
+  const Point at_a = normal_at(texel, texel_count, texel_normals), at_b = normal_at(right, texel_count, texel_normals);
+  const Point at_c = normal_at(beyond, texel_count, texel_normals), at_d = normal_at(above, texel_count, texel_normals);
+  const float most = greater(suspicion_of_side(minus(b, a), at_a, at_b), suspicion_of_side(minus(d, a), at_a, at_d));
+  const int is_turned = looks_against(a, b, c, at_a, at_b, at_c) | looks_against(a, c, d, at_a, at_c, at_d) | looks_against(a, b, d, at_a, at_b, at_d) |
+                        looks_against(b, c, d, at_b, at_c, at_d);
+  return is_turned ? INFINITY : most * most;
+}
+
+__attribute__((noinline)) float suspicion2_of_any_at_end(int texel, int right, int texture_width, int texel_count, global const float* texel_normals,
+                                                         global const float* x, global const float* y, global const float* z) {
+  return suspicion2_of_any(texel, right, texture_width, texel_count, texel_normals, x, y, z);
+}
+
+// NDRange and all else as for suspect_quads, of a lattice whose diagonals are not chosen. A side is that of one of the two quads at it.
+kernel void suspect_any_quads(const int row_count, const int texture_width, const int texel_count, global const int* restrict lattice_rows,
+                              global const PatchRecord* restrict patches, global const int* restrict texel_triangles, global const float* restrict texel_normals,
+                              global const float* restrict x, global const float* restrict y, global const float* restrict z,
+                              global float* restrict suspicions2) {
+  const int k = get_group_id(0);
+  if (k >= row_count) return;
+  global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
+  const int width = patch->width;
+  const int texel = (patch->y + lattice_rows[4 * k + 1]) * texture_width + patch->x;
+  if (texel_triangles[texel] == NO_TRIANGLE) return;
+  const int one = min(width, 1);
+  for (int j = get_local_id(0); j < width - 1; j += ROW_ITEMS)
+    suspicions2[texel + j] = suspicion2_of_any(texel + j, texel + j + one, texture_width, texel_count, texel_normals, x, y, z);
+  if (get_local_id(0) == 0)
+    suspicions2[texel + width - 1] = suspicion2_of_any_at_end(texel + width - 1, texel, texture_width, texel_count, texel_normals, x, y, z);
+}
+
 // A vertex of the lattice: a texel, or behind these a vertex of its ends.
 __attribute__((always_inline)) Point lattice_point(int vertex, int texel_count, global const float* restrict x, global const float* restrict y,
                                                    global const float* restrict z, global const float* restrict end_x, global const float* restrict end_y,
@@ -141,23 +195,33 @@ kernel void measure_triangles(const int count, const int texel_count, const floa
   if (i >= count) return;
   distances2[i] = -1.0f;
   is_turned[i] = 0;
-  int at = NO_TRIANGLE;
+  int starts[3];
   Point abc[3];
   for (int k = 0; k < 3; ++k) {
     const int vertex = listed[3 * i + k];
     abc[k] = lattice_point(vertex, texel_count, x, y, z, end_x, end_y, end_z);
-    if (at == NO_TRIANGLE && vertex < texel_count) at = texel_triangles[vertex];
+    starts[k] = vertex < texel_count ? texel_triangles[vertex] : NO_TRIANGLE;
   }
-  if (at == NO_TRIANGLE) return;
   const Point ab = minus(abc[1], abc[0]), ac = minus(abc[2], abc[0]);
   const float third[3] = {1.0f / 3.0f, 1.0f / 3.0f, 1.0f / 3.0f};
+  const float near2 = NEAR2 * fmax(product(ab, ab), product(ac, ac));
   float w[3];
-  Point nearest, normal;
+  Point nearest;
   const Point middle = weighted(third, abc[0], abc[1], abc[2]), own = cross_of(ab, ac);
-  float furthest2 = walk_over_mesh(middle, middle_enough2, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &at, &nearest, &normal, w);
-  if (product(own, normal) < 0.0f)
-    furthest2 = walk_over_mesh(middle, 0.0f, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &at, &nearest, &normal, w);
-  is_turned[i] = product(own, normal) < 0.0f;
+  // A walk can end where all triangles around are further, as across a thin part: then those from the other corners may know better.
+  int at = NO_TRIANGLE;
+  float furthest2 = INFINITY;
+  for (int k = 0; k < 3; ++k) {
+    int t = starts[k];
+    if (t == NO_TRIANGLE || (k > 0 && t == starts[k - 1]) || (k == 2 && t == starts[0])) continue;
+    Point normal;
+    float distance2 = walk_over_mesh(middle, middle_enough2, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &t, &nearest, &normal, w);
+    if (product(own, normal) < 0.0f)
+      distance2 = walk_over_mesh(middle, 0.0f, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &t, &nearest, &normal, w);
+    if (distance2 < furthest2) furthest2 = distance2, at = t, is_turned[i] = product(own, normal) < 0.0f;
+    if (furthest2 <= fmax(middle_enough2, near2) && !is_turned[i]) break;
+  }
+  if (at == NO_TRIANGLE) return;
   if (furthest2 > worth_a_look2) {
     // No point of a triangle is further from another triangle than the furthest of its corners.
     const Point d = point_at(vertex_x, vertex_y, vertex_z, corners[at]), e = point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + at]),
@@ -168,6 +232,7 @@ kernel void measure_triangles(const int count, const int texel_count, const floa
       const float s = place_s[k], t = place_t[k];
       const Point p = {abc[0].x + s * ab.x + t * ac.x, abc[0].y + s * ab.y + t * ac.y, abc[0].z + s * ab.z + t * ac.z};
       int start = at;
+      Point normal;
       furthest2 = fmax(furthest2, walk_over_mesh(p, enough2, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &start, &nearest, &normal, w));
     }
   }

@@ -314,8 +314,8 @@ __attribute__((always_inline)) EdgePlace place_on(global const EdgeRecord* edge,
   return place;
 }
 
-// A free texel where columns wrap round. Compiled once.
-__attribute__((noinline)) void place_at_end(global const PatchRecord* restrict p, const int texture_width, const int column, const int row,
+// A free texel of any column. Compiled once.
+__attribute__((noinline)) void place_one(global const PatchRecord* restrict p, const int texture_width, const int column, const int row,
                                             global const EdgeRecord* restrict edges, global const int* offers, global int* restrict anchors,
                                             global float* restrict parameters, global float* offset_x, global float* offset_y) {
   const Neighbours n = neighbours_of(p, texture_width, column, row);
@@ -346,6 +346,15 @@ __attribute__((always_inline)) void place_colour(const RowColour colour, const i
     const int anchor = moves ? -1 - edges[e].number : anchors[texel];
     own_x[texel] = to_x, own_y[texel] = to_y, parameters[texel] = t, anchors[texel] = anchor;
   }
+}
+
+// The same where hardly any texel has an offer.
+__attribute__((always_inline)) void place_few(global const PatchRecord* restrict p, const RowColour colour, const int odd, const int texture_width, const int row,
+                                              global const EdgeRecord* restrict edges, global const int* restrict offers, global int* restrict anchors,
+                                              global float* restrict parameters, global float* offset_x, global float* offset_y) {
+  for (int i = get_local_id(0); i < colour.end - colour.first; i += ROW_ITEMS)
+    if (offers[colour.first + i] != NONE)
+      place_one(p, texture_width, odd ? 2 * i + 1 : 2 * i + 2, row, edges, offers, anchors, parameters, offset_x, offset_y);
 }
 
 // NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. Free texels of a row relax, then go to the nearest edge within reach, one colour of the row after
@@ -394,10 +403,12 @@ kernel void place_on_edges(const int row_count, const int texture_width, const i
   WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
   for (int colour = 0; colour < 2 + (width & 1); ++colour) {
     const int at_end = end_of_colour(colour, width);
-    if (colour < 2)
+    if (colour < 2 && is_again)
+      place_few(p, row_colour(colour, first, width), colour, texture_width, row, edges, offers, anchors, parameters, offset_x, offset_y);
+    else if (colour < 2)
       place_colour(row_colour(colour, first, width), colour, height, texture_width, row, edges, offers, anchors, parameters, offset_x, offset_y, offset_x,
                    offset_y);
-    if (get_local_id(0) == 0 && at_end >= 0) place_at_end(p, texture_width, at_end, row, edges, offers, anchors, parameters, offset_x, offset_y);
+    if (get_local_id(0) == 0 && at_end >= 0) place_one(p, texture_width, at_end, row, edges, offers, anchors, parameters, offset_x, offset_y);
     WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
   }
 }

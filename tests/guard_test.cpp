@@ -58,7 +58,9 @@ struct Points {
     upload();
   }
   void upload() { on_device = {device().upload(planes[0]), device().upload(planes[1]), device().upload(planes[2])}; }
-  LatticeMesh lattice(const SkeletexModel& model, DiagonalRule rule) const { return {device(), model, rule, patches, on_device}; }
+  LatticeMesh lattice(const SkeletexModel& model, DiagonalRule rule, LatticeMesh::Parts parts = LatticeMesh::Parts::kAll) const {
+    return {device(), model, rule, patches, on_device, parts};
+  }
   /// Every `step`-th texel of inner rows takes its point from others. \return those
   std::vector<int> take(const SkeletexModel& model, const Points& others, int step) {
     std::vector<int> taken;
@@ -125,6 +127,19 @@ TEST(LatticeMesh, IsTheModelsAndWithMovedPointsWhatTheyWouldMake) {
     for (std::size_t i = 0; i < expected.positions.size(); ++i)
       EXPECT_LT((before.positions[i] - expected.positions[i]).norm(), 1e-6 * model.diagonal);
 
+    // One that has what it is asked for.
+    LatticeMesh asked_of = points.lattice(model, rule, LatticeMesh::Parts::kAsked);
+    ASSERT_EQ(asked_of.triangle_count(), lattice.triangle_count());
+    std::vector<int> quads;
+    for (const int number : numbers)
+      if (number < lattice.first_end_triangle() && number % 6 == 0) quads.push_back(number / 2);
+    asked_of.choose(quads);
+    asked_of.fill_ends();
+    for (const int number : numbers)
+      if (number >= lattice.first_end_triangle() || number % 6 < 2) {
+        EXPECT_EQ(asked_of.triangle(number), lattice.triangle(number)) << number;
+      }
+
     lattice.release();
     const std::vector<int> changed = lattice.move(points.take(model, others, 20));
     const LatticeMesh made = points.lattice(model, rule);
@@ -158,7 +173,7 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
     const SkeletexModel model = encoded(each.name, each.size);
     Points points(model, each.noise, random);
     const Points others(model, each.noise + 2e-3, random);
-    const LatticeMesh other_lattice = others.lattice(model, DiagonalRule::kNearest);
+    LatticeMesh other_lattice = others.lattice(model, DiagonalRule::kNearest);
     LatticeMesh lattice = points.lattice(model, DiagonalRule::kNearest);
     LatticeCrossings crossings(lattice);
     std::vector<int> numbers;
@@ -216,6 +231,14 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
     EXPECT_EQ(same_of_some.given_there, same_of_some.counted) << each.name;
     EXPECT_LT(same_of_some.counted, all.size()) << each.name;
     EXPECT_GT(same_of_some.counted, 0u) << each.name;
+    // Of a lattice whose triangles are not there yet it asks for those that it needs.
+    LatticeMesh asked_of = others.lattice(model, DiagonalRule::kNearest, LatticeMesh::Parts::kAsked);
+    for (const int share : {1, 3}) {
+      const LatticeCrossings::Others of_whole = crossings.find_between_same(all, other_lattice, share), of_asked = crossings.find_between_same(all, asked_of, share);
+      EXPECT_EQ(of_asked.pairs, of_whole.pairs) << each.name;
+      EXPECT_EQ(of_asked.counted, of_whole.counted) << each.name;
+      EXPECT_EQ(of_asked.given_there, of_whole.given_there) << each.name;
+    }
     EXPECT_FALSE(different.pairs.empty()) << each.name;
     EXPECT_GT(different.given_there, 0u) << each.name;
     EXPECT_LT(different.given_there, all.size()) << each.name;
@@ -239,19 +262,24 @@ TEST(TriangleBlock, LeavesOutOnlyPairsThatDoNotMeet) {
     std::vector<Vec3> points(40);
     for (Vec3& p : points) p = Vec3(unit(random), unit(random), unit(random) < 0.3 ? 0.5 : unit(random));
     std::array<TriangleBlock, 2> blocks;
-    std::array<std::array<float, 3>, 2> least, greatest;
+    std::array<BlockBox, 2> around, around_asked;
+    const double share = run % 3 == 0 ? 0.05 : 0.7;
     for (int b : {0, 1}) {
       TriangleBlock& block = blocks[b];
-      least[b].fill(2), greatest[b].fill(-2);
+      for (BlockBox* box : {&around[b], &around_asked[b]}) box->least.fill(2), box->greatest.fill(-2);
       for (int i = 0; i < TriangleBlock::kSize; ++i) {
         const int first = vertex(random), second = (first + 1 + vertex(random) % 13) % 40, third = (second + 1 + vertex(random) % 13) % 40;
         const Triangle triangle{first, second, third};
-        block.numbers[i] = i, block.is_asked[i] = unit(random) < 0.7 ? 1 : 0;
+        block.numbers[i] = i, block.is_asked[i] = unit(random) < share ? 1 : 0;
         for (int axis = 0; axis < 3; ++axis) {
           for (int corner = 0; corner < 3; ++corner) block.vertices[corner][i] = triangle[corner], block.corners[corner][axis][i] = points[triangle[corner]][axis];
           const auto [low, high] = std::minmax({points[first][axis], points[second][axis], points[third][axis]});
           block.least[axis][i] = static_cast<float>(low) - 1e-6f, block.greatest[axis][i] = static_cast<float>(high) + 1e-6f;
-          least[b][axis] = std::min(least[b][axis], block.least[axis][i]), greatest[b][axis] = std::max(greatest[b][axis], block.greatest[axis][i]);
+          for (BlockBox* box : {&around[b], &around_asked[b]})
+            if (box == &around[b] || block.is_asked[i] != 0) {
+              box->least[axis] = std::min(box->least[axis], block.least[axis][i]);
+              box->greatest[axis] = std::max(box->greatest[axis], block.greatest[axis][i]);
+            }
         }
       }
       find_planes(1e-10, block);
@@ -259,7 +287,7 @@ TEST(TriangleBlock, LeavesOutOnlyPairsThatDoNotMeet) {
     for (const int b : {0, 1}) {
       const TriangleBlock &one = blocks[0], &other = blocks[b];
       BlockOverlaps overlaps;
-      find_overlaps(one, other, least[b].data(), greatest[b].data(), overlaps);
+      find_overlaps(one, other, around[b], around_asked[b], overlaps);
       BlockPairs pairs;
       const int count = find_unsettled(one, other, overlaps, pairs);
       const std::set<std::array<unsigned char, 2>> found(pairs.begin(), pairs.begin() + count);
@@ -520,9 +548,48 @@ TEST(GuardKernels, TrianglesAtEndsAreMeasuredByTheirTexels) {
   EXPECT_EQ(found2[count], -1);
 }
 
+TEST(GuardKernels, AWalkThatGoesAstrayIsBegunFromTheOtherCorners) {
+  std::mt19937 random(13);
+  const TubeAndLattice tube(random, 0.3);
+  const int count = static_cast<int>(tube.lattice.triangles.size()), texels = static_cast<int>(tube.layout.size());
+  auto distances = device().allocate<float>(count);
+  auto turned = device().allocate<int>(count);
+  // From all corners, and from each alone: the others are vertices of ends.
+  std::vector<int> corners;
+  for (const Triangle& t : tube.lattice.triangles) corners.insert(corners.end(), t.begin(), t.end());
+  launch_measuring(tube, device().upload(corners), count, 0, 1e30f, 0, distances, turned);
+  const std::vector<float> all2 = device().download(distances);
+  std::vector<float> first2, best2(count, std::numeric_limits<float>::max());
+  for (const int k : {0, 1, 2}) {
+    std::vector<int> from_one;
+    std::array<std::vector<float>, 3> ends;
+    for (const Triangle& t : tube.lattice.triangles)
+      for (int corner = 0; corner < 3; ++corner) {
+        from_one.push_back(corner == k ? t[corner] : texels + static_cast<int>(ends[0].size()));
+        if (corner == k) continue;
+        for (int axis = 0; axis < 3; ++axis) ends[axis].push_back(static_cast<float>(tube.lattice.positions[t[corner]][axis]));
+      }
+    launch_measuring(tube, device().upload(from_one), count, 0, 1e30f, 0, distances, turned, ends);
+    const std::vector<float> own2 = device().download(distances);
+    if (k == 0) first2 = own2;
+    for (int i = 0; i < count; ++i) best2[i] = std::min(best2[i], own2[i]);
+  }
+  int astray = 0;
+  for (int i = 0; i < count; ++i) {
+    const auto [a, b, c] = tube.lattice.triangles[i];
+    const std::vector<Vec3>& at = tube.lattice.positions;
+    const double near2 = 0.0025 * std::max((at[b] - at[a]).squaredNorm(), (at[c] - at[a]).squaredNorm());
+    if (all2[i] > near2) {
+      EXPECT_FLOAT_EQ(all2[i], best2[i]) << i;
+      astray += first2[i] > 1.1f * best2[i];
+    }
+  }
+  EXPECT_GT(astray, 3);
+}
+
 TEST(GuardKernels, SuspicionsAreWhereTheMeshsPlanesMeet) {
   std::mt19937 random(9);
-  const TubeAndLattice tube(random, 0.1);
+  const TubeAndLattice tube(random, 0.2);
   const int quads = static_cast<int>(tube.lattice.triangles.size()) / 2, triangle_count = tube.maps.triangle_count;
   auto normals = device().allocate<float>(3 * static_cast<std::size_t>(triangle_count)), suspicions = device().allocate<float>(tube.layout.size());
   const int texels = static_cast<int>(tube.layout.size());
@@ -537,21 +604,24 @@ TEST(GuardKernels, SuspicionsAreWhereTheMeshsPlanesMeet) {
                   tube.points[1], tube.points[2], suspicions);
   const std::vector<float> found2 = device().download(suspicions);
   int against = 0;
+  const auto normal_at = [&](int vertex) { return tube.normal(tube.chart.triangles[tube.seeds[vertex]], tube.chart.positions); };
+  // Points of a side in both planes' half spaces: the least height over it where one of the planes is reached, at the crease.
+  const auto height_over = [&](int from, int to) {
+    const Vec3 along = tube.lattice.positions[to] - tube.lattice.positions[from];
+    const auto rise = [&](const Vec3& n) { return n.norm() > 1e-6 ? std::abs(along.dot(n.normalized())) : along.lpNorm<1>(); };
+    double most = 0;
+    for (double share = 0; share <= 1; share += 1e-3) most = std::max(most, std::min(share * rise(normal_at(from)), (1 - share) * rise(normal_at(to))));
+    return most;
+  };
   for (int quad = 0; quad < quads; ++quad) {
     double expected = 0;
     bool is_against = false, is_unsure = false;
     for (const int side : {0, 1}) {
       const Triangle& t = tube.lattice.triangles[2 * quad + side];
       const Vec3 own = tube.normal(t, tube.lattice.positions);
-      // Points of a side in both planes' half spaces: the least height over it where one of the planes is reached, at the crease.
-      const auto normal_at = [&](int vertex) { return tube.normal(tube.chart.triangles[tube.seeds[vertex]], tube.chart.positions); };
       for (int k = 0; k < 3; ++k) {
         const int from = t[k], to = t[(k + 1) % 3];
-        const Vec3 along = tube.lattice.positions[to] - tube.lattice.positions[from];
-        const auto rise = [&](const Vec3& n) { return n.norm() > 1e-6 ? std::abs(along.dot(n.normalized())) : along.lpNorm<1>(); };
-        double most = 0;
-        for (double share = 0; share <= 1; share += 1e-3) most = std::max(most, std::min(share * rise(normal_at(from)), (1 - share) * rise(normal_at(to))));
-        expected = std::max(expected, most);
+        expected = std::max(expected, height_over(from, to));
         const double product = own.dot(normal_at(from));
         is_against = is_against || product < -1e-4;
         is_unsure = is_unsure || std::abs(product) <= 1e-4;
@@ -565,6 +635,41 @@ TEST(GuardKernels, SuspicionsAreWhereTheMeshsPlanesMeet) {
       EXPECT_NEAR(std::sqrt(found2[tube.numbers[2 * quad] / 2]), expected, 2e-3) << quad;
   }
   EXPECT_LT(against, quads / 2);
+
+  // Of some quads the same.
+  std::vector<int> listed;
+  for (int quad = quads - 1; quad >= 0; quad -= 3) listed.push_back(tube.numbers[2 * quad] / 2);
+  auto suspicions_of_listed = device().allocate<float>(listed.size());
+  device().launch({"guard.cl", "suspect_listed_quads"}, ClRange(listed.size()), static_cast<int>(listed.size()), tube.layout.width, texels,
+                  device().upload(listed), tube.layout.texel_patches, tube.layout.patches, device().upload(tube.diagonals), tube.texel_triangles, texel_normals,
+                  tube.points[0], tube.points[1], tube.points[2], suspicions_of_listed);
+  const std::vector<float> of_listed2 = device().download(suspicions_of_listed);
+  for (std::size_t i = 0; i < listed.size(); ++i) EXPECT_FLOAT_EQ(of_listed2[i], found2[listed[i]]) << listed[i];
+
+  // Before diagonals are chosen: triangles of either count, and the sides that begin at the texel.
+  device().launch({"guard.cl", "suspect_any_quads"}, row_range(device(), rows.size()), static_cast<int>(rows.size()), tube.layout.width, texels,
+                  device().upload(rows), tube.layout.patches, tube.texel_triangles, texel_normals, tube.points[0], tube.points[1], tube.points[2], suspicions);
+  const std::vector<float> any2 = device().download(suspicions);
+  int looser = 0, measured = 0;
+  for (int quad = 0; quad < quads; ++quad) {
+    const int own = tube.numbers[2 * quad] / 2, line = own - own % tube.layout.width + 2, column = own - line;
+    const int right = line + (column + 1) % TubeAndLattice::kWidth, above = own + tube.layout.width, beyond = right + tube.layout.width;
+    bool is_either_against = false, is_unsure = false;
+    for (const Triangle& t : {Triangle{own, right, beyond}, Triangle{own, beyond, above}, Triangle{own, right, above}, Triangle{right, beyond, above}})
+      for (const int vertex : t) {
+        const double product = tube.normal(t, tube.lattice.positions).dot(normal_at(vertex));
+        is_either_against = is_either_against || product < -1e-4;
+        is_unsure = is_unsure || std::abs(product) <= 1e-4;
+      }
+    if (is_unsure) continue;
+    looser += is_either_against && !std::isinf(found2[own]), measured += !is_either_against;
+    if (is_either_against)
+      EXPECT_TRUE(std::isinf(any2[own])) << quad;
+    else
+      EXPECT_NEAR(std::sqrt(any2[own]), std::max(height_over(own, right), height_over(own, above)), 2e-3) << quad;
+  }
+  EXPECT_GT(looser, 0);
+  EXPECT_GT(measured, quads / 10);
 }
 
 // Walks over a mesh with thin legs end on the wrong side of one, far too far away; what the furthest seems to be then must not decide which others are measured.
@@ -578,7 +683,7 @@ TEST(Guard, DoesNotTakeTheEvenLatticeForNearerThanItIs) {
     const EncodeReport report = encode_model(device(), model.mesh, model.skeleton, options).report;
     const double share = static_cast<double>(report.snap->texels_put_back) / (size * size);
     RecordProperty(name, std::to_string(share));
-    EXPECT_LT(share, 0.06) << name;
+    EXPECT_LT(share, 0.1) << name;  // then some three quarters
   }
 }
 

@@ -229,13 +229,8 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
                                                                     : spread_rows_uniformly(patch.rectangle.height);
     model.patches.push_back(std::move(patch));
   }
-  std::future<DeviceSnapTables> listing_features;
-  if (placing.has_snap) {
-    auto list = [&, on = context.beside()] {
-      return upload_tables(*on, tables_of(place_features(finding_features.get(), charts, model.patches), model.patches));
-    };
-    listing_features = context.can_run_beside() ? run_beside(std::move(list)) : std::async(std::launch::deferred, std::move(list));
-  }
+  std::future<SnapFeatures> placing_features;
+  if (placing.has_snap) placing_features = run_beside([&] { return place_features(finding_features.get(), charts, model.patches); });
   model.diagonals = options.diagonals.value_or(placing.has_snap || placing.has_fit ? DiagonalRule::kSmooth : DiagonalRule::kNearest);
   Seams seams = sample_seams(segmentation, skeleton, walls, layout.rectangles, placing.has_snap ? SeamSampling::kSnapped : SeamSampling::kEven);
   model.arcs = std::move(seams.arcs);
@@ -269,7 +264,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   const GuardSources guard{model, mesh, options.tree, charts};
   TexelOptions texel_options{.has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_fit = placing.has_fit};
   if (options.has_half_texels) texel_options.half_rule = model.diagonals;
-  TexelResult texels = read_texels(context, skeleton, walls, {charts, model.patches, hits, end_points, &guard, placing.has_snap ? &listing_features : nullptr},
+  TexelResult texels = read_texels(context, skeleton, walls, {charts, model.patches, hits, end_points, &guard, placing.has_snap ? &placing_features : nullptr},
                                    options.width, options.height, model.origin, texel_options);
   model.texture = std::move(texels.texture);
   {

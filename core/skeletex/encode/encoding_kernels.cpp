@@ -49,8 +49,8 @@ std::vector<KernelVariant> encoding_kernels(const ClContext& context, const Enco
   if (can_snap || can_fit) {
     add("lattice.cl", {"choose_diagonals"}, rows);
     add("guard.cl", {"find_normals", "normals_of_texels"}, items);
-    add("guard.cl", {"suspect_quads"}, rows);
-    add("guard.cl", {"measure_triangles"}, items);
+    add("guard.cl", {"suspect_any_quads", "suspect_quads"}, rows);
+    add("guard.cl", {"suspect_listed_quads", "measure_triangles"}, items);
     add("metro.cl", {"find_nearest_triangles"}, kSearch);
     add("guard.cl", {"measure_vertices"}, items);
     add("snap.cl", {"put_listed_back"}, rows);

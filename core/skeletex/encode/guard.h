@@ -19,7 +19,8 @@ struct GuardSources {
 
 struct GuardReport {
   int texels_put_back = 0;
-  int turned_triangles = 0, even_turned_triangles = 0;  ///< that look against the mesh: of the VSM patches' lattice, and of the even one
+  /// That look against the mesh: of the VSM patches' lattice, and of the even one, there but for its strips and fans.
+  int turned_triangles = 0, even_turned_triangles = 0;
   std::vector<int> anchors;  ///< per texel what holds it now, see ReadingPositions
 };
 
@@ -30,16 +31,18 @@ struct GuardReport {
 /// lattice's. Where the even lattice has the same faults, and not clearly fewer, they are left.
 class Guard {
  public:
-  /// Measures the even lattice. All that is given by reference must outlive the guard.
+  /// Measures the even lattice, for the most part on a thread of its own: the context is the guard's alone. All that is given by reference must outlive the guard.
   /// \param even_triangles  per texel a triangle of the map near it, of the even lattice
   /// \param even            the even lattice's points
   /// \param filtered        these as they would be stored: what texels go back to
   Guard(ClContext& context, const GuardSources& sources, const DeviceLayout& layout, const DeviceMaps& maps, ClBuffer<int> even_triangles,
         TexelPoints even, TexelPoints filtered);
   ~Guard();
+  /// Can be called once.
+  /// \param context        another queue than the guard's, beside which it goes on; it has come by what these are
   /// \param vertex_points  of the features' vertices, see SnapFeatures; none where nothing is snapped
   /// \param triangles      as even_triangles, of the points
-  GuardReport put_back_faults(std::span<const int> vertex_points, const ClBuffer<int>& triangles, ReadingPositions& positions, TexelPoints& points);
+  GuardReport put_back_faults(ClContext& context, std::span<const int> vertex_points, const ClBuffer<int>& triangles, ReadingPositions& positions, TexelPoints& points);
 
  private:
   struct Even;

@@ -6,11 +6,13 @@
 #include <limits>
 #include <memory>
 
+#include "skeletex/model/parallel.h"
+
 namespace skeletex {
 namespace {
 
 constexpr int kNoTriangle = std::numeric_limits<int>::max();  // as in encode.cl
-constexpr int kAnyHolds = -1, kNoneHolds = 0;                 // bits of anchors that keep a texel from being filtered
+constexpr int kIsKept = 1, kNoneIsKept = 0;                   // what keeps a texel from being filtered
 
 /// Distances along the rays of one SPD patch; a missed texel takes the mean of the nearest hits of its column, weighted
 /// by nearness, or of its row where the whole column missed. \return texels filled
@@ -205,6 +207,12 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   }
   place_end_rows(context, sources, texture_width, origin, points);
 
+  // Beside the rounds of unfolding, each of which is too little for all processors; the kernels before are not.
+  std::future<DeviceSnapTables> listing_features;
+  if (is_snapped) {
+    auto list = [&, on = context.beside()] { return upload_tables(*on, tables_of(sources.features->get(), sources.patches)); };
+    listing_features = context.can_run_beside() ? run_beside(std::move(list)) : std::async(std::launch::deferred, std::move(list));
+  }
   if (options.has_unfold && maps.triangle_count > 0) {
     const auto read_listed = [&](const ClBuffer<int>& listed, int count) {
       context.launch({"encode.cl", "read_listed"}, ClRange(count), count, texture_width, maps.triangle_count, listed, layout.texel_patches, covering,
@@ -217,10 +225,10 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   const TexelPoints even = points;
   const ClBuffer<int> even_covering = covering;
   const auto all_rows = context.upload(lattice_rows({sources.patches.begin(), sources.patches.end()}, RowChoice::kAll));
-  const auto prefilter = [&](ClContext& on, const TexelPoints& from, const ClBuffer<int>& anchors, int held) {
+  const auto prefilter = [&](ClContext& on, const TexelPoints& from, const ClBuffer<int>& are_kept, int kept) {
     TexelPoints filtered = allocate_points(on, texels);
-    on.launch({"encode.cl", "prefilter_positions"}, row_range(on, all_rows.size), static_cast<int>(all_rows.size), texture_width, held, all_rows,
-              layout.patches, anchors, from.x, from.y, from.z, filtered.x, filtered.y, filtered.z);
+    on.launch({"encode.cl", "prefilter_positions"}, row_range(on, all_rows.size), static_cast<int>(all_rows.size), texture_width, kept, all_rows,
+              layout.patches, are_kept, from.x, from.y, from.z, filtered.x, filtered.y, filtered.z);
     return filtered;
   };
   // The even lattice is measured beside the snapping, on a queue of its own.
@@ -230,14 +238,14 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     context.finish();
     beside = context.beside();
     measuring_even = std::async(context.can_run_beside() ? std::launch::async : std::launch::deferred, [&] {
-      const TexelPoints filtered = options.has_prefilter ? prefilter(*beside, even, even_covering, kNoneHolds) : even;
+      const TexelPoints filtered = options.has_prefilter ? prefilter(*beside, even, even_covering, kNoneIsKept) : even;
       return std::make_unique<Guard>(*beside, *sources.guard, layout, maps, even_covering, even, filtered);
     });
   }
   int put_back = 0, edges = 0;
   std::vector<int> vertex_points;
   if (is_snapped) {
-    const DeviceSnapTables features = sources.features->get();
+    const DeviceSnapTables features = listing_features.get();
     vertex_points = context.download(features.vertex_points), edges = static_cast<int>(features.edge_points.size);
     snap_positions(context, layout, features, positions);
     points = allocate_points(context, texels), covering = context.allocate<int>(texels);
@@ -259,15 +267,16 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   }
 
   if (is_fitted) result.report.fit = fit_points(context, layout, maps, covering, positions, points);
-  if (options.has_prefilter && !(is_fitted && !has_spd)) {
-    // What is fitted is not filtered as well: with SPD patches beside it, only these are.
-    points = prefilter(context, points, is_fitted ? context.upload(vsm_texels(sources.patches, texture_width, texture_height)) : positions.anchors, kAnyHolds);
-  }
+  // What is snapped or fitted is not filtered as well: with SPD patches beside it, only these are.
+  const bool is_placed = is_snapped || is_fitted;
+  if (options.has_prefilter && !is_placed) points = prefilter(context, points, positions.anchors, kNoneIsKept);
+  if (options.has_prefilter && is_placed && has_spd)
+    points = prefilter(context, points, context.upload(vsm_texels(sources.patches, texture_width, texture_height)), kIsKept);
   std::vector<int> anchors;
   if (measuring_even.valid()) {
     context.finish();
     const std::unique_ptr<Guard> even_guard = measuring_even.get();
-    GuardReport guard = even_guard->put_back_faults(vertex_points, covering, positions, points);
+    GuardReport guard = even_guard->put_back_faults(context, vertex_points, covering, positions, points);
     context.take_profile(*beside);
     result.report.turned_triangles = guard.turned_triangles, result.report.even_turned_triangles = guard.even_turned_triangles;
     (is_fitted ? result.report.fit->texels_put_back : put_back) += guard.texels_put_back;

@@ -286,6 +286,14 @@ void LatticeCrossings::view(const LatticeMesh& lattice, const Node& node, Square
   for (int i = 0; i < square.rows; ++i) square.diagonals[i] = square.copied_diagonals.data() + i * kSide;
 }
 
+/// The texels of its quads.
+void LatticeCrossings::append_quads(const Node& node, std::vector<int>& texels) const {
+  const Rectangle& r = rectangles_[grids_[node.grid].patch];
+  const int column = kSide * node.column, row = kSide * node.row;
+  for (int i = row; i < std::min(row + kSide, r.height - 3); ++i)
+    for (int k = column; k < std::min(column + kSide, r.width); ++k) texels.push_back(texel_of(grids_[node.grid].patch, k, i));
+}
+
 /// Four columns at a time, and no more than their loads, or the compiler keeps copies in memory.
 LatticeCrossings::Bounds LatticeCrossings::measure_square(const LatticeMesh& lattice, const Node& node) const {
   SquareVertices square;
@@ -692,7 +700,10 @@ void LatticeCrossings::find_between(const LatticeMesh& lattice, int a, int b, co
   const std::size_t places = leaves.size() - 1, place_a = a % places, place_b = a != b && b % places == place_a ? places : b % places;
   const TriangleBlock &one = boxes_of(lattice, a, asked, leaves[place_a]), &other = boxes_of(lattice, b, asked, leaves[place_b]);
   BlockOverlaps overlaps;
-  find_overlaps(one, other, around_b.least.data(), around_b.greatest.data(), overlaps);
+  const auto block_box = [](const Box& box) {
+    return BlockBox{{box.least[0], box.least[1], box.least[2]}, {box.greatest[0], box.greatest[1], box.greatest[2]}};
+  };
+  find_overlaps(one, other, block_box(around_b), block_box(!asked ? around_b : asked->has(b) ? asked->box(b) : no_box<Box>()), overlaps);
   if (overlaps.group_count == 0) return;
   find_planes_of(lattice, leaves[place_a]), find_planes_of(lattice, leaves[place_b]);
   BlockPairs unsettled;
@@ -810,7 +821,7 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattic
   return pairs;
 }
 
-LatticeCrossings::Others LatticeCrossings::find_between_same(std::span<const std::array<int, 2>> pairs, const LatticeMesh& other, int share) const {
+LatticeCrossings::Others LatticeCrossings::find_between_same(std::span<const std::array<int, 2>> pairs, LatticeMesh& other, int share) const {
   struct Given {
     Task leaves;
     std::array<int, 2> pair;
@@ -828,6 +839,20 @@ LatticeCrossings::Others LatticeCrossings::find_between_same(std::span<const std
   const std::size_t count = first.size() - 1;
   std::vector<std::vector<std::array<int, 2>>> found(count);
   const auto is_whole = [&](std::size_t i) { return i % share == 0; };
+  std::vector<int> quads;
+  bool has_end = false;
+  for (std::size_t i = 0; i < count; ++i) {
+    for (const int leaf : given[first[i]].leaves)
+      if (leaf >= first_of_ends()) has_end = true;
+      else if (is_whole(i)) append_quads(nodes_[leaf], quads);
+    for (std::size_t k = first[i]; k < first[i + 1] && !is_whole(i); ++k)
+      for (const int triangle : given[k].pair)
+        if (triangle < other.first_end_triangle()) quads.push_back(triangle / 2);
+  }
+  std::sort(quads.begin(), quads.end());
+  quads.erase(std::unique(quads.begin(), quads.end()), quads.end());
+  other.choose(quads);
+  if (has_end) other.fill_ends();
   for_each_block(count, kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
     Leaves& leaves = fresh_leaves();
     for (std::size_t i = begin; i < end; ++i) {

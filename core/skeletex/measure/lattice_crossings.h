@@ -29,7 +29,8 @@ class LatticeCrossings {
     std::size_t counted = 0;      ///< of these, those between such pairs of parts
     std::size_t given_there = 0;  ///< of the given ones, those between them where there is any of the others
   };
-  Others find_between_same(std::span<const std::array<int, 2>> pairs, const LatticeMesh& other, int share) const;
+  /// \param other  its triangles there are chosen and filled where they are not there yet
+  Others find_between_same(std::span<const std::array<int, 2>> pairs, LatticeMesh& other, int share) const;
 
  private:
   /// Least and greatest coordinates; the fourth does not count.
@@ -103,6 +104,7 @@ class LatticeCrossings {
     std::array<int, kSide * kSide> copied_diagonals;
   };
   void view(const LatticeMesh& lattice, const Node& node, SquareVertices& square) const;
+  void append_quads(const Node& node, std::vector<int>& texels) const;
   Bounds measure_square(const LatticeMesh& lattice, const Node& node) const;
   void measure_squares(const LatticeMesh& lattice, int first);
   void box_squares(const LatticeMesh& lattice, int first);

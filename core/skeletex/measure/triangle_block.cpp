@@ -68,7 +68,7 @@ SKELETEX_WIDE_TOO void find_planes(double margin, TriangleBlock& block) {
 
 // Both without branches but for the ends of loops: which boxes overlap, and which planes tell, is chance, and a wrong guess costs as much as four triangles.
 
-SKELETEX_WIDE_TOO void find_overlaps(const TriangleBlock& one, const TriangleBlock& other, const float* least, const float* greatest,
+SKELETEX_WIDE_TOO void find_overlaps(const TriangleBlock& one, const TriangleBlock& other, const BlockBox& around, const BlockBox& around_asked,
                                      BlockOverlaps& overlaps) {
   constexpr int kSize = TriangleBlock::kSize;
   using Flags = TriangleBlock::Lanes<int>;
@@ -80,8 +80,13 @@ SKELETEX_WIDE_TOO void find_overlaps(const TriangleBlock& one, const TriangleBlo
       do_overlap[i] = static_cast<int>(least_x[i] <= high_x) & static_cast<int>(low_x <= greatest_x[i]) & static_cast<int>(least_y[i] <= high_y) &
                       static_cast<int>(low_y <= greatest_y[i]) & static_cast<int>(least_z[i] <= high_z) & static_cast<int>(low_z <= greatest_z[i]);
   };
-  Flags are_near;
-  find_overlapping(one, least[0], least[1], least[2], greatest[0], greatest[1], greatest[2], are_near);
+  // Of the first block what is asked for and near the second one, and what is near that which is asked for there.
+  const auto find_overlapping_box = [&](const BlockBox& box, Flags& do_overlap) {
+    find_overlapping(one, box.least[0], box.least[1], box.least[2], box.greatest[0], box.greatest[1], box.greatest[2], do_overlap);
+  };
+  Flags are_near, are_near_asked;
+  find_overlapping_box(around, are_near), find_overlapping_box(around_asked, are_near_asked);
+  for (int i = 0; i < kSize; ++i) are_near[i] = (are_near[i] & one.is_asked[i]) | are_near_asked[i];
   std::array<int, kSize + 1> near;
   int near_count = 0;
   for (int i = 0; i < kSize; ++i) {

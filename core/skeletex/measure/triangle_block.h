@@ -57,9 +57,14 @@ struct BlockOverlaps {
   int group_count = 0;
   std::array<TriangleBlock::Lanes<int>, TriangleBlock::kSize> do_overlap;  ///< by i; of those in groups
 };
+/// Least and greatest coordinates; infinite the other way round where there is nothing.
+struct BlockBox {
+  std::array<float, 3> least, greatest;
+};
 /// Of two blocks, or of one, the pairs of which one is asked for. Needs no more than boxes.
-/// \param least, greatest  box around the second block
-void find_overlaps(const TriangleBlock& one, const TriangleBlock& other, const float* least, const float* greatest, BlockOverlaps& overlaps);
+/// \param around        the second block
+/// \param around_asked  what is asked for of it
+void find_overlaps(const TriangleBlock& one, const TriangleBlock& other, const BlockBox& around, const BlockBox& around_asked, BlockOverlaps& overlaps);
 
 using BlockPairs = std::array<std::array<unsigned char, 2>, TriangleBlock::kSize * TriangleBlock::kSize + 1>;
 /// Of these those where neither's plane has all of the other that they do not share on one side, further from it than rounding could put it: others do not

@@ -43,7 +43,7 @@ void choose_diagonals(ClContext& context, DiagonalRule rule, const std::vector<P
 }
 
 std::shared_ptr<const LatticeMesh::Common> LatticeMesh::make_common(ClContext& context, const SkeletexModel& model, ClBuffer<PatchRecord> patches) {
-  Common common{without_rows(number_lattice(model)), {}, {}, {}, {}, std::move(patches)};
+  Common common{without_rows(number_lattice(model)), {}, {}, {}, {0}, {}, std::move(patches)};
   common.rows = context.upload(quad_rows(model.patches));
   common.texel_patches.assign(static_cast<std::size_t>(model.texture.width) * model.texture.height, -1);
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
@@ -58,16 +58,20 @@ std::shared_ptr<const LatticeMesh::Common> LatticeMesh::make_common(ClContext& c
   for_each_block(common.seams.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
     common.seams[i] = end_seam(model, walls, common.ends, common.positions, static_cast<int>(i / 2), static_cast<BoneEnd>(i % 2));
   });
+  // A triangle per column of the row next to the end, and one per side of the seam.
+  for (std::size_t i = 0; i < common.seams.size(); ++i)
+    common.first_end.push_back(common.first_end.back() + model.patches[i / 2].rectangle.width + static_cast<int>(common.seams[i].ring.vertices.size()));
   return std::make_shared<const Common>(std::move(common));
 }
 
-LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, ClBuffer<PatchRecord> patches, DevicePlanes points)
-    : LatticeMesh(context, model, rule, make_common(context, model, std::move(patches)), std::move(points)) {}
+LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, ClBuffer<PatchRecord> patches, DevicePlanes points, Parts parts)
+    : LatticeMesh(context, model, rule, make_common(context, model, std::move(patches)), std::move(points), parts) {}
 
-LatticeMesh::LatticeMesh(const LatticeMesh& other, DiagonalRule rule, DevicePlanes points)
-    : LatticeMesh(other.context_, other.model_, rule, other.common_, std::move(points)) {}
+LatticeMesh::LatticeMesh(ClContext& context, const LatticeMesh& other, DiagonalRule rule, DevicePlanes points)
+    : LatticeMesh(context, other.model_, rule, other.common_, std::move(points), Parts::kAll) {}
 
-LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, std::shared_ptr<const Common> common, DevicePlanes points)
+LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, std::shared_ptr<const Common> common, DevicePlanes points,
+                         Parts parts)
     : context_(context),
       model_(model),
       rule_(rule),
@@ -77,26 +81,50 @@ LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, Diagona
   // Before the kernel is queued, so that the host can go on beside it.
   read_points();
   device_diagonals_ = context.allocate<int>(texel_count());
-  choose_diagonals(context, rule, model.patches, model.texture.width, common_->rows, common_->patches, points_, device_diagonals_);
+  if (parts == Parts::kAll)
+    choose_diagonals(context, rule, model.patches, model.texture.width, common_->rows, common_->patches, points_, device_diagonals_);
+  else
+    context.fill(device_diagonals_, 0);
   for_each_pole(model, common_->ends, [&](int vertex, int, int, std::size_t texel) { end_positions_[vertex] = position(static_cast<int>(texel)); });
+  std::array<std::vector<float>, 3> end_planes;
   for (const Vec3& place : end_positions_) {
     end_points_.emplace_back(0);
     end_points_.back().head<3>() = (place - model.origin).cast<float>();
+    for (int axis = 0; axis < 3; ++axis) end_planes[axis].push_back(end_points_.back()[axis]);
   }
-  std::vector<int> ends(2 * model.patches.size());
-  std::iota(ends.begin(), ends.end(), 0);
-  first_end_.push_back(0);
-  for (const std::vector<Triangle>& end : fill_ends(ends)) {
-    end_triangles_.insert(end_triangles_.end(), end.begin(), end.end());
-    first_end_.push_back(static_cast<int>(end_triangles_.size()));
-  }
+  device_end_points_ = {context.upload(end_planes[0]), context.upload(end_planes[1]), context.upload(end_planes[2])};
+  if (parts == Parts::kAsked) return;
+  fill_ends();
   diagonals_ = context.map(device_diagonals_);
+}
+
+void LatticeMesh::fill_ends() {
+  std::vector<int> ends(common_->seams.size());
+  std::iota(ends.begin(), ends.end(), 0);
+  end_triangles_.clear();
+  for (const std::vector<Triangle>& end : make_ends(ends)) end_triangles_.insert(end_triangles_.end(), end.begin(), end.end());
+}
+
+void LatticeMesh::choose(std::span<const int> texels) {
+  if (texels.empty()) return;
+  diagonals_ = {};
+  choose_listed(texels);
+  diagonals_ = context_.map(device_diagonals_);
+}
+
+void LatticeMesh::choose_listed(std::span<const int> quads) {
+  std::vector<int> patches;
+  patches.reserve(quads.size());
+  for (const int quad : quads) patches.push_back(patch_of(quad));
+  context_.launch({"lattice.cl", "choose_listed_diagonals"}, ClRange(quads.size()), static_cast<int>(quads.size()), model_.texture.width,
+                  static_cast<int>(rule_ == DiagonalRule::kSmooth), context_.upload(quads), context_.upload(patches), common_->patches, points_.x, points_.y,
+                  points_.z, device_diagonals_);
 }
 
 void LatticeMesh::read_points() { std::tie(planes_[0], planes_[1], planes_[2]) = context_.map(points_.x, points_.y, points_.z); }
 
-/// The strips or fans of ends, numbered as in first_end_.
-std::vector<std::vector<Triangle>> LatticeMesh::fill_ends(std::span<const int> ends) {
+/// The strips or fans of ends, numbered as in Common::first_end.
+std::vector<std::vector<Triangle>> LatticeMesh::make_ends(std::span<const int> ends) {
   std::vector<std::vector<Triangle>> filled(ends.size());
   for_each_block(ends.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
     const int bone = ends[i] / 2;
@@ -152,22 +180,19 @@ std::vector<int> LatticeMesh::move(std::span<const int> texels) {
       first_line = std::min(first_line, r.y + i), last_line = std::max(last_line, r.y + i);
     }
   }
-  std::vector<int> quads, patches;
+  std::vector<int> quads;
   for (auto at = is_asked.begin() + static_cast<std::ptrdiff_t>(first_line) * width, end = is_asked.begin() + static_cast<std::ptrdiff_t>(last_line + 1) * width;
        (at = std::find(at, end, 1)) != end; ++at)
     quads.push_back(static_cast<int>(at - is_asked.begin()));
-  for (const int quad : quads) patches.push_back(patch_of(quad));
 
   std::vector<int> before, changed;
   for (const int quad : quads) before.push_back(diagonals_[quad]);
   diagonals_ = {};
-  context_.launch({"lattice.cl", "choose_listed_diagonals"}, ClRange(quads.size()), static_cast<int>(quads.size()), width,
-                  static_cast<int>(rule_ == DiagonalRule::kSmooth), context_.upload(quads), context_.upload(patches), common_->patches, points_.x, points_.y,
-                  points_.z, device_diagonals_);
+  choose_listed(quads);
   std::vector<int> ends;
   for (int end = 0; end < static_cast<int>(has_moved_end.size()); ++end)
     if (has_moved_end[end]) ends.push_back(end);
-  const std::vector<std::vector<Triangle>> filled = fill_ends(ends);  // beside the kernel
+  const std::vector<std::vector<Triangle>> filled = make_ends(ends);  // beside the kernel
   diagonals_ = context_.map(device_diagonals_);
   for (std::size_t i = 0; i < quads.size(); ++i) {
     const bool is_other = diagonals_[quads[i]] != before[i];
@@ -177,10 +202,10 @@ std::vector<int> LatticeMesh::move(std::span<const int> texels) {
   }
   for (std::size_t k = 0; k < ends.size(); ++k)
     for (std::size_t i = 0; i < filled[k].size(); ++i) {
-      Triangle& triangle = end_triangles_[first_end_[ends[k]] + i];
+      Triangle& triangle = end_triangles_[common_->first_end[ends[k]] + i];
       const bool is_other = std::exchange(triangle, filled[k][i]) != filled[k][i];
       if (is_other || std::any_of(triangle.begin(), triangle.end(), [&](int vertex) { return is_texel(vertex) && is_moved[vertex]; }))
-        changed.push_back(first_end_triangle() + first_end_[ends[k]] + static_cast<int>(i));
+        changed.push_back(first_end_triangle() + common_->first_end[ends[k]] + static_cast<int>(i));
     }
   return changed;
 }

@@ -25,19 +25,26 @@ void choose_diagonals(ClContext& context, DiagonalRule rule, const std::vector<P
 ///  - triangles 2 t and 2 t + 1: of the quad to the right of and above texel t, between inner rows; those at ends follow behind all.
 class LatticeMesh {
  public:
+  /// Which triangles there are from the beginning.
+  enum class Parts {
+    kAll,
+    kAsked  ///< none before `choose` and `fill_ends`: no others may be asked for, and nothing may `move`
+  };
   /// \param rule     of its diagonals, in place of the model's
   /// \param patches  see frame_tables
   /// \param points   x, y, z per texel of the texture, relative to the model's origin; of rows 0 and height-1 only poles count.
   ///                 These planes are kept, not copied, and read by the host: see `release` for what changes in them
-  LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, ClBuffer<PatchRecord> patches, DevicePlanes points);
-  /// Other points of the same model, with which it has in common what does not depend on them.
-  LatticeMesh(const LatticeMesh& other, DiagonalRule rule, DevicePlanes points);
+  LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, ClBuffer<PatchRecord> patches, DevicePlanes points,
+              Parts parts = Parts::kAll);
+  /// Other points of the same model, with which it has in common what does not depend on them. All its triangles are there.
+  /// \param context  another queue than that of the other lattice can go on beside it
+  LatticeMesh(ClContext& context, const LatticeMesh& other, DiagonalRule rule, DevicePlanes points);
 
   const SkeletexModel& model() const { return model_; }
   int texel_count() const { return static_cast<int>(common_->texel_patches.size()); }
   int vertex_count() const { return texel_count() + static_cast<int>(end_points_.size()); }
   int first_end_triangle() const { return 2 * texel_count(); }
-  int triangle_count() const { return first_end_triangle() + static_cast<int>(end_triangles_.size()); }
+  int triangle_count() const { return first_end_triangle() + common_->first_end.back(); }
 
   bool is_texel(int vertex) const { return vertex < texel_count(); }
   int patch_of(int texel) const { return common_->texel_patches[texel]; }
@@ -68,16 +75,23 @@ class LatticeMesh {
   /// Of a strip or fan, the first triangle and that behind the last.
   std::pair<int, int> triangles_of_end(int bone, BoneEnd end) const {
     const std::size_t i = 2 * bone + static_cast<int>(end);
-    return {first_end_triangle() + first_end_[i], first_end_triangle() + first_end_[i + 1]};
+    return {first_end_triangle() + common_->first_end[i], first_end_triangle() + common_->first_end[i + 1]};
   }
   /// Whether that is a fan around a pole.
   bool is_pole(int bone, BoneEnd end) const { return common_->ends.poles[bone][static_cast<int>(end)] >= 0; }
 
   const DevicePlanes& device_points() const { return points_; }
+  /// Those of vertices behind the texels, from the model's origin.
+  const DevicePlanes& device_end_points() const { return device_end_points_; }
   /// Per texel whether its quad takes the second diagonal.
   const ClBuffer<int>& device_diagonals() const { return device_diagonals_; }
   const ClBuffer<LatticeRow>& device_rows() const { return common_->rows; }
   const ClBuffer<PatchRecord>& device_patches() const { return common_->patches; }
+
+  /// The diagonals of some quads, by their texels, of a lattice of which not all are there.
+  void choose(std::span<const int> texels);
+  /// All triangles at ends.
+  void fill_ends();
 
   /// Before anything writes to its points on the device: until `move` no vertex' place can be asked for.
   void release() { planes_ = {}; }
@@ -92,13 +106,15 @@ class LatticeMesh {
     std::vector<int> texel_patches;
     std::vector<Vec3> positions;  ///< of samples and corners
     std::vector<EndSeam> seams;   ///< per patch and end
+    std::vector<int> first_end;   ///< triangles, counted from those at the first end; and the end
     ClBuffer<LatticeRow> rows;    ///< those that quads begin at
     ClBuffer<PatchRecord> patches;
   };
   static std::shared_ptr<const Common> make_common(ClContext& context, const SkeletexModel& model, ClBuffer<PatchRecord> patches);
-  LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, std::shared_ptr<const Common> common, DevicePlanes points);
+  LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, std::shared_ptr<const Common> common, DevicePlanes points, Parts parts);
   void read_points();
-  std::vector<std::vector<Triangle>> fill_ends(std::span<const int> ends);
+  void choose_listed(std::span<const int> quads);
+  std::vector<std::vector<Triangle>> make_ends(std::span<const int> ends);
 
   ClContext& context_;
   const SkeletexModel& model_;
@@ -108,9 +124,8 @@ class LatticeMesh {
   std::vector<Eigen::Array4f> end_points_;  // of vertices behind the texels
   std::vector<Vec3> end_positions_;         // the same in double precision, not from the model's origin
   std::vector<Triangle> end_triangles_;
-  std::vector<int> first_end_;  // per patch and end, in end_triangles_; and the end
   ClMapping<int> diagonals_;
-  DevicePlanes points_;
+  DevicePlanes points_, device_end_points_;
   ClBuffer<int> device_diagonals_;
 };
 
