@@ -333,7 +333,7 @@ void add_encode_command(CLI::App& program) {
       ->group("Texels");
   command
       .add_flag("--snap,!--no-snap", a.is_snapped,
-                "texels of VSM patches sit on the mesh's own vertices and edges where they can (default: from 2 texels per vertex on, with the fit from 1.5)")
+                "texels of VSM patches sit on the mesh's own vertices and edges where they can; instead of the prefilter (default: from 2 texels per vertex on, with the fit from 1.5)")
       ->group("Texels");
   command
       .add_flag("--fit,!--no-fit", a.is_fitted,

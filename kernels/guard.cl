@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // How far a lattice and the mesh are from each other, found from nearby instead of by a tree.
-//   find_normals       normals of the mesh's triangles
-//   normals_of_texels  normals of the mesh at texels
-//   suspect_quads      quads of the lattice -> how far they could be from the mesh, by its planes at their corners
-//   suspect_any_quads  the same before diagonals are chosen
+//   find_normals          normals of the mesh's triangles
+//   normals_of_texels     normals of the mesh at texels
+//   suspect_quads         quads of the lattice -> how far they could be from the mesh, by its planes at their corners
+//   suspect_any_quads     the same before diagonals are chosen
 //   suspect_listed_quads  of some
-//   measure_triangles  triangles of the lattice -> the mesh, by a walk over it
-//   measure_vertices   vertices of the mesh -> the lattice, among the quads around their place in the map
+//   measure_triangles     triangles of the lattice -> the mesh, by a walk over it
+//   measure_vertices      vertices of the mesh -> the lattice, among the quads around their place in the map
 // The last two can only find too large a distance, where the nearest point lies elsewhere. Vertices of the lattice are texels; triangles
 // 2 t and 2 t + 1 are those of the quad to the right of and above texel t, by the diagonals that lattice.cl chooses.
 #include "skeletex_structs.h"
@@ -148,6 +148,7 @@ __attribute__((always_inline)) float suspicion2_of_any(int texel, int right, int
   return is_turned ? INFINITY : most * most;
 }
 
+// The same, compiled once.
 __attribute__((noinline)) float suspicion2_of_any_at_end(int texel, int right, int texture_width, int texel_count, global const float* texel_normals,
                                                          global const float* x, global const float* y, global const float* z) {
   return suspicion2_of_any(texel, right, texture_width, texel_count, texel_normals, x, y, z);

@@ -33,8 +33,8 @@ struct EncodeOptions {
   RowSpacing row_spacing = RowSpacing::kSurfaceLength;
   bool has_prefilter = true;
   bool has_unfold = true;  ///< see unfold_lattice; snapping and fit start from the lattice that it leaves
-  /// Texels of VSM patches sit on the mesh's own vertices and edges where they can (docs/snap.md). Default: from 2 texels per vertex
-  /// on, with the fit from 1.5 on.
+  /// Texels of VSM patches sit on the mesh's own vertices and edges where they can (docs/snap.md). Takes the prefilter's place. Default:
+  /// from 2 texels per vertex on, with the fit from 1.5 on.
   std::optional<bool> has_snap;
   /// Their points move so that the flat triangles between them are nearer to the mesh (docs/snap.md). Takes the prefilter's place.
   /// Default: with the prefilter, up to 256 x 256 texels.

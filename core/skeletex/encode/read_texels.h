@@ -32,7 +32,7 @@ struct TexelSources {
 };
 
 struct TexelOptions {
-  bool has_prefilter = true;
+  bool has_prefilter = true;    ///< of patches that are neither snapped nor fitted
   bool has_unfold = true;
   bool has_fit = false;         ///< points of VSM patches are fitted to the mesh, instead of the prefilter
   std::optional<DiagonalRule> half_rule = {};  ///< inner rows come as half floats, see round_to_half; the rule of the lattice's diagonals
