@@ -26,6 +26,7 @@
 #define PLACED 5           // states of a vertex: 0 to 3 the candidate it claims, 4 none is left
 #define BAD 1              // a mark of a texel's quad
 #define NONE -1            // of a bin's edges
+#define FLATTEST 5.0f      // of edges that texels look for again, see EdgeRecord: dihedral angles of 0.1 rad
 
 // The smallest cross product at the four corners of a quad in the map; 1 in the even lattice.
 float quad_cross(const float x[4], const float y[4]) {
@@ -331,8 +332,9 @@ __attribute__((noinline)) void place_one(global const PatchRecord* restrict p, c
 
 // Texels of one colour, as for relax_colour, go to the edge that is nearest.
 // in   odd: 1 where their columns are odd
+// out  offers: of those that could not, and are worth another try
 __attribute__((always_inline)) void place_colour(const RowColour colour, const int odd, const int height, const int texture_width, const int row,
-                                                 global const EdgeRecord* restrict edges, global const int* restrict offers, global int* restrict anchors,
+                                                 global const EdgeRecord* restrict edges, global int* restrict offers, global int* restrict anchors,
                                                  global float* restrict parameters, global const float* restrict offset_x,
                                                  global const float* restrict offset_y, global float* restrict own_x, global float* restrict own_y) {
   for (int i = get_local_id(0); i < colour.end - colour.first; i += ROW_ITEMS) {
@@ -345,6 +347,7 @@ __attribute__((always_inline)) void place_colour(const RowColour colour, const i
     const float to_x = moves ? place.dx : from_x, to_y = moves ? place.dy : from_y, t = moves ? place.t : parameters[texel];
     const int anchor = moves ? -1 - edges[e].number : anchors[texel];
     own_x[texel] = to_x, own_y[texel] = to_y, parameters[texel] = t, anchors[texel] = anchor;
+    offers[texel] = has_offer & !moves & (edges[e].flatness <= FLATTEST) ? e : NONE;
   }
 }
 
@@ -358,9 +361,9 @@ __attribute__((always_inline)) void place_few(global const PatchRecord* restrict
 }
 
 // NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. Free texels of a row relax, then go to the nearest edge within reach, one colour of the row after
-// the other. A row comes in bins of eight columns, each with a list of the edges near it, which look for theirs together.
+// the other. A row comes in bins of eight columns, which look for their edges together; bins, of this row alone or of several, have lists of the edges near them.
 // in   rows: patch, row, number of the first bin, 0: inner ones, even or odd; bin_begins: into bin_edges, numbers of edges
-//      is_again: to edges only in bins where a texel could not go to its own the time before
+//      is_again: to edges only in bins where a texel could not go to one the time before that is sharp enough (FLATTEST)
 // out  parameters: where on its edge a texel is, 0 to 1; offers: what else the kernel needs per texel
 kernel void place_on_edges(const int row_count, const int texture_width, const int is_again, global const int* restrict rows,
                            global const PatchRecord* restrict patches, global const int* restrict bin_begins, global const int* restrict bin_edges,
@@ -413,7 +416,8 @@ kernel void place_on_edges(const int row_count, const int texture_width, const i
   }
 }
 
-// NDRange and rows as for place_on_edges. Offsets with their rows by colour, from `home`, where columns follow each other.
+// NDRange and rows as for place_on_edges. Offsets with their rows by colour, from `home`, where columns follow each other. They are 0 before, and stay so in rows
+// without any at home: nearly all.
 kernel void part_colours(const int row_count, const int texture_width, global const int* restrict rows, global const PatchRecord* restrict patches,
                          global const float* restrict home_x, global const float* restrict home_y, global float* restrict offset_x,
                          global float* restrict offset_y) {
@@ -421,6 +425,9 @@ kernel void part_colours(const int row_count, const int texture_width, global co
   if (k >= row_count) return;
   global const PatchRecord* restrict p = patches + rows[4 * k];
   const int width = p->width, first = (p->y + rows[4 * k + 1]) * texture_width + p->x, odd = first + ((width + 1) >> 1);
+  int has_any = 0;
+  for (int i = 0; i < width; ++i) has_any |= (home_x[first + i] != 0.0f) | (home_y[first + i] != 0.0f);
+  if (!has_any) return;
   for (int i = get_local_id(0); i < width >> 1; i += ROW_ITEMS) {
     offset_x[first + i] = home_x[first + 2 * i], offset_x[odd + i] = home_x[first + 2 * i + 1];
     offset_y[first + i] = home_y[first + 2 * i], offset_y[odd + i] = home_y[first + 2 * i + 1];

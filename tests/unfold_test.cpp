@@ -133,7 +133,7 @@ TEST(Unfold, TakesTheFoldsOutOfALatticeOverASwirlAndTouchesNothingElse) {
   const auto read = [&](const ClBuffer<int>& texels, int count) {
     std::vector<int> walking = device().download(texels);
     walking.resize(count);
-    const std::vector<float> dx = device().download(positions.x), dy = device().download(positions.y);
+    const std::vector<float> dx = device().download(positions.home_x), dy = device().download(positions.home_y);
     std::vector<float> x = device().download(points.x), y = device().download(points.y);
     for (const int i : walking) {
       if (triangles[i] == kNone) continue;

@@ -130,12 +130,12 @@ SnapReport report_snap(int vertices, int edges, int put_back, const std::vector<
   report.vertices = vertices;
   report.edges = edges;
   report.texels_put_back = put_back;
+  // Signs, as 0 and -1.
+  const Eigen::Map<const Eigen::ArrayXi> numbers(anchors.data(), static_cast<Eigen::Index>(anchors.size()));
+  report.snapped_vertices = -(-numbers).shiftRight<31>().sum(), report.texels_on_edges = -numbers.shiftRight<31>().sum();
   // Without branches: what holds a texel follows no pattern. The first flag is that of texels on no edge.
   std::vector<char> has_texel(edges + 1, 0);
-  for (const int anchor : anchors) {
-    report.snapped_vertices += anchor > 0, report.texels_on_edges += anchor < 0;
-    has_texel[std::max(0, -anchor)] = 1;
-  }
+  for (const int anchor : anchors) has_texel[std::max(0, -anchor)] = 1;
   report.snapped_edges = static_cast<int>(std::count(has_texel.begin() + 1, has_texel.end(), 1));
   return report;
 }
@@ -179,7 +179,7 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     context.write(covering, texel_triangles);
     context.launch({"encode.cl", "read_surface"}, row_range(context, inner_rows.size), inner_row_count, texture_width, maps.triangle_count, inner_rows,
                    covering, maps.corners, maps.turns, maps.poles, maps.u_high, maps.u_low, maps.v_high, maps.v_low, maps.x, maps.y, maps.z, layout.patches,
-                   maps.row_high, maps.row_low, positions.x, positions.y, points.x, points.y, points.z, is_read);
+                   maps.row_high, maps.row_low, positions.home_x, positions.home_y, points.x, points.y, points.z, is_read);
   }
 
   // Rays.
@@ -217,10 +217,9 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     const auto read_listed = [&](const ClBuffer<int>& listed, int count) {
       context.launch({"encode.cl", "read_listed"}, ClRange(count), count, texture_width, maps.triangle_count, listed, layout.texel_patches, covering,
                      maps.corners, maps.turns, maps.poles, maps.across, maps.u_high, maps.u_low, maps.v_high, maps.v_low, maps.x, maps.y, maps.z, layout.patches,
-                     maps.row_high, maps.row_low, positions.x, positions.y, points.x, points.y, points.z, is_read);
+                     maps.row_high, maps.row_low, positions.home_x, positions.home_y, points.x, points.y, points.z, is_read);
     };
     result.report.unfold = unfold_lattice(context, layout, sources.patches, maps, covering, read_listed, positions, points);
-    copy_plane(context, positions.x, positions.home_x), copy_plane(context, positions.y, positions.home_y);
   }
   const TexelPoints even = points;
   const ClBuffer<int> even_covering = covering;
@@ -256,6 +255,7 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
                    features.vertex_points, features.edge_points, even.x, even.y, even.z, covering, points.x, points.y, points.z, is_read);
     positions.parameters = {};
   } else if (is_fitted) {
+    copy_plane(context, positions.home_x, positions.x), copy_plane(context, positions.home_y, positions.y);
     points = copy_points(context, even);
   }
   if (maps.triangle_count > 0) {

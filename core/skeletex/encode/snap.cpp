@@ -15,12 +15,13 @@
 namespace skeletex {
 namespace {
 
-constexpr int kBinWidth = 8;  // as in snap.cl
+constexpr int kBinWidth = 8;   // as in snap.cl
+constexpr int kBinHeight = 2;  // an edge is listed in fewer of them, and they list hardly more edges than bins of one row would
 
 constexpr int kEdgeRounds = 2;          // what one round has moved lets texels through that the fold test had stopped
 constexpr double kFlat = 1e-6;          // radians: what rounding may make of a flat edge
 constexpr double kFullDihedral = 0.5;   // radians: edges this sharp attract texels fully
-constexpr int kWideRounds = 3;          // of claims with a work-item per vertex; hardly any are open after them
+constexpr int kWideRounds = 2;          // of claims with a work-item per vertex; hardly any are open after them
 
 /// One work-item per vertex or edge, in groups of one size: PoCL compiles a kernel for every size that it meets.
 ClRange over(int count) { return {{static_cast<std::size_t>(count), 1}, {64, 1}}; }
@@ -149,6 +150,13 @@ constexpr int kMostTurns = 8;
 constexpr double kReach = 0.7 + 0.5;  // cells along each axis from a free texel's own place to an edge that it can go to
 constexpr double kLeastClipped = 3;   // columns that an edge has to span before it pays to look at each row's part alone
 
+/// Bands of inner rows, and bins of each.
+struct BinCounts {
+  int bands, across;
+};
+BinCounts bins_of(const Rectangle& r) { return {(std::max(0, r.height - 2) + kBinHeight - 1) / kBinHeight, (r.width + kBinWidth - 1) / kBinWidth}; }
+int band_of(int row) { return (row - 1) / kBinHeight; }
+
 /// The even and odd inner rows of VSM patches with their first bins. Two rows apart texels do not look at each other.
 /// \return how many bins there are
 int list_rows(std::span<const Patch> patches, std::array<std::vector<LatticeRow>, 2>& rows) {
@@ -156,17 +164,18 @@ int list_rows(std::span<const Patch> patches, std::array<std::vector<LatticeRow>
   for (std::size_t bone = 0; bone < patches.size(); ++bone) {
     if (patches[bone].method != Method::kVsm) continue;
     const Rectangle& r = patches[bone].rectangle;
-    for (int row = 1; row < r.height - 1; ++row, bins += (r.width + kBinWidth - 1) / kBinWidth)
-      rows[row % 2].push_back({static_cast<int>(bone), row, bins, 0});
+    const BinCounts counts = bins_of(r);
+    for (int row = 1; row < r.height - 1; ++row) rows[row % 2].push_back({static_cast<int>(bone), row, bins + band_of(row) * counts.across, 0});
+    bins += counts.bands * counts.across;
   }
   return bins;
 }
 
-/// Calls act(bin, turn of v) for the bins of a patch whose texels an edge can reach; bins count from the patch's first.
+/// Calls act(bin, turn of v) for the bins of a patch whose texels an edge can reach, band by band; bins count from the patch's first.
 template <class Act>
 void for_each_bin(const SnapFeatures::Edge& edge, int width, int height, const Act& act) {
   const int bins = (width + kBinWidth - 1) / kBinWidth;
-  const auto for_columns = [&](int first_row, int last_row, double low_x, double high_x) {
+  const auto for_columns = [&](int first_band, int last_band, double low_x, double high_x) {
     const int first = -floor_of(kReach - low_x), last = std::min(floor_of(high_x + kReach), first + width - 1);
     int turn = static_cast<int>(low_x) / width;
     while (first < turn * width) --turn;
@@ -174,19 +183,22 @@ void for_each_bin(const SnapFeatures::Edge& edge, int width, int height, const A
     for (int begin = first - turn * width; turn * width <= last; ++turn, begin = 0) {
       if (turn < -kMostTurns || turn >= kMostTurns) continue;
       const int first_bin = begin / kBinWidth, last_bin = std::min(last - turn * width, width - 1) / kBinWidth;
-      for (int row = first_row; row <= last_row; ++row)
-        for (int bin = first_bin; bin <= last_bin; ++bin) act((row - 1) * bins + bin, turn);
+      for (int band = first_band; band <= last_band; ++band)
+        for (int bin = first_bin; bin <= last_bin; ++bin) act(band * bins + bin, turn);
     }
   };
   const auto [low_x, high_x] = std::minmax(edge.x[0], edge.x[1]);
   const auto [low_y, high_y] = std::minmax(edge.y[0], edge.y[1]);
   const int first_row = std::max(1, -floor_of(kReach - low_y)), last_row = std::min(height - 2, floor_of(high_y + kReach));
-  if (high_x - low_x < kLeastClipped || high_y - low_y < kReach) return for_columns(first_row, last_row, low_x, high_x);
-  // The part of the edge near each row.
+  if (last_row < first_row) return;
+  const int first_band = band_of(first_row), last_band = band_of(last_row);
+  if (high_x - low_x < kLeastClipped || high_y - low_y < kReach) return for_columns(first_band, last_band, low_x, high_x);
+  // The part of the edge near each band.
   const double slope = (edge.x[1] - edge.x[0]) / (edge.y[1] - edge.y[0]);
-  for (int row = first_row; row <= last_row; ++row) {
-    const double a = edge.x[0] + slope * (std::max(row - kReach, low_y) - edge.y[0]), b = edge.x[0] + slope * (std::min(row + kReach, high_y) - edge.y[0]);
-    for_columns(row, row, std::min(a, b), std::max(a, b));
+  for (int band = first_band; band <= last_band; ++band) {
+    const double low = kBinHeight * band + 1 - kReach, high = kBinHeight * (band + 1) + kReach;
+    const double a = edge.x[0] + slope * (std::max(low, low_y) - edge.y[0]), b = edge.x[0] + slope * (std::min(high, high_y) - edge.y[0]);
+    for_columns(band, band, std::min(a, b), std::max(a, b));
   }
 }
 
@@ -211,7 +223,7 @@ void fill_bins(const std::vector<SnapFeatures::Edge>& edges, std::span<const Pat
   for (std::size_t bone = 0; bone < patches.size(); ++bone) {
     if (patches[bone].method != Method::kVsm) continue;
     const Rectangle& r = patches[bone].rectangle;
-    const int bins = std::max(0, r.height - 2) * ((r.width + kBinWidth - 1) / kBinWidth);
+    const int bins = bins_of(r).bands * bins_of(r).across;
     int* const counts = begins.data() + first_bin;
     entries.clear();
     for (; edge != edges.end() && edge->patch == static_cast<int>(bone); ++edge) {

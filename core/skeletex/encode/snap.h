@@ -67,7 +67,7 @@ struct SnapTables {
   std::vector<std::array<int, 2>> edge_points;
   std::vector<Edge> edges;
   std::array<std::vector<LatticeRow>, 2> rows;  ///< of VSM patches, inner ones, even and odd: patch, row, first bin, 0
-  std::vector<int> bin_begins, bin_edges;       ///< the edges near each bin of eight columns of a row
+  std::vector<int> bin_begins, bin_edges;       ///< the edges near each bin of eight columns of two rows
 };
 /// \param patches  as for place_features
 SnapTables tables_of(const SnapFeatures& features, std::span<const Patch> patches);

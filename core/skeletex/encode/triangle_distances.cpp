@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "skeletex/measure/point_triangle.h"
+#include "skeletex/model/for_each_where.h"
 
 namespace skeletex {
 namespace {
@@ -91,11 +92,11 @@ class Queries {
 
 float squared(float x) { return x * x; }
 
-/// Those that are more suspicious than that or look against the mesh.
+/// Those that are more suspicious than that or look against the mesh. \param least  finite
 std::vector<int> quads_above(const ClMapping<float>& suspicions2, float least) {
   std::vector<int> quads;
-  for (int texel = 0; texel < static_cast<int>(suspicions2.size()); ++texel)
-    if (suspicions2[texel] > least || std::isinf(suspicions2[texel])) quads.push_back(texel);
+  for_each_where(std::span(suspicions2.data(), suspicions2.size()), [least](float suspicion2) { return suspicion2 > least; },
+                 [&](std::size_t texel) { quads.push_back(static_cast<int>(texel)); });
   return quads;
 }
 std::vector<int> triangles_of(const std::vector<int>& quads) {
@@ -252,7 +253,16 @@ std::vector<Measured> TriangleDistances::measure_near(const LatticeMesh& lattice
   if (asked.empty()) return measured;
   std::vector<Triangle> corners;
   corners.reserve(asked.size()), measured.reserve(asked.size());
-  for (const int i : asked) corners.push_back(lattice.triangle(i));
+  for (std::size_t k = 0; k < asked.size(); ++k) {
+    const int i = asked[k];
+    if (i % 2 == 0 && i < lattice.first_end_triangle() && k + 1 < asked.size() && asked[k + 1] == i + 1) {
+      const auto [lower, upper] = lattice.triangles_of(i / 2, lattice.right_of(i / 2));
+      corners.push_back(lower), corners.push_back(upper);
+      ++k;
+    } else {
+      corners.push_back(lattice.triangle(i));
+    }
+  }
   const DevicePlanes &points = lattice.device_points(), &ends = lattice.device_end_points();
   auto device_distances = context_.allocate<float>(asked.size());
   auto device_turned = context_.allocate<int>(asked.size());

@@ -37,7 +37,7 @@ UnfoldReport unfold_lattice(ClContext& context, const DeviceLayout& layout, std:
   const auto relax = [&](bool is_back) {
     context.fill(quad_count, 0), context.fill(back_count, 0);
     context.launch({"unfold.cl", "relax_folds"}, ClRange(marks), layout.width, marks, static_cast<int>(is_back), marked, layout.texel_patches, layout.patches,
-                   triangles, points.x, points.y, points.z, is_marked, positions.x, positions.y, quad_count, quads, is_listed, back_count);
+                   triangles, points.x, points.y, points.z, is_marked, positions.home_x, positions.home_y, quad_count, quads, is_listed, back_count);
     read(marked, marks);
     return is_back ? context.download(back_count)[0] : 0;
   };

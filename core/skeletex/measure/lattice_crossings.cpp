@@ -448,9 +448,8 @@ void LatticeCrossings::measure_leaves(const LatticeMesh& lattice, std::span<cons
 
 LatticeCrossings::Asked LatticeCrossings::ask(const LatticeMesh& lattice, std::span<const int> triangles) const {
   Asked asked;
-  asked.triangles.assign(lattice.triangle_count(), 0), asked.nodes.assign(nodes_.size(), 0);
+  asked.nodes.assign(nodes_.size(), 0);
   for (const int number : triangles) {
-    asked.triangles[number] = 1;
     const int leaf = leaf_of(lattice, number);
     int& box_number = asked.nodes[leaf];
     if (box_number == 0) {
@@ -669,7 +668,7 @@ const TriangleBlock& LatticeCrossings::boxes_of(const LatticeMesh& lattice, int 
   }
   if (asked)
     for (int i = 0; i < TriangleBlock::kSize; ++i)
-      if (block.least[0][i] <= block.greatest[0][i]) block.is_asked[i] = asked->triangles[block.numbers[i]];
+      if (block.least[0][i] <= block.greatest[0][i]) block.is_asked[i] = is_asked_[block.numbers[i]];
   return block;
 }
 
@@ -746,11 +745,16 @@ std::vector<int> LatticeCrossings::squares_near(const Asked& asked) const {
   return squares;
 }
 
+/// Of either of two nodes to the other.
+bool LatticeCrossings::do_asked_lie_at(const Asked& asked, const Task& task) const {
+  const auto [a, b] = task;
+  return (asked.has(a) && do_overlap(asked.box(a), boxes_[b])) || (asked.has(b) && do_overlap(boxes_[a], asked.box(b)));
+}
+
 /// What is to be asked in place of a pair of nodes, or a node by itself. \return whether they are leaves that can meet
 bool LatticeCrossings::split(const Asked& asked, const Task& task, std::vector<Task>& tasks) const {
   const auto [a, b] = task;
-  // What is asked for of either has to lie at the other.
-  if (!(asked.has(a) && do_overlap(asked.box(a), boxes_[b])) && !(asked.has(b) && do_overlap(boxes_[a], asked.box(b)))) return false;
+  if (!do_asked_lie_at(asked, task)) return false;
   const Node &one = nodes_[a], &other = nodes_[b];
   if (one.level == 0 && other.level == 0) return can_meet(a, b);
   const auto parts_of = [&](const Node& node, std::array<int, 4>& parts) {
@@ -792,6 +796,8 @@ void LatticeCrossings::measure(const LatticeMesh& lattice, std::span<const int> 
 std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattice, std::span<const int> triangles) {
   if (triangles.empty()) return {};
   const Asked asked = ask(lattice, triangles);
+  is_asked_.resize(lattice.triangle_count(), 0);
+  for (const int triangle : triangles) is_asked_[triangle] = 1;
   measure_leaves(lattice, squares_near(asked), true);
   // Large nodes first, so that there are tasks for all processors.
   std::vector<Task> large, tasks;
@@ -800,10 +806,10 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattic
   while (!large.empty()) {
     const Task task = large.back();
     large.pop_back();
-    if (std::max(nodes_[task[0]].level, nodes_[task[1]].level) <= kTaskLevel)
-      tasks.push_back(task);
-    else
+    if (std::max(nodes_[task[0]].level, nodes_[task[1]].level) > kTaskLevel)
       split(asked, task, large);
+    else if (do_asked_lie_at(asked, task))
+      tasks.push_back(task);
   }
   std::vector<std::vector<std::array<int, 2>>> found(block_count(tasks.size(), kTasks));
   for_each_block(tasks.size(), kTasks, [&](std::size_t block, std::size_t begin, std::size_t end) {
@@ -815,6 +821,7 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattic
       if (split(asked, task, stack)) find_between(lattice, task[0], task[1], boxes_[task[1]], &asked, leaves, found[block]);
     }
   });
+  for (const int triangle : triangles) is_asked_[triangle] = 0;
   std::vector<std::array<int, 2>> pairs;
   for (const auto& some : found) pairs.insert(pairs.end(), some.begin(), some.end());
   std::sort(pairs.begin(), pairs.end());

@@ -76,9 +76,8 @@ class LatticeCrossings {
     int first_sample = 0, last_sample = -1;  ///< vertices of the seam, if they are neighbours on an arc
     bool has_sliver = false;                 ///< a triangle that rounding can turn: its normal tells nothing
   };
-  /// Some triangles, the nodes that have any of them, and boxes around those that each has.
+  /// Of some triangles the nodes that have any of them, and boxes around those that each has.
   struct Asked {
-    std::vector<char> triangles;
     std::vector<int> nodes;  ///< 1 + number of its box, 0 where there are none
     std::vector<Box> boxes;
     std::vector<int> leaves;  ///< sorted
@@ -117,6 +116,7 @@ class LatticeCrossings {
   EndLeaf describe_end(const LatticeMesh& lattice, const Node& node) const;
   int first_of_ends() const { return grids_[rectangles_.size()].levels[0].first; }
 
+  bool do_asked_lie_at(const Asked& asked, const Task& task) const;
   bool can_meet(int a, int b) const;
   bool is_smooth_within(const Node& a, const Node& b) const;
   bool is_smooth_at_end(const Node& end, const Node& square) const;
@@ -141,6 +141,7 @@ class LatticeCrossings {
   std::vector<Box> boxes_;        // of nodes
   std::vector<Normals> normals_;  // of leaves; of squares that are not near what was asked for any
   std::vector<EndLeaf> ends_;     // per node behind those of patches
+  std::vector<char> is_asked_;    // per triangle, while pairs with some are looked for
 };
 
 }  // namespace skeletex

@@ -18,14 +18,10 @@ constexpr double kCapCost = 1;          // times the square of its longest side
 constexpr int kAroundCap = 3;           // seam vertices where caps are charged, before and behind one
 
 /// What it costs that a triangle is a cap, one with hardly an area and a direction of its own: a texel or sample lies between two others that
-/// sit on the same edge of the mesh.
-double cap_cost(const Vec3& a, const Vec3& b, const Vec3& c) {
-  std::array<Vec3, 3> sides{c - b, a - c, b - a};
-  std::array<double, 3> lengths2{sides[0].squaredNorm(), sides[1].squaredNorm(), sides[2].squaredNorm()};
-  const auto longest = static_cast<int>(std::max_element(lengths2.begin(), lengths2.end()) - lengths2.begin());
-  const int next = (longest + 1) % 3, last = (longest + 2) % 3;
-  const double along = sides[next].dot(sides[last]);
-  return along > 0 && along * along > kCapCosine2 * lengths2[next] * lengths2[last] ? kCapCost * lengths2[longest] : 0;
+/// sit on the same edge of the mesh. By its sides, squared.
+double cap_cost(double a2, double b2, double c2) {
+  const double longest2 = std::max({a2, b2, c2}), along = 0.5 * (2 * longest2 - (a2 + b2 + c2));  // the others' inner product
+  return along > 0 && along * along * longest2 > kCapCosine2 * a2 * b2 * c2 ? kCapCost * longest2 : 0;
 }
 
 }  // namespace
@@ -100,7 +96,16 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::s
     first[k] = std::max(first_column(start + k) - start_column, 0), last[k] = std::min(last_column(start + k) - start_column, n);
     place[k + 1] = place[k] + last[k] - first[k] + 1;
   }
-  std::vector<double> best(place[m + 1]);     // best[place[k] + j - first[k]]: the cheapest merge that joins seam vertex k to column j
+  // Squared lengths: of what joins seam vertex k to column j, at place[k] + j - first[k], and along the rings from k or j on.
+  std::vector<double> joints2(place[m + 1]), seam_steps2(m), row_steps2(n);
+  for (int k = 0; k <= m; ++k)
+    for (int j = first[k]; j <= last[k]; ++j) joints2[place[k] + j - first[k]] = (seam_points[k] - row_points[j]).squaredNorm();
+  for (int k = 0; k < m; ++k) seam_steps2[k] = (seam_points[k + 1] - seam_points[k]).squaredNorm();
+  for (int j = 0; j < n; ++j) row_steps2[j] = (row_points[j + 1] - row_points[j]).squaredNorm();
+  const auto joint2 = [&](int k, int j) { return joints2[place[k] + j - first[k]]; };
+  const auto column_cap_cost = [&](int k, int j) { return cap_cost(joint2(k, j), joint2(k, j + 1), row_steps2[j]); };
+  const auto seam_cap_cost = [&](int k, int j) { return cap_cost(joint2(k, j), joint2(k + 1, j), seam_steps2[k]); };
+  std::vector<double> best(place[m + 1]);     // the cheapest merge that joins k to j, at the same places
   std::vector<char> along_row(place[m + 1]);  // the last step went to the next column, not to the next seam vertex
   std::vector<char> charges_caps(m + 1, 0);
   const auto find_cheapest = [&](int from) {
@@ -109,10 +114,10 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::s
         const int at = place[k] + j - first[k];
         const bool has_column = j > first[k], has_seam = k > 0 && j <= last[k - 1];
         double from_column = has_column ? best[at - 1] : 0, from_seam = has_seam ? best[place[k - 1] + j - first[k - 1]] : 0;
-        if (charges_caps[k] && has_column) from_column += cap_cost(seam_points[k], row_points[j - 1], row_points[j]);
-        if (charges_caps[k] && has_seam) from_seam += cap_cost(seam_points[k - 1], seam_points[k], row_points[j]);
+        if (charges_caps[k] && has_column) from_column += column_cap_cost(k, j - 1);
+        if (charges_caps[k] && has_seam) from_seam += seam_cap_cost(k - 1, j);
         along_row[at] = has_column && (!has_seam || from_column < from_seam);
-        best[at] = (along_row[at] ? from_column : from_seam) + (seam_points[k] - row_points[j]).squaredNorm();
+        best[at] = (along_row[at] ? from_column : from_seam) + joints2[at];
       }
   };
   const std::size_t begin = triangles.size();
@@ -130,12 +135,12 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::s
         --j;
         const int apex = seam_vertices[k], here = row_vertices[j], next = row_vertices[j + 1];
         triangles.push_back(is_head ? Triangle{apex, next, here} : Triangle{here, next, apex});
-        if (cap_cost(seam_points[k], row_points[j], row_points[j + 1]) > 0) look_again(k);
+        if (column_cap_cost(k, j) > 0) look_again(k);
       } else {
         --k;
         const int apex = row_vertices[j], here = seam_vertices[k], next = seam_vertices[k + 1];
         triangles.push_back(is_head ? Triangle{here, next, apex} : Triangle{apex, next, here});
-        if (cap_cost(seam_points[k], seam_points[k + 1], row_points[j]) > 0) look_again(k);
+        if (seam_cap_cost(k, j) > 0) look_again(k);
       }
     }
     return again;
