@@ -315,16 +315,19 @@ __attribute__((always_inline)) EdgePlace place_on(global const EdgeRecord* edge,
   return place;
 }
 
-// A free texel of any column. Compiled once.
+// A free texel of any column; if it cannot, and the edge is flat, it has no offer any more. Compiled once.
 __attribute__((noinline)) void place_one(global const PatchRecord* restrict p, const int texture_width, const int column, const int row,
-                                            global const EdgeRecord* restrict edges, global const int* offers, global int* restrict anchors,
+                                            global const EdgeRecord* restrict edges, global int* offers, global int* restrict anchors,
                                             global float* restrict parameters, global float* offset_x, global float* offset_y) {
   const Neighbours n = neighbours_of(p, texture_width, column, row);
   const int texel = n.own, e = offers[texel];
   if (e == NONE) return;
   const EdgePlace place = place_on(edges + e, column, row, offset_x[texel], offset_y[texel]);
-  if (fmax(fabs(place.dx), fabs(place.dy)) > FURTHEST) return;
-  if (cross_around(n, p->height, texture_width, row, place.dx, place.dy, offset_x, offset_y) < LEAST_CROSS) return;
+  if (fmax(fabs(place.dx), fabs(place.dy)) > FURTHEST ||
+      cross_around(n, p->height, texture_width, row, place.dx, place.dy, offset_x, offset_y) < LEAST_CROSS) {
+    if (edges[e].flatness > FLATTEST) offers[texel] = NONE;
+    return;
+  }
   offset_x[texel] = place.dx, offset_y[texel] = place.dy;
   parameters[texel] = place.t;
   anchors[texel] = -1 - edges[e].number;
@@ -347,13 +350,14 @@ __attribute__((always_inline)) void place_colour(const RowColour colour, const i
     const float to_x = moves ? place.dx : from_x, to_y = moves ? place.dy : from_y, t = moves ? place.t : parameters[texel];
     const int anchor = moves ? -1 - edges[e].number : anchors[texel];
     own_x[texel] = to_x, own_y[texel] = to_y, parameters[texel] = t, anchors[texel] = anchor;
-    offers[texel] = has_offer & !moves & (edges[e].flatness <= FLATTEST) ? e : NONE;
+    const int is_open = has_offer & !moves & (edges[e].flatness <= FLATTEST);
+    offers[texel] = is_open ? e : NONE;
   }
 }
 
 // The same where hardly any texel has an offer.
 __attribute__((always_inline)) void place_few(global const PatchRecord* restrict p, const RowColour colour, const int odd, const int texture_width, const int row,
-                                              global const EdgeRecord* restrict edges, global const int* restrict offers, global int* restrict anchors,
+                                              global const EdgeRecord* restrict edges, global int* restrict offers, global int* restrict anchors,
                                               global float* restrict parameters, global float* offset_x, global float* offset_y) {
   for (int i = get_local_id(0); i < colour.end - colour.first; i += ROW_ITEMS)
     if (offers[colour.first + i] != NONE)

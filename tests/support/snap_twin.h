@@ -112,7 +112,7 @@ struct SnapLattice {
   /// \param first   as above
   /// \param chosen  in and out, per texel: what it chooses; the time before, -1 there for none
   void snap_to_edges(int first, const std::vector<SnapFeatures::Edge>& edges, bool is_again, std::vector<int>& chosen) {
-    // The second time only bins of eight columns where a texel could not go to its edge.
+    // The second time only bins of eight columns where a texel could not go to its edge, and that is not flat.
     const std::vector<int> before = chosen;
     const auto is_looked_at = [&](int column, int row) {
       const int first_column = column / 8 * 8;
@@ -154,6 +154,7 @@ struct SnapLattice {
           double dx = 0, dy = 0;
           nearest(edges[e], j, row, dx, dy);
           if (std::abs(dx) <= 1 && std::abs(dy) <= 1 && move(j, row, dx, dy)) anchors[at(j, row)] = -1 - e;
+          else if (edges[e].dihedral < 0.1) chosen[at(j, row)] = -1;
         }
   }
 
