@@ -186,6 +186,23 @@ TEST(Snap, PutsTexelsWhereItsTwinDoes) {
   }
 }
 
+TEST(Snap, LooksForEdgesAgainOnlyWhereTheyAreSharp) {
+  // Which edge is the nearest does not depend on a dihedral angle that all have.
+  const auto texels_on_edges = [](double dihedral) {
+    std::ptrdiff_t count = 0;
+    for (unsigned seed = 1; seed <= 12; ++seed) {
+      std::mt19937 random(seed);
+      const OnePatch patch(random_rectangle(random));
+      SnapFeatures features = random_features(patch.rectangle(), random);
+      for (SnapFeatures::Edge& edge : features.edges) edge.dihedral = dihedral;
+      const std::vector<int> anchors = snapped(patch, features).anchors;
+      count += std::count_if(anchors.begin(), anchors.end(), [](int anchor) { return anchor < 0; });
+    }
+    return count;
+  };
+  EXPECT_GT(texels_on_edges(0.101), texels_on_edges(0.099));
+}
+
 TEST(Snap, NeverFoldsTheMapAndHoldsTexelsExactlyOnTheirVertexOrEdge) {
   for (unsigned seed = 100; seed < 112; ++seed) {
     SCOPED_TRACE(seed);
