@@ -17,25 +17,6 @@ namespace {
 constexpr int kVertexReach = 6;  // columns and rows around a texel: diagonals depend on it, vertices are measured to their quads (guard.cl)
 constexpr int kEndsInBox = 32;   // triangles of strips and fans that a vertex is compared to at once
 
-/// The end of its patch that a vertex is next to: patch and end as one number, as LatticeMesh has them in order.
-int end_of(const PlacedVertex& vertex) { return 2 * vertex.patch + (vertex.y < 2 ? 0 : 1); }
-/// That of a triangle at one.
-int end_with(const LatticeMesh& lattice, int triangle) {
-  int end = 0;
-  while (triangle >= lattice.triangles_of_end(end / 2, static_cast<BoneEnd>(end % 2)).second) ++end;
-  return end;
-}
-/// Whether ends have any of some triangles. \param triangles  in order
-std::vector<char> ends_with(const LatticeMesh& lattice, const std::vector<int>& triangles) {
-  std::vector<char> have_any(2 * lattice.model().patches.size(), 0);
-  for (auto at = std::lower_bound(triangles.begin(), triangles.end(), lattice.first_end_triangle()); at != triangles.end();) {
-    const int end = end_with(lattice, *at);
-    have_any[end] = 1;
-    at = std::lower_bound(at, triangles.end(), lattice.triangles_of_end(end / 2, static_cast<BoneEnd>(end % 2)).second);
-  }
-  return have_any;
-}
-
 }  // namespace
 
 PlacedVertices place_vertices(std::span<const Chart> charts, std::span<const Patch> patches, const DeviceMaps& maps, const DeviceLayout& layout) {
@@ -66,14 +47,9 @@ VertexDistances::VertexDistances(const SkeletexModel& model, std::span<const Cha
 
 void VertexDistances::list(std::span<const int> vertex_points, std::vector<int> anchors) {
   anchors_ = std::move(anchors);
-  // Without branches: which texels are on vertices follows no pattern. The last flag is that of the others.
-  const int none = static_cast<int>(maps_.x.size);
-  is_held_.assign(none + 1, 0);
-  if (!vertex_points.empty())
-    for (const int anchor : anchors_) {
-      const int point = vertex_points[std::max(anchor, 1) - 1];
-      is_held_[anchor > 0 ? point : none] = 1;
-    }
+  is_held_.assign(maps_.x.size, 0);
+  for (const int anchor : anchors_)
+    if (anchor > 0) is_held_[vertex_points[anchor - 1]] = 1;
   vertices_.resize(placed_.all.size());
   are_near_.assign(layout_.size(), 0), are_lines_near_.assign(layout_.height, 0);
   asked_.clear();
@@ -137,13 +113,10 @@ std::vector<int> VertexDistances::triangles_at_far(const LatticeMesh& lattice, c
       far.push_back(vertices_[i].nearest);
     }
   }
-  // Strips and fans can be nearer: nearly always their own, those across the seam else. Where neither their own nor the nearest are other than they were, what
-  // was found still holds: at most another one has come nearer.
-  const std::vector<char> has_moved = ends_with(lattice, changed);
-  std::erase_if(at_ends, [&](int i) {
-    const MeasuredVertex& measured = vertices_[i];
-    return measured.is_compared && has_moved[end_of(placed_.all[i])] == 0 && (measured.nearest_end < 0 || has_moved[measured.nearest_end] == 0);
-  });
+  // Where these are not what they were, all are compared to them again.
+  const bool have_ends_moved = std::any_of(changed.begin(), changed.end(), [&](int triangle) { return triangle >= lattice.first_end_triangle(); });
+  // Strips and fans can be nearer: nearly always their own, those across the seam else.
+  std::erase_if(at_ends, [&](int i) { return vertices_[i].is_compared && !have_ends_moved; });
   compare_to_ends(lattice, at_ends, limit);
   for (const int i : far_)
     if (vertices_[i].is_compared && vertices_[i].nearer >= 0) far.push_back(vertices_[i].nearer);
@@ -182,12 +155,12 @@ void VertexDistances::compare_to_ends(const LatticeMesh& lattice, const std::vec
     Eigen::Array4f place = Eigen::Array4f::Zero();
     place.head<3>() = (point - model_.origin).cast<float>().array();
     double least2 = measured.distance2;
-    measured.is_compared = true, measured.nearer = measured.nearest, measured.nearest_end = -1;
+    measured.is_compared = true, measured.nearer = measured.nearest;
     const auto is_too_far = [&](const Box& box) {
       const Eigen::Array4f gap = (box.least - place).max(place - box.greatest).max(margin) - margin;
       return static_cast<double>((gap * gap).sum()) > least2;
     };
-    const auto [begin, end] = lattice.triangles_of_end(vertex.patch, static_cast<BoneEnd>(end_of(vertex) % 2));
+    const auto [begin, end] = lattice.triangles_of_end(vertex.patch, vertex.y < 2 ? BoneEnd::kHead : BoneEnd::kTail);
     for (const auto& [first, last] : {std::pair(begin, end), std::pair(first_end, all)}) {
       for (int i = first; i < last; ++i) {
         if (is_too_far(box_with(i))) {
@@ -200,7 +173,6 @@ void VertexDistances::compare_to_ends(const LatticeMesh& lattice, const std::vec
         const double distance2 = offset_from_triangle(point, a, b, c).squaredNorm();
         if (distance2 < least2) least2 = distance2, measured.nearer = i;
       }
-      if (measured.nearer >= first_end) measured.nearest_end = end_with(lattice, measured.nearer);
       if (least2 <= static_cast<double>(limit) * limit) measured.nearer = -1;
       if (measured.nearer < 0) break;
     }

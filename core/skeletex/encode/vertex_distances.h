@@ -53,7 +53,6 @@ class VertexDistances {
     bool is_far = false;
     bool is_compared = false;  ///< to strips and fans as well
     int nearer = -1;           ///< then the triangle that it is nearest to, -1 if it is not far
-    int nearest_end = -1;      ///< the strip or fan, as number of patch and end, that was nearer than the quads; -1: none
   };
   std::vector<int> triangles_at_far(const LatticeMesh& lattice, const std::vector<int>& changed, float limit);
   void compare_to_ends(const LatticeMesh& lattice, const std::vector<int>& asked, float limit);
