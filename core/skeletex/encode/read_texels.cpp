@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/encode/read_texels.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <future>
 #include <limits>
