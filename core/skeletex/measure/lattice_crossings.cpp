@@ -846,20 +846,21 @@ LatticeCrossings::Others LatticeCrossings::find_between_same(std::span<const std
   const std::size_t count = first.size() - 1;
   std::vector<std::vector<std::array<int, 2>>> found(count);
   const auto is_whole = [&](std::size_t i) { return i % share == 0; };
-  std::vector<int> quads;
-  bool has_end = false;
+  std::vector<int> quads, ends;
   for (std::size_t i = 0; i < count; ++i) {
     for (const int leaf : given[first[i]].leaves)
-      if (leaf >= first_of_ends()) has_end = true;
+      if (const Grid& grid = grids_[nodes_[leaf].grid]; grid.end >= 0) ends.push_back(2 * grid.patch + grid.end);
       else if (is_whole(i)) append_quads(nodes_[leaf], quads);
     for (std::size_t k = first[i]; k < first[i + 1] && !is_whole(i); ++k)
       for (const int triangle : given[k].pair)
         if (triangle < other.first_end_triangle()) quads.push_back(triangle / 2);
   }
-  std::sort(quads.begin(), quads.end());
-  quads.erase(std::unique(quads.begin(), quads.end()), quads.end());
+  for (std::vector<int>* each : {&quads, &ends}) {
+    std::sort(each->begin(), each->end());
+    each->erase(std::unique(each->begin(), each->end()), each->end());
+  }
   other.choose(quads);
-  if (has_end) other.fill_ends();
+  other.fill_ends(ends);
   for_each_block(count, kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
     Leaves& leaves = fresh_leaves();
     for (std::size_t i = begin; i < end; ++i) {

@@ -94,15 +94,16 @@ LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, Diagona
   }
   device_end_points_ = {context.upload(end_planes[0]), context.upload(end_planes[1]), context.upload(end_planes[2])};
   if (parts == Parts::kAsked) return;
-  fill_ends();
+  std::vector<int> ends(common_->seams.size());
+  std::iota(ends.begin(), ends.end(), 0);
+  fill_ends(ends);
   diagonals_ = context.map(device_diagonals_);
 }
 
-void LatticeMesh::fill_ends() {
-  std::vector<int> ends(common_->seams.size());
-  std::iota(ends.begin(), ends.end(), 0);
-  end_triangles_.clear();
-  for (const std::vector<Triangle>& end : make_ends(ends)) end_triangles_.insert(end_triangles_.end(), end.begin(), end.end());
+void LatticeMesh::fill_ends(std::span<const int> ends) {
+  end_triangles_.resize(common_->first_end.back());
+  const std::vector<std::vector<Triangle>> filled = make_ends(ends);
+  for (std::size_t k = 0; k < ends.size(); ++k) std::copy(filled[k].begin(), filled[k].end(), end_triangles_.begin() + common_->first_end[ends[k]]);
 }
 
 void LatticeMesh::choose(std::span<const int> texels) {

@@ -90,8 +90,8 @@ class LatticeMesh {
 
   /// The diagonals of some quads, by their texels, of a lattice of which not all are there.
   void choose(std::span<const int> texels);
-  /// All triangles at ends.
-  void fill_ends();
+  /// The triangles at some ends: of patch i 2 i and 2 i + 1.
+  void fill_ends(std::span<const int> ends);
 
   /// Before anything writes to its points on the device: until `move` no vertex' place can be asked for.
   void release() { planes_ = {}; }
