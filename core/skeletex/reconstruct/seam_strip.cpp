@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "skeletex/model/loop_turns.h"
@@ -67,10 +68,12 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::s
   // The columns that a seam vertex may be joined to: those between its neighbours' angles and a little more, but never
   // n + 1 of them, so that no column is met twice from the same vertex.
   const auto first_column = [&](int i) {
-    return static_cast<int>(std::ceil(std::max(column_of(i - 1) - kSlackColumns, column_of(i) - 0.5 * (n - 1))));
+    const double column = std::max(column_of(i - 1) - kSlackColumns, column_of(i) - 0.5 * (n - 1));
+    return static_cast<int>(column) + (static_cast<int>(column) < column);
   };
   const auto last_column = [&](int i) {
-    return static_cast<int>(std::floor(std::min(column_of(i + 1) + kSlackColumns, column_of(i) + 0.5 * (n - 1))));
+    const double column = std::min(column_of(i + 1) + kSlackColumns, column_of(i) + 0.5 * (n - 1));
+    return static_cast<int>(column) - (static_cast<int>(column) > column);
   };
 
   int start = 0;
@@ -109,7 +112,22 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::s
   std::vector<char> along_row(place[m + 1]);  // the last step went to the next column, not to the next seam vertex
   std::vector<char> charges_caps(m + 1, 0);
   const auto find_cheapest = [&](int from) {
-    for (int k = from; k <= m; ++k)
+    for (int k = from; k <= m; ++k) {
+      if (k > 0 && !charges_caps[k] && first[k] <= last[k - 1]) {
+        // Without branches: which of the two is cheaper follows no pattern.
+        const int before = place[k - 1] - first[k - 1], own = place[k] - first[k], last_of_both = std::min(last[k], last[k - 1]);
+        const double* const lengths2 = joints2.data();
+        double* const costs = best.data();
+        char* const steps = along_row.data();
+        double cheapest = std::numeric_limits<double>::infinity();
+        int j = first[k];
+        for (; j <= last_of_both; ++j) {
+          steps[own + j] = cheapest < costs[before + j];
+          costs[own + j] = cheapest = std::min(costs[before + j], cheapest) + lengths2[own + j];
+        }
+        for (const int last_of_own = last[k]; j <= last_of_own; ++j) steps[own + j] = 1, costs[own + j] = cheapest = cheapest + lengths2[own + j];
+        continue;
+      }
       for (int j = first[k]; j <= last[k]; ++j) {
         const int at = place[k] + j - first[k];
         const bool has_column = j > first[k], has_seam = k > 0 && j <= last[k - 1];
@@ -119,8 +137,10 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::s
         along_row[at] = has_column && (!has_seam || from_column < from_seam);
         best[at] = (along_row[at] ? from_column : from_seam) + joints2[at];
       }
+    }
   };
   const std::size_t begin = triangles.size();
+  triangles.reserve(begin + m + n);
   const bool is_head = end == BoneEnd::kHead;
   /// \return the first seam vertex where the merge is to be looked for again, m + 1 if none
   const auto take_cheapest = [&] {
