@@ -148,7 +148,7 @@ namespace {
 
 constexpr int kMostTurns = 8;
 constexpr double kReach = 0.7 + 0.5;  // cells along each axis from a free texel's own place to an edge that it can go to
-constexpr double kLeastClipped = 3;   // columns that an edge has to span before it pays to look at each row's part alone
+constexpr double kLeastClipped = 3;   // columns that an edge has to span before it pays to look at each band's part alone
 
 /// Bands of inner rows, and bins of each.
 struct BinCounts {

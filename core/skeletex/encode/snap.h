@@ -95,7 +95,8 @@ struct DeviceSnapTables {
 /// \throw DeviceError when there is no room
 DeviceSnapTables upload_tables(ClContext& context, const SnapTables& tables);
 
-/// Moves reading positions to vertices, strongest first, and then to creased edges; the map does not fold.
+/// Moves reading positions from home to vertices, strongest first, and then to creased edges; the map does not fold.
+/// \param positions  x and y are 0 before, whatever is at home
 void snap_positions(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables, ReadingPositions& positions);
 
 /// Planes of points, one per texel.
