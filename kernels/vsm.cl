@@ -194,7 +194,8 @@ VSM_ONCE void form_residual_of_slice(int slice, global const int* restrict slice
   // Four rows at once: a neighbour's map is one load, where eight rows side by side would gather each of its parts.
   for (int i = 0; i < VSM_LANES; i += 4) {
     const int row = first + i, longest = max(max(row_length[row], row_length[row + 1]), max(row_length[row + 2], row_length[row + 3]));
-    const float16 own = vload16(0, map + 4 * row);
+    const float8 own_low = vload8(0, map + 4 * row), own_high = vload8(0, map + 4 * row + 8);
+    const float8 own_u = (float8)(own_low.s0145, own_high.s0145), own_v = (float8)(own_low.s2367, own_high.s2367);
     float8 sum = 0.0f, total = 0.0f;
     for (int k = 0; k < longest; ++k) {
       const int e = entry_index(slice_begin, row, k);
@@ -203,7 +204,7 @@ VSM_ONCE void form_residual_of_slice(int slice, global const int* restrict slice
       // Weights of padding are 0.
       const float4 weight_u = vload4(0, weights + e), weight_v = jump == VSM_POLE ? (float4)0.0f : weight_u;
       const float8 jump_v = (float8)((float4)0.0f, convert_float4(jump)).s04152637, weight = (float8)(weight_u, weight_v).s04152637;
-      const float8 value = weight * lifted_differences(own.s014589cd, own.s2367abef, (float8)(at0.xy, at1.xy, at2.xy, at3.xy),
+      const float8 value = weight * lifted_differences(own_u, own_v, (float8)(at0.xy, at1.xy, at2.xy, at3.xy),
                                                        (float8)(at0.zw, at1.zw, at2.zw, at3.zw), jump_v);
       sum += value;
       total += fabs(value);
