@@ -284,6 +284,10 @@ float8 gathered(const int8 at, global const float* from) {
   return (float8)(from[at.s0], from[at.s1], from[at.s2], from[at.s3], from[at.s4], from[at.s5], from[at.s6], from[at.s7]);
 }
 
+int8 gathered_ints(const int8 at, global const int* from) {
+  return (int8)(from[at.s0], from[at.s1], from[at.s2], from[at.s3], from[at.s4], from[at.s5], from[at.s6], from[at.s7]);
+}
+
 // Of a bin's edges those that are nearest to eight texels, by distance / weight, and within reach; of two as near the first one.
 int8 nearest_edges(const float8 x, const float8 y, const int begin, const int end, global const int* restrict bin_edges,
                    global const EdgeRecord* restrict edges) {
@@ -302,77 +306,79 @@ int8 nearest_edges(const float8 x, const float8 y, const int begin, const int en
   return nearest;
 }
 
-// Where a texel goes that an edge is near, and the parameter of that point of the edge.
-typedef struct EdgePlace {
-  float dx, dy, t;
-} EdgePlace;
+// Records of eight edges, by field.
+typedef struct EdgeRecords {
+  float8 x, y, ex, ey, over_x, over_y, flatness;
+  int8 number;
+} EdgeRecords;
 
-// in   offset_x, offset_y: of the texel now
-__attribute__((always_inline)) EdgePlace place_on(global const EdgeRecord* edge, int column, int row, float offset_x, float offset_y) {
-  const float to_x = edge->x - ((float)column + offset_x), to_y = edge->y - ((float)row + offset_y);
-  const float t = clamp(to_x * edge->over_x + to_y * edge->over_y, 0.0f, 1.0f);
-  const EdgePlace place = {to_x + t * edge->ex + offset_x, to_y + t * edge->ey + offset_y, t};
-  return place;
+EdgeRecords gathered_edges(const int8 at, global const EdgeRecord* restrict edges) {
+  global const float* from = (global const float*)edges;
+  const int8 first = at * 8;
+  const EdgeRecords all = {gathered(first, from), gathered(first, from + 1), gathered(first, from + 2), gathered(first, from + 3),
+                           gathered(first, from + 4), gathered(first, from + 5), gathered(first, from + 6), as_int8(gathered(first, from + 7))};
+  return all;
 }
 
-// A free texel of any column; if it cannot, and the edge is flat, it has no offer any more. Compiled once.
+// What an edge offers a texel: its number, and whether it is so sharp that another try is worth it. NONE: nothing.
+int8 offers_of(const EdgeRecords edges) { return 2 * edges.number + ((edges.flatness <= FLATTEST) & 1); }
+int number_of_offer(int offer) { return offer >> 1; }
+int is_sharp_offer(int offer) { return offer & 1; }
+
+// A free texel of any column goes where its offer is; if it cannot, and the edge is flat, it has none any more. Compiled once.
 __attribute__((noinline)) void place_one(global const PatchRecord* restrict p, const int texture_width, const int column, const int row,
-                                            global const EdgeRecord* restrict edges, global int* offers, global int* restrict anchors,
-                                            global float* restrict parameters, global float* offset_x, global float* offset_y) {
+                                            global const float* restrict target_x, global const float* restrict target_y, global int* offers,
+                                            global int* restrict anchors, global float* offset_x, global float* offset_y) {
   const Neighbours n = neighbours_of(p, texture_width, column, row);
-  const int texel = n.own, e = offers[texel];
-  if (e == NONE) return;
-  const EdgePlace place = place_on(edges + e, column, row, offset_x[texel], offset_y[texel]);
-  if (fmax(fabs(place.dx), fabs(place.dy)) > FURTHEST ||
-      cross_around(n, p->height, texture_width, row, place.dx, place.dy, offset_x, offset_y) < LEAST_CROSS) {
-    if (edges[e].flatness > FLATTEST) offers[texel] = NONE;
+  const int texel = n.own, offer = offers[texel];
+  if (offer == NONE) return;
+  const float dx = target_x[texel], dy = target_y[texel];
+  if (fmax(fabs(dx), fabs(dy)) > FURTHEST || cross_around(n, p->height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) {
+    if (!is_sharp_offer(offer)) offers[texel] = NONE;
     return;
   }
-  offset_x[texel] = place.dx, offset_y[texel] = place.dy;
-  parameters[texel] = place.t;
-  anchors[texel] = -1 - edges[e].number;
+  offset_x[texel] = dx, offset_y[texel] = dy;
+  anchors[texel] = -1 - number_of_offer(offer), offers[texel] = NONE;
 }
 
 // Texels of one colour, as for relax_colour, go to the edge that is nearest.
-// in   odd: 1 where their columns are odd
 // out  offers: of those that could not, and are worth another try
-__attribute__((always_inline)) void place_colour(const RowColour colour, const int odd, const int height, const int texture_width, const int row,
-                                                 global const EdgeRecord* restrict edges, global int* restrict offers, global int* restrict anchors,
-                                                 global float* restrict parameters, global const float* restrict offset_x,
+__attribute__((always_inline)) void place_colour(const RowColour colour, const int height, const int texture_width, const int row,
+                                                 global const float* restrict target_x, global const float* restrict target_y,
+                                                 global int* restrict offers, global int* restrict anchors, global const float* restrict offset_x,
                                                  global const float* restrict offset_y, global float* restrict own_x, global float* restrict own_y) {
   for (int i = get_local_id(0); i < colour.end - colour.first; i += ROW_ITEMS) {
-    const int texel = colour.first + i, has_offer = offers[texel] != NONE, e = has_offer ? offers[texel] : 0;
-    const float from_x = own_x[texel], from_y = own_y[texel];
-    const EdgePlace place = place_on(edges + e, odd ? 2 * i + 1 : 2 * i + 2, row, from_x, from_y);
+    const int texel = colour.first + i, offer = offers[texel], has_offer = offer != NONE;
+    const float from_x = own_x[texel], from_y = own_y[texel], dx = target_x[texel], dy = target_y[texel];
     const Neighbours n = {texel, colour.left + i, colour.left + i + 1};
-    const int stands = cross_around(n, height, texture_width, row, place.dx, place.dy, offset_x, offset_y) >= LEAST_CROSS;
-    const int moves = has_offer & (fabs(place.dx) <= FURTHEST) & (fabs(place.dy) <= FURTHEST) & stands;
-    const float to_x = moves ? place.dx : from_x, to_y = moves ? place.dy : from_y, t = moves ? place.t : parameters[texel];
-    const int anchor = moves ? -1 - edges[e].number : anchors[texel];
-    own_x[texel] = to_x, own_y[texel] = to_y, parameters[texel] = t, anchors[texel] = anchor;
-    const int is_open = has_offer & !moves & (edges[e].flatness <= FLATTEST);
-    offers[texel] = is_open ? e : NONE;
+    const int stands = cross_around(n, height, texture_width, row, dx, dy, offset_x, offset_y) >= LEAST_CROSS;
+    const int moves = has_offer & (fabs(dx) <= FURTHEST) & (fabs(dy) <= FURTHEST) & stands;
+    const float to_x = moves ? dx : from_x, to_y = moves ? dy : from_y;
+    const int anchor = moves ? -1 - number_of_offer(offer) : anchors[texel];
+    own_x[texel] = to_x, own_y[texel] = to_y, anchors[texel] = anchor;
+    const int is_open = has_offer & !moves & is_sharp_offer(offer);
+    offers[texel] = is_open ? offer : NONE;
   }
 }
 
 // The same where hardly any texel has an offer.
 __attribute__((always_inline)) void place_few(global const PatchRecord* restrict p, const RowColour colour, const int odd, const int texture_width, const int row,
-                                              global const EdgeRecord* restrict edges, global int* restrict offers, global int* restrict anchors,
-                                              global float* restrict parameters, global float* offset_x, global float* offset_y) {
+                                              global const float* restrict target_x, global const float* restrict target_y, global int* restrict offers,
+                                              global int* restrict anchors, global float* offset_x, global float* offset_y) {
   for (int i = get_local_id(0); i < colour.end - colour.first; i += ROW_ITEMS)
     if (offers[colour.first + i] != NONE)
-      place_one(p, texture_width, odd ? 2 * i + 1 : 2 * i + 2, row, edges, offers, anchors, parameters, offset_x, offset_y);
+      place_one(p, texture_width, odd ? 2 * i + 1 : 2 * i + 2, row, target_x, target_y, offers, anchors, offset_x, offset_y);
 }
 
 // NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. Free texels of a row relax, then go to the nearest edge within reach, one colour of the row after
 // the other. A row comes in bins of eight columns, which look for their edges together; bins, of this row alone or of several, have lists of the edges near them.
 // in   rows: patch, row, number of the first bin, 0: inner ones, even or odd; bin_begins: into bin_edges, numbers of edges
 //      is_again: to edges only in bins where a texel could not go to one the time before that is sharp enough (FLATTEST)
-// out  parameters: where on its edge a texel is, 0 to 1; offers: what else the kernel needs per texel
+// out  parameters: where on its edge a texel is, 0 to 1; offers, target_x, target_y: what else the kernel needs per texel
 kernel void place_on_edges(const int row_count, const int texture_width, const int is_again, global const int* restrict rows,
                            global const PatchRecord* restrict patches, global const int* restrict bin_begins, global const int* restrict bin_edges,
                            global const EdgeRecord* restrict edges, global int* restrict anchors, global float* restrict parameters, global float* offset_x,
-                           global float* offset_y, global int* restrict offers) {
+                           global float* offset_y, global int* restrict offers, global float* restrict target_x, global float* restrict target_y) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   global const PatchRecord* restrict p = patches + rows[4 * k];
@@ -385,37 +391,45 @@ kernel void place_on_edges(const int row_count, const int texture_width, const i
     const int8 texels = (columns >> 1) + ((columns & 1) == 0 ? (int8)(first) : (int8)(odd));
     const int is_whole = column + 8 <= width, at_even = first + column / 2, at_odd = odd + column / 2;
     if (is_again && is_whole) {
-      const int4 at_even_open = (vload4(0, anchors + at_even) == 0) & (vload4(0, offers + at_even) != NONE);
-      const int4 at_odd_open = (vload4(0, anchors + at_odd) == 0) & (vload4(0, offers + at_odd) != NONE);
-      if (!any(at_even_open | at_odd_open)) {
-        vstore4((int4)(NONE), 0, offers + at_even);
-        vstore4((int4)(NONE), 0, offers + at_odd);
-        continue;
-      }
+      if (!any((vload4(0, offers + at_even) != NONE) | (vload4(0, offers + at_odd) != NONE))) continue;
     }
     const float8 x = is_whole ? (float8)(vload4(0, offset_x + at_even), vload4(0, offset_x + at_odd)) : gathered(texels, offset_x);
     const float8 y = is_whole ? (float8)(vload4(0, offset_y + at_even), vload4(0, offset_y + at_odd)) : gathered(texels, offset_y);
     const int8 nearest = nearest_edges(convert_float8(columns) + x, (float)row + y, bin_begins[bin], bin_begins[bin + 1], bin_edges, edges);
+    const int8 are_held = is_whole ? (int8)(vload4(0, anchors + at_even), vload4(0, anchors + at_odd)) != 0 : gathered_ints(texels, anchors) != 0;
+    const int8 have_offers = (nearest != NONE) & !are_held;
+    const EdgeRecords found = gathered_edges(have_offers ? nearest : (int8)(0), edges);
+    const float8 to_x = found.x - (convert_float8(columns) + x), to_y = found.y - ((float)row + y);
+    const float8 t = clamp(to_x * found.over_x + to_y * found.over_y, (float8)(0.0f), (float8)(1.0f));
+    const float8 to_offset_x = to_x + t * found.ex + x, to_offset_y = to_y + t * found.ey + y;
+    const int8 new_offers = have_offers ? offers_of(found) : (int8)(NONE);
     if (is_whole) {
-      vstore4(vload4(0, anchors + at_even) == 0 ? nearest.lo : (int4)(NONE), 0, offers + at_even);
-      vstore4(vload4(0, anchors + at_odd) == 0 ? nearest.hi : (int4)(NONE), 0, offers + at_odd);
+      vstore4(new_offers.lo, 0, offers + at_even), vstore4(new_offers.hi, 0, offers + at_odd);
+      vstore4(to_offset_x.lo, 0, target_x + at_even), vstore4(to_offset_x.hi, 0, target_x + at_odd);
+      vstore4(to_offset_y.lo, 0, target_y + at_even), vstore4(to_offset_y.hi, 0, target_y + at_odd);
+      // The first time those of others are nothing yet.
+      vstore4(is_again ? (have_offers.lo ? t.lo : vload4(0, parameters + at_even)) : t.lo, 0, parameters + at_even);
+      vstore4(is_again ? (have_offers.hi ? t.hi : vload4(0, parameters + at_odd)) : t.hi, 0, parameters + at_odd);
     } else {
-      int of_lanes[8], at[8];
-      vstore8(nearest, 0, of_lanes);
-      vstore8(texels, 0, at);
+      int at[8], of_lanes[8];
+      float x_of_lanes[8], y_of_lanes[8], t_of_lanes[8];
+      vstore8(texels, 0, at), vstore8(new_offers, 0, of_lanes);
+      vstore8(to_offset_x, 0, x_of_lanes), vstore8(to_offset_y, 0, y_of_lanes), vstore8(t, 0, t_of_lanes);
       // What several lanes look at is the same.
-      for (int i = 0; i < 8; ++i) offers[at[i]] = anchors[at[i]] == 0 ? of_lanes[i] : NONE;
+      for (int i = 0; i < 8; ++i) {
+        offers[at[i]] = of_lanes[i], target_x[at[i]] = x_of_lanes[i], target_y[at[i]] = y_of_lanes[i];
+        if (of_lanes[i] != NONE) parameters[at[i]] = t_of_lanes[i];
+      }
     }
   }
   WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
   for (int colour = 0; colour < 2 + (width & 1); ++colour) {
     const int at_end = end_of_colour(colour, width);
     if (colour < 2 && is_again)
-      place_few(p, row_colour(colour, first, width), colour, texture_width, row, edges, offers, anchors, parameters, offset_x, offset_y);
+      place_few(p, row_colour(colour, first, width), colour, texture_width, row, target_x, target_y, offers, anchors, offset_x, offset_y);
     else if (colour < 2)
-      place_colour(row_colour(colour, first, width), colour, height, texture_width, row, edges, offers, anchors, parameters, offset_x, offset_y, offset_x,
-                   offset_y);
-    if (get_local_id(0) == 0 && at_end >= 0) place_one(p, texture_width, at_end, row, edges, offers, anchors, parameters, offset_x, offset_y);
+      place_colour(row_colour(colour, first, width), height, texture_width, row, target_x, target_y, offers, anchors, offset_x, offset_y, offset_x, offset_y);
+    if (get_local_id(0) == 0 && at_end >= 0) place_one(p, texture_width, at_end, row, target_x, target_y, offers, anchors, offset_x, offset_y);
     WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
   }
 }

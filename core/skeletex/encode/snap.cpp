@@ -309,10 +309,11 @@ void snap_positions(ClContext& context, const DeviceLayout& layout, const Device
   };
   for (const int parity : {0, 1}) for_rows("part_colours", parity, rows[parity], layout.patches, positions.home_x, positions.home_y, positions.x, positions.y);
   snap_to_vertices(context, layout, tables, spare, positions);
+  const auto target_x = context.allocate<float>(layout.size()), target_y = context.allocate<float>(layout.size());
   for (int round = 0; round < (tables.edges.size == 0 ? 0 : kEdgeRounds); ++round)
     for (const int parity : {0, 1})
       for_rows("place_on_edges", parity, static_cast<int>(round > 0), rows[parity], layout.patches, tables.bin_begins, tables.bin_edges, tables.edges, positions.anchors,
-               positions.parameters, positions.x, positions.y, spare);
+               positions.parameters, positions.x, positions.y, spare, target_x, target_y);
   for (const int parity : {0, 1})
     for_rows("join_colours", parity, rows[parity], layout.patches, spare, positions.x, positions.y, positions.anchors, positions.parameters);
   // Each plane is now in the memory of the one before, where it is as large and 0 outside of those rows.
