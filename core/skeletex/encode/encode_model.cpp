@@ -217,7 +217,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   const std::vector<PatchDemand> demands = patch_demands(sources, has_even_rows ? std::span<const RowProfile>() : profiles,
                                                          options.texel_share.value_or(is_all_spd ? TexelShare::kArea : TexelShare::kError));
   const TexelPlacing placing = choose_placing(options, mesh, is_all_spd);
-  // Packing is one processor's work, and so is most of what comes before the device reads texels.
+  // Packing is one processor's work, and so is most of what comes before the device reads texels: features are found and listed beside.
   std::future<MapFeatures> finding_features;
   if (placing.has_snap) finding_features = run_beside([&] { return find_features(charts, methods, kLeastDihedral); });
   const AtlasLayout layout = pack_atlas(demands, options.width, options.height);
@@ -229,8 +229,13 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
                                                                     : spread_rows_uniformly(patch.rectangle.height);
     model.patches.push_back(std::move(patch));
   }
-  std::future<SnapFeatures> placing_features;
-  if (placing.has_snap) placing_features = run_beside([&] { return place_features(finding_features.get(), charts, model.patches); });
+  std::future<DeviceSnapTables> listing_features;
+  if (placing.has_snap) {
+    auto list = [&, on = context.beside()] {
+      return upload_tables(*on, tables_of(place_features(finding_features.get(), charts, model.patches), model.patches));
+    };
+    listing_features = context.can_run_beside() ? run_beside(std::move(list)) : std::async(std::launch::deferred, std::move(list));
+  }
   model.diagonals = options.diagonals.value_or(placing.has_snap || placing.has_fit ? DiagonalRule::kSmooth : DiagonalRule::kNearest);
   Seams seams = sample_seams(segmentation, skeleton, walls, layout.rectangles, placing.has_snap ? SeamSampling::kSnapped : SeamSampling::kEven);
   model.arcs = std::move(seams.arcs);
@@ -264,7 +269,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   const GuardSources guard{model, mesh, options.tree, charts};
   TexelOptions texel_options{.has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_fit = placing.has_fit};
   if (options.has_half_texels) texel_options.half_rule = model.diagonals;
-  TexelResult texels = read_texels(context, skeleton, walls, {charts, model.patches, hits, end_points, &guard, placing.has_snap ? &placing_features : nullptr},
+  TexelResult texels = read_texels(context, skeleton, walls, {charts, model.patches, hits, end_points, &guard, placing.has_snap ? &listing_features : nullptr},
                                    options.width, options.height, model.origin, texel_options);
   model.texture = std::move(texels.texture);
   {

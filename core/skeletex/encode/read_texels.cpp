@@ -208,12 +208,6 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   }
   place_end_rows(context, sources, texture_width, origin, points);
 
-  // Beside the rounds of unfolding, each of which is too little for all processors; the kernels before are not.
-  std::future<DeviceSnapTables> listing_features;
-  if (is_snapped) {
-    auto list = [&, on = context.beside()] { return upload_tables(*on, tables_of(sources.features->get(), sources.patches)); };
-    listing_features = context.can_run_beside() ? run_beside(std::move(list)) : std::async(std::launch::deferred, std::move(list));
-  }
   if (options.has_unfold && maps.triangle_count > 0) {
     const auto read_listed = [&](const ClBuffer<int>& listed, int count) {
       context.launch({"encode.cl", "read_listed"}, ClRange(count), count, texture_width, maps.triangle_count, listed, layout.texel_patches, covering,
@@ -245,7 +239,7 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   int put_back = 0, edges = 0;
   std::vector<int> vertex_points;
   if (is_snapped) {
-    const DeviceSnapTables features = listing_features.get();
+    const DeviceSnapTables features = sources.features->get();
     vertex_points = context.download(features.vertex_points), edges = static_cast<int>(features.edge_points.size);
     snap_positions(context, layout, features, positions);
     points = allocate_points(context, texels), covering = context.allocate<int>(texels);

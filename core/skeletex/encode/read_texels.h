@@ -27,8 +27,8 @@ struct TexelSources {
   std::span<const std::array<std::vector<Vec3>, 2>> end_points;
   /// With snapping or fit, what the finished lattice is compared with; without it there is no such guard.
   const GuardSources* guard = nullptr;
-  /// With snapping, what texels of VSM patches move to; waited for when the even lattice has been read.
-  std::future<SnapFeatures>* features = nullptr;
+  /// With snapping, what texels of VSM patches move to; waited for when the even lattice is there.
+  std::future<DeviceSnapTables>* features = nullptr;
 };
 
 struct TexelOptions {
