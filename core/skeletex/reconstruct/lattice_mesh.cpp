@@ -13,6 +13,7 @@ namespace skeletex {
 namespace {
 
 constexpr int kBandRows = 16, kBandColumns = 64;  // of choose_diagonals, columns as in lattice.cl: each group works out the normals of two rows more
+constexpr int kRun = 8;  // quads of choose_listed_diagonals, as in lattice.cl
 
 /// Poles, samples of seams and corners of a lattice alone, which has no more vertices.
 Lattice without_rows(Lattice lattice) {
@@ -113,13 +114,23 @@ void LatticeMesh::choose(std::span<const int> texels) {
   diagonals_ = context_.map(device_diagonals_);
 }
 
+/// By runs of columns: quads are seldom asked for by themselves.
+/// \param quads  in order
 void LatticeMesh::choose_listed(std::span<const int> quads) {
-  std::vector<int> patches;
-  patches.reserve(quads.size());
-  for (const int quad : quads) patches.push_back(patch_of(quad));
-  context_.launch({"lattice.cl", "choose_listed_diagonals"}, ClRange(quads.size()), static_cast<int>(quads.size()), model_.texture.width,
-                  static_cast<int>(rule_ == DiagonalRule::kSmooth), context_.upload(quads), context_.upload(patches), common_->patches, points_.x, points_.y,
-                  points_.z, device_diagonals_);
+  std::vector<int> firsts, asked, patches;
+  int end = 0;  // of the last run, or of its row
+  for (const int quad : quads) {
+    if (quad >= end) {
+      const int patch = patch_of(quad), width = model_.texture.width;
+      const Rectangle& r = model_.patches[patch].rectangle;
+      firsts.push_back(quad), asked.push_back(0), patches.push_back(patch);
+      end = std::min(quad + kRun, quad / width * width + r.x + r.width);
+    }
+    asked.back() |= 1 << (quad - firsts.back());
+  }
+  context_.launch({"lattice.cl", "choose_listed_diagonals"}, ClRange(firsts.size()), static_cast<int>(firsts.size()), model_.texture.width,
+                  static_cast<int>(rule_ == DiagonalRule::kSmooth), context_.upload(firsts), context_.upload(asked), context_.upload(patches), common_->patches,
+                  points_.x, points_.y, points_.z, device_diagonals_);
 }
 
 void LatticeMesh::read_points() { std::tie(planes_[0], planes_[1], planes_[2]) = context_.map(points_.x, points_.y, points_.z); }

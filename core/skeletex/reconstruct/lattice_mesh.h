@@ -88,7 +88,7 @@ class LatticeMesh {
   const ClBuffer<LatticeRow>& device_rows() const { return common_->rows; }
   const ClBuffer<PatchRecord>& device_patches() const { return common_->patches; }
 
-  /// The diagonals of some quads, by their texels, of a lattice of which not all are there.
+  /// The diagonals of some quads, by their texels, in order, of a lattice of which not all are there.
   void choose(std::span<const int> texels);
   /// The triangles at some ends: of patch i 2 i and 2 i + 1.
   void fill_ends(std::span<const int> ends);
