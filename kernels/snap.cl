@@ -24,7 +24,7 @@
 #define MARGIN 0.6f        // cells that the rows next to a seam or pole keep from it
 #define LEAST_MOVE 0.01f   // cells: shorter steps of free texels are not worth their test
 #define PLACED 5           // states of a vertex: 0 to 3 the candidate it claims, 4 none is left
-#define BAD 1              // a mark of a texel's quad
+#define LOOKED_AT 1        // a mark of a texel's quad
 #define NONE -1            // of a bin's edges
 #define FLATTEST 5.0f      // of edges that texels look for again, see EdgeRecord: dihedral angles of 0.1 rad
 
@@ -519,11 +519,18 @@ int is_bad_quad(global const PatchRecord* restrict p, int texture_width, int col
          (is_turned(now[1], now[2], now[3], normal) && !is_turned(even[1], even[2], even[3], normal));
 }
 
+// The k-th quad around a texel: its number, and where it begins.
+int quad_at(global const PatchRecord* restrict p, int texture_width, int texel, int k, int* column, int* row) {
+  const int line = texel / texture_width, from = texel - line * texture_width - p->x - (k & 1);
+  *column = from < 0 ? from + p->width : from, *row = line - p->y - (k >> 1);
+  return texel_at(p, texture_width, *column, *row);
+}
+
 // NDRange: one work-group of ROW_ITEMS. Texels of a list go back, those on vertices only `with_vertices`; and in rounds those of bad quads at texels that
 // have gone back in the round before. Rounds are many, but soon of few texels, and a launch takes longer than most of them. What a
 // texel does within a round does not depend on others, so that their order is any.
 // in   before_x, before_y, before_z: where they were
-// in and out  marks: per texel bits; `taken`: it has gone back, or was there, set in none before; BAD: its quad, in none
+// in and out  marks: per texel bits; `taken`: it has gone back, or was there, set in none before; LOOKED_AT: its quad, in none
 //              counts: how many are on these lists, 0 before
 // out  back: those that have gone back; bad: quads of a round
 kernel void put_listed_back(const int count, const int with_vertices, const int taken, const int texture_width, global const int* restrict listed,
@@ -544,7 +551,6 @@ kernel void put_listed_back(const int count, const int with_vertices, const int 
         if (anchors[texel] > 0 && !with_vertices) continue;
       } else {
         const int quad = bad[i >> 2];
-        atomic_and(marks + quad, ~BAD);
         global const PatchRecord* p = patches + texel_patches[quad];
         const int line = quad / texture_width, row = line - p->y + ((i >> 1) & 1);
         if (row < 1 || row > p->height - 2) continue;
@@ -563,14 +569,19 @@ kernel void put_listed_back(const int count, const int with_vertices, const int 
     if (own == 0) counts[1] = 0;
     WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
     for (int i = 4 * begin + own; i < 4 * end; i += ROW_ITEMS) {
-      const int texel = back[i >> 2];
-      global const PatchRecord* p = patches + texel_patches[texel];
-      const int line = texel / texture_width;
-      const int from = texel - line * texture_width - p->x - (i & 1);
-      const int column = from < 0 ? from + p->width : from, row = line - p->y - ((i >> 1) & 1);
-      const int quad = texel_at(p, texture_width, column, row);
-      if (is_bad_quad(p, texture_width, column, row, offset_x, offset_y, even_x, even_y, even_z, x, y, z) && !(atomic_or(marks + quad, BAD) & BAD))
+      int column, row;
+      global const PatchRecord* p = patches + texel_patches[back[i >> 2]];
+      const int quad = quad_at(p, texture_width, back[i >> 2], i & 3, &column, &row);
+      // Once, whichever of its texels have gone back.
+      if ((atomic_or(marks + quad, LOOKED_AT) & LOOKED_AT) == 0 &&
+          is_bad_quad(p, texture_width, column, row, offset_x, offset_y, even_x, even_y, even_z, x, y, z))
         bad[atomic_inc(counts + 1)] = quad;
+    }
+    WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
+    for (int i = 4 * begin + own; i < 4 * end; i += ROW_ITEMS) {
+      int column, row;
+      const int quad = quad_at(patches + texel_patches[back[i >> 2]], texture_width, back[i >> 2], i & 3, &column, &row);
+      atomic_and(marks + quad, ~LOOKED_AT);
     }
     WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
   }

@@ -148,8 +148,6 @@ GuardReport Guard::put_back_faults(ClContext& context, std::span<const int> vert
   std::optional<TexelReturns> returns;  // in memory that measuring has given back
   for (int pass = 0; pass < kPasses; ++pass) {
     marks.clear();
-    if (pass > 0) vertices.list(vertex_points, lattice, back);
-    vertices.start(context, lattice, limit);
     // Crossings are the host's alone: they are found beside distances, which are for the most part the device's. Where the lattice lies on the original it
     // intersects itself no more than that does.
     std::promise<std::vector<int>> suspects;
@@ -159,6 +157,8 @@ GuardReport Guard::put_back_faults(ClContext& context, std::span<const int> vert
           pass == 0 ? measuring_parts.get() : crossings.measure(lattice, changed);
           return crossings.find(lattice, listed.get());
         });
+    if (pass > 0) vertices.list(vertex_points, lattice, back);
+    vertices.start(context, lattice, limit);
     if (pass == 0) {
       distances.measure_suspects(lattice, *suspicions2, triangles, limit, std::move(suspects));
       suspicions2.reset();
