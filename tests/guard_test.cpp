@@ -59,7 +59,7 @@ struct Points {
   }
   void upload() { on_device = {device().upload(planes[0]), device().upload(planes[1]), device().upload(planes[2])}; }
   LatticeMesh lattice(const SkeletexModel& model, DiagonalRule rule, LatticeMesh::Parts parts = LatticeMesh::Parts::kAll) const {
-    return {device(), model, rule, patches, on_device, parts};
+    return {device(), model, rule, frame_lattice(model), patches, on_device, parts};
   }
   /// Every `step`-th texel of inner rows takes its point from others. \return those
   std::vector<int> take(const SkeletexModel& model, const Points& others, int step) {

@@ -241,6 +241,9 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   model.arcs = std::move(seams.arcs);
   model.corners = std::move(seams.corners);
   model.ends = std::move(seams.ends);
+  model.texture.width = options.width, model.texture.height = options.height;
+  std::shared_future<GuardFrame> framing_guard;
+  if (placing.has_snap || placing.has_fit) framing_guard = run_beside([&] { return frame_guard(model, charts); }).share();
 
   std::vector<SpdHits> hits(bones);
   {
@@ -265,8 +268,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
         points = points_on_loop(segmentation.segments[bone], skeleton, walls, end, model.patches[bone].rectangle.width);
     }
   progress("encoding", 0.8);
-  model.texture.width = options.width, model.texture.height = options.height;
-  const GuardSources guard{model, mesh, options.tree, charts};
+  const GuardSources guard{model, mesh, options.tree, charts, std::move(framing_guard)};
   TexelOptions texel_options{.has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_fit = placing.has_fit};
   if (options.has_half_texels) texel_options.half_rule = model.diagonals;
   TexelResult texels = read_texels(context, skeleton, walls, {charts, model.patches, hits, end_points, &guard, placing.has_snap ? &listing_features : nullptr},

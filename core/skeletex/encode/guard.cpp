@@ -7,9 +7,7 @@
 #include <utility>
 
 #include "skeletex/encode/triangle_distances.h"
-#include "skeletex/encode/vertex_distances.h"
 #include "skeletex/measure/lattice_crossings.h"
-#include "skeletex/reconstruct/lattice_mesh.h"
 
 namespace skeletex {
 namespace {
@@ -72,6 +70,10 @@ class TexelSet {
 
 }  // namespace
 
+GuardFrame frame_guard(const SkeletexModel& model, std::span<const Chart> charts) {
+  return {frame_lattice(model), place_vertices(charts, model.patches, model.texture.width, model.texture.height)};
+}
+
 struct Guard::Even {
   ClContext& context;
   const GuardSources& sources;
@@ -89,7 +91,7 @@ struct Guard::Even {
   std::future<void> measuring;  // the last two; lattice, distances and the queue are its own so long
 
   Even(ClContext& own_context, const GuardSources& own_sources, const DeviceLayout& own_layout, const DeviceMaps& maps, ClBuffer<int> own_triangles,
-       TexelPoints own_points, TexelPoints stored, std::future<TriangleTree> own_tree, std::future<PlacedVertices> placed)
+       TexelPoints own_points, TexelPoints stored, std::future<TriangleTree> own_tree)
       : context(own_context),
         sources(own_sources),
         layout(own_layout),
@@ -98,18 +100,17 @@ struct Guard::Even {
         triangles(std::move(own_triangles)),
         texel_normals(find_texel_normals(context, layout, maps, triangles)),
         suspicions2(suspect_any_quads(context, layout, context.upload(quad_rows(sources.model.patches)), filtered, triangles, texel_normals)),
-        lattice(context, sources.model, DiagonalRule::kNearest, layout.patches, filtered, LatticeMesh::Parts::kAsked),
+        lattice(context, sources.model, DiagonalRule::kNearest, sources.frame.get().lattice, layout.patches, filtered, LatticeMesh::Parts::kAsked),
         crossings(lattice),
         distances(context, sources.mesh, layout, maps, texel_normals,
                   own_tree.valid() ? NearestSearch(context, own_tree.get()) : NearestSearch(context, *sources.tree)),
-        vertices(sources.model, sources.charts, layout, maps, placed.get()) {}
+        vertices(sources.model, sources.charts, layout, maps, sources.frame.get().vertices) {}
 };
 
 Guard::Guard(ClContext& context, const GuardSources& sources, const DeviceLayout& layout, const DeviceMaps& maps, ClBuffer<int> even_triangles,
              TexelPoints even, TexelPoints filtered)
     : even_(std::make_unique<Even>(context, sources, layout, maps, std::move(even_triangles), std::move(even), std::move(filtered),
-                                   sources.tree ? std::future<TriangleTree>() : std::async(std::launch::async, [&] { return build_triangle_tree(sources.mesh); }),
-                                   std::async(std::launch::async, [&] { return place_vertices(sources.charts, sources.model.patches, maps, layout); }))) {
+                                   sources.tree ? std::future<TriangleTree>() : std::async(std::launch::async, [&] { return build_triangle_tree(sources.mesh); }))) {
   context.finish();
   even_->measuring = std::async(context.can_run_beside() ? std::launch::async : std::launch::deferred, [even = even_.get()] {
     const ClMapping<float> suspicions2 = even->context.map(std::exchange(even->suspicions2, {}));

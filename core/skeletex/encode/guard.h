@@ -1,13 +1,24 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <future>
 #include <memory>
 
 #include "skeletex/encode/snap.h"
+#include "skeletex/encode/vertex_distances.h"
 #include "skeletex/measure/triangle_tree.h"
 #include "skeletex/model/mesh.h"
 #include "skeletex/model/texture.h"
+#include "skeletex/reconstruct/lattice_mesh.h"
 
 namespace skeletex {
+
+/// What the guard needs that depends on the layout alone, not on where texels read.
+struct GuardFrame {
+  std::shared_ptr<const LatticeFrame> lattice;
+  PlacedVertices vertices;  ///< of the original
+};
+/// \param model  all but its texels
+GuardFrame frame_guard(const SkeletexModel& model, std::span<const Chart> charts);
 
 /// What the guard of the finished lattice compares.
 struct GuardSources {
@@ -15,6 +26,7 @@ struct GuardSources {
   const TriangleMesh& mesh;       ///< the original
   const TriangleTree* tree;       ///< of its triangles; null: it is built
   std::span<const Chart> charts;  ///< its maps
+  std::shared_future<GuardFrame> frame;
 };
 
 struct GuardReport {

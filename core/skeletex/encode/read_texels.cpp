@@ -134,9 +134,9 @@ SnapReport report_snap(int vertices, int edges, int put_back, const std::vector<
   // Signs, as 0 and -1.
   const Eigen::Map<const Eigen::ArrayXi> numbers(anchors.data(), static_cast<Eigen::Index>(anchors.size()));
   report.snapped_vertices = -(-numbers).shiftRight<31>().sum(), report.texels_on_edges = -numbers.shiftRight<31>().sum();
-  // Without branches: what holds a texel follows no pattern. The first flag is that of texels on no edge.
+  // Without branches, which std::max is here: what holds a texel follows no pattern. The first flag is that of texels on no edge.
   std::vector<char> has_texel(edges + 1, 0);
-  for (const int anchor : anchors) has_texel[std::max(0, -anchor)] = 1;
+  for (const int anchor : anchors) has_texel[-anchor & (anchor >> 31)] = 1;
   report.snapped_edges = static_cast<int>(std::count(has_texel.begin() + 1, has_texel.end(), 1));
   return report;
 }

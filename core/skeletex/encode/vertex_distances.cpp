@@ -19,10 +19,11 @@ constexpr int kEndsInBox = 32;   // triangles of strips and fans that a vertex i
 
 }  // namespace
 
-PlacedVertices place_vertices(std::span<const Chart> charts, std::span<const Patch> patches, const DeviceMaps& maps, const DeviceLayout& layout) {
+PlacedVertices place_vertices(std::span<const Chart> charts, std::span<const Patch> patches, int texture_width, int texture_height) {
   std::vector<PlacedVertex> placed;
   PlacedVertices by_line;
-  by_line.first_of_line.assign(layout.height + 1, 0);
+  by_line.first_of_line.assign(texture_height + 1, 0);
+  int first_point = 0;  // as in DeviceMaps
   for (int bone = 0; bone < static_cast<int>(charts.size()); ++bone) {
     if (patches[bone].method != Method::kVsm) continue;
     const Chart& chart = charts[bone];
@@ -31,19 +32,21 @@ PlacedVertices place_vertices(std::span<const Chart> charts, std::span<const Pat
       if (chart.kinds[i] != ChartVertex::kInner) continue;
       const auto x = static_cast<float>(chart.v[i] * r.width), y = static_cast<float>(row_of(patches[bone].row_u, chart.u[i]));
       const int column = static_cast<int>(std::floor(x)), line = r.y + std::clamp(static_cast<int>(std::floor(y)), 1, r.height - 3);
-      placed.push_back({bone, maps.first_vertex[bone] + i, x, y, line * layout.width + r.x + (column % r.width + r.width) % r.width});
+      placed.push_back({bone, first_point + i, x, y, line * texture_width + r.x + (column % r.width + r.width) % r.width});
       ++by_line.first_of_line[line + 1];
     }
+    first_point += static_cast<int>(chart.positions.size());
   }
   std::partial_sum(by_line.first_of_line.begin(), by_line.first_of_line.end(), by_line.first_of_line.begin());
   by_line.all.resize(placed.size());
   std::vector<int> next = by_line.first_of_line;
-  for (const PlacedVertex& vertex : placed) by_line.all[next[vertex.texel / layout.width]++] = vertex;
+  for (const PlacedVertex& vertex : placed) by_line.all[next[vertex.texel / texture_width]++] = vertex;
   return by_line;
 }
 
-VertexDistances::VertexDistances(const SkeletexModel& model, std::span<const Chart> charts, const DeviceLayout& layout, const DeviceMaps& maps, PlacedVertices placed)
-    : model_(model), charts_(charts), layout_(layout), maps_(maps), placed_(std::move(placed)) {}
+VertexDistances::VertexDistances(const SkeletexModel& model, std::span<const Chart> charts, const DeviceLayout& layout, const DeviceMaps& maps,
+                                 const PlacedVertices& placed)
+    : model_(model), charts_(charts), layout_(layout), maps_(maps), placed_(placed) {}
 
 void VertexDistances::list(std::span<const int> vertex_points, std::vector<int> anchors) {
   anchors_ = std::move(anchors);

@@ -21,14 +21,15 @@ struct PlacedVertices {
   std::vector<int> first_of_line;  ///< and the end
 };
 /// The inner vertices of VSM patches' charts.
-PlacedVertices place_vertices(std::span<const Chart> charts, std::span<const Patch> patches, const DeviceMaps& maps, const DeviceLayout& layout);
+PlacedVertices place_vertices(std::span<const Chart> charts, std::span<const Patch> patches, int texture_width, int texture_height);
 
 /// How far the original's vertices are from a lattice, measured again where that has changed. Found among the quads around their places in the map (guard.cl);
 /// what looks too far next to seams and poles is compared to the strips and fans there.
 class VertexDistances {
  public:
   /// All that is given by reference must outlive this.
-  VertexDistances(const SkeletexModel& model, std::span<const Chart> charts, const DeviceLayout& layout, const DeviceMaps& maps, PlacedVertices placed);
+  VertexDistances(const SkeletexModel& model, std::span<const Chart> charts, const DeviceLayout& layout, const DeviceMaps& maps,
+                  const PlacedVertices& placed);
 
   /// Lists the vertices that no texel sits on, for `start`.
   /// \param vertex_points  of the features' vertices, see SnapFeatures
@@ -62,7 +63,7 @@ class VertexDistances {
   std::span<const Chart> charts_;
   const DeviceLayout& layout_;
   const DeviceMaps& maps_;
-  PlacedVertices placed_;
+  const PlacedVertices& placed_;
   std::vector<MeasuredVertex> vertices_;  // as placed_
   std::vector<int> asked_;                // of these
   ClBuffer<float> device_distances_;      // of those asked

@@ -43,50 +43,48 @@ void choose_diagonals(ClContext& context, DiagonalRule rule, const std::vector<P
                  points.x, points.y, points.z, diagonals);
 }
 
-std::shared_ptr<const LatticeMesh::Common> LatticeMesh::make_common(ClContext& context, const SkeletexModel& model, ClBuffer<PatchRecord> patches) {
-  Common common{without_rows(number_lattice(model)), {}, {}, {}, {0}, {}, std::move(patches)};
-  common.rows = context.upload(quad_rows(model.patches));
-  common.texel_patches.assign(static_cast<std::size_t>(model.texture.width) * model.texture.height, -1);
+std::shared_ptr<const LatticeFrame> frame_lattice(const SkeletexModel& model) {
+  LatticeFrame frame{without_rows(number_lattice(model)), {}, {}, {}, {0}};
+  frame.texel_patches.assign(static_cast<std::size_t>(model.texture.width) * model.texture.height, -1);
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
     const Rectangle& r = model.patches[bone].rectangle;
     for (int row = 0; row < r.height; ++row)
-      std::fill_n(common.texel_patches.begin() + (r.y + row) * static_cast<std::ptrdiff_t>(model.texture.width) + r.x, r.width, static_cast<int>(bone));
+      std::fill_n(frame.texel_patches.begin() + (r.y + row) * static_cast<std::ptrdiff_t>(model.texture.width) + r.x, r.width, static_cast<int>(bone));
   }
   const Walls walls(model.skeleton);
-  common.positions.resize(common.ends.vertex_count);
-  place_seams(model, walls, common.ends, common.positions);
-  common.seams.resize(2 * model.patches.size());
-  for_each_block(common.seams.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-    common.seams[i] = end_seam(model, walls, common.ends, common.positions, static_cast<int>(i / 2), static_cast<BoneEnd>(i % 2));
+  frame.positions.resize(frame.ends.vertex_count);
+  place_seams(model, walls, frame.ends, frame.positions);
+  frame.seams.resize(2 * model.patches.size());
+  for_each_block(frame.seams.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+    frame.seams[i] = end_seam(model, walls, frame.ends, frame.positions, static_cast<int>(i / 2), static_cast<BoneEnd>(i % 2));
   });
   // A triangle per column of the row next to the end, and one per side of the seam.
-  for (std::size_t i = 0; i < common.seams.size(); ++i)
-    common.first_end.push_back(common.first_end.back() + model.patches[i / 2].rectangle.width + static_cast<int>(common.seams[i].ring.vertices.size()));
-  return std::make_shared<const Common>(std::move(common));
+  for (std::size_t i = 0; i < frame.seams.size(); ++i)
+    frame.first_end.push_back(frame.first_end.back() + model.patches[i / 2].rectangle.width + static_cast<int>(frame.seams[i].ring.vertices.size()));
+  return std::make_shared<const LatticeFrame>(std::move(frame));
 }
 
-LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, ClBuffer<PatchRecord> patches, DevicePlanes points, Parts parts)
-    : LatticeMesh(context, model, rule, make_common(context, model, std::move(patches)), std::move(points), parts) {}
-
 LatticeMesh::LatticeMesh(ClContext& context, const LatticeMesh& other, DiagonalRule rule, DevicePlanes points)
-    : LatticeMesh(context, other.model_, rule, other.common_, std::move(points), Parts::kAll) {}
+    : LatticeMesh(context, other.model_, rule, other.frame_, other.patches_, std::move(points), Parts::kAll) {}
 
-LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, std::shared_ptr<const Common> common, DevicePlanes points,
-                         Parts parts)
+LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule, std::shared_ptr<const LatticeFrame> frame,
+                         ClBuffer<PatchRecord> patches, DevicePlanes points, Parts parts)
     : context_(context),
       model_(model),
       rule_(rule),
-      common_(std::move(common)),
-      end_positions_(common_->positions),
+      frame_(std::move(frame)),
+      rows_(context.upload(quad_rows(model.patches))),
+      patches_(std::move(patches)),
+      end_positions_(frame_->positions),
       points_(std::move(points)) {
   // Before the kernel is queued, so that the host can go on beside it.
   read_points();
   device_diagonals_ = context.allocate<int>(texel_count());
   if (parts == Parts::kAll)
-    choose_diagonals(context, rule, model.patches, model.texture.width, common_->rows, common_->patches, points_, device_diagonals_);
+    choose_diagonals(context, rule, model.patches, model.texture.width, rows_, patches_, points_, device_diagonals_);
   else
     context.fill(device_diagonals_, 0);
-  for_each_pole(model, common_->ends, [&](int vertex, int, int, std::size_t texel) { end_positions_[vertex] = position(static_cast<int>(texel)); });
+  for_each_pole(model, frame_->ends, [&](int vertex, int, int, std::size_t texel) { end_positions_[vertex] = position(static_cast<int>(texel)); });
   std::array<std::vector<float>, 3> end_planes;
   for (const Vec3& place : end_positions_) {
     end_points_.emplace_back(0);
@@ -95,16 +93,16 @@ LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, Diagona
   }
   device_end_points_ = {context.upload(end_planes[0]), context.upload(end_planes[1]), context.upload(end_planes[2])};
   if (parts == Parts::kAsked) return;
-  std::vector<int> ends(common_->seams.size());
+  std::vector<int> ends(frame_->seams.size());
   std::iota(ends.begin(), ends.end(), 0);
   fill_ends(ends);
   diagonals_ = context.map(device_diagonals_);
 }
 
 void LatticeMesh::fill_ends(std::span<const int> ends) {
-  end_triangles_.resize(common_->first_end.back());
+  end_triangles_.resize(frame_->first_end.back());
   const std::vector<std::vector<Triangle>> filled = make_ends(ends);
-  for (std::size_t k = 0; k < ends.size(); ++k) std::copy(filled[k].begin(), filled[k].end(), end_triangles_.begin() + common_->first_end[ends[k]]);
+  for (std::size_t k = 0; k < ends.size(); ++k) std::copy(filled[k].begin(), filled[k].end(), end_triangles_.begin() + frame_->first_end[ends[k]]);
 }
 
 void LatticeMesh::choose(std::span<const int> texels) {
@@ -129,13 +127,13 @@ void LatticeMesh::choose_listed(std::span<const int> quads) {
     asked.back() |= 1 << (quad - firsts.back());
   }
   context_.launch({"lattice.cl", "choose_listed_diagonals"}, ClRange(firsts.size()), static_cast<int>(firsts.size()), model_.texture.width,
-                  static_cast<int>(rule_ == DiagonalRule::kSmooth), context_.upload(firsts), context_.upload(asked), context_.upload(patches), common_->patches,
+                  static_cast<int>(rule_ == DiagonalRule::kSmooth), context_.upload(firsts), context_.upload(asked), context_.upload(patches), patches_,
                   points_.x, points_.y, points_.z, device_diagonals_);
 }
 
 void LatticeMesh::read_points() { std::tie(planes_[0], planes_[1], planes_[2]) = context_.map(points_.x, points_.y, points_.z); }
 
-/// The strips or fans of ends, numbered as in Common::first_end.
+/// The strips or fans of ends, numbered as in LatticeFrame::first_end.
 std::vector<std::vector<Triangle>> LatticeMesh::make_ends(std::span<const int> ends) {
   std::vector<std::vector<Triangle>> filled(ends.size());
   for_each_block(ends.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
@@ -145,8 +143,8 @@ std::vector<std::vector<Triangle>> LatticeMesh::make_ends(std::span<const int> e
     const int first_texel = (r.y + (end == BoneEnd::kHead ? 1 : r.height - 2)) * model_.texture.width + r.x;
     std::vector<int> vertices(r.width);  // the row next to the end
     std::iota(vertices.begin(), vertices.end(), first_texel);
-    const EndSeam& seam = common_->seams[ends[i]];
-    if (seam.ring.vertices.empty()) return append_pole_fan(vertices, texel_count() + common_->ends.poles[bone][ends[i] % 2], end, filled[i]);
+    const EndSeam& seam = frame_->seams[ends[i]];
+    if (seam.ring.vertices.empty()) return append_pole_fan(vertices, texel_count() + frame_->ends.poles[bone][ends[i] % 2], end, filled[i]);
     for (const int vertex : seam.ring.vertices) vertices.push_back(texel_count() + vertex);
     std::vector<Vec3> positions;
     for (const int vertex : vertices) positions.push_back(position(vertex));
@@ -214,10 +212,10 @@ std::vector<int> LatticeMesh::move(std::span<const int> texels) {
   }
   for (std::size_t k = 0; k < ends.size(); ++k)
     for (std::size_t i = 0; i < filled[k].size(); ++i) {
-      Triangle& triangle = end_triangles_[common_->first_end[ends[k]] + i];
+      Triangle& triangle = end_triangles_[frame_->first_end[ends[k]] + i];
       const bool is_other = std::exchange(triangle, filled[k][i]) != filled[k][i];
       if (is_other || std::any_of(triangle.begin(), triangle.end(), [&](int vertex) { return is_texel(vertex) && is_moved[vertex]; }))
-        changed.push_back(first_end_triangle() + common_->first_end[ends[k]] + static_cast<int>(i));
+        changed.push_back(first_end_triangle() + frame_->first_end[ends[k]] + static_cast<int>(i));
     }
   return changed;
 }
