@@ -205,19 +205,21 @@ kernel void read_listed(const int count, const int texture_width, const int tria
 
 // NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. What snapping has made of the even lattice: texels on vertices and edges of the mesh
 // take those points, others that have moved read where they are now, the rest stays.
-// in   lattice_rows: all; home_x, home_y: the even lattice's offsets; vertex_points: number of a vertex' point in the planes; edge_points: two per edge
-// out  texel_triangles: of texels on vertices and edges as they were
+// in   lattice_rows: all; home_x, home_y: the even lattice's offsets; snapped_x, snapped_y, snapped_anchors, parameters: by colour, as snap.cl leaves them;
+//      vertex_points: number of a vertex' point in the planes; edge_points: two per edge
+// out  offset_x, offset_y, anchors: the same, columns one after the other; texel_triangles: of texels on vertices and edges as they were
 kernel void read_snapped(const int row_count, const int texture_width, const int triangle_count, global const int* restrict lattice_rows,
                          global const int* restrict even_triangles, global const int* restrict corners, global const int* restrict turns,
                          global const int* restrict poles, global const int* restrict across, global const float* restrict u_high,
                          global const float* restrict u_low, global const float* restrict v_high, global const float* restrict v_low,
                          global const float* restrict vertex_x, global const float* restrict vertex_y, global const float* restrict vertex_z,
                          global const PatchRecord* restrict patches, global const float* restrict row_high, global const float* restrict row_low,
-                         global const float* restrict home_x, global const float* restrict home_y, global const float* restrict offset_x,
-                         global const float* restrict offset_y, global const int* restrict anchors, global const float* restrict parameters,
+                         global const float* restrict home_x, global const float* restrict home_y, global const float* restrict snapped_x,
+                         global const float* restrict snapped_y, global const int* restrict snapped_anchors, global const float* restrict parameters,
                          global const int* restrict vertex_points, global const int* restrict edge_points, global const float* restrict even_x,
-                         global const float* restrict even_y, global const float* restrict even_z, global int* restrict texel_triangles,
-                         global float* restrict x, global float* restrict y, global float* restrict z, global int* restrict is_triangle_read) {
+                         global const float* restrict even_y, global const float* restrict even_z, global float* restrict offset_x,
+                         global float* restrict offset_y, global int* restrict anchors, global int* restrict texel_triangles, global float* restrict x,
+                         global float* restrict y, global float* restrict z, global int* restrict is_triangle_read) {
   local int listed[SNAPPED_COLUMNS], is_beyond[SNAPPED_COLUMNS], listed_count;
   local float point_x[SNAPPED_COLUMNS], point_y[SNAPPED_COLUMNS], point_z[SNAPPED_COLUMNS];
   const int k = get_group_id(0);
@@ -228,22 +230,25 @@ kernel void read_snapped(const int row_count, const int texture_width, const int
     if (get_local_id(0) == 0) listed_count = 0;
     WAIT_FOR_GROUP(CLK_LOCAL_MEM_FENCE);
     for (int j = begin + get_local_id(0); j < min(begin + SNAPPED_COLUMNS, width); j += ROW_ITEMS) {
-      const int texel = first + j, anchor = anchors[texel], t = even_triangles[texel];
+      const int texel = first + j, by_colour = first + (j >> 1) + ((j & 1) ? (width + 1) >> 1 : 0);
+      const int anchor = snapped_anchors[by_colour], t = even_triangles[texel];
+      const float dx = snapped_x[by_colour], dy = snapped_y[by_colour];
       SurfacePoint point = {even_x[texel], even_y[texel], even_z[texel]};
       if (anchor != 0) {
         const int a = anchor > 0 ? vertex_points[anchor - 1] : edge_points[2 * (-1 - anchor)];
         const int b = anchor > 0 ? a : edge_points[2 * (-1 - anchor) + 1];
-        const float s = anchor > 0 ? 0.0f : parameters[texel];
+        const float s = anchor > 0 ? 0.0f : parameters[by_colour];
         point.x = vertex_x[a] + s * (vertex_x[b] - vertex_x[a]);
         point.y = vertex_y[a] + s * (vertex_y[b] - vertex_y[a]);
         point.z = vertex_z[a] + s * (vertex_z[b] - vertex_z[a]);
-      } else if (t != NO_TRIANGLE && (offset_x[texel] != 0.0f || offset_y[texel] != 0.0f || home_x[texel] != 0.0f || home_y[texel] != 0.0f)) {
+      } else if (t != NO_TRIANGLE && (dx != 0.0f || dy != 0.0f || home_x[texel] != 0.0f || home_y[texel] != 0.0f)) {
         listed[NEXT_OF(listed_count)] = j;
       }
-      texel_triangles[texel] = t;
+      texel_triangles[texel] = t, anchors[texel] = anchor;
+      offset_x[texel] = dx, offset_y[texel] = dy;
       x[texel] = point.x, y[texel] = point.y, z[texel] = point.z;
     }
-    WAIT_FOR_GROUP(CLK_LOCAL_MEM_FENCE);
+    WAIT_FOR_GROUP(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
     // Most are still in the triangle that covers their place: all look there first, as vector instructions.
     const int count = listed_count;
     for (int i = get_local_id(0); i < count; i += ROW_ITEMS) {

@@ -3,7 +3,7 @@
 //   claim_texels, decide_claims, decide_the_rest
 //                               vertices, strongest first, take the nearest texel that is free
 //   place_on_edges              free texels follow their neighbours half way, then go to the nearest point of a creased edge
-//   part_colours, join_colours  rows by colour, and back, see below
+//   part_colours                rows by colour, see below; read_snapped in encode.cl has them the other way again
 //   put_listed_back             texels of a list, and what then folds in the map or in space, go back to the even lattice
 // A reading position is an offset from the texel's own place in the lattice, in cells: two planes over the texture, x
 // around, y along. Rows 0 and height-1 stay. `anchors` says what holds a texel: 0 nothing, 1 + i vertex i of the list
@@ -451,26 +451,6 @@ kernel void part_colours(const int row_count, const int texture_width, global co
     offset_y[first + i] = home_y[first + 2 * i], offset_y[odd + i] = home_y[first + 2 * i + 1];
   }
   if (get_local_id(0) == 0 && (width & 1)) offset_x[odd - 1] = home_x[first + width - 1], offset_y[odd - 1] = home_y[first + width - 1];
-}
-
-void join_row(const int first, const int width, global const int* restrict from, global int* restrict to) {
-  const int odd = first + ((width + 1) >> 1);
-  for (int i = get_local_id(0); i < width >> 1; i += ROW_ITEMS) to[first + 2 * i] = from[first + i], to[first + 2 * i + 1] = from[odd + i];
-  if (get_local_id(0) == 0 && (width & 1)) to[first + width - 1] = from[odd - 1];
-  WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
-}
-
-// NDRange and rows as for place_on_edges. Columns one after the other again, each plane's in the plane before. What is in them does not matter.
-kernel void join_colours(const int row_count, const int texture_width, global const int* restrict rows, global const PatchRecord* restrict patches,
-                         global int* spare, global int* first_plane, global int* second_plane, global int* third_plane, global int* fourth_plane) {
-  const int k = get_group_id(0);
-  if (k >= row_count) return;
-  global const PatchRecord* restrict p = patches + rows[4 * k];
-  const int width = p->width, first = (p->y + rows[4 * k + 1]) * texture_width + p->x;
-  join_row(first, width, first_plane, spare);
-  join_row(first, width, second_plane, first_plane);
-  join_row(first, width, third_plane, second_plane);
-  join_row(first, width, fourth_plane, third_plane);
 }
 
 void cross_product(const float a[3], const float b[3], const float c[3], float n[3]) {

@@ -61,6 +61,16 @@ Rectangle random_rectangle(std::mt19937& random) {
   return {static_cast<int>(random() % (kTextureWidth - width + 1)), static_cast<int>(random() % (kTextureHeight - height + 1)), width, height};
 }
 
+/// A plane that has its even columns first, then its odd ones.
+template <class T>
+std::vector<T> by_columns(const OnePatch& patch, const std::vector<T>& by_colour) {
+  std::vector<T> plane = by_colour;
+  for (int row = 1; row + 1 < patch.rectangle().height; ++row)
+    for (int column = 0; column < patch.rectangle().width; ++column)
+      plane[patch.texel(column, row)] = by_colour[patch.texel(column / 2 + column % 2 * ((patch.rectangle().width + 1) / 2), row)];
+  return plane;
+}
+
 struct HostPositions {
   std::vector<float> x, y, parameters;
   std::vector<int> anchors;
@@ -69,8 +79,9 @@ struct HostPositions {
 HostPositions snapped(const OnePatch& patch, const SnapFeatures& features, const std::vector<float>& home_x = {}, const std::vector<float>& home_y = {}) {
   ReadingPositions positions = even_positions(device(), patch.layout);
   device().write(positions.home_x, home_x), device().write(positions.home_y, home_y);
-  snap_positions(device(), patch.layout, upload_tables(device(), tables_of(features, patch.patches)), positions);
-  return {device().download(positions.x), device().download(positions.y), device().download(positions.parameters), device().download(positions.anchors)};
+  const SnappedPositions snapped = snap_positions(device(), patch.layout, upload_tables(device(), tables_of(features, patch.patches)), positions);
+  return {by_columns(patch, device().download(snapped.x)), by_columns(patch, device().download(snapped.y)), by_columns(patch, device().download(snapped.parameters)),
+          by_columns(patch, device().download(snapped.anchors))};
 }
 
 /// A box of a tube, square across, with a vertex on every edge and in the middle of every side.

@@ -40,7 +40,7 @@ std::vector<KernelVariant> encoding_kernels(const ClContext& context, const Enco
   const bool can_fit = has_vsm && options.has_fit.value_or(options.has_prefilter && texels <= kMostFittedTexels);
   if (can_snap) {
     add("snap.cl", {"claim_texels", "decide_claims"}, items);
-    add("snap.cl", {"part_colours", "decide_the_rest", "place_on_edges", "join_colours"}, rows);
+    add("snap.cl", {"part_colours", "decide_the_rest", "place_on_edges"}, rows);
     add("encode.cl", {"read_snapped"}, rows);
   }
   if (can_fit)

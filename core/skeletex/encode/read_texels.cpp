@@ -241,14 +241,15 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   if (is_snapped) {
     const DeviceSnapTables features = sources.features->get();
     vertex_points = context.download(features.vertex_points), edges = static_cast<int>(features.edge_points.size);
-    snap_positions(context, layout, features, positions);
+    const SnappedPositions snapped = snap_positions(context, layout, features, positions);
     points = allocate_points(context, texels), covering = context.allocate<int>(texels);
-    if (has_gaps) context.fill(covering, kNoTriangle);
+    positions.x = context.allocate<float>(texels), positions.y = context.allocate<float>(texels), positions.anchors = context.allocate<int>(texels);
+    if (has_gaps) context.fill(covering, kNoTriangle), context.fill(positions.anchors, 0);
     context.launch({"encode.cl", "read_snapped"}, row_range(context, all_rows.size), static_cast<int>(all_rows.size), texture_width, maps.triangle_count,
                    all_rows, even_covering, maps.corners, maps.turns, maps.poles, maps.across, maps.u_high, maps.u_low, maps.v_high, maps.v_low, maps.x, maps.y,
-                   maps.z, layout.patches, maps.row_high, maps.row_low, positions.home_x, positions.home_y, positions.x, positions.y, positions.anchors, positions.parameters,
-                   features.vertex_points, features.edge_points, even.x, even.y, even.z, covering, points.x, points.y, points.z, is_read);
-    positions.parameters = {};
+                   maps.z, layout.patches, maps.row_high, maps.row_low, positions.home_x, positions.home_y, snapped.x, snapped.y, snapped.anchors, snapped.parameters,
+                   features.vertex_points, features.edge_points, even.x, even.y, even.z, positions.x, positions.y, positions.anchors, covering, points.x, points.y,
+                   points.z, is_read);
   } else if (is_fitted) {
     copy_plane(context, positions.home_x, positions.x), copy_plane(context, positions.home_y, positions.y);
     points = copy_points(context, even);

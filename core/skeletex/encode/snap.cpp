@@ -138,9 +138,9 @@ SnapFeatures place_features(const MapFeatures& features, std::span<const Chart> 
 
 ReadingPositions even_positions(ClContext& context, const DeviceLayout& layout) {
   ReadingPositions positions{context.allocate<float>(layout.size()), context.allocate<float>(layout.size()), context.allocate<int>(layout.size()),
-                             context.allocate<float>(layout.size()), context.allocate<float>(layout.size()), context.allocate<float>(layout.size())};
+                             context.allocate<float>(layout.size()), context.allocate<float>(layout.size())};
   for (ClBuffer<float>* plane : {&positions.x, &positions.y, &positions.home_x, &positions.home_y}) context.fill(*plane, 0.f);
-  context.fill(positions.anchors, 0), context.fill(positions.parameters, 0.f);
+  context.fill(positions.anchors, 0);
   return positions;
 }
 
@@ -251,7 +251,7 @@ void fill_bins(const std::vector<SnapFeatures::Edge>& edges, std::span<const Pat
 }
 
 /// \param claims  0
-void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables, ClBuffer<int>& claims, ReadingPositions& positions) {
+void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables, ClBuffer<int>& claims, SnappedPositions& positions) {
   if (tables.vertex_x.size == 0) return;
   const int count = static_cast<int>(tables.vertex_x.size);
   const auto &patch = tables.vertex_patches, &rank = tables.vertex_ranks;
@@ -299,7 +299,8 @@ DeviceSnapTables upload_tables(ClContext& context, const SnapTables& tables) {
           context.upload(tables.bin_edges)};
 }
 
-void snap_positions(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables, ReadingPositions& positions) {
+SnappedPositions snap_positions(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables, ReadingPositions& positions) {
+  SnappedPositions snapped{std::move(positions.x), std::move(positions.y), std::move(positions.anchors), context.allocate<float>(layout.size())};
   auto spare = context.allocate<int>(layout.size());
   context.fill(spare, 0);
   const auto& rows = tables.rows;
@@ -307,18 +308,14 @@ void snap_positions(ClContext& context, const DeviceLayout& layout, const Device
     const std::size_t count = rows[parity].size;
     context.launch({"snap.cl", kernel}, row_range(context, count), static_cast<int>(count), layout.width, arguments...);
   };
-  for (const int parity : {0, 1}) for_rows("part_colours", parity, rows[parity], layout.patches, positions.home_x, positions.home_y, positions.x, positions.y);
-  snap_to_vertices(context, layout, tables, spare, positions);
+  for (const int parity : {0, 1}) for_rows("part_colours", parity, rows[parity], layout.patches, positions.home_x, positions.home_y, snapped.x, snapped.y);
+  snap_to_vertices(context, layout, tables, spare, snapped);
   const auto target_x = context.allocate<float>(layout.size()), target_y = context.allocate<float>(layout.size());
   for (int round = 0; round < (tables.edges.size == 0 ? 0 : kEdgeRounds); ++round)
     for (const int parity : {0, 1})
-      for_rows("place_on_edges", parity, static_cast<int>(round > 0), rows[parity], layout.patches, tables.bin_begins, tables.bin_edges, tables.edges, positions.anchors,
-               positions.parameters, positions.x, positions.y, spare, target_x, target_y);
-  for (const int parity : {0, 1})
-    for_rows("join_colours", parity, rows[parity], layout.patches, spare, positions.x, positions.y, positions.anchors, positions.parameters);
-  // Each plane is now in the memory of the one before, where it is as large and 0 outside of those rows.
-  std::swap(positions.parameters.memory, positions.anchors.memory), std::swap(positions.anchors.memory, positions.y.memory);
-  std::swap(positions.y.memory, positions.x.memory), std::swap(positions.x.memory, spare.memory);
+      for_rows("place_on_edges", parity, static_cast<int>(round > 0), rows[parity], layout.patches, tables.bin_begins, tables.bin_edges, tables.edges, snapped.anchors,
+               snapped.parameters, snapped.x, snapped.y, spare, target_x, target_y);
+  return snapped;
 }
 
 TexelReturns::TexelReturns(ClContext& context, const DeviceLayout& layout)

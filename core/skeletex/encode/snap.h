@@ -75,13 +75,19 @@ SnapTables tables_of(const SnapFeatures& features, std::span<const Patch> patche
 /// Where each texel reads, a thing of its own between the map and the texel: per texel an offset from its place in the
 /// even lattice, in cells, at most 1 along each axis, and what holds it there.
 struct ReadingPositions {
-  ClBuffer<float> x, y;         ///< around, along
-  ClBuffer<int> anchors;        ///< 0: nothing; 1 + i: vertex i of the features; -1 - i: edge i
-  ClBuffer<float> parameters;   ///< place on the edge, 0 at its first point, 1 at its last
+  ClBuffer<float> x, y;            ///< around, along
+  ClBuffer<int> anchors;           ///< 0: nothing; 1 + i: vertex i of the features; -1 - i: edge i
   ClBuffer<float> home_x, home_y;  ///< the offsets that texels go back to: 0, but where the even lattice is unfolded
 };
 /// The even lattice.
 ReadingPositions even_positions(ClContext& context, const DeviceLayout& layout);
+
+/// The same as they are while texels snap: inner rows of VSM patches have their even columns first, then their odd ones. All others are 0.
+struct SnappedPositions {
+  ClBuffer<float> x, y;
+  ClBuffer<int> anchors;
+  ClBuffer<float> parameters;  ///< of texels on edges: place on the edge, 0 at its first point, 1 at its last
+};
 
 /// SnapTables on the device; lists that are empty are buffers of size 0.
 struct DeviceSnapTables {
@@ -96,8 +102,8 @@ struct DeviceSnapTables {
 DeviceSnapTables upload_tables(ClContext& context, const SnapTables& tables);
 
 /// Moves reading positions from home to vertices, strongest first, and then to creased edges; the map does not fold.
-/// \param positions  x and y are 0 before, whatever is at home
-void snap_positions(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables, ReadingPositions& positions);
+/// \param positions  0 but for what is at home; x, y and anchors are taken over
+SnappedPositions snap_positions(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables, ReadingPositions& positions);
 
 /// Planes of points, one per texel.
 using TexelPoints = DevicePlanes;
