@@ -133,6 +133,7 @@ TEST(LatticeMesh, IsTheModelsAndWithMovedPointsWhatTheyWouldMake) {
     std::vector<int> quads;
     for (const int number : numbers)
       if (number < lattice.first_end_triangle() && number % 6 == 0) quads.push_back(number / 2);
+    std::sort(quads.begin(), quads.end());
     asked_of.choose(quads);
     const auto triangles_of = [&](int end) { return lattice.triangles_of_end(end / 2, static_cast<BoneEnd>(end % 2)); };
     std::vector<int> ends;  // one after the other, in two calls
