@@ -288,6 +288,20 @@ int8 gathered_ints(const int8 at, global const int* from) {
   return (int8)(from[at.s0], from[at.s1], from[at.s2], from[at.s3], from[at.s4], from[at.s5], from[at.s6], from[at.s7]);
 }
 
+// Of eight columns, by colour.
+float8 loaded(global const float* plane, const int at_even, const int at_odd) {
+  return (float8)(vload4(0, plane + at_even), vload4(0, plane + at_odd));
+}
+int8 loaded_ints(global const int* plane, const int at_even, const int at_odd) { return (int8)(vload4(0, plane + at_even), vload4(0, plane + at_odd)); }
+void store(const float8 values, global float* plane, const int at_even, const int at_odd) {
+  vstore4(values.lo, 0, plane + at_even);
+  vstore4(values.hi, 0, plane + at_odd);
+}
+void store_ints(const int8 values, global int* plane, const int at_even, const int at_odd) {
+  vstore4(values.lo, 0, plane + at_even);
+  vstore4(values.hi, 0, plane + at_odd);
+}
+
 // Of a bin's edges those that are nearest to eight texels, by distance / weight, and within reach; of two as near the first one.
 int8 nearest_edges(const float8 x, const float8 y, const int begin, const int end, global const int* restrict bin_edges,
                    global const EdgeRecord* restrict edges) {
@@ -390,13 +404,11 @@ kernel void place_on_edges(const int row_count, const int texture_width, const i
     const int8 columns = min(column + (int8)(0, 2, 4, 6, 1, 3, 5, 7), (int8)(width - 1));
     const int8 texels = (columns >> 1) + ((columns & 1) == 0 ? (int8)(first) : (int8)(odd));
     const int is_whole = column + 8 <= width, at_even = first + column / 2, at_odd = odd + column / 2;
-    if (is_again && is_whole) {
-      if (!any((vload4(0, offers + at_even) != NONE) | (vload4(0, offers + at_odd) != NONE))) continue;
-    }
-    const float8 x = is_whole ? (float8)(vload4(0, offset_x + at_even), vload4(0, offset_x + at_odd)) : gathered(texels, offset_x);
-    const float8 y = is_whole ? (float8)(vload4(0, offset_y + at_even), vload4(0, offset_y + at_odd)) : gathered(texels, offset_y);
+    if (is_again && is_whole && !any(loaded_ints(offers, at_even, at_odd) != NONE)) continue;
+    const float8 x = is_whole ? loaded(offset_x, at_even, at_odd) : gathered(texels, offset_x);
+    const float8 y = is_whole ? loaded(offset_y, at_even, at_odd) : gathered(texels, offset_y);
     const int8 nearest = nearest_edges(convert_float8(columns) + x, (float)row + y, bin_begins[bin], bin_begins[bin + 1], bin_edges, edges);
-    const int8 are_held = is_whole ? (int8)(vload4(0, anchors + at_even), vload4(0, anchors + at_odd)) != 0 : gathered_ints(texels, anchors) != 0;
+    const int8 are_held = (is_whole ? loaded_ints(anchors, at_even, at_odd) : gathered_ints(texels, anchors)) != 0;
     const int8 have_offers = (nearest != NONE) & !are_held;
     const EdgeRecords found = gathered_edges(have_offers ? nearest : (int8)(0), edges);
     const float8 to_x = found.x - (convert_float8(columns) + x), to_y = found.y - ((float)row + y);
@@ -404,12 +416,11 @@ kernel void place_on_edges(const int row_count, const int texture_width, const i
     const float8 to_offset_x = to_x + t * found.ex + x, to_offset_y = to_y + t * found.ey + y;
     const int8 new_offers = have_offers ? offers_of(found) : (int8)(NONE);
     if (is_whole) {
-      vstore4(new_offers.lo, 0, offers + at_even), vstore4(new_offers.hi, 0, offers + at_odd);
-      vstore4(to_offset_x.lo, 0, target_x + at_even), vstore4(to_offset_x.hi, 0, target_x + at_odd);
-      vstore4(to_offset_y.lo, 0, target_y + at_even), vstore4(to_offset_y.hi, 0, target_y + at_odd);
+      store_ints(new_offers, offers, at_even, at_odd);
+      store(to_offset_x, target_x, at_even, at_odd), store(to_offset_y, target_y, at_even, at_odd);
       // The first time those of others are nothing yet.
-      vstore4(is_again ? (have_offers.lo ? t.lo : vload4(0, parameters + at_even)) : t.lo, 0, parameters + at_even);
-      vstore4(is_again ? (have_offers.hi ? t.hi : vload4(0, parameters + at_odd)) : t.hi, 0, parameters + at_odd);
+      const float8 before = is_again ? loaded(parameters, at_even, at_odd) : t;
+      store(have_offers ? t : before, parameters, at_even, at_odd);
     } else {
       int at[8], of_lanes[8];
       float x_of_lanes[8], y_of_lanes[8], t_of_lanes[8];

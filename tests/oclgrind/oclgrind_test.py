@@ -84,9 +84,10 @@ def main():
     for path in (WORK / "kernels").iterdir():
         source = path.read_text().replace("__attribute__((always_inline)) ", "")
         # Its watch over unwritten values crashes where vectors are put together of halves, or taken apart: the same, number by number.
-        source = re.sub(r"\(float8\)\(vload4\(0, (\w+) \+ at_even\), vload4\(0, \1 \+ at_odd\)\)", r"gathered(texels, \1)", source)
-        for half, first in (("lo", 0), ("hi", 4)):
-            source = source.replace(f"nearest.{half}", "(int4)(" + ", ".join(f"nearest.s{first + i}" for i in range(4)) + ")")
+        source = re.sub(r"\((float|int)8\)\(vload4\(0, plane \+ at_even\), vload4\(0, plane \+ at_odd\)\)",
+                        lambda load: f"({load[1]}8)(" + ", ".join(f"plane[{at} + {i}]" for at in ("at_even", "at_odd") for i in range(4)) + ")", source)
+        for half, at, first in (("lo", "at_even", 0), ("hi", "at_odd", 4)):
+            source = source.replace(f"vstore4(values.{half}, 0, plane + {at});", " ".join(f"plane[{at} + {i}] = values.s{first + i};" for i in range(4)))
         path.write_text(source)
     capsule(WORK / "c.off", 0)
     capsule(WORK / "rough.off", 0.2)  # so that the lattice folds
