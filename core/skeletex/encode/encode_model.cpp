@@ -229,12 +229,12 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
                                                                     : spread_rows_uniformly(patch.rectangle.height);
     model.patches.push_back(std::move(patch));
   }
-  std::future<DeviceSnapTables> listing_features;
+  std::shared_future<DeviceSnapTables> listing_features;
   if (placing.has_snap) {
     auto list = [&, on = context.beside()] {
       return upload_tables(*on, tables_of(place_features(finding_features.get(), charts, model.patches), model.patches));
     };
-    listing_features = context.can_run_beside() ? run_beside(std::move(list)) : std::async(std::launch::deferred, std::move(list));
+    listing_features = (context.can_run_beside() ? run_beside(std::move(list)) : std::async(std::launch::deferred, std::move(list))).share();
   }
   model.diagonals = options.diagonals.value_or(placing.has_snap || placing.has_fit ? DiagonalRule::kSmooth : DiagonalRule::kNearest);
   Seams seams = sample_seams(segmentation, skeleton, walls, layout.rectangles, placing.has_snap ? SeamSampling::kSnapped : SeamSampling::kEven);
@@ -243,7 +243,11 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   model.ends = std::move(seams.ends);
   model.texture.width = options.width, model.texture.height = options.height;
   std::shared_future<GuardFrame> framing_guard;
-  if (placing.has_snap || placing.has_fit) framing_guard = run_beside([&] { return frame_guard(model, charts); }).share();
+  if (placing.has_snap || placing.has_fit)
+    framing_guard = run_beside([&, listing = context.can_run_beside() ? listing_features : std::shared_future<DeviceSnapTables>()] {
+                      if (listing.valid()) listing.wait();  // two at once would take turns with what all wait for
+                      return frame_guard(model, charts);
+                    }).share();
 
   std::vector<SpdHits> hits(bones);
   {
@@ -271,7 +275,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   const GuardSources guard{model, mesh, options.tree, charts, std::move(framing_guard)};
   TexelOptions texel_options{.has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_fit = placing.has_fit};
   if (options.has_half_texels) texel_options.half_rule = model.diagonals;
-  TexelResult texels = read_texels(context, skeleton, walls, {charts, model.patches, hits, end_points, &guard, placing.has_snap ? &listing_features : nullptr},
+  TexelResult texels = read_texels(context, skeleton, walls, {charts, model.patches, hits, end_points, &guard, listing_features},
                                    options.width, options.height, model.origin, texel_options);
   model.texture = std::move(texels.texture);
   {

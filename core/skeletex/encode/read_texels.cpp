@@ -165,7 +165,7 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   ReadingPositions positions = even_positions(context, layout);
 
   const DeviceMaps maps = upload_maps(context, sources.charts, sources.patches, origin);
-  const bool is_snapped = sources.features && maps.triangle_count > 0, is_fitted = options.has_fit && maps.triangle_count > 0;
+  const bool is_snapped = sources.features.valid() && maps.triangle_count > 0, is_fitted = options.has_fit && maps.triangle_count > 0;
   auto covering = context.allocate<int>(texels);
   auto is_read = context.allocate<int>(std::max(1, maps.triangle_count));
   context.fill(is_read, 0);
@@ -239,7 +239,7 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   int put_back = 0, edges = 0;
   std::vector<int> vertex_points;
   if (is_snapped) {
-    const DeviceSnapTables features = sources.features->get();
+    const DeviceSnapTables& features = sources.features.get();
     vertex_points = context.download(features.vertex_points), edges = static_cast<int>(features.edge_points.size);
     const SnappedPositions snapped = snap_positions(context, layout, features, positions);
     points = allocate_points(context, texels), covering = context.allocate<int>(texels);

@@ -28,7 +28,7 @@ struct TexelSources {
   /// With snapping or fit, what the finished lattice is compared with; without it there is no such guard.
   const GuardSources* guard = nullptr;
   /// With snapping, what texels of VSM patches move to; waited for when the even lattice is there.
-  std::future<DeviceSnapTables>* features = nullptr;
+  std::shared_future<DeviceSnapTables> features = {};
 };
 
 struct TexelOptions {
