@@ -466,6 +466,32 @@ TEST(GuardKernels, AWalkIsNeverNearerThanTheMeshAndOnASmoothOneAsFar) {
   }
 }
 
+TEST(FitKernels, TheWayFromATriangleOfTheLatticeLeadsToThePointOfTheMeshThatTheWalkEndsAt) {
+  constexpr int kPlanes = 5;  // of fit.cl: area, residual, direction
+  std::mt19937 random(9);
+  for (const double noise : {0.0, 0.05, 0.3}) {
+    const TubeAndLattice tube(random, noise);
+    const std::size_t size = tube.layout.size();
+    std::vector<int> starts;  // four planes
+    for (int i = 0; i < 4; ++i) starts.insert(starts.end(), tube.seeds.begin(), tube.seeds.end());
+    auto lattice = device().allocate<float>(2 * kPlanes * size), costs = device().allocate<float>(size), areas = device().allocate<float>(size);
+    device().fill(costs, 0.f), device().fill(areas, 0.f);
+    device().launch({"fit.cl", "match_lattice"}, tube.layout.range(), tube.layout.width, tube.layout.height, tube.maps.triangle_count, tube.layout.texel_patches,
+                    tube.layout.patches, device().upload(starts), tube.maps.corners, tube.maps.across, tube.maps.x, tube.maps.y, tube.maps.z,
+                    device().upload(tube.diagonals), tube.points[0], tube.points[1], tube.points[2], lattice, costs, areas);
+    const std::vector<float> found = device().download(lattice);
+    for (std::size_t i = 0; i < tube.lattice.triangles.size(); ++i) {
+      const Triangle& t = tube.lattice.triangles[i];
+      const auto value = [&](int plane) { return found[(kPlanes * (tube.numbers[i] % 2) + plane) * size + tube.numbers[i] / 2]; };
+      const Vec3 middle = (tube.lattice.positions[t[0]] + tube.lattice.positions[t[1]] + tube.lattice.positions[t[2]]) / 3;
+      const Vec3 led_to = middle - value(1) * Vec3(value(2), value(3), value(4));
+      double least = 1e9;
+      for (const Triangle& m : tube.chart.triangles) least = std::min(least, tube.distance(led_to, m, tube.chart.positions));
+      EXPECT_LT(least, 2e-5) << noise << " " << i;
+    }
+  }
+}
+
 TEST(GuardKernels, AVertexIsMeasuredToTheQuadsAroundItsPlace) {
   std::mt19937 random(8);
   const TubeAndLattice tube(random, 0.05);
