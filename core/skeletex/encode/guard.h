@@ -17,7 +17,8 @@ struct GuardFrame {
   std::shared_ptr<const LatticeFrame> lattice;
   PlacedVertices vertices;  ///< of the original
 };
-/// \param model  all but its texels
+/// \param model   all but its texels
+/// \param charts  per patch, of VSM patches with their maps
 GuardFrame frame_guard(const SkeletexModel& model, std::span<const Chart> charts);
 
 /// What the guard of the finished lattice compares.
@@ -26,7 +27,7 @@ struct GuardSources {
   const TriangleMesh& mesh;       ///< the original
   const TriangleTree* tree;       ///< of its triangles; null: it is built
   std::span<const Chart> charts;  ///< its maps
-  std::shared_future<GuardFrame> frame;
+  std::shared_future<GuardFrame> frame;  ///< of that model and those maps; waited for
 };
 
 struct GuardReport {

@@ -82,11 +82,11 @@ struct ReadingPositions {
 /// The even lattice.
 ReadingPositions even_positions(ClContext& context, const DeviceLayout& layout);
 
-/// The same as they are while texels snap: inner rows of VSM patches have their even columns first, then their odd ones. All others are 0.
+/// The same as they are while texels snap: inner rows of VSM patches have their even columns first, then their odd ones.
 struct SnappedPositions {
-  ClBuffer<float> x, y;
-  ClBuffer<int> anchors;
-  ClBuffer<float> parameters;  ///< of texels on edges: place on the edge, 0 at its first point, 1 at its last
+  ClBuffer<float> x, y;        ///< see ReadingPositions; 0 in all other rows
+  ClBuffer<int> anchors;       ///< likewise
+  ClBuffer<float> parameters;  ///< place on the edge, 0 at its first point, 1 at its last; of texels on edges alone
 };
 
 /// SnapTables on the device; lists that are empty are buffers of size 0.

@@ -20,7 +20,8 @@ struct PlacedVertices {
   std::vector<PlacedVertex> all;
   std::vector<int> first_of_line;  ///< and the end
 };
-/// The inner vertices of VSM patches' charts.
+/// The inner vertices of VSM patches' charts, numbered as in DeviceMaps.
+/// \param texture_width, texture_height  texels
 PlacedVertices place_vertices(std::span<const Chart> charts, std::span<const Patch> patches, int texture_width, int texture_height);
 
 /// How far the original's vertices are from a lattice, measured again where that has changed. Found among the quads around their places in the map (guard.cl);
