@@ -259,10 +259,10 @@ __attribute__((noinline)) void nearest_around(Point p, global const PatchRecord*
     }
 }
 
-// NDRange (count). Vertices of the mesh: the nearest triangle of the quads around, further around where that is further than the
-// root of `limit2`.
+// NDRange (count). Vertices of the mesh: the nearest triangle of their own quad, of the quads around where that is further than the root of `limit2`, and
+// further around where these are.
 // in   vertices: their numbers; places: where they are in the cells of their patches, x and y
-// out  distances2, squared; nearest: triangles of the lattice
+// out  distances2, squared, and nearest, triangles of the lattice; where they are nearer than that there may be nearer ones
 kernel void measure_vertices(const int count, const int texture_width, const float limit2, global const int* restrict vertices,
                              global const int* restrict vertex_patches, global const float* restrict places, global const PatchRecord* restrict patches,
                              global const int* restrict diagonals, global const float* restrict vertex_x, global const float* restrict vertex_y,
@@ -275,7 +275,11 @@ kernel void measure_vertices(const int count, const int texture_width, const flo
   const Point point = point_at(vertex_x, vertex_y, vertex_z, vertices[i]);
   float best = INFINITY;
   int found = 0;
-  nearest_around(point, p, texture_width, column, row, 1, diagonals, x, y, z, &best, &found);
+  nearest_around(point, p, texture_width, column, row, 0, diagonals, x, y, z, &best, &found);
+  if (best > limit2) {
+    best = INFINITY;
+    nearest_around(point, p, texture_width, column, row, 1, diagonals, x, y, z, &best, &found);
+  }
   if (best > limit2) nearest_around(point, p, texture_width, column, row, 3, diagonals, x, y, z, &best, &found);
   distances2[i] = best;
   nearest[i] = found;

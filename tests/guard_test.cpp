@@ -61,6 +61,10 @@ struct Points {
   LatticeMesh lattice(const SkeletexModel& model, DiagonalRule rule, LatticeMesh::Parts parts = LatticeMesh::Parts::kAll) const {
     return {device(), model, rule, frame_lattice(model), patches, on_device, parts};
   }
+  std::array<ClMapping<float>, 3> map() const {
+    auto [x, y, z] = device().map(on_device.x, on_device.y, on_device.z);
+    return {std::move(x), std::move(y), std::move(z)};
+  }
   /// Every `step`-th texel of inner rows takes its point from others. \return those
   std::vector<int> take(const SkeletexModel& model, const Points& others, int step) {
     std::vector<int> taken;
@@ -149,7 +153,7 @@ TEST(LatticeMesh, IsTheModelsAndWithMovedPointsWhatTheyWouldMake) {
       }
 
     lattice.release();
-    const std::vector<int> changed = lattice.move(points.take(model, others, 20));
+    const std::vector<int> changed = lattice.move(points.take(model, others, 20), points.map());
     const LatticeMesh made = points.lattice(model, rule);
     const TriangleMesh now = whole(lattice, numbers), remade = whole(made, numbers);
     EXPECT_EQ(now.positions, remade.positions);
@@ -208,7 +212,7 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
         << each.name;
 
     lattice.release();
-    const std::vector<int> changed = lattice.move(points.take(model, others, 50));
+    const std::vector<int> changed = lattice.move(points.take(model, others, 50), points.map());
     crossings.measure(lattice, changed);
     const Pairs found_of_changed = crossings.find(lattice, changed);
     const auto all_of = [&](const LatticeMesh& measured) {
@@ -503,13 +507,15 @@ TEST(GuardKernels, AVertexIsMeasuredToTheQuadsAroundItsPlace) {
     places.push_back(static_cast<float>(tube.chart.u[i] * (TubeAndLattice::kHeight - 1)));
   }
   const int count = static_cast<int>(vertices.size());
-  auto distances = device().allocate<float>(count);
-  auto nearest = device().allocate<int>(count);
-  device().launch({"guard.cl", "measure_vertices"}, ClRange(count), count, tube.layout.width, 0.0f, device().upload(vertices),
-                  device().upload(patches), device().upload(places), tube.layout.patches, device().upload(tube.diagonals), tube.maps.x, tube.maps.y,
-                  tube.maps.z, tube.points[0], tube.points[1], tube.points[2], distances, nearest);
-  const std::vector<float> found2 = device().download(distances);
-  const std::vector<int> found = device().download(nearest);
+  const auto measure = [&](float limit2) {
+    auto distances = device().allocate<float>(count);
+    auto nearest = device().allocate<int>(count);
+    device().launch({"guard.cl", "measure_vertices"}, ClRange(count), count, tube.layout.width, limit2, device().upload(vertices),
+                    device().upload(patches), device().upload(places), tube.layout.patches, device().upload(tube.diagonals), tube.maps.x, tube.maps.y,
+                    tube.maps.z, tube.points[0], tube.points[1], tube.points[2], distances, nearest);
+    return device().download(distances, nearest);
+  };
+  const auto [found2, found] = measure(0);
   for (int i = 0; i < count; ++i) {
     double expected = 1e9;
     for (const Triangle& t : tube.lattice.triangles) expected = std::min(expected, tube.distance(tube.chart.positions[i], t, tube.lattice.positions));
@@ -518,6 +524,22 @@ TEST(GuardKernels, AVertexIsMeasuredToTheQuadsAroundItsPlace) {
     ASSERT_LT(number, std::ssize(tube.numbers));
     EXPECT_NEAR(tube.distance(tube.chart.positions[i], tube.lattice.triangles[number], tube.lattice.positions), expected, 1e-4) << i;
   }
+  // What is near enough is not looked at more closely, and what is not is found as without that.
+  std::vector<float> sorted = found2;
+  std::nth_element(sorted.begin(), sorted.begin() + count / 2, sorted.end());
+  const float limit2 = sorted[count / 2];
+  const auto [limited2, limited] = measure(limit2);
+  int further = 0;
+  for (int i = 0; i < count; ++i) {
+    EXPECT_EQ(limited2[i] > limit2, found2[i] > limit2) << i;
+    EXPECT_GE(limited2[i], found2[i]) << i;
+    further += limited2[i] > found2[i];
+    if (found2[i] > limit2) {
+      EXPECT_EQ(limited2[i], found2[i]) << i;
+      EXPECT_EQ(limited[i], found[i]) << i;
+    }
+  }
+  EXPECT_GT(further, 0);
 }
 
 // What is near enough is not looked at more closely, and what is not is found as without that.

@@ -168,6 +168,29 @@ TEST(SnapFeatures, ComeByRowsAndAlongThemWhateverTheOrderOfTrianglesAndTheTurn) 
   }
 }
 
+TEST(SnapFeatures, LieInTheRowsThatBisectionFinds) {
+  std::mt19937 random(12);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (const int height : {3, 4, 5, 17, 300}) {
+    for (const double unevenness : {0.0, 1.0, 6.0}) {
+      std::vector<double> row_u(height);
+      for (int row = 0; row < height; ++row) row_u[row] = std::pow(static_cast<double>(row) / (height - 1), 1 + unevenness);
+      if (height > 10) row_u[5] = row_u[6] = row_u[7];  // rows of no length
+      std::vector<double> u{0, 1};
+      for (int i = 0; i < 1000; ++i) u.push_back(uniform(random));
+      u.insert(u.end(), row_u.begin(), row_u.end());
+      for (int i = 0; i <= 4 * height; ++i) u.push_back(static_cast<double>(i) / (4 * height));
+      const std::vector<double> rows = rows_of(row_u, u);
+      ASSERT_EQ(rows.size(), u.size());
+      for (std::size_t i = 0; i < u.size(); ++i) {
+        const auto above = std::upper_bound(row_u.begin() + 1, row_u.end() - 1, u[i]);
+        const double low = *(above - 1), high = *above;
+        EXPECT_EQ(rows[i], static_cast<double>(above - 1 - row_u.begin()) + (high > low ? (u[i] - low) / (high - low) : 0)) << height << " " << u[i];
+      }
+    }
+  }
+}
+
 TEST(Snap, PutsTexelsWhereItsTwinDoes) {
   for (unsigned seed = 1; seed <= 24; ++seed) {
     SCOPED_TRACE(seed);
@@ -303,7 +326,7 @@ TEST(Snap, WithTexelsThatGoBackGoesWhatThenFoldsAndNothingElse) {
   std::shuffle(marked.begin(), marked.end(), random);
   for (std::size_t call = 0, third = marked.size() / 3 + 1; call < 3; ++call) {
     const std::vector<int> some(marked.begin() + std::min(marked.size(), call * third), marked.begin() + std::min(marked.size(), (call + 1) * third));
-    const std::vector<int> more = put_back_listed(device(), patch.layout, even_points, even_points, some, true, returns, positions, points);
+    const std::vector<int> more = put_back_listed(device(), patch.layout, even_points, even_points, some, true, returns, positions, points).texels;
     EXPECT_FALSE(more.empty());
     back.insert(back.end(), more.begin(), more.end());
   }

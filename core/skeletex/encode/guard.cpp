@@ -126,11 +126,12 @@ GuardReport Guard::put_back_faults(ClContext& context, std::span<const int> vert
   LatticeCrossings& crossings = even_->crossings;
   TriangleDistances& distances = even_->distances;
   VertexDistances& vertices = even_->vertices;
-  std::vector<int> anchors = context.download(positions.anchors);
+  std::optional<ClMapping<int>> anchors(context.map(positions.anchors));
   LatticeMesh lattice(context, even_lattice, even_->sources.model.diagonals, points);
   std::future<void> measuring_parts = std::async(std::launch::async, [&] { crossings.measure(lattice); });
   ClBuffer<float> device_suspicions2 = distances.suspect_quads(context, lattice, triangles);
-  vertices.list(vertex_points, std::move(anchors));
+  vertices.list(vertex_points, {anchors->data(), anchors->data() + anchors->size()});
+  anchors.reset();
   std::optional<ClMapping<float>> suspicions2(context.map(std::exchange(device_suspicions2, {})));
   even_->measuring.get();
   const float limit = even_->limit;
@@ -198,10 +199,11 @@ GuardReport Guard::put_back_faults(ClContext& context, std::span<const int> vert
     if (marks.texels().empty()) break;
     lattice.release();
     if (!returns) returns.emplace(context, even_->layout);
-    back = put_back_listed(context, even_->layout, even_->points, even_->filtered, marks.texels(), with_vertices, *returns, positions, points);
+    TexelsBack gone = put_back_listed(context, even_->layout, even_->points, even_->filtered, marks.texels(), with_vertices, *returns, positions, points);
+    back = std::move(gone.texels);
     report.texels_put_back += static_cast<int>(back.size());
     if (back.empty() && with_vertices) break;
-    changed = lattice.move(back);
+    changed = lattice.move(back, std::move(gone.points));
   }
   report.anchors = vertices.take_anchors();
   for (const int texel : back) report.anchors[texel] = 0;

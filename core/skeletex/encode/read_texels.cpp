@@ -254,14 +254,6 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
     copy_plane(context, positions.home_x, positions.x), copy_plane(context, positions.home_y, positions.y);
     points = copy_points(context, even);
   }
-  if (maps.triangle_count > 0) {
-    const std::vector<int> marks = context.download(is_read);
-    for (int bone = 0; bone < bones; ++bone) {
-      const int begin = maps.first_triangle[bone], end = maps.first_triangle[bone + 1];
-      if (end > begin) result.report.sampled_triangle_fractions[bone] = static_cast<double>(std::count(marks.begin() + begin, marks.begin() + end, 1)) / (end - begin);
-    }
-  }
-
   if (is_fitted) result.report.fit = fit_points(context, layout, maps, covering, positions, points);
   // What is snapped or fitted is not filtered as well: with SPD patches beside it, only these are.
   const bool is_placed = is_snapped || is_fitted;
@@ -287,7 +279,11 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Wall
   if (options.half_rule)
     result.report.rounding = round_to_half(context, *options.half_rule, {sources.patches.begin(), sources.patches.end()}, layout, rows, columns, points, stored);
   if (is_snapped) result.report.snap = report_snap(static_cast<int>(vertex_points.size()), edges, put_back, anchors);  // beside the device's work
-  auto [along, around, out] = context.download(stored.x, stored.y, stored.z);
+  auto [along, around, out, marks] = context.download(stored.x, stored.y, stored.z, is_read);
+  for (int bone = 0; bone < bones; ++bone) {
+    const int begin = maps.first_triangle[bone], end = maps.first_triangle[bone + 1];
+    if (end > begin) result.report.sampled_triangle_fractions[bone] = static_cast<double>(std::count(marks.begin() + begin, marks.begin() + end, 1)) / (end - begin);
+  }
   result.texture = {texture_width, texture_height, std::move(along), std::move(around), std::move(out)};
   return result;
 }

@@ -67,8 +67,8 @@ std::vector<int> order_by_place(int count, const Rectangle& r, const X& x, const
   std::vector<int> places, next(static_cast<std::size_t>(r.height) * bins + 1, 0), order(count);
   places.reserve(count);
   for (int i = 0; i < count; ++i) {
-    const int column = floor_of(x(i)) % r.width, row = std::clamp(static_cast<int>(y(i)), 0, r.height - 1);
-    places.push_back(row * bins + (column < 0 ? column + r.width : column) / kBinWidth);
+    const int row = std::clamp(static_cast<int>(y(i)), 0, r.height - 1);
+    places.push_back(row * bins + wrapped(floor_of(x(i)), r.width) / kBinWidth);
     ++next[places.back() + 1];
   }
   std::partial_sum(next.begin(), next.end(), next.begin());
@@ -78,10 +78,24 @@ std::vector<int> order_by_place(int count, const Rectangle& r, const X& x, const
 
 }  // namespace
 
-double row_of(const std::vector<double>& row_u, double u) {
-  const auto above = std::upper_bound(row_u.begin() + 1, row_u.end() - 1, u);
-  const double low = *(above - 1), high = *above;
-  return static_cast<double>(above - 1 - row_u.begin()) + (high > low ? (u - low) / (high - low) : 0);
+std::vector<double> rows_of(const std::vector<double>& row_u, std::span<const double> u) {
+  // From where to look for the first row above: no row before that is in as high a share of [0, 1].
+  const int last = static_cast<int>(row_u.size()) - 1, shares = 2 * last;
+  const auto share_of = [&](double x) { return std::clamp(static_cast<int>(x * shares), 0, shares - 1); };
+  std::vector<int> firsts(shares);
+  for (int share = 0, row = 1; share < shares; ++share) {
+    while (row < last && share_of(row_u[row]) < share) ++row;
+    firsts[share] = row;
+  }
+  std::vector<double> rows;
+  rows.reserve(u.size());
+  for (const double own : u) {
+    int above = firsts[share_of(own)];
+    while (above < last && row_u[above] <= own) ++above;
+    const double low = row_u[above - 1], high = row_u[above];
+    rows.push_back(above - 1 + (high > low ? (own - low) / (high - low) : 0));
+  }
+  return rows;
 }
 
 MapFeatures find_features(std::span<const Chart> charts, std::span<const Method> methods, double least_dihedral) {
@@ -115,9 +129,7 @@ SnapFeatures place_features(const MapFeatures& features, std::span<const Chart> 
     if (patches[bone].method != Method::kVsm) continue;
     const Chart& chart = charts[bone];
     const Rectangle& r = patches[bone].rectangle;
-    std::vector<double> rows;
-    rows.reserve(chart.u.size());
-    for (const double u : chart.u) rows.push_back(row_of(patches[bone].row_u, u));
+    const std::vector<double> rows = rows_of(patches[bone].row_u, chart.u);
     const std::span<const MapFeatures::Vertex> vertices = features.vertices[bone];
     for (const int i : order_by_place(static_cast<int>(vertices.size()), r, [&](int i) { return chart.v[vertices[i].vertex] * r.width; },
                                       [&](int i) { return rows[vertices[i].vertex]; })) {
@@ -325,17 +337,16 @@ TexelReturns::TexelReturns(ClContext& context, const DeviceLayout& layout)
   context.fill(marks, 0);
 }
 
-std::vector<int> put_back_listed(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before,
-                                 const std::vector<int>& texels, bool with_vertices, TexelReturns& returns, ReadingPositions& positions, TexelPoints& points) {
-  if (texels.empty()) return {};
+TexelsBack put_back_listed(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before,
+                           const std::vector<int>& texels, bool with_vertices, TexelReturns& returns, ReadingPositions& positions, TexelPoints& points) {
   const auto device_counts = context.upload(std::vector{0, 0});
   // One work-group: on a CPU one work-item.
   context.launch({"snap.cl", "put_listed_back"}, row_range(context, 1), static_cast<int>(texels.size()), static_cast<int>(with_vertices),
                  1 << ++returns.calls, layout.width, context.upload(texels), layout.texel_patches, layout.patches, even.x, even.y, even.z, before.x, before.y,
                  before.z, positions.home_x, positions.home_y, returns.marks, positions.anchors, positions.x, positions.y, points.x, points.y, points.z,
                  returns.back, returns.bad, device_counts);
-  const auto [counts, back] = context.map(device_counts, returns.back);
-  return {back.data(), back.data() + counts[0]};
+  auto [counts, back, x, y, z] = context.map(device_counts, returns.back, points.x, points.y, points.z);
+  return {{back.data(), back.data() + counts[0]}, {std::move(x), std::move(y), std::move(z)}};
 }
 
 }  // namespace skeletex

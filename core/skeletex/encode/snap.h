@@ -47,8 +47,14 @@ struct SnapFeatures {
   std::vector<Edge> edges;  ///< patch after patch; both there by rows and along them
 };
 
-/// The row, with fractions, that reads at u.
-double row_of(const std::vector<double>& row_u, double u);
+/// A column of a patch that one lies at, round and round.
+inline int wrapped(int column, int width) {
+  while (column < 0) column += width;
+  while (column >= width) column -= width;
+  return column;
+}
+/// The rows, with fractions, that read at some u of [0, 1].
+std::vector<double> rows_of(const std::vector<double>& row_u, std::span<const double> u);
 
 /// Those near each other in the texture come one after the other.
 /// \param charts   as for find_features
@@ -115,13 +121,17 @@ struct TexelReturns {
   int calls = 0;
 };
 
+struct TexelsBack {
+  std::vector<int> texels;                   ///< that went back, in any order
+  std::array<ClMapping<float>, 3> points;  ///< where all are now
+};
 /// Texels of inner rows go back to the even lattice, those on vertices only `with_vertices`; and with them the texels of quads at
 /// them that then fold in the map, or in space where the even lattice does not.
 /// \param even    the even lattice's points, the measure of folds
 /// \param before  what texels go back to: these as they would be stored
 /// \param texels  each once
-/// \return the texels that went back, in any order. \throw DeviceError
-std::vector<int> put_back_listed(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before,
+/// \throw DeviceError
+TexelsBack put_back_listed(ClContext& context, const DeviceLayout& layout, const TexelPoints& even, const TexelPoints& before,
                                  const std::vector<int>& texels, bool with_vertices, TexelReturns& returns, ReadingPositions& positions, TexelPoints& points);
 
 }  // namespace skeletex

@@ -28,11 +28,12 @@ PlacedVertices place_vertices(std::span<const Chart> charts, std::span<const Pat
     if (patches[bone].method != Method::kVsm) continue;
     const Chart& chart = charts[bone];
     const Rectangle& r = patches[bone].rectangle;
+    const std::vector<double> rows = rows_of(patches[bone].row_u, chart.u);
     for (int i = 0; i < static_cast<int>(chart.positions.size()); ++i) {
       if (chart.kinds[i] != ChartVertex::kInner) continue;
-      const auto x = static_cast<float>(chart.v[i] * r.width), y = static_cast<float>(row_of(patches[bone].row_u, chart.u[i]));
+      const auto x = static_cast<float>(chart.v[i] * r.width), y = static_cast<float>(rows[i]);
       const int column = static_cast<int>(std::floor(x)), line = r.y + std::clamp(static_cast<int>(std::floor(y)), 1, r.height - 3);
-      placed.push_back({bone, first_point + i, x, y, line * texture_width + r.x + (column % r.width + r.width) % r.width});
+      placed.push_back({bone, first_point + i, x, y, line * texture_width + r.x + wrapped(column, r.width)});
       ++by_line.first_of_line[line + 1];
     }
     first_point += static_cast<int>(chart.positions.size());

@@ -693,10 +693,9 @@ void LatticeCrossings::find_planes_of(const LatticeMesh& lattice, Leaf& leaf) co
 }
 
 /// Triangles of two leaves, or of one.
-void LatticeCrossings::find_between(const LatticeMesh& lattice, int a, int b, const Box& around_b, const Asked* asked, Leaves& leaves,
+void LatticeCrossings::find_between(const LatticeMesh& lattice, int a, int b, const Box& around_b, const Asked* asked, const Leaves& leaves,
                                     std::vector<std::array<int, 2>>& pairs) const {
-  // The last one is for two that are kept at the same place.
-  const std::size_t places = leaves.size() - 1, place_a = a % places, place_b = a != b && b % places == place_a ? places : b % places;
+  const std::size_t place_a = a % kLeaves, place_b = a != b && b % kLeaves == place_a ? kLeaves : b % kLeaves;
   const TriangleBlock &one = boxes_of(lattice, a, asked, leaves[place_a]), &other = boxes_of(lattice, b, asked, leaves[place_b]);
   BlockOverlaps overlaps;
   const auto block_box = [](const Box& box) {
@@ -717,12 +716,8 @@ void LatticeCrossings::find_between(const LatticeMesh& lattice, int a, int b, co
   }
 }
 
-/// The thread's own, none of them known.
-LatticeCrossings::Leaves& LatticeCrossings::fresh_leaves() {
-  static thread_local Leaves leaves(kLeaves + 1);
-  for (Leaf& leaf : leaves) leaf.node = -1;
-  return leaves;
-}
+/// None of them known. (For overwrite: what is not known yet need not be cleared.)
+LatticeCrossings::Leaves LatticeCrossings::fresh_leaves() { return std::make_unique_for_overwrite<Leaf[]>(kLeaves + 1); }
 
 /// Squares whose normals tell whether triangles asked for can meet others near them.
 std::vector<int> LatticeCrossings::squares_near(const Asked& asked) const {
@@ -813,7 +808,7 @@ std::vector<std::array<int, 2>> LatticeCrossings::find(const LatticeMesh& lattic
   }
   std::vector<std::vector<std::array<int, 2>>> found(block_count(tasks.size(), kTasks));
   for_each_block(tasks.size(), kTasks, [&](std::size_t block, std::size_t begin, std::size_t end) {
-    Leaves& leaves = fresh_leaves();
+    const Leaves leaves = fresh_leaves();
     std::vector<Task> stack(tasks.begin() + static_cast<std::ptrdiff_t>(begin), tasks.begin() + static_cast<std::ptrdiff_t>(end));
     while (!stack.empty()) {
       const Task task = stack.back();
@@ -862,7 +857,7 @@ LatticeCrossings::Others LatticeCrossings::find_between_same(std::span<const std
   other.choose(quads);
   other.fill_ends(ends);
   for_each_block(count, kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
-    Leaves& leaves = fresh_leaves();
+    const Leaves leaves = fresh_leaves();
     for (std::size_t i = begin; i < end; ++i) {
       if (is_whole(i)) {
         const auto [a, b] = given[first[i]].leaves;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <array>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -69,7 +70,8 @@ class LatticeCrossings {
     QuadBlock quads;  ///< of a square
     TriangleBlock triangles;
   };
-  using Leaves = std::vector<Leaf>;
+  /// Kept by each thread, by the numbers of their nodes; the last one is for two of the same place.
+  using Leaves = std::unique_ptr<Leaf[]>;
   /// What a strip's or fan's triangles share with others.
   struct EndLeaf {
     int first_column = 0, last_column = 0;   ///< of its patch: from the first on, not wrapped
@@ -124,11 +126,11 @@ class LatticeCrossings {
   bool are_quads_smooth(const LatticeMesh& lattice, int patch, int s, int t) const;
   std::vector<int> squares_near(const Asked& asked) const;
   bool split(const Asked& asked, const Task& task, std::vector<Task>& tasks) const;
-  static Leaves& fresh_leaves();
+  static Leaves fresh_leaves();
   void copy_quads(const Node& node, const SquareVertices& square, QuadBlock& quads) const;
   const TriangleBlock& boxes_of(const LatticeMesh& lattice, int node, const Asked* asked, Leaf& leaf) const;
   void find_planes_of(const LatticeMesh& lattice, Leaf& leaf) const;
-  void find_between(const LatticeMesh& lattice, int a, int b, const Box& around_b, const Asked* asked, Leaves& leaves,
+  void find_between(const LatticeMesh& lattice, int a, int b, const Box& around_b, const Asked* asked, const Leaves& leaves,
                     std::vector<std::array<int, 2>>& pairs) const;
 
   float margin_;

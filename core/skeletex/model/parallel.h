@@ -37,6 +37,12 @@ inline void leave_processor([[maybe_unused]] int processor) {
 #endif
 }
 
+/// As many as there are when it is first asked for: the system library opens a file for every answer.
+inline std::size_t processor_count() {
+  static const std::size_t count = std::max(1u, std::thread::hardware_concurrency());
+  return count;
+}
+
 /// Calls act() on a thread of its own. The future's destructor waits for it.
 template <class Act>
 auto run_beside(Act act) {
@@ -52,7 +58,7 @@ auto run_beside(Act act) {
 template <class Act>
 void for_each_block(std::size_t size, std::size_t block_size, const Act& act) {
   const std::size_t blocks = (size + block_size - 1) / block_size;
-  const std::size_t threads = std::min<std::size_t>(blocks, std::max(1u, std::thread::hardware_concurrency()));
+  const std::size_t threads = std::min(blocks, processor_count());
   std::atomic<std::size_t> next{0};
   std::exception_ptr failure;
   std::mutex failure_mutex;

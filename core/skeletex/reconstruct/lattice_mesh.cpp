@@ -78,7 +78,7 @@ LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, Diagona
       end_positions_(frame_->positions),
       points_(std::move(points)) {
   // Before the kernel is queued, so that the host can go on beside it.
-  read_points();
+  std::tie(planes_[0], planes_[1], planes_[2]) = context.map(points_.x, points_.y, points_.z);
   device_diagonals_ = context.allocate<int>(texel_count());
   if (parts == Parts::kAll)
     choose_diagonals(context, rule, model.patches, model.texture.width, rows_, patches_, points_, device_diagonals_);
@@ -131,8 +131,6 @@ void LatticeMesh::choose_listed(std::span<const int> quads) {
                   points_.x, points_.y, points_.z, device_diagonals_);
 }
 
-void LatticeMesh::read_points() { std::tie(planes_[0], planes_[1], planes_[2]) = context_.map(points_.x, points_.y, points_.z); }
-
 /// The strips or fans of ends, numbered as in LatticeFrame::first_end.
 std::vector<std::vector<Triangle>> LatticeMesh::make_ends(std::span<const int> ends) {
   std::vector<std::vector<Triangle>> filled(ends.size());
@@ -169,8 +167,8 @@ Triangle LatticeMesh::triangle(int index) const {
   return triangles_of(index / 2, right_of(index / 2))[index % 2];
 }
 
-std::vector<int> LatticeMesh::move(std::span<const int> texels) {
-  read_points();
+std::vector<int> LatticeMesh::move(std::span<const int> texels, std::array<ClMapping<float>, 3> points) {
+  planes_ = std::move(points);
   if (texels.empty()) return {};
   const int width = model_.texture.width;
   std::vector<char> is_moved(texel_count(), 0), is_asked(texel_count(), 0);
