@@ -194,7 +194,7 @@ std::string report_text(const EncodeReport& report, const EncodeOptions& options
 }
 
 // What texels take, with snapping and without, and a mesh by its file; and the most that the heap can hold without growing (keep_freed_memory).
-constexpr std::size_t kBytesPerSnappedTexel = 160, kBytesPerTexel = 104, kBytesPerByteOfMesh = 16, kMostMemoryAhead = 192 << 20;
+constexpr std::size_t kBytesPerSnappedTexel = 132, kBytesPerTexel = 104, kBytesPerByteOfMesh = 16, kMostMemoryAhead = 192 << 20;
 
 std::size_t memory_for(const Arguments& arguments, const EncodeOptions& options) {
   const std::size_t per_texel = options.has_snap.value_or(true) ? kBytesPerSnappedTexel : kBytesPerTexel;
