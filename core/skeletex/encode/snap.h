@@ -122,7 +122,7 @@ struct TexelReturns {
 };
 
 struct TexelsBack {
-  std::vector<int> texels;                   ///< that went back, in any order
+  std::vector<int> texels;                 ///< that went back, in any order
   std::array<ClMapping<float>, 3> points;  ///< where all are now
 };
 /// Texels of inner rows go back to the even lattice, those on vertices only `with_vertices`; and with them the texels of quads at

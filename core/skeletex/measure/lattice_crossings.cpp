@@ -25,7 +25,7 @@ constexpr float kSliver = 16;         // of what rounding moves a vertex by: the
 constexpr std::size_t kAtOnce = 128;
 constexpr int kTaskLevel = 3;         // nodes up to here are one task
 constexpr std::size_t kTasks = 8;     // at once
-constexpr std::size_t kLeaves = 96;   // kept by each thread
+constexpr std::size_t kLeaves = 96;   // kept while some tasks are gone through
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 

@@ -70,7 +70,7 @@ class LatticeCrossings {
     QuadBlock quads;  ///< of a square
     TriangleBlock triangles;
   };
-  /// Kept by each thread, by the numbers of their nodes; the last one is for two of the same place.
+  /// Kept at places by the numbers of their nodes; the last place is for two that would have the same.
   using Leaves = std::unique_ptr<Leaf[]>;
   /// What a strip's or fan's triangles share with others.
   struct EndLeaf {
