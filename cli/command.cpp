@@ -3,13 +3,13 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <sched.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <memory>
 
+#include "device_threads.h"
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/suggestion.h"
@@ -99,31 +99,9 @@ double Stopwatch::lap_ms() {
   return ms;
 }
 
-namespace {
-
-/// While it lives, threads that a driver starts take over a policy by which they do not interrupt whoever gives them work: PoCL's, woken for the first of several
-/// launches, take the processor on which the others are made ready. They are given as much time as ever.
-class DeviceThreadsPolicy {
- public:
-#ifdef __linux__
-  DeviceThreadsPolicy() : before_(sched_getscheduler(0)) {
-    if (before_ == SCHED_OTHER) sched_setscheduler(0, SCHED_BATCH, &parameters_);
-  }
-  ~DeviceThreadsPolicy() {
-    if (before_ == SCHED_OTHER) sched_setscheduler(0, before_, &parameters_);
-  }
-
- private:
-  int before_;
-  sched_param parameters_{};
-#endif
-};
-
-}  // namespace
-
 ClContext& open_device(const std::string& selector) {
   static std::vector<std::unique_ptr<ClContext>> open;
-  [[maybe_unused]] const DeviceThreadsPolicy policy{};
+  const LoadingDevice loading;
   return *open.emplace_back(std::make_unique<ClContext>(selector));
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <fmt/format.h>
 #include <malloc.h>
-#include <sched.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sys/mman.h>
@@ -16,6 +15,7 @@
 #include <new>
 
 #include "command.h"
+#include "device_threads.h"
 #include "help_formatter.h"
 #include "skeletex/io/suggestion.h"
 #include "skeletex/model/error.h"
@@ -66,24 +66,6 @@ void keep_freed_memory() {
   std::free(large);
   if (end_of_heap() > begin) madvise(reinterpret_cast<void*>(begin), end_of_heap() - begin, MADV_HUGEPAGE);
 #endif
-#endif
-}
-
-/// PoCL's threads stay on processors of their own: left to Linux, two of them share one for milliseconds while the other is idle. Only where
-/// this process may use all processors and the number of threads is PoCL's own choice: its n-th thread takes the n-th processor, or it aborts.
-void keep_device_threads_apart() {
-#ifdef __linux__
-  for (const char* number_of_threads : {"POCL_MAX_PTHREAD_COUNT", "POCL_CPU_MAX_CU_COUNT"})
-    if (std::getenv(number_of_threads)) return;
-  const long processors = sysconf(_SC_NPROCESSORS_CONF);
-  cpu_set_t allowed, last;
-  if (processors < 2 || processors > CPU_SETSIZE || sched_getaffinity(0, sizeof allowed, &allowed) != 0) return;
-  for (long i = 0; i < processors; ++i)
-    if (!CPU_ISSET(i, &allowed)) return;
-  // Whether a thread may choose at all.
-  CPU_ZERO(&last);
-  CPU_SET(processors - 1, &last);
-  if (sched_setaffinity(0, sizeof last, &last) == 0 && sched_setaffinity(0, sizeof allowed, &allowed) == 0) setenv("POCL_AFFINITY", "1", 0);
 #endif
 }
 
@@ -146,7 +128,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   skeletex::cli::keep_freed_memory();
-  skeletex::cli::keep_device_threads_apart();
+  skeletex::cli::prepare_device_threads();
   auto log = spdlog::stderr_color_mt("skeletex");
   log->set_pattern("%^%l:%$ %v");
   spdlog::set_default_logger(log);
