@@ -47,13 +47,13 @@ struct SnapFeatures {
   std::vector<Edge> edges;  ///< patch after patch; both there by rows and along them
 };
 
-/// A column of a patch that one lies at, round and round.
+/// Columns of a patch wrap round: the one of [0, width) that is the same.
 inline int wrapped(int column, int width) {
   while (column < 0) column += width;
   while (column >= width) column -= width;
   return column;
 }
-/// The rows, with fractions, that read at some u of [0, 1].
+/// The rows of a patch, with fractions, that read at some u. \param row_u  per row, see Patch \param u  of [0, 1] \return per u
 std::vector<double> rows_of(const std::vector<double>& row_u, std::span<const double> u);
 
 /// Those near each other in the texture come one after the other.
@@ -121,9 +121,10 @@ struct TexelReturns {
   int calls = 0;
 };
 
+/// What put_back_listed has done.
 struct TexelsBack {
   std::vector<int> texels;                 ///< that went back, in any order
-  std::array<ClMapping<float>, 3> points;  ///< where all are now
+  std::array<ClMapping<float>, 3> points;  ///< x, y, z per texel of the texture, where all are now
 };
 /// Texels of inner rows go back to the even lattice, those on vertices only `with_vertices`; and with them the texels of quads at
 /// them that then fold in the map, or in space where the even lattice does not.

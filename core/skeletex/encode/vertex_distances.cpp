@@ -193,7 +193,7 @@ void VertexDistances::add_around(const LatticeMesh& lattice, int texel) {
     if (column >= kVertexReach && column + kVertexReach < r.width)
       std::fill_n(line + column - kVertexReach, 2 * kVertexReach + 1, 1);
     else
-      for (int j = column - kVertexReach; j <= column + kVertexReach; ++j) line[(j % r.width + r.width) % r.width] = 1;
+      for (int j = column - kVertexReach; j <= column + kVertexReach; ++j) line[wrapped(j, r.width)] = 1;
   }
 }
 

@@ -108,7 +108,8 @@ class LatticeMesh {
   /// Before anything writes to its points on the device: until `move` no vertex' place can be asked for.
   void release() { planes_ = {}; }
   /// These inner texels, and no others, have other points since `release`. Quads around them take their diagonals anew, strips beside them are filled
-  /// anew. \param points  all of them \return the triangles that are not what they were, in order
+  /// anew. \param points  x, y, z of all: the planes that the constructor was given
+  /// \return the triangles that are not what they were, in order
   std::vector<int> move(std::span<const int> texels, std::array<ClMapping<float>, 3> points);
 
  private:
