@@ -13,6 +13,7 @@
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/pose_file.h"
 #include "skeletex/model/error.h"
+#include "deform_option.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 
@@ -20,7 +21,7 @@ namespace skeletex::cli {
 namespace {
 
 struct Arguments {
-  std::string model, output, pose, device, json;
+  std::string model, output, pose, device, json, deform = "smooth";
   int size = 0, level = 0;
   std::optional<double> time, constant_offset;  ///< the offset in diagonals
   std::vector<std::string> bones;
@@ -66,7 +67,7 @@ void run(const Arguments& arguments) {
       const Skeleton& skeleton = posed ? *posed : model.skeleton;
       mesh = constant_offset_mesh(context, model, skeleton, bones_by_name(model, arguments.bones), *arguments.constant_offset * model.diagonal, rule);
     } else {
-      mesh = posed ? reconstruct_mesh(context, model, *posed, rule) : reconstruct_mesh(context, model);
+      mesh = posed ? reconstruct_mesh(context, model, *posed, {deformation_of(arguments.deform), rule}) : reconstruct_mesh(context, model);
     }
     reconstruct_ms = watch.lap_ms();
     bar.show("writing", 0.7);
@@ -107,7 +108,8 @@ void add_reconstruct_command(CLI::App& program) {
       ->type_name("K");
   CLI::Option* pose = command.add_option("--pose", arguments->pose, "pose or animation: .json")->type_name("FILE");
   command.add_option("--time", arguments->time, "time in the animation (default: its first frame)")->type_name("T")->needs(pose);
-  command.add_flag("--no-distance", arguments->is_distance_dropped, "do not restore the distances to the bones in the pose")->needs(pose);
+  add_deform_option(command, arguments->deform)->needs(pose);
+  command.add_flag("--no-distance", arguments->is_distance_dropped, "with --deform paper or coordinates: do not restore the distances to the bones")->needs(pose);
   CLI::Option* offset = command
                             .add_option("--constant-offset", arguments->constant_offset,
                                         "instead of the surface the plane of bone tangent space that lies so far out: a tube around every bone, "

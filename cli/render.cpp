@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "command.h"
+#include "deform_option.h"
 #include "progress_bar.h"
 #include "skeletex/io/json_file.h"
 #include "skeletex/io/model_config.h"
@@ -32,7 +33,7 @@ namespace {
 constexpr int kCheckerCells = 24;
 
 struct Arguments {
-  std::string input, output, skeleton, pose, camera, against, device, gl_device, json, up, front;
+  std::string deform = "smooth", input, output, skeleton, pose, camera, against, device, gl_device, json, up, front;
   std::string mode = "shaded", size = "1200x900", background = "white";
   std::optional<double> time, azimuth, elevation, fov, zoom;
   double error_max = 0;
@@ -195,6 +196,23 @@ void check_arguments(const Arguments& arguments) {
   check_json_target(arguments.json);
 }
 
+/// Moves the surface of a model to its pose on the GL device.
+void pose_surface(GlContext& gl, ClContext& context, const Arguments& arguments, const Subject& subject, GpuSurface& surface) {
+  const SkeletexModel& model = *subject.model;
+  const Deformation deformation = deformation_of(arguments.deform);
+  const DistanceRule distance = arguments.is_distance_dropped ? DistanceRule::kFromFoot : DistanceRule::kFromBone;
+  if (arguments.pose.empty() || deformation == Deformation::kPaper) {
+    displace(gl, upload_model(model), model, *subject.skeleton, distance, surface);
+    return;
+  }
+  if (deformation == Deformation::kCoordinates) {
+    surface = upload_surface(gl, reconstruct_mesh(context, model, *subject.skeleton, {deformation, distance}));
+    return;
+  }
+  const Skin skin = make_skin(context, model, displace_inner(context, model, Walls(model.skeleton), number_lattice(model)));
+  pose_skin(gl, upload_skin(skin, subject.mesh), skin, bone_motions(model.skeleton, *subject.skeleton), *subject.skeleton, surface);
+}
+
 void run(Arguments arguments) {
   nlohmann::json own_view;
   if (arguments.input.ends_with(".json")) {
@@ -228,9 +246,8 @@ void run(Arguments arguments) {
   double displace_ms = 0;
   std::vector<Vec3> points = subject.mesh.positions;
   if (subject.model) {
-    const GpuModel device = upload_model(*subject.model);
     watch.lap_ms();
-    displace(gl, device, *subject.model, *subject.skeleton, arguments.is_distance_dropped ? DistanceRule::kFromFoot : DistanceRule::kFromBone, surface);
+    pose_surface(gl, context, arguments, subject, surface);
     points = download_positions(surface);
     displace_ms = watch.lap_ms();
   }
@@ -298,7 +315,8 @@ void add_render_command(CLI::App& program) {
       ->check(CLI::PositiveNumber.description(""))->type_name("X");
   CLI::Option* pose = command.add_option("--pose", arguments->pose, "pose or animation of a model: .json")->type_name("FILE");
   command.add_option("--time", arguments->time, "time in the animation (default: its first frame)")->type_name("T")->needs(pose);
-  command.add_flag("--no-distance", arguments->is_distance_dropped, "do not restore the distances to the bones in the pose")->needs(pose);
+  add_deform_option(command, arguments->deform)->needs(pose);
+  command.add_flag("--no-distance", arguments->is_distance_dropped, "with --deform paper or coordinates: do not restore the distances to the bones")->needs(pose);
   command.add_option("--lattice", arguments->lattice, "draw a model at another texture size, 4 to 16384 texels")->check(CLI::Range(4, 16384).description(""))->type_name("N");
   command.add_option("--camera", arguments->camera, "view: .json with azimuth, elevation, fov, zoom, up, front, target, eye")->type_name("FILE");
   command.add_option("--azimuth", arguments->azimuth, "degrees about the up axis, 0 from the front (default: 30)")->type_name("DEG");

@@ -59,7 +59,42 @@ typedef struct PosedColumnRecord {
   float slope_tail;
 } PosedColumnRecord;
 
+/// One joint of a walk along the skeleton, from the bone that a point belongs to towards other bones: see WeightWalks.
+typedef struct WeightStep {
+  float normal[3];       ///< (d_from - d_to) / girth: unit directions away from the joint along the two bones
+  float girth_inverse;   ///< 1 / girth, the median distance of the seams at the joint to their bones
+  float joint[3];        ///< relative to the model's origin
+  float reach;           ///< the largest distance of those seams to the joint
+  SKELETEX_INT bone;     ///< that the step leads to
+  SKELETEX_INT before;   ///< the step before this one in the same walk; -1: it begins at the point's own bone
+  SKELETEX_INT same;     ///< an earlier step of the walk that leads to the same bone; -1: none
+} WeightStep;
+
+/// Consecutive vertices of one patch, SKIN_BLOCK at most, and the bones that move them. The weights of bone k of the block
+/// stand behind each other from first_weight + k * SKIN_BLOCK on.
+typedef struct SkinBlock {
+  SKELETEX_INT first_vertex;
+  SKELETEX_INT vertex_count;
+  SKELETEX_INT bone;  ///< the patch's own
+  SKELETEX_INT first_bone;  ///< in the table of the blocks' bones
+  SKELETEX_INT bone_count;
+  SKELETEX_INT first_weight;
+} SkinBlock;
+#define SKIN_BLOCK 64
+
+/// How a pose moves a bone, as a dual quaternion (w, x, y, z) from bind to posed device coordinates, and how it stretches it.
+typedef struct BoneMotionRecord {
+  float real[4];
+  float dual[4];
+  float head[3];     ///< in the bind pose
+  float stretch[3];  ///< what the tail moves by as the bone gets longer or shorter
+  float axis[3];     ///< unit vector from head to tail in the bind pose, divided by the length
+} BoneMotionRecord;
+
 #ifndef __OPENCL_C_VERSION__
+static_assert(sizeof(WeightStep) == 4 * 11);
+static_assert(sizeof(SkinBlock) == 4 * 6);
+static_assert(sizeof(BoneMotionRecord) == 4 * 17);
 static_assert(sizeof(PatchRecord) == 4 * 19);
 static_assert(sizeof(RowRecord) == 16);
 static_assert(sizeof(ColumnRecord) == 16);

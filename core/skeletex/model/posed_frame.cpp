@@ -71,12 +71,7 @@ Vec3 posed_point(const SkeletexModel& model, const Walls& bind, const PosedWalls
 PoseTables pose_tables(const SkeletexModel& model, const PosedWalls& posed) {
   PoseTables tables;
   const Skeleton& skeleton = posed.skeleton();
-  BoundingBox box{skeleton.nodes[0].position, skeleton.nodes[0].position};
-  for (const Node& node : skeleton.nodes) {
-    box.lower = box.lower.cwiseMin(node.position);
-    box.upper = box.upper.cwiseMax(node.position);
-  }
-  tables.origin = box.centre();
+  tables.origin = middle_of_nodes(skeleton);
   int row_begin = 0;
   for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
     const Patch& patch = model.patches[bone];

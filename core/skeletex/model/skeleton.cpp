@@ -38,6 +38,15 @@ Vec3 direction_from(const Skeleton& skeleton, BoneAtNode at) {
   return at.end == BoneEnd::kHead ? o : Vec3(-o);
 }
 
+Vec3 middle_of_nodes(const Skeleton& skeleton) {
+  BoundingBox box{skeleton.nodes[0].position, skeleton.nodes[0].position};
+  for (const Node& node : skeleton.nodes) {
+    box.lower = box.lower.cwiseMin(node.position);
+    box.upper = box.upper.cwiseMax(node.position);
+  }
+  return box.centre();
+}
+
 double distance_to_bone(const Vec3& point, const Vec3& head, const Vec3& tail) {
   const Vec3 axis = tail - head;
   const double t = std::clamp((point - head).dot(axis) / axis.squaredNorm(), 0.0, 1.0);

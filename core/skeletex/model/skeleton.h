@@ -58,6 +58,9 @@ int end_node(const Skeleton& skeleton, int bone, BoneEnd end);
 /// \throw InputError naming a bone of no length, or one whose s is parallel to it
 std::vector<BoneBasis> bone_bases(const Skeleton& skeleton);
 
+/// Centre of the nodes' bounding box. \pre there are nodes
+Vec3 middle_of_nodes(const Skeleton& skeleton);
+
 /// Distance from a point to the bone segment [H,T].
 double distance_to_bone(const Vec3& point, const Vec3& head, const Vec3& tail);
 

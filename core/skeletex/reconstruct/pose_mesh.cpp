@@ -9,6 +9,7 @@
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/reconstruct/skin.h"
 
 namespace skeletex {
 namespace {
@@ -70,9 +71,21 @@ void place_shared_vertices(const SkeletexModel& model, const PosedWalls& walls, 
   for (int c = 0; c < static_cast<int>(model.corners.size()); ++c) positions[lattice.first_corner + c] = walls.corner_point(c, rule);
 }
 
-TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model, const Skeleton& posed, DistanceRule rule) {
-  TriangleMesh mesh = reconstruct_mesh(context, model);
-  const Lattice lattice = number_lattice(model);
+namespace {
+
+void pose_smoothly(ClContext& context, const SkeletexModel& model, const Skeleton& posed, const Lattice& lattice, std::vector<Vec3>& positions) {
+  DevicePlanes bind = displace_inner(context, model, Walls(model.skeleton), lattice);
+  const Skin skin = make_skin(context, model, bind);
+  const DeviceSkin device = upload_skin(context, skin, std::move(bind));
+  const std::vector<BoneMotion> motions = bone_motions(model.skeleton, posed);
+  const Vec3 origin = middle_of_nodes(posed);
+  DevicePlanes points = allocate_planes(context, lattice.inner_count);
+  pose_skin(context, skin, device, motions, origin, points);
+  download_points(context, points, origin, positions);
+  pose_shared_vertices(skin, motions, positions);
+}
+
+void pose_by_paper(ClContext& context, const SkeletexModel& model, const Skeleton& posed, const Lattice& lattice, DistanceRule rule, std::vector<Vec3>& positions) {
   const Walls bind(model.skeleton);
   const PosedWalls walls(model, posed);
   const DeviceLattice device =
@@ -80,9 +93,29 @@ TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model, co
   const DevicePose pose = upload_pose(context, model, walls, RowChoice::kInner, rule);
   DevicePlanes points = allocate_planes(context, device.vertex_count);
   displace_posed(context, device, pose, points);
-  download_points(context, points, pose.origin, mesh.positions);
+  download_points(context, points, pose.origin, positions);
+  place_shared_vertices(model, walls, lattice, rule, positions);
+}
 
-  place_shared_vertices(model, walls, lattice, rule, mesh.positions);
+}  // namespace
+
+const char* to_string(Deformation deformation) {
+  switch (deformation) {
+    case Deformation::kSmooth: return "smooth";
+    case Deformation::kCoordinates: return "coordinates";
+    case Deformation::kPaper: return "paper";
+  }
+  return "?";
+}
+
+TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model, const Skeleton& posed, const PoseRule& rule) {
+  TriangleMesh mesh = reconstruct_mesh(context, model);
+  const Lattice lattice = number_lattice(model);
+  switch (rule.deformation) {
+    case Deformation::kSmooth: pose_smoothly(context, model, posed, lattice, mesh.positions); break;
+    case Deformation::kCoordinates:
+    case Deformation::kPaper: pose_by_paper(context, model, posed, lattice, rule.distance, mesh.positions); break;
+  }
   return mesh;
 }
 

@@ -8,12 +8,25 @@
 
 namespace skeletex {
 
+/// How a pose moves the surface.
+enum class Deformation {
+  kSmooth,       ///< bind points by blended dual quaternions, with weights of all bones near by (skin.h)
+  kCoordinates,  ///< each bind point by the paper's rules at its own coordinates along and about its bone
+  kPaper,        ///< texels by the paper's rules at their own (u, v) (paper 3.4, 3.6.1)
+};
+const char* to_string(Deformation deformation);
+
+struct PoseRule {
+  Deformation deformation = Deformation::kSmooth;
+  DistanceRule distance = DistanceRule::kFromBone;  ///< of kPaper and kCoordinates
+};
+
 /// The model's mesh in a pose: the vertices, triangles and numbering of reconstruct_mesh(context, model), with posed
 /// positions. So all poses of a model share their triangles, and every pose is as closed as the bind pose.
 /// \param posed  apply_pose(model.skeleton, ...)
-TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model, const Skeleton& posed, DistanceRule rule = DistanceRule::kFromBone);
+TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model, const Skeleton& posed, const PoseRule& rule = {});
 
-/// Poles, seam samples and corners of a pose: few, and shared by several patches, so they are made on the host in double.
+/// Poles, seam samples and corners of a pose by the paper's rules: few, and shared by several patches, so they are made on the host in double.
 /// \param positions  by lattice vertex, world; inner vertices are left as they are
 void place_shared_vertices(const SkeletexModel& model, const PosedWalls& walls, const Lattice& lattice, DistanceRule rule, std::vector<Vec3>& positions);
 

@@ -37,8 +37,6 @@ void for_each_pole(const SkeletexModel& model, const Lattice& lattice, const std
     }
 }
 
-namespace {
-
 void place_shared_vertices(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, std::vector<Vec3>& positions) {
   const DisplacementTexture& texture = model.texture;
   for_each_pole(model, lattice, [&](int vertex, int bone, int end, std::size_t texel) {
@@ -54,6 +52,8 @@ DevicePlanes displace_inner(ClContext& context, const SkeletexModel& model, cons
            points);
   return points;
 }
+
+namespace {
 
 std::vector<Vec3> place_vertices(ClContext& context, const SkeletexModel& model, const Walls& walls, const Lattice& lattice, const DevicePlanes& inner) {
   std::vector<Vec3> positions(lattice.vertex_count);

@@ -36,6 +36,10 @@ void append_end_triangles(const SkeletexModel& model, const Lattice& lattice, st
                           std::vector<Triangle>& triangles);
 /// Seam samples and corners: few, and shared by several patches, so they are made on the host in double.
 void place_seams(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, std::span<Vec3> positions);
+/// All vertices of the lattice that are not inner ones, in the bind pose: poles, seam samples and corners.
+void place_shared_vertices(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, std::vector<Vec3>& positions);
+/// The inner vertices in the bind pose, relative to the model's origin.
+DevicePlanes displace_inner(ClContext& context, const SkeletexModel& model, const Walls& walls, const Lattice& lattice);
 /// Every pole, and the texel that holds it.
 void for_each_pole(const SkeletexModel& model, const Lattice& lattice, const std::function<void(int vertex, int bone, int end, std::size_t texel)>& place);
 

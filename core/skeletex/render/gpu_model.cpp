@@ -26,6 +26,22 @@ GlBuffer upload_planes(const std::vector<Record>& records) {
   return gl_buffer(planes);
 }
 
+std::vector<std::array<float, 3>> relative_positions(std::span<const Vec3> positions, const Vec3& origin) {
+  std::vector<std::array<float, 3>> relative;
+  relative.reserve(positions.size());
+  for (const Vec3& position : positions) {
+    const Eigen::Vector3f p = (position - origin).cast<float>();
+    relative.push_back({p.x(), p.y(), p.z()});
+  }
+  return relative;
+}
+
+/// Poles, seam samples and corners: the vertices behind the inner ones.
+void write_shared_vertices(std::span<const Vec3> positions, int inner_count, GpuSurface& surface) {
+  const auto shared = relative_positions(positions.subspan(inner_count), surface.origin);
+  surface.positions.write(inner_count * sizeof(shared[0]), shared.size() * sizeof(shared[0]), shared.data());
+}
+
 }  // namespace
 
 GpuModel upload_model(const SkeletexModel& model) {
@@ -73,13 +89,39 @@ void displace(GlContext& context, const GpuModel& device, const SkeletexModel& m
 
   std::vector<Vec3> points(device.lattice.vertex_count);
   place_shared_vertices(model, walls, device.lattice, rule, points);
-  std::vector<std::array<float, 3>> shared;
-  for (std::size_t i = device.lattice.inner_count; i < points.size(); ++i) {
-    const Eigen::Vector3f p = (points[i] - surface.origin).cast<float>();
-    shared.push_back({p.x(), p.y(), p.z()});
-  }
-  surface.positions.write(device.lattice.inner_count * sizeof(shared[0]), shared.size() * sizeof(shared[0]), shared.data());
+  write_shared_vertices(points, device.lattice.inner_count, surface);
   check_gl("displacing");
+  update_normals(context, surface);
+}
+
+GpuSkin upload_skin(const Skin& skin, const TriangleMesh& bind) {
+  GpuSkin device;
+  device.blocks = gl_buffer(skin.blocks);
+  device.block_bones = gl_buffer(skin.block_bones);
+  device.weights = gl_buffer(skin.weights);
+  device.bind_positions = gl_buffer(relative_positions(std::span(bind.positions).first(skin.inner_count), skin.origin));
+  check_gl("weights");
+  return device;
+}
+
+void pose_skin(GlContext& context, const GpuSkin& device, const Skin& skin, std::span<const BoneMotion> motions, const Skeleton& posed, GpuSurface& surface) {
+  surface.origin = middle_of_nodes(posed);
+  const GlBuffer records = gl_buffer(motion_records(motions, skin.origin, surface.origin));
+  glUseProgram(context.program({"skin.comp"}));
+  surface.positions.bind(0);
+  device.bind_positions.bind(1);
+  device.blocks.bind(2);
+  device.block_bones.bind(3);
+  device.weights.bind(4);
+  records.bind(5);
+  const int blocks = static_cast<int>(skin.blocks.size()), columns = std::min(blocks, 32768);
+  glUniform1i(0, blocks);
+  if (blocks > 0) glDispatchCompute(columns, (blocks + columns - 1) / columns, 1);
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+  std::vector<Vec3> points(skin.inner_count + skin.shared_points.size());
+  pose_shared_vertices(skin, motions, points);
+  write_shared_vertices(points, skin.inner_count, surface);
+  check_gl("posing");
   update_normals(context, surface);
 }
 

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+#include "deform_option.h"
+
+#include <algorithm>
+#include <array>
+
+namespace skeletex::cli {
+namespace {
+
+constexpr std::array kDeformations{Deformation::kSmooth, Deformation::kCoordinates, Deformation::kPaper};
+
+}  // namespace
+
+CLI::Option* add_deform_option(CLI::App& command, std::string& value) {
+  CLI::Option* option = command.add_option("--deform", value,
+                                           "how a pose moves the surface: smooth blends the motions of the bones near by, coordinates keeps each point's place along "
+                                           "and about its bone, paper moves texels by the paper's rules (default: smooth)");
+  std::vector<std::string> words;
+  for (const Deformation deformation : kDeformations) words.push_back(to_string(deformation));
+  take_one_of(*option, words);
+  return option;
+}
+
+Deformation deformation_of(const std::string& word) {
+  return *std::find_if(kDeformations.begin(), kDeformations.end(), [&](Deformation deformation) { return word == to_string(deformation); });
+}
+
+}  // namespace skeletex::cli

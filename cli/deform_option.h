@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <string>
+
+#include "command.h"
+#include "skeletex/reconstruct/pose_mesh.h"
+
+namespace skeletex::cli {
+
+/// --deform smooth, coordinates or paper.
+CLI::Option* add_deform_option(CLI::App& command, std::string& value);
+/// \pre one of the option's words
+Deformation deformation_of(const std::string& word);
+
+}  // namespace skeletex::cli

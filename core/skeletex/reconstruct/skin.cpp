@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/reconstruct/skin.h"
+
+#include <algorithm>
+
+#include "skeletex/model/walls.h"
+#include "skeletex/model/weight_walk.h"
+#include "skeletex/reconstruct/lattice.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+
+namespace skeletex {
+namespace {
+
+constexpr std::size_t kBlocksAtOnce = 4096;
+
+ClRange block_range(const ClContext& context, std::size_t blocks) {
+  const std::size_t group = std::min<std::size_t>(context.row_items(), SKIN_BLOCK);
+  return {{blocks * group, 1}, {group, 1}};
+}
+
+/// Appends the bones of a block that move any of its vertices, and their weights.
+/// \param weights  per slot SKIN_BLOCK values, those behind the block's vertices not set
+void append_block(SkinBlock& block, std::span<const int> bones, const float* weights, Skin& skin) {
+  block.first_bone = static_cast<int>(skin.block_bones.size());
+  block.first_weight = static_cast<int>(skin.weights.size());
+  for (std::size_t k = 0; k < bones.size(); ++k) {
+    const float* const own = weights + k * SKIN_BLOCK;
+    if (std::all_of(own, own + block.vertex_count, [](float weight) { return weight == 0; })) continue;
+    skin.block_bones.push_back(bones[k]);
+    skin.weights.insert(skin.weights.end(), own, own + block.vertex_count);
+    skin.weights.resize(skin.weights.size() + SKIN_BLOCK - block.vertex_count, 0.f);
+  }
+  block.bone_count = static_cast<int>(skin.block_bones.size()) - block.first_bone;
+}
+
+void weigh_inner_vertices(ClContext& context, const WeightWalks& walks, const DevicePlanes& points, Skin& skin) {
+  const auto blocks = context.upload(skin.blocks);
+  const auto steps = context.upload(walks.steps);
+  const auto first_steps = context.upload(walks.first_steps);
+  const std::size_t slots = walks.longest + 1;
+  auto device_weights = context.allocate<float>(std::min(kBlocksAtOnce, skin.blocks.size()) * slots * SKIN_BLOCK);
+  for (std::size_t begin = 0; begin < skin.blocks.size(); begin += kBlocksAtOnce) {
+    const std::size_t count = std::min(kBlocksAtOnce, skin.blocks.size() - begin);
+    context.launch({"skin.cl", "bone_weights"}, block_range(context, count), static_cast<int>(count), static_cast<int>(begin), static_cast<int>(slots),
+                   blocks, first_steps, steps, points.x, points.y, points.z, device_weights);
+    const ClMapping<float> weights = context.map(device_weights);
+    for (std::size_t b = 0; b < count; ++b) {
+      SkinBlock& block = skin.blocks[begin + b];
+      std::vector<int> bones{block.bone};
+      for (int k = walks.first_steps[block.bone]; k < walks.first_steps[block.bone + 1]; ++k) bones.push_back(walks.steps[k].bone);
+      append_block(block, bones, weights.data() + b * slots * SKIN_BLOCK, skin);
+    }
+  }
+}
+
+/// A bone that each pole, seam sample and corner belongs to, in the order of their vertices.
+std::vector<int> bones_of_shared_vertices(const SkeletexModel& model, const Lattice& lattice) {
+  std::vector<int> bones(lattice.vertex_count - lattice.inner_count, -1);
+  for (int bone = 0; bone < static_cast<int>(lattice.poles.size()); ++bone)
+    for (const int pole : lattice.poles[bone])
+      if (pole >= 0) bones[pole - lattice.inner_count] = bone;
+  for (std::size_t a = 0; a < model.arcs.size(); ++a)
+    std::fill_n(bones.begin() + (lattice.first_sample[a] - lattice.inner_count), model.arcs[a].samples.size(), model.arcs[a].bones[0]);
+  for (std::size_t c = 0; c < model.corners.size(); ++c) bones[lattice.first_corner - lattice.inner_count + static_cast<int>(c)] = model.corners[c].bones[0];
+  return bones;
+}
+
+}  // namespace
+
+std::vector<SkinBlock> skin_blocks(const std::vector<Patch>& patches) {
+  std::vector<SkinBlock> blocks;
+  int vertex = 0;
+  for (int bone = 0; bone < static_cast<int>(patches.size()); ++bone) {
+    const int end = vertex + patches[bone].rectangle.width * (patches[bone].rectangle.height - 2);
+    for (; vertex < end; vertex = blocks.back().first_vertex + blocks.back().vertex_count)
+      blocks.push_back({vertex, std::min(SKIN_BLOCK, end - vertex), bone, 0, 0, 0});
+  }
+  return blocks;
+}
+
+Skin make_skin(ClContext& context, const SkeletexModel& model, const DevicePlanes& points) {
+  const Lattice lattice = number_lattice(model);
+  const WeightWalks walks = make_weight_walks(model);
+  Skin skin;
+  skin.blocks = skin_blocks(model.patches);
+  skin.inner_count = lattice.inner_count;
+  skin.origin = model.origin;
+  weigh_inner_vertices(context, walks, points, skin);
+
+  std::vector<Vec3> positions(lattice.vertex_count);
+  place_shared_vertices(model, Walls(model.skeleton), lattice, positions);
+  skin.shared_points.assign(positions.begin() + lattice.inner_count, positions.end());
+  const std::vector<int> bones = bones_of_shared_vertices(model, lattice);
+  for (std::size_t i = 0; i < bones.size(); ++i) skin.shared_weights.push_back(bone_weights(walks, bones[i], skin.shared_points[i] - model.origin));
+  return skin;
+}
+
+DeviceSkin upload_skin(ClContext& context, const Skin& skin, DevicePlanes points) {
+  return {context.upload(skin.blocks), context.upload(skin.block_bones), context.upload(skin.weights), std::move(points)};
+}
+
+std::vector<BoneMotionRecord> motion_records(std::span<const BoneMotion> motions, const Vec3& bind_origin, const Vec3& posed_origin) {
+  std::vector<BoneMotionRecord> records;
+  for (const BoneMotion& motion : motions) {
+    BoneMotionRecord record{};
+    const Eigen::Vector4d real(motion.rotation.w(), motion.rotation.x(), motion.rotation.y(), motion.rotation.z());
+    const Eigen::Vector4d dual = dual_part(motion, bind_origin, posed_origin);
+    const Vec3 head = motion.bind_head - bind_origin;
+    for (int i = 0; i < 4; ++i) record.real[i] = static_cast<float>(real[i]), record.dual[i] = static_cast<float>(dual[i]);
+    for (int i = 0; i < 3; ++i) {
+      record.head[i] = static_cast<float>(head[i]);
+      record.stretch[i] = static_cast<float>(motion.stretch[i]);
+      record.axis[i] = static_cast<float>(motion.bind_axis[i]);
+    }
+    records.push_back(record);
+  }
+  return records;
+}
+
+bool is_stretched(std::span<const BoneMotion> motions) {
+  return std::any_of(motions.begin(), motions.end(), [](const BoneMotion& motion) { return !motion.stretch.isZero(0); });
+}
+
+void pose_skin(ClContext& context, const Skin& skin, const DeviceSkin& device, std::span<const BoneMotion> motions, const Vec3& posed_origin, DevicePlanes& points) {
+  if (skin.blocks.empty()) return;
+  const auto records = context.upload(motion_records(motions, skin.origin, posed_origin));
+  context.launch({"skin.cl", "skin"}, block_range(context, skin.blocks.size()), static_cast<int>(skin.blocks.size()), static_cast<int>(is_stretched(motions)),
+                 device.blocks, device.block_bones, device.weights, records, device.points.x, device.points.y, device.points.z, points.x, points.y, points.z,
+                 ClLocal{11 * SKIN_BLOCK * sizeof(float)});
+}
+
+void pose_shared_vertices(const Skin& skin, std::span<const BoneMotion> motions, std::vector<Vec3>& positions) {
+  for (std::size_t i = 0; i < skin.shared_points.size(); ++i)
+    positions[skin.inner_count + i] = blend_motions(motions, skin.shared_weights[i], skin.shared_points[i]);
+}
+
+}  // namespace skeletex
