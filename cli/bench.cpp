@@ -7,6 +7,7 @@
 
 #include "bench/stages/stages.h"
 #include "command.h"
+#include "deform_option.h"
 #include "program_path.h"
 #include "progress_bar.h"
 #include "skeletex/io/model_file.h"
@@ -19,7 +20,7 @@ namespace {
 
 struct Arguments {
   std::vector<std::string> models, stages;
-  std::string pose, device, json;
+  std::string pose, device, json, deform = "smooth";
   int size = 0, repeats = 0;
 };
 
@@ -76,7 +77,7 @@ Stage make_stage(const std::string& name, ClContext& context, Inputs& inputs, co
     const TextureInputPointer input = inputs.texture(0, "armadillo", kFrameSize);
     std::optional<Pose> pose;
     if (!arguments.pose.empty()) pose = pose_at(input->model.skeleton, read_animation(arguments.pose, input->model.skeleton), 0);
-    return pose_stage(context, input, pose);
+    return pose_stage(context, input, pose, deformation_of(arguments.deform));
   }
   if (name == "morph") return morph_stage(context, inputs.texture(0, "bear", kFrameSize), inputs.texture(1, "bear_bis", kFrameSize));
   if (name == "transfer") return transfer_stage(context, inputs.texture(0, "bear", kFrameSize), inputs.texture(1, "bear_bis", kFrameSize));
@@ -170,6 +171,7 @@ void add_bench_command(CLI::App& program) {
       ->check(CLI::Range(4, 16384).description(""))
       ->type_name("N");
   command.add_option("--pose", arguments->pose, "pose: .json (default: the skeleton bent by 40 degrees)")->type_name("FILE");
+  add_deform_option(command, arguments->deform);
   command.add_option("--repeats", arguments->repeats, "runs that are timed, after one that is not (default: up to 15, 3 at least, in 2 s)")
       ->check(CLI::Range(1, 10000).description(""))
       ->type_name("N");

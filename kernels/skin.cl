@@ -60,68 +60,63 @@ __kernel void bone_weights(const int block_count, const int first_block, const i
   }
 }
 
+// Moves one vertex, or sixteen side by side, `i` places into a block. REAL is float or float16.
+#define LOAD_1(from) (*(from))
+#define STORE_1(value, to) *(to) = (value)
+#define LOAD_16(from) vload16(0, from)
+#define STORE_16(value, to) vstore16(value, 0, to)
+#define MOVE_VERTICES(REAL, LOAD, STORE)                                                                                          \
+  {                                                                                                                               \
+    const REAL p_x = LOAD(bind_x + vertex + i), p_y = LOAD(bind_y + vertex + i), p_z = LOAD(bind_z + vertex + i);                 \
+    REAL w = 0.0f, a = 0.0f, b = 0.0f, c = 0.0f, dual_w = 0.0f, dual_a = 0.0f, dual_b = 0.0f, dual_c = 0.0f;                      \
+    REAL stretch_x = 0.0f, stretch_y = 0.0f, stretch_z = 0.0f;                                                                    \
+    for (int k = 0; k < bone_count; ++k) {                                                                                        \
+      __global const BoneMotionRecord* restrict motion = motions + bones[k];                                                      \
+      const REAL weight = LOAD(block_weights + k * SKIN_BLOCK + i);                                                               \
+      w += weight * motion->real[0], a += weight * motion->real[1], b += weight * motion->real[2], c += weight * motion->real[3]; \
+      dual_w += weight * motion->dual[0], dual_a += weight * motion->dual[1];                                                     \
+      dual_b += weight * motion->dual[2], dual_c += weight * motion->dual[3];                                                     \
+      if (is_stretched) {                                                                                                         \
+        const REAL along = (p_x - motion->head[0]) * motion->axis[0] + (p_y - motion->head[1]) * motion->axis[1] +                \
+                           (p_z - motion->head[2]) * motion->axis[2];                                                             \
+        const REAL share = weight * clamp(along, 0.0f, 1.0f);                                                                     \
+        stretch_x += share * motion->stretch[0], stretch_y += share * motion->stretch[1], stretch_z += share * motion->stretch[2]; \
+      }                                                                                                                           \
+    }                                                                                                                             \
+    /* With the quaternion's vector part v: p + 2 (v x t + w d - dual_w v) / |q|^2, where t = v x p + w p + d. */                 \
+    const REAL scale = 2.0f / (w * w + a * a + b * b + c * c);                                                                    \
+    const REAL t_x = b * p_z - c * p_y + w * p_x + dual_a, t_y = c * p_x - a * p_z + w * p_y + dual_b;                            \
+    const REAL t_z = a * p_y - b * p_x + w * p_z + dual_c;                                                                        \
+    STORE(p_x + stretch_x + scale * (b * t_z - c * t_y + w * dual_a - dual_w * a), x + vertex + i);                               \
+    STORE(p_y + stretch_y + scale * (c * t_x - a * t_z + w * dual_b - dual_w * b), y + vertex + i);                               \
+    STORE(p_z + stretch_z + scale * (a * t_y - b * t_x + w * dual_c - dual_w * c), z + vertex + i);                               \
+  }
+
 // Bind points moved by the blend of their bones' motions (Kavan et al. 2008).
 //   block_bones, weights          as SkinBlock says
 //   motions                       per bone
 //   bind_x, bind_y, bind_z        points in the bind pose, relative to the model's origin
 //   x, y, z                       points in the pose, relative to the pose's origin
 //   is_stretched                  0 where no bone changes its length
-//   sums                          11 * SKIN_BLOCK floats
 __kernel void skin(const int block_count, const int is_stretched, __global const SkinBlock* restrict blocks, __global const int* restrict block_bones,
                    __global const float* restrict weights, __global const BoneMotionRecord* restrict motions, __global const float* restrict bind_x,
                    __global const float* restrict bind_y, __global const float* restrict bind_z, __global float* restrict x, __global float* restrict y,
-                   __global float* restrict z, __local float* restrict sums) {
+                   __global float* restrict z) {
   const int group = get_group_id(0);
   if (group >= block_count) return;
   __global const SkinBlock* restrict block = blocks + group;
   const int vertex = block->first_vertex, count = block->vertex_count, bone_count = block->bone_count;
+  __global const int* restrict bones = block_bones + block->first_bone;
   __global const float* restrict block_weights = weights + block->first_weight;
-  const int item = get_local_id(0);
-
-  for (int k = 0; k < bone_count; ++k) {
-    __global const BoneMotionRecord* restrict motion = motions + block_bones[block->first_bone + k];
-    __global const float* restrict w = block_weights + k * SKIN_BLOCK;
-    // Components one after the other, so that each loop is a plain multiply-add over the block.
-    for (int c = 0; c < 8; ++c) {
-      const float value = c < 4 ? motion->real[c] : motion->dual[c - 4];
-      __local float* restrict sum = sums + c * SKIN_BLOCK;
-      if (k == 0)
-        for (int i = item; i < count; i += ROW_ITEMS) sum[i] = w[i] * value;
-      else
-        for (int i = item; i < count; i += ROW_ITEMS) sum[i] += w[i] * value;
+#if ROW_ITEMS == 1
+  // The last sixteen may be among those before: these are made twice, alike.
+  if (count >= 16) {
+    for (int begin = 0; begin < count; begin += 16) {
+      const int i = min(begin, count - 16);
+      MOVE_VERTICES(float16, LOAD_16, STORE_16)
     }
-    if (is_stretched) {
-      const float head_x = motion->head[0], head_y = motion->head[1], head_z = motion->head[2];
-      const float axis_x = motion->axis[0], axis_y = motion->axis[1], axis_z = motion->axis[2];
-      const float stretch_x = motion->stretch[0], stretch_y = motion->stretch[1], stretch_z = motion->stretch[2];
-      __local float* restrict sum = sums + 8 * SKIN_BLOCK;
-      for (int i = item; i < count; i += ROW_ITEMS) {
-        const float along = (bind_x[vertex + i] - head_x) * axis_x + (bind_y[vertex + i] - head_y) * axis_y + (bind_z[vertex + i] - head_z) * axis_z;
-        const float share = w[i] * clamp(along, 0.0f, 1.0f);
-        sum[i] = (k == 0 ? 0.0f : sum[i]) + share * stretch_x;
-        sum[SKIN_BLOCK + i] = (k == 0 ? 0.0f : sum[SKIN_BLOCK + i]) + share * stretch_y;
-        sum[2 * SKIN_BLOCK + i] = (k == 0 ? 0.0f : sum[2 * SKIN_BLOCK + i]) + share * stretch_z;
-      }
-    }
+    return;
   }
-
-  for (int i = item; i < count; i += ROW_ITEMS) {
-    const float w = sums[i], a = sums[SKIN_BLOCK + i], b = sums[2 * SKIN_BLOCK + i], c = sums[3 * SKIN_BLOCK + i];
-    const float dual_w = sums[4 * SKIN_BLOCK + i], dual_a = sums[5 * SKIN_BLOCK + i];
-    const float dual_b = sums[6 * SKIN_BLOCK + i], dual_c = sums[7 * SKIN_BLOCK + i];
-    // 2 / |q|^2 in place of dividing both parts by |q|.
-    const float scale = 2.0f / (w * w + a * a + b * b + c * c);
-    const float p_x = bind_x[vertex + i], p_y = bind_y[vertex + i], p_z = bind_z[vertex + i];
-    // p + 2 v x (v x p + w p), and the translation 2 (w d - dual_w v + v x d).
-    const float t_x = b * p_z - c * p_y + w * p_x + dual_a, t_y = c * p_x - a * p_z + w * p_y + dual_b, t_z = a * p_y - b * p_x + w * p_z + dual_c;
-    x[vertex + i] = p_x + scale * (b * t_z - c * t_y + w * dual_a - dual_w * a);
-    y[vertex + i] = p_y + scale * (c * t_x - a * t_z + w * dual_b - dual_w * b);
-    z[vertex + i] = p_z + scale * (a * t_y - b * t_x + w * dual_c - dual_w * c);
-  }
-  if (is_stretched)
-    for (int i = item; i < count; i += ROW_ITEMS) {
-      x[vertex + i] += sums[8 * SKIN_BLOCK + i];
-      y[vertex + i] += sums[9 * SKIN_BLOCK + i];
-      z[vertex + i] += sums[10 * SKIN_BLOCK + i];
-    }
+#endif
+  for (int i = get_local_id(0); i < count; i += ROW_ITEMS) MOVE_VERTICES(float, LOAD_1, STORE_1)
 }

@@ -72,28 +72,31 @@ TEST_P(PoseModels, StayWhatTheyAre) {
   const SkeletexModel model = encoded();
   const double diagonal = model.diagonal;
   const TriangleMesh bound = reconstruct_mesh(device(), model);
+  for (const Deformation deformation : {Deformation::kSmooth, Deformation::kCoordinates, Deformation::kPaper}) {
+    SCOPED_TRACE(to_string(deformation));
+    const PoseRule rule{deformation};
+    // The bind pose is exact.
+    EXPECT_LT(largest_difference(reconstruct_mesh(device(), model, apply_pose(model.skeleton, Pose{}), rule).positions, bound.positions), 1e-6 * diagonal);
 
-  // The bind pose is exact.
-  EXPECT_LT(largest_difference(reconstruct_mesh(device(), model, apply_pose(model.skeleton, Pose{})).positions, bound.positions), 1e-6 * diagonal);
-
-  // A rigid motion of the skeleton is that motion of the mesh: as a rotation at the root, and as node positions.
-  const Eigen::Quaterniond rotation(Eigen::AngleAxisd(2.1, Vec3(1, -2, 0.5).normalized()));
-  if (is_tree(model.skeleton)) {
-    const int root = root_nodes(model.skeleton)[0];
-    Pose turned;
-    turned.rotations.assign(model.skeleton.bones.size(), Eigen::Quaterniond::Identity());
-    const auto at = bones_at_nodes(model.skeleton);
-    for (const BoneAtNode bone : at[root]) turned.rotations[bone.bone] = rotation;
-    const Vec3 pivot = model.skeleton.nodes[root].position;
+    // A rigid motion of the skeleton is that motion of the mesh: as a rotation at the root, and as node positions.
+    const Eigen::Quaterniond rotation(Eigen::AngleAxisd(2.1, Vec3(1, -2, 0.5).normalized()));
+    if (is_tree(model.skeleton)) {
+      const int root = root_nodes(model.skeleton)[0];
+      Pose turned;
+      turned.rotations.assign(model.skeleton.bones.size(), Eigen::Quaterniond::Identity());
+      const auto at = bones_at_nodes(model.skeleton);
+      for (const BoneAtNode bone : at[root]) turned.rotations[bone.bone] = rotation;
+      const Vec3 pivot = model.skeleton.nodes[root].position;
+      std::vector<Vec3> expected = bound.positions;
+      for (Vec3& p : expected) p = pivot + rotation * (p - pivot);
+      EXPECT_LT(largest_difference(reconstruct_mesh(device(), model, apply_pose(model.skeleton, turned), rule).positions, expected), 1e-6 * diagonal);
+    }
+    Pose moved;
+    for (const Node& node : model.skeleton.nodes) moved.nodes.push_back(rotation * node.position + Vec3(3, 2, 1) * diagonal);
     std::vector<Vec3> expected = bound.positions;
-    for (Vec3& p : expected) p = pivot + rotation * (p - pivot);
-    EXPECT_LT(largest_difference(reconstruct_mesh(device(), model, apply_pose(model.skeleton, turned)).positions, expected), 1e-6 * diagonal);
+    for (Vec3& p : expected) p = rotation * p + Vec3(3, 2, 1) * diagonal;
+    EXPECT_LT(largest_difference(reconstruct_mesh(device(), model, apply_pose(model.skeleton, moved), rule).positions, expected), 1e-6 * diagonal);
   }
-  Pose moved;
-  for (const Node& node : model.skeleton.nodes) moved.nodes.push_back(rotation * node.position + Vec3(3, 2, 1) * diagonal);
-  std::vector<Vec3> expected = bound.positions;
-  for (Vec3& p : expected) p = rotation * p + Vec3(3, 2, 1) * diagonal;
-  EXPECT_LT(largest_difference(reconstruct_mesh(device(), model, apply_pose(model.skeleton, moved)).positions, expected), 1e-6 * diagonal);
 
   // Random poses.
   const Walls bind(model.skeleton);
@@ -109,9 +112,11 @@ TEST_P(PoseModels, StayWhatTheyAre) {
         seam = std::max(seam, (p - walls.sample_point(a, i, DistanceRule::kFromBone, 1)).norm());
       }
     if (seed % 10 != 0) continue;
-    const TriangleMesh mesh = reconstruct_mesh(device(), model, posed);
-    const ManifoldReport report = measure_manifold(mesh);
-    ASSERT_TRUE(report.is_closed_manifold() && report.components == 1 && report.genus == model.genus && report.non_finite_vertices.empty()) << "seed " << seed;
+    for (const Deformation deformation : {Deformation::kSmooth, Deformation::kCoordinates, Deformation::kPaper}) {
+      const ManifoldReport report = measure_manifold(reconstruct_mesh(device(), model, posed, {deformation}));
+      ASSERT_TRUE(report.is_closed_manifold() && report.components == 1 && report.genus == model.genus && report.non_finite_vertices.empty())
+          << "seed " << seed << " " << to_string(deformation);
+    }
     for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
       const Patch& patch = model.patches[bone];
       const auto [x, y, width, height] = patch.rectangle;

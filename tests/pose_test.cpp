@@ -362,7 +362,7 @@ TEST(Pose, MeshesAreClosedInRandomPosesAndTheKernelsAgreeWithTheirTwin) {
       const Skeleton posed = apply_pose(model.skeleton, random_pose(model.skeleton, kPi / 3, 1000 + seed));
       const PosedWalls walls(model, posed);
       const DistanceRule rule = seed % 4 == 3 ? DistanceRule::kFromFoot : DistanceRule::kFromBone;
-      const TriangleMesh mesh = reconstruct_mesh(device(), model, posed, rule);
+      const TriangleMesh mesh = reconstruct_mesh(device(), model, posed, {Deformation::kPaper, rule});
       for (const Vec3& p : mesh.positions) ASSERT_TRUE(p.allFinite()) << named.name << " seed " << seed;
       if (seed % 20 > 1) continue;  // all poses share their triangles
       ASSERT_EQ(broken_rule(mesh, surface.genus()), "") << named.name << " seed " << seed;
@@ -386,7 +386,7 @@ TEST(Pose, TheKernelsLeaveTheBindPoseAlone) {
     const SkeletexModel model = model_of(surface, 33, 17);
     const TriangleMesh bound = reconstruct_mesh(device(), model);
     for (const DistanceRule rule : {DistanceRule::kFromBone, DistanceRule::kFromFoot})
-      EXPECT_LT(largest_difference(reconstruct_mesh(device(), model, apply_pose(model.skeleton, Pose{}), rule).positions, bound.positions), 1e-6 * model.diagonal)
+      EXPECT_LT(largest_difference(reconstruct_mesh(device(), model, apply_pose(model.skeleton, Pose{}), {Deformation::kPaper, rule}).positions, bound.positions), 1e-6 * model.diagonal)
           << named.name;
   }
 }

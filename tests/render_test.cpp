@@ -61,7 +61,15 @@ TEST(Render, ShaderAndLibraryPlaceEveryVertexAlikeInEveryPose) {
       const Skeleton posed = apply_pose(model.skeleton, pose);
       for (const DistanceRule rule : {DistanceRule::kFromBone, DistanceRule::kFromFoot}) {
         displace(gl(), device, model, posed, rule, surface);
-        EXPECT_LT(largest_difference(download_positions(surface), reconstruct_mesh(cl(), model, posed, rule).positions), 1e-5 * model.diagonal);
+        EXPECT_LT(largest_difference(download_positions(surface), reconstruct_mesh(cl(), model, posed, {Deformation::kPaper, rule}).positions), 1e-5 * model.diagonal);
+      }
+      const Skin skin = make_skin(cl(), model, displace_inner(cl(), model, Walls(model.skeleton), number_lattice(model)));
+      const GpuSkin gpu_skin = upload_skin(skin, bind);
+      Skeleton stretched = posed;
+      for (Node& node : stretched.nodes) node.position *= 1.3;
+      for (const Skeleton& skeleton : {posed, stretched}) {
+        pose_skin(gl(), gpu_skin, skin, bone_motions(model.skeleton, skeleton), skeleton, surface);
+        EXPECT_LT(largest_difference(download_positions(surface), reconstruct_mesh(cl(), model, skeleton).positions), 1e-5 * model.diagonal);
       }
     }
 }

@@ -125,8 +125,7 @@ void pose_skin(ClContext& context, const Skin& skin, const DeviceSkin& device, s
   if (skin.blocks.empty()) return;
   const auto records = context.upload(motion_records(motions, skin.origin, posed_origin));
   context.launch({"skin.cl", "skin"}, block_range(context, skin.blocks.size()), static_cast<int>(skin.blocks.size()), static_cast<int>(is_stretched(motions)),
-                 device.blocks, device.block_bones, device.weights, records, device.points.x, device.points.y, device.points.z, points.x, points.y, points.z,
-                 ClLocal{11 * SKIN_BLOCK * sizeof(float)});
+                 device.blocks, device.block_bones, device.weights, records, device.points.x, device.points.y, device.points.z, points.x, points.y, points.z);
 }
 
 void pose_shared_vertices(const Skin& skin, std::span<const BoneMotion> motions, std::vector<Vec3>& positions) {

@@ -10,6 +10,8 @@
 #include "skeletex/edit/transfer.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/reconstruct/skin.h"
 #include "stages.h"
 
 namespace skeletex {
@@ -80,7 +82,33 @@ Stage reconstruct_stage(ClContext& context, TextureInputPointer input) {
   return stage;
 }
 
-Stage pose_stage(ClContext& context, TextureInputPointer input, const std::optional<Pose>& given) {
+namespace {
+
+Stage smooth_pose_stage(ClContext& context, TextureInputPointer input, const std::optional<Pose>& given) {
+  Stage stage = stage_of("pose", *input);
+  const SkeletexModel& model = input->model;
+  const Pose pose = given ? *given : bent(model.skeleton);
+  const auto frame = std::make_shared<Frame>(context, input);
+  std::shared_ptr<const Skin> skin;
+  std::shared_ptr<const DeviceSkin> device;
+  const double prepare_ms = wall_ms([&] {
+    DevicePlanes bind = displace_inner(context, model, Walls(model.skeleton), number_lattice(model));
+    skin = std::make_shared<const Skin>(make_skin(context, model, bind));
+    device = std::make_shared<const DeviceSkin>(upload_skin(context, *skin, std::move(bind)));
+    context.finish();
+  });
+  stage.run = [&context, frame, skin, device, pose] {
+    const Skeleton& bind = frame->model().skeleton;
+    const Skeleton posed = apply_pose(bind, pose);
+    pose_skin(context, *skin, *device, bone_motions(bind, posed), middle_of_nodes(posed), frame->points);
+  };
+  stage.run_reference = device_copy(context, 2 * kPlanes * frame->lattice.vertex_count);
+  const double bones = static_cast<double>(skin->block_bones.size()) / static_cast<double>(std::max<std::size_t>(1, skin->blocks.size()));
+  stage.details = [prepare_ms, bones] { return std::vector<std::pair<std::string, double>>{{"prepare_ms", prepare_ms}, {"bones_per_block", bones}}; };
+  return stage;
+}
+
+Stage paper_pose_stage(ClContext& context, TextureInputPointer input, const std::optional<Pose>& given) {
   Stage stage = stage_of("pose", *input);
   const Pose pose = given ? *given : bent(input->model.skeleton);
   const auto frame = std::make_shared<Frame>(context, std::move(input));
@@ -91,6 +119,17 @@ Stage pose_stage(ClContext& context, TextureInputPointer input, const std::optio
   };
   stage.run_reference = device_copy(context, 2 * kPlanes * frame->lattice.vertex_count);
   return stage;
+}
+
+}  // namespace
+
+Stage pose_stage(ClContext& context, TextureInputPointer input, const std::optional<Pose>& pose, Deformation deformation) {
+  switch (deformation) {
+    case Deformation::kSmooth: return smooth_pose_stage(context, std::move(input), pose);
+    case Deformation::kPaper: return paper_pose_stage(context, std::move(input), pose);
+    case Deformation::kCoordinates: break;
+  }
+  throw InputError("the pose stage measures --deform smooth and paper");
 }
 
 namespace {

@@ -6,6 +6,7 @@
 
 #include "inputs.h"
 #include "skeletex/model/pose.h"
+#include "skeletex/reconstruct/pose_mesh.h"
 #include "stage.h"
 
 /// The pipeline's stages, each beside what a user would take instead, or beside what no program can undercut.
@@ -19,8 +20,9 @@ inline const std::vector<std::string> kStageNames{"reconstruct", "pose", "morph"
 
 /// The bind pose's vertices.
 Stage reconstruct_stage(ClContext& context, TextureInputPointer input);
-/// Those of a pose, walls and tables of the pose included. \param pose  default: the skeleton bent by 40 degrees over its longest axis
-Stage pose_stage(ClContext& context, TextureInputPointer input, const std::optional<Pose>& pose = {});
+/// Those of a pose; what is made once per pose is included, what is made once per model is not.
+/// \param pose  default: the skeleton bent by 40 degrees over its longest axis    \param deformation  kSmooth or kPaper, else InputError
+Stage pose_stage(ClContext& context, TextureInputPointer input, const std::optional<Pose>& pose = {}, Deformation deformation = Deformation::kSmooth);
 /// A live morph: another weight every time, texels blended, and the vertices of the model in between.
 Stage morph_stage(ClContext& context, TextureInputPointer first, TextureInputPointer second);
 /// The largest bone with a free end is taken from the source.

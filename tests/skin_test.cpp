@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/reconstruct/skin.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <random>
+
+#include "skeletex/measure/manifold.h"
+#include "skeletex/model/pose.h"
+#include "skeletex/model/walls.h"
+#include "skeletex/model/weight_walk.h"
+#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "support/synthetic_model.h"
+
+namespace skeletex {
+namespace {
+
+struct NamedSkeleton {
+  const char* name;
+  Skeleton skeleton;
+  double radius;
+};
+
+std::vector<NamedSkeleton> all_skeletons() {
+  return {{"lone bone", lone_bone(), 0.3}, {"chain of two", chain(2), 0.2}, {"chain of nine", chain(9), 0.2},           {"Y", y_branch(), 0.25},
+          {"cross of 6", cross(6), 0.3},   {"ring of 3", ring(3), 0.2},     {"ring with an arm", ring_with_arm(6), 0.2}, {"tree of 12", random_tree(12, 3), 0.15}};
+}
+
+SkeletexModel model_of(const NamedSkeleton& named) {
+  const SyntheticSurface surface(named.skeleton, named.radius);
+  return surface.model(std::vector<std::pair<int, int>>(named.skeleton.bones.size(), {24, 11}));
+}
+
+ClContext& device() {
+  static ClContext context;
+  return context;
+}
+
+std::map<int, double> by_bone(const std::vector<BoneWeight>& weights) {
+  std::map<int, double> map;
+  for (const auto& [bone, weight] : weights) {
+    EXPECT_EQ(map.count(bone), 0u) << "bone " << bone << " twice";
+    map[bone] = weight;
+  }
+  return map;
+}
+
+double largest_difference(const std::vector<BoneWeight>& a, const std::vector<BoneWeight>& b) {
+  std::map<int, double> difference = by_bone(a);
+  for (const auto& [bone, weight] : by_bone(b)) difference[bone] -= weight;
+  double largest = 0;
+  for (const auto& [bone, value] : difference) largest = std::max(largest, std::abs(value));
+  return largest;
+}
+
+/// Nodes moved by up to 0.3: bones turn, get longer and shorter.
+Skeleton moved(const Skeleton& skeleton, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> unit(-0.3, 0.3);
+  Pose pose;
+  for (const Node& node : skeleton.nodes) pose.nodes.push_back(node.position + Vec3(unit(random), unit(random), unit(random)));
+  return apply_pose(skeleton, pose);
+}
+
+TEST(Skin, WeightsAgreeOnBothSidesOfEverySeam) {
+  for (const NamedSkeleton& named : all_skeletons()) {
+    SCOPED_TRACE(named.name);
+    const SkeletexModel model = model_of(named);
+    const Walls walls(model.skeleton);
+    const WeightWalks walks = make_weight_walks(model);
+    const auto check = [&](int node, const auto& bones, const SeamSample& sample) {
+      const BoneEnd end = model.skeleton.bones[bones[0]].head == node ? BoneEnd::kHead : BoneEnd::kTail;
+      const Vec3 point = walls.seam_point(bones[0], end, sample.turn, sample.distance) - model.origin;
+      const auto weights = bone_weights(walks, bones[0], point);
+      for (const int other : bones) EXPECT_LT(largest_difference(weights, bone_weights(walks, other, point)), 1e-5);
+    };
+    for (const SeamArc& arc : model.arcs)
+      for (const SeamSample& sample : arc.samples) check(arc.node, arc.bones, sample);
+    for (const SeamCorner& corner : model.corners) check(corner.node, corner.bones, corner.sample);
+  }
+}
+
+TEST(Skin, WeightsOfAStraightJointAreALogisticFunctionOfTheHeight) {
+  // Two bones along x with a joint at (1, 0, 0): (P - N).(d_i - d_j) is twice the height.
+  Skeleton skeleton;
+  skeleton.nodes = {{"a", Vec3(0, 0, 0)}, {"b", Vec3(1, 0, 0)}, {"c", Vec3(2, 0, 0)}};
+  skeleton.bones = {{"left", 0, 1, Vec3::UnitZ()}, {"right", 1, 2, Vec3::UnitZ()}};
+  const double radius = 0.2;
+  const SkeletexModel model = SyntheticSurface(skeleton, radius).model({{24, 11}, {24, 11}});
+  const WeightWalks walks = make_weight_walks(model);
+  std::vector<double> distances;
+  for (const SeamSample& sample : model.arcs[0].samples) distances.push_back(sample.distance);
+  std::sort(distances.begin(), distances.end());
+  const double girth = distances[distances.size() / 2];
+  for (const double height : {0.0, 0.03, 0.1}) {
+    const Vec3 point = Vec3(1 + height, 0, 0.9 * distances.front()) - model.origin;  // within the seam's reach
+    const auto weights = by_bone(bone_weights(walks, 1, point));
+    const double share = std::exp(-0.7 * 2 * height / girth) - 0.002, own = 1 - 0.002;
+    EXPECT_NEAR(weights.at(0), share / (share + own), 1e-5) << height;
+    EXPECT_NEAR(weights.at(0) + weights.at(1), 1, 1e-12);
+  }
+  // Far along the bone nothing of the other one is left.
+  EXPECT_EQ(by_bone(bone_weights(walks, 1, Vec3(2, 0, 0.1) - model.origin)).count(0), 0u);
+}
+
+TEST(Skin, KernelsMoveVerticesAsTheHostDoesInDoublePrecision) {
+  for (const NamedSkeleton& named : all_skeletons()) {
+    SCOPED_TRACE(named.name);
+    const SkeletexModel model = model_of(named);
+    const TriangleMesh bind = reconstruct_mesh(device(), model);
+    const WeightWalks walks = make_weight_walks(model);
+    const Lattice lattice = number_lattice(model);
+    const Skeleton posed = moved(model.skeleton, 7);
+    const std::vector<BoneMotion> motions = bone_motions(model.skeleton, posed);
+    ASSERT_TRUE(is_stretched(motions));
+    const TriangleMesh mesh = reconstruct_mesh(device(), model, posed);
+    EXPECT_EQ(mesh.triangles, bind.triangles);
+    for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
+      const Rectangle& rectangle = model.patches[bone].rectangle;
+      for (int i = lattice.first_inner[bone]; i < lattice.first_inner[bone] + rectangle.width * (rectangle.height - 2); ++i) {
+        const Vec3 expected = blend_motions(motions, bone_weights(walks, bone, bind.positions[i] - model.origin), bind.positions[i]);
+        ASSERT_LT((mesh.positions[i] - expected).norm(), 1e-5 * model.diagonal) << "vertex " << i;
+      }
+    }
+  }
+}
+
+TEST(Skin, BindPoseAndRigidMotionsAreExactAndEveryPoseIsClosed) {
+  for (const NamedSkeleton& named : all_skeletons()) {
+    SCOPED_TRACE(named.name);
+    const SkeletexModel model = model_of(named);
+    const TriangleMesh bind = reconstruct_mesh(device(), model);
+    const Eigen::Quaterniond rotation(Eigen::AngleAxisd(2.1, Vec3(1, -2, 0.5).normalized()));
+    Pose rigid;
+    for (const Node& node : model.skeleton.nodes) rigid.nodes.push_back(rotation * node.position + Vec3(3, 2, 1));
+    const TriangleMesh same = reconstruct_mesh(device(), model, apply_pose(model.skeleton, Pose{})), turned = reconstruct_mesh(device(), model, apply_pose(model.skeleton, rigid));
+    for (std::size_t i = 0; i < bind.positions.size(); ++i) {
+      ASSERT_LT((same.positions[i] - bind.positions[i]).norm(), 1e-6 * model.diagonal);
+      // The nodes of a lone bone leave its turn about itself open.
+      const double error = (turned.positions[i] - (rotation * bind.positions[i] + Vec3(3, 2, 1))).norm();
+      ASSERT_TRUE(model.skeleton.bones.size() == 1 || error < 1e-6 * model.diagonal) << error;
+    }
+    for (unsigned seed = 0; seed < 5; ++seed) {
+      const ManifoldReport report = measure_manifold(reconstruct_mesh(device(), model, moved(model.skeleton, seed)));
+      EXPECT_TRUE(report.is_closed_manifold() && report.genus == model.genus && report.non_finite_vertices.empty()) << seed;
+    }
+  }
+}
+
+TEST(Skin, ABoneThatGetsLongerTakesItsSurfaceAlong) {
+  Skeleton skeleton;
+  skeleton.nodes = {{"a", Vec3(0, 0, 0)}, {"b", Vec3(1, 0, 0)}, {"c", Vec3(2, 0, 0)}};
+  skeleton.bones = {{"left", 0, 1, Vec3::UnitZ()}, {"right", 1, 2, Vec3::UnitZ()}};
+  Skeleton posed = skeleton;
+  posed.nodes[1].position.x() = 1.5;
+  posed.nodes[2].position.x() = 2.5;
+  const std::vector<BoneMotion> motions = bone_motions(skeleton, posed);
+  const std::vector<BoneWeight> left{{0, 1.0}}, right{{1, 1.0}};
+  EXPECT_LT((blend_motions(motions, left, Vec3(0.5, 0.2, 0)) - Vec3(0.75, 0.2, 0)).norm(), 1e-12);
+  EXPECT_LT((blend_motions(motions, left, Vec3(-0.1, 0.2, 0)) - Vec3(-0.1, 0.2, 0)).norm(), 1e-12);
+  // At the joint the two bones agree.
+  EXPECT_LT((blend_motions(motions, left, Vec3(1, 0.2, 0)) - blend_motions(motions, right, Vec3(1, 0.2, 0))).norm(), 1e-12);
+}
+
+TEST(Skin, HalfWeightsHalveTheTurnAndSignsFollowTheSkeleton) {
+  // Each of five bones turns by 80 degrees more than the one before: the last by more than a turn.
+  const Skeleton skeleton = chain(6);
+  Pose pose;
+  for (std::size_t i = 0; i < skeleton.bones.size(); ++i)
+    pose.rotations.push_back(Eigen::Quaterniond(Eigen::AngleAxisd(i == 0 ? 0 : 80 * std::numbers::pi / 180, Vec3::UnitZ())));
+  const std::vector<BoneMotion> motions = bone_motions(skeleton, apply_pose(skeleton, pose));
+  for (std::size_t i = 0; i + 1 < motions.size(); ++i) EXPECT_GT(motions[i].rotation.dot(motions[i + 1].rotation), 0.7) << i;
+  const Vec3 joint = skeleton.nodes[skeleton.bones[0].tail].position;
+  const std::vector<BoneWeight> half{{0, 0.5}, {1, 0.5}};
+  const Vec3 expected = joint + Eigen::AngleAxisd(40 * std::numbers::pi / 180, Vec3::UnitZ()) * Vec3(0.1, 0.2, 0.3);
+  EXPECT_LT((blend_motions(motions, half, joint + Vec3(0.1, 0.2, 0.3)) - expected).norm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace skeletex
