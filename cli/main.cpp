@@ -82,6 +82,7 @@ int run(int argc, char** argv) {
   add_filter_command(program);
   add_lod_command(program);
   add_transfer_command(program);
+  add_weights_command(program);
   add_metro_command(program);
   add_segment_command(program);
   add_validate_command(program);

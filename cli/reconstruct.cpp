@@ -12,6 +12,7 @@
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/pose_file.h"
+#include "skeletex/measure/deformation.h"
 #include "skeletex/model/error.h"
 #include "deform_option.h"
 #include "skeletex/reconstruct/pose_mesh.h"
@@ -25,8 +26,25 @@ struct Arguments {
   int size = 0, level = 0;
   std::optional<double> time, constant_offset;  ///< the offset in diagonals
   std::vector<std::string> bones;
-  bool is_distance_dropped = false;
+  bool is_distance_dropped = false, has_no_report = false;
 };
+
+/// What a pose does to the surface, in words and for the JSON.
+struct PoseReport {
+  std::string text;
+  Json json;
+};
+
+PoseReport report_pose(const TriangleMesh& bind, const TriangleMesh& posed) {
+  const DeformationReport report = measure_deformation(make_bind_surface(bind), posed.positions);
+  return {fmt::format("pose: {} new folds, {} new intersections, volume {:+.1f} %, symmetric Dirichlet energy {:.2f} (99 % of the area lies below)\n", report.new_folds,
+                      report.new_intersections, 100 * (report.volume_ratio - 1), report.energy_99),
+          {{"new_folds", report.new_folds},
+           {"new_intersections", report.new_intersections},
+           {"volume_ratio", report.volume_ratio},
+           {"energy_mean", report.energy_mean},
+           {"energy_99", report.energy_99}}};
+}
 
 std::vector<int> bones_by_name(const SkeletexModel& model, const std::vector<std::string>& names) {
   std::vector<int> result;
@@ -54,6 +72,7 @@ void run(const Arguments& arguments) {
   const double start_ms = watch.lap_ms();
   double resample_ms = 0, reconstruct_ms = 0, write_ms = 0;
   TriangleMesh mesh;
+  std::optional<PoseReport> pose_report;
   {
     ProgressBar bar;
     if (arguments.size > 0 && arguments.size != std::max(model.texture.width, model.texture.height)) {
@@ -73,13 +92,17 @@ void run(const Arguments& arguments) {
     bar.show("writing", 0.7);
     write_mesh(arguments.output, mesh);
     write_ms = watch.lap_ms();
+    if (posed && !arguments.constant_offset && !arguments.has_no_report) {
+      bar.show("measuring the pose", 0.8);
+      pose_report = report_pose(reconstruct_mesh(context, model), mesh);
+    }
   }
   const double total_ms = total.lap_ms();
   print(arguments.json, fmt::format("{} vertices, {} triangles from {} x {} texels, on {}\n"
-                                    "read {:.0f} ms, device {:.0f} ms, resample {:.0f} ms, reconstruct {:.0f} ms, write {:.0f} ms\n{}\n",
+                                    "read {:.0f} ms, device {:.0f} ms, resample {:.0f} ms, reconstruct {:.0f} ms, write {:.0f} ms\n{}{}\n",
                                     mesh.positions.size(), mesh.triangles.size(), model.texture.width, model.texture.height, context.device().name,
-                                    read_ms, start_ms, resample_ms, reconstruct_ms, write_ms, arguments.output));
-  write_json(arguments.json, {{"vertices", mesh.positions.size()},
+                                    read_ms, start_ms, resample_ms, reconstruct_ms, write_ms, pose_report ? pose_report->text : "", arguments.output));
+  Json json{{"vertices", mesh.positions.size()},
                               {"triangles", mesh.triangles.size()},
                               {"size", {model.texture.width, model.texture.height}},
                               {"times_ms",
@@ -90,7 +113,9 @@ void run(const Arguments& arguments) {
                                 {"write", write_ms},
                                 {"total", total_ms}}},
                               {"device", context.device().name},
-                              {"kernels", profile_json(context)}});
+                              {"kernels", profile_json(context)}};
+  if (pose_report) json["pose"] = pose_report->json;
+  write_json(arguments.json, json);
 }
 
 }  // namespace
@@ -110,6 +135,7 @@ void add_reconstruct_command(CLI::App& program) {
   command.add_option("--time", arguments->time, "time in the animation (default: its first frame)")->type_name("T")->needs(pose);
   add_deform_option(command, arguments->deform)->needs(pose);
   command.add_flag("--no-distance", arguments->is_distance_dropped, "with --deform paper or coordinates: do not restore the distances to the bones")->needs(pose);
+  command.add_flag("--no-report", arguments->has_no_report, "do not measure what the pose does to the surface")->needs(pose);
   CLI::Option* offset = command
                             .add_option("--constant-offset", arguments->constant_offset,
                                         "instead of the surface the plane of bone tangent space that lies so far out: a tube around every bone, "

@@ -190,6 +190,33 @@ TEST(ModelFile, HalfTexelsAreTheNearestHalvesAndAllElseStaysExact) {
   EXPECT_EQ(folder.file_count(), 1);
 }
 
+TEST(ModelFile, WeightsOfBonesAreLayersOfTheirOwn) {
+  SkeletexModel model = branch_model();
+  model.skeleton.bones[3].name = "left hand: tip";  // not what names of layers hold
+  const std::size_t texels = model.texture.along.size();
+  for (std::size_t bone = 0; bone < model.skeleton.bones.size(); ++bone) {
+    std::vector<float>& plane = model.bone_weights.emplace_back(texels);
+    for (std::size_t i = 0; i < texels; ++i) plane[i] = static_cast<float>((i * (bone + 3)) % 17) / 16;
+  }
+  EXPECT_EQ(weight_channels(model.skeleton), (std::vector<std::string>{"weights.stem", "weights.left", "weights.right", "weights.left_hand__tip"}));
+  const ScratchFolder scratch;
+  const auto path = scratch / "weights.skx.exr";
+  write_model(path, model);
+  const SkeletexModel back = read_model(path);
+  ASSERT_EQ(back.bone_weights.size(), model.bone_weights.size());
+  for (std::size_t bone = 0; bone < model.bone_weights.size(); ++bone) EXPECT_TRUE(same_bits(back.bone_weights[bone], model.bone_weights[bone])) << bone;
+  expect_same(back, model);
+
+  model.bone_weights[1][5] = -0.1f;
+  try {
+    write_model(scratch / "bad.skx.exr", model);
+    FAIL() << "a weight below 0 was written";
+  } catch (const IoError& error) {
+    EXPECT_NE(std::string(error.what()).find("weights.left at column 5, row 0"), std::string::npos) << error.what();
+  }
+  EXPECT_FALSE(std::filesystem::exists(scratch / "bad.skx.exr"));
+}
+
 TEST(ModelFile, TheSameModelGivesTheSameBytes) {
   const ScratchFolder folder;
   const SkeletexModel model = branch_model(200, 100);

@@ -152,6 +152,55 @@ TEST(Skin, BindPoseAndRigidMotionsAreExactAndEveryPoseIsClosed) {
   }
 }
 
+double largest_distance(const TriangleMesh& a, const TriangleMesh& b) {
+  double largest = 0;
+  for (std::size_t i = 0; i < a.positions.size(); ++i) largest = std::max(largest, (a.positions[i] - b.positions[i]).norm());
+  return largest;
+}
+
+TEST(Skin, AModelsOwnWeightsTakeThePlaceOfTheClosedForm) {
+  const SkeletexModel model = model_of({"Y", y_branch(), 0.25});
+  const Skeleton posed = moved(model.skeleton, 3);
+  const TriangleMesh expected = reconstruct_mesh(device(), model, posed);
+  SkeletexModel painted = model;
+  painted.bone_weights = weight_planes(device(), model);
+  // Rows next to seams lie on them, so only what is linear between columns there differs.
+  EXPECT_LT(largest_distance(reconstruct_mesh(device(), painted, posed), expected), 5e-3 * model.diagonal);
+  // Their sum does not matter.
+  for (auto& plane : painted.bone_weights)
+    for (float& weight : plane) weight *= 3;
+  EXPECT_LT(largest_distance(reconstruct_mesh(device(), painted, posed), expected), 5e-3 * model.diagonal);
+  // All to the first bone: its motion alone, everywhere. Where nothing is painted each bone moves its own.
+  for (std::size_t bone = 0; bone < painted.bone_weights.size(); ++bone)
+    std::fill(painted.bone_weights[bone].begin(), painted.bone_weights[bone].end(), bone == 0 ? 1.f : 0.f);
+  const TriangleMesh bind = reconstruct_mesh(device(), model), rigid = reconstruct_mesh(device(), painted, posed);
+  const std::vector<BoneMotion> motions = bone_motions(model.skeleton, posed);
+  for (std::size_t i = 0; i < bind.positions.size(); ++i) {
+    const std::vector<BoneWeight> first{{0, 1}};
+    ASSERT_LT((rigid.positions[i] - blend_motions(motions, first, bind.positions[i])).norm(), 1e-5 * model.diagonal);
+  }
+  for (auto& plane : painted.bone_weights) std::fill(plane.begin(), plane.end(), 0.f);
+  const TriangleMesh own = reconstruct_mesh(device(), painted, posed);
+  const Lattice lattice = number_lattice(model);
+  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
+    const std::vector<BoneWeight> alone{{bone, 1}};
+    const int i = lattice.first_inner[bone];
+    EXPECT_LT((own.positions[i] - blend_motions(motions, alone, bind.positions[i])).norm(), 1e-5 * model.diagonal);
+  }
+}
+
+TEST(Skin, PaintedWeightsFollowToOtherSizes) {
+  const SkeletexModel model = model_of({"tree of 12", random_tree(12, 3), 0.15});
+  SkeletexModel painted = model;
+  painted.bone_weights = weight_planes(device(), model);
+  const int size = 2 * std::max(model.texture.width, model.texture.height);
+  const SkeletexModel large = resample_model(device(), painted, size);
+  SkeletexModel plain = large;
+  plain.bone_weights.clear();
+  const Skeleton posed = moved(model.skeleton, 5);
+  EXPECT_LT(largest_distance(reconstruct_mesh(device(), large, posed), reconstruct_mesh(device(), plain, posed)), 0.02 * model.diagonal);
+}
+
 TEST(Skin, ABoneThatGetsLongerTakesItsSurfaceAlong) {
   Skeleton skeleton;
   skeleton.nodes = {{"a", Vec3(0, 0, 0)}, {"b", Vec3(1, 0, 0)}, {"c", Vec3(2, 0, 0)}};

@@ -15,6 +15,7 @@ void mirror_x(Vec3& v) { v.x() = -v.x(); }
 
 SkeletexModel mirrored(const SkeletexModel& model) {
   SkeletexModel result = model;
+  result.bone_weights.clear();
   const std::vector<BoneBasis> bases = bone_bases(model.skeleton);
   for (std::size_t i = 0; i < bases.size(); ++i) {
     Vec3 s = bases[i].s;

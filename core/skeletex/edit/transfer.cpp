@@ -301,6 +301,7 @@ class Laying {
 
   SkeletexModel run(std::span<const std::unique_ptr<PartTransfer>> parts) {
     SkeletexModel result = target_;
+    result.bone_weights.clear();  // they belong to the surface that is replaced in part
     for (const auto& part : parts) part->set_seams(result, walls_);
     for (std::size_t b = 0; b < part_of_.size(); ++b)
       if (part_of_[b].first) part_of_[b].first->set_rows(part_of_[b].second, result.patches[b]);

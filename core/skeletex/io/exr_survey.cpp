@@ -15,7 +15,7 @@
 namespace skeletex {
 namespace {
 
-constexpr int kMaxChannels = 16;
+constexpr int kMaxChannels = 2048;  // the three of a model, and a weight per bone
 constexpr std::size_t kMaxParts = 32;
 constexpr std::string_view kScanlines = "scanlineimage";
 constexpr std::uintmax_t kMaxAttributeBytes = std::uintmax_t{1} << 30;
@@ -113,7 +113,7 @@ int check_header(const Reader& in, int max_size, bool is_one_of_several, ExrSurv
     } else if (attribute.type == "chlist") {
       int channels = 0;
       for (std::size_t at = 0; at < value.size() && value[at] != '\0'; ++channels) at = value.find('\0', at) == std::string::npos ? value.size() : value.find('\0', at) + 17;
-      if (channels > kMaxChannels) in.fail(fmt::format("an image of {} channels; a model has three", channels));
+      if (channels > kMaxChannels) in.fail(fmt::format("an image of {} channels; a model has at most {}", channels, kMaxChannels));
     }
   }
   std::int32_t window[4];

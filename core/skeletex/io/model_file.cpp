@@ -68,16 +68,27 @@ void use_threads() {
 const std::vector<float>& plane(const DisplacementTexture& texture, int i) { return i == 0 ? texture.along : i == 1 ? texture.around : texture.out; }
 std::vector<float>& plane(DisplacementTexture& texture, int i) { return i == 0 ? texture.along : i == 1 ? texture.around : texture.out; }
 
-void check_texels(const DisplacementTexture& texture, const std::string& where) {
+/// \param is_good  what a value of the channel must be    \param what  why it is not
+template <class Good>
+void check_plane(const std::vector<float>& values, const std::string& channel, const DisplacementTexture& texture, const Good& is_good, const char* what,
+                 const std::string& where) {
   const std::size_t count = static_cast<std::size_t>(texture.width) * static_cast<std::size_t>(texture.height);
-  for (int i = 0; i < 3; ++i) {
-    if (plane(texture, i).size() != count) throw IoError(fmt::format("{}: channel {} must have {} texels", where, kChannels[i], count));
-    const auto bad = std::find_if(plane(texture, i).begin(), plane(texture, i).end(), [](float x) { return !std::isfinite(x); });
-    if (bad != plane(texture, i).end()) {
-      const auto at = static_cast<int>(bad - plane(texture, i).begin());
-      throw IoError(fmt::format("{}: channel {} at column {}, row {} is not a finite number", where, kChannels[i], at % texture.width, at / texture.width));
-    }
-  }
+  if (values.size() != count) throw IoError(fmt::format("{}: channel {} must have {} texels", where, channel, count));
+  const auto bad = std::find_if_not(values.begin(), values.end(), is_good);
+  if (bad == values.end()) return;
+  const auto at = static_cast<int>(bad - values.begin());
+  throw IoError(fmt::format("{}: channel {} at column {}, row {} is {}", where, channel, at % texture.width, at / texture.width, what));
+}
+
+void check_texels(const SkeletexModel& model, const std::string& where) {
+  for (int i = 0; i < 3; ++i)
+    check_plane(plane(model.texture, i), kChannels[i], model.texture, [](float x) { return std::isfinite(x); }, "not a finite number", where);
+  if (model.bone_weights.empty()) return;
+  if (model.bone_weights.size() != model.skeleton.bones.size())
+    throw IoError(fmt::format("{}: weights of {} bones are expected, not of {}", where, model.skeleton.bones.size(), model.bone_weights.size()));
+  const std::vector<std::string> channels = weight_channels(model.skeleton);
+  for (std::size_t bone = 0; bone < channels.size(); ++bone)
+    check_plane(model.bone_weights[bone], channels[bone], model.texture, [](float x) { return x >= 0 && std::isfinite(x); }, "no weight: at least 0, and finite", where);
 }
 
 nlohmann::json header_json(const ExrSurvey& survey, const std::string& where) {
@@ -107,7 +118,7 @@ void with_openexr(const std::string& where, const char* what, const Run& run) {
 struct ExrPart {
   Imf::Header header;
   Imf::FrameBuffer frame;
-  std::vector<half> halves[3];
+  std::vector<std::vector<half>> halves;  ///< what the frame reads, where it is not the model's own planes
 };
 
 /// Whether ZIP takes off a sixteenth or more, by three pieces of its blocks of lines.
@@ -144,7 +155,7 @@ bool pays_zip(const ExrPart& part, int width, int height) {
 
 ExrPart make_part(const SkeletexModel& model, const ModelFileOptions& options, const std::string& where) {
   check_model(model, where);
-  check_texels(model.texture, where);
+  check_texels(model, where);
   const int width = model.texture.width, height = model.texture.height;
   std::string json;
   try {
@@ -155,19 +166,23 @@ ExrPart make_part(const SkeletexModel& model, const ModelFileOptions& options, c
   const bool is_half = options.format == TexelFormat::kHalf;
   ExrPart part{Imf::Header(width, height), {}, {}};
   part.header.insert(kAttribute, Imf::StringAttribute(json));
-  for (int i = 0; i < 3; ++i) {
-    const std::vector<float>& texels = plane(model.texture, i);
+  const auto add_channel = [&](const std::string& name, const std::vector<float>& texels) {
+    const void* data = texels.data();
     if (is_half) {
       const auto largest = std::max_element(texels.begin(), texels.end(), [](float a, float b) { return std::abs(a) < std::abs(b); });
       if (std::abs(*largest) > HALF_MAX)
-        throw IoError(fmt::format("{}: channel {} has {}, beyond half precision's range of +-65504; store float, or scale the mesh", where, kChannels[i], *largest));
-      part.halves[i].assign(texels.begin(), texels.end());
+        throw IoError(fmt::format("{}: channel {} has {}, beyond half precision's range of +-65504; store float, or scale the mesh", where, name, *largest));
+      data = part.halves.emplace_back(texels.begin(), texels.end()).data();
     }
     const Imf::PixelType type = is_half ? Imf::HALF : Imf::FLOAT;
     const std::size_t bytes = is_half ? sizeof(half) : sizeof(float);
-    const void* data = is_half ? static_cast<const void*>(part.halves[i].data()) : texels.data();
-    part.header.channels().insert(kChannels[i], Imf::Channel(type));
-    part.frame.insert(kChannels[i], Imf::Slice(type, static_cast<char*>(const_cast<void*>(data)), bytes, bytes * static_cast<std::size_t>(width)));
+    part.header.channels().insert(name, Imf::Channel(type));
+    part.frame.insert(name, Imf::Slice(type, static_cast<char*>(const_cast<void*>(data)), bytes, bytes * static_cast<std::size_t>(width)));
+  };
+  for (int i = 0; i < 3; ++i) add_channel(kChannels[i], plane(model.texture, i));
+  if (!model.bone_weights.empty()) {
+    const std::vector<std::string> channels = weight_channels(model.skeleton);
+    for (std::size_t bone = 0; bone < channels.size(); ++bone) add_channel(channels[bone], model.bone_weights[bone]);
   }
   const bool has_zip = options.compression == ExrCompression::kZip || (options.compression == ExrCompression::kAuto && pays_zip(part, width, height));
   part.header.compression() = has_zip ? Imf::ZIP_COMPRESSION : options.compression == ExrCompression::kPiz ? Imf::PIZ_COMPRESSION : Imf::NO_COMPRESSION;
@@ -240,10 +255,14 @@ std::vector<std::array<int, 2>> read_model_levels(const std::filesystem::path& p
 SkeletexModel read_model(const std::filesystem::path& path, int level) {
   const std::string where = path.string();
   SkeletexModel model;
+  std::vector<std::string> weight_names;
   {
     const std::vector<ExrSurvey> parts = survey_exr(path, kMaxTextureSize, false);
     const ExrSurvey& survey = part_of(parts, level, where);
-    model = model_from_json(header_json(survey, where), where);
+    const nlohmann::json header = header_json(survey, where);
+    model = model_from_json(header, where);
+    weight_names = weight_channels(header, model.skeleton.bones.size(), where);
+    model.bone_weights.resize(weight_names.size());
     if (model.texture.width != survey.width || model.texture.height != survey.height)
       throw IoError(fmt::format("{}: the image has {} x {} texels, but the model in its header {} x {}; it was resized by another program", where, survey.width,
                                 survey.height, model.texture.width, model.texture.height));
@@ -254,19 +273,21 @@ SkeletexModel read_model(const std::filesystem::path& path, int level) {
     Imf::MultiPartInputFile file(path.c_str());
     Imf::InputPart exr(file, level);
     Imf::FrameBuffer frame;
-    for (int i = 0; i < 3; ++i) {
-      const Imf::Channel* channel = exr.header().channels().findChannel(kChannels[i]);
+    const auto add_channel = [&](const std::string& name, std::vector<float>& values) {
+      const Imf::Channel* channel = exr.header().channels().findChannel(name);
       if (channel == nullptr || channel->xSampling != 1 || channel->ySampling != 1 || channel->type == Imf::UINT)
-        throw IoError(fmt::format("{}: a model has the channels R, G and B in full resolution, float or half; {} is not like that", where, kChannels[i]));
-      plane(model.texture, i).resize(width * height);
-      frame.insert(kChannels[i], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(plane(model.texture, i).data()), sizeof(float), sizeof(float) * width));
-    }
+        throw IoError(fmt::format("{}: a model has the channels R, G, B and those of its weights in full resolution, float or half; {} is not like that", where, name));
+      values.resize(width * height);
+      frame.insert(name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()), sizeof(float), sizeof(float) * width));
+    };
+    for (int i = 0; i < 3; ++i) add_channel(kChannels[i], plane(model.texture, i));
+    for (std::size_t bone = 0; bone < weight_names.size(); ++bone) add_channel(weight_names[bone], model.bone_weights[bone]);
     const Imath::Box2i window = exr.header().dataWindow();
     if (window.min != Imath::V2i(0, 0) || window.max != Imath::V2i(model.texture.width - 1, model.texture.height - 1)) throw IoError(where + ": the file changed while it was read");
     exr.setFrameBuffer(frame);
     exr.readPixels(0, model.texture.height - 1);
   });
-  check_texels(model.texture, where);
+  check_texels(model, where);
   return model;
 }
 

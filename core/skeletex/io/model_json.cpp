@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <limits>
 
@@ -56,6 +57,14 @@ SegmentTopology topology_from_json(const json& value, const std::string& where) 
   throw IoError(where + ": \"annulus\", \"disk\" or \"sphere\" is expected");
 }
 
+/// Letters, digits, - and _ are what every image program takes in the name of a layer.
+std::string layer_word(const std::string& name) {
+  std::string word = name.substr(0, 100);
+  for (char& c : word)
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-' && c != '_') c = '_';
+  return word;
+}
+
 json conventions() {
   return {
       {"texel", "R along, G around, B out: the vector from the bone's foot point W(u) towards the surface in the frame of (u, v), its length the surface "
@@ -65,11 +74,35 @@ json conventions() {
       {"rows", "row r of a patch is read at u = row_u[r], 0 at the head and 1 at the tail"},
       {"seams", "samples are turn, distance, turn, distance, ...: the angle about bones[0] and the distance to the half-line from the node along it"},
       {"origin", "of the image: first row of the file is y = 0, first column x = 0; triangles of the surface run counter-clockwise seen from outside"},
+      {"weights", "where the header has \"weights\": per bone the channel of its weights in smooth poses, at least 0; their sum does not matter"},
       {"units", "lengths in the units of the input mesh, angles in turns"},
   };
 }
 
 }  // namespace
+
+std::vector<std::string> weight_channels(const Skeleton& skeleton) {
+  std::vector<std::string> names;
+  for (const Bone& bone : skeleton.bones) {
+    std::string name = "weights." + layer_word(bone.name);
+    if (std::find(names.begin(), names.end(), name) != names.end()) name += fmt::format("_{}", names.size());
+    names.push_back(std::move(name));
+  }
+  return names;
+}
+
+std::vector<std::string> weight_channels(const json& header, std::size_t bones, const std::string& where) {
+  const auto found = header.find("weights");
+  if (found == header.end()) return {};
+  if (!found->is_array() || found->size() != bones) throw IoError(fmt::format("{}: \"weights\": the names of {} channels are expected, one per bone", where, bones));
+  std::vector<std::string> names;
+  for (const json& name : *found) {
+    if (!name.is_string()) throw IoError(where + ": \"weights\": names of channels are expected");
+    names.push_back(name.get<std::string>());
+    if (std::count(names.begin(), names.end(), names.back()) > 1) throw IoError(fmt::format("{}: \"weights\": \"{}\" is named twice", where, names.back()));
+  }
+  return names;
+}
 
 json model_to_json(const SkeletexModel& model, const std::string& where) {
   json patches = json::array(), arcs = json::array(), corners = json::array();
@@ -111,6 +144,7 @@ json model_to_json(const SkeletexModel& model, const std::string& where) {
                  {"arcs", std::move(arcs)},
                  {"corners", std::move(corners)}};
   if (model.diagonals == DiagonalRule::kSmooth) result["diagonals"] = "smooth";
+  if (!model.bone_weights.empty()) result["weights"] = weight_channels(model.skeleton);
   if (!model.encoder_settings.empty()) {
     result["encoder"] = parse_json(model.encoder_settings, where + ": encoder settings");
     if (!result["encoder"].is_object()) throw IoError(where + ": the encoder's settings must be a JSON object");

@@ -2,6 +2,7 @@
 #pragma once
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "skeletex/model/texture.h"
 
@@ -18,6 +19,11 @@ nlohmann::json model_to_json(const SkeletexModel& model, const std::string& wher
 /// A model with the texture's size, but without texels; checked by check_model.
 /// \throw IoError
 SkeletexModel model_from_json(const nlohmann::json& json, const std::string& where);
+
+/// The channels that hold the weights of bones, one per bone: "weights." and the bone's name, in which all but letters, digits, - and _ is _.
+std::vector<std::string> weight_channels(const Skeleton& skeleton);
+/// The channels that a header names for its weights, one per bone; empty: it names none. \throw IoError
+std::vector<std::string> weight_channels(const nlohmann::json& header, std::size_t bones, const std::string& where);
 
 /// Whether the parts of a model fit together, so that whatever uses it may take every index and size for granted: all
 /// indices exist, rectangles lie in the texture apart from each other, rows increase from 0 to 1, each end's arcs close

@@ -81,6 +81,9 @@ struct SkeletexModel {
   std::vector<std::array<PatchEnd, 2>> ends;  ///< one pair per bone: head, tail
   std::vector<SeamArc> arcs;
   std::vector<SeamCorner> corners;
+  /// How much each bone moves each texel in a smooth pose, where that is painted or imported: per bone a plane as the texture's, values
+  /// of at least 0 whose sum does not matter. Empty: weights in closed form (weight_walk.h).
+  std::vector<std::vector<float>> bone_weights;
   std::string encoder_settings;  ///< JSON object: the options and version of the encoder, for the record
 };
 

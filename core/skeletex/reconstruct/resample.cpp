@@ -350,6 +350,24 @@ SeamArc resample_arc(const SkeletexModel& model, const Walls& walls, const SeamA
   return result;
 }
 
+/// A plane of one value per texel at another size, linear between texels of the same patch.
+std::vector<float> resample_plane(const std::vector<float>& values, const SkeletexModel& model, const SkeletexModel& result) {
+  std::vector<float> resampled(static_cast<std::size_t>(result.texture.width) * result.texture.height, 0.f);
+  for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
+    const Rectangle &from = model.patches[bone].rectangle, &to = result.patches[bone].rectangle;
+    const auto value = [&](int row, int column) { return values[static_cast<std::size_t>(from.y + row) * model.texture.width + from.x + column % from.width]; };
+    for (int row = 0; row < to.height; ++row)
+      for (int column = 0; column < to.width; ++column) {
+        const double y = static_cast<double>(row) * (from.height - 1) / (to.height - 1), x = static_cast<double>(column) * from.width / to.width;
+        const int r = std::min(static_cast<int>(y), from.height - 2), c = static_cast<int>(x);
+        const double v = y - r, u = x - c;
+        resampled[static_cast<std::size_t>(to.y + row) * result.texture.width + to.x + column] = static_cast<float>(
+            (1 - v) * ((1 - u) * value(r, c) + u * value(r, c + 1)) + v * ((1 - u) * value(r + 1, c) + u * value(r + 1, c + 1)));
+      }
+  }
+  return resampled;
+}
+
 }  // namespace
 
 SkeletexModel resample_model(ClContext& context, const SkeletexModel& model, int size) {
@@ -366,6 +384,7 @@ SkeletexModel resample_model(ClContext& context, const SkeletexModel& model, int
   result.patches = scale_patches(model, width, height);
   result.diagonals = DiagonalRule::kNearest;  // new texels lie evenly
   resample_texels(context, model, walls, result);
+  for (std::vector<float>& weights : result.bone_weights) weights = resample_plane(weights, model, result);
   for (SeamArc& arc : result.arcs) {
     double ratio = 0;
     for (const int bone : arc.bones)

@@ -2,7 +2,10 @@
 #include "skeletex/reconstruct/skin.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 
+#include "skeletex/model/parallel.h"
 #include "skeletex/model/walls.h"
 #include "skeletex/model/weight_walk.h"
 #include "skeletex/reconstruct/lattice.h"
@@ -53,6 +56,63 @@ void weigh_inner_vertices(ClContext& context, const WeightWalks& walks, const De
   }
 }
 
+/// The weights of a place in a patch that a model's own weights say; the patch's own bone where all of them are 0.
+/// \param row  0 to height - 1    \param turn  v; between columns weights are linear
+std::vector<BoneWeight> weights_at(const SkeletexModel& model, int bone, int row, double turn) {
+  const Rectangle& r = model.patches[bone].rectangle;
+  const double x = (turn - std::floor(turn)) * r.width;
+  const int column = static_cast<int>(x) % r.width;
+  const double share = x - std::floor(x);
+  const std::size_t line = static_cast<std::size_t>(r.y + row) * model.texture.width + r.x;
+  std::vector<BoneWeight> weights;
+  double sum = 0;
+  for (int b = 0; b < static_cast<int>(model.bone_weights.size()); ++b) {
+    const std::vector<float>& plane = model.bone_weights[b];
+    const double weight = (1 - share) * plane[line + column] + share * plane[line + (column + 1) % r.width];
+    if (!(weight > 0)) continue;
+    weights.push_back({b, weight});
+    sum += weight;
+  }
+  if (weights.empty()) return {{bone, 1}};
+  for (BoneWeight& weight : weights) weight.weight /= sum;
+  return weights;
+}
+
+void take_inner_weights(const SkeletexModel& model, Skin& skin) {
+  const std::size_t bones = model.bone_weights.size();
+  std::vector<int> all(bones);
+  std::iota(all.begin(), all.end(), 0);
+  std::vector<float> weights(bones * SKIN_BLOCK);
+  int bone = -1, first_vertex = 0;  // of the patch
+  for (SkinBlock& block : skin.blocks) {
+    if (block.bone != bone) bone = block.bone, first_vertex = block.first_vertex;
+    std::fill(weights.begin(), weights.end(), 0.f);
+    const int width = model.patches[bone].rectangle.width;
+    for (int i = 0; i < block.vertex_count; ++i) {
+      const int inner = block.first_vertex - first_vertex + i;
+      for (const auto& [moving, weight] : weights_at(model, bone, 1 + inner / width, static_cast<double>(inner % width) / width))
+        weights[moving * SKIN_BLOCK + i] = static_cast<float>(weight);
+    }
+    append_block(block, all, weights.data(), skin);
+  }
+}
+
+/// Poles, seam samples and corners as the rows at the ends of their patches have it.
+std::vector<std::vector<BoneWeight>> shared_weights_of(const SkeletexModel& model, const Lattice& lattice) {
+  std::vector<std::vector<BoneWeight>> weights;
+  const auto at = [&](int bone, BoneEnd end, double turn) {
+    weights.push_back(weights_at(model, bone, end == BoneEnd::kHead ? 0 : model.patches[bone].rectangle.height - 1, turn));
+  };
+  const auto end_at = [&](int bone, int node) { return model.skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail; };
+  for (int bone = 0; bone < static_cast<int>(lattice.poles.size()); ++bone)
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
+      if (lattice.poles[bone][static_cast<int>(end)] >= 0) at(bone, end, 0);
+  for (const SeamArc& arc : model.arcs)
+    for (const SeamSample& sample : arc.samples) at(arc.bones[0], end_at(arc.bones[0], arc.node), sample.turn);
+  for (const SeamCorner& corner : model.corners) at(corner.bones[0], end_at(corner.bones[0], corner.node), corner.sample.turn);
+  return weights;
+}
+
 /// A bone that each pole, seam sample and corner belongs to, in the order of their vertices.
 std::vector<int> bones_of_shared_vertices(const SkeletexModel& model, const Lattice& lattice) {
   std::vector<int> bones(lattice.vertex_count - lattice.inner_count, -1);
@@ -80,19 +140,42 @@ std::vector<SkinBlock> skin_blocks(const std::vector<Patch>& patches) {
 
 Skin make_skin(ClContext& context, const SkeletexModel& model, const DevicePlanes& points) {
   const Lattice lattice = number_lattice(model);
-  const WeightWalks walks = make_weight_walks(model);
   Skin skin;
   skin.blocks = skin_blocks(model.patches);
   skin.inner_count = lattice.inner_count;
   skin.origin = model.origin;
-  weigh_inner_vertices(context, walks, points, skin);
-
   std::vector<Vec3> positions(lattice.vertex_count);
   place_shared_vertices(model, Walls(model.skeleton), lattice, positions);
   skin.shared_points.assign(positions.begin() + lattice.inner_count, positions.end());
+  if (!model.bone_weights.empty()) {
+    take_inner_weights(model, skin);
+    skin.shared_weights = shared_weights_of(model, lattice);
+    return skin;
+  }
+  const WeightWalks walks = make_weight_walks(model);
+  weigh_inner_vertices(context, walks, points, skin);
   const std::vector<int> bones = bones_of_shared_vertices(model, lattice);
   for (std::size_t i = 0; i < bones.size(); ++i) skin.shared_weights.push_back(bone_weights(walks, bones[i], skin.shared_points[i] - model.origin));
   return skin;
+}
+
+std::vector<std::vector<float>> weight_planes(ClContext& context, const SkeletexModel& model) {
+  const WeightWalks walks = make_weight_walks(model);
+  const DevicePlanes device = row_points(context, model, Walls(model.skeleton));
+  const std::vector<float> x = context.download(device.x), y = context.download(device.y), z = context.download(device.z);
+  const std::size_t texels = static_cast<std::size_t>(model.texture.width) * model.texture.height;
+  std::vector<std::vector<float>> planes(model.skeleton.bones.size(), std::vector<float>(texels, 0.f));
+  const std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kAll);
+  for_each_block(rows.size(), 8, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      const auto [bone, row, vertex, quad] = rows[k];
+      const Rectangle& r = model.patches[bone].rectangle;
+      for (int j = 0; j < r.width; ++j)
+        for (const auto& [moving, weight] : bone_weights(walks, bone, Vec3(x[vertex + j], y[vertex + j], z[vertex + j])))
+          planes[moving][static_cast<std::size_t>(r.y + row) * model.texture.width + r.x + j] = static_cast<float>(weight);
+    }
+  });
+  return planes;
 }
 
 DeviceSkin upload_skin(ClContext& context, const Skin& skin, DevicePlanes points) {

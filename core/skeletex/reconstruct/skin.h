@@ -39,6 +39,9 @@ std::vector<SkinBlock> skin_blocks(const std::vector<Patch>& patches);
 Skin make_skin(ClContext& context, const SkeletexModel& model, const DevicePlanes& points);
 DeviceSkin upload_skin(ClContext& context, const Skin& skin, DevicePlanes points);
 
+/// Weights in closed form of all texels, per bone a plane of the texture's size, as SkeletexModel::bone_weights has them; 0 outside patches.
+std::vector<std::vector<float>> weight_planes(ClContext& context, const SkeletexModel& model);
+
 /// The motions as the kernels read them: from the bind origin to the posed one.
 std::vector<BoneMotionRecord> motion_records(std::span<const BoneMotion> motions, const Vec3& bind_origin, const Vec3& posed_origin);
 /// Whether a bone changes its length.

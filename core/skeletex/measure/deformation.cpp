@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/measure/deformation.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <tuple>
+
+#include "skeletex/measure/self_intersection.h"
+#include "skeletex/model/error.h"
+
+namespace skeletex {
+namespace {
+
+constexpr double kFoldDegrees = 90;
+
+std::vector<Vec3> unit_normals(const TriangleMesh& mesh, std::span<const Vec3> positions) {
+  std::vector<Vec3> normals;
+  normals.reserve(mesh.triangles.size());
+  for (const Triangle& t : mesh.triangles) normals.push_back((positions[t[1]] - positions[t[0]]).cross(positions[t[2]] - positions[t[0]]).normalized());
+  return normals;
+}
+
+std::vector<double> bends_of(const BindSurface& bind, std::span<const Vec3> positions) {
+  const std::vector<Vec3> normals = unit_normals(bind.mesh, positions);
+  std::vector<double> bends;
+  bends.reserve(bind.edges.size());
+  for (const auto& [first, second] : bind.edge_triangles)
+    bends.push_back(std::acos(std::clamp(normals[first].dot(normals[second]), -1.0, 1.0)) * 180 / std::numbers::pi);
+  return bends;
+}
+
+/// A triangle in its own plane: first edge along x.
+Eigen::Matrix2d in_plane(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 first = b - a, second = c - a;
+  const double length = first.norm();
+  Eigen::Matrix2d edges;
+  edges << length, first.dot(second) / length, 0, first.cross(second).norm() / length;
+  return edges;
+}
+
+void measure_energy(const BindSurface& bind, std::span<const Vec3> positions, DeformationReport& report) {
+  std::vector<std::array<double, 2>> energies;  // energy, area
+  double area = 0, sum = 0;
+  for (const Triangle& t : bind.mesh.triangles) {
+    const auto& p = bind.mesh.positions;
+    const Eigen::Matrix2d before = in_plane(p[t[0]], p[t[1]], p[t[2]]);
+    const double weight = 0.5 * before.determinant();
+    if (!(weight > 0)) continue;
+    const Eigen::Matrix2d map = in_plane(positions[t[0]], positions[t[1]], positions[t[2]]) * before.inverse();
+    const double size = map.squaredNorm(), determinant = map.determinant();
+    // |J^-1|^2 of a 2 x 2 matrix is |J|^2 / det^2. A triangle pressed to nothing counts as 1e6.
+    const double energy = std::isfinite(size) && determinant > 0 ? std::min(1e6, 0.25 * (size + size / (determinant * determinant))) : 1e6;
+    energies.push_back({energy, weight});
+    area += weight;
+    sum += weight * energy;
+  }
+  if (energies.empty()) return;
+  report.energy_mean = sum / area;
+  std::sort(energies.begin(), energies.end());
+  double below = 0;
+  for (const auto& [energy, weight] : energies) {
+    report.energy_99 = energy;
+    if ((below += weight) >= 0.99 * area) break;
+  }
+}
+
+void check_count(const BindSurface& bind, std::span<const Vec3> positions) {
+  if (positions.size() != bind.mesh.positions.size())
+    throw InputError(fmt::format("the mesh in the pose has {} vertices, in the bind pose {}; they must be two poses of one model", positions.size(), bind.mesh.positions.size()));
+}
+
+}  // namespace
+
+BindSurface make_bind_surface(TriangleMesh mesh) {
+  BindSurface bind;
+  bind.mesh = std::move(mesh);
+  std::vector<std::tuple<int, int, int>> sides;  // lower vertex, higher vertex, triangle
+  for (std::size_t t = 0; t < bind.mesh.triangles.size(); ++t)
+    for (int i = 0; i < 3; ++i) {
+      const auto [low, high] = std::minmax(bind.mesh.triangles[t][i], bind.mesh.triangles[t][(i + 1) % 3]);
+      sides.emplace_back(low, high, static_cast<int>(t));
+    }
+  std::sort(sides.begin(), sides.end());
+  for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
+    const auto& [a, b, first] = sides[i];
+    const auto& [c, d, second] = sides[i + 1];
+    if (a != c || b != d) continue;
+    bind.edges.push_back({a, b});
+    bind.edge_triangles.push_back({first, second});
+  }
+  bind.bends = bends_of(bind, bind.mesh.positions);
+  bind.intersections = find_self_intersections(bind.mesh);
+  return bind;
+}
+
+DeformationReport measure_deformation(const BindSurface& bind, std::span<const Vec3> positions) {
+  check_count(bind, positions);
+  DeformationReport report;
+  const std::vector<double> bends = bends_of(bind, positions);
+  for (std::size_t i = 0; i < bends.size(); ++i) report.new_folds += bends[i] > kFoldDegrees && bind.bends[i] <= kFoldDegrees;
+  const TriangleMesh posed{{positions.begin(), positions.end()}, bind.mesh.triangles};
+  for (const auto& pair : find_self_intersections(posed))
+    report.new_intersections += !std::binary_search(bind.intersections.begin(), bind.intersections.end(), pair);
+  measure_energy(bind, positions, report);
+  const double volume = signed_volume(bind.mesh);
+  report.volume_ratio = volume != 0 ? signed_volume(posed) / volume : 1;
+  return report;
+}
+
+double added_bend(const BindSurface& bind, std::span<const Vec3> positions, const std::vector<bool>& is_chosen, double share) {
+  check_count(bind, positions);
+  const std::vector<double> bends = bends_of(bind, positions);
+  std::vector<double> added;
+  for (std::size_t i = 0; i < bends.size(); ++i)
+    if (is_chosen[i]) added.push_back(bends[i] - bind.bends[i]);
+  if (added.empty()) return 0;
+  const auto at = added.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(added.size() - 1));
+  std::nth_element(added.begin(), at, added.end());
+  return *at;
+}
+
+}  // namespace skeletex
