@@ -42,32 +42,6 @@ Eigen::Matrix2d in_plane(const Vec3& a, const Vec3& b, const Vec3& c) {
   return edges;
 }
 
-void measure_energy(const BindSurface& bind, std::span<const Vec3> positions, DeformationReport& report) {
-  std::vector<std::array<double, 2>> energies;  // energy, area
-  double area = 0, sum = 0;
-  for (const Triangle& t : bind.mesh.triangles) {
-    const auto& p = bind.mesh.positions;
-    const Eigen::Matrix2d before = in_plane(p[t[0]], p[t[1]], p[t[2]]);
-    const double weight = 0.5 * before.determinant();
-    if (!(weight > 0)) continue;
-    const Eigen::Matrix2d map = in_plane(positions[t[0]], positions[t[1]], positions[t[2]]) * before.inverse();
-    const double size = map.squaredNorm(), determinant = map.determinant();
-    // |J^-1|^2 of a 2 x 2 matrix is |J|^2 / det^2. A triangle pressed to nothing counts as 1e6.
-    const double energy = std::isfinite(size) && determinant > 0 ? std::min(1e6, 0.25 * (size + size / (determinant * determinant))) : 1e6;
-    energies.push_back({energy, weight});
-    area += weight;
-    sum += weight * energy;
-  }
-  if (energies.empty()) return;
-  report.energy_mean = sum / area;
-  std::sort(energies.begin(), energies.end());
-  double below = 0;
-  for (const auto& [energy, weight] : energies) {
-    report.energy_99 = energy;
-    if ((below += weight) >= 0.99 * area) break;
-  }
-}
-
 void check_count(const BindSurface& bind, std::span<const Vec3> positions) {
   if (positions.size() != bind.mesh.positions.size())
     throw InputError(fmt::format("the mesh in the pose has {} vertices, in the bind pose {}; they must be two poses of one model", positions.size(), bind.mesh.positions.size()));
@@ -97,6 +71,31 @@ BindSurface make_bind_surface(TriangleMesh mesh) {
   return bind;
 }
 
+std::vector<TriangleEnergy> triangle_energies(const BindSurface& bind, std::span<const Vec3> positions) {
+  check_count(bind, positions);
+  std::vector<TriangleEnergy> energies;
+  for (const Triangle& t : bind.mesh.triangles) {
+    const auto& p = bind.mesh.positions;
+    const Eigen::Matrix2d before = in_plane(p[t[0]], p[t[1]], p[t[2]]);
+    const double area = 0.5 * before.determinant();
+    if (!(area > 0)) continue;
+    const Eigen::Matrix2d map = in_plane(positions[t[0]], positions[t[1]], positions[t[2]]) * before.inverse();
+    const double size = map.squaredNorm(), determinant = map.determinant();
+    // |J^-1|^2 of a 2 x 2 matrix is |J|^2 / det^2.
+    energies.push_back({std::isfinite(size) && determinant > 0 ? std::min(1e6, 0.25 * (size + size / (determinant * determinant))) : 1e6, area});
+  }
+  return energies;
+}
+
+double energy_below(std::vector<TriangleEnergy> energies, double share) {
+  std::sort(energies.begin(), energies.end(), [](const TriangleEnergy& a, const TriangleEnergy& b) { return a.energy < b.energy; });
+  double area = 0, below = 0;
+  for (const TriangleEnergy& triangle : energies) area += triangle.area;
+  for (const TriangleEnergy& triangle : energies)
+    if ((below += triangle.area) >= share * area) return triangle.energy;
+  return energies.empty() ? 1 : energies.back().energy;
+}
+
 DeformationReport measure_deformation(const BindSurface& bind, std::span<const Vec3> positions) {
   check_count(bind, positions);
   DeformationReport report;
@@ -105,7 +104,14 @@ DeformationReport measure_deformation(const BindSurface& bind, std::span<const V
   const TriangleMesh posed{{positions.begin(), positions.end()}, bind.mesh.triangles};
   for (const auto& pair : find_self_intersections(posed))
     report.new_intersections += !std::binary_search(bind.intersections.begin(), bind.intersections.end(), pair);
-  measure_energy(bind, positions, report);
+  const std::vector<TriangleEnergy> energies = triangle_energies(bind, positions);
+  double area = 0, sum = 0;
+  for (const TriangleEnergy& triangle : energies) {
+    area += triangle.area;
+    sum += triangle.area * triangle.energy;
+  }
+  if (area > 0) report.energy_mean = sum / area;
+  report.energy_99 = energy_below(energies, 0.99);
   const double volume = signed_volume(bind.mesh);
   report.volume_ratio = volume != 0 ? signed_volume(posed) / volume : 1;
   return report;

@@ -19,13 +19,22 @@ struct BindSurface {
 /// \pre indices in range, coordinates finite
 BindSurface make_bind_surface(TriangleMesh mesh);
 
+/// Symmetric Dirichlet energy (|J|^2 + |J^-1|^2) / 4 of the map of a triangle from the bind pose (Smith and Schaefer, Bijective
+/// Parameterization with Free Boundaries, 2015): 1 where nothing is stretched.
+struct TriangleEnergy {
+  double energy = 1;
+  double area = 0;  ///< in the bind pose
+};
+/// Of the triangles that have an area in the bind pose. One that is pressed to nothing counts as 1e6.
+std::vector<TriangleEnergy> triangle_energies(const BindSurface& bind, std::span<const Vec3> positions);
+/// What a share of the area lies below. \param share  0 to 1    \return 1 when there are none
+double energy_below(std::vector<TriangleEnergy> energies, double share);
+
 /// How far a pose has spoilt a surface.
 struct DeformationReport {
   long new_folds = 0;          ///< edges over which it turns by more than 90 degrees, and did not in the bind pose
   long new_intersections = 0;  ///< pairs of triangles that intersect, and did not
-  /// Symmetric Dirichlet energy (|J|^2 + |J^-1|^2) / 4 of the map of each triangle from the bind pose (Smith and Schaefer,
-  /// Bijective Parameterization with Free Boundaries, 2015): 1 where nothing is stretched. Weighted by area in the bind pose.
-  double energy_mean = 1, energy_99 = 1;  ///< mean, and what 99 % of the area lies below
+  double energy_mean = 1, energy_99 = 1;  ///< of triangles, by area: mean, and what 99 % lies below
   double volume_ratio = 1;                ///< enclosed volume over that of the bind pose
 };
 /// \param positions  of the bind mesh's vertices in the pose    \throw InputError when their number differs

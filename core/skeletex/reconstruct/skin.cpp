@@ -113,7 +113,8 @@ std::vector<std::vector<BoneWeight>> shared_weights_of(const SkeletexModel& mode
   return weights;
 }
 
-/// A bone that each pole, seam sample and corner belongs to, in the order of their vertices.
+}  // namespace
+
 std::vector<int> bones_of_shared_vertices(const SkeletexModel& model, const Lattice& lattice) {
   std::vector<int> bones(lattice.vertex_count - lattice.inner_count, -1);
   for (int bone = 0; bone < static_cast<int>(lattice.poles.size()); ++bone)
@@ -124,8 +125,6 @@ std::vector<int> bones_of_shared_vertices(const SkeletexModel& model, const Latt
   for (std::size_t c = 0; c < model.corners.size(); ++c) bones[lattice.first_corner - lattice.inner_count + static_cast<int>(c)] = model.corners[c].bones[0];
   return bones;
 }
-
-}  // namespace
 
 std::vector<SkinBlock> skin_blocks(const std::vector<Patch>& patches) {
   std::vector<SkinBlock> blocks;

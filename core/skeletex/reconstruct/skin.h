@@ -7,6 +7,7 @@
 #include "skeletex/model/bone_motion.h"
 #include "skeletex/model/texture.h"
 #include "skeletex/reconstruct/displace.h"
+#include "skeletex/reconstruct/lattice.h"
 #include "skeletex_structs.h"
 
 namespace skeletex {
@@ -32,6 +33,9 @@ struct DeviceSkin {
 
 /// The blocks of a model's inner vertices, whose bones and weights are not filled in.
 std::vector<SkinBlock> skin_blocks(const std::vector<Patch>& patches);
+
+/// A bone that each pole, seam sample and corner belongs to, in the order of their vertices.
+std::vector<int> bones_of_shared_vertices(const SkeletexModel& model, const Lattice& lattice);
 
 /// Weights of the model's own (SkeletexModel::bone_weights) where it has them, else in closed form (weight_walk.h).
 /// \param points  of the inner vertices in the bind pose, relative to the model's origin
