@@ -41,8 +41,11 @@ SECTIONS = [
     ("Figure 19, middle: SPD and VSM in morphing", "morph_methods", pictures.fig19_morph_methods,
      "Half-way between the two. VSM keeps all of both surfaces, and distorts what one of them lacks; SPD is smoother and leaves out what its rays do not see."),
     ("Figure 20: animation", "animation", pictures.fig20_animation,
-     "Poses interpolated between key frames, and a pose that turns bones by 80 to 120 degrees. Closed in all of them; creases at the seams are those of a C0 surface, "
-     "and folds grow with the thickness of the body (shoulders of the armadillo)."),
+     "Poses interpolated between key frames, and a pose that turns bones by 80 to 120 degrees. Closed in all of them. The surface is posed smoothly, by blended dual quaternions with "
+     "weights in closed form; the paper's own rule bends sharply at every separation plane (Figure 10)."),
+    ("Beyond the paper: poses beside skinning", "posing", sweeps.draw_posing,
+     "New folds (edges that bend beyond 90 degrees) and new intersecting pairs of triangles, summed over the poses of configs/poses/evaluation, by each rule of this project and by skinning with each "
+     "vertex' own bone diffused over 0.05 of the diagonal (narrow: 0.025)."),
     ("Beyond the paper: iterations of VSM", "iterations", sweeps.draw_iterations,
      "The paper's weights w A even out areas in the texture; divided by a power of the surface area they even out the texels on the surface."),
     ("Beyond the paper: what the recipe's parts bring", "recipe", sweeps.draw_recipe, "The paper's own recipe, the default, the default on an even lattice, and that with one part taken back."),

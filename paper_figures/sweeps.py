@@ -50,6 +50,31 @@ def draw_recipe(results, folder):
     return [style.save(figure, folder, "recipe")]
 
 
+POSING_RULES = [("smooth", "smooth (default)"), ("dual_quaternions", "dual quaternions, 0.05"), ("dual_quaternions_narrow", "dual quaternions, 0.025"),
+                ("linear", "linear, 0.05"), ("coordinates", "coordinates"), ("paper", "paper")]
+
+
+def draw_posing(results, folder):
+    rows = [row for row in style.rows(results, "posing") or [] if row["parameters"]["method"] == "vsm"]
+    if not rows:
+        return []
+    names = [row["parameters"]["body"] for row in rows]
+    figure, axes = plt.subplots(1, 2, figsize=(11, 3.4))
+    width = 0.8 / len(POSING_RULES)
+    for axis, (count, title) in zip(axes, [("new_folds", "new folds"), ("new_intersections", "new intersections")]):
+        for k, (rule, label) in enumerate(POSING_RULES):
+            heights = [max(1, row["columns"][f"{rule}_{count}"]) for row in rows]
+            axis.bar([i + (k - len(POSING_RULES) / 2 + 0.5) * width for i in range(len(rows))], heights, width, color=style.SERIES[k % len(style.SERIES)][0],
+                     hatch=["", "//", "..", "\\\\", "xx", "--"][k], edgecolor="white", label=label)
+        axis.set_yscale("log")
+        axis.set_xticks(range(len(rows)), names)
+        axis.set_title(title)
+        axis.grid(axis="x", visible=False)
+    figure.tight_layout()
+    axes[-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+    return [style.save(figure, folder, "posing")]
+
+
 def draw_simplification(results, folder):
     rows = style.rows(results, "simplification")
     if not rows:
