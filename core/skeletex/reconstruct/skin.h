@@ -32,6 +32,8 @@ struct DeviceSkin {
 
 /// The blocks of a model's inner vertices, whose bones and weights are not filled in.
 std::vector<SkinBlock> skin_blocks(const std::vector<Patch>& patches);
+/// One work-group per block: see kernels/skin.cl.
+ClRange block_range(const ClContext& context, std::size_t blocks);
 
 /// Weights of the model's own (SkeletexModel::bone_weights) where it has them, else in closed form (weight_walk.h).
 /// \param points  of the inner vertices in the bind pose, relative to the model's origin
