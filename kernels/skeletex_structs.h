@@ -51,6 +51,9 @@ typedef struct PosedRowRecord {
   float reach_tail;
 } PosedRowRecord;
 
+/// The share of a bone's length, from a seam on, over which its capsule is drawn out: by (1 - station / share)^2 of what it is at the seam.
+#define POSED_SEAM_SHARE 0.25f
+
 /// What a pose adds to a column, at the bone's head and tail.
 typedef struct PosedColumnRecord {
   float roll_head;  ///< radians, to be added to the column's angle
@@ -58,6 +61,23 @@ typedef struct PosedColumnRecord {
   float slope_head;  ///< of the posed walls at the rolled angle
   float slope_tail;
 } PosedColumnRecord;
+
+/// What holds along an arc of a loop of seams around a bone's end in a pose. Angles are those of the bind pose, radians.
+typedef struct PosedArcRecord {
+  float begin;    ///< where it begins, in [0, 2 pi); the first arc of a loop begins at 0, and the last one ends at 2 pi
+  float roll;     ///< radians, to be added to the angle where the arc begins
+  float rate;     ///< by which the roll grows with the angle
+  float slope_s;  ///< the separation plane's slope at the rolled angle a is slope_s cos a + slope_b sin a
+  float slope_b;
+} PosedArcRecord;
+
+/// The arcs around a bone's head and tail in a pose; a free end has one, without roll and slope.
+typedef struct PosedEndsRecord {
+  SKELETEX_INT first_arc[2];  ///< in the table of PosedArcRecord
+  SKELETEX_INT arc_count[2];
+  float bind_reach[2];  ///< PosedRowRecord's past the head at the tail's seam, and past the tail at the head's; world units
+  float reach[2];
+} PosedEndsRecord;
 
 /// One joint of a walk along the skeleton, from the bone that a point belongs to towards other bones: see WeightWalks.
 typedef struct WeightStep {
@@ -100,6 +120,8 @@ static_assert(sizeof(RowRecord) == 16);
 static_assert(sizeof(ColumnRecord) == 16);
 static_assert(sizeof(PosedRowRecord) == 16);
 static_assert(sizeof(PosedColumnRecord) == 16);
+static_assert(sizeof(PosedArcRecord) == 4 * 5);
+static_assert(sizeof(PosedEndsRecord) == 4 * 8);
 }  // namespace skeletex
 #endif
 #undef SKELETEX_INT

@@ -9,8 +9,6 @@
 namespace skeletex {
 namespace {
 
-constexpr double kSeamShare = 0.25;  // of the bone's length, over which a seam's rule fades
-
 void store(float (&out)[3], const Vec3& v) {
   for (int i = 0; i < 3; ++i) out[i] = static_cast<float>(v[i]);
 }
@@ -19,7 +17,7 @@ void store(float (&out)[3], const Vec3& v) {
 
 PosedRow posed_row(const SkeletexModel& model, const PosedWalls& posed, int bone, const Station& at) {
   PosedRow row;
-  const auto fade = [](double from_seam) { return from_seam < kSeamShare ? std::pow(1 - from_seam / kSeamShare, 2) : 0.0; };
+  const auto fade = [](double from_seam) { return from_seam < POSED_SEAM_SHARE ? std::pow(1 - from_seam / POSED_SEAM_SHARE, 2) : 0.0; };
   for (const int end : {0, 1}) {
     if (model.ends[bone][end].arcs.empty()) continue;
     const int node = end_node(model.skeleton, bone, static_cast<BoneEnd>(end));
@@ -68,27 +66,36 @@ Vec3 posed_point(const SkeletexModel& model, const Walls& bind, const PosedWalls
   return foot + stretch * (q[0] * spoke + q[1] * basis.o.cross(spoke) + q[2] * basis.o);
 }
 
-PoseTables pose_tables(const SkeletexModel& model, const PosedWalls& posed) {
-  PoseTables tables;
-  const Skeleton& skeleton = posed.skeleton();
-  tables.origin = middle_of_nodes(skeleton);
-  int row_begin = 0;
+std::vector<PatchRecord> posed_patches(const SkeletexModel& model, const PosedWalls& posed, const Vec3& origin) {
+  std::vector<PatchRecord> patches;
+  int row_begin = 0, column_begin = 0;
   for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
-    const Patch& patch = model.patches[bone];
+    const Rectangle& rectangle = model.patches[bone].rectangle;
     PatchRecord record{};
-    store(record.head, end_position(skeleton, bone, BoneEnd::kHead) - tables.origin);
-    record.length = static_cast<float>(bone_length(skeleton, bone));
+    store(record.head, end_position(posed.skeleton(), bone, BoneEnd::kHead) - origin);
+    record.length = static_cast<float>(bone_length(posed.skeleton(), bone));
     store(record.axis, posed.bases()[bone].o);
     store(record.s, posed.bases()[bone].s);
     store(record.b, posed.bases()[bone].b);
-    record.x = patch.rectangle.x;
-    record.y = patch.rectangle.y;
-    record.width = patch.rectangle.width;
-    record.height = patch.rectangle.height;
+    record.x = rectangle.x;
+    record.y = rectangle.y;
+    record.width = rectangle.width;
+    record.height = rectangle.height;
     record.row_begin = row_begin;
-    record.column_begin = static_cast<int>(tables.columns.size());
-    row_begin += patch.rectangle.height;
-    tables.patches.push_back(record);
+    record.column_begin = column_begin;
+    row_begin += rectangle.height;
+    column_begin += rectangle.width;
+    patches.push_back(record);
+  }
+  return patches;
+}
+
+PoseTables pose_tables(const SkeletexModel& model, const PosedWalls& posed) {
+  PoseTables tables;
+  tables.origin = middle_of_nodes(posed.skeleton());
+  tables.patches = posed_patches(model, posed, tables.origin);
+  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
+    const Patch& patch = model.patches[bone];
     for (const double u : patch.row_u) {
       const PosedRow row = posed_row(model, posed, bone, station_of(u, model.ends[bone][0].arcs.empty(), model.ends[bone][1].arcs.empty()));
       tables.rows.push_back({static_cast<float>(row.bind_reaches[0]), static_cast<float>(row.bind_reaches[1]), static_cast<float>(row.reaches[0]),

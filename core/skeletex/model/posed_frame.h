@@ -19,6 +19,10 @@ PosedRow posed_row(const SkeletexModel& model, const PosedWalls& posed, int bone
 Vec3 posed_point(const SkeletexModel& model, const Walls& bind, const PosedWalls& posed, int bone, double u, double turn, const Vec3& texel,
                  DistanceRule rule);
 
+/// The posed bones as the kernels see them, with the rectangles, rows and columns of the model's patches.
+/// \param origin  world position that posed device coordinates are relative to
+std::vector<PatchRecord> posed_patches(const SkeletexModel& model, const PosedWalls& posed, const Vec3& origin);
+
 /// What the kernels read for a pose, beside the tables of the bind pose (frame_tables): same rows, same columns.
 struct PoseTables {
   std::vector<PatchRecord> patches;

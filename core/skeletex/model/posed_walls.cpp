@@ -246,8 +246,12 @@ std::vector<PosedBound> PosedWalls::bounds(int bone, BoneEnd end) const {
   const Loop& loop = loops_[bone][static_cast<int>(end)];
   std::vector<PosedBound> bounds;
   for (const Interval& interval : loop.intervals) {
-    const Side& side = arcs_[interval.arc].sides[interval.side];
-    bounds.push_back({loop.base + interval.start, side.rolls[side.sign > 0 ? 0 : 1]});
+    const Arc& arc = arcs_[interval.arc];
+    const Side& side = arc.sides[interval.side];
+    const BoneBasis& basis = bases_[bone];
+    const int first = side.sign > 0 ? 0 : 1;
+    bounds.push_back({loop.base + interval.start, side.rolls[first], side.rolls[1 - first], meet(basis, basis.s, arc.normal),
+                      meet(basis, basis.b, arc.normal)});
   }
   return bounds;
 }

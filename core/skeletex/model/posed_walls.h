@@ -20,10 +20,13 @@ struct PosedSpoke {
   double slope = 0;  ///< k' of the wall that separates the two bones there (see Walls::slope), at the rolled angle
 };
 
-/// Where an arc around a bone's end begins.
+/// Where an arc around a bone's end begins, and what holds along it.
 struct PosedBound {
-  double turn = 0;  ///< angle in the bind pose, turns
-  double roll = 0;  ///< turns, to be added to it
+  double turn = 0;      ///< angle in the bind pose, turns
+  double roll = 0;      ///< turns, to be added to it
+  double end_roll = 0;  ///< where the arc ends; rolls are linear in between
+  double slope_s = 0;   ///< slope of the arc's separation plane in the pose along s; at angle a about the posed bone it is
+  double slope_b = 0;   ///< slope_s cos a + slope_b sin a
 };
 
 /// The seams of a model in a pose (paper 3.3 and 3.4.1). Each node is a drawing on the sphere around it: corners are

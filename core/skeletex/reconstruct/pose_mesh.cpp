@@ -8,6 +8,7 @@
 
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/lattice.h"
+#include "skeletex/reconstruct/pose_by_coordinates.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/skin.h"
 
@@ -85,6 +86,17 @@ void pose_smoothly(ClContext& context, const SkeletexModel& model, const Skeleto
   pose_shared_vertices(skin, motions, positions);
 }
 
+void pose_by_own_coordinates(ClContext& context, const SkeletexModel& model, const Skeleton& posed, const Lattice& lattice, DistanceRule rule,
+                             std::vector<Vec3>& positions) {
+  const PosedWalls walls(model, posed);
+  const DeviceCoordinates coordinates = make_coordinates(context, model, displace_inner(context, model, Walls(model.skeleton), lattice));
+  const Vec3 origin = middle_of_nodes(posed);
+  DevicePlanes points = allocate_planes(context, lattice.inner_count);
+  pose_by_coordinates(context, model, coordinates, walls, rule, origin, points);
+  download_points(context, points, origin, positions);
+  place_shared_by_coordinates(model, walls, lattice, rule, positions);
+}
+
 void pose_by_paper(ClContext& context, const SkeletexModel& model, const Skeleton& posed, const Lattice& lattice, DistanceRule rule, std::vector<Vec3>& positions) {
   const Walls bind(model.skeleton);
   const PosedWalls walls(model, posed);
@@ -113,7 +125,7 @@ TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model, co
   const Lattice lattice = number_lattice(model);
   switch (rule.deformation) {
     case Deformation::kSmooth: pose_smoothly(context, model, posed, lattice, mesh.positions); break;
-    case Deformation::kCoordinates:
+    case Deformation::kCoordinates: pose_by_own_coordinates(context, model, posed, lattice, rule.distance, mesh.positions); break;
     case Deformation::kPaper: pose_by_paper(context, model, posed, lattice, rule.distance, mesh.positions); break;
   }
   return mesh;

@@ -16,11 +16,6 @@ namespace {
 
 constexpr std::size_t kBlocksAtOnce = 4096;
 
-ClRange block_range(const ClContext& context, std::size_t blocks) {
-  const std::size_t group = std::min<std::size_t>(context.row_items(), SKIN_BLOCK);
-  return {{blocks * group, 1}, {group, 1}};
-}
-
 /// Appends the bones of a block that move any of its vertices, and their weights.
 /// \param weights  per slot SKIN_BLOCK values, those behind the block's vertices not set
 void append_block(SkinBlock& block, std::span<const int> bones, const float* weights, Skin& skin) {
@@ -135,6 +130,11 @@ std::vector<SkinBlock> skin_blocks(const std::vector<Patch>& patches) {
       blocks.push_back({vertex, std::min(SKIN_BLOCK, end - vertex), bone, 0, 0, 0});
   }
   return blocks;
+}
+
+ClRange block_range(const ClContext& context, std::size_t blocks) {
+  const std::size_t group = std::min<std::size_t>(context.row_items(), SKIN_BLOCK);
+  return {{blocks * group, 1}, {group, 1}};
 }
 
 Skin make_skin(ClContext& context, const SkeletexModel& model, const DevicePlanes& points) {

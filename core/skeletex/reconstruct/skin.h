@@ -33,6 +33,8 @@ struct DeviceSkin {
 
 /// The blocks of a model's inner vertices, whose bones and weights are not filled in.
 std::vector<SkinBlock> skin_blocks(const std::vector<Patch>& patches);
+/// One work-group per block: see kernels/skin.cl.
+ClRange block_range(const ClContext& context, std::size_t blocks);
 
 /// A bone that each pole, seam sample and corner belongs to, in the order of their vertices.
 std::vector<int> bones_of_shared_vertices(const SkeletexModel& model, const Lattice& lattice);
