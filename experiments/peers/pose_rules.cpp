@@ -45,6 +45,7 @@ void measure(Rule& rule, const BindSurface& bind, const std::vector<bool>& is_se
   const DeformationReport report = measure_deformation(bind, positions);
   const double bend = added_bend(bind, positions, is_seam, 0.99);
   rule.poses.push_back({{"time", frame.time},
+                        {"name", frame.name},
                         {"new_folds", report.new_folds},
                         {"new_intersections", report.new_intersections},
                         {"energy_99", report.energy_99},

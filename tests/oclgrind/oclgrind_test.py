@@ -32,9 +32,10 @@ MODELS = [("spd", "encode c.off c.skeleton.json -o s.skx.exr --size 12 --method 
 RESULTS = [("smooth", "filter s.skx.exr smooth -o f.ply --scale 0.00001"),
            ("noise", "filter v.skx.exr noise -o n.ply"),
            ("larger", "lod s.skx.exr --size 18 -o l.skx.exr"),
-           ("pose", "reconstruct v.skx.exr -o p.ply --pose p.json"),
+           ("pose", "reconstruct v.skx.exr -o p.ply --pose p.json --deform paper"),
+           ("skin", "reconstruct v.skx.exr -o k.ply --pose p.json"),
            ("coordinates", "reconstruct v.skx.exr -o k.ply --pose p.json --deform coordinates"),
-           ("direction", "reconstruct v.skx.exr -o d.ply --pose p.json --no-distance"),
+           ("direction", "reconstruct v.skx.exr -o d.ply --pose p.json --deform paper --no-distance"),
            ("morph", "morph n.skx.exr s.skx.exr --t 0.3 -o m.ply"),
            ("transfer", "transfer s.skx.exr v.skx.exr --bones bc=bc --keep 0 --share 0.5 -o t.ply")]
 

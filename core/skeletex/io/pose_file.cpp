@@ -89,16 +89,21 @@ Pose pose_from_json(const nlohmann::json& json, const Skeleton& skeleton, const 
 }  // namespace
 
 PoseAnimation animation_from_json(const nlohmann::json& json, const Skeleton& skeleton, const std::string& where) {
-  if (!json.is_object() || !json.contains("frames")) return {{{0, pose_from_json(json, skeleton, where)}}};
+  if (!json.is_object() || !json.contains("frames")) return {{PoseFrame{0, pose_from_json(json, skeleton, where)}}};
   check_keys(json, {"frames"}, where);
   PoseAnimation animation;
   for (const nlohmann::json& entry : json_array(json["frames"], where + ": \"frames\"")) {
     const std::string here = fmt::format("{}: frames[{}]", where, animation.frames.size());
-    check_keys(entry, {"time", "pose"}, here);
+    check_keys(entry, {"time", "name", "pose"}, here);
     const double time = json_number(json_member(entry, "time", here), here + ", \"time\"");
     if (!animation.frames.empty() && !(time > animation.frames.back().time))
       throw IoError(fmt::format("{}, \"time\": {} is not after the frame before, {}; times must grow", here, time, animation.frames.back().time));
-    animation.frames.push_back({time, pose_from_json(json_member(entry, "pose", here), skeleton, here + ", \"pose\"")});
+    PoseFrame frame{time, pose_from_json(json_member(entry, "pose", here), skeleton, here + ", \"pose\"")};
+    if (const auto name = entry.find("name"); name != entry.end()) {
+      if (!name->is_string()) throw IoError(here + ", \"name\": text is expected");
+      frame.name = name->get<std::string>();
+    }
+    animation.frames.push_back(std::move(frame));
   }
   if (animation.frames.empty()) throw IoError(where + ": \"frames\" is empty; an animation has at least one");
   return animation;

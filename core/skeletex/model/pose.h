@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <Eigen/Geometry>
+#include <string>
 #include <vector>
 
 #include "skeletex/model/skeleton.h"
@@ -22,6 +23,7 @@ struct Pose {
 struct PoseFrame {
   double time = 0;
   Pose pose;
+  std::string name{};  ///< for tables and messages; may be empty
 };
 struct PoseAnimation {
   std::vector<PoseFrame> frames;  ///< by growing time, at least one
