@@ -7,6 +7,7 @@
 
 #include "bench/stages/stages.h"
 #include "command.h"
+#include "files.h"
 #include "deform_option.h"
 #include "program_path.h"
 #include "progress_bar.h"
@@ -130,7 +131,6 @@ Json row_json(const Stage& stage, const StageSamples& samples, const std::string
 
 void run(const Arguments& arguments) {
   if (arguments.models.size() > 2) throw CLI::ValidationError("one model, or two that correspond");
-  check_json_target(arguments.json);
   const std::vector<std::string> names = stages_of(arguments);
   ClContext& context = open_device(arguments.device);
   Inputs inputs(context, arguments);
@@ -161,19 +161,19 @@ void run(const Arguments& arguments) {
 void add_bench_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("bench", "Time the stages on your device, each beside what it is measured against");
-  command.add_option("MODEL", arguments->models,
+  declare_input(command, command.add_option("MODEL", arguments->models,
                      "model (.skx.exr), or mesh and skeleton (.json as in configs/models), and for morph and transfer another one whose skeleton corresponds "
-                     "(default: models of the project)");
+                     "(default: models of the project)"));
   CLI::Option& stages = *command.add_option("--stage", arguments->stages, "these stages only")->delimiter(',');
   take_one_of(stages, kStageNames);
   stages.type_name("NAME,..");
   command.add_option("--size", arguments->size, "texels along the longer side (default: the model's; of others 2048 for frames, else 512)")
-      ->check(CLI::Range(4, 16384).description(""))
+      ->check(number_in(4, 16384))
       ->type_name("N");
-  command.add_option("--pose", arguments->pose, "pose: .json (default: the skeleton bent by 40 degrees)")->type_name("FILE");
+  declare_input(command, command.add_option("--pose", arguments->pose, "pose: .json (default: the skeleton bent by 40 degrees)"))->type_name("FILE");
   add_deform_option(command, arguments->deform);
   command.add_option("--repeats", arguments->repeats, "runs that are timed, after one that is not (default: up to 15, 3 at least, in 2 s)")
-      ->check(CLI::Range(1, 10000).description(""))
+      ->check(number_in(1, 10000))
       ->type_name("N");
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "command.h"
+#include "files.h"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -26,7 +27,7 @@ void add_device_option(CLI::App& command, std::string& selector) {
 }
 
 void add_json_option(CLI::App& command, std::string& target) {
-  command.add_option("--json", target, "write the results as JSON to this file; - for standard output")->type_name("FILE|-");
+  declare_text_output(command, command.add_option("--json", target, "write the results as JSON to this file; - for standard output"))->type_name("FILE|-");
 }
 
 void take_one_of(CLI::Option& option, const std::vector<std::string>& words) {
@@ -64,10 +65,6 @@ void check_output(const std::filesystem::path& path) {
     throw IoError(fmt::format("{}: there is no folder {}; make it first", path.string(), folder.string()));
   if (std::filesystem::is_directory(path, ignored)) throw IoError(fmt::format("{} is a folder; name a file in it", path.string()));
   if (::access(folder.c_str(), W_OK) != 0) throw IoError(fmt::format("{}: the folder {} is not writable", path.string(), folder.string()));
-}
-
-void check_json_target(const std::string& target) {
-  if (!target.empty() && target != "-") check_output(target);
 }
 
 TriangleMesh load_mesh(const std::filesystem::path& path) {

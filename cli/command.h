@@ -38,6 +38,9 @@ void add_bench_command(CLI::App& program);
 void add_run_command(CLI::App& program);
 void add_replay_command(CLI::App& program);
 
+/// All commands, in the order of the help. Each has its files checked (files.h) before it runs.
+void add_commands(CLI::App& program);
+
 /// Exit code of the process when what a command found is bad news, but no error: `throw CLI::RuntimeError(kExitBad)`.
 constexpr int kExitBad = 1;
 constexpr int kExitUsage = 2;
@@ -56,8 +59,6 @@ void warn(const std::string& text);
 
 /// Fails before the work rather than after it. \throw IoError when the folder of `path` is missing or not writable
 void check_output(const std::filesystem::path& path);
-/// The same for the target of --json, where "" and - need no folder.
-void check_json_target(const std::string& target);
 
 /// Reads a mesh, and says on standard error what the reader did to it (polygons split, vertices welded).
 TriangleMesh load_mesh(const std::filesystem::path& path);

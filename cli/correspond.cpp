@@ -5,6 +5,7 @@
 
 #include "bone_pairs.h"
 #include "command.h"
+#include "files.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/skeleton_file.h"
 #include "table.h"
@@ -21,7 +22,6 @@ Skeleton skeleton_of(const std::string& path) { return path.ends_with(".exr") ? 
 
 void run(const Arguments& arguments) {
   const BonePairs given = parse_bone_pairs(arguments.bones);
-  check_json_target(arguments.json);
   const Skeleton a = skeleton_of(arguments.a), b = skeleton_of(arguments.b);
   const Correspondence found = correspond(arguments.a, a, arguments.b, b, given);
 
@@ -42,8 +42,8 @@ void run(const Arguments& arguments) {
 void add_correspond_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("correspond", "Which bone of one skeleton becomes which of another");
-  command.add_option("A", arguments->a, "model (.skx.exr) or skeleton (.json)")->required();
-  command.add_option("B", arguments->b, "another one")->required();
+  declare_input(command, command.add_option("A", arguments->a, "model (.skx.exr) or skeleton (.json)"))->required();
+  declare_input(command, command.add_option("B", arguments->b, "another one"))->required();
   command.add_option("--bones", arguments->bones, "pairs that must hold; the rest is found")->delimiter(',')->type_name("A=B,..");
   add_json_option(command, arguments->json);
   command.footer(

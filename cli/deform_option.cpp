@@ -21,6 +21,11 @@ CLI::Option* add_deform_option(CLI::App& command, std::string& value) {
   return option;
 }
 
+void check_distance_option(bool is_distance_dropped, const std::string& word) {
+  if (is_distance_dropped && deformation_of(word) == Deformation::kSmooth)
+    throw CLI::ValidationError("--no-distance", "smooth poses restore no distances to the bones; add --deform paper or --deform coordinates");
+}
+
 Deformation deformation_of(const std::string& word) {
   return *std::find_if(kDeformations.begin(), kDeformations.end(), [&](Deformation deformation) { return word == to_string(deformation); });
 }

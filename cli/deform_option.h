@@ -9,6 +9,8 @@ namespace skeletex::cli {
 
 /// --deform smooth, coordinates or paper.
 CLI::Option* add_deform_option(CLI::App& command, std::string& value);
+/// Refuses --no-distance with the smooth rule, which restores no distances. \throw CLI::ValidationError
+void check_distance_option(bool is_distance_dropped, const std::string& word);
 /// \pre one of the option's words
 Deformation deformation_of(const std::string& word);
 

@@ -14,7 +14,6 @@ namespace {
 std::string short_version(const std::string& version) { return version.substr(0, version.find(' ', version.find(' ') + 1)); }
 
 void run(const std::string& json_target) {
-  check_json_target(json_target);
   const std::vector<ClDeviceInfo> devices = list_devices();
   const double gib = 1024.0 * 1024.0 * 1024.0;
   Table table({"device", "type", "platform", "version", "driver", "units", "memory GiB", "buffer GiB", "double"});

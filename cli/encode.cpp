@@ -12,6 +12,7 @@
 #include <ranges>
 
 #include "command.h"
+#include "files.h"
 #include "progress_bar.h"
 #include "memory_ahead.h"
 #include "second_compiler.h"
@@ -243,8 +244,6 @@ void compile_from_last(const std::string& device, const EncodeOptions& options, 
 void run(const Arguments& arguments, const CLI::App& command) {
   EncodeOptions options = encode_options(arguments, command);
   Stopwatch watch;
-  check_output(arguments.output);
-  check_json_target(arguments.json);
   SecondCompiler second([&](const std::function<bool()>& is_wanted) { compile_from_last(arguments.device, options, is_wanted); });
   std::optional<ProgressBar> bar(std::in_place);
   bar->show("reading and checking the input", 0);
@@ -296,9 +295,9 @@ void add_encode_command(CLI::App& program) {
     return *command.add_option(name, value, description)->group(group);
   };
   Arguments& a = *arguments;
-  add("Positionals", "MESH", a.mesh, "closed triangle mesh: .obj, .ply, .off or .stl").required();
-  add("Positionals", "SKELETON", a.skeleton, "skeleton: JSON with nodes and bones, in the mesh's coordinates").required();
-  add("Options", "-o,--output", a.output, "the model; by custom its name ends in .skx.exr").required()->type_name("FILE");
+  declare_input(command, &add("Positionals", "MESH", a.mesh, "closed triangle mesh: .obj, .ply, .off or .stl"))->required();
+  declare_input(command, &add("Positionals", "SKELETON", a.skeleton, "skeleton: JSON with nodes and bones, in the mesh's coordinates"))->required();
+  declare_output(command, &add("Options", "-o,--output", a.output, "the model: .skx.exr"), {".exr"})->required()->type_name("FILE");
   add("Options", "--size", a.size, "texels: N for N x N, or WIDTHxHEIGHT").type_name("N|WxH");
   take_one_of(add("Options", "--method", a.method,
                   "how bones are mapped: spd casts rays from the bone (a height field), vsm spreads the triangles over the texels, hybrid takes spd "
@@ -306,19 +305,19 @@ void add_encode_command(CLI::App& program) {
               {"spd", "vsm", "hybrid"});
   add("VSM", "--iterations", a.iterations, "reweightings after the first solve, 0 to 100; 0 is the plain barycentric map")
       .type_name("N")
-      ->check(CLI::Range(0, 100).description(""));
+      ->check(number_in(0, 100));
   add("VSM", "--alpha", a.alpha,
       "weights grow by texture area / surface area ^ alpha, 0 to 2; 0 evens out texture areas (the paper), 1 density on the surface")
       .type_name("X")
-      ->check(CLI::Range(0.0, 2.0).description(""));
+      ->check(number_in(0.0, 2.0));
   add("VSM", "--stop-spread", a.stop_spread,
       "stop when a reweighting changes the spread of texture areas by less than this share, e.g. 0.01; 0: never")
       .type_name("X")
-      ->check(CLI::Range(0.0, 1.0).description(""));
+      ->check(number_in(0.0, 1.0));
   take_one_of(add("SPD", "--spd-hit", a.spd_hit, "which hit of a ray counts where there are several"), {"first", "last"});
   add("Hybrid", "--hybrid-threshold", a.hybrid_threshold, "bones take vsm where spd does not see more than this share of their area, 0 to 1")
       .type_name("X")
-      ->check(CLI::Range(0.0, 1.0).description(""));
+      ->check(number_in(0.0, 1.0));
   add("Hybrid", "--bone-method", a.bone_methods, "method of a bone by its name; repeat for more bones")
       .type_name("BONE=vsm|spd")
       ->expected(1)

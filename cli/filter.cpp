@@ -8,6 +8,7 @@
 #include <set>
 
 #include "command.h"
+#include "files.h"
 #include "result_file.h"
 #include "skeletex/edit/differential.h"
 #include "skeletex/edit/filter.h"
@@ -61,8 +62,7 @@ double usual_size(const std::vector<float>& values) {
 
 /// Writes the mesh with normals, the mean curvature as a property, and colours.
 void run_curvature(const Arguments& arguments) {
-  if (!arguments.output.ends_with(".ply")) throw IoError(fmt::format("{}: curvature is written as a mesh with values: .ply", arguments.output));
-  check_output(arguments.output);
+  if (!arguments.output.ends_with(".ply")) throw CLI::ValidationError("--output", fmt::format("\"{}\" must end in .ply: curvature is a mesh with values", arguments.output));
   const SkeletexModel stored = read_model(arguments.model);
   ClContext& context = open_device(arguments.device);
   Stopwatch watch;
@@ -103,12 +103,10 @@ FilterResult apply_filter(ClContext& context, const SkeletexModel& model, Argume
 }
 
 void run(const Arguments& arguments) {
-  check_json_target(arguments.json);
   if (arguments.filter == "curvature") {
     run_curvature(arguments);
     return;
   }
-  check_result(arguments.output);
   const SkeletexModel model = read_model(arguments.model);
   ClContext& context = open_device(arguments.device);
   Stopwatch watch;
@@ -137,26 +135,27 @@ void add_filter_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   Arguments& a = *arguments;
   CLI::App& command = *program.add_subcommand("filter", "Smooth a model, enhance its detail, add noise, or measure its curvature");
-  command.add_option("MODEL", a.model, "model: .skx.exr")->required();
+  declare_input(command, command.add_option("MODEL", a.model, "model: .skx.exr"))->required();
   take_one_of(*command.add_option("FILTER", a.filter, "what to do")->required(), {"smooth", "enhance", "noise", "curvature"});
   add_result_option(command, a.output);
   const auto add = [&command](const char* group, const char* name, auto& value, const char* description) -> CLI::Option& {
     return *command.add_option(name, value, description)->group(group);
   };
   add("Region", "--bones", a.region.bones, "filter these bones only (names with commas between them)").delimiter(',')->type_name("NAMES");
-  add("Region", "--falloff", a.region.falloff, "over what distance the effect fades out inside them, in diagonals").capture_default_str()->type_name("D");
+  add("Region", "--falloff", a.region.falloff, "over what distance the effect fades out inside them, in diagonals").check(number_in(0, 1))->capture_default_str()->type_name("D");
   add("Smooth, enhance, curvature", "--scale", a.scale, "size of detail, in diagonals (default: 0.01; curvature: three spacings of vertices)")
-      .check(CLI::PositiveNumber.description(""))
+      .check(number_above(0))
       ->type_name("D");
-  add("Smooth, enhance, curvature", "--iterations", a.smooth.iterations, "smooth: steps to divide the way into").capture_default_str()->type_name("N");
+  add("Smooth, enhance, curvature", "--iterations", a.smooth.iterations, "smooth: steps to divide the way into").check(number_in(1, 1000))->capture_default_str()->type_name("N");
   command.add_flag("--keep-volume", a.smooth.keeps_volume, "smooth: keep the volume that the surface encloses")->group("Smooth, enhance, curvature");
   add("Smooth, enhance, curvature", "--gain", a.enhance.gain, "enhance: how many times the detail is added; negative takes away")
-      .capture_default_str()
+      .check(number_in(-1, 100))
+      ->capture_default_str()
       ->type_name("K");
-  add("Noise", "--amplitude", a.noise.amplitude, "height of the largest waves, in diagonals").capture_default_str()->type_name("D");
-  add("Noise", "--wavelength", a.noise.wavelength, "length of the largest waves, in diagonals").capture_default_str()->type_name("D");
-  add("Noise", "--octaves", a.noise.octaves, "how many sizes of waves, each half the one before").capture_default_str()->type_name("N");
-  add("Noise", "--seed", a.noise.seed, "another number gives another noise").capture_default_str()->type_name("N");
+  add("Noise", "--amplitude", a.noise.amplitude, "height of the largest waves, in diagonals").check(number_in(0, 1))->capture_default_str()->type_name("D");
+  add("Noise", "--wavelength", a.noise.wavelength, "length of the largest waves, in diagonals").check(number_above(0))->capture_default_str()->type_name("D");
+  add("Noise", "--octaves", a.noise.octaves, "how many sizes of waves, each half the one before").check(number_in(1, 16))->capture_default_str()->type_name("N");
+  add("Noise", "--seed", a.noise.seed, "another number gives another noise").check(number_in(0, 4294967295))->capture_default_str()->type_name("N");
   add_device_option(command, a.device);
   add_json_option(command, a.json);
   command.footer(

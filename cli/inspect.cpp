@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "command.h"
+#include "files.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/measure/manifold.h"
 #include "skeletex/measure/self_intersection.h"
@@ -124,7 +125,6 @@ void inspect_mesh(const Arguments& arguments) {
 }
 
 void run(const Arguments& arguments) {
-  check_json_target(arguments.json);
   if (is_mesh_file(arguments.file)) {
     inspect_mesh(arguments);
     return;
@@ -144,7 +144,7 @@ void run(const Arguments& arguments) {
 void add_inspect_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("inspect", "Say what a model, or a mesh, consists of");
-  command.add_option("FILE", arguments->file, "model (.skx.exr), or mesh (.obj, .ply, .off, .stl)")->required();
+  declare_input(command, command.add_option("FILE", arguments->file, "model (.skx.exr), or mesh (.obj, .ply, .off, .stl)"))->required();
   command.add_flag("--self-intersections", arguments->has_self_intersections, "of a mesh: count the pairs of triangles that intersect");
   add_json_option(command, arguments->json);
   command.footer(

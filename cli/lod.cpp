@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "command.h"
+#include "files.h"
 #include "result_file.h"
 #include "skeletex/encode/half_texels.h"
 #include "skeletex/io/model_file.h"
@@ -22,11 +23,9 @@ struct Arguments {
 };
 
 void run(const Arguments& arguments) {
-  check_json_target(arguments.json);
-  check_result(arguments.output);
   if (arguments.has_levels && !arguments.output.ends_with(".exr"))
-    throw IoError(fmt::format("{}: levels are written as one model with several parts: .skx.exr", arguments.output));
-  if (arguments.is_half && !arguments.output.ends_with(".exr")) throw IoError(fmt::format("{}: half floats are those of a model: .skx.exr", arguments.output));
+    throw CLI::ValidationError("--output", fmt::format("\"{}\" must end in .skx.exr: levels are one model with several parts", arguments.output));
+  if (arguments.is_half && !arguments.output.ends_with(".exr")) throw CLI::ValidationError("--output", fmt::format("\"{}\" must end in .skx.exr: half floats are those of a model", arguments.output));
   const SkeletexModel model = read_model(arguments.model);
   ClContext& context = open_device(arguments.device);
   Stopwatch watch;
@@ -68,15 +67,15 @@ void run(const Arguments& arguments) {
 void add_lod_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("lod", "Make a smaller model of a model, or a file of all its levels of detail");
-  command.add_option("MODEL", arguments->model, "model: .skx.exr")->required();
+  declare_input(command, command.add_option("MODEL", arguments->model, "model: .skx.exr"))->required();
   add_result_option(command, arguments->output);
   CLI::Option* size = command.add_option("--size", arguments->size, "texels along the longer side, 4 to 16384")
-                          ->check(CLI::Range(4, 16384).description(""))
+                          ->check(number_in(4, 16384))
                           ->type_name("N");
   CLI::Option* levels = command.add_flag("--levels", arguments->has_levels, "all levels, each half the size of the one before, in one model file");
   size->excludes(levels);
   command.add_option("--smallest", arguments->smallest, "with --levels: longer side of the smallest level")
-      ->check(CLI::Range(4, 16384).description(""))
+      ->check(number_in(4, 16384))
       ->capture_default_str()
       ->type_name("N")
       ->needs(levels);

@@ -74,23 +74,7 @@ int run(int argc, char** argv) {
   program.set_version_flag("--version", std::string("skeletex ") + SKELETEX_VERSION);
   program.require_subcommand(1);
   program.formatter(std::make_shared<HelpFormatter>());
-  add_encode_command(program);
-  add_reconstruct_command(program);
-  add_render_command(program);
-  add_correspond_command(program);
-  add_morph_command(program);
-  add_filter_command(program);
-  add_lod_command(program);
-  add_transfer_command(program);
-  add_weights_command(program);
-  add_metro_command(program);
-  add_segment_command(program);
-  add_validate_command(program);
-  add_inspect_command(program);
-  add_bench_command(program);
-  add_run_command(program);
-  add_replay_command(program);
-  add_devices_command(program);
+  add_commands(program);
   program.footer(
       "`skeletex COMMAND --help` tells more. Exit codes: 0 done, 1 input or run, 2 usage.\n"
       "Examples:\n"

@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "command.h"
+#include "files.h"
 #include "progress_bar.h"
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/mesh_file.h"
@@ -60,9 +61,6 @@ void write_coloured(const std::string& path, const TriangleMesh& mesh, const std
 }
 
 void run(const Arguments& arguments) {
-  for (const std::string& path : {arguments.csv, arguments.ply})
-    if (!path.empty()) check_output(path);
-  check_json_target(arguments.json);
   if (!arguments.ply.empty() && !arguments.ply.ends_with(".ply"))
     throw CLI::ValidationError("--ply", "\"" + arguments.ply + "\" does not end in .ply");
   const TriangleMesh a = load_surface(arguments.a), b = load_surface(arguments.b);
@@ -107,18 +105,18 @@ void run(const Arguments& arguments) {
 void add_metro_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("metro", "Measure the distance between two surfaces, in both directions");
-  command.add_option("A", arguments->a, "mesh, usually the original: its diagonal is the unit")->required();
-  command.add_option("B", arguments->b, "mesh, usually the reconstruction")->required();
+  declare_input(command, command.add_option("A", arguments->a, "mesh, usually the original: its diagonal is the unit"))->required();
+  declare_input(command, command.add_option("B", arguments->b, "mesh, usually the reconstruction"))->required();
   command
       .add_option("--samples", arguments->samples,
                   "points spread evenly over each surface (default: ten per vertex of the larger mesh, at least 100000)")
-      ->check(CLI::Range(1L, 1000000000L).description(""))
+      ->check(number_in(1, 1e9))
       ->type_name("N");
-  command.add_option("--csv", arguments->csv, "write A's vertices and their distances to B, in A's units")->type_name("FILE");
-  command.add_option("--ply", arguments->ply, "write A with the property distance and colours from dark blue (0) to yellow")->type_name("FILE");
+  declare_output(command, command.add_option("--csv", arguments->csv, "write A's vertices and their distances to B, in A's units"), {".csv"})->type_name("FILE");
+  declare_output(command, command.add_option("--ply", arguments->ply, "write A with the property distance and colours from dark blue (0) to yellow"), {".ply"})->type_name("FILE");
   command
       .add_option("--ply-max", arguments->ply_max, "distance that is yellow, divided by the diagonal (default: what 99 % of the vertices lie below)")
-      ->check(CLI::Validator(CLI::PositiveNumber).description(""))
+      ->check(number_above(0))
       ->type_name("X");
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);

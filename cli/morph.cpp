@@ -8,6 +8,7 @@
 
 #include "bone_pairs.h"
 #include "command.h"
+#include "files.h"
 #include "progress_bar.h"
 #include "result_file.h"
 #include "skeletex/edit/morph.h"
@@ -46,7 +47,7 @@ Json distortion_json(const Distortion& d) {
           {"collapsed", d.collapsed}};
 }
 
-void run(const Arguments& arguments) {
+void run(const Arguments& arguments, const CLI::App& command) {
   if (arguments.models.size() < 2) throw CLI::ValidationError("a morph needs two models or more");
   if (!arguments.times.empty() + !arguments.weights.empty() + (arguments.frames > 0) != 1)
     throw CLI::ValidationError("give one of --t, --weights and --frames");
@@ -68,8 +69,10 @@ void run(const Arguments& arguments) {
   }
   std::vector<std::string> outputs;
   for (std::size_t i = 0; i < all_weights.size(); ++i) outputs.push_back(all_weights.size() == 1 && arguments.frames == 0 ? arguments.output : numbered(arguments.output, i));
-  for (const std::string& output : outputs) check_result(output);
-  check_json_target(arguments.json);
+  for (const std::string& output : outputs) {
+    if (output != arguments.output) check_made_output(command, output);
+    check_output(output);
+  }
 
   Stopwatch total;
   std::vector<SkeletexModel> models;
@@ -119,25 +122,25 @@ void run(const Arguments& arguments) {
 void add_morph_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("morph", "In-between models of two models or more");
-  command.add_option("MODEL", arguments->models, "models (.skx.exr) whose skeletons correspond: two, or more with --weights")->required();
+  declare_input(command, command.add_option("MODEL", arguments->models, "models (.skx.exr) whose skeletons correspond: two, or more with --weights"))->required();
   add_result_option(command, arguments->output);
   CLI::Option* times = command.add_option("--t", arguments->times, "0: the first model, 1: the second; several make numbered files")
                            ->delimiter(',')
-                           ->check(CLI::Range(0.0, 1.0).description(""))
+                           ->check(number_in(0.0, 1.0))
                            ->type_name("T,..");
-  CLI::Option* weights = command.add_option("--weights", arguments->weights, "one per model, none negative, of sum 1")->delimiter(',')->type_name("W,W,..");
+  CLI::Option* weights = command.add_option("--weights", arguments->weights, "one per model, none negative, of sum 1")->delimiter(',')->check(number_in(0, 1))->type_name("W,W,..");
   command.add_option("--frames", arguments->frames, "a sequence of numbered files from t = 0 to t = 1: out_000.ply ..")
-      ->check(CLI::Range(2, 1000).description(""))
+      ->check(number_in(2, 1000))
       ->excludes(times)
       ->excludes(weights)
       ->type_name("N");
   times->excludes(weights);
   command.add_option("--bones", arguments->bones, "pairs of bones that must correspond; the rest is found")->delimiter(',')->type_name("A=B,..");
   command.add_option("--layout", arguments->layout, "take rectangles, names and order of bones from the K-th model (default: that of the largest weight)")
-      ->check(CLI::Range(1, 1000).description(""))
+      ->check(number_in(1, 1000))
       ->type_name("K");
   command.add_option("--size", arguments->size, "texels along the longer side (default: the largest model's)")
-      ->check(CLI::Range(4, 16384).description(""))
+      ->check(number_in(4, 16384))
       ->type_name("N");
   command.add_flag("--creases", arguments->has_creases, "leave creases where bones of different turns meet: the texels' means alone, as at frame rates");
   add_device_option(command, arguments->device);
@@ -148,7 +151,7 @@ void add_morph_command(CLI::App& program) {
       "  skeletex morph bull.skx.exr camel.skx.exr --frames 30 -o frames/out.ply\n"
       "  skeletex morph a.skx.exr b.skx.exr c.skx.exr --weights 0.5,0.3,0.2 -o mean.skx.exr\n"
       "Also tells how the map between the models distorts area and angles, and its symmetric Dirichlet energy; 1 each for an isometry.");
-  command.callback([arguments] { run(*arguments); });
+  command.callback([arguments, &command] { run(*arguments, command); });
 }
 
 }  // namespace skeletex::cli

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "command.h"
+#include "files.h"
 #include "progress_bar.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_file.h"
@@ -58,8 +59,7 @@ std::vector<int> bones_by_name(const SkeletexModel& model, const std::vector<std
 }
 
 void run(const Arguments& arguments) {
-  check_output(arguments.output);
-  check_json_target(arguments.json);
+  if (!arguments.constant_offset) check_distance_option(arguments.is_distance_dropped, arguments.deform);
   Stopwatch total, watch;
   SkeletexModel model = read_model(arguments.model, arguments.level);
   std::optional<Skeleton> posed;
@@ -123,16 +123,16 @@ void run(const Arguments& arguments) {
 void add_reconstruct_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("reconstruct", "Turn a model back into a closed mesh, at any resolution and in any pose");
-  command.add_option("MODEL", arguments->model, "model: .skx.exr")->required();
-  command.add_option("-o,--output", arguments->output, "mesh: .ply (binary) or .obj")->required()->type_name("FILE");
+  declare_input(command, command.add_option("MODEL", arguments->model, "model: .skx.exr"))->required();
+  declare_output(command, command.add_option("-o,--output", arguments->output, "mesh: .ply (binary) or .obj"), {".ply", ".obj"})->required()->type_name("FILE");
   command.add_option("--size", arguments->size, "texels along the longer side, 4 to 16384 (default: the model's own size)")
-      ->check(CLI::Range(4, 16384).description(""))
+      ->check(number_in(4, 16384))
       ->type_name("N");
   command.add_option("--level", arguments->level, "level of a file that `skeletex lod --levels` has written (default: 0, the finest)")
-      ->check(CLI::NonNegativeNumber.description(""))
+      ->check(number_from(0))
       ->type_name("K");
-  CLI::Option* pose = command.add_option("--pose", arguments->pose, "pose or animation: .json")->type_name("FILE");
-  command.add_option("--time", arguments->time, "time in the animation (default: its first frame)")->type_name("T")->needs(pose);
+  CLI::Option* pose = declare_input(command, command.add_option("--pose", arguments->pose, "pose or animation: .json"))->type_name("FILE");
+  command.add_option("--time", arguments->time, "time in the animation (default: its first frame)")->check(any_number())->type_name("T")->needs(pose);
   add_deform_option(command, arguments->deform)->needs(pose);
   command.add_flag("--no-distance", arguments->is_distance_dropped, "with --deform paper or coordinates: do not restore the distances to the bones")->needs(pose);
   command.add_flag("--no-report", arguments->has_no_report, "do not measure what the pose does to the surface")->needs(pose);
@@ -140,7 +140,7 @@ void add_reconstruct_command(CLI::App& program) {
                             .add_option("--constant-offset", arguments->constant_offset,
                                         "instead of the surface the plane of bone tangent space that lies so far out: a tube around every bone, "
                                         "in diagonals, above 0 and up to 1")
-                            ->check(CLI::Range(1e-6, 1.0).description(""))
+                            ->check(number_in(1e-6, 1.0))
                             ->type_name("W");
   command.add_option("--bones", arguments->bones, "the plane around these bones only (names with commas between them)")->delimiter(',')->type_name("NAMES")->needs(offset);
   add_device_option(command, arguments->device);

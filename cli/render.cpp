@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "command.h"
+#include "files.h"
 #include "deform_option.h"
 #include "progress_bar.h"
 #include "skeletex/io/json_file.h"
@@ -64,7 +65,7 @@ Vec3 parse_direction(const char* option, const std::string& text) {
   for (int axis = 0; axis < 3; ++axis) {
     const auto [rest, code] = std::from_chars(at, end, v[axis]);
     const bool is_last = axis == 2;
-    if (code != std::errc() || (is_last ? rest != end : rest == end || *rest != ','))
+    if (code != std::errc() || !std::isfinite(v[axis]) || (is_last ? rest != end : rest == end || *rest != ','))
       throw CLI::ValidationError(option, "\"" + text + "\" is no direction; give x,y,z, e.g. 0,1,0");
     at = rest + 1;
   }
@@ -179,8 +180,7 @@ void write_picture(const std::string& path, const Image& image) {
 }
 
 void check_arguments(const Arguments& arguments) {
-  if (!arguments.output.ends_with(".png") && !arguments.output.ends_with(".exr"))
-    throw CLI::ValidationError("--output", "\"" + arguments.output + "\" is no picture; give .png, or .exr for linear floats");
+  check_distance_option(arguments.is_distance_dropped, arguments.deform);
   const bool is_texture = arguments.mode == "map" || arguments.mode == "layout";
   if (!is_model(arguments.input)) {
     if (is_texture || arguments.mode == "checker") throw CLI::ValidationError("--mode", arguments.mode + " shows a model's texture; a mesh has none");
@@ -192,8 +192,6 @@ void check_arguments(const Arguments& arguments) {
     throw CLI::ValidationError("--skeleton", "a model brings its own skeleton; --show-skeleton draws it");
   }
   if (arguments.mode == "error" && arguments.against.empty()) throw CLI::ValidationError("--mode", "error needs the mesh to measure --against");
-  check_output(arguments.output);
-  check_json_target(arguments.json);
 }
 
 /// Moves the surface of a model to its pose on the GL device.
@@ -213,11 +211,13 @@ void pose_surface(GlContext& gl, ClContext& context, const Arguments& arguments,
   pose_skin(gl, upload_skin(skin, subject.mesh), skin, bone_motions(model.skeleton, *subject.skeleton), *subject.skeleton, surface);
 }
 
-void run(Arguments arguments) {
+void run(Arguments arguments, const CLI::App& command) {
   nlohmann::json own_view;
   if (arguments.input.ends_with(".json")) {
     const ModelConfig config = read_model_config(arguments.input);
     own_view = config.view;
+    check_named_input(command, config.mesh.string(), "the mesh of " + arguments.input);
+    if (!config.skeleton.empty()) check_named_input(command, config.skeleton.string(), "the skeleton of " + arguments.input);
     arguments.input = config.mesh.string();
     if (arguments.skeleton.empty() && (arguments.shows_skeleton || arguments.mode == "segments")) arguments.skeleton = config.skeleton.string();
   }
@@ -302,32 +302,32 @@ void run(Arguments arguments) {
 void add_render_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("render", "Draw a model or a mesh to a picture");
-  command.add_option("MODEL|MESH", arguments->input, "model (.skx.exr), mesh, or .json that names mesh, skeleton and view (configs/models)")->required();
-  command.add_option("-o,--output", arguments->output, "picture: .png, or .exr for linear floats")->required()->type_name("FILE");
+  declare_input(command, command.add_option("MODEL|MESH", arguments->input, "model (.skx.exr), mesh, or .json that names mesh, skeleton and view (configs/models)"))->required();
+  declare_output(command, command.add_option("-o,--output", arguments->output, "picture: .png, or .exr for linear floats"), {".png", ".exr"})->required()->type_name("FILE");
   const std::vector<std::string> modes{"shaded", "segments", "normals", "checker", "error", "map", "layout"};
   take_one_of(*command.add_option("--mode", arguments->mode, "what is shown: shaded, segments, normals, checker, error, map or layout"), modes);
   command.add_flag("--flat", arguments->is_flat, "a normal per triangle");
   command.add_flag("--wireframe", arguments->has_wires, "draw the triangles' edges");
-  command.add_option("--skeleton", arguments->skeleton, "skeleton of a mesh: .json; drawn inside, or used by --mode segments")->type_name("FILE");
+  declare_input(command, command.add_option("--skeleton", arguments->skeleton, "skeleton of a mesh: .json; drawn inside, or used by --mode segments"))->type_name("FILE");
   command.add_flag("--show-skeleton", arguments->shows_skeleton, "draw the skeleton inside");
-  command.add_option("--against", arguments->against, "--mode error: the mesh that distances are measured to")->type_name("MESH");
+  declare_input(command, command.add_option("--against", arguments->against, "--mode error: the mesh that distances are measured to"))->type_name("MESH");
   command.add_option("--error-max", arguments->error_max, "upper end of the colours, share of the diagonal (default: 99 % lie below)")
-      ->check(CLI::PositiveNumber.description(""))->type_name("X");
-  CLI::Option* pose = command.add_option("--pose", arguments->pose, "pose or animation of a model: .json")->type_name("FILE");
-  command.add_option("--time", arguments->time, "time in the animation (default: its first frame)")->type_name("T")->needs(pose);
+      ->check(number_above(0))->type_name("X");
+  CLI::Option* pose = declare_input(command, command.add_option("--pose", arguments->pose, "pose or animation of a model: .json"))->type_name("FILE");
+  command.add_option("--time", arguments->time, "time in the animation (default: its first frame)")->check(any_number())->type_name("T")->needs(pose);
   add_deform_option(command, arguments->deform)->needs(pose);
   command.add_flag("--no-distance", arguments->is_distance_dropped, "with --deform paper or coordinates: do not restore the distances to the bones")->needs(pose);
-  command.add_option("--lattice", arguments->lattice, "draw a model at another texture size, 4 to 16384 texels")->check(CLI::Range(4, 16384).description(""))->type_name("N");
-  command.add_option("--camera", arguments->camera, "view: .json with azimuth, elevation, fov, zoom, up, front, target, eye")->type_name("FILE");
-  command.add_option("--azimuth", arguments->azimuth, "degrees about the up axis, 0 from the front (default: 30)")->type_name("DEG");
-  command.add_option("--elevation", arguments->elevation, "degrees above the horizon (default: 15)")->check(CLI::Range(-90.0, 90.0).description(""))->type_name("DEG");
-  command.add_option("--fov", arguments->fov, "degrees of the shorter side, 0: orthographic (default: 25)")->check(CLI::Range(0.0, 120.0).description(""))->type_name("DEG");
-  command.add_option("--zoom", arguments->zoom, "1: the model fills the picture")->check(CLI::Range(0.01, 1000.0).description(""))->type_name("X");
+  command.add_option("--lattice", arguments->lattice, "draw a model at another texture size, 4 to 16384 texels")->check(number_in(4, 16384))->type_name("N");
+  declare_input(command, command.add_option("--camera", arguments->camera, "view: .json with azimuth, elevation, fov, zoom, up, front, target, eye"))->type_name("FILE");
+  command.add_option("--azimuth", arguments->azimuth, "degrees about the up axis, 0 from the front (default: 30)")->check(any_number())->type_name("DEG");
+  command.add_option("--elevation", arguments->elevation, "degrees above the horizon (default: 15)")->check(number_in(-90.0, 90.0))->type_name("DEG");
+  command.add_option("--fov", arguments->fov, "degrees of the shorter side, 0: orthographic (default: 25)")->check(number_in(0.0, 120.0))->type_name("DEG");
+  command.add_option("--zoom", arguments->zoom, "1: the model fills the picture")->check(number_in(0.01, 1000.0))->type_name("X");
   command.add_option("--up", arguments->up, "the model's up direction (default: 0,1,0)")->type_name("X,Y,Z");
   command.add_option("--front", arguments->front, "where the model looks (default: 0,0,1)")->type_name("X,Y,Z");
-  command.add_option("--views", arguments->views, "pictures side by side, all the way round")->check(CLI::Range(1, 24).description(""))->type_name("N");
+  command.add_option("--views", arguments->views, "pictures side by side, all the way round")->check(number_in(1, 24))->type_name("N");
   command.add_option("--size", arguments->size, "of one view, pixels (default: 1200x900)")->type_name("WxH");
-  command.add_option("--samples", arguments->samples, "per pixel and direction, 1 to 8 (default: 2)")->check(CLI::Range(1, 8).description(""))->type_name("N");
+  command.add_option("--samples", arguments->samples, "per pixel and direction, 1 to 8 (default: 2)")->check(number_in(1, 8))->type_name("N");
   command.add_option("--background", arguments->background, "white, black, transparent or #rrggbb")->type_name("COLOUR");
   command.add_option("--gl-device", arguments->gl_device, "EGL device: number or part of its name (default: hardware, else software)")->type_name("DEVICE");
   add_device_option(command, arguments->device);
@@ -340,7 +340,7 @@ void add_render_command(CLI::App& program) {
       "  skeletex render bear.off --mode error --against bear.ply -o error.png\n"
       "  skeletex render bear.skx.exr --pose wave.json --views 4 --size 600x800 -o round.png\n"
       "No display is needed. Models are placed on the GL device, straight from their texture.");
-  command.callback([arguments] { run(*arguments); });
+  command.callback([arguments, &command] { run(*arguments, command); });
 }
 
 }  // namespace skeletex::cli

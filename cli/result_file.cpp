@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "result_file.h"
 
+#include "files.h"
+
 #include <fmt/format.h>
 
 #include "skeletex/io/mesh_file.h"
@@ -15,13 +17,7 @@ bool is_model(const std::string& path) { return path.ends_with(".exr"); }
 }  // namespace
 
 void add_result_option(CLI::App& command, std::string& path) {
-  command.add_option("-o,--output", path, "model (.skx.exr) or mesh (.ply, .obj)")->required()->type_name("FILE");
-}
-
-void check_result(const std::string& path) {
-  if (!is_model(path) && !path.ends_with(".ply") && !path.ends_with(".obj"))
-    throw IoError(fmt::format("{}: a result is a model (.skx.exr) or a mesh (.ply, .obj), by its ending", path));
-  check_output(path);
+  declare_output(command, command.add_option("-o,--output", path, "model (.skx.exr) or mesh (.ply, .obj)"), {".exr", ".ply", ".obj"})->required()->type_name("FILE");
 }
 
 Json write_result(ClContext& context, const SkeletexModel& model, const std::string& path, const ModelFileOptions& options) {

@@ -10,8 +10,6 @@ namespace skeletex::cli {
 /// The -o option of commands whose result is a model (.skx.exr) or the mesh that it reconstructs to (.ply, .obj): its
 /// ending decides.
 void add_result_option(CLI::App& command, std::string& path);
-/// Fails before the work: another ending, a folder that is missing or not writable. \throw IoError
-void check_result(const std::string& path);
 /// Writes the model, or reconstructs it in its bind pose and writes the mesh. \throw IoError, DeviceError
 /// \param options  of a model's file
 /// \return for the JSON: path, kind ("model" or "mesh"), size, and of a mesh vertices and triangles

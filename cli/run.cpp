@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "command.h"
+#include "files.h"
 #include "program_path.h"
 #include "progress_bar.h"
 #include "runner/run_experiment.h"
@@ -76,8 +77,18 @@ ExperimentChanges changes_from(const OrderedJson& source) {
   return changes;
 }
 
-void run(const Arguments& arguments) {
-  check_json_target(arguments.json);
+/// What a run writes may not be what it reads: its config, and the meshes and skeletons of its models.
+void check_results(const CLI::App& command, const Experiment& experiment, const fs::path& folder) {
+  for (const char* name : {"results.json", "results.csv", "record.json"}) {
+    const std::string path = (folder / name).string();
+    check_made_output(command, path);
+    for (const ModelConfig& model : experiment.models)
+      for (const fs::path& input : {model.mesh, model.skeleton})
+        if (is_same_file(input.string(), path)) throw CLI::ValidationError("--output", fmt::format("{} of model {} would be replaced by the results; name another folder", input.string(), model.name));
+  }
+}
+
+void run(const Arguments& arguments, const CLI::App& command) {
   OrderedJson source{{"config", ""}, {"settings", arguments.settings}, {"only", arguments.only}, {"quick", arguments.is_quick}, {"models", OrderedJson::array()}};
   const auto add_model = [&](const ModelConfig& model) {
     source["models"].push_back({{"name", model.name}, {"mesh", model.mesh.string()}, {"skeleton", model.skeleton.string()}, {"view", OrderedJson(model.view)}});
@@ -91,6 +102,7 @@ void run(const Arguments& arguments) {
     Experiment experiment = read_experiment(file, changes_from(source));
     RunOptions options{.program = "", .folder = fs::path(arguments.output) / experiment.name, .is_resumed = arguments.is_resumed, .jobs = arguments.jobs,
                        .device = arguments.device, .source = source, .progress = {}};
+    check_results(command, experiment, options.folder);
     const RunSummary summary = run_with_bar(experiment, options);
     failed += summary.failed;
     print(arguments.json, fmt::format("{}{} done ({} kept), {} failed: {}\n\n", rows_text(experiment, summary), summary.done, summary.kept, summary.failed, options.folder.string()));
@@ -101,7 +113,6 @@ void run(const Arguments& arguments) {
 }
 
 void replay(const ReplayArguments& arguments) {
-  check_json_target(arguments.json);
   const fs::path path = fs::is_directory(arguments.record) ? fs::path(arguments.record) / "record.json" : fs::path(arguments.record);
   const auto load = [](const fs::path& file) {
     const std::string text = read_file(file);
@@ -129,16 +140,16 @@ void replay(const ReplayArguments& arguments) {
 void add_run_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("run", "Run an experiment, or a list of them, from its JSON");
-  command.add_option("CONFIG", arguments->config, "experiment or list: .json (configs/experiments, configs/paper.json)")->required();
-  command.add_option("-o,--output", arguments->output, "results go to FOLDER/NAME (default: results)")->type_name("FOLDER");
+  declare_input(command, command.add_option("CONFIG", arguments->config, "experiment or list: .json (configs/experiments, configs/paper.json)"))->required();
+  declare_output_folder(command, command.add_option("-o,--output", arguments->output, "results go to FOLDER/NAME (default: results)"))->type_name("FOLDER");
   command.add_option("--set", arguments->settings, "change a value of the experiment: sweep.size=[64,128]")->type_name("KEY=VALUE")->take_all();
   command.add_flag("--quick", arguments->is_quick, "the experiment's own quick settings");
   command.add_flag("--resume", arguments->is_resumed, "keep items that are done and whose commands and inputs are the same");
-  command.add_option("--jobs", arguments->jobs, "items at a time; timings want 1")->check(CLI::Range(1, 256).description(""))->type_name("N");
+  command.add_option("--jobs", arguments->jobs, "items at a time; timings want 1")->check(number_in(1, 256))->type_name("N");
   command.add_option("--only", arguments->only, "only this model of the experiment's")->type_name("MODEL")->take_all();
   command.add_option("--model", arguments->models, "this model instead: a name, or a .json with name, mesh, skeleton, view")->type_name("MODEL")->take_all();
-  CLI::Option* mesh = command.add_option("--mesh", arguments->mesh, "your own mesh instead, with --skeleton")->type_name("FILE");
-  CLI::Option* skeleton = command.add_option("--skeleton", arguments->skeleton, "its skeleton")->type_name("FILE")->needs(mesh);
+  CLI::Option* mesh = declare_input(command, command.add_option("--mesh", arguments->mesh, "your own mesh instead, with --skeleton"))->type_name("FILE");
+  CLI::Option* skeleton = declare_input(command, command.add_option("--skeleton", arguments->skeleton, "its skeleton"))->type_name("FILE")->needs(mesh);
   mesh->needs(skeleton);
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
@@ -148,16 +159,16 @@ void add_run_command(CLI::App& program) {
       "  skeletex run configs/experiments/fidelity.json --mesh my.obj --skeleton my.skeleton.json -o mine\n"
       "  skeletex run configs/paper.json --quick --resume\n"
       "Writes results.json, results.csv, record.json and items/. A failed item is recorded and does not stop the rest; then the exit code is 1.");
-  command.callback([arguments] { run(*arguments); });
+  command.callback([arguments, &command] { run(*arguments, command); });
 }
 
 void add_replay_command(CLI::App& program) {
   auto arguments = std::make_shared<ReplayArguments>();
   CLI::App& command = *program.add_subcommand("replay", "Run an experiment again from its record and compare");
-  command.add_option("RECORD", arguments->record, "record.json of a run, or its folder")->required();
-  command.add_option("-o,--output", arguments->output, "folder of the new run (default: replay, beside the record)")->type_name("FOLDER");
-  command.add_option("--tolerance", arguments->tolerance, "relative difference of numbers that counts as the same (default: 0.02)")->check(CLI::NonNegativeNumber.description(""))->type_name("X");
-  command.add_option("--jobs", arguments->jobs, "items at a time")->check(CLI::Range(1, 256).description(""))->type_name("N");
+  declare_input(command, command.add_option("RECORD", arguments->record, "record.json of a run, or its folder"))->required();
+  declare_output_folder(command, command.add_option("-o,--output", arguments->output, "folder of the new run (default: replay, beside the record)"))->type_name("FOLDER");
+  command.add_option("--tolerance", arguments->tolerance, "relative difference of numbers that counts as the same (default: 0.02)")->check(number_from(0))->type_name("X");
+  command.add_option("--jobs", arguments->jobs, "items at a time")->check(number_in(1, 256))->type_name("N");
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer("Example:\n  skeletex replay results/fidelity\nTimes and memory (columns that end in _ms, _s, _mb) are not compared.");

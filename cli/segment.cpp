@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "command.h"
+#include "files.h"
 #include "progress_bar.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/skeleton_file.h"
@@ -23,8 +24,6 @@ struct Arguments {
 void run(const Arguments& arguments) {
   if (!arguments.output.ends_with(".ply"))
     throw CLI::ValidationError("--output", "\"" + arguments.output + "\" does not end in .ply, which carries the colours");
-  check_output(arguments.output);
-  check_json_target(arguments.json);
   TriangleMesh mesh = load_mesh(arguments.mesh);
   const Skeleton skeleton = read_skeleton(arguments.skeleton);
   ClContext& context = open_device(arguments.device);
@@ -80,9 +79,9 @@ void run(const Arguments& arguments) {
 void add_segment_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("segment", "Cut a mesh into one piece per bone and colour the pieces");
-  command.add_option("MESH", arguments->mesh, "closed triangle mesh: .obj, .ply, .off or .stl")->required();
-  command.add_option("SKELETON", arguments->skeleton, "skeleton: JSON with nodes and bones, in the mesh's coordinates")->required();
-  command.add_option("-o,--output", arguments->output, "cut mesh with a colour per face: .ply")->required()->type_name("FILE");
+  declare_input(command, command.add_option("MESH", arguments->mesh, "closed triangle mesh: .obj, .ply, .off or .stl"))->required();
+  declare_input(command, command.add_option("SKELETON", arguments->skeleton, "skeleton: JSON with nodes and bones, in the mesh's coordinates"))->required();
+  declare_output(command, command.add_option("-o,--output", arguments->output, "cut mesh with a colour per face: .ply"), {".ply"})->required()->type_name("FILE");
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(

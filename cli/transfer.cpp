@@ -9,6 +9,7 @@
 
 #include "bone_pairs.h"
 #include "command.h"
+#include "files.h"
 #include "progress_bar.h"
 #include "result_file.h"
 #include "skeletex/edit/live.h"
@@ -79,8 +80,6 @@ void run(const Arguments& arguments) {
   parse_scale(arguments.scale, options);
   options.keep = parse_share("--keep", arguments.keep);
   options.skip = parse_share("--skip", arguments.skip);
-  check_result(arguments.output);
-  check_json_target(arguments.json);
 
   Stopwatch total;
   SkeletexModel source = read_model(arguments.source);
@@ -123,8 +122,8 @@ void run(const Arguments& arguments) {
 void add_transfer_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("transfer", "Replace the surface of bones by that of another model's, or of others of the same");
-  command.add_option("SOURCE", arguments->source, "model (.skx.exr) to take from")->required();
-  command.add_option("TARGET", arguments->target, "model to put it on; may be the same")->required();
+  declare_input(command, command.add_option("SOURCE", arguments->source, "model (.skx.exr) to take from"))->required();
+  declare_input(command, command.add_option("TARGET", arguments->target, "model to put it on; may be the same"))->required();
   command.add_option("--bones", arguments->bones, "pairs of bones: SOURCE's=TARGET's")->required()->delimiter(',')->type_name("A=B,..");
   command.add_flag("--limb", arguments->has_limbs, "also all bones below them, which must branch alike");
   command.add_flag("--mirror", arguments->is_mirrored, "take from the source's mirror image: a left arm for a right one");
@@ -135,7 +134,7 @@ void add_transfer_command(CLI::App& program) {
   command.add_option("--keep", arguments->keep, "share of its rows that the target keeps at its seams (default: auto, up to the limb's root)")->type_name("auto|S");
   command.add_option("--skip", arguments->skip, "share of the source's rows that is left out there (default: auto, up to the limb's root)")->type_name("auto|S");
   command.add_flag("--creases", arguments->has_creases, "join each column by itself, within the first bone, which may leave creases");
-  command.add_option("--share", arguments->share, "how far the target goes towards that, texel by texel (default: 1)")->check(CLI::Range(0.0, 1.0).description(""));
+  command.add_option("--share", arguments->share, "how far the target goes towards that, texel by texel (default: 1)")->check(number_in(0.0, 1.0));
   add_result_option(command, arguments->output);
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "command.h"
+#include "files.h"
 #include "progress_bar.h"
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/validate/validate_input.h"
@@ -24,7 +25,6 @@ const char* to_word(Severity severity) {
 }
 
 void run(const Arguments& arguments) {
-  check_json_target(arguments.json);
   TriangleMesh mesh = load_mesh(arguments.mesh);
   const Skeleton skeleton = read_skeleton(arguments.skeleton);
   ClContext& context = open_device(arguments.device);
@@ -64,8 +64,8 @@ void run(const Arguments& arguments) {
 void add_validate_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("validate", "Say everything that is wrong with a mesh and a skeleton, each with its place and remedy");
-  command.add_option("MESH", arguments->mesh, "triangle mesh: .obj, .ply, .off or .stl")->required();
-  command.add_option("SKELETON", arguments->skeleton, "skeleton: JSON with nodes and bones, in the mesh's coordinates")->required();
+  declare_input(command, command.add_option("MESH", arguments->mesh, "triangle mesh: .obj, .ply, .off or .stl"))->required();
+  declare_input(command, command.add_option("SKELETON", arguments->skeleton, "skeleton: JSON with nodes and bones, in the mesh's coordinates"))->required();
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "command.h"
+#include "files.h"
 #include "progress_bar.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/model_json.h"
@@ -18,8 +19,6 @@ struct Arguments {
 };
 
 void run(const Arguments& arguments) {
-  check_output(arguments.output);
-  check_json_target(arguments.json);
   Stopwatch watch;
   SkeletexModel model = read_model(arguments.model);
   if (arguments.is_removed) {
@@ -45,8 +44,8 @@ void run(const Arguments& arguments) {
 void add_weights_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("weights", "Store how much each bone moves each texel in a smooth pose, as layers to paint on");
-  command.add_option("MODEL", arguments->model, "model: .skx.exr")->required();
-  command.add_option("-o,--output", arguments->output, "the model with a layer \"weights.BONE\" per bone: .skx.exr")->required()->type_name("FILE");
+  declare_input(command, command.add_option("MODEL", arguments->model, "model: .skx.exr"))->required();
+  declare_output(command, command.add_option("-o,--output", arguments->output, "the model with a layer \"weights.BONE\" per bone: .skx.exr"), {".exr"})->required()->type_name("FILE");
   command.add_flag("--remove", arguments->is_removed, "take such layers away: weights in closed form again");
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);

@@ -214,7 +214,7 @@ TEST_F(Program, WritesHalfFloatsNearTheSurface) {
   EXPECT_EQ(json_of({"lod", "half.skx.exr", "--levels", "--half", "-o", "levels.skx.exr"})["rounding"].size(), 3u);
   EXPECT_EQ(run({"reconstruct", "levels.skx.exr", "--level", "2", "-o", "half.ply"}).code, 0);
   EXPECT_EQ(json_of({"inspect", "half.ply"})["closed_manifold"], true);
-  expect_refused(1, {"lod", "half.skx.exr", "--size", "64", "--half", "-o", "no.ply"}, {"no.ply", ".skx.exr"});
+  expect_refused(2, {"lod", "half.skx.exr", "--size", "64", "--half", "-o", "no.ply"}, {"no.ply", ".skx.exr"});
   for (const char* name : {"half.skx.exr", "later.skx.exr", "levels.skx.exr", "half.ply"}) fs::remove(folder_ / name);
 }
 
@@ -256,8 +256,12 @@ TEST_F(Program, ReconstructsInPosesAndAnimations) {
     ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "animation.json", "--time", time}).code, 0);
     EXPECT_LT(difference(positions("again.ply"), positions(same)), 1e-5) << time;
   }
-  ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "pose.json", "--no-distance"}).code, 0);
-  EXPECT_GT(difference(positions("again.ply"), positions("posed.ply")), 1e-3);
+  ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "pose.json", "--deform", "paper"}).code, 0);
+  const auto kept = positions("again.ply");
+  EXPECT_GT(difference(kept, positions("posed.ply")), 1e-3);
+  ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "pose.json", "--deform", "paper", "--no-distance"}).code, 0);
+  expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "pose.json", "--no-distance"}, {"--no-distance", "--deform paper"});
+  EXPECT_GT(difference(positions("again.ply"), kept), 1e-3);
 
   expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--no-distance"}, {"--pose"});
   expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--time", "1"}, {"--pose"});
@@ -310,8 +314,8 @@ TEST_F(Program, RefusesOptionsThatAreAnotherFiltersAndBonesThatAreNone) {
   expect_refused(2, {"filter", "y.skx.exr", "smooth", "-o", "no.ply", "--gain", "2"}, {"--gain is for enhance, not for smooth"});
   expect_refused(2, {"filter", "y.skx.exr", "smoth", "-o", "no.ply"}, {"smoth", "smooth"});
   expect_refused(1, {"filter", "y.skx.exr", "smooth", "-o", "no.ply", "--bones", "nose"}, {"nose"});
-  expect_refused(1, {"filter", "y.skx.exr", "curvature", "-o", "no.skx.exr"}, {".ply"});
-  expect_refused(1, {"filter", "y.skx.exr", "noise", "-o", "no.stl"}, {".stl", ".ply"});
+  expect_refused(2, {"filter", "y.skx.exr", "curvature", "-o", "no.skx.exr"}, {".ply"});
+  expect_refused(2, {"filter", "y.skx.exr", "noise", "-o", "no.stl"}, {".stl", ".ply"});
 }
 
 TEST_F(Program, TransfersBonesAndSaysHow) {
@@ -380,7 +384,7 @@ TEST_F(Program, WritesSmallerModelsAndChainsOfLevels) {
   expect_refused(1, {"reconstruct", "cut.skx.exr", "-o", "no.ply"}, {"cut.skx.exr", "ends early"});
   expect_refused(1, {"reconstruct", "levels.skx.exr", "--level", "3", "-o", "no.ply"}, {"no level 3", "levels 0 to 2"});
   expect_refused(1, {"reconstruct", "y.skx.exr", "--level", "1", "-o", "no.ply"}, {"no level 1", "level 0 alone"});
-  expect_refused(1, {"lod", "y.skx.exr", "--levels", "-o", "no.ply"}, {".skx.exr"});
+  expect_refused(2, {"lod", "y.skx.exr", "--levels", "-o", "no.ply"}, {".skx.exr"});
   expect_refused(2, {"lod", "y.skx.exr", "-o", "no.ply"}, {"--size", "--levels"});
 }
 
@@ -673,7 +677,7 @@ TEST_F(Program, MorphsToModelsAndMeshes) {
   refused(1, {"--t", "0.5", "--bones", "nope=nope"}, {"nope"});
   expect_refused(2, {"morph", "y.skx.exr", "-o", "no.ply", "--t", "0"}, {"two models"});
   expect_refused(1, {"morph", "y.skx.exr", "y.ply", "--t", "0", "-o", "no.ply"}, {"y.ply"});
-  expect_refused(1, {"morph", "y.skx.exr", "half.skx.exr", "--t", "0", "-o", "no.xyz"}, {"no.xyz"});
+  expect_refused(2, {"morph", "y.skx.exr", "half.skx.exr", "--t", "0", "-o", "no.xyz"}, {"no.xyz"});
   for (const char* name : {"half.skx.exr", "half.ply"}) fs::remove(folder_ / name);
 }
 
@@ -714,12 +718,57 @@ TEST_F(Program, TimesStagesBesideTheirReferencesAndReportsWhatTheContractNames) 
 
 TEST_F(Program, RefusesOutputsThatCannotBeWrittenAndLeavesNothingBehind) {
   expect_refused(1, {"encode", "y.ply", "y.skeleton.json", "-o", "no/such/folder/a.skx.exr"}, {"no/such/folder"});
-  expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "."}, {"."});
-  expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "a.xyz"}, {"a.xyz"});
+  expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "."}, {"."});
+  expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.xyz"}, {"a.xyz"});
   expect_refused(1, {"metro", "y.ply", "y.ply", "--csv", "no/d.csv"}, {"no/d.csv"});
   expect_refused(1, {"inspect", "y.skx.exr", "--json", "no/i.json"}, {"no/i.json"});
   expect_refused(1, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--json", "no/e.json"}, {"no/e.json"});
   expect_refused(1, {"segment", "y.ply", "y.skeleton.json", "-o", "/proc/a.ply"}, {"/proc"});
+}
+
+TEST_F(Program, NeverWritesOverWhatItReads) {
+  const auto bytes = [&](const char* name) {
+    std::ostringstream text;
+    text << std::ifstream(folder_ / name).rdbuf();
+    return text.str();
+  };
+  const auto count = [&] { return std::distance(fs::directory_iterator(folder_), fs::directory_iterator()); };
+  fs::create_symlink("y.skx.exr", folder_ / "link.exr");
+  const std::string mesh = bytes("y.ply"), skeleton = bytes("y.skeleton.json"), model = bytes("y.skx.exr");
+  const auto files = count();
+  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--json", "y.skeleton.json"}, {"--json", "SKELETON"});
+  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "y.ply"}, {"--output", "MESH"});
+  expect_refused(2, {"metro", "y.ply", "y.ply", "--ply", "y.ply"}, {"--ply", "A"});
+  expect_refused(2, {"lod", "y.skx.exr", "--size", "64", "-o", "link.exr"}, {"--output", "MODEL"});
+  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "-"}, {"--output"});
+  expect_refused(2, {"morph", "y.skx.exr", "half.skx.exr", "--frames", "2", "-o", "a.ply", "--json", "a_001.ply"}, {"--json", "a_001.ply"});
+  std::ofstream(folder_ / "config.json") << nlohmann::json{{"name", "y"}, {"mesh", "y.ply"}, {"skeleton", "y.skeleton.json"}, {"credits", "made here"}};
+  expect_refused(2, {"render", "config.json", "-o", "a.png", "--json", "y.skeleton.json"}, {"--json", "skeleton of config.json"});
+  fs::remove(folder_ / "config.json");
+  EXPECT_EQ(bytes("y.ply"), mesh);
+  EXPECT_EQ(bytes("y.skeleton.json"), skeleton);
+  EXPECT_EQ(bytes("y.skx.exr"), model);
+  EXPECT_EQ(count(), files);
+  fs::remove(folder_ / "link.exr");
+}
+
+TEST_F(Program, MeshesThatSinglePrecisionCannotHoldAreRefused) {
+  const Skeleton skeleton = read_skeleton(folder_ / "y.skeleton.json");
+  const TriangleMesh mesh = read_mesh(folder_ / "y.ply").mesh;
+  for (const double scale : {1e-19, 1e17}) {
+    std::ofstream off(folder_ / "scaled.off");
+    off << "OFF\n" << mesh.positions.size() << ' ' << mesh.triangles.size() << " 0\n";
+    for (const Vec3& p : mesh.positions) off << scale * p.x() << ' ' << scale * p.y() << ' ' << scale * p.z() << '\n';
+    for (const Triangle& t : mesh.triangles) off << "3 " << t[0] << ' ' << t[1] << ' ' << t[2] << '\n';
+    off.close();
+    nlohmann::json json = nlohmann::json::parse(std::ifstream(folder_ / "y.skeleton.json"));
+    for (auto& node : json["nodes"])
+      for (auto& x : node["position"]) x = scale * x.get<double>();
+    std::ofstream(folder_ / "scaled.json") << json;
+    expect_refused(1, {"encode", "scaled.off", "scaled.json", "-o", "scaled.skx.exr"}, {"single precision"});
+    EXPECT_FALSE(fs::exists(folder_ / "scaled.skx.exr"));
+  }
+  for (const char* name : {"scaled.off", "scaled.json"}) fs::remove(folder_ / name);
 }
 
 TEST_F(Program, SaysWhenStandardOutputIsFull) {

@@ -9,11 +9,14 @@
 #include <limits>
 #include <random>
 
+#include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_json.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "support/corrupted.h"
 #include "support/full_disk.h"
 #include "support/scratch.h"
+#include "support/synthetic_model.h"
 
 namespace skeletex {
 namespace {
@@ -185,6 +188,7 @@ TEST(ModelFile, HalfTexelsAreTheNearestHalvesAndAllElseStaysExact) {
     EXPECT_LE(std::abs(read.texture.out[i] - x), std::max(std::abs(x) * 0x1p-11f, 0x1p-25f));
   }
   SkeletexModel large = model;
+  large.diagonal = 1e6;
   large.texture.out[3] = 1e6f;
   EXPECT_TRUE(contains(error_of([&] { write_model(folder / "large.skx.exr", large, {TexelFormat::kHalf, ExrCompression::kZip}); }), "half"));
   EXPECT_EQ(folder.file_count(), 1);
@@ -277,7 +281,7 @@ TEST(ModelFile, RefusesModelsWhosePartsDoNotFitTogether) {
       {"skeleton", [](SkeletexModel& m) { m.skeleton.bones[1].tail = 7; }},
       {"skeleton", [](SkeletexModel& m) { m.skeleton.bones[1].s = std::nullopt; }},
       {"parallel", [](SkeletexModel& m) { m.skeleton.bones[0].s = Vec3(0, 1, 0); }},
-      {"no length", [](SkeletexModel& m) { m.skeleton.nodes[0].position = Vec3::Zero(); }},
+      {"millionth", [](SkeletexModel& m) { m.skeleton.nodes[0].position = Vec3::Zero(); }},
       {"diagonal", [](SkeletexModel& m) { m.diagonal = 0; }},
       {"genus", [](SkeletexModel& m) { m.genus = -1; }},
       {"origin", [](SkeletexModel& m) { m.origin[1] = std::numeric_limits<double>::infinity(); }},
@@ -309,6 +313,57 @@ TEST(ModelFile, RefusesModelsWhosePartsDoNotFitTogether) {
     EXPECT_TRUE(contains(message, expected)) << expected << ": " << message;
     EXPECT_EQ(folder.file_count(), 0) << expected;
   }
+}
+
+/// What a user, a script or a bad byte may make of a header. Each is refused, or gives a mesh of finite numbers.
+TEST(ModelFile, EditedHeadersAreRefusedOrGiveFiniteMeshes) {
+  const SkeletexModel model = SyntheticSurface(y_branch(), 0.25).model({{24, 11}, {24, 11}, {24, 11}});
+  const nlohmann::json header = model_to_json(model, "header");
+  const auto at = [](const char* pointer) { return nlohmann::json::json_pointer(pointer); };
+  const nlohmann::json first_head = header.at(at("/skeleton/nodes/0/position")), other = header.at(at("/skeleton/nodes/2/position"));
+  const std::vector<std::pair<std::string, nlohmann::json>> edits{
+      {"/skeleton/nodes/0/position", other},                        // a bone folded back on its neighbour, of the same length
+      {"/skeleton/nodes/0/position", {0.3 * other[0].get<double>(), 0.3 * other[1].get<double>(), 0.3 * other[2].get<double>()}},  // and shorter
+      {"/skeleton/nodes/0/position/0", 1e30},    {"/skeleton/nodes/0/position/1", -1e30}, {"/skeleton/nodes/0/position/2", 1e300},
+      {"/skeleton/nodes/0/position/2", nullptr}, {"/skeleton/nodes/1/position", first_head}, {"/skeleton/nodes/2/position/0", 1e5},
+      {"/skeleton/bones/0/tail", 0},             {"/skeleton/bones/0/s", {0, 0, 0}},       {"/skeleton/bones/0/s/0", 1e300},
+      {"/skeleton/bones/1/s/1", 1e-300},         {"/origin/0", 1e300},                     {"/origin/1", 1e30},
+      {"/origin/2", "x"},                        {"/diagonal", 0},                         {"/diagonal", -1},
+      {"/diagonal", 1e300},                      {"/diagonal", 1e-300},                    {"/arcs/0/samples/1", 1e39},
+      {"/arcs/0/samples/1", -1},                 {"/arcs/0/samples/0", 1e300},             {"/arcs/1/samples/3", 1e300},
+      {"/corners/0/sample/1", 1e39},             {"/corners/1/sample/0", -0.5},            {"/patches/0/row_u/3", 1e300},
+      {"/genus", -1}};
+  ClContext device;
+  int refused = 0;
+  for (const auto& [place, value] : edits) {
+    nlohmann::json edited = header;
+    edited.at(at(place.c_str())) = value;
+    SCOPED_TRACE(place + " = " + value.dump());
+    try {
+      SkeletexModel read = model_from_json(edited, "file.skx.exr");
+      read.texture = model.texture;
+      for (const Vec3& p : reconstruct_mesh(device, read).positions) ASSERT_TRUE(p.allFinite());
+    } catch (const Error& error) {
+      ++refused;
+      EXPECT_NE(std::string(error.what()).find("file.skx.exr"), std::string::npos) << error.what();
+    }
+  }
+  EXPECT_GE(refused, 23);
+}
+
+TEST(ModelFile, MeshesWithoutFiniteNumbersAreNotWritten) {
+  const ScratchFolder folder;
+  for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity(), 1e39})
+    for (const char* name : {"a.ply", "a.obj"}) {
+      const TriangleMesh mesh{{{0, 0, 0}, {1, bad, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+      try {
+        write_mesh(folder / name, mesh);
+        FAIL() << "written: " << bad;
+      } catch (const IoError& error) {
+        EXPECT_NE(std::string(error.what()).find("y of vertex 1"), std::string::npos) << error.what();
+      }
+    }
+  EXPECT_EQ(folder.file_count(), 0);
 }
 
 TEST(ModelFile, SaysWhatIsWrongWithForeignTruncatedAndNewerFiles) {

@@ -168,6 +168,9 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   const BoundingBox box = bounding_box(mesh);
   model.origin = box.centre();
   model.diagonal = box.diagonal();
+  if (!(model.diagonal >= kSmallestDiagonal && model.diagonal <= kLargestDiagonal))
+    throw InputError(fmt::format("the mesh's bounding box has a diagonal of {:.3g}; the device computes in single precision, which needs {:g} to {:g}: scale mesh and skeleton",
+                                 model.diagonal, kSmallestDiagonal, kLargestDiagonal));
   // Euler's formula for a closed triangle mesh: edges are 3/2 of the triangles.
   model.genus = (2 - (static_cast<int>(mesh.positions.size()) - static_cast<int>(mesh.triangles.size()) / 2)) / 2;
 

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <bit>
 #include <charconv>
+#include <cmath>
 #include <cstring>
 #include <mutex>
 #include <sstream>
@@ -119,6 +120,20 @@ void append(std::string& out, VertexColour colour) {
   append(out, colour.b);
 }
 
+/// What is written as single precision must stay a number in it.
+void check_finite(const TriangleMesh& mesh, const PlyAttributes& attributes, const std::string& where) {
+  const auto is_good = [](double x) { return std::isfinite(static_cast<float>(x)); };
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i)
+    for (int axis = 0; axis < 3; ++axis)
+      if (!is_good(mesh.positions[i][axis]))
+        throw IoError(fmt::format("{}: {} of vertex {} is {}, which the file cannot hold; nothing was written", where, "xyz"[axis], i, mesh.positions[i][axis]));
+  for (std::size_t i = 0; i < attributes.vertex_normals.size(); ++i)
+    if (!attributes.vertex_normals[i].allFinite()) throw IoError(fmt::format("{}: the normal of vertex {} is not finite; nothing was written", where, i));
+  for (std::size_t i = 0; i < attributes.vertex_property.size(); ++i)
+    if (!std::isfinite(attributes.vertex_property[i]))
+      throw IoError(fmt::format("{}: {} of vertex {} is not finite; nothing was written", where, attributes.vertex_property_name, i));
+}
+
 void write_ply(OutputFile& file, const TriangleMesh& mesh, const PlyAttributes& attributes) {
   constexpr const char* kColour = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   std::string header = fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n", mesh.positions.size());
@@ -193,6 +208,7 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, con
     throw IoError(fmt::format("{}: there must be as many colours, normals or values as the mesh has vertices or triangles", path.string()));
   if (!attributes.vertex_property.empty() && attributes.vertex_property_name.empty())
     throw IoError(fmt::format("{}: the vertex property needs a name", path.string()));
+  check_finite(mesh, attributes, path.string());
   write_atomically(path, [&](const std::filesystem::path& temporary) {
     OutputFile file(temporary, path);
     if (extension == ".ply")

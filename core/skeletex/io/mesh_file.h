@@ -39,7 +39,7 @@ struct PlyAttributes {
 
 /// Writes binary PLY (little endian, float positions) or OBJ by the ending, under a temporary name that is renamed when
 /// complete. Attributes go into PLY only.
-/// \throw IoError (unknown ending, folder not writable, disk full, attributes that do not fit the mesh): no file is left behind
+/// \throw IoError (unknown ending, folder not writable, disk full, attributes that do not fit the mesh, a number that is not finite in single precision): no file is left behind
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, const PlyAttributes& attributes = {});
 
 }  // namespace skeletex

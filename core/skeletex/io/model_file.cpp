@@ -82,7 +82,8 @@ void check_plane(const std::vector<float>& values, const std::string& channel, c
 
 void check_texels(const SkeletexModel& model, const std::string& where) {
   for (int i = 0; i < 3; ++i)
-    check_plane(plane(model.texture, i), kChannels[i], model.texture, [](float x) { return std::isfinite(x); }, "not a finite number", where);
+    check_plane(plane(model.texture, i), kChannels[i], model.texture, [&](float x) { return std::abs(x) <= kMostDiagonals * model.diagonal; },
+                "not a finite number, or beyond 100 diagonals", where);
   if (model.bone_weights.empty()) return;
   if (model.bone_weights.size() != model.skeleton.bones.size())
     throw IoError(fmt::format("{}: weights of {} bones are expected, not of {}", where, model.skeleton.bones.size(), model.bone_weights.size()));

@@ -237,8 +237,9 @@ class ModelCheck {
   ModelCheck(const SkeletexModel& model, const std::string& where) : m_(model), where_(where) {}
 
   void run() {
-    require(std::isfinite(m_.diagonal) && m_.diagonal > 0, "diagonal", "must be a positive length");
-    require(m_.origin.allFinite(), "origin", "must be finite");
+    require(m_.diagonal >= kSmallestDiagonal && m_.diagonal <= kLargestDiagonal, "diagonal",
+            fmt::format("must be a length from {:g} to {:g}, as single precision holds no others", kSmallestDiagonal, kLargestDiagonal));
+    require(m_.origin.allFinite() && m_.origin.cwiseAbs().maxCoeff() <= 1e12 * m_.diagonal, "origin", "must be finite, and within 1e12 diagonals of zero");
     require(m_.genus >= 0, "genus", "must not be negative");
     require(m_.texture.width > 0 && m_.texture.height > 0 && m_.texture.width <= kMaxTextureSize && m_.texture.height <= kMaxTextureSize, "texture",
             fmt::format("its sides must be from 1 to {}", kMaxTextureSize));
@@ -259,23 +260,29 @@ class ModelCheck {
   int node_of(std::size_t bone, std::size_t end) const { return end == 0 ? m_.skeleton.bones[bone].head : m_.skeleton.bones[bone].tail; }
   bool is_at(int bone, int node) const { return m_.skeleton.bones[bone].head == node || m_.skeleton.bones[bone].tail == node; }
   bool is_index(int index, const auto& list) const { return index >= 0 && index < size_of(list); }
-  static bool is_sample(const SeamSample& s) { return s.turn >= 0 && s.turn < 1 && s.distance >= 0 && std::isfinite(s.distance); }
+  bool is_sample(const SeamSample& s) const { return s.turn >= 0 && s.turn < 1 && s.distance >= 0 && s.distance <= kMostDiagonals * m_.diagonal; }
 
   void check_skeleton() {
     const auto& bones = m_.skeleton.bones;
-    for (const Node& node : m_.skeleton.nodes) require(node.position.allFinite(), "skeleton", fmt::format("node \"{}\" must have a finite position", node.name));
+    for (const Node& node : m_.skeleton.nodes)
+      require(node.position.allFinite() && (node.position - m_.origin).cwiseAbs().maxCoeff() <= kMostDiagonals * m_.diagonal, "skeleton",
+              fmt::format("node \"{}\" must lie within {:g} diagonals of the origin", node.name, kMostDiagonals));
     bones_at_.assign(m_.skeleton.nodes.size(), 0);
     require(!bones.empty(), "skeleton", "must have a bone");
     for (const Bone& bone : bones) {
       require(is_index(bone.head, m_.skeleton.nodes) && is_index(bone.tail, m_.skeleton.nodes) && bone.head != bone.tail, "skeleton",
               fmt::format("bone \"{}\" must join two nodes", bone.name));
-      require(bone.s && bone.s->allFinite(), "skeleton", fmt::format("bone \"{}\" must have its s", bone.name));
+      require(bone.s && bone.s->cwiseAbs().maxCoeff() >= 1e-6 && bone.s->cwiseAbs().maxCoeff() <= 1e6, "skeleton",
+              fmt::format("bone \"{}\" must have its s, a direction of length about 1", bone.name));
+      const double length = (m_.skeleton.nodes[bone.tail].position - m_.skeleton.nodes[bone.head].position).norm();
+      require(length >= 1e-6 * m_.diagonal, "skeleton", fmt::format("bone \"{}\" must be at least a millionth of the diagonal long", bone.name));
       ++bones_at_[bone.head];
       ++bones_at_[bone.tail];
     }
     try {
       bone_bases(m_.skeleton);
-    } catch (const InputError& error) {
+      check_directions(m_.skeleton);
+    } catch (const Error& error) {
       throw IoError(fmt::format("{}: skeleton: {}", where_, error.what()));
     }
   }
@@ -314,7 +321,7 @@ class ModelCheck {
       require(bones.size() >= 3 && std::adjacent_find(bones.begin(), bones.end()) == bones.end(), entry("corners", i), "three or more bones meet at a corner");
       for (const int bone : bones)
         require(is_index(bone, m_.skeleton.bones) && is_at(bone, corner.node), entry("corners", i), "its bones must lie at its node");
-      require(is_sample(corner.sample), entry("corners", i), "turn must be in [0,1), distance not negative");
+      require(is_sample(corner.sample), entry("corners", i), "turn must be in [0,1), distance not negative and at most 100 diagonals");
     }
   }
 
@@ -335,7 +342,7 @@ class ModelCheck {
         }
       }
       require(arc.samples.size() >= (arc.is_closed() ? 3u : 1u), entry("arcs", i), "a closed arc has at least three samples, an open one at least one");
-      require(std::all_of(arc.samples.begin(), arc.samples.end(), is_sample), entry("arcs", i), "turns must be in [0,1), distances not negative");
+      require(std::all_of(arc.samples.begin(), arc.samples.end(), [&](const SeamSample& s) { return is_sample(s); }), entry("arcs", i), "turns must be in [0,1), distances not negative and at most 100 diagonals");
     }
   }
 

@@ -38,6 +38,21 @@ Vec3 direction_from(const Skeleton& skeleton, BoneAtNode at) {
   return at.end == BoneEnd::kHead ? o : Vec3(-o);
 }
 
+void check_directions(const Skeleton& skeleton) {
+  constexpr double kLeast = 1e-3;  // between the ends of two unit vectors
+  const auto at_nodes = bones_at_nodes(skeleton);
+  for (std::size_t n = 0; n < at_nodes.size(); ++n)
+    for (std::size_t i = 0; i < at_nodes[n].size(); ++i)
+      for (std::size_t j = i + 1; j < at_nodes[n].size(); ++j) {
+        const BoneAtNode &a = at_nodes[n][i], &b = at_nodes[n][j];
+        if ((direction_from(skeleton, a) - direction_from(skeleton, b)).norm() >= kLeast) continue;
+        const Vec3& p = skeleton.nodes[n].position;
+        throw TopologyError(fmt::format("bones \"{}\" and \"{}\" leave node \"{}\" at ({:.6g}, {:.6g}, {:.6g}) in the same direction, so no plane separates them; "
+                                        "move the far end of one of them",
+                                        skeleton.bones[a.bone].name, skeleton.bones[b.bone].name, skeleton.nodes[n].name, p.x(), p.y(), p.z()));
+      }
+}
+
 Vec3 middle_of_nodes(const Skeleton& skeleton) {
   BoundingBox box{skeleton.nodes[0].position, skeleton.nodes[0].position};
   for (const Node& node : skeleton.nodes) {

@@ -58,6 +58,10 @@ int end_node(const Skeleton& skeleton, int bone, BoneEnd end);
 /// \throw InputError naming a bone of no length, or one whose s is parallel to it
 std::vector<BoneBasis> bone_bases(const Skeleton& skeleton);
 
+/// That no two bones leave a node in the same direction, so that a plane separates them.
+/// \throw TopologyError naming the bones, the node and its place
+void check_directions(const Skeleton& skeleton);
+
 /// Centre of the nodes' bounding box. \pre there are nodes
 Vec3 middle_of_nodes(const Skeleton& skeleton);
 

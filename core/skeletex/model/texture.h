@@ -69,6 +69,11 @@ enum class DiagonalRule {
   kSmooth,   ///< the one whose triangles turn least against those around: for texels on the mesh's own vertices and edges
 };
 
+/// Lengths, in the units of the mesh, whose squares single precision holds with room to spare: diagonals of models lie between them.
+inline constexpr double kSmallestDiagonal = 1e-15, kLargestDiagonal = 1e15;
+/// How many diagonals a model's nodes, seams and texels may lie away from its origin.
+inline constexpr double kMostDiagonals = 100;
+
 /// A model: one texture and what is needed to turn it back into a mesh.
 struct SkeletexModel {
   Skeleton skeleton;  ///< bind pose, every bone with its s

@@ -42,6 +42,7 @@ double scattered(std::uint64_t index) {
 std::vector<NodeCells> node_cells(const Skeleton& skeleton, double perturbation) {
   std::vector<NodeCells> result;
   const auto at_nodes = bones_at_nodes(skeleton);
+  check_directions(skeleton);
   for (int n = 0; n < static_cast<int>(at_nodes.size()); ++n) {
     if (at_nodes[n].size() < 2) continue;
     const std::string& node_name = skeleton.nodes[n].name;
@@ -54,13 +55,6 @@ std::vector<NodeCells> node_cells(const Skeleton& skeleton, double perturbation)
     const auto key = [](const Vec3& d) { return std::make_tuple(d.x(), d.y(), d.z()); };
     std::sort(node.cells.begin(), node.cells.end(), [&](const Cell& a, const Cell& b) { return key(a.direction) < key(b.direction); });
     for (std::size_t c = 0; c < node.cells.size(); ++c) node.cells[c].offset = perturbation * scattered(c);
-    for (std::size_t i = 0; i < node.cells.size(); ++i)
-      for (std::size_t j = i + 1; j < node.cells.size(); ++j)
-        if ((node.cells[i].direction - node.cells[j].direction).norm() < 1e-3)
-          throw TopologyError(fmt::format("bones \"{}\" and \"{}\" leave node \"{}\" at ({:.6g}, {:.6g}, {:.6g}) in the same direction, so no "
-                                          "wall separates them; move the far end of one of them",
-                                          skeleton.bones[node.cells[i].bone.bone].name, skeleton.bones[node.cells[j].bone.bone].name,
-                                          node_name, node.position.x(), node.position.y(), node.position.z()));
     result.push_back(std::move(node));
   }
   return result;

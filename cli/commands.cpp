@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+#include "command.h"
+#include "files.h"
+
+namespace skeletex::cli {
+
+void add_commands(CLI::App& program) {
+  add_encode_command(program);
+  add_reconstruct_command(program);
+  add_render_command(program);
+  add_correspond_command(program);
+  add_morph_command(program);
+  add_filter_command(program);
+  add_lod_command(program);
+  add_transfer_command(program);
+  add_weights_command(program);
+  add_metro_command(program);
+  add_segment_command(program);
+  add_validate_command(program);
+  add_inspect_command(program);
+  add_bench_command(program);
+  add_run_command(program);
+  add_replay_command(program);
+  add_devices_command(program);
+  for (CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) command->parse_complete_callback([command] { check_files(*command); });
+}
+
+}  // namespace skeletex::cli
