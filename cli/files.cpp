@@ -11,6 +11,7 @@
 #include <map>
 
 #include "command.h"
+#include "skeletex/io/same_file.h"
 
 namespace skeletex::cli {
 namespace {
@@ -52,18 +53,6 @@ void check_ending(const NamedFile& file) {
   std::string list;
   for (std::size_t i = 0; i < endings.size(); ++i) list += (i == 0 ? "" : i + 1 == endings.size() ? " or " : ", ") + endings[i];
   throw CLI::ValidationError(file.name, fmt::format("\"{}\" must end in {}, which says what is written", file.path, list));
-}
-
-/// The path as it will be once its links are followed; a link that leads nowhere is followed too.
-fs::path resolved(const fs::path& path) {
-  std::error_code error;
-  fs::path at = fs::absolute(path, error);
-  for (int links = 0; links < 40 && fs::is_symlink(fs::symlink_status(at, error)); ++links) {
-    const fs::path target = fs::read_symlink(at, error);
-    at = target.is_absolute() ? target : at.parent_path() / target;
-  }
-  const fs::path whole = fs::weakly_canonical(at, error);
-  return error ? at.lexically_normal() : whole;
 }
 
 bool is_stream(const NamedFile& file) { return file.path == "-" && file.declaration->is_output; }
@@ -109,12 +98,6 @@ CLI::Option* declare_text_output(CLI::App& command, CLI::Option* option) {
 const std::vector<FileOption>& files_of(const CLI::App& command) { return declarations()[&command]; }
 
 std::string option_name(const CLI::Option& option) { return option.get_lnames().empty() ? option.get_name(true) : "--" + option.get_lnames().front(); }
-
-bool is_same_file(const std::string& a, const std::string& b) {
-  std::error_code error;
-  if (fs::equivalent(a, b, error) && !error) return true;
-  return resolved(a) == resolved(b);
-}
 
 void check_files(const CLI::App& command) {
   const std::vector<NamedFile> files = named_files(command);

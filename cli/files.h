@@ -29,9 +29,6 @@ const std::vector<FileOption>& files_of(const CLI::App& command);
 /// As messages name it: "MESH", "--output".
 std::string option_name(const CLI::Option& option);
 
-/// Whether two paths lead to one file: by device and inode, links followed; files that are not there yet by their path.
-bool is_same_file(const std::string& a, const std::string& b);
-
 /// Called once a command's options are known and before it does anything.
 /// \throw CLI::ValidationError when an output is an input or another output, has an ending that the command does not write, or is "-" where
 ///        that is not standard output; IoError when the folder of an output is missing or not writable

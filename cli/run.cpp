@@ -12,6 +12,7 @@
 #include "runner/run_experiment.h"
 #include "skeletex/io/json_file.h"
 #include "skeletex/io/read_file.h"
+#include "skeletex/io/same_file.h"
 #include "skeletex/model/error.h"
 #include "table.h"
 
@@ -84,7 +85,7 @@ void check_results(const CLI::App& command, const Experiment& experiment, const 
     check_made_output(command, path);
     for (const ModelConfig& model : experiment.models)
       for (const fs::path& input : {model.mesh, model.skeleton})
-        if (is_same_file(input.string(), path)) throw CLI::ValidationError("--output", fmt::format("{} of model {} would be replaced by the results; name another folder", input.string(), model.name));
+        if (is_same_file(input, path)) throw CLI::ValidationError("--output", fmt::format("{} of model {} would be replaced by the results; name another folder", input.string(), model.name));
   }
 }
 

@@ -9,6 +9,7 @@
 #include "simplify.h"
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/mesh_file.h"
+#include "skeletex/io/same_file.h"
 #include "skeletex/measure/manifold.h"
 #include "skeletex/model/error.h"
 
@@ -26,6 +27,7 @@ skeletex::TriangleMesh subdivided_to(skeletex::TriangleMesh mesh, int vertices) 
 
 void run(const Arguments& arguments) {
   using namespace skeletex;
+  for (const std::string& output : {arguments.output, arguments.json}) check_not_an_input(output, {arguments.mesh, arguments.like});
   const TriangleMesh mesh = read_mesh(arguments.mesh).mesh;
   const ManifoldReport report = measure_manifold(mesh);
   if (!report.is_closed_manifold()) throw InputError(arguments.mesh + ": not a closed manifold; skeletex validate says where");

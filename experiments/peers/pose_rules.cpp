@@ -9,6 +9,7 @@
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/pose_file.h"
+#include "skeletex/io/same_file.h"
 #include "skeletex/measure/deformation.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/lattice.h"
@@ -123,6 +124,7 @@ int main(int argc, char** argv) {
   program.add_option("--device", device, "OpenCL device, as for skeletex");
   try {
     program.parse(argc, argv);
+    check_not_an_input(json, {model, poses});
     const Json result = run(model, poses, device);
     if (!json.empty()) write_text_atomically(json, result.dump(2) + "\n");
   } catch (const CLI::ParseError& error) {
