@@ -13,6 +13,7 @@ void add_commands(CLI::App& program) {
   add_filter_command(program);
   add_lod_command(program);
   add_transfer_command(program);
+  add_pose_random_command(program);
   add_weights_command(program);
   add_metro_command(program);
   add_segment_command(program);

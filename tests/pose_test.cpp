@@ -5,11 +5,13 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <filesystem>
 #include <numbers>
 #include <numeric>
 #include <random>
 
 #include "skeletex/io/pose_file.h"
+#include "skeletex/io/skeleton_file.h"
 #include "skeletex/model/error.h"
 #include "skeletex/model/posed_frame.h"
 #include "skeletex/reconstruct/lattice.h"
@@ -170,6 +172,43 @@ std::string message_of(const nlohmann::json& json, const Skeleton& skeleton) {
     return error.what();
   }
   return "accepted";
+}
+
+TEST(Pose, RandomPosesAreWhatTheirSeedSays) {
+  const Skeleton skeleton = random_tree(12, 3);
+  const double largest = 0.7;
+  const Pose pose = make_random_pose(skeleton, largest, 5), same = make_random_pose(skeleton, largest, 5), other = make_random_pose(skeleton, largest, 6);
+  const int root = root_nodes(skeleton)[0];
+  bool is_other = false;
+  for (std::size_t i = 0; i < skeleton.bones.size(); ++i) {
+    EXPECT_EQ(pose.rotations[i].coeffs(), same.rotations[i].coeffs());
+    is_other = is_other || pose.rotations[i].coeffs() != other.rotations[i].coeffs();
+    const double angle = pose.rotations[i].angularDistance(Eigen::Quaterniond::Identity());
+    EXPECT_LE(angle, largest + 1e-12);
+    EXPECT_EQ(angle == 0, skeleton.bones[i].head == root || skeleton.bones[i].tail == root) << i;
+  }
+  EXPECT_TRUE(is_other);
+  EXPECT_THROW(make_random_pose(ring(5), largest, 1), InputError);
+}
+
+TEST(Pose, EveryPoseOfTheProjectFitsItsSkeleton) {
+  const std::filesystem::path configs = std::filesystem::path(SKELETEX_SOURCE_DIR) / "configs";
+  int count = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(configs / "poses")) {
+    if (entry.path().extension() != ".json") continue;
+    // bear_bis_walk belongs to bear_bis, evaluation/man to man: the longest name of a skeleton that the file's begins with.
+    const std::string stem = entry.path().stem().string();
+    std::string model;
+    for (const auto& file : std::filesystem::directory_iterator(configs / "skeletons")) {
+      const std::string name = file.path().stem().stem().string();
+      if (stem.starts_with(name) && name.size() > model.size()) model = name;
+    }
+    const Skeleton skeleton = read_skeleton(configs / "skeletons" / (model + ".skeleton.json"));
+    const PoseAnimation animation = read_animation(entry.path(), skeleton);
+    for (const PoseFrame& frame : animation.frames) EXPECT_EQ(apply_pose(skeleton, frame.pose).nodes.size(), skeleton.nodes.size());
+    ++count;
+  }
+  EXPECT_GE(count, 40);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <deque>
 #include <numbers>
+#include <random>
 
 #include "skeletex/model/error.h"
 #include "skeletex/model/walls.h"
@@ -241,6 +242,24 @@ Skeleton apply_pose(const Skeleton& bind, const Pose& pose) {
     posed.bones[i].s = s;
   }
   return posed;
+}
+
+Pose make_random_pose(const Skeleton& skeleton, double largest, std::uint64_t seed) {
+  if (skeleton.nodes.size() != skeleton.bones.size() + root_nodes(skeleton).size())
+    throw InputError("the skeleton has a cycle, so its bones cannot be turned; random poses are for trees");
+  std::mt19937_64 random(seed);
+  // The library's distributions differ from system to system: 53 bits in [0, 1).
+  const auto uniform = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
+  const std::vector<int> roots = root_nodes(skeleton);
+  const auto is_root = [&](int node) { return std::find(roots.begin(), roots.end(), node) != roots.end(); };
+  Pose pose;
+  for (const Bone& bone : skeleton.bones) {
+    const double z = 2 * uniform() - 1, around = 2 * std::numbers::pi * uniform(), angle = largest * uniform();
+    const double radius = std::sqrt(std::max(0.0, 1 - z * z));
+    const bool is_still = is_root(bone.head) || is_root(bone.tail);
+    pose.rotations.push_back(is_still ? Quaterniond::Identity() : Quaterniond(Eigen::AngleAxisd(angle, Vec3(radius * std::cos(around), radius * std::sin(around), z))));
+  }
+  return pose;
 }
 
 Pose pose_at(const Skeleton& bind, const PoseAnimation& animation, double time) {

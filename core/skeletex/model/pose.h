@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <Eigen/Geometry>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -47,5 +48,10 @@ std::vector<int> root_nodes(const Skeleton& skeleton);
 /// order nor direction of the bones matter.
 /// \throw InputError when sizes do not match, rotations meet a cycle, or a bone has no length, naming the bone
 Skeleton apply_pose(const Skeleton& bind, const Pose& pose);
+
+/// Every bone that is not at a root turns about an axis that is uniform on the sphere, by an angle uniform in [0, largest]. The same
+/// seed gives the same pose on every machine.
+/// \param largest  radians    \throw InputError for skeletons with cycles, whose bones cannot be turned
+Pose make_random_pose(const Skeleton& skeleton, double largest, std::uint64_t seed);
 
 }  // namespace skeletex
