@@ -32,7 +32,9 @@ esac
 cd "$(dirname "$0")/.."
 bash scripts/install-dependencies.sh
 cmake --preset release
-cmake --build --preset release --target skeletex
+targets=(skeletex)
+[ -n "$main" ] || targets+=(peers pose_rules)  # what experiments compare with
+cmake --build --preset release --target "${targets[@]}"
 program=build/release/bin/skeletex
 
 if [ -n "$main" ]; then
