@@ -568,6 +568,10 @@ TEST(PoseFile, RejectsWhatItDoesNotKnowWithTheNearestName) {
   has(R"({"frames":[{"time":0,"pose":{}},{"time":0,"pose":{}}]})", "times must grow");
   has(R"({"frames":[{"time":0,"pos":{}}]})", "did you mean pose?");
   has(R"([])", "object");
+  has(R"({"rotations":{"bone1":{"axis":[1e300,0,0],"degrees":30}}})", "out of range");
+  has(R"({"rotations":{"bone1":{"axis":[1,0,0],"degrees":1e200}}})", "out of range");
+  has(R"({"nodes":{"end0":[0,-1e30,0]}})", "out of range");
+  has(R"({"roll":{"bone1":1e16}})", "out of range");
 }
 
 }  // namespace skeletex

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include "skeletex/io/json_file.h"
@@ -33,11 +34,19 @@ std::size_t index_of(const std::vector<Named>& all, const std::string& name, con
   throw IoError(fmt::format("{}: there is no {} \"{}\"{}", where, kind, name, did_you_mean(name, names)));
 }
 
+/// A number of a pose: what is larger is a slip of the pen, and its square may be infinite.
+double pose_number(const nlohmann::json& json, const std::string& where) {
+  constexpr double kMost = 1e15;
+  const double value = json_number(json, where);
+  if (std::abs(value) > kMost) throw IoError(fmt::format("{}: {:g} is out of range; numbers of a pose go from {:g} to {:g}", where, value, -kMost, kMost));
+  return value;
+}
+
 template <std::size_t N>
 Eigen::Matrix<double, N, 1> numbers_from_json(const nlohmann::json& json, const char* what, const std::string& where) {
   if (!json.is_array() || json.size() != N) throw IoError(fmt::format("{}: {} is expected", where, what));
   Eigen::Matrix<double, N, 1> v;
-  for (std::size_t i = 0; i < N; ++i) v[static_cast<Eigen::Index>(i)] = json_number(json[i], where);
+  for (std::size_t i = 0; i < N; ++i) v[static_cast<Eigen::Index>(i)] = pose_number(json[i], where);
   return v;
 }
 
@@ -50,7 +59,7 @@ Eigen::Quaterniond rotation_from_json(const nlohmann::json& json, const std::str
     return Eigen::Quaterniond(q[3], q[0], q[1], q[2]).normalized();
   }
   const Vec3 axis = numbers_from_json<3>(json_member(json, "axis", where), "three numbers [x, y, z]", where + ", \"axis\"");
-  const double degrees = json_number(json_member(json, "degrees", where), where + ", \"degrees\"");
+  const double degrees = pose_number(json_member(json, "degrees", where), where + ", \"degrees\"");
   if (!(axis.norm() > 1e-12)) throw IoError(where + ", \"axis\": the zero vector is no axis");
   return Eigen::Quaterniond(Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis.normalized()));
 }
@@ -81,7 +90,7 @@ Pose pose_from_json(const nlohmann::json& json, const Skeleton& skeleton, const 
     pose.rolls.assign(skeleton.bones.size(), 0);
     for (const auto& [name, value] : object_member(json, "roll", where).items())
       pose.rolls[index_of(skeleton.bones, name, "bone", where + ", \"roll\"")] =
-          json_number(value, fmt::format("{}, \"roll\", \"{}\"", where, name)) * std::numbers::pi / 180;
+          pose_number(value, fmt::format("{}, \"roll\", \"{}\"", where, name)) * std::numbers::pi / 180;
   }
   return pose;
 }
@@ -95,7 +104,7 @@ PoseAnimation animation_from_json(const nlohmann::json& json, const Skeleton& sk
   for (const nlohmann::json& entry : json_array(json["frames"], where + ": \"frames\"")) {
     const std::string here = fmt::format("{}: frames[{}]", where, animation.frames.size());
     check_keys(entry, {"time", "name", "pose"}, here);
-    const double time = json_number(json_member(entry, "time", here), here + ", \"time\"");
+    const double time = pose_number(json_member(entry, "time", here), here + ", \"time\"");
     if (!animation.frames.empty() && !(time > animation.frames.back().time))
       throw IoError(fmt::format("{}, \"time\": {} is not after the frame before, {}; times must grow", here, time, animation.frames.back().time));
     PoseFrame frame{time, pose_from_json(json_member(entry, "pose", here), skeleton, here + ", \"pose\"")};
