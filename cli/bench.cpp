@@ -28,7 +28,7 @@ struct Arguments {
 bool is_one_of(const std::string& name, std::initializer_list<const char*> names) { return std::find(names.begin(), names.end(), name) != names.end(); }
 bool needs_mesh(const std::string& stage) { return is_one_of(stage, {"vsm", "spd_rays", "metro", "segment", "encode", "snap"}); }
 bool needs_two(const std::string& stage) { return is_one_of(stage, {"morph", "transfer"}); }
-bool is_config(const std::string& path) { return path.ends_with(".json"); }
+bool is_config(const std::string& path) { return has_ending(path, ".json"); }
 
 /// What the stages are made from: the models given, or the project's own. Read and encoded when a stage asks for them.
 class Inputs {

@@ -18,7 +18,7 @@ struct Arguments {
   std::vector<std::string> bones;
 };
 
-Skeleton skeleton_of(const std::string& path) { return path.ends_with(".exr") ? read_model(path).skeleton : read_skeleton(path); }
+Skeleton skeleton_of(const std::string& path) { return has_ending(path, ".exr") ? read_model(path).skeleton : read_skeleton(path); }
 
 void run(const Arguments& arguments) {
   const BonePairs given = parse_bone_pairs(arguments.bones);

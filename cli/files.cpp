@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
@@ -49,7 +50,7 @@ std::vector<NamedFile> named_files(const CLI::App& command) {
 
 void check_ending(const NamedFile& file) {
   const std::vector<std::string>& endings = file.declaration->endings;
-  if (endings.empty() || std::any_of(endings.begin(), endings.end(), [&](const std::string& ending) { return file.path.ends_with(ending); })) return;
+  if (endings.empty() || std::any_of(endings.begin(), endings.end(), [&](const std::string& ending) { return has_ending(file.path, ending); })) return;
   std::string list;
   for (std::size_t i = 0; i < endings.size(); ++i) list += (i == 0 ? "" : i + 1 == endings.size() ? " or " : ", ") + endings[i];
   throw CLI::ValidationError(file.name, fmt::format("\"{}\" must end in {}, which says what is written", file.path, list));
@@ -96,6 +97,12 @@ CLI::Option* declare_text_output(CLI::App& command, CLI::Option* option) {
 }
 
 const std::vector<FileOption>& files_of(const CLI::App& command) { return declarations()[&command]; }
+
+bool has_ending(const std::string& path, const std::string& ending) {
+  std::string lower = path;
+  for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return lower.ends_with(ending);
+}
 
 std::string option_name(const CLI::Option& option) { return option.get_lnames().empty() ? option.get_name(true) : "--" + option.get_lnames().front(); }
 

@@ -26,6 +26,8 @@ CLI::Option* declare_text_output(CLI::App& command, CLI::Option* option);
 /// In the order of their declaration.
 const std::vector<FileOption>& files_of(const CLI::App& command);
 
+/// \param ending  with its dot, in lower case; the path's may be in capitals
+bool has_ending(const std::string& path, const std::string& ending);
 /// As messages name it: "MESH", "--output".
 std::string option_name(const CLI::Option& option);
 

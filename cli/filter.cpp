@@ -62,7 +62,7 @@ double usual_size(const std::vector<float>& values) {
 
 /// Writes the mesh with normals, the mean curvature as a property, and colours.
 void run_curvature(const Arguments& arguments) {
-  if (!arguments.output.ends_with(".ply")) throw CLI::ValidationError("--output", fmt::format("\"{}\" must end in .ply: curvature is a mesh with values", arguments.output));
+  if (!has_ending(arguments.output, ".ply")) throw CLI::ValidationError("--output", fmt::format("\"{}\" must end in .ply: curvature is a mesh with values", arguments.output));
   const SkeletexModel stored = read_model(arguments.model);
   ClContext& context = open_device(arguments.device);
   Stopwatch watch;

@@ -23,9 +23,9 @@ struct Arguments {
 };
 
 void run(const Arguments& arguments) {
-  if (arguments.has_levels && !arguments.output.ends_with(".exr"))
+  if (arguments.has_levels && !has_ending(arguments.output, ".exr"))
     throw CLI::ValidationError("--output", fmt::format("\"{}\" must end in .skx.exr: levels are one model with several parts", arguments.output));
-  if (arguments.is_half && !arguments.output.ends_with(".exr")) throw CLI::ValidationError("--output", fmt::format("\"{}\" must end in .skx.exr: half floats are those of a model", arguments.output));
+  if (arguments.is_half && !has_ending(arguments.output, ".exr")) throw CLI::ValidationError("--output", fmt::format("\"{}\" must end in .skx.exr: half floats are those of a model", arguments.output));
   const SkeletexModel model = read_model(arguments.model);
   ClContext& context = open_device(arguments.device);
   Stopwatch watch;

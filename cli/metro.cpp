@@ -61,7 +61,7 @@ void write_coloured(const std::string& path, const TriangleMesh& mesh, const std
 }
 
 void run(const Arguments& arguments) {
-  if (!arguments.ply.empty() && !arguments.ply.ends_with(".ply"))
+  if (!arguments.ply.empty() && !has_ending(arguments.ply, ".ply"))
     throw CLI::ValidationError("--ply", "\"" + arguments.ply + "\" does not end in .ply");
   const TriangleMesh a = load_surface(arguments.a), b = load_surface(arguments.b);
   ClContext& context = open_device(arguments.device);

@@ -23,7 +23,7 @@ struct Arguments {
 };
 
 void run(const Arguments& arguments) {
-  const Skeleton skeleton = arguments.input.ends_with(".json") ? read_skeleton(arguments.input) : read_model(arguments.input).skeleton;
+  const Skeleton skeleton = has_ending(arguments.input, ".json") ? read_skeleton(arguments.input) : read_model(arguments.input).skeleton;
   Json frames = Json::array();
   for (int i = 0; i < arguments.frames; ++i) {
     const Pose pose = make_random_pose(skeleton, arguments.degrees * std::numbers::pi / 180, arguments.seed + static_cast<std::uint64_t>(i));

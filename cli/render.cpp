@@ -42,7 +42,7 @@ struct Arguments {
   bool is_flat = false, has_wires = false, shows_skeleton = false, is_distance_dropped = false;
 };
 
-bool is_model(const std::string& path) { return path.ends_with(".exr"); }
+bool is_model(const std::string& path) { return has_ending(path, ".exr"); }
 
 std::array<int, 2> parse_picture_size(const std::string& text) {
   std::array<int, 2> size{0, 0};
@@ -65,7 +65,7 @@ Vec3 parse_direction(const char* option, const std::string& text) {
   for (int axis = 0; axis < 3; ++axis) {
     const auto [rest, code] = std::from_chars(at, end, v[axis]);
     const bool is_last = axis == 2;
-    if (code != std::errc() || !std::isfinite(v[axis]) || (is_last ? rest != end : rest == end || *rest != ','))
+    if (code != std::errc() || !(std::abs(v[axis]) <= 1e15) || (is_last ? rest != end : rest == end || *rest != ','))
       throw CLI::ValidationError(option, "\"" + text + "\" is no direction; give x,y,z, e.g. 0,1,0");
     at = rest + 1;
   }
@@ -175,7 +175,7 @@ SurfacePaint paint_of(const Arguments& arguments, const Subject& subject, ClCont
 }
 
 void write_picture(const std::string& path, const Image& image) {
-  if (path.ends_with(".exr")) write_exr_image(path, image);
+  if (has_ending(path, ".exr")) write_exr_image(path, image);
   else write_png(path, image);
 }
 
@@ -213,7 +213,7 @@ void pose_surface(GlContext& gl, ClContext& context, const Arguments& arguments,
 
 void run(Arguments arguments, const CLI::App& command) {
   nlohmann::json own_view;
-  if (arguments.input.ends_with(".json")) {
+  if (has_ending(arguments.input, ".json")) {
     const ModelConfig config = read_model_config(arguments.input);
     own_view = config.view;
     check_named_input(command, config.mesh.string(), "the mesh of " + arguments.input);

@@ -12,7 +12,7 @@
 namespace skeletex::cli {
 namespace {
 
-bool is_model(const std::string& path) { return path.ends_with(".exr"); }
+bool is_model(const std::string& path) { return has_ending(path, ".exr"); }
 
 }  // namespace
 

@@ -95,7 +95,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
     source["models"].push_back({{"name", model.name}, {"mesh", model.mesh.string()}, {"skeleton", model.skeleton.string()}, {"view", OrderedJson(model.view)}});
   };
   if (!arguments.mesh.empty()) add_model({fs::path(arguments.mesh).stem().string(), arguments.mesh, arguments.skeleton, "", nlohmann::json()});
-  for (const std::string& model : arguments.models) add_model(find_model(model, model.ends_with(".json") ? "." : fs::path(arguments.config).parent_path() / "experiments"));
+  for (const std::string& model : arguments.models) add_model(find_model(model, has_ending(model, ".json") ? "." : fs::path(arguments.config).parent_path() / "experiments"));
   Json report = Json::array();
   int failed = 0;
   for (const fs::path& file : experiment_files(arguments.config)) {
@@ -113,7 +113,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
   if (failed > 0) throw CLI::RuntimeError(kExitBad);
 }
 
-void replay(const ReplayArguments& arguments) {
+void replay(const ReplayArguments& arguments, const CLI::App& command) {
   const fs::path path = fs::is_directory(arguments.record) ? fs::path(arguments.record) / "record.json" : fs::path(arguments.record);
   const auto load = [](const fs::path& file) {
     const std::string text = read_file(file);
@@ -125,6 +125,9 @@ void replay(const ReplayArguments& arguments) {
   const OrderedJson& source = record.at("source");
   const Experiment experiment = read_experiment(source.at("config").get<std::string>(), changes_from(source));
   const fs::path folder = arguments.output.empty() ? path.parent_path() / "replay" : fs::path(arguments.output);
+  if (is_same_file(folder, path.parent_path().empty() ? "." : path.parent_path()))
+    throw CLI::ValidationError("--output", fmt::format("\"{}\" holds RECORD, which would be lost; name another folder", folder.string()));
+  check_results(command, experiment, folder);
   const RunSummary summary =
       run_with_bar(experiment, {.program = "", .folder = folder, .is_resumed = false, .jobs = arguments.jobs, .device = arguments.device, .source = source, .progress = {}});
   const std::vector<std::string> differences = compare_results(expected, summary.results, arguments.tolerance);
@@ -173,7 +176,7 @@ void add_replay_command(CLI::App& program) {
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer("Example:\n  skeletex replay results/fidelity\nTimes and memory (columns that end in _ms, _s, _mb) are not compared.");
-  command.callback([arguments] { replay(*arguments); });
+  command.callback([arguments, &command] { replay(*arguments, command); });
 }
 
 }  // namespace skeletex::cli

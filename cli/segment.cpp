@@ -22,7 +22,7 @@ struct Arguments {
 };
 
 void run(const Arguments& arguments) {
-  if (!arguments.output.ends_with(".ply"))
+  if (!has_ending(arguments.output, ".ply"))
     throw CLI::ValidationError("--output", "\"" + arguments.output + "\" does not end in .ply, which carries the colours");
   TriangleMesh mesh = load_mesh(arguments.mesh);
   const Skeleton skeleton = read_skeleton(arguments.skeleton);

@@ -384,6 +384,8 @@ TEST_F(Program, WritesSmallerModelsAndChainsOfLevels) {
   expect_refused(1, {"reconstruct", "cut.skx.exr", "-o", "no.ply"}, {"cut.skx.exr", "ends early"});
   expect_refused(1, {"reconstruct", "levels.skx.exr", "--level", "3", "-o", "no.ply"}, {"no level 3", "levels 0 to 2"});
   expect_refused(1, {"reconstruct", "y.skx.exr", "--level", "1", "-o", "no.ply"}, {"no level 1", "level 0 alone"});
+  ASSERT_EQ(run({"lod", "y.skx.exr", "--size", "32", "-o", "y32.SKX.EXR"}).code, 0);
+  fs::remove(folder_ / "y32.SKX.EXR");
   expect_refused(2, {"lod", "y.skx.exr", "--levels", "-o", "no.ply"}, {".skx.exr"});
   expect_refused(2, {"lod", "y.skx.exr", "-o", "no.ply"}, {"--size", "--levels"});
 }
@@ -580,6 +582,7 @@ TEST_F(Program, DrawsModelsAndMeshesInEveryMode) {
   expect_refused(2, {"render", "y.ply", "-o", "a.png", "--size", "64"}, {"1200x900"});
   expect_refused(2, {"render", "y.ply", "-o", "a.png", "--background", "whitish"}, {"#rrggbb"});
   expect_refused(2, {"render", "y.ply", "-o", "a.png", "--up", "0,1"}, {"0,1,0"});
+  expect_refused(2, {"render", "y.ply", "-o", "a.png", "--up", "1e300,1e300,0"}, {"--up"});
   expect_refused(1, {"render", "y.ply", "-o", "no/a.png"}, {"no/a.png"});
   std::ofstream(folder_ / "view.json") << R"({"azimut": 3})";
   expect_refused(1, {"render", "y.ply", "-o", "a.png", "--camera", "view.json"}, {"view.json", "azimut"});
@@ -602,6 +605,9 @@ TEST_F(Program, RunsAnExperimentOnTheUsersOwnModelResumesAndReplaysIt) {
   const Outcome again = run({"replay", "out/e", "--json", "replay.json"});
   EXPECT_EQ(again.code, 0) << again.err << again.out;
   EXPECT_EQ(nlohmann::json::parse(text_of(folder_ / "replay.json")).at("differences").size(), 0u);
+  const std::string record = text_of(folder_ / "out/e/record.json");
+  expect_refused(2, {"replay", "out/e/record.json", "-o", "out/e"}, {"out/e", "RECORD"});
+  EXPECT_EQ(text_of(folder_ / "out/e/record.json"), record);
   expect_refused(1, {"run", "e.json", "--set", "swep.size=1"}, {"swep", "did you mean sweep?"});
   expect_refused(1, {"run", "absent.json"}, {"absent.json"});
   expect_refused(2, {"run", "e.json", "--mesh", "y.ply"}, {"--skeleton"});

@@ -144,6 +144,10 @@ TEST_F(CommandFiles, OutputsEndAsTheyAreWrittenAndOnlyTextGoesToStandardOutput) 
       const std::string said = complaint(arguments(*command, {{output.option, (folder_ / "result.doc").string()}}));
       for (const std::string& ending : output.endings) EXPECT_NE(said.find(ending), std::string::npos) << command->get_name() << ": " << said;
       for (const std::string& ending : output.endings) EXPECT_EQ(complaint(arguments(*command, {{output.option, (folder_ / ("result" + ending)).string()}})), "") << command->get_name();
+      for (std::string ending : output.endings) {
+        for (char& c : ending) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+        EXPECT_EQ(complaint(arguments(*command, {{output.option, (folder_ / ("result" + ending)).string()}})), "") << command->get_name();
+      }
     }
   EXPECT_GE(outputs, 8);
   EXPECT_EQ(folder_.file_count(), 0);
