@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "deform_option.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
+
+#include "skeletex/model/error.h"
 
 namespace skeletex::cli {
 namespace {
@@ -21,9 +25,19 @@ CLI::Option* add_deform_option(CLI::App& command, std::string& value) {
   return option;
 }
 
+void add_polish_option(CLI::App& command, bool& value, CLI::Option* pose) {
+  command.add_flag("--polish", value, "smooth the surface where the pose has folded it")->needs(pose);
+}
+
 void check_distance_option(bool is_distance_dropped, const std::string& word) {
   if (is_distance_dropped && deformation_of(word) == Deformation::kSmooth)
     throw CLI::ValidationError("--no-distance", "smooth poses restore no distances to the bones; add --deform paper or --deform coordinates");
+}
+
+int bone_by_name(const Skeleton& skeleton, const std::string& name) {
+  const auto found = std::find_if(skeleton.bones.begin(), skeleton.bones.end(), [&](const Bone& bone) { return bone.name == name; });
+  if (found == skeleton.bones.end()) throw InputError(fmt::format("the skeleton has no bone \"{}\"; `skeletex inspect` lists them", name));
+  return static_cast<int>(found - skeleton.bones.begin());
 }
 
 Deformation deformation_of(const std::string& word) {

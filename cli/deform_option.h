@@ -9,9 +9,14 @@ namespace skeletex::cli {
 
 /// --deform smooth, coordinates or paper.
 CLI::Option* add_deform_option(CLI::App& command, std::string& value);
+/// --polish.
+void add_polish_option(CLI::App& command, bool& value, CLI::Option* pose);
 /// Refuses --no-distance with the smooth rule, which restores no distances. \throw CLI::ValidationError
 void check_distance_option(bool is_distance_dropped, const std::string& word);
 /// \pre one of the option's words
 Deformation deformation_of(const std::string& word);
+
+/// \throw InputError when the skeleton has no bone of that name
+int bone_by_name(const Skeleton& skeleton, const std::string& name);
 
 }  // namespace skeletex::cli

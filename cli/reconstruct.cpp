@@ -16,6 +16,7 @@
 #include "skeletex/measure/deformation.h"
 #include "skeletex/model/error.h"
 #include "deform_option.h"
+#include "skeletex/reconstruct/polish.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 
@@ -27,7 +28,7 @@ struct Arguments {
   int size = 0, level = 0;
   std::optional<double> time, constant_offset;  ///< the offset in diagonals
   std::vector<std::string> bones;
-  bool is_distance_dropped = false, has_no_report = false;
+  bool is_distance_dropped = false, has_no_report = false, is_polished = false;
 };
 
 /// What a pose does to the surface, in words and for the JSON.
@@ -47,18 +48,14 @@ PoseReport report_pose(const TriangleMesh& bind, const TriangleMesh& posed) {
            {"energy_99", report.energy_99}}};
 }
 
-std::vector<int> bones_by_name(const SkeletexModel& model, const std::vector<std::string>& names) {
-  std::vector<int> result;
-  for (const std::string& name : names) {
-    const auto& bones = model.skeleton.bones;
-    const auto found = std::find_if(bones.begin(), bones.end(), [&](const Bone& bone) { return bone.name == name; });
-    if (found == bones.end()) throw InputError(fmt::format("the skeleton has no bone \"{}\"; `skeletex inspect` lists them", name));
-    result.push_back(static_cast<int>(found - bones.begin()));
-  }
-  return result;
+std::vector<int> bones_by_name(const Skeleton& skeleton, const std::vector<std::string>& names) {
+  std::vector<int> bones;
+  for (const std::string& name : names) bones.push_back(bone_by_name(skeleton, name));
+  return bones;
 }
 
 void run(const Arguments& arguments) {
+  if (arguments.constant_offset && arguments.is_polished) throw CLI::ValidationError("--polish", "--constant-offset writes no surface that could be polished");
   if (!arguments.constant_offset) check_distance_option(arguments.is_distance_dropped, arguments.deform);
   Stopwatch total, watch;
   SkeletexModel model = read_model(arguments.model, arguments.level);
@@ -73,6 +70,7 @@ void run(const Arguments& arguments) {
   double resample_ms = 0, reconstruct_ms = 0, write_ms = 0;
   TriangleMesh mesh;
   std::optional<PoseReport> pose_report;
+  std::optional<PolishReport> polish_report;
   {
     ProgressBar bar;
     if (arguments.size > 0 && arguments.size != std::max(model.texture.width, model.texture.height)) {
@@ -84,9 +82,13 @@ void run(const Arguments& arguments) {
     const DistanceRule rule = arguments.is_distance_dropped ? DistanceRule::kFromFoot : DistanceRule::kFromBone;
     if (arguments.constant_offset) {
       const Skeleton& skeleton = posed ? *posed : model.skeleton;
-      mesh = constant_offset_mesh(context, model, skeleton, bones_by_name(model, arguments.bones), *arguments.constant_offset * model.diagonal, rule);
+      mesh = constant_offset_mesh(context, model, skeleton, bones_by_name(model.skeleton, arguments.bones), *arguments.constant_offset * model.diagonal, rule);
     } else {
       mesh = posed ? reconstruct_mesh(context, model, *posed, {deformation_of(arguments.deform), rule}) : reconstruct_mesh(context, model);
+    }
+    if (arguments.is_polished) {
+      bar.show("polishing", 0.5);
+      polish_report = polish_pose(reconstruct_mesh(context, model), mesh.positions);
     }
     reconstruct_ms = watch.lap_ms();
     bar.show("writing", 0.7);
@@ -98,10 +100,15 @@ void run(const Arguments& arguments) {
     }
   }
   const double total_ms = total.lap_ms();
+  std::string pose_text;
+  if (polish_report)
+    pose_text = fmt::format("polish: {} new folds became {}, {} vertices moved by up to {:.2g} diagonals\n", polish_report->folds_before, polish_report->folds_after,
+                            polish_report->moved_vertices, polish_report->farthest / model.diagonal);
+  if (pose_report) pose_text += pose_report->text;
   print(arguments.json, fmt::format("{} vertices, {} triangles from {} x {} texels, on {}\n"
                                     "read {:.0f} ms, device {:.0f} ms, resample {:.0f} ms, reconstruct {:.0f} ms, write {:.0f} ms\n{}{}\n",
                                     mesh.positions.size(), mesh.triangles.size(), model.texture.width, model.texture.height, context.device().name,
-                                    read_ms, start_ms, resample_ms, reconstruct_ms, write_ms, pose_report ? pose_report->text : "", arguments.output));
+                                    read_ms, start_ms, resample_ms, reconstruct_ms, write_ms, pose_text, arguments.output));
   Json json{{"vertices", mesh.positions.size()},
                               {"triangles", mesh.triangles.size()},
                               {"size", {model.texture.width, model.texture.height}},
@@ -115,6 +122,12 @@ void run(const Arguments& arguments) {
                               {"device", context.device().name},
                               {"kernels", profile_json(context)}};
   if (pose_report) json["pose"] = pose_report->json;
+  if (polish_report)
+    json["polish"] = {{"new_folds_before", polish_report->folds_before},
+                      {"new_folds", polish_report->folds_after},
+                      {"rounds", polish_report->rounds},
+                      {"moved_vertices", polish_report->moved_vertices},
+                      {"farthest", polish_report->farthest / model.diagonal}};
   write_json(arguments.json, json);
 }
 
@@ -135,6 +148,7 @@ void add_reconstruct_command(CLI::App& program) {
   command.add_option("--time", arguments->time, "time in the animation (default: its first frame)")->check(any_number())->type_name("T")->needs(pose);
   add_deform_option(command, arguments->deform)->needs(pose);
   command.add_flag("--no-distance", arguments->is_distance_dropped, "with --deform paper or coordinates: do not restore the distances to the bones")->needs(pose);
+  add_polish_option(command, arguments->is_polished, pose);
   command.add_flag("--no-report", arguments->has_no_report, "do not measure what the pose does to the surface")->needs(pose);
   CLI::Option* offset = command
                             .add_option("--constant-offset", arguments->constant_offset,

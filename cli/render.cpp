@@ -19,8 +19,10 @@
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/measure/metro.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/polish.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/reconstruct/skin.h"
 #include "skeletex/render/colours.h"
 #include "skeletex/render/draw.h"
 #include "skeletex/render/gpu_model.h"
@@ -34,12 +36,12 @@ namespace {
 constexpr int kCheckerCells = 24;
 
 struct Arguments {
-  std::string deform = "smooth", input, output, skeleton, pose, camera, against, device, gl_device, json, up, front;
+  std::string deform = "smooth", input, output, skeleton, pose, camera, against, device, gl_device, json, up, front, bone;
   std::string mode = "shaded", size = "1200x900", background = "white";
   std::optional<double> time, azimuth, elevation, fov, zoom;
   double error_max = 0;
   int lattice = 0, views = 1, samples = 2;
-  bool is_flat = false, has_wires = false, shows_skeleton = false, is_distance_dropped = false;
+  bool is_flat = false, has_wires = false, shows_skeleton = false, is_distance_dropped = false, is_polished = false;
 };
 
 bool is_model(const std::string& path) { return has_ending(path, ".exr"); }
@@ -142,6 +144,10 @@ struct ErrorScale {
   double highest = 0;                 ///< of the diagonal
 };
 
+Skin skin_of(ClContext& context, const SkeletexModel& model) {
+  return make_skin(context, model, displace_inner(context, model, Walls(model.skeleton), number_lattice(model)));
+}
+
 SurfacePaint paint_of(const Arguments& arguments, const Subject& subject, ClContext& context, ErrorScale& scale) {
   SurfacePaint paint;
   if (arguments.mode == "segments") {
@@ -154,6 +160,12 @@ SurfacePaint paint_of(const Arguments& arguments, const Subject& subject, ClCont
   } else if (arguments.mode == "checker") {
     paint.paint = Paint::kChecker;
     paint.corner_uv = gl_buffer(checker_coordinates(*subject.model, number_lattice(*subject.model), subject.mesh, kCheckerCells));
+  } else if (arguments.mode == "weights") {
+    const int bone = bone_by_name(subject.model->skeleton, arguments.bone);
+    std::vector<VertexColour> colours;
+    for (const float weight : vertex_weights(skin_of(context, *subject.model), bone)) colours.push_back(viridis(weight));
+    paint.paint = Paint::kVertex;
+    paint.colours = upload_colours(colours);
   } else if (arguments.mode == "error") {
     const TriangleMesh other = load_mesh(arguments.against);
     const double diagonal = bounding_box(other).diagonal();
@@ -183,6 +195,7 @@ void check_arguments(const Arguments& arguments) {
   check_distance_option(arguments.is_distance_dropped, arguments.deform);
   const bool is_texture = arguments.mode == "map" || arguments.mode == "layout";
   if (!is_model(arguments.input)) {
+    if (arguments.mode == "weights") throw CLI::ValidationError("--mode", "weights are a model's; a mesh has none");
     if (is_texture || arguments.mode == "checker") throw CLI::ValidationError("--mode", arguments.mode + " shows a model's texture; a mesh has none");
     if (!arguments.pose.empty()) throw CLI::ValidationError("--pose", "only a model can be posed; encode the mesh first");
     if (arguments.lattice > 0) throw CLI::ValidationError("--lattice", "only a model has a lattice");
@@ -191,6 +204,7 @@ void check_arguments(const Arguments& arguments) {
   } else if (!arguments.skeleton.empty()) {
     throw CLI::ValidationError("--skeleton", "a model brings its own skeleton; --show-skeleton draws it");
   }
+  if (arguments.bone.empty() == (arguments.mode == "weights")) throw CLI::ValidationError("--mode", "weights and --bone need each other: how much the bone moves the surface");
   if (arguments.mode == "error" && arguments.against.empty()) throw CLI::ValidationError("--mode", "error needs the mesh to measure --against");
 }
 
@@ -199,6 +213,12 @@ void pose_surface(GlContext& gl, ClContext& context, const Arguments& arguments,
   const SkeletexModel& model = *subject.model;
   const Deformation deformation = deformation_of(arguments.deform);
   const DistanceRule distance = arguments.is_distance_dropped ? DistanceRule::kFromFoot : DistanceRule::kFromBone;
+  if (arguments.is_polished) {
+    TriangleMesh posed = reconstruct_mesh(context, model, *subject.skeleton, {deformation, distance});
+    polish_pose(subject.mesh, posed.positions);
+    surface = upload_surface(gl, posed);
+    return;
+  }
   if (arguments.pose.empty() || deformation == Deformation::kPaper) {
     displace(gl, upload_model(model), model, *subject.skeleton, distance, surface);
     return;
@@ -207,7 +227,7 @@ void pose_surface(GlContext& gl, ClContext& context, const Arguments& arguments,
     surface = upload_surface(gl, reconstruct_mesh(context, model, *subject.skeleton, {deformation, distance}));
     return;
   }
-  const Skin skin = make_skin(context, model, displace_inner(context, model, Walls(model.skeleton), number_lattice(model)));
+  const Skin skin = skin_of(context, model);
   pose_skin(gl, upload_skin(skin, subject.mesh), skin, bone_motions(model.skeleton, *subject.skeleton), *subject.skeleton, surface);
 }
 
@@ -253,7 +273,7 @@ void run(Arguments arguments, const CLI::App& command) {
   }
   DrawOptions options{.width = width, .height = height, .samples = arguments.samples, .is_flat = arguments.is_flat};
   if (arguments.has_wires) options.wire_pixels = 0.45;
-  if (arguments.mode == "error") options.lighting = 0.55;
+  if (arguments.mode == "error" || arguments.mode == "weights") options.lighting = 0.55;
   const bool shows_skeleton = subject.skeleton && (arguments.shows_skeleton || (!arguments.skeleton.empty() && arguments.mode != "segments"));
   std::vector<Image> images;
   for (int i = 0; i < arguments.views; ++i) {
@@ -304,8 +324,9 @@ void add_render_command(CLI::App& program) {
   CLI::App& command = *program.add_subcommand("render", "Draw a model or a mesh to a picture");
   declare_input(command, command.add_option("MODEL|MESH", arguments->input, "model (.skx.exr), mesh, or .json that names mesh, skeleton and view (configs/models)"))->required();
   declare_output(command, command.add_option("-o,--output", arguments->output, "picture: .png, or .exr for linear floats"), {".png", ".exr"})->required()->type_name("FILE");
-  const std::vector<std::string> modes{"shaded", "segments", "normals", "checker", "error", "map", "layout"};
-  take_one_of(*command.add_option("--mode", arguments->mode, "what is shown: shaded, segments, normals, checker, error, map or layout"), modes);
+  const std::vector<std::string> modes{"shaded", "segments", "normals", "checker", "error", "weights", "map", "layout"};
+  take_one_of(*command.add_option("--mode", arguments->mode, "what is shown: shaded, segments, normals, checker, error, weights, map or layout"), modes);
+  command.add_option("--bone", arguments->bone, "--mode weights: the bone, by its name")->type_name("NAME");
   command.add_flag("--flat", arguments->is_flat, "a normal per triangle");
   command.add_flag("--wireframe", arguments->has_wires, "draw the triangles' edges");
   declare_input(command, command.add_option("--skeleton", arguments->skeleton, "skeleton of a mesh: .json; drawn inside, or used by --mode segments"))->type_name("FILE");
@@ -317,6 +338,7 @@ void add_render_command(CLI::App& program) {
   command.add_option("--time", arguments->time, "time in the animation (default: its first frame)")->check(any_number())->type_name("T")->needs(pose);
   add_deform_option(command, arguments->deform)->needs(pose);
   command.add_flag("--no-distance", arguments->is_distance_dropped, "with --deform paper or coordinates: do not restore the distances to the bones")->needs(pose);
+  add_polish_option(command, arguments->is_polished, pose);
   command.add_option("--lattice", arguments->lattice, "draw a model at another texture size, 4 to 16384 texels")->check(number_in(4, 16384))->type_name("N");
   declare_input(command, command.add_option("--camera", arguments->camera, "view: .json with azimuth, elevation, fov, zoom, up, front, target, eye"))->type_name("FILE");
   command.add_option("--azimuth", arguments->azimuth, "degrees about the up axis, 0 from the front (default: 30)")->check(any_number())->type_name("DEG");

@@ -50,7 +50,7 @@ def draw_recipe(results, folder):
     return [style.save(figure, folder, "recipe")]
 
 
-POSING_RULES = [("smooth", "smooth (default)"), ("dual_quaternions", "dual quaternions, 0.05"), ("dual_quaternions_narrow", "dual quaternions, 0.025"),
+POSING_RULES = [("smooth", "smooth (default)"), ("polished", "smooth, polished"), ("dual_quaternions", "dual quaternions, 0.05"), ("dual_quaternions_narrow", "dual quaternions, 0.025"),
                 ("linear", "linear, 0.05"), ("coordinates", "coordinates"), ("paper", "paper")]
 
 
@@ -65,7 +65,7 @@ def draw_posing(results, folder):
         for k, (rule, label) in enumerate(POSING_RULES):
             heights = [max(1, row["columns"][f"{rule}_{count}"]) for row in rows]
             axis.bar([i + (k - len(POSING_RULES) / 2 + 0.5) * width for i in range(len(rows))], heights, width, color=style.SERIES[k % len(style.SERIES)][0],
-                     hatch=["", "//", "..", "\\\\", "xx", "--"][k], edgecolor="white", label=label)
+                     hatch=["", "//", "..", "\\\\", "xx", "--", "++"][k], edgecolor="white", label=label)
         axis.set_yscale("log")
         axis.set_xticks(range(len(rows)), names)
         axis.set_title(title)

@@ -256,6 +256,13 @@ TEST_F(Program, ReconstructsInPosesAndAnimations) {
     ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "animation.json", "--time", time}).code, 0);
     EXPECT_LT(difference(positions("again.ply"), positions(same)), 1e-5) << time;
   }
+  const nlohmann::json polished = json_of({"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "pose.json", "--polish"});
+  EXPECT_EQ(polished.at("polish").at("new_folds"), polished.at("pose").at("new_folds"));
+  EXPECT_LE(polished.at("polish").at("new_folds"), polished.at("polish").at("new_folds_before"));
+  ASSERT_EQ(run({"render", "y.skx.exr", "-o", "again.png", "--pose", "pose.json", "--polish", "--size", "64x64"}).code, 0);
+  expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--polish"}, {"--pose"});
+  expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--pose", "pose.json", "--polish", "--constant-offset", "0.1"}, {"--polish"});
+  fs::remove(folder_ / "again.png");
   ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "pose.json", "--deform", "paper"}).code, 0);
   const auto kept = positions("again.ply");
   EXPECT_GT(difference(kept, positions("posed.ply")), 1e-3);

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/polish.h"
 
 namespace skeletex {
 namespace {
@@ -85,8 +86,8 @@ TEST(Deformation, AddedBendIsThatOfTheChosenEdges) {
   const auto bent = moved(bind.mesh, [&](const Vec3& p) -> Vec3 {
     return p.x() > 1.5 ? Vec3(Vec3(1, 0, 0) + Eigen::AngleAxisd(angle, Vec3::UnitZ()) * (p - Vec3(1, 0, 0))) : p;
   });
-  std::vector<bool> middle, none(bind.edges.size(), false);
-  for (const auto& [a, b] : bind.edges) middle.push_back(a / 4 == 1 && b / 4 == 1);
+  std::vector<bool> middle, none(bind.edges.vertices.size(), false);
+  for (const auto& [a, b] : bind.edges.vertices) middle.push_back(a / 4 == 1 && b / 4 == 1);
   const double most = added_bend(bind, bent, middle, 1);
   EXPECT_GT(most, 15);
   EXPECT_LT(most, 45);
@@ -97,6 +98,63 @@ TEST(Deformation, AddedBendIsThatOfTheChosenEdges) {
 TEST(Deformation, AnotherMeshIsRefused) {
   const BindSurface bind = make_bind_surface(tube(3, 4, 1, 2));
   EXPECT_THROW(measure_deformation(bind, tube(4, 4, 1, 2).positions), InputError);
+}
+
+TEST(Polish, TakesFoldsAwayAndLeavesTheRest) {
+  // One vertex in the middle of a bent tube is pulled over its neighbours.
+  const TriangleMesh bind = tube(17, 24, 1, 8);
+  const auto posed = moved(bind, [](const Vec3& p) -> Vec3 { return p.x() > 4 ? Vec3(Vec3(4, 0, 0) + Eigen::AngleAxisd(0.4, Vec3::UnitZ()) * (p - Vec3(4, 0, 0))) : p; });
+  std::vector<Vec3> folded = posed, polished;
+  const int pulled = 4 * 24 + 3;
+  folded[pulled] += Vec3(1.3, 0, 0);
+  polished = folded;
+  const PolishReport report = polish_pose(bind, polished);
+  EXPECT_GT(report.folds_before, 0);
+  EXPECT_EQ(report.folds_after, 0);
+  EXPECT_EQ(measure_deformation(make_bind_surface(bind), polished).new_folds, 0);
+  EXPECT_LT((polished[pulled] - posed[pulled]).norm(), 0.6);
+  std::size_t moved_vertices = 0;
+  for (std::size_t v = 0; v < folded.size(); ++v) {
+    moved_vertices += polished[v] != folded[v];
+    if ((bind.positions[v] - bind.positions[pulled]).norm() > 3) {
+      EXPECT_EQ(polished[v], folded[v]) << v;
+    }
+  }
+  EXPECT_EQ(report.moved_vertices, moved_vertices);
+  EXPECT_GT(report.farthest, 0.1);
+}
+
+TEST(Polish, APoseWithoutFoldsStaysAsItIs) {
+  const TriangleMesh bind = tube(9, 12, 1, 8);
+  const auto posed = moved(bind, [](const Vec3& p) -> Vec3 { return Eigen::AngleAxisd(1.2, Vec3::UnitZ()) * p + Vec3(0, 3, 0); });
+  std::vector<Vec3> polished = posed;
+  const PolishReport report = polish_pose(bind, polished);
+  EXPECT_EQ(polished, posed);
+  EXPECT_EQ(report.moved_vertices, 0u);
+  EXPECT_EQ(report.rounds, 0);
+}
+
+TEST(Polish, NeverMakesFoldsOrIntersectionsMore) {
+  // Vertices thrown about: folds and intersections everywhere.
+  const TriangleMesh bind = tube(17, 24, 1, 8);
+  const BindSurface surface = make_bind_surface(bind);
+  for (const double size : {0.2, 0.4, 0.8}) {
+    std::uint32_t state = 7;
+    const auto next = [&] { return (state = state * 1664525u + 1013904223u) / 4294967296.0 - 0.5; };
+    const auto thrown = moved(bind, [&](const Vec3& p) -> Vec3 { return p.x() > 3 && p.x() < 5 ? Vec3(p + size * Vec3(next(), next(), next())) : p; });
+    std::vector<Vec3> polished = thrown;
+    const PolishReport report = polish_pose(bind, polished);
+    const DeformationReport before = measure_deformation(surface, thrown), after = measure_deformation(surface, polished);
+    EXPECT_EQ(before.new_folds, report.folds_before);
+    EXPECT_EQ(after.new_folds, report.folds_after);
+    EXPECT_LE(after.new_folds, before.new_folds);
+    EXPECT_LE(after.new_intersections, before.new_intersections);
+  }
+}
+
+TEST(Polish, AnotherMeshIsRefused) {
+  std::vector<Vec3> positions = tube(4, 4, 1, 2).positions;
+  EXPECT_THROW(polish_pose(tube(3, 4, 1, 2), positions), InputError);
 }
 
 }  // namespace

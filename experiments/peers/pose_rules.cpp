@@ -7,12 +7,14 @@
 
 #include "peers/skinning.h"
 #include "skeletex/io/atomic_file.h"
+#include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/pose_file.h"
 #include "skeletex/io/same_file.h"
 #include "skeletex/measure/deformation.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/lattice.h"
+#include "skeletex/reconstruct/polish.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/skin.h"
@@ -41,8 +43,9 @@ std::vector<int> own_bones(const SkeletexModel& model) {
   return own;
 }
 
-void measure(Rule& rule, const BindSurface& bind, const std::vector<bool>& is_seam, const PoseFrame& frame, const Skeleton& posed) {
+void measure(Rule& rule, const BindSurface& bind, const std::vector<bool>& is_seam, const PoseFrame& frame, const Skeleton& posed, const std::string& folder) {
   const std::vector<Vec3> positions = rule.pose(posed);
+  if (!folder.empty()) write_mesh(fmt::format("{}/{}.{}.ply", folder, frame.name, rule.name), {positions, bind.mesh.triangles});
   const DeformationReport report = measure_deformation(bind, positions);
   const double bend = added_bend(bind, positions, is_seam, 0.99);
   rule.poses.push_back({{"time", frame.time},
@@ -69,18 +72,23 @@ int poses_not_worse(const Rule& rule, const Rule& other) {
   return count;
 }
 
-Json run(const std::string& model_path, const std::string& pose_path, const std::string& device) {
+Json run(const std::string& model_path, const std::string& pose_path, const std::string& device, const std::string& folder) {
   const SkeletexModel model = read_model(model_path);
   const PoseAnimation animation = read_animation(pose_path, model.skeleton);
   ClContext context(device);
   const BindSurface bind = make_bind_surface(reconstruct_mesh(context, model));
   const int first_seam = number_lattice(model).first_sample.empty() ? number_lattice(model).first_corner : number_lattice(model).first_sample[0];
   std::vector<bool> is_seam;
-  for (const auto& [a, b] : bind.edges) is_seam.push_back(b >= first_seam);  // vertices of seams come last
+  for (const auto& [a, b] : bind.edges.vertices) is_seam.push_back(b >= first_seam);  // vertices of seams come last
 
   std::vector<Rule> rules;
   for (const Deformation deformation : {Deformation::kSmooth, Deformation::kCoordinates, Deformation::kPaper})
     rules.push_back({to_string(deformation), [&, deformation](const Skeleton& posed) { return reconstruct_mesh(context, model, posed, {deformation}).positions; }});
+  rules.push_back({"polished", [&](const Skeleton& posed) {
+                     std::vector<Vec3> positions = reconstruct_mesh(context, model, posed).positions;
+                     polish_pose(bind.mesh, positions);
+                     return positions;
+                   }});
   const std::vector<int> own = own_bones(model);
   const auto weights = [&](double width) { return diffused_weights(bind.mesh, own, static_cast<int>(model.skeleton.bones.size()), width * model.diagonal); };
   const VertexWeights wide = weights(0.05), narrow = weights(0.025);
@@ -92,7 +100,7 @@ Json run(const std::string& model_path, const std::string& pose_path, const std:
   add_peer("dual_quaternions_narrow", skin_by_dual_quaternions, narrow);
   for (const PoseFrame& frame : animation.frames) {
     const Skeleton posed = apply_pose(model.skeleton, frame.pose);
-    for (Rule& rule : rules) measure(rule, bind, is_seam, frame, posed);
+    for (Rule& rule : rules) measure(rule, bind, is_seam, frame, posed, folder);
   }
   Json json;
   for (const Rule& rule : rules) {
@@ -117,15 +125,16 @@ int main(int argc, char** argv) {
   CLI::App program("What poses do to a model's surface by each rule of this project, and by linear and dual quaternion skinning with each vertex' own bone diffused over 0.05 "
                    "(narrow: 0.025) diagonals.",
                    "pose_rules");
-  std::string model, poses, json, device;
+  std::string model, poses, json, device, folder;
   program.add_option("MODEL", model, "model: .skx.exr")->required();
   program.add_option("POSES", poses, "animation of which each frame is a pose: .json")->required();
   program.add_option("--json", json, "write the numbers of every rule, and of every pose, to this file");
+  program.add_option("--meshes", folder, "write the mesh of every pose by every rule to this folder: POSE.RULE.ply")->check(CLI::ExistingDirectory);
   program.add_option("--device", device, "OpenCL device, as for skeletex");
   try {
     program.parse(argc, argv);
     check_not_an_input(json, {model, poses});
-    const Json result = run(model, poses, device);
+    const Json result = run(model, poses, device, folder);
     if (!json.empty()) write_text_atomically(json, result.dump(2) + "\n");
   } catch (const CLI::ParseError& error) {
     return program.exit(error) == 0 ? 0 : 2;

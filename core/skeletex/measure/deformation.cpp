@@ -24,11 +24,11 @@ std::vector<Vec3> unit_normals(const TriangleMesh& mesh, std::span<const Vec3> p
   return normals;
 }
 
-std::vector<double> bends_of(const BindSurface& bind, std::span<const Vec3> positions) {
-  const std::vector<Vec3> normals = unit_normals(bind.mesh, positions);
+std::vector<double> bends_of(const TriangleMesh& mesh, const SurfaceEdges& edges, std::span<const Vec3> positions) {
+  const std::vector<Vec3> normals = unit_normals(mesh, positions);
   std::vector<double> bends;
-  bends.reserve(bind.edges.size());
-  for (const auto& [first, second] : bind.edge_triangles)
+  bends.reserve(edges.triangles.size());
+  for (const auto& [first, second] : edges.triangles)
     bends.push_back(std::acos(std::clamp(normals[first].dot(normals[second]), -1.0, 1.0)) * 180 / std::numbers::pi);
   return bends;
 }
@@ -49,13 +49,12 @@ void check_count(const BindSurface& bind, std::span<const Vec3> positions) {
 
 }  // namespace
 
-BindSurface make_bind_surface(TriangleMesh mesh) {
-  BindSurface bind;
-  bind.mesh = std::move(mesh);
+SurfaceEdges surface_edges(const TriangleMesh& mesh) {
+  SurfaceEdges edges;
   std::vector<std::tuple<int, int, int>> sides;  // lower vertex, higher vertex, triangle
-  for (std::size_t t = 0; t < bind.mesh.triangles.size(); ++t)
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     for (int i = 0; i < 3; ++i) {
-      const auto [low, high] = std::minmax(bind.mesh.triangles[t][i], bind.mesh.triangles[t][(i + 1) % 3]);
+      const auto [low, high] = std::minmax(mesh.triangles[t][i], mesh.triangles[t][(i + 1) % 3]);
       sides.emplace_back(low, high, static_cast<int>(t));
     }
   std::sort(sides.begin(), sides.end());
@@ -63,12 +62,25 @@ BindSurface make_bind_surface(TriangleMesh mesh) {
     const auto& [a, b, first] = sides[i];
     const auto& [c, d, second] = sides[i + 1];
     if (a != c || b != d) continue;
-    bind.edges.push_back({a, b});
-    bind.edge_triangles.push_back({first, second});
+    edges.vertices.push_back({a, b});
+    edges.triangles.push_back({first, second});
   }
-  bind.bends = bends_of(bind, bind.mesh.positions);
-  bind.intersections = find_self_intersections(bind.mesh);
-  return bind;
+  edges.bends = bends_of(mesh, edges, mesh.positions);
+  return edges;
+}
+
+std::vector<int> new_folds(const TriangleMesh& bind, const SurfaceEdges& edges, std::span<const Vec3> positions) {
+  const std::vector<double> bends = bends_of(bind, edges, positions);
+  std::vector<int> folds;
+  for (std::size_t i = 0; i < bends.size(); ++i)
+    if (bends[i] > kFoldDegrees && edges.bends[i] <= kFoldDegrees) folds.push_back(static_cast<int>(i));
+  return folds;
+}
+
+BindSurface make_bind_surface(TriangleMesh mesh) {
+  SurfaceEdges edges = surface_edges(mesh);
+  auto intersections = find_self_intersections(mesh);
+  return {std::move(mesh), std::move(edges), std::move(intersections)};
 }
 
 std::vector<TriangleEnergy> triangle_energies(const BindSurface& bind, std::span<const Vec3> positions) {
@@ -99,8 +111,7 @@ double energy_below(std::vector<TriangleEnergy> energies, double share) {
 DeformationReport measure_deformation(const BindSurface& bind, std::span<const Vec3> positions) {
   check_count(bind, positions);
   DeformationReport report;
-  const std::vector<double> bends = bends_of(bind, positions);
-  for (std::size_t i = 0; i < bends.size(); ++i) report.new_folds += bends[i] > kFoldDegrees && bind.bends[i] <= kFoldDegrees;
+  report.new_folds = static_cast<long>(new_folds(bind.mesh, bind.edges, positions).size());
   const TriangleMesh posed{{positions.begin(), positions.end()}, bind.mesh.triangles};
   for (const auto& pair : find_self_intersections(posed))
     report.new_intersections += !std::binary_search(bind.intersections.begin(), bind.intersections.end(), pair);
@@ -119,10 +130,10 @@ DeformationReport measure_deformation(const BindSurface& bind, std::span<const V
 
 double added_bend(const BindSurface& bind, std::span<const Vec3> positions, const std::vector<bool>& is_chosen, double share) {
   check_count(bind, positions);
-  const std::vector<double> bends = bends_of(bind, positions);
+  const std::vector<double> bends = bends_of(bind.mesh, bind.edges, positions);
   std::vector<double> added;
   for (std::size_t i = 0; i < bends.size(); ++i)
-    if (is_chosen[i]) added.push_back(bends[i] - bind.bends[i]);
+    if (is_chosen[i]) added.push_back(bends[i] - bind.edges.bends[i]);
   if (added.empty()) return 0;
   const auto at = added.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(added.size() - 1));
   std::nth_element(added.begin(), at, added.end());

@@ -8,13 +8,22 @@
 
 namespace skeletex {
 
+/// The edges of a mesh between two triangles.
+struct SurfaceEdges {
+  std::vector<std::array<int, 2>> vertices;   ///< the lower first
+  std::vector<std::array<int, 2>> triangles;  ///< at each edge
+  std::vector<double> bends;                  ///< degrees by which the surface turns over each edge, 0 to 180
+};
+SurfaceEdges surface_edges(const TriangleMesh& mesh);
+/// The edges over which the surface turns by more than 90 degrees, and did not in the bind pose.
+/// \param edges  of the bind pose    \param positions  of the mesh's vertices in the pose
+std::vector<int> new_folds(const TriangleMesh& bind, const SurfaceEdges& edges, std::span<const Vec3> positions);
+
 /// What is measured of a mesh in its bind pose, once for all its poses.
 struct BindSurface {
   TriangleMesh mesh;
-  std::vector<std::array<int, 2>> edges;           ///< between two triangles, lower vertex first
-  std::vector<std::array<int, 2>> edge_triangles;  ///< the triangles at each of them
-  std::vector<double> bends;                       ///< degrees by which the surface turns over each edge, 0 to 180
-  std::vector<std::array<int, 2>> intersections;   ///< pairs of triangles, sorted
+  SurfaceEdges edges;
+  std::vector<std::array<int, 2>> intersections;  ///< pairs of triangles, sorted
 };
 /// \pre indices in range, coordinates finite
 BindSurface make_bind_surface(TriangleMesh mesh);

@@ -158,6 +158,18 @@ Skin make_skin(ClContext& context, const SkeletexModel& model, const DevicePlane
   return skin;
 }
 
+std::vector<float> vertex_weights(const Skin& skin, int bone) {
+  std::vector<float> weights(skin.inner_count + skin.shared_weights.size(), 0.f);
+  for (const SkinBlock& block : skin.blocks)
+    for (int k = 0; k < block.bone_count; ++k)
+      if (skin.block_bones[block.first_bone + k] == bone)
+        std::copy_n(skin.weights.begin() + block.first_weight + k * SKIN_BLOCK, block.vertex_count, weights.begin() + block.first_vertex);
+  for (std::size_t i = 0; i < skin.shared_weights.size(); ++i)
+    for (const BoneWeight& weight : skin.shared_weights[i])
+      if (weight.bone == bone) weights[skin.inner_count + i] = static_cast<float>(weight.weight);
+  return weights;
+}
+
 std::vector<std::vector<float>> weight_planes(ClContext& context, const SkeletexModel& model) {
   const WeightWalks walks = make_weight_walks(model);
   const DevicePlanes device = row_points(context, model, Walls(model.skeleton));

@@ -45,6 +45,9 @@ std::vector<int> bones_of_shared_vertices(const SkeletexModel& model, const Latt
 Skin make_skin(ClContext& context, const SkeletexModel& model, const DevicePlanes& points);
 DeviceSkin upload_skin(ClContext& context, const Skin& skin, DevicePlanes points);
 
+/// How much a bone moves each vertex of the model's mesh, 0 to 1.
+std::vector<float> vertex_weights(const Skin& skin, int bone);
+
 /// Weights in closed form of all texels, per bone a plane of the texture's size, as SkeletexModel::bone_weights has them; 0 outside patches.
 std::vector<std::vector<float>> weight_planes(ClContext& context, const SkeletexModel& model);
 
