@@ -7,8 +7,8 @@
 
 #include "bench/stages/stages.h"
 #include "command.h"
-#include "files.h"
 #include "deform_option.h"
+#include "files.h"
 #include "program_path.h"
 #include "progress_bar.h"
 #include "skeletex/io/model_file.h"
@@ -25,8 +25,12 @@ struct Arguments {
   int size = 0, repeats = 0;
 };
 
-bool is_one_of(const std::string& name, std::initializer_list<const char*> names) { return std::find(names.begin(), names.end(), name) != names.end(); }
-bool needs_mesh(const std::string& stage) { return is_one_of(stage, {"vsm", "spd_rays", "metro", "segment", "encode", "snap"}); }
+bool is_one_of(const std::string& name, std::initializer_list<const char*> names) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+bool needs_mesh(const std::string& stage) {
+  return is_one_of(stage, {"vsm", "spd_rays", "metro", "segment", "encode", "snap"});
+}
 bool needs_two(const std::string& stage) { return is_one_of(stage, {"morph", "transfer"}); }
 bool is_config(const std::string& path) { return has_ending(path, ".json"); }
 
@@ -61,7 +65,9 @@ class Inputs {
   }
 
  private:
-  std::string name_of(std::size_t number, const char* own_name) const { return arguments_.models.empty() ? own_name : arguments_.models[number]; }
+  std::string name_of(std::size_t number, const char* own_name) const {
+    return arguments_.models.empty() ? own_name : arguments_.models[number];
+  }
 
   ClContext& context_;
   const Arguments& arguments_;
@@ -77,11 +83,14 @@ Stage make_stage(const std::string& name, ClContext& context, Inputs& inputs, co
   if (name == "pose") {
     const TextureInputPointer input = inputs.texture(0, "armadillo", kFrameSize);
     std::optional<Pose> pose;
-    if (!arguments.pose.empty()) pose = pose_at(input->model.skeleton, read_animation(arguments.pose, input->model.skeleton), 0);
+    if (!arguments.pose.empty())
+      pose = pose_at(input->model.skeleton, read_animation(arguments.pose, input->model.skeleton), 0);
     return pose_stage(context, input, pose, deformation_of(arguments.deform));
   }
-  if (name == "morph") return morph_stage(context, inputs.texture(0, "bear", kFrameSize), inputs.texture(1, "bear_bis", kFrameSize));
-  if (name == "transfer") return transfer_stage(context, inputs.texture(0, "bear", kFrameSize), inputs.texture(1, "bear_bis", kFrameSize));
+  if (name == "morph")
+    return morph_stage(context, inputs.texture(0, "bear", kFrameSize), inputs.texture(1, "bear_bis", kFrameSize));
+  if (name == "transfer")
+    return transfer_stage(context, inputs.texture(0, "bear", kFrameSize), inputs.texture(1, "bear_bis", kFrameSize));
   if (name == "filter") return filter_stage(context, inputs.texture(0, "armadillo", kModelSize));
   if (name == "vsm") return vsm_stage(context, inputs.mesh(0));
   if (name == "spd_rays") return spd_rays_stage(context, inputs.mesh(0), size);
@@ -95,7 +104,8 @@ Stage make_stage(const std::string& name, ClContext& context, Inputs& inputs, co
 std::vector<std::string> stages_of(const Arguments& arguments) {
   const auto lacks = [&](const std::string& stage) -> const char* {
     if (arguments.models.empty()) return nullptr;
-    if (needs_mesh(stage) && !is_config(arguments.models[0])) return "a mesh and its skeleton: a .json as in configs/models";
+    if (needs_mesh(stage) && !is_config(arguments.models[0]))
+      return "a mesh and its skeleton: a .json as in configs/models";
     if (needs_two(stage) && arguments.models.size() < 2) return "two models that correspond";
     return nullptr;
   };
@@ -103,12 +113,15 @@ std::vector<std::string> stages_of(const Arguments& arguments) {
     if (const char* what = lacks(stage)) throw CLI::ValidationError("--stage", stage + " takes " + what);
   std::vector<std::string> chosen;
   for (const std::string& stage : kStageNames)
-    if (arguments.stages.empty() ? !lacks(stage) : std::find(arguments.stages.begin(), arguments.stages.end(), stage) != arguments.stages.end()) chosen.push_back(stage);
+    if (arguments.stages.empty()
+            ? !lacks(stage)
+            : std::find(arguments.stages.begin(), arguments.stages.end(), stage) != arguments.stages.end())
+      chosen.push_back(stage);
   return chosen;
 }
 
 Json row_json(const Stage& stage, const StageSamples& samples, const std::string& device) {
-  const double wall = samples.median(&StageSample::wall_ms);
+  const double separation_plane = samples.median(&StageSample::wall_ms);
   Json row{{"stage", stage.name},
            {"model", stage.model},
            {"size", stage.size},
@@ -116,8 +129,8 @@ Json row_json(const Stage& stage, const StageSamples& samples, const std::string
            {"reference", stage.reference},
            {"reference_ms", samples.median(&StageSample::reference_ms)},
            {"ratio", samples.ratio()},
-           {"wall_ms", wall},
-           {"frames_per_second", 1000 / wall},
+           {"wall_ms", separation_plane},
+           {"frames_per_second", 1000 / separation_plane},
            {"ms_min", samples.least(&StageSample::ms)},
            {"ms_max", samples.most(&StageSample::ms)},
            {"device_ms", samples.median(&StageSample::device_ms)},
@@ -142,13 +155,15 @@ void run(const Arguments& arguments) {
   {
     ProgressBar bar;
     for (std::size_t i = 0; i < names.size(); ++i) {
-      const auto show = [&](double done) { bar.show(names[i], (static_cast<double>(i) + done) / static_cast<double>(names.size())); };
+      const auto show = [&](double done) {
+        bar.show(names[i], (static_cast<double>(i) + done) / static_cast<double>(names.size()));
+      };
       show(0);
       const Stage stage = make_stage(names[i], context, inputs, arguments);
       const Json row = row_json(stage, measure(context, stage, repeats, show), context.device().name);
       const auto cell = [&](const char* key) { return fmt::format("{:.2f}", row.at(key).get<double>()); };
-      table.add({stage.name, stage.model, fmt::format("{}", stage.size), cell("ms"), cell("ms_min"), cell("ms_max"), cell("wall_ms"), cell("reference_ms"), cell("ratio"),
-                 stage.reference});
+      table.add({stage.name, stage.model, fmt::format("{}", stage.size), cell("ms"), cell("ms_min"), cell("ms_max"),
+                 cell("wall_ms"), cell("reference_ms"), cell("ratio"), stage.reference});
       json.push_back(row);
     }
   }
@@ -160,19 +175,27 @@ void run(const Arguments& arguments) {
 
 void add_bench_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App& command = *program.add_subcommand("bench", "Time the stages on your device, each beside what it is measured against");
+  CLI::App& command =
+      *program.add_subcommand("bench", "Time the stages on your device, each beside what it is measured against");
   declare_input(command, command.add_option("MODEL", arguments->models,
-                     "model (.skx.exr), or mesh and skeleton (.json as in configs/models), and for morph and transfer another one whose skeleton corresponds "
-                     "(default: models of the project)"));
+                                            "model (.skx.exr), or mesh and skeleton (.json as in configs/models), and "
+                                            "for morph and transfer another one whose skeleton corresponds "
+                                            "(default: models of the project)"));
   CLI::Option& stages = *command.add_option("--stage", arguments->stages, "these stages only")->delimiter(',');
   take_one_of(stages, kStageNames);
   stages.type_name("NAME,..");
-  command.add_option("--size", arguments->size, "texels along the longer side (default: the model's; of others 2048 for frames, else 512)")
+  command
+      .add_option("--size", arguments->size,
+                  "texels along the longer side (default: the model's; of others 2048 for frames, else 512)")
       ->check(number_in(4, 16384))
       ->type_name("N");
-  declare_input(command, command.add_option("--pose", arguments->pose, "pose: .json (default: the skeleton bent by 40 degrees)"))->type_name("FILE");
+  declare_input(command,
+                command.add_option("--pose", arguments->pose, "pose: .json (default: the skeleton bent by 40 degrees)"))
+      ->type_name("FILE");
   add_deform_option(command, arguments->deform);
-  command.add_option("--repeats", arguments->repeats, "runs that are timed, after one that is not (default: up to 15, 3 at least, in 2 s)")
+  command
+      .add_option("--repeats", arguments->repeats,
+                  "runs that are timed, after one that is not (default: up to 15, 3 at least, in 2 s)")
       ->check(number_in(1, 10000))
       ->type_name("N");
   add_device_option(command, arguments->device);
@@ -182,8 +205,10 @@ void add_bench_command(CLI::App& program) {
       "  skeletex bench\n"
       "  skeletex bench bear.skx.exr bear_bis.skx.exr --size 2048 --stage pose,morph\n"
       "  skeletex bench configs/models/bunny00.json --stage vsm,encode\n"
-      "Stages: reconstruct, pose, morph, transfer, filter; of a mesh also vsm, spd_rays, metro, segment, encode, snap. The first five count the kernels' time,\n"
-      "beside a device copy that moves the bytes that they must; the others all time, beside another library's on the same data, snap beside the parameterization.");
+      "Stages: reconstruct, pose, morph, transfer, filter; of a mesh also vsm, spd_rays, metro, segment, encode, snap. "
+      "The first five count the kernels' time,\n"
+      "beside a device copy that moves the bytes that they must; the others all time, beside another library's on the "
+      "same data, snap beside the parameterization.");
   command.callback([arguments] { run(*arguments); });
 }
 

@@ -29,7 +29,8 @@ void check_bone(const std::string& path, const Skeleton& skeleton, const std::st
     throw InputError(fmt::format("{} has no bone \"{}\"{}", path, name, did_you_mean(name, names)));
 }
 
-Correspondence correspond(const std::string& path_a, const Skeleton& a, const std::string& path_b, const Skeleton& b, const BonePairs& given) {
+Correspondence correspond(const std::string& path_a, const Skeleton& a, const std::string& path_b, const Skeleton& b,
+                          const BonePairs& given) {
   for (const auto& [from, to] : given) {
     check_bone(path_a, a, from);
     check_bone(path_b, b, to);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "command.h"
-#include "files.h"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -11,23 +10,27 @@
 #include <memory>
 
 #include "device_threads.h"
+#include "files.h"
+#include "skeletex/analysis/validate_input.h"
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/suggestion.h"
 #include "skeletex/model/error.h"
-#include "skeletex/validate/validate_input.h"
 
 namespace skeletex::cli {
 
 void add_device_option(CLI::App& command, std::string& selector) {
   command
       .add_option("--device", selector,
-                  "OpenCL device: its number in `skeletex devices`, a part of its name, cpu or gpu (default: SKELETEX_DEVICE, else the first GPU)")
+                  "OpenCL device: its number in `skeletex devices`, a part of its name, cpu or gpu (default: "
+                  "SKELETEX_DEVICE, else the first GPU)")
       ->type_name("DEVICE");
 }
 
 void add_json_option(CLI::App& command, std::string& target) {
-  declare_text_output(command, command.add_option("--json", target, "write the results as JSON to this file; - for standard output"))->type_name("FILE|-");
+  declare_text_output(
+      command, command.add_option("--json", target, "write the results as JSON to this file; - for standard output"))
+      ->type_name("FILE|-");
 }
 
 void take_one_of(CLI::Option& option, const std::vector<std::string>& words) {
@@ -63,15 +66,19 @@ void check_output(const std::filesystem::path& path) {
   std::error_code ignored;
   if (!std::filesystem::is_directory(folder, ignored))
     throw IoError(fmt::format("{}: there is no folder {}; make it first", path.string(), folder.string()));
-  if (std::filesystem::is_directory(path, ignored)) throw IoError(fmt::format("{} is a folder; name a file in it", path.string()));
-  if (::access(folder.c_str(), W_OK) != 0) throw IoError(fmt::format("{}: the folder {} is not writable", path.string(), folder.string()));
+  if (std::filesystem::is_directory(path, ignored))
+    throw IoError(fmt::format("{} is a folder; name a file in it", path.string()));
+  if (::access(folder.c_str(), W_OK) != 0)
+    throw IoError(fmt::format("{}: the folder {} is not writable", path.string(), folder.string()));
 }
 
 TriangleMesh load_mesh(const std::filesystem::path& path) {
   MeshFile file = read_mesh(path);
-  if (file.triangles != file.faces_in_file) spdlog::info("{}: {} polygons became {} triangles", path.string(), file.faces_in_file, file.triangles);
+  if (file.triangles != file.faces_in_file)
+    spdlog::info("{}: {} polygons became {} triangles", path.string(), file.faces_in_file, file.triangles);
   if (file.merged_vertices > 0)
-    spdlog::info("{}: {} of {} vertices lay on others and were welded", path.string(), file.merged_vertices, file.vertices_in_file);
+    spdlog::info("{}: {} of {} vertices lay on others and were welded", path.string(), file.merged_vertices,
+                 file.vertices_in_file);
   return std::move(file.mesh);
 }
 

@@ -9,10 +9,10 @@
 #include <string_view>
 #include <vector>
 
-#include "skeletex/cl/context.h"
-#include "skeletex/measure/triangle_tree.h"
-#include "skeletex/model/mesh.h"
-#include "skeletex/model/skeleton.h"
+#include "skeletex/device/context.h"
+#include "skeletex/geometry/mesh.h"
+#include "skeletex/geometry/triangle_tree.h"
+#include "skeletex/skeleton/skeleton.h"
 
 /// The program `skeletex`: one file per command, each adds itself to the program and runs as its callback. Results go
 /// to standard output, everything else to standard error.
@@ -63,8 +63,8 @@ void check_output(const std::filesystem::path& path);
 
 /// Reads a mesh, and says on standard error what the reader did to it (polygons split, vertices welded).
 TriangleMesh load_mesh(const std::filesystem::path& path);
-/// Checks that mesh and skeleton fit (validate_before_segmentation, which turns a mesh that is inside out) and prints every finding to
-/// standard error. \throw CLI::RuntimeError(kExitBad) when one is an error
+/// Checks that mesh and skeleton fit (validate_before_segmentation, which turns a mesh that is inside out) and prints
+/// every finding to standard error. \throw CLI::RuntimeError(kExitBad) when one is an error
 void require_valid(TriangleMesh& mesh, const Skeleton& skeleton, std::optional<TriangleTree>* tree = nullptr);
 
 /// Milliseconds since it was made or last read.

@@ -23,7 +23,8 @@ void add_commands(CLI::App& program) {
   add_run_command(program);
   add_replay_command(program);
   add_devices_command(program);
-  for (CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) command->parse_complete_callback([command] { check_files(*command); });
+  for (CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; }))
+    command->parse_complete_callback([command] { check_files(*command); });
 }
 
 }  // namespace skeletex::cli

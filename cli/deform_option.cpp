@@ -16,9 +16,11 @@ constexpr std::array kDeformations{Deformation::kSmooth, Deformation::kCoordinat
 }  // namespace
 
 CLI::Option* add_deform_option(CLI::App& command, std::string& value) {
-  CLI::Option* option = command.add_option("--deform", value,
-                                           "how a pose moves the surface: smooth blends the motions of the bones near by, coordinates keeps each point's place along "
-                                           "and about its bone, paper moves texels by the paper's rules (default: smooth)");
+  CLI::Option* option =
+      command.add_option("--deform", value,
+                         "how a pose moves the surface: smooth blends the motions of the bones near by, coordinates "
+                         "keeps each point's place along "
+                         "and about its bone, paper moves texels by the paper's rules (default: smooth)");
   std::vector<std::string> words;
   for (const Deformation deformation : kDeformations) words.push_back(to_string(deformation));
   take_one_of(*option, words);
@@ -31,17 +33,21 @@ void add_polish_option(CLI::App& command, bool& value, CLI::Option* pose) {
 
 void check_distance_option(bool is_distance_dropped, const std::string& word) {
   if (is_distance_dropped && deformation_of(word) == Deformation::kSmooth)
-    throw CLI::ValidationError("--no-distance", "smooth poses restore no distances to the bones; add --deform paper or --deform coordinates");
+    throw CLI::ValidationError(
+        "--no-distance", "smooth poses restore no distances to the bones; add --deform paper or --deform coordinates");
 }
 
 int bone_by_name(const Skeleton& skeleton, const std::string& name) {
-  const auto found = std::find_if(skeleton.bones.begin(), skeleton.bones.end(), [&](const Bone& bone) { return bone.name == name; });
-  if (found == skeleton.bones.end()) throw InputError(fmt::format("the skeleton has no bone \"{}\"; `skeletex inspect` lists them", name));
+  const auto found =
+      std::find_if(skeleton.bones.begin(), skeleton.bones.end(), [&](const Bone& bone) { return bone.name == name; });
+  if (found == skeleton.bones.end())
+    throw InputError(fmt::format("the skeleton has no bone \"{}\"; `skeletex inspect` lists them", name));
   return static_cast<int>(found - skeleton.bones.begin());
 }
 
 Deformation deformation_of(const std::string& word) {
-  return *std::find_if(kDeformations.begin(), kDeformations.end(), [&](Deformation deformation) { return word == to_string(deformation); });
+  return *std::find_if(kDeformations.begin(), kDeformations.end(),
+                       [&](Deformation deformation) { return word == to_string(deformation); });
 }
 
 }  // namespace skeletex::cli

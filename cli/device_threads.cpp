@@ -16,7 +16,8 @@ namespace {
 #ifdef __linux__
 
 /// Left to Linux, two of PoCL's threads share a processor for milliseconds while the other is idle. Only where
-/// this process may use all processors and the number of threads is PoCL's own choice: its n-th thread takes the n-th processor, or it aborts.
+/// this process may use all processors and the number of threads is PoCL's own choice: its n-th thread takes the n-th
+/// processor, or it aborts.
 void keep_device_threads_apart() {
   for (const char* number_of_threads : {"POCL_MAX_PTHREAD_COUNT", "POCL_CPU_MAX_CU_COUNT"})
     if (std::getenv(number_of_threads)) return;
@@ -28,7 +29,8 @@ void keep_device_threads_apart() {
   // Whether a thread may choose at all.
   CPU_ZERO(&last);
   CPU_SET(processors - 1, &last);
-  if (sched_setaffinity(0, sizeof last, &last) == 0 && sched_setaffinity(0, sizeof allowed, &allowed) == 0) setenv("POCL_AFFINITY", "1", 0);
+  if (sched_setaffinity(0, sizeof last, &last) == 0 && sched_setaffinity(0, sizeof allowed, &allowed) == 0)
+    setenv("POCL_AFFINITY", "1", 0);
 }
 
 /// Of the threads that want to run now, this one among them, there is no more than one for every two processors.

@@ -11,7 +11,9 @@ namespace skeletex::cli {
 namespace {
 
 /// "OpenCL 3.0 and what the vendor adds" without what the vendor adds.
-std::string short_version(const std::string& version) { return version.substr(0, version.find(' ', version.find(' ') + 1)); }
+std::string short_version(const std::string& version) {
+  return version.substr(0, version.find(' ', version.find(' ') + 1));
+}
 
 void run(const std::string& json_target) {
   const std::vector<ClDeviceInfo> devices = list_devices();
@@ -19,9 +21,11 @@ void run(const std::string& json_target) {
   Table table({"device", "type", "platform", "version", "driver", "units", "memory GiB", "buffer GiB", "double"});
   Json list = Json::array();
   for (const ClDeviceInfo& device : devices) {
-    table.add({fmt::format("{}: {}", device.index, device.name), device.type, device.platform, short_version(device.version), device.driver,
-               fmt::format("{}", device.compute_units), fmt::format("{:.1f}", static_cast<double>(device.global_memory_bytes) / gib),
-               fmt::format("{:.1f}", static_cast<double>(device.max_allocation_bytes) / gib), device.has_double ? "yes" : "no"});
+    table.add({fmt::format("{}: {}", device.index, device.name), device.type, device.platform,
+               short_version(device.version), device.driver, fmt::format("{}", device.compute_units),
+               fmt::format("{:.1f}", static_cast<double>(device.global_memory_bytes) / gib),
+               fmt::format("{:.1f}", static_cast<double>(device.max_allocation_bytes) / gib),
+               device.has_double ? "yes" : "no"});
     list.push_back({{"index", device.index},
                     {"name", device.name},
                     {"type", device.type},
@@ -39,7 +43,9 @@ void run(const std::string& json_target) {
     print(json_target, table.text() + fmt::format("default: {}\n", ClContext().device().name));
   }
   write_json(json_target, {{"devices", std::move(list)}});
-  if (devices.empty()) throw DeviceError("no OpenCL device found; install a driver (Debian: apt-get install pocl-opencl-icd runs OpenCL on the CPU)");
+  if (devices.empty())
+    throw DeviceError(
+        "no OpenCL device found; install a driver (Debian: apt-get install pocl-opencl-icd runs OpenCL on the CPU)");
 }
 
 }  // namespace

@@ -13,11 +13,11 @@
 
 #include "command.h"
 #include "files.h"
-#include "progress_bar.h"
 #include "memory_ahead.h"
+#include "progress_bar.h"
 #include "second_compiler.h"
-#include "skeletex/encode/encode_model.h"
-#include "skeletex/encode/encoding_kernels.h"
+#include "skeletex/convert/encode_model.h"
+#include "skeletex/convert/sample/encoding_kernels.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/io/suggestion.h"
@@ -32,7 +32,8 @@ struct Arguments {
   int iterations = 4;
   double alpha = 0.5, stop_spread = 0, hybrid_threshold = EncodeOptions{}.hybrid_unseen_threshold;
   std::string rows = "surface", spd_hit = "last", share, diagonals, compression = "auto", rounding = "surface";
-  bool has_no_prefilter = false, has_no_unfold = false, is_snapped = false, is_fitted = false, is_paper_recipe = false, is_half = false;
+  bool has_no_prefilter = false, has_no_unfold = false, is_snapped = false, is_fitted = false, is_paper_recipe = false,
+       is_half = false;
   std::vector<std::string> bone_methods;
 };
 
@@ -48,7 +49,9 @@ std::array<int, 2> parse_size(const std::string& text) {
     code = second.ec;
   }
   if (code != std::errc() || rest != end || size[0] < 4 || size[1] < 4 || size[0] > 16384 || size[1] > 16384)
-    throw CLI::ValidationError("--size", "\"" + text + "\" is no texture size; give N or WIDTHxHEIGHT, 4 to 16384 texels, e.g. 512 or 1024x512");
+    throw CLI::ValidationError(
+        "--size",
+        "\"" + text + "\" is no texture size; give N or WIDTHxHEIGHT, 4 to 16384 texels, e.g. 512 or 1024x512");
   return size;
 }
 
@@ -57,23 +60,29 @@ std::vector<std::pair<std::string, Method>> parse_bone_methods(const std::vector
   for (const std::string& text : texts) {
     const auto equals = text.rfind('=');
     const std::string method = equals == std::string::npos ? "" : text.substr(equals + 1);
-    if (method != "vsm" && method != "spd") throw CLI::ValidationError("--bone-method", "\"" + text + "\" is not BONE=vsm or BONE=spd");
+    if (method != "vsm" && method != "spd")
+      throw CLI::ValidationError("--bone-method", "\"" + text + "\" is not BONE=vsm or BONE=spd");
     methods.emplace_back(text.substr(0, equals), method == "vsm" ? Method::kVsm : Method::kSpd);
   }
   return methods;
 }
 
-TexelShare share_of(const std::string& name) { return name == "area" ? TexelShare::kArea : name == "triangles" ? TexelShare::kTriangles : TexelShare::kError; }
+TexelShare share_of(const std::string& name) {
+  return name == "area" ? TexelShare::kArea : name == "triangles" ? TexelShare::kTriangles : TexelShare::kError;
+}
 
 EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command) {
   EncodeOptions options;
   const auto size = parse_size(arguments.size);
   options.width = size[0];
   options.height = size[1];
-  options.method = arguments.method == "spd" ? EncodeMethod::kSpd : arguments.method == "vsm" ? EncodeMethod::kVsm : EncodeMethod::kHybrid;
+  options.method = arguments.method == "spd"   ? EncodeMethod::kSpd
+                   : arguments.method == "vsm" ? EncodeMethod::kVsm
+                                               : EncodeMethod::kHybrid;
   options.hybrid_unseen_threshold = arguments.hybrid_threshold;
   options.hybrid_overrides = parse_bone_methods(arguments.bone_methods);
-  if (options.method != EncodeMethod::kHybrid && (!arguments.bone_methods.empty() || command.count("--hybrid-threshold") > 0))
+  if (options.method != EncodeMethod::kHybrid &&
+      (!arguments.bone_methods.empty() || command.count("--hybrid-threshold") > 0))
     throw CLI::ValidationError("--bone-method and --hybrid-threshold", "need --method hybrid");
   if (arguments.is_paper_recipe) {
     options.vsm = {.iterations = 1, .alpha = 0};
@@ -88,12 +97,14 @@ EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command
   if (is_given("--iterations")) options.vsm.iterations = arguments.iterations;
   if (is_given("--alpha")) options.vsm.alpha = arguments.alpha;
   options.vsm.stop_spread_change = arguments.stop_spread;
-  if (is_given("--rows")) options.row_spacing = arguments.rows == "uniform" ? RowSpacing::kUniform : RowSpacing::kSurfaceLength;
+  if (is_given("--rows"))
+    options.row_spacing = arguments.rows == "uniform" ? RowSpacing::kUniform : RowSpacing::kSurfaceLength;
   if (arguments.has_no_prefilter) options.has_prefilter = false;
   if (arguments.has_no_unfold) options.has_unfold = false;
   if (is_given("--snap")) options.has_snap = arguments.is_snapped;
   if (is_given("--fit")) options.has_fit = arguments.is_fitted;
-  if (is_given("--diagonals")) options.diagonals = arguments.diagonals == "smooth" ? DiagonalRule::kSmooth : DiagonalRule::kNearest;
+  if (is_given("--diagonals"))
+    options.diagonals = arguments.diagonals == "smooth" ? DiagonalRule::kSmooth : DiagonalRule::kNearest;
   options.spd_hit = arguments.spd_hit == "first" ? SpdHit::kFirst : SpdHit::kLast;
   if (is_given("--rounding") && !arguments.is_half) throw CLI::ValidationError("--rounding", "needs --half");
   options.has_half_texels = arguments.is_half && arguments.rounding == "surface";
@@ -106,7 +117,8 @@ void check_bone_names(const Arguments& arguments, const EncodeOptions& options, 
   for (const Bone& bone : skeleton.bones) names.push_back(bone.name);
   for (const auto& [name, method] : options.hybrid_overrides)
     if (std::find(names.begin(), names.end(), name) == names.end())
-      throw InputError(fmt::format("--bone-method: {} has no bone \"{}\"{}", arguments.skeleton, name, did_you_mean(name, names)));
+      throw InputError(
+          fmt::format("--bone-method: {} has no bone \"{}\"{}", arguments.skeleton, name, did_you_mean(name, names)));
 }
 
 Json report_json(const EncodeReport& report, const EncodeOptions& options, double used_seconds) {
@@ -132,16 +144,20 @@ Json report_json(const EncodeReport& report, const EncodeOptions& options, doubl
                      {"used_direct_solver", bone.vsm.used_direct_solver}};
     bones.push_back(std::move(json));
   }
-  Json json{{"mesh", {{"vertices", report.vertices}, {"triangles", report.triangles}, {"diagonal", report.diagonal}, {"genus", report.genus}}},
-          {"bones", std::move(bones)},
-          {"atlas", {{"size", {options.width, options.height}}, {"used_fraction", report.used_fraction}}},
-          {"times_ms",
-           {{"half_edge", report.half_edge_ms},
-            {"segmentation", report.segmentation_ms},
-            {"parameterization", report.parameterization_ms},
-            {"encoding", report.encoding_ms}}},
-          {"seconds", used_seconds},
-          {"device", report.device}};
+  Json json{{"mesh",
+             {{"vertices", report.vertices},
+              {"triangles", report.triangles},
+              {"diagonal", report.diagonal},
+              {"genus", report.genus}}},
+            {"bones", std::move(bones)},
+            {"atlas", {{"size", {options.width, options.height}}, {"used_fraction", report.used_fraction}}},
+            {"times_ms",
+             {{"half_edge", report.half_edge_ms},
+              {"segmentation", report.segmentation_ms},
+              {"parameterization", report.parameterization_ms},
+              {"encoding", report.encoding_ms}}},
+            {"seconds", used_seconds},
+            {"device", report.device}};
   if (report.unfold) json["lattice"] = {{"folded_quads", report.unfold->folded_quads}, {"left", report.unfold->left}};
   if (report.snap)
     json["snap"] = {{"vertices", report.snap->vertices},
@@ -155,8 +171,11 @@ Json report_json(const EncodeReport& report, const EncodeOptions& options, doubl
     for (const double residual : report.fit->residuals) residuals.push_back(residual / report.diagonal);
     json["fit"] = {{"residuals", std::move(residuals)}, {"texels_put_back", report.fit->texels_put_back}};
   }
-  if (report.rounding) json["rounding"] = {{"nearest", report.rounding->nearest / report.diagonal}, {"chosen", report.rounding->chosen / report.diagonal}};
-  if (report.snap || report.fit) json["turned_triangles"] = {{"lattice", report.turned_triangles}, {"even", report.even_turned_triangles}};
+  if (report.rounding)
+    json["rounding"] = {{"nearest", report.rounding->nearest / report.diagonal},
+                        {"chosen", report.rounding->chosen / report.diagonal}};
+  if (report.snap || report.fit)
+    json["turned_triangles"] = {{"lattice", report.turned_triangles}, {"even", report.even_turned_triangles}};
   return json;
 }
 
@@ -164,15 +183,18 @@ std::string report_text(const EncodeReport& report, const EncodeOptions& options
   Table table({"bone", "method", "surface", "triangles", "texels", "columns x rows", "unseen %", "read %"});
   for (const BoneReport& bone : report.bones) {
     const Rectangle& r = bone.rectangle;
-    table.add({bone.name, to_string(bone.method), to_string(bone.topology), fmt::format("{}", bone.triangles), fmt::format("{}", r.width * r.height),
-               fmt::format("{} x {}", r.width, r.height), fmt::format("{:.1f}", 100 * bone.unseen_area_fraction),
+    table.add({bone.name, to_string(bone.method), to_string(bone.topology), fmt::format("{}", bone.triangles),
+               fmt::format("{}", r.width * r.height), fmt::format("{} x {}", r.width, r.height),
+               fmt::format("{:.1f}", 100 * bone.unseen_area_fraction),
                fmt::format("{:.0f}", 100 * bone.sampled_triangle_fraction)});
   }
   const auto percent = [](int part, int whole) { return whole > 0 ? 100.0 * part / whole : 100.0; };
-  const std::string snap = !report.snap ? ""
-                                        : fmt::format("snapped to {:.1f} % of {} vertices and {:.1f} % of {} edges; {} texels put back\n",
-                                                      percent(report.snap->snapped_vertices, report.snap->vertices), report.snap->vertices,
-                                                      percent(report.snap->snapped_edges, report.snap->edges), report.snap->edges, report.snap->texels_put_back);
+  const std::string snap =
+      !report.snap ? ""
+                   : fmt::format("snapped to {:.1f} % of {} vertices and {:.1f} % of {} edges; {} texels put back\n",
+                                 percent(report.snap->snapped_vertices, report.snap->vertices), report.snap->vertices,
+                                 percent(report.snap->snapped_edges, report.snap->edges), report.snap->edges,
+                                 report.snap->texels_put_back);
   std::string fit;
   if (report.fit) {
     fit = "fitted: mean distance / diagonal";
@@ -181,21 +203,28 @@ std::string report_text(const EncodeReport& report, const EncodeOptions& options
     fit += fmt::format("; {} texels put back\n", report.fit->texels_put_back);
   }
   if (report.rounding)
-    fit += fmt::format("rounded to half floats: points leave the lattice's planes by {:.1e} of the diagonal, with the nearest ones by {:.1e} (root mean squares)\n",
-                       report.rounding->chosen / report.diagonal, report.rounding->nearest / report.diagonal);
+    fit += fmt::format(
+        "rounded to half floats: points leave the lattice's planes by {:.1e} of the diagonal, with the nearest ones by "
+        "{:.1e} (root mean squares)\n",
+        report.rounding->chosen / report.diagonal, report.rounding->nearest / report.diagonal);
   if (report.snap || report.fit)
-    fit += fmt::format("{} triangles look against the mesh, {} of the even lattice\n", report.turned_triangles, report.even_turned_triangles);
+    fit += fmt::format("{} triangles look against the mesh, {} of the regular grid\n", report.turned_triangles,
+                       report.even_turned_triangles);
   std::error_code ignored;
   return fmt::format(
       "{}\n{} vertices, {} triangles, genus {}; {} x {} texels, {:.1f} % used, on {}\n"
-      "{}half edges {:.0f} ms, segmentation {:.0f} ms, parameterization {:.0f} ms, encoding {:.0f} ms\n{} ({:.1f} MiB)\n",
-      table.text(), report.vertices, report.triangles, report.genus, options.width, options.height, 100 * report.used_fraction, report.device, snap + fit,
-      report.half_edge_ms, report.segmentation_ms, report.parameterization_ms, report.encoding_ms, output,
+      "{}half edges {:.0f} ms, segmentation {:.0f} ms, parameterization {:.0f} ms, encoding {:.0f} ms\n{} ({:.1f} "
+      "MiB)\n",
+      table.text(), report.vertices, report.triangles, report.genus, options.width, options.height,
+      100 * report.used_fraction, report.device, snap + fit, report.half_edge_ms, report.segmentation_ms,
+      report.parameterization_ms, report.encoding_ms, output,
       static_cast<double>(std::filesystem::file_size(output, ignored)) / (1 << 20));
 }
 
-// What texels take, with snapping and without, and a mesh by its file; and the most that the heap can hold without growing (keep_freed_memory).
-constexpr std::size_t kBytesPerSnappedTexel = 132, kBytesPerTexel = 104, kBytesPerByteOfMesh = 16, kMostMemoryAhead = 192 << 20;
+// What texels take, with snapping and without, and a mesh by its file; and the most that the heap can hold without
+// growing (keep_freed_memory).
+constexpr std::size_t kBytesPerSnappedTexel = 132, kBytesPerTexel = 104, kBytesPerByteOfMesh = 16,
+                      kMostMemoryAhead = 192 << 20;
 
 std::size_t memory_for(const Arguments& arguments, const EncodeOptions& options) {
   const std::size_t per_texel = options.has_snap.value_or(true) ? kBytesPerSnappedTexel : kBytesPerTexel;
@@ -219,11 +248,15 @@ Input read_input(const Arguments& arguments, const EncodeOptions& options) {
 }
 
 ExrCompression compression_of(const std::string& name) {
-  return name == "none" ? ExrCompression::kNone : name == "zip" ? ExrCompression::kZip : name == "piz" ? ExrCompression::kPiz : ExrCompression::kAuto;
+  return name == "none"  ? ExrCompression::kNone
+         : name == "zip" ? ExrCompression::kZip
+         : name == "piz" ? ExrCompression::kPiz
+                         : ExrCompression::kAuto;
 }
 
-/// Programs, so that they are loaded beside the input. A launch of nothing that takes long has compiled its kernel: then there are more to compile,
-/// for two processes. Both share the driver's folder of kernels, which is safe for kernels, not for programs: here these are there before.
+/// Programs, so that they are loaded beside the input. A launch of nothing that takes long has compiled its kernel:
+/// then there are more to compile, for two processes. Both share the driver's folder of kernels, which is safe for
+/// kernels, not for programs: here these are there before.
 void prepare_encoding(ClContext& context, const EncodeOptions& options, SecondCompiler& second) {
   constexpr double kCompiling = 20;  // ms: more than it takes to load a kernel, less than to compile one
   const std::vector<KernelVariant> kernels = encoding_kernels(context, options);
@@ -235,7 +268,8 @@ void prepare_encoding(ClContext& context, const EncodeOptions& options, SecondCo
 }
 
 /// The last ones first: the other process begins with the first.
-void compile_from_last(const std::string& device, const EncodeOptions& options, const std::function<bool()>& is_wanted) {
+void compile_from_last(const std::string& device, const EncodeOptions& options,
+                       const std::function<bool()>& is_wanted) {
   ClContext context(device);
   for (const KernelVariant& kernel : encoding_kernels(context, options) | std::views::reverse)
     if (is_wanted()) context.compile(kernel.name, kernel.range);
@@ -244,7 +278,8 @@ void compile_from_last(const std::string& device, const EncodeOptions& options, 
 void run(const Arguments& arguments, const CLI::App& command) {
   EncodeOptions options = encode_options(arguments, command);
   Stopwatch watch;
-  SecondCompiler second([&](const std::function<bool()>& is_wanted) { compile_from_last(arguments.device, options, is_wanted); });
+  SecondCompiler second(
+      [&](const std::function<bool()>& is_wanted) { compile_from_last(arguments.device, options, is_wanted); });
   std::optional<ProgressBar> bar(std::in_place);
   bar->show("reading and checking the input", 0);
   // A driver takes as long to load as the input. It stays on this thread, as some keep state per thread.
@@ -274,7 +309,8 @@ void run(const Arguments& arguments, const CLI::App& command) {
                .compression = compression_of(arguments.compression)});
   bar.reset();
   for (const BoneReport& bone : result.report.bones) {
-    if (bone.flipped_triangles > 0) warn(fmt::format("bone \"{}\": {} triangles are flipped in its map", bone.name, bone.flipped_triangles));
+    if (bone.flipped_triangles > 0)
+      warn(fmt::format("bone \"{}\": {} triangles are flipped in its map", bone.name, bone.flipped_triangles));
     if (bone.method == Method::kSpd && bone.unseen_area_fraction > EncodeOptions{}.hybrid_unseen_threshold)
       warn(fmt::format("bone \"{}\": SPD does not see {:.1f} % of its surface; --method hybrid or vsm does", bone.name,
                        100 * bone.unseen_area_fraction));
@@ -289,73 +325,100 @@ void run(const Arguments& arguments, const CLI::App& command) {
 
 void add_encode_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App& command = *program.add_subcommand("encode", "Turn a closed mesh and its skeleton into a model: one texture in an OpenEXR file");
+  CLI::App& command = *program.add_subcommand(
+      "encode", "Turn a closed mesh and its skeleton into a model: one texture in an OpenEXR file");
   command.option_defaults()->always_capture_default();
   const auto add = [&](const char* group, const char* name, auto& value, const char* description) -> CLI::Option& {
     return *command.add_option(name, value, description)->group(group);
   };
   Arguments& a = *arguments;
-  declare_input(command, &add("Positionals", "MESH", a.mesh, "closed triangle mesh: .obj, .ply, .off or .stl"))->required();
-  declare_input(command, &add("Positionals", "SKELETON", a.skeleton, "skeleton: JSON with nodes and bones, in the mesh's coordinates"))->required();
-  declare_output(command, &add("Options", "-o,--output", a.output, "the model: .skx.exr"), {".exr"})->required()->type_name("FILE");
+  declare_input(command, &add("Positionals", "MESH", a.mesh, "closed triangle mesh: .obj, .ply, .off or .stl"))
+      ->required();
+  declare_input(command, &add("Positionals", "SKELETON", a.skeleton,
+                              "skeleton: JSON with nodes and bones, in the mesh's coordinates"))
+      ->required();
+  declare_output(command, &add("Options", "-o,--output", a.output, "the model: .skx.exr"), {".exr"})
+      ->required()
+      ->type_name("FILE");
   add("Options", "--size", a.size, "texels: N for N x N, or WIDTHxHEIGHT").type_name("N|WxH");
   take_one_of(add("Options", "--method", a.method,
-                  "how bones are mapped: spd casts rays from the bone (a height field), vsm spreads the triangles over the texels, hybrid takes spd "
+                  "how bones are mapped: spd casts rays from the bone (a height field), vsm spreads the triangles over "
+                  "the texels, hybrid takes spd "
                   "where it sees the surface and vsm elsewhere"),
               {"spd", "vsm", "hybrid"});
-  add("VSM", "--iterations", a.iterations, "reweightings after the first solve, 0 to 100; 0 is the plain barycentric map")
+  add("VSM", "--iterations", a.iterations,
+      "reweightings after the first solve, 0 to 100; 0 is the plain barycentric map")
       .type_name("N")
       ->check(number_in(0, 100));
   add("VSM", "--alpha", a.alpha,
-      "weights grow by texture area / surface area ^ alpha, 0 to 2; 0 evens out texture areas (the paper), 1 density on the surface")
+      "weights grow by texture area / surface area ^ alpha, 0 to 2; 0 evens out texture areas (the paper), 1 density "
+      "on the surface")
       .type_name("X")
       ->check(number_in(0.0, 2.0));
   add("VSM", "--stop-spread", a.stop_spread,
       "stop when a reweighting changes the spread of texture areas by less than this share, e.g. 0.01; 0: never")
       .type_name("X")
       ->check(number_in(0.0, 1.0));
-  take_one_of(add("SPD", "--spd-hit", a.spd_hit, "which hit of a ray counts where there are several"), {"first", "last"});
-  add("Hybrid", "--hybrid-threshold", a.hybrid_threshold, "bones take vsm where spd does not see more than this share of their area, 0 to 1")
+  take_one_of(add("SPD", "--spd-hit", a.spd_hit, "which hit of a ray counts where there are several"),
+              {"first", "last"});
+  add("Hybrid", "--hybrid-threshold", a.hybrid_threshold,
+      "bones take vsm where spd does not see more than this share of their area, 0 to 1")
       .type_name("X")
       ->check(number_in(0.0, 1.0));
   add("Hybrid", "--bone-method", a.bone_methods, "method of a bone by its name; repeat for more bones")
       .type_name("BONE=vsm|spd")
       ->expected(1)
       ->take_all();
-  take_one_of(add("Texels", "--rows", a.rows, "where rows lie along a bone: evenly in surface length, or uniform in the map (the paper)"),
+  take_one_of(add("Texels", "--rows", a.rows,
+                  "where rows lie along a bone: evenly in surface length, or uniform in the map (the paper)"),
               {"surface", "uniform"});
-  take_one_of(
-      add("Texels", "--share", a.share, "what a bone's share of the texels follows, and by error its columns per row as well; unless given: area with --method spd, error otherwise"),
-      {"error", "triangles", "area"});
-  command.add_flag("--no-unfold", a.has_no_unfold, "the even lattice as it is, also where it folds in space");
-  command.add_flag("--no-prefilter", a.has_no_prefilter, "texels exactly on the mesh, so that flat triangles lie inside its curved parts")
+  take_one_of(add("Texels", "--share", a.share,
+                  "what a bone's share of the texels follows, and by error its columns per row as well; unless given: "
+                  "area with --method spd, error otherwise"),
+              {"error", "triangles", "area"});
+  command.add_flag("--no-unfold", a.has_no_unfold, "the regular grid as it is, also where it folds in space");
+  command
+      .add_flag("--no-prefilter", a.has_no_prefilter,
+                "texels exactly on the mesh, so that flat triangles lie inside its curved parts")
       ->group("Texels");
   command
       .add_flag("--snap,!--no-snap", a.is_snapped,
-                "texels of VSM patches sit on the mesh's own vertices and edges where they can; instead of the prefilter (default: from 2 texels per vertex on, with the fit from 1.5)")
+                "texels of VSM patches sit on the mesh's own vertices and edges where they can; instead of the "
+                "prefilter (default: from 2 texels per vertex on, with the fit from 1.5)")
       ->group("Texels");
   command
       .add_flag("--fit,!--no-fit", a.is_fitted,
-                "their points move so that the triangles between them are nearer to the mesh; instead of the prefilter (default: up to 256 x 256 texels)")
+                "their points move so that the triangles between them are nearer to the mesh; instead of the prefilter "
+                "(default: up to 256 x 256 texels)")
       ->group("Texels");
   take_one_of(add("Texels", "--diagonals", a.diagonals,
-                  "how the decoder cuts quads: nearest to the surface that texels around foretell, or smooth, going on best into the quads around; unless "
+                  "how the decoder cuts quads: nearest to the surface that texels around foretell, or smooth, going on "
+                  "best into the quads around; unless "
                   "given: smooth where texels are snapped or fitted, else nearest"),
               {"nearest", "smooth"});
   command
       .add_flag("--paper-recipe", a.is_paper_recipe,
-                "as the paper: --rows uniform --share triangles --alpha 0 --iterations 1 --no-unfold --no-prefilter --no-snap --no-fit (unfold and prefilter stay off, the others can still be given)")
+                "as the paper: --rows uniform --share triangles --alpha 0 --iterations 1 --no-unfold --no-prefilter "
+                "--no-snap --no-fit (unfold and prefilter stay off, the others can still be given)")
       ->group("Texels");
-  command.add_flag("--half", a.is_half, "16 bits a channel: half the file, or a third, for an error of some 2e-6 of the diagonal more")->group("File");
-  take_one_of(add("File", "--rounding", a.rounding, "with --half, which half floats: those near a texel whose point stays nearest to the surface, or the nearest ones"),
+  command
+      .add_flag("--half", a.is_half,
+                "16 bits a channel: half the file, or a third, for an error of some 2e-6 of the diagonal more")
+      ->group("File");
+  take_one_of(add("File", "--rounding", a.rounding,
+                  "with --half, which half floats: those near a texel whose point stays nearest to the surface, or the "
+                  "nearest ones"),
               {"surface", "nearest"});
-  take_one_of(add("File", "--compression", a.compression, "lossless compression of the file; auto: zip where it saves a sixteenth or more, else none"), {"auto", "none", "zip", "piz"});
+  take_one_of(add("File", "--compression", a.compression,
+                  "lossless compression of the file; auto: zip where it saves a sixteenth or more, else none"),
+              {"auto", "none", "zip", "piz"});
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(
       "Examples:\n"
       "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr\n"
-      "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr --method hybrid --bone-method head=vsm --size 1024\n"
+      "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr --method hybrid --bone-method head=vsm --size "
+      "1024\n"
       "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr --json - | jq .times_ms\n"
       "Areas are in the mesh's units squared, times in milliseconds.");
   command.callback([arguments, &command] { run(*arguments, command); });

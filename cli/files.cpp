@@ -50,10 +50,14 @@ std::vector<NamedFile> named_files(const CLI::App& command) {
 
 void check_ending(const NamedFile& file) {
   const std::vector<std::string>& endings = file.declaration->endings;
-  if (endings.empty() || std::any_of(endings.begin(), endings.end(), [&](const std::string& ending) { return has_ending(file.path, ending); })) return;
+  if (endings.empty() || std::any_of(endings.begin(), endings.end(),
+                                     [&](const std::string& ending) { return has_ending(file.path, ending); }))
+    return;
   std::string list;
-  for (std::size_t i = 0; i < endings.size(); ++i) list += (i == 0 ? "" : i + 1 == endings.size() ? " or " : ", ") + endings[i];
-  throw CLI::ValidationError(file.name, fmt::format("\"{}\" must end in {}, which says what is written", file.path, list));
+  for (std::size_t i = 0; i < endings.size(); ++i)
+    list += (i == 0 ? "" : i + 1 == endings.size() ? " or " : ", ") + endings[i];
+  throw CLI::ValidationError(file.name,
+                             fmt::format("\"{}\" must end in {}, which says what is written", file.path, list));
 }
 
 bool is_stream(const NamedFile& file) { return file.path == "-" && file.declaration->is_output; }
@@ -104,7 +108,9 @@ bool has_ending(const std::string& path, const std::string& ending) {
   return lower.ends_with(ending);
 }
 
-std::string option_name(const CLI::Option& option) { return option.get_lnames().empty() ? option.get_name(true) : "--" + option.get_lnames().front(); }
+std::string option_name(const CLI::Option& option) {
+  return option.get_lnames().empty() ? option.get_name(true) : "--" + option.get_lnames().front();
+}
 
 void check_files(const CLI::App& command) {
   const std::vector<NamedFile> files = named_files(command);
@@ -115,8 +121,10 @@ void check_files(const CLI::App& command) {
     for (const NamedFile& other : files) {
       if (&other == &output || is_stream(output) || is_stream(other)) continue;
       if (is_same_file(output.path, other.path))
-        throw CLI::ValidationError(output.name, fmt::format("\"{}\" is also {}, which would be lost; name another file", output.path,
-                                                            other.declaration == output.declaration ? "named a second time" : other.name + " \"" + other.path + '"'));
+        throw CLI::ValidationError(
+            output.name, fmt::format("\"{}\" is also {}, which would be lost; name another file", output.path,
+                                     other.declaration == output.declaration ? "named a second time"
+                                                                             : other.name + " \"" + other.path + '"'));
     }
   }
   for (const NamedFile& output : files) {
@@ -124,7 +132,8 @@ void check_files(const CLI::App& command) {
     check_ending(output);
     if (output.declaration->is_folder) {
       std::error_code error;
-      if (fs::exists(output.path, error) && !fs::is_directory(output.path, error)) throw CLI::ValidationError(output.name, fmt::format("\"{}\" is a file, not a folder", output.path));
+      if (fs::exists(output.path, error) && !fs::is_directory(output.path, error))
+        throw CLI::ValidationError(output.name, fmt::format("\"{}\" is a file, not a folder", output.path));
     } else {
       check_output(output.path);
     }
@@ -134,18 +143,28 @@ void check_files(const CLI::App& command) {
 void check_made_output(const CLI::App& command, const std::string& path) {
   for (const NamedFile& file : named_files(command))
     if (!file.declaration->is_folder && !is_stream(file) && is_same_file(file.path, path))
-      throw CLI::ValidationError(file.name, fmt::format("\"{}\" would be replaced by {}, one of the outputs; name another file", file.path, path));
+      throw CLI::ValidationError(
+          file.name,
+          fmt::format("\"{}\" would be replaced by {}, one of the outputs; name another file", file.path, path));
 }
 
 void check_named_input(const CLI::App& command, const std::string& path, const std::string& what) {
   for (const NamedFile& file : named_files(command))
-    if (file.declaration->is_output && !file.declaration->is_folder && !is_stream(file) && is_same_file(file.path, path))
-      throw CLI::ValidationError(file.name, fmt::format("\"{}\" is {}, which would be lost; name another file", file.path, what));
+    if (file.declaration->is_output && !file.declaration->is_folder && !is_stream(file) &&
+        is_same_file(file.path, path))
+      throw CLI::ValidationError(file.name,
+                                 fmt::format("\"{}\" is {}, which would be lost; name another file", file.path, what));
 }
 
-CLI::Validator number_in(double lower, double upper) { return number(fmt::format("a number from {:g} to {:g}", lower, upper), lower, upper, true); }
-CLI::Validator number_above(double lower) { return number(fmt::format("a number above {:g}", lower), lower, kMostNumber, false); }
-CLI::Validator number_from(double lower) { return number(fmt::format("a number of at least {:g}", lower), lower, kMostNumber, true); }
+CLI::Validator number_in(double lower, double upper) {
+  return number(fmt::format("a number from {:g} to {:g}", lower, upper), lower, upper, true);
+}
+CLI::Validator number_above(double lower) {
+  return number(fmt::format("a number above {:g}", lower), lower, kMostNumber, false);
+}
+CLI::Validator number_from(double lower) {
+  return number(fmt::format("a number of at least {:g}", lower), lower, kMostNumber, true);
+}
 CLI::Validator any_number() { return number("a number", -kMostNumber, kMostNumber, true); }
 
 }  // namespace skeletex::cli

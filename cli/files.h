@@ -6,7 +6,8 @@
 
 namespace skeletex::cli {
 
-/// A file that an option or positional of a command names. Commands declare all of theirs; check_files looks after them.
+/// A file that an option or positional of a command names. Commands declare all of theirs; check_files looks after
+/// them.
 struct FileOption {
   const CLI::Option* option = nullptr;
   bool is_output = false;
@@ -32,7 +33,8 @@ bool has_ending(const std::string& path, const std::string& ending);
 std::string option_name(const CLI::Option& option);
 
 /// Called once a command's options are known and before it does anything.
-/// \throw CLI::ValidationError when an output is an input or another output, has an ending that the command does not write, or is "-" where
+/// \throw CLI::ValidationError when an output is an input or another output, has an ending that the command does not
+/// write, or is "-" where
 ///        that is not standard output; IoError when the folder of an output is missing or not writable
 void check_files(const CLI::App& command);
 /// The same for an output whose name the command makes of others, and which no option names.
@@ -40,7 +42,8 @@ void check_made_output(const CLI::App& command, const std::string& path);
 /// Refuses an output that is a file which an input names in turn. \param what  the file, in words
 void check_named_input(const CLI::App& command, const std::string& path, const std::string& what);
 
-/// Numbers of the command line: finite, nothing before or behind them, within limits. The message says the limits in words.
+/// Numbers of the command line: finite, nothing before or behind them, within limits. The message says the limits in
+/// words.
 CLI::Validator number_in(double lower, double upper);
 CLI::Validator number_above(double lower);
 CLI::Validator number_from(double lower);

@@ -39,14 +39,18 @@ HelpFormatter::HelpFormatter() { column_width(kIndent); }
 
 std::string HelpFormatter::make_option(const CLI::Option* option, bool is_positional) const {
   std::string name = is_positional ? option->get_name(true) : option->get_name(false, true);
-  if (!is_positional && option->get_type_size() > 0 && !option->get_type_name().empty()) name += ' ' + option->get_type_name();
+  if (!is_positional && option->get_type_size() > 0 && !option->get_type_name().empty())
+    name += ' ' + option->get_type_name();
   std::string description = option->get_description();
   const std::string standard = option->get_default_str();
-  if (!standard.empty() && standard != "[]" && option->get_type_size() > 0) description += " (default: " + standard + ")";
+  if (!standard.empty() && standard != "[]" && option->get_type_size() > 0)
+    description += " (default: " + standard + ")";
   if (!is_positional && option->get_required()) description += " (required)";
   return entry(name, description);
 }
 
-std::string HelpFormatter::make_subcommand(const CLI::App* command) const { return entry(command->get_name(), command->get_description()); }
+std::string HelpFormatter::make_subcommand(const CLI::App* command) const {
+  return entry(command->get_name(), command->get_description());
+}
 
 }  // namespace skeletex::cli

@@ -8,9 +8,9 @@
 
 #include "command.h"
 #include "files.h"
+#include "skeletex/analysis/manifold.h"
+#include "skeletex/geometry/self_intersection.h"
 #include "skeletex/io/model_file.h"
-#include "skeletex/measure/manifold.h"
-#include "skeletex/measure/self_intersection.h"
 #include "skeletex/model/error.h"
 #include "table.h"
 
@@ -24,7 +24,8 @@ struct Arguments {
 
 bool is_mesh_file(const std::filesystem::path& path) {
   std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   constexpr std::array<std::string_view, 4> kEndings{".obj", ".ply", ".off", ".stl"};
   return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
 }
@@ -34,7 +35,8 @@ std::string in_one_line(const nlohmann::json& value) {
   if (value.is_string()) return value.get<std::string>();
   if (!value.is_structured()) return value.dump();
   std::string text;
-  for (const auto& [key, item] : value.items()) text += (text.empty() ? "" : ", ") + (value.is_object() ? key + " " : "") + in_one_line(item);
+  for (const auto& [key, item] : value.items())
+    text += (text.empty() ? "" : ", ") + (value.is_object() ? key + " " : "") + in_one_line(item);
   return text;
 }
 
@@ -52,22 +54,24 @@ std::string model_text(const nlohmann::json& header, const std::string& path) {
       return count == 0 ? std::string("pole") : fmt::format("{}", count);
     };
     table.add({skeleton.at("bones").at(i).at("name").get<std::string>(), patch.at("method").get<std::string>(),
-               patch.at("topology").get<std::string>(), fmt::format("{} x {}", r[2], r[3]), fmt::format("{}, {}", r[0], r[1]), seams("head"),
-               seams("tail")});
+               patch.at("topology").get<std::string>(), fmt::format("{} x {}", r[2], r[3]),
+               fmt::format("{}, {}", r[0], r[1]), seams("head"), seams("tail")});
   }
   std::size_t samples = 0;
   for (const auto& arc : header.at("arcs")) samples += arc.at("samples").size() / 2;
   const int width = header.at("texture").at("width").get<int>(), height = header.at("texture").at("height").get<int>();
   std::string text = fmt::format(
-      "{}: model, format version {}\n{} x {} texels, {:.1f} % used; {} nodes, {} bones, genus {}; {} seams with {} samples, {} corners; diagonal of "
+      "{}: model, format version {}\n{} x {} texels, {:.1f} % used; {} nodes, {} bones, genus {}; {} seams with {} "
+      "samples, {} corners; diagonal of "
       "the input "
       "{:.6g}\n\n{}",
-      path, header.at("version").dump(), width, height, 100.0 * static_cast<double>(texels) / width / height, skeleton.at("nodes").size(),
-      skeleton.at("bones").size(), header.at("genus").get<int>(), header.at("arcs").size(), samples, header.at("corners").size(),
-      header.at("diagonal").get<double>(), table.text());
+      path, header.at("version").dump(), width, height, 100.0 * static_cast<double>(texels) / width / height,
+      skeleton.at("nodes").size(), skeleton.at("bones").size(), header.at("genus").get<int>(), header.at("arcs").size(),
+      samples, header.at("corners").size(), header.at("diagonal").get<double>(), table.text());
   if (header.contains("encoder")) {
     text += "\nencoder\n";
-    for (const auto& [key, value] : header.at("encoder").items()) text += fmt::format("  {}: {}\n", key, in_one_line(value));
+    for (const auto& [key, value] : header.at("encoder").items())
+      text += fmt::format("  {}: {}\n", key, in_one_line(value));
   }
   return text;
 }
@@ -95,8 +99,9 @@ void inspect_mesh(const Arguments& arguments) {
             {"upper", {box.upper.x(), box.upper.y(), box.upper.z()}},
             {"area", area}};
   std::string text =
-      fmt::format("{}: mesh\n{} vertices, {} edges, {} triangles, {} component{}; diagonal {:.6g}, area {:.6g}\n", arguments.file, report.vertices,
-                  report.edges, report.triangles, report.components, report.components == 1 ? "" : "s", box.diagonal(), area);
+      fmt::format("{}: mesh\n{} vertices, {} edges, {} triangles, {} component{}; diagonal {:.6g}, area {:.6g}\n",
+                  arguments.file, report.vertices, report.edges, report.triangles, report.components,
+                  report.components == 1 ? "" : "s", box.diagonal(), area);
   if (is_closed) {
     json["genus"] = report.genus;
     json["volume"] = signed_volume(mesh);
@@ -130,11 +135,13 @@ void run(const Arguments& arguments) {
     return;
   }
   if (arguments.has_self_intersections)
-    throw InputError(fmt::format("{}: --self-intersections is for meshes; reconstruct the model first", arguments.file));
+    throw InputError(
+        fmt::format("{}: --self-intersections is for meshes; reconstruct the model first", arguments.file));
   const nlohmann::json header = read_model_header(arguments.file);
   std::string levels;
   const std::vector<std::array<int, 2>> sizes = read_model_levels(arguments.file);
-  for (std::size_t level = 1; level < sizes.size(); ++level) levels += fmt::format("level {}: {} x {}\n", level, sizes[level][0], sizes[level][1]);
+  for (std::size_t level = 1; level < sizes.size(); ++level)
+    levels += fmt::format("level {}: {} x {}\n", level, sizes[level][0], sizes[level][1]);
   if (arguments.json != "-") print(arguments.json, model_text(header, arguments.file) + levels);
   write_json(arguments.json, Json(header));
 }
@@ -144,15 +151,19 @@ void run(const Arguments& arguments) {
 void add_inspect_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("inspect", "Say what a model, or a mesh, consists of");
-  declare_input(command, command.add_option("FILE", arguments->file, "model (.skx.exr), or mesh (.obj, .ply, .off, .stl)"))->required();
-  command.add_flag("--self-intersections", arguments->has_self_intersections, "of a mesh: count the pairs of triangles that intersect");
+  declare_input(command,
+                command.add_option("FILE", arguments->file, "model (.skx.exr), or mesh (.obj, .ply, .off, .stl)"))
+      ->required();
+  command.add_flag("--self-intersections", arguments->has_self_intersections,
+                   "of a mesh: count the pairs of triangles that intersect");
   add_json_option(command, arguments->json);
   command.footer(
       "Examples:\n"
       "  skeletex inspect bear.skx.exr\n"
       "  skeletex inspect bear.skx.exr --json - | jq '.patches[0]'\n"
       "  skeletex inspect bear.ply\n"
-      "The JSON of a model is its header as it stands in the file (docs/file-formats.md); texels are not read. Lengths are in the mesh's units.");
+      "The JSON of a model is its header as it stands in the file (docs/file-formats.md); texels are not read. Lengths "
+      "are in the mesh's units.");
   command.callback([arguments] { run(*arguments); });
 }
 

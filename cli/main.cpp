@@ -39,19 +39,22 @@ void check_names(const CLI::App& program, int argc, char** argv, std::string& ch
       for (const CLI::Option* option : app->get_options())
         for (const std::string& known : option->get_lnames()) names.push_back("--" + known);
       if (std::find(names.begin(), names.end(), name) == names.end())
-        throw CLI::ExtrasError(fmt::format("unknown option {}{}", name, did_you_mean(name, names)), CLI::ExitCodes::ExtrasError);
+        throw CLI::ExtrasError(fmt::format("unknown option {}{}", name, did_you_mean(name, names)),
+                               CLI::ExitCodes::ExtrasError);
     } else if (app == &program && !argument.starts_with('-')) {
       const auto found = std::find(commands.begin(), commands.end(), argument);
       if (found == commands.end())
-        throw CLI::ExtrasError(fmt::format("unknown command {}{}", argument, did_you_mean(argument, commands)), CLI::ExitCodes::ExtrasError);
+        throw CLI::ExtrasError(fmt::format("unknown command {}{}", argument, did_you_mean(argument, commands)),
+                               CLI::ExitCodes::ExtrasError);
       app = all[found - commands.begin()];
       chosen = argument + ' ';
     }
   }
 }
 
-/// Stages pass large arrays on and free them. Kept for the next one, they need not be cleared by the system again: a tenth of the time of `encode`. And where
-/// the system gives huge pages to those who ask, they are asked for: two in three page faults less.
+/// Stages pass large arrays on and free them. Kept for the next one, they need not be cleared by the system again: a
+/// tenth of the time of `encode`. And where the system gives huge pages to those who ask, they are asked for: two in
+/// three page faults less.
 void keep_freed_memory() {
 #ifdef __GLIBC__
   mallopt(M_MMAP_THRESHOLD, 32 << 20);  // the most it takes

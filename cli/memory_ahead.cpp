@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "memory_ahead.h"
 
-#include "skeletex/model/parallel.h"
+#include "skeletex/geometry/parallel.h"
 
 namespace skeletex::cli {
 namespace {
 
 constexpr std::size_t kPage = 4096;
-constexpr std::size_t kBlock = 8 << 20;  // less than what the allocator would give back to the system (keep_freed_memory)
+constexpr std::size_t kBlock =
+    8 << 20;  // less than what the allocator would give back to the system (keep_freed_memory)
 
 }  // namespace
 

@@ -8,8 +8,9 @@
 
 namespace skeletex::cli {
 
-/// Takes memory from the system beside what is done until it is needed, and then gives it to the allocator: the system clears each page when it is first
-/// touched, and a virtual machine may have to ask its host for it first, which together can take as long as a stage itself.
+/// Takes memory from the system beside what is done until it is needed, and then gives it to the allocator: the system
+/// clears each page when it is first touched, and a virtual machine may have to ask its host for it first, which
+/// together can take as long as a stage itself.
 class MemoryAhead {
  public:
   explicit MemoryAhead(std::size_t bytes);

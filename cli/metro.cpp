@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/measure/metro.h"
+#include "skeletex/analysis/metro.h"
 
 #include <fmt/format.h>
 
@@ -25,7 +25,9 @@ struct Arguments {
   double ply_max = 0;
 };
 
-Json statistics_json(const DistanceStatistics& s) { return {{"mean", s.mean}, {"std", s.std}, {"rms", s.rms}, {"max", s.max}}; }
+Json statistics_json(const DistanceStatistics& s) {
+  return {{"mean", s.mean}, {"std", s.std}, {"rms", s.rms}, {"max", s.max}};
+}
 
 TriangleMesh load_surface(const std::string& path) {
   TriangleMesh mesh = load_mesh(path);
@@ -50,7 +52,8 @@ double colour_scale(std::vector<float> distances) {
   return *at;
 }
 
-void write_coloured(const std::string& path, const TriangleMesh& mesh, const std::vector<float>& distances, double scale) {
+void write_coloured(const std::string& path, const TriangleMesh& mesh, const std::vector<float>& distances,
+                    double scale) {
   std::vector<VertexColour> colours;
   for (const float distance : distances) colours.push_back(viridis(scale > 0 ? distance / scale : 0));
   PlyAttributes attributes;
@@ -72,22 +75,27 @@ void run(const Arguments& arguments) {
     report = measure_metro(context, a, b, {.samples = arguments.samples});
   }
   if (!arguments.csv.empty()) write_csv(arguments.csv, a, report.vertex_distances);
-  const double scale = arguments.ply_max > 0 ? arguments.ply_max * report.diagonal : colour_scale(report.vertex_distances);
+  const double scale =
+      arguments.ply_max > 0 ? arguments.ply_max * report.diagonal : colour_scale(report.vertex_distances);
   if (!arguments.ply.empty()) write_coloured(arguments.ply, a, report.vertex_distances, scale);
 
   Table table({"divided by the diagonal", "mean", "std", "rms", "max"});
   const auto add = [&table](const char* name, const DistanceStatistics& s) {
-    table.add({name, fmt::format("{:.3e}", s.mean), fmt::format("{:.3e}", s.std), fmt::format("{:.3e}", s.rms), fmt::format("{:.3e}", s.max)});
+    table.add({name, fmt::format("{:.3e}", s.mean), fmt::format("{:.3e}", s.std), fmt::format("{:.3e}", s.rms),
+               fmt::format("{:.3e}", s.max)});
   };
   add("A's surface to B", report.forward);
   add("B's surface to A", report.backward);
   add("A's vertices to B", report.vertex);
-  std::string text = table.text() + fmt::format("symmetric surface mean {:.3e}, maximum {:.3e}; diagonal of A {:.6g}; {:.2f} s on {}\n",
-                                                symmetric_mean(report), std::max(report.forward.max, report.backward.max),
-                                                report.diagonal, report.seconds, context.device().name);
+  std::string text =
+      table.text() +
+      fmt::format("symmetric surface mean {:.3e}, maximum {:.3e}; diagonal of A {:.6g}; {:.2f} s on {}\n",
+                  symmetric_mean(report), std::max(report.forward.max, report.backward.max), report.diagonal,
+                  report.seconds, context.device().name);
   if (!arguments.csv.empty()) text += fmt::format("{}: distances of A's vertices, in its units\n", arguments.csv);
   if (!arguments.ply.empty())
-    text += fmt::format("{}: dark blue at 0 to yellow at {:.3e} ({:.3e} of the diagonal)\n", arguments.ply, scale, scale / report.diagonal);
+    text += fmt::format("{}: dark blue at 0 to yellow at {:.3e} ({:.3e} of the diagonal)\n", arguments.ply, scale,
+                        scale / report.diagonal);
   print(arguments.json, text);
   Json json{{"diagonal", report.diagonal},
             {"forward", statistics_json(report.forward)},
@@ -105,17 +113,27 @@ void run(const Arguments& arguments) {
 void add_metro_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("metro", "Measure the distance between two surfaces, in both directions");
-  declare_input(command, command.add_option("A", arguments->a, "mesh, usually the original: its diagonal is the unit"))->required();
+  declare_input(command, command.add_option("A", arguments->a, "mesh, usually the original: its diagonal is the unit"))
+      ->required();
   declare_input(command, command.add_option("B", arguments->b, "mesh, usually the reconstruction"))->required();
   command
-      .add_option("--samples", arguments->samples,
-                  "points spread evenly over each surface (default: ten per vertex of the larger mesh, at least 100000)")
+      .add_option(
+          "--samples", arguments->samples,
+          "points spread evenly over each surface (default: ten per vertex of the larger mesh, at least 100000)")
       ->check(number_in(1, 1e9))
       ->type_name("N");
-  declare_output(command, command.add_option("--csv", arguments->csv, "write A's vertices and their distances to B, in A's units"), {".csv"})->type_name("FILE");
-  declare_output(command, command.add_option("--ply", arguments->ply, "write A with the property distance and colours from dark blue (0) to yellow"), {".ply"})->type_name("FILE");
+  declare_output(
+      command, command.add_option("--csv", arguments->csv, "write A's vertices and their distances to B, in A's units"),
+      {".csv"})
+      ->type_name("FILE");
+  declare_output(command,
+                 command.add_option("--ply", arguments->ply,
+                                    "write A with the property distance and colours from dark blue (0) to yellow"),
+                 {".ply"})
+      ->type_name("FILE");
   command
-      .add_option("--ply-max", arguments->ply_max, "distance that is yellow, divided by the diagonal (default: what 99 % of the vertices lie below)")
+      .add_option("--ply-max", arguments->ply_max,
+                  "distance that is yellow, divided by the diagonal (default: what 99 % of the vertices lie below)")
       ->check(number_above(0))
       ->type_name("X");
   add_device_option(command, arguments->device);
@@ -124,7 +142,8 @@ void add_metro_command(CLI::App& program) {
       "Examples:\n"
       "  skeletex metro bear.off bear.ply\n"
       "  skeletex metro bear.off bear.ply --ply error.ply --csv error.csv --json error.json\n"
-      "Means, RMS and maxima are divided by the diagonal of A's bounding box. \"Surface\" measures from points spread evenly over a surface (as the "
+      "Means, RMS and maxima are divided by the diagonal of A's bounding box. \"Surface\" measures from points spread "
+      "evenly over a surface (as the "
       "tool\n"
       "metro does), \"vertices\" from A's vertices (as the paper does); the two differ, so say which one you quote.");
   command.callback([arguments] { run(*arguments); });

@@ -23,8 +23,8 @@ void ProgressBar::show(const std::string& stage, double done) {
   last_ = now;
   constexpr int kWidth = 32;
   const int filled = static_cast<int>(std::clamp(done, 0.0, 1.0) * kWidth);
-  fmt::print(stderr, "\r\033[K[{}{}] {:3.0f} % {}", std::string(filled, '#'), std::string(kWidth - filled, '.'), 100 * std::clamp(done, 0.0, 1.0),
-             stage);
+  fmt::print(stderr, "\r\033[K[{}{}] {:3.0f} % {}", std::string(filled, '#'), std::string(kWidth - filled, '.'),
+             100 * std::clamp(done, 0.0, 1.0), stage);
   std::fflush(stderr);
   is_drawn_ = true;
 }

@@ -8,14 +8,14 @@
 #include <vector>
 
 #include "command.h"
+#include "deform_option.h"
 #include "files.h"
 #include "progress_bar.h"
+#include "skeletex/analysis/deformation.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/pose_file.h"
-#include "skeletex/measure/deformation.h"
 #include "skeletex/model/error.h"
-#include "deform_option.h"
 #include "skeletex/reconstruct/polish.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
@@ -39,8 +39,9 @@ struct PoseReport {
 
 PoseReport report_pose(const TriangleMesh& bind, const TriangleMesh& posed) {
   const DeformationReport report = measure_deformation(make_bind_surface(bind), posed.positions);
-  return {fmt::format("pose: {} new folds, {} new intersections, volume {:+.1f} %, symmetric Dirichlet energy {:.2f} (99 % of the area lies below)\n", report.new_folds,
-                      report.new_intersections, 100 * (report.volume_ratio - 1), report.energy_99),
+  return {fmt::format("pose: {} new folds, {} new intersections, volume {:+.1f} %, symmetric Dirichlet energy {:.2f} "
+                      "(99 % of the area lies below)\n",
+                      report.new_folds, report.new_intersections, 100 * (report.volume_ratio - 1), report.energy_99),
           {{"new_folds", report.new_folds},
            {"new_intersections", report.new_intersections},
            {"volume_ratio", report.volume_ratio},
@@ -55,14 +56,16 @@ std::vector<int> bones_by_name(const Skeleton& skeleton, const std::vector<std::
 }
 
 void run(const Arguments& arguments) {
-  if (arguments.constant_offset && arguments.is_polished) throw CLI::ValidationError("--polish", "--constant-offset writes no surface that could be polished");
+  if (arguments.constant_offset && arguments.is_polished)
+    throw CLI::ValidationError("--polish", "--constant-offset writes no surface that could be polished");
   if (!arguments.constant_offset) check_distance_option(arguments.is_distance_dropped, arguments.deform);
   Stopwatch total, watch;
   SkeletexModel model = read_model(arguments.model, arguments.level);
   std::optional<Skeleton> posed;
   if (!arguments.pose.empty()) {
     const PoseAnimation animation = read_animation(arguments.pose, model.skeleton);
-    posed = apply_pose(model.skeleton, pose_at(model.skeleton, animation, arguments.time.value_or(animation.frames.front().time)));
+    posed = apply_pose(model.skeleton,
+                       pose_at(model.skeleton, animation, arguments.time.value_or(animation.frames.front().time)));
   }
   const double read_ms = watch.lap_ms();
   ClContext& context = open_device(arguments.device);
@@ -82,9 +85,11 @@ void run(const Arguments& arguments) {
     const DistanceRule rule = arguments.is_distance_dropped ? DistanceRule::kFromFoot : DistanceRule::kFromBone;
     if (arguments.constant_offset) {
       const Skeleton& skeleton = posed ? *posed : model.skeleton;
-      mesh = constant_offset_mesh(context, model, skeleton, bones_by_name(model.skeleton, arguments.bones), *arguments.constant_offset * model.diagonal, rule);
+      mesh = constant_offset_mesh(context, model, skeleton, bones_by_name(model.skeleton, arguments.bones),
+                                  *arguments.constant_offset * model.diagonal, rule);
     } else {
-      mesh = posed ? reconstruct_mesh(context, model, *posed, {deformation_of(arguments.deform), rule}) : reconstruct_mesh(context, model);
+      mesh = posed ? reconstruct_mesh(context, model, *posed, {deformation_of(arguments.deform), rule})
+                   : reconstruct_mesh(context, model);
     }
     if (arguments.is_polished) {
       bar.show("polishing", 0.5);
@@ -102,25 +107,29 @@ void run(const Arguments& arguments) {
   const double total_ms = total.lap_ms();
   std::string pose_text;
   if (polish_report)
-    pose_text = fmt::format("polish: {} new folds became {}, {} vertices moved by up to {:.2g} diagonals\n", polish_report->folds_before, polish_report->folds_after,
-                            polish_report->moved_vertices, polish_report->farthest / model.diagonal);
+    pose_text = fmt::format("polish: {} new folds became {}, {} vertices moved by up to {:.2g} diagonals\n",
+                            polish_report->folds_before, polish_report->folds_after, polish_report->moved_vertices,
+                            polish_report->farthest / model.diagonal);
   if (pose_report) pose_text += pose_report->text;
-  print(arguments.json, fmt::format("{} vertices, {} triangles from {} x {} texels, on {}\n"
-                                    "read {:.0f} ms, device {:.0f} ms, resample {:.0f} ms, reconstruct {:.0f} ms, write {:.0f} ms\n{}{}\n",
-                                    mesh.positions.size(), mesh.triangles.size(), model.texture.width, model.texture.height, context.device().name,
-                                    read_ms, start_ms, resample_ms, reconstruct_ms, write_ms, pose_text, arguments.output));
+  print(arguments.json,
+        fmt::format(
+            "{} vertices, {} triangles from {} x {} texels, on {}\n"
+            "read {:.0f} ms, device {:.0f} ms, resample {:.0f} ms, reconstruct {:.0f} ms, write {:.0f} ms\n{}{}\n",
+            mesh.positions.size(), mesh.triangles.size(), model.texture.width, model.texture.height,
+            context.device().name, read_ms, start_ms, resample_ms, reconstruct_ms, write_ms, pose_text,
+            arguments.output));
   Json json{{"vertices", mesh.positions.size()},
-                              {"triangles", mesh.triangles.size()},
-                              {"size", {model.texture.width, model.texture.height}},
-                              {"times_ms",
-                               {{"read", read_ms},
-                                {"device", start_ms},
-                                {"resample", resample_ms},
-                                {"reconstruct", reconstruct_ms},
-                                {"write", write_ms},
-                                {"total", total_ms}}},
-                              {"device", context.device().name},
-                              {"kernels", profile_json(context)}};
+            {"triangles", mesh.triangles.size()},
+            {"size", {model.texture.width, model.texture.height}},
+            {"times_ms",
+             {{"read", read_ms},
+              {"device", start_ms},
+              {"resample", resample_ms},
+              {"reconstruct", reconstruct_ms},
+              {"write", write_ms},
+              {"total", total_ms}}},
+            {"device", context.device().name},
+            {"kernels", profile_json(context)}};
   if (pose_report) json["pose"] = pose_report->json;
   if (polish_report)
     json["polish"] = {{"new_folds_before", polish_report->folds_before},
@@ -135,28 +144,48 @@ void run(const Arguments& arguments) {
 
 void add_reconstruct_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App& command = *program.add_subcommand("reconstruct", "Turn a model back into a closed mesh, at any resolution and in any pose");
+  CLI::App& command =
+      *program.add_subcommand("reconstruct", "Turn a model back into a closed mesh, at any resolution and in any pose");
   declare_input(command, command.add_option("MODEL", arguments->model, "model: .skx.exr"))->required();
-  declare_output(command, command.add_option("-o,--output", arguments->output, "mesh: .ply (binary) or .obj"), {".ply", ".obj"})->required()->type_name("FILE");
-  command.add_option("--size", arguments->size, "texels along the longer side, 4 to 16384 (default: the model's own size)")
+  declare_output(command, command.add_option("-o,--output", arguments->output, "mesh: .ply (binary) or .obj"),
+                 {".ply", ".obj"})
+      ->required()
+      ->type_name("FILE");
+  command
+      .add_option("--size", arguments->size, "texels along the longer side, 4 to 16384 (default: the model's own size)")
       ->check(number_in(4, 16384))
       ->type_name("N");
-  command.add_option("--level", arguments->level, "level of a file that `skeletex lod --levels` has written (default: 0, the finest)")
+  command
+      .add_option("--level", arguments->level,
+                  "level of a file that `skeletex lod --levels` has written (default: 0, the finest)")
       ->check(number_from(0))
       ->type_name("K");
-  CLI::Option* pose = declare_input(command, command.add_option("--pose", arguments->pose, "pose or animation: .json"))->type_name("FILE");
-  command.add_option("--time", arguments->time, "time in the animation (default: its first frame)")->check(any_number())->type_name("T")->needs(pose);
+  CLI::Option* pose = declare_input(command, command.add_option("--pose", arguments->pose, "pose or animation: .json"))
+                          ->type_name("FILE");
+  command.add_option("--time", arguments->time, "time in the animation (default: its first frame)")
+      ->check(any_number())
+      ->type_name("T")
+      ->needs(pose);
   add_deform_option(command, arguments->deform)->needs(pose);
-  command.add_flag("--no-distance", arguments->is_distance_dropped, "with --deform paper or coordinates: do not restore the distances to the bones")->needs(pose);
+  command
+      .add_flag("--no-distance", arguments->is_distance_dropped,
+                "with --deform paper or coordinates: do not restore the distances to the bones")
+      ->needs(pose);
   add_polish_option(command, arguments->is_polished, pose);
-  command.add_flag("--no-report", arguments->has_no_report, "do not measure what the pose does to the surface")->needs(pose);
-  CLI::Option* offset = command
-                            .add_option("--constant-offset", arguments->constant_offset,
-                                        "instead of the surface the plane of bone tangent space that lies so far out: a tube around every bone, "
-                                        "in diagonals, above 0 and up to 1")
-                            ->check(number_in(1e-6, 1.0))
-                            ->type_name("W");
-  command.add_option("--bones", arguments->bones, "the plane around these bones only (names with commas between them)")->delimiter(',')->type_name("NAMES")->needs(offset);
+  command.add_flag("--no-report", arguments->has_no_report, "do not measure what the pose does to the surface")
+      ->needs(pose);
+  CLI::Option* offset =
+      command
+          .add_option(
+              "--constant-offset", arguments->constant_offset,
+              "instead of the surface the plane of bone tangent space that lies so far out: a tube around every bone, "
+              "in diagonals, above 0 and up to 1")
+          ->check(number_in(1e-6, 1.0))
+          ->type_name("W");
+  command.add_option("--bones", arguments->bones, "the plane around these bones only (names with commas between them)")
+      ->delimiter(',')
+      ->type_name("NAMES")
+      ->needs(offset);
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(
@@ -165,7 +194,8 @@ void add_reconstruct_command(CLI::App& program) {
       "  skeletex reconstruct bear.skx.exr -o draft.obj --size 64\n"
       "  skeletex reconstruct bear.skx.exr -o waving.ply --pose wave.json --time 0.5\n"
       "  skeletex reconstruct bear.skx.exr -o tubes.ply --pose wave.json --constant-offset 0.05\n"
-      "The mesh is closed, oriented, 2-manifold and of the input's genus at every size and in every pose. Coordinates are in the input mesh's units.");
+      "The mesh is closed, oriented, 2-manifold and of the input's genus at every size and in every pose. Coordinates "
+      "are in the input mesh's units.");
   command.callback([arguments] { run(*arguments); });
 }
 

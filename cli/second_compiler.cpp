@@ -18,8 +18,10 @@ SecondCompiler::SecondCompiler(const std::function<void(const std::function<bool
   process_ = fork();
   if (process_ != 0) {
     close(ends[0]);
-    if (process_ < 0) close(ends[1]);
-    else other_ = ends[1];
+    if (process_ < 0)
+      close(ends[1]);
+    else
+      other_ = ends[1];
     return;
   }
   close(ends[1]);

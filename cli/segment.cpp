@@ -6,12 +6,12 @@
 #include "command.h"
 #include "files.h"
 #include "progress_bar.h"
+#include "skeletex/convert/segment/segment_mesh.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/model/error.h"
 #include "skeletex/model/texture.h"
 #include "skeletex/render/colours.h"
-#include "skeletex/segment/segment_mesh.h"
 #include "table.h"
 
 namespace skeletex::cli {
@@ -23,7 +23,8 @@ struct Arguments {
 
 void run(const Arguments& arguments) {
   if (!has_ending(arguments.output, ".ply"))
-    throw CLI::ValidationError("--output", "\"" + arguments.output + "\" does not end in .ply, which carries the colours");
+    throw CLI::ValidationError("--output",
+                               "\"" + arguments.output + "\" does not end in .ply, which carries the colours");
   TriangleMesh mesh = load_mesh(arguments.mesh);
   const Skeleton skeleton = read_skeleton(arguments.skeleton);
   ClContext& context = open_device(arguments.device);
@@ -62,9 +63,11 @@ void run(const Arguments& arguments) {
                      {"triangles", segment.mesh.triangles.size()},
                      {"area", area}});
   }
-  print(arguments.json, fmt::format("{}\n{} triangles, {} after the cuts; {} seams; half edges {:.0f} ms, segmentation {:.0f} ms on {}\n{}\n",
-                                    table.text(), mesh.triangles.size(), segmentation.cut_mesh.triangles.size(), segmentation.arcs.size(),
-                                    half_edge_ms, segmentation_ms, context.device().name, arguments.output));
+  print(arguments.json,
+        fmt::format(
+            "{}\n{} triangles, {} after the cuts; {} seams; half edges {:.0f} ms, segmentation {:.0f} ms on {}\n{}\n",
+            table.text(), mesh.triangles.size(), segmentation.cut_mesh.triangles.size(), segmentation.arcs.size(),
+            half_edge_ms, segmentation_ms, context.device().name, arguments.output));
   write_json(arguments.json, {{"bones", std::move(bones)},
                               {"arcs", segmentation.arcs.size()},
                               {"vertices", segmentation.cut_mesh.positions.size()},
@@ -79,15 +82,22 @@ void run(const Arguments& arguments) {
 void add_segment_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("segment", "Cut a mesh into one piece per bone and colour the pieces");
-  declare_input(command, command.add_option("MESH", arguments->mesh, "closed triangle mesh: .obj, .ply, .off or .stl"))->required();
-  declare_input(command, command.add_option("SKELETON", arguments->skeleton, "skeleton: JSON with nodes and bones, in the mesh's coordinates"))->required();
-  declare_output(command, command.add_option("-o,--output", arguments->output, "cut mesh with a colour per face: .ply"), {".ply"})->required()->type_name("FILE");
+  declare_input(command, command.add_option("MESH", arguments->mesh, "closed triangle mesh: .obj, .ply, .off or .stl"))
+      ->required();
+  declare_input(command, command.add_option("SKELETON", arguments->skeleton,
+                                            "skeleton: JSON with nodes and bones, in the mesh's coordinates"))
+      ->required();
+  declare_output(command, command.add_option("-o,--output", arguments->output, "cut mesh with a colour per face: .ply"),
+                 {".ply"})
+      ->required()
+      ->type_name("FILE");
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(
       "Example:\n"
       "  skeletex segment bear.off bear.skeleton.json -o segments.ply --json legend.json\n"
-      "The table and the JSON say which colour is which bone; the i-th bone of a skeleton always has the same one. Areas are in the mesh's units "
+      "The table and the JSON say which colour is which bone; the i-th bone of a skeleton always has the same one. "
+      "Areas are in the mesh's units "
       "squared.");
   command.callback([arguments] { run(*arguments); });
 }

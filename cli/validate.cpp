@@ -6,8 +6,8 @@
 #include "command.h"
 #include "files.h"
 #include "progress_bar.h"
+#include "skeletex/analysis/validate_input.h"
 #include "skeletex/io/skeleton_file.h"
-#include "skeletex/validate/validate_input.h"
 
 namespace skeletex::cli {
 namespace {
@@ -42,7 +42,10 @@ void run(const Arguments& arguments) {
     warnings += finding.severity == Severity::kWarning;
     text += fmt::format("{} ({}): {}\n", to_word(finding.severity), finding.rule, finding.message);
     if (!finding.remedy.empty()) text += fmt::format("  remedy: {}\n", finding.remedy);
-    list.push_back({{"severity", to_word(finding.severity)}, {"rule", finding.rule}, {"message", finding.message}, {"remedy", finding.remedy}});
+    list.push_back({{"severity", to_word(finding.severity)},
+                    {"rule", finding.rule},
+                    {"message", finding.message},
+                    {"remedy", finding.remedy}});
   }
   text += fmt::format("{} triangles, {} bones: {}\n", mesh.triangles.size(), skeleton.bones.size(),
                       errors > 0     ? fmt::format("{} error{}; not usable as it is", errors, errors == 1 ? "" : "s")
@@ -63,9 +66,13 @@ void run(const Arguments& arguments) {
 
 void add_validate_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App& command = *program.add_subcommand("validate", "Say everything that is wrong with a mesh and a skeleton, each with its place and remedy");
-  declare_input(command, command.add_option("MESH", arguments->mesh, "triangle mesh: .obj, .ply, .off or .stl"))->required();
-  declare_input(command, command.add_option("SKELETON", arguments->skeleton, "skeleton: JSON with nodes and bones, in the mesh's coordinates"))->required();
+  CLI::App& command = *program.add_subcommand(
+      "validate", "Say everything that is wrong with a mesh and a skeleton, each with its place and remedy");
+  declare_input(command, command.add_option("MESH", arguments->mesh, "triangle mesh: .obj, .ply, .off or .stl"))
+      ->required();
+  declare_input(command, command.add_option("SKELETON", arguments->skeleton,
+                                            "skeleton: JSON with nodes and bones, in the mesh's coordinates"))
+      ->required();
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(

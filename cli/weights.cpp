@@ -34,18 +34,26 @@ void run(const Arguments& arguments) {
     for (const std::string& name : weight_channels(model.skeleton)) channels.push_back(name);
   const double ms = watch.lap_ms();
   print(arguments.json, arguments.is_removed ? fmt::format("weights removed: {}\n", arguments.output)
-                                             : fmt::format("{} layers, {} to {}: {}\n", channels.size(), channels.front().get<std::string>(),
+                                             : fmt::format("{} layers, {} to {}: {}\n", channels.size(),
+                                                           channels.front().get<std::string>(),
                                                            channels.back().get<std::string>(), arguments.output));
-  write_json(arguments.json, {{"output", arguments.output}, {"channels", std::move(channels)}, {"times_ms", {{"total", ms}}}});
+  write_json(arguments.json,
+             {{"output", arguments.output}, {"channels", std::move(channels)}, {"times_ms", {{"total", ms}}}});
 }
 
 }  // namespace
 
 void add_weights_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App& command = *program.add_subcommand("weights", "Store how much each bone moves each texel in a smooth pose, as layers to paint on");
+  CLI::App& command = *program.add_subcommand(
+      "weights", "Store how much each bone moves each texel in a smooth pose, as layers to paint on");
   declare_input(command, command.add_option("MODEL", arguments->model, "model: .skx.exr"))->required();
-  declare_output(command, command.add_option("-o,--output", arguments->output, "the model with a layer \"weights.BONE\" per bone: .skx.exr"), {".exr"})->required()->type_name("FILE");
+  declare_output(command,
+                 command.add_option("-o,--output", arguments->output,
+                                    "the model with a layer \"weights.BONE\" per bone: .skx.exr"),
+                 {".exr"})
+      ->required()
+      ->type_name("FILE");
   command.add_flag("--remove", arguments->is_removed, "take such layers away: weights in closed form again");
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);

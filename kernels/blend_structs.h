@@ -22,8 +22,9 @@ typedef struct BlendSource {
   float sign;                 ///< of the parts along and around: -1 where the source's bone is reversed
 } BlendSource;
 
-/// Where one column of the result reads in one source, at the bone's head and tail, and how far the walls' slopes of the
-/// result lie above the source's there. `even` is the same smoothed around the bone: what counts away from that end.
+/// Where one column of the result reads in one source, at the bone's head and tail, and how far the separation planes'
+/// slopes of the result lie above the source's there. `even` is the same smoothed around the bone: what counts away
+/// from that end.
 typedef struct BlendColumn {
   float head, even_head, tail, even_tail;  ///< columns of the source, any lift; the patch is periodic
   float head_rise, even_head_rise, tail_rise, even_tail_rise;

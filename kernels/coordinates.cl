@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Points posed by the paper's rule (3.4, 3.6.1) at their own coordinates about their bone.
 //
-// Blocks, work-groups and work-items as in skin.cl: no work-item reads what another one writes, so no barriers are needed.
+// Blocks, work-groups and work-items as in skin.cl: no work-item reads what another one writes, so no barriers are
+// needed.
 //   blocks                    of inner vertices; their bones and weights are not read
 //   patches, ends, arcs       tables of the bind pose or of the pose, by bone
-//   angle, distance, height   cylinder coordinates of the points in the bind pose about their bone: radians in [0, 2 pi), from the axis, and
+//   angle, distance, height   cylinder coordinates of the points in the bind pose about their bone: radians in [0, 2
+//   pi), from the axis, and
 //                             along the axis from the head
 //   slope_head, slope_tail    of the bind pose's separation planes at that angle
 #include "pose_math.h"
@@ -12,8 +14,9 @@
 
 // What the arcs around a bone's end give to each vertex of a block: the roll, and the two parts of the slope.
 //   loop  3 * SKIN_BLOCK floats
-__attribute__((always_inline)) void read_arcs(const int item, const int count, const int arc_count, __global const PosedArcRecord* restrict arcs,
-                      __global const float* restrict angle, __local float* restrict loop) {
+__attribute__((always_inline)) void read_arcs(const int item, const int count, const int arc_count,
+                                              __global const PosedArcRecord* restrict arcs,
+                                              __global const float* restrict angle, __local float* restrict loop) {
   for (int k = 0; k < arc_count; ++k) {
     const float begin = arcs[k].begin, roll = arcs[k].roll, rate = arcs[k].rate;
     const float slope_s = arcs[k].slope_s, slope_b = arcs[k].slope_b;
@@ -29,11 +32,14 @@ __attribute__((always_inline)) void read_arcs(const int item, const int count, c
 // The coordinates of points in the bind pose.
 //   x, y, z  relative to the origin of the patch records
 //   loops    6 * SKIN_BLOCK floats
-__kernel void bone_coordinates(const int block_count, __global const SkinBlock* restrict blocks, __global const PatchRecord* restrict patches,
-                               __global const PosedEndsRecord* restrict ends, __global const PosedArcRecord* restrict arcs,
-                               __global const float* restrict x, __global const float* restrict y, __global const float* restrict z,
-                               __global float* restrict angle, __global float* restrict distance, __global float* restrict height,
-                               __global float* restrict slope_head, __global float* restrict slope_tail, __local float* restrict loops) {
+__kernel void bone_coordinates(const int block_count, __global const SkinBlock* restrict blocks,
+                               __global const PatchRecord* restrict patches,
+                               __global const PosedEndsRecord* restrict ends,
+                               __global const PosedArcRecord* restrict arcs, __global const float* restrict x,
+                               __global const float* restrict y, __global const float* restrict z,
+                               __global float* restrict angle, __global float* restrict distance,
+                               __global float* restrict height, __global float* restrict slope_head,
+                               __global float* restrict slope_tail, __local float* restrict loops) {
   const int group = get_group_id(0);
   if (group >= block_count) return;
   const int vertex = blocks[group].first_vertex, count = blocks[group].vertex_count, bone = blocks[group].bone;
@@ -60,19 +66,23 @@ __kernel void bone_coordinates(const int block_count, __global const SkinBlock* 
   }
 }
 
-// Points with these coordinates in a pose. They are moved as SPD's texels are: their station is that of the foot from which SPD's ray leads
-// to the point in the bind pose, the ray turns with the frame there, and the point's distance from the bone is restored.
+// Points with these coordinates in a pose. They are moved as SPD's texels are: their axial parameter is that of the
+// foot from which SPD's ray leads to the point in the bind pose, the ray turns with the frame there, and the point's
+// distance from the bone is restored.
 //   is_distance_kept  0: the point keeps its distance from the foot instead
 //   bind_patches      for their lengths
 //   x, y, z           relative to the origin of the posed patch records
 //   loops             6 * SKIN_BLOCK floats
-__kernel void pose_by_coordinates(const int block_count, const int is_distance_kept, __global const SkinBlock* restrict blocks,
-                                  __global const PatchRecord* restrict bind_patches, __global const PatchRecord* restrict patches,
-                                  __global const PosedEndsRecord* restrict ends, __global const PosedArcRecord* restrict arcs,
-                                  __global const float* restrict angle, __global const float* restrict distance,
-                                  __global const float* restrict height, __global const float* restrict slope_head,
-                                  __global const float* restrict slope_tail, __global float* restrict x, __global float* restrict y,
-                                  __global float* restrict z, __local float* restrict loops) {
+__kernel void pose_by_coordinates(const int block_count, const int is_distance_kept,
+                                  __global const SkinBlock* restrict blocks,
+                                  __global const PatchRecord* restrict bind_patches,
+                                  __global const PatchRecord* restrict patches,
+                                  __global const PosedEndsRecord* restrict ends,
+                                  __global const PosedArcRecord* restrict arcs, __global const float* restrict angle,
+                                  __global const float* restrict distance, __global const float* restrict height,
+                                  __global const float* restrict slope_head, __global const float* restrict slope_tail,
+                                  __global float* restrict x, __global float* restrict y, __global float* restrict z,
+                                  __local float* restrict loops) {
   const int group = get_group_id(0);
   if (group >= block_count) return;
   const int vertex = blocks[group].first_vertex, count = blocks[group].vertex_count, bone = blocks[group].bone;
@@ -94,14 +104,15 @@ __kernel void pose_by_coordinates(const int block_count, const int is_distance_k
     const float turned = angle[at], across = distance[at], along = height[at];
     const float bind_slope_head = slope_head[at], bind_slope_tail = slope_tail[at];
 
-    // Along the bone from the head's separation plane, and to the tail's. Where the planes have crossed in between, the point is
-    // beyond both, and the nearer it is to the head, the smaller its station still is. Beyond one plane or past a free end it is that end's.
+    // Along the bone from the head's separation plane, and to the tail's. Where the planes have crossed in between, the
+    // point is beyond both, and the nearer it is to the head, the smaller its axial parameter still is. Beyond one
+    // plane or past a free end it is that end's.
     const float from_head = along - across * bind_slope_head;
     const float to_tail = bind_length + across * bind_slope_tail - along;
     const float before = fmax(0.0f, from_head) + fmax(0.0f, -to_tail);
     const float after = fmax(0.0f, to_tail) + fmax(0.0f, -from_head);
-    const float station = before > 0.0f ? before / (before + after) : 0.0f;
-    const float eased = EASED(station);
+    const float axial = before > 0.0f ? before / (before + after) : 0.0f;
+    const float eased = EASED(axial);
 
     const float roll_head = loops[i], roll_tail = tail[i];
     float sine, cosine;
@@ -109,26 +120,29 @@ __kernel void pose_by_coordinates(const int block_count, const int is_distance_k
     const float change_head = loops[SKIN_BLOCK + i] * cosine + loops[2 * SKIN_BLOCK + i] * sine - bind_slope_head;
     SIN_COS(turned + roll_tail, sine, cosine);
     const float change_tail = tail[SKIN_BLOCK + i] * cosine + tail[2 * SKIN_BLOCK + i] * sine - bind_slope_tail;
-    const float bind_slope = bind_slope_head + station * (bind_slope_tail - bind_slope_head);
+    const float bind_slope = bind_slope_head + axial * (bind_slope_tail - bind_slope_head);
     const float change = change_head + eased * (change_tail - change_head);
     const float slope = bind_slope + change;
 
     // The ray from the foot in the plane of the bone and the point, turned from the bind pose's frame to the posed one.
-    const float ray = along - station * bind_length;
+    const float ray = along - axial * bind_length;
     const float turn_cosine = 1.0f + bind_slope * slope;
     const float scale = 1.0f / sqrt((1.0f + bind_slope * bind_slope) * (1.0f + slope * slope));
     const float q_s = (across * turn_cosine - ray * change) * scale;
     const float q_o = (across * change + ray * turn_cosine) * scale;
 
-    // Where it leaves the capsule, in ray lengths (leave_capsule of frame.h). Near seams both capsules are drawn out (PosedRow).
-    const float near_head = fmax(0.0f, 1.0f - station / POSED_SEAM_SHARE), near_tail = fmax(0.0f, 1.0f - (1.0f - station) / POSED_SEAM_SHARE);
+    // Where it leaves the capsule, in ray lengths (leave_capsule of frame.h). Near seams both capsules are drawn out
+    // (PosedRow).
+    const float near_head = fmax(0.0f, 1.0f - axial / POSED_SEAM_SHARE),
+                near_tail = fmax(0.0f, 1.0f - (1.0f - axial) / POSED_SEAM_SHARE);
     const float share_head = near_tail * near_tail, share_tail = near_head * near_head;
-    const float past = fmax(0.0f, fmax(-share_head * bind_reach_head - along, along - bind_length - share_tail * bind_reach_tail));
+    const float past =
+        fmax(0.0f, fmax(-share_head * bind_reach_head - along, along - bind_length - share_tail * bind_reach_tail));
     const float e2 = across * across + ray * ray;
     const float e2_inverse = e2 > 0.0f ? 1.0f / e2 : 0.0f;
     const float radius2 = (across * across + past * past) * e2_inverse;
     const float sin2 = q_s * q_s * e2_inverse;
-    const float foot = station * length;
+    const float foot = axial * length;
     const float rest = q_o < 0.0f ? foot + share_head * reach_head : length - foot + share_tail * reach_tail;
     const float rest2 = rest * rest * e2_inverse;
     const int is_cylinder = q_o * q_o * e2_inverse * radius2 <= rest2 * sin2;

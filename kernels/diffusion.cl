@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Diffusion over the surface by conjugate gradients. Vertices, rows, fans, fields and weights as in filter.cl, whose head comment explains
-// them. A file of its own because it is compiled with other options: one program of both would be compiled twice.
+// Diffusion over the surface by conjugate gradients. Vertices, rows, fans, fields and weights as in filter.cl, whose
+// head comment explains them. A file of its own because it is compiled with other options: one program of both would be
+// compiled twice.
 //
 // Sums are partial sums, one per work-item of every group, that sum_partials adds up: no result depends on the order in
 // which groups run.
@@ -9,23 +10,27 @@
 #define VERTEX_CHUNK 4096
 
 // Sum of w (p here - p there) over the eight neighbours in the rows.
-float laplacian_at(const int count, __global const float* restrict weights, __global const float* restrict p, const int before, const int here,
-                   const int after, const int left, const int j, const int right, const float has_before) {
+float laplacian_at(const int count, __global const float* restrict weights, __global const float* restrict p,
+                   const int before, const int here, const int after, const int left, const int j, const int right,
+                   const float has_before) {
   const int v = here + j;
   const float centre = p[v];
   const float beside = weights[v] * (centre - p[here + right]) + weights[here + left] * (centre - p[here + left]);
-  const float ahead = weights[count + v] * (centre - p[after + left]) + weights[2 * count + v] * (centre - p[after + j]) +
+  const float ahead = weights[count + v] * (centre - p[after + left]) +
+                      weights[2 * count + v] * (centre - p[after + j]) +
                       weights[3 * count + v] * (centre - p[after + right]);
-  const float behind = weights[count + before + right] * (centre - p[before + right]) + weights[2 * count + before + j] * (centre - p[before + j]) +
+  const float behind = weights[count + before + right] * (centre - p[before + right]) +
+                       weights[2 * count + before + j] * (centre - p[before + j]) +
                        weights[3 * count + before + left] * (centre - p[before + left]);
   return beside + ahead + has_before * behind;
 }
 
 // q = is_free (mass_share M + time L) p, and partial sums of p q.
 // NDRange: rows. in  p: field; is_free: 1 or 0 per vertex     out  q: field; partials: one per work-item
-__kernel void apply_rows(const int row_count, const int components, const int count, const float mass_share, const float time,
-                         __global const int* restrict rows, __global const float* restrict weights, __global const float* restrict mass,
-                         __global const float* restrict is_free, __global const float* restrict p, __global float* restrict q,
+__kernel void apply_rows(const int row_count, const int components, const int count, const float mass_share,
+                         const float time, __global const int* restrict rows, __global const float* restrict weights,
+                         __global const float* restrict mass, __global const float* restrict is_free,
+                         __global const float* restrict p, __global float* restrict q,
                          __global float* restrict partials) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
@@ -40,7 +45,8 @@ __kernel void apply_rows(const int row_count, const int components, const int co
       to[here + j] = time * laplacian_at(count, weights, from, before, here, after, j - 1, j, j + 1, has_before);
     if (begin == 0) {
       to[here] = time * laplacian_at(count, weights, from, before, here, after, width - 1, 0, 1, has_before);
-      to[here + width - 1] = time * laplacian_at(count, weights, from, before, here, after, width - 2, width - 1, 0, has_before);
+      to[here + width - 1] =
+          time * laplacian_at(count, weights, from, before, here, after, width - 2, width - 1, 0, has_before);
     }
     // A work-item goes on with what it has written itself.
     for (int j = 1 + begin; j < width - 1; j += step) {
@@ -61,10 +67,12 @@ __kernel void apply_rows(const int row_count, const int components, const int co
 
 // The same for the triangles of the fans; M of vertices in no row. NDRange: fans.
 // in and out  q     out  partials, from `first_partial` on
-__kernel void apply_fans(const int fan_count, const int inner_count, const int components, const int count, const int first_partial,
-                         const float mass_share, const float time, __global const int* restrict fan_vertices, __global const int* restrict fan_begin,
-                         __global const int* restrict fans, __global const float* restrict fan_weights, __global const float* restrict mass,
-                         __global const float* restrict is_free, __global const float* restrict p, __global float* restrict q,
+__kernel void apply_fans(const int fan_count, const int inner_count, const int components, const int count,
+                         const int first_partial, const float mass_share, const float time,
+                         __global const int* restrict fan_vertices, __global const int* restrict fan_begin,
+                         __global const int* restrict fans, __global const float* restrict fan_weights,
+                         __global const float* restrict mass, __global const float* restrict is_free,
+                         __global const float* restrict p, __global float* restrict q,
                          __global float* restrict partials) {
   const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, fan_count);
   float sum = 0.0f;
@@ -74,7 +82,8 @@ __kernel void apply_fans(const int fan_count, const int inner_count, const int c
       __global const float* restrict from = p + c * count;
       const float centre = from[v];
       float laplacian = 0.0f;
-      for (int i = 2 * fan_begin[k]; i < 2 * fan_begin[k + 1]; ++i) laplacian += fan_weights[i] * (centre - from[fans[i]]);
+      for (int i = 2 * fan_begin[k]; i < 2 * fan_begin[k + 1]; ++i)
+        laplacian += fan_weights[i] * (centre - from[fans[i]]);
       const float value = is_free[v] * (time * laplacian + (v < inner_count ? 0.0f : mass_share * mass[v] * centre));
       q[c * count + v] = value + (v < inner_count ? q[c * count + v] : 0.0f);
       sum += centre * value;
@@ -84,8 +93,8 @@ __kernel void apply_fans(const int fan_count, const int inner_count, const int c
 }
 
 // result[slot] = the sum of the partial sums. One work-group, with a local float per work-item.
-__kernel void sum_partials(const int partial_count, const int slot, __global const float* restrict partials, __local float* restrict sums,
-                           __global float* restrict result) {
+__kernel void sum_partials(const int partial_count, const int slot, __global const float* restrict partials,
+                           __local float* restrict sums, __global float* restrict result) {
   const int begin = get_local_id(0), step = get_local_size(0);
   float sum = 0.0f;
   for (int i = begin; i < partial_count; i += step) sum += partials[i];
@@ -96,20 +105,23 @@ __kernel void sum_partials(const int partial_count, const int slot, __global con
   result[slot] = sum;
 }
 
-// Conjugate gradients. On one lattice the preconditioner is 1 / R + 1 / C: R takes the matrix's part along each row, periodic and
-// tridiagonal, C that along each column of inner rows, tridiagonal; for the other vertices both take its diagonal. So
-// neither dense rings around a pole nor rows that a slanting seam presses together count, which the diagonal alone would
-// need many steps for. Vertices whose value is given are cut off from those that are free. Where a diagonal does not outweigh its neighbours it is raised until it does, so both are positive.
-// R = L D L^T, with L's entries next to the diagonal in `below` and those of its last row in `last`; C alike, no last.
+// Conjugate gradients. On one lattice the preconditioner is 1 / R + 1 / C: R takes the matrix's part along each row,
+// periodic and tridiagonal, C that along each column of inner rows, tridiagonal; for the other vertices both take its
+// diagonal. So neither dense rings around a pole nor rows that a slanting seam presses together count, which the
+// diagonal alone would need many steps for. Vertices whose value is given are cut off from those that are free. Where a
+// diagonal does not outweigh its neighbours it is raised until it does, so both are positive. R = L D L^T, with L's
+// entries next to the diagonal in `below` and those of its last row in `last`; C alike, no last.
 
 float raised_diagonal(const float mass, const float stiffness, const float one, const float other, const float time) {
   return mass + time * fmax(stiffness, fabs(one) + fabs(other)) + 1e-35f;
 }
 
 // NDRange: rows; one work-item each does it. out  inverse_pivots (1 / D), below, last: one plane each
-__kernel void factor_rows(const int row_count, const float time, __global const int* restrict rows, __global const float* restrict weights,
-                          __global const float* restrict mass, __global const float* restrict stiffness, __global const float* restrict is_free,
-                          __global float* restrict inverse_pivots, __global float* restrict below, __global float* restrict last) {
+__kernel void factor_rows(const int row_count, const float time, __global const int* restrict rows,
+                          __global const float* restrict weights, __global const float* restrict mass,
+                          __global const float* restrict stiffness, __global const float* restrict is_free,
+                          __global float* restrict inverse_pivots, __global float* restrict below,
+                          __global float* restrict last) {
   const int k = get_group_id(0);
   if (k >= row_count || get_local_id(0) > 0) return;
   const int here = rows[4 * k], end = here + rows[4 * k + 1] - 1;
@@ -132,12 +144,14 @@ __kernel void factor_rows(const int row_count, const float time, __global const 
   inverse_pivots[end] = 1.0f / fmax(diagonal + end_change, 1e-6f * diagonal);
 }
 
-// NDRange of this and precondition_columns: one work-group per four ints of `blocks`: first vertex in the first inner row,
-// number of columns, distance between rows, number of rows; work-items take columns in turn.
-// out  inverse_pivots, below: one plane each
-__kernel void factor_columns(const int block_count, const int count, const float time, __global const int* restrict blocks,
-                             __global const float* restrict weights, __global const float* restrict mass, __global const float* restrict stiffness,
-                             __global const float* restrict is_free, __global float* restrict inverse_pivots, __global float* restrict below) {
+// NDRange of this and precondition_columns: one work-group per four ints of `blocks`: first vertex in the first inner
+// row, number of columns, distance between rows, number of rows; work-items take columns in turn. out  inverse_pivots,
+// below: one plane each
+__kernel void factor_columns(const int block_count, const int count, const float time,
+                             __global const int* restrict blocks, __global const float* restrict weights,
+                             __global const float* restrict mass, __global const float* restrict stiffness,
+                             __global const float* restrict is_free, __global float* restrict inverse_pivots,
+                             __global float* restrict below) {
   const int k = get_group_id(0);
   if (k >= block_count) return;
   const int first = blocks[4 * k], columns = blocks[4 * k + 1], stride = blocks[4 * k + 2], rows = blocks[4 * k + 3];
@@ -156,10 +170,11 @@ __kernel void factor_columns(const int block_count, const int count, const float
   }
 }
 
-// z = 1 / R r, in the rows. NDRange: rows; one work-item each does it, all components at once: their chains of dependent
-// steps overlap.
-__kernel void precondition_rows(const int row_count, const int components, const int count, __global const int* restrict rows,
-                                __global const float* restrict inverse_pivots, __global const float* restrict below, __global const float* restrict last,
+// z = 1 / R r, in the rows. NDRange: rows; one work-item each does it, all components at once: their chains of
+// dependent steps overlap.
+__kernel void precondition_rows(const int row_count, const int components, const int count,
+                                __global const int* restrict rows, __global const float* restrict inverse_pivots,
+                                __global const float* restrict below, __global const float* restrict last,
                                 __global const float* restrict r, __global float* restrict z) {
   const int k = get_group_id(0);
   if (k >= row_count || get_local_id(0) > 0) return;
@@ -200,9 +215,10 @@ __kernel void precondition_rows(const int row_count, const int components, const
 }
 
 // z = is_free (z + 1 / C r), in the rows, and partial sums of r z. y: a field for use in between
-__kernel void precondition_columns(const int block_count, const int components, const int count, __global const int* restrict blocks,
-                                   __global const float* restrict inverse_pivots, __global const float* restrict below,
-                                   __global const float* restrict is_free, __global const float* restrict r, __global float* restrict y,
+__kernel void precondition_columns(const int block_count, const int components, const int count,
+                                   __global const int* restrict blocks, __global const float* restrict inverse_pivots,
+                                   __global const float* restrict below, __global const float* restrict is_free,
+                                   __global const float* restrict r, __global float* restrict y,
                                    __global float* restrict z, __global float* restrict partials) {
   const int k = get_group_id(0);
   if (k >= block_count) return;
@@ -216,7 +232,8 @@ __kernel void precondition_columns(const int block_count, const int components, 
     for (int v = first + begin; v < first + columns; v += step) between[v] = from[v];
     for (int row = 1; row < rows; ++row) {
       const int here = first + row * stride;
-      for (int v = here + begin; v < here + columns; v += step) between[v] = from[v] - below[v - stride] * between[v - stride];
+      for (int v = here + begin; v < here + columns; v += step)
+        between[v] = from[v] - below[v - stride] * between[v - stride];
     }
     for (int row = rows - 1; row >= 0; --row) {
       const int here = first + row * stride, ahead = row + 1 < rows ? stride : 0;
@@ -235,9 +252,10 @@ __kernel void precondition_columns(const int block_count, const int components, 
 
 // z = 2 is_free r / D for the vertices in no row, from inner_count on. NDRange: work-items take them in turn.
 // out  partials of r z, from `first_partial` on
-__kernel void precondition_others(const int inner_count, const int components, const int count, const int first_partial, const float time,
-                                  __global const float* restrict mass, __global const float* restrict stiffness,
-                                  __global const float* restrict is_free, __global const float* restrict r, __global float* restrict z,
+__kernel void precondition_others(const int inner_count, const int components, const int count, const int first_partial,
+                                  const float time, __global const float* restrict mass,
+                                  __global const float* restrict stiffness, __global const float* restrict is_free,
+                                  __global const float* restrict r, __global float* restrict z,
                                   __global float* restrict partials) {
   float sum = 0.0f;
   for (int v = inner_count + (int)get_global_id(0); v < count; v += get_global_size(0))
@@ -250,11 +268,13 @@ __kernel void precondition_others(const int inner_count, const int components, c
 }
 
 // Levels: a lattice of about half of the rows and columns, see edit/coarsen.h. Each of its vertices lies at a vertex of
-// this one (`picks`); a vertex here reads four of its values (`sources`, `shares`), and `readers` lists who reads which.
+// this one (`picks`); a vertex here reads four of its values (`sources`, `shares`), and `readers` lists who reads
+// which.
 
 // The residual there: each vertex takes what its readers have, by their shares. NDRange: the coarser lattice's vertices
-__kernel void restrict_field(const int coarse_count, const int components, const int count, __global const int* restrict reader_begin,
-                             __global const int* restrict readers, __global const float* restrict reader_shares, __global const float* restrict from,
+__kernel void restrict_field(const int coarse_count, const int components, const int count,
+                             __global const int* restrict reader_begin, __global const int* restrict readers,
+                             __global const float* restrict reader_shares, __global const float* restrict from,
                              __global float* restrict to) {
   const int v = get_global_id(0);
   if (v >= coarse_count) return;
@@ -269,14 +289,16 @@ __kernel void restrict_field(const int coarse_count, const int components, const
 // z += is_free times what the coarser lattice has at each vertex, and partial sums of r times that.
 // NDRange: one work-group per VERTEX_CHUNK vertices. out  partials, from `first_partial` on
 __kernel void add_coarse_field(const int components, const int count, const int coarse_count, const int first_partial,
-                               __global const int* restrict sources, __global const float* restrict shares, __global const float* restrict is_free,
-                               __global const float* restrict coarse, __global const float* restrict r, __global float* restrict z,
+                               __global const int* restrict sources, __global const float* restrict shares,
+                               __global const float* restrict is_free, __global const float* restrict coarse,
+                               __global const float* restrict r, __global float* restrict z,
                                __global float* restrict partials) {
   const int begin = get_group_id(0) * VERTEX_CHUNK, end = min(begin + VERTEX_CHUNK, count);
   float sum = 0.0f;
   for (int v = begin + (int)get_local_id(0); v < end; v += get_local_size(0)) {
     const int s0 = sources[4 * v], s1 = sources[4 * v + 1], s2 = sources[4 * v + 2], s3 = sources[4 * v + 3];
-    const float w0 = is_free[v] * shares[4 * v], w1 = is_free[v] * shares[4 * v + 1], w2 = is_free[v] * shares[4 * v + 2];
+    const float w0 = is_free[v] * shares[4 * v], w1 = is_free[v] * shares[4 * v + 1],
+                w2 = is_free[v] * shares[4 * v + 2];
     const float w3 = is_free[v] * shares[4 * v + 3];
     for (int c = 0; c < components; ++c) {
       __global const float* restrict from = coarse + c * coarse_count;
@@ -289,8 +311,9 @@ __kernel void add_coarse_field(const int components, const int count, const int 
 }
 
 // r = is_free b, x = 0, p = 0. NDRange of this and the next two: one work-group per VERTEX_CHUNK values of the fields.
-__kernel void begin_solve(const int values, const int count, __global const float* restrict is_free, __global const float* restrict b,
-                          __global float* restrict x, __global float* restrict r, __global float* restrict p) {
+__kernel void begin_solve(const int values, const int count, __global const float* restrict is_free,
+                          __global const float* restrict b, __global float* restrict x, __global float* restrict r,
+                          __global float* restrict p) {
   const int begin = get_group_id(0) * VERTEX_CHUNK, end = min(begin + VERTEX_CHUNK, values);
   for (int i = begin + (int)get_local_id(0); i < end; i += get_local_size(0)) {
     x[i] = 0.0f;
@@ -300,8 +323,9 @@ __kernel void begin_solve(const int values, const int count, __global const floa
 }
 
 // x += a p, r -= a q, where a = (r z) / (p q). scalars: sums, by slot
-__kernel void take_step(const int values, const int rz, const int pq, __global const float* restrict scalars, __global const float* restrict p,
-                        __global const float* restrict q, __global float* restrict x, __global float* restrict r) {
+__kernel void take_step(const int values, const int rz, const int pq, __global const float* restrict scalars,
+                        __global const float* restrict p, __global const float* restrict q, __global float* restrict x,
+                        __global float* restrict r) {
   const int begin = get_group_id(0) * VERTEX_CHUNK, end = min(begin + VERTEX_CHUNK, values);
   const float length = scalars[pq] > 0.0f ? scalars[rz] / scalars[pq] : 0.0f;
   for (int i = begin + (int)get_local_id(0); i < end; i += get_local_size(0)) {
@@ -311,8 +335,9 @@ __kernel void take_step(const int values, const int rz, const int pq, __global c
 }
 
 // p = z + (new r z) / (old r z) p.
-__kernel void turn_direction(const int values, const int old_rz, const int new_rz, __global const float* restrict scalars,
-                             __global const float* restrict z, __global float* restrict p) {
+__kernel void turn_direction(const int values, const int old_rz, const int new_rz,
+                             __global const float* restrict scalars, __global const float* restrict z,
+                             __global float* restrict p) {
   const int begin = get_group_id(0) * VERTEX_CHUNK, end = min(begin + VERTEX_CHUNK, values);
   const float kept = scalars[old_rz] > 0.0f ? scalars[new_rz] / scalars[old_rz] : 0.0f;
   for (int i = begin + (int)get_local_id(0); i < end; i += get_local_size(0)) p[i] = z[i] + kept * p[i];

@@ -1,26 +1,28 @@
 // SPDX-License-Identifier: MIT
-// Texture-space filters: the Laplace operator of the surface, normals, noise. What is solved with that operator: diffusion.cl.
+// Texture-space filters: the Laplace operator of the surface, normals, noise. What is solved with that operator:
+// diffusion.cl.
 //
 // Vertices are those of the model's lattice (reconstruct/lattice.h). Who is next to whom:
 //   Inside a patch, by arithmetic. `rows` has four ints per inner row of every patch: its first vertex, its width, and
 //   whether rows before and after it are inner rows too. Columns wrap. Kernels over rows run one work-group per row, of
 //   any size, whose work-items take columns in turn (see reconstruct.cl).
 //   At the ends of patches, by a table. `fan_vertices` lists the vertices there (first and last inner row, poles, seam
-//   samples, corners); entries fan_begin[k] .. fan_begin[k + 1] of `fans` hold two ints per triangle at vertex k outside
-//   the quads between inner rows: its other two corners, counter-clockwise. Both sides of a seam are in one fan. Kernels
-//   over fans run one work-group per FAN_CHUNK vertices. They add to what kernels over rows have written.
+//   samples, corners); entries fan_begin[k] .. fan_begin[k + 1] of `fans` hold two ints per triangle at vertex k
+//   outside the quads between inner rows: its other two corners, counter-clockwise. Both sides of a seam are in one
+//   fan. Kernels over fans run one work-group per FAN_CHUNK vertices. They add to what kernels over rows have written.
 // Quads count half for each of their two diagonals, so that no choice between them shows.
 //
 // A field has one or three components, planes of `count` floats behind each other. Positions are a field of three,
 // relative to the model's origin, in diagonals.
 
 #define FAN_CHUNK 64
-// Where twice a triangle's area is below this share of half the sum of its squared edges, it counts as that much: weights
-// stay finite, the same seen from all three corners, and the operator positive.
+// Where twice a triangle's area is below this share of half the sum of its squared edges, it counts as that much:
+// weights stay finite, the same seen from all three corners, and the operator positive.
 #define LEAST_AREA 1.2e-4f
 
 // Adds half the cotangent weights of the triangle (0, e, f) to the edges from 0 to e and to f, and its area to *area.
-void add_triangle(const float ex, const float ey, const float ez, const float fx, const float fy, const float fz, float* to_e, float* to_f, float* area) {
+void add_triangle(const float ex, const float ey, const float ez, const float fx, const float fy, const float fz,
+                  float* to_e, float* to_f, float* area) {
   const float nx = ey * fz - ez * fy, ny = ez * fx - ex * fz, nz = ex * fy - ey * fx;
   const float ee = ex * ex + ey * ey + ez * ez, ff = fx * fx + fy * fy + fz * fz, ef = ex * fx + ey * fy + ez * fz;
   const float twice = sqrt(nx * nx + ny * ny + nz * nz);
@@ -32,23 +34,26 @@ void add_triangle(const float ex, const float ey, const float ez, const float fx
 
 // Corner a of the quad a, b, c, d, given as b - a, c - a, d - a: both triangulations, half each.
 // weights: of the edges to b, c, d
-void weigh_corner(const float* restrict b, const float* restrict c, const float* restrict d, float* restrict weights, float* restrict area) {
+void weigh_corner(const float* restrict b, const float* restrict c, const float* restrict d, float* restrict weights,
+                  float* restrict area) {
   add_triangle(b[0], b[1], b[2], c[0], c[1], c[2], weights, weights + 1, area);
   add_triangle(c[0], c[1], c[2], d[0], d[1], d[2], weights + 1, weights + 2, area);
   add_triangle(b[0], b[1], b[2], d[0], d[1], d[2], weights, weights + 2, area);
 }
 
-void edge_between(__global const float* restrict points, const int count, const int from, const int to, float* restrict edge) {
+void edge_between(__global const float* restrict points, const int count, const int from, const int to,
+                  float* restrict edge) {
   edge[0] = points[to] - points[from];
   edge[1] = points[count + to] - points[count + from];
   edge[2] = points[2 * count + to] - points[2 * count + from];
 }
 
-// Weights of the edges from each vertex of a row to its right (0, +1), and to the next row at (+1, -1), (+1, 0), (+1, +1):
-// four planes of `count`; the other four are those of its neighbours. mass: its share of the area; stiffness: the sum of
-// all its weights.
-void weigh_vertex(const int count, __global const float* restrict points, const int before, const int here, const int after, const int left, const int j,
-                  const int right, const float has_before, const float has_after, __global float* restrict weights, __global float* restrict mass,
+// Weights of the edges from each vertex of a row to its right (0, +1), and to the next row at (+1, -1), (+1, 0), (+1,
+// +1): four planes of `count`; the other four are those of its neighbours. mass: its share of the area; stiffness: the
+// sum of all its weights.
+void weigh_vertex(const int count, __global const float* restrict points, const int before, const int here,
+                  const int after, const int left, const int j, const int right, const float has_before,
+                  const float has_after, __global float* restrict weights, __global float* restrict mass,
                   __global float* restrict stiffness) {
   const int v = here + j;
   float e[8][3];
@@ -68,7 +73,8 @@ void weigh_vertex(const int count, __global const float* restrict points, const 
   weigh_corner(e[6], e[7], e[0], w[3], &area_before);
   const float to_right = has_after * w[0][0] + has_before * w[3][2];
   const float to_left = has_after * w[1][2] + has_before * w[2][0];
-  const float ahead = has_after * (w[0][2] + w[1][0]), ahead_right = has_after * w[0][1], ahead_left = has_after * w[1][1];
+  const float ahead = has_after * (w[0][2] + w[1][0]), ahead_right = has_after * w[0][1],
+              ahead_left = has_after * w[1][1];
   const float behind = has_before * (w[2][2] + w[3][0] + w[2][1] + w[3][1]);
   weights[v] = to_right;
   weights[count + v] = ahead_left;
@@ -80,8 +86,9 @@ void weigh_vertex(const int count, __global const float* restrict points, const 
 
 // NDRange: rows.
 // in   points     out  weights: four planes; mass, stiffness: one plane each
-__kernel void weigh_rows(const int row_count, const int count, __global const int* restrict rows, __global const float* restrict points,
-                         __global float* restrict weights, __global float* restrict mass, __global float* restrict stiffness) {
+__kernel void weigh_rows(const int row_count, const int count, __global const int* restrict rows,
+                         __global const float* restrict points, __global float* restrict weights,
+                         __global float* restrict mass, __global float* restrict stiffness) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   const int here = rows[4 * k], width = rows[4 * k + 1], has_before = rows[4 * k + 2], has_after = rows[4 * k + 3];
@@ -91,7 +98,8 @@ __kernel void weigh_rows(const int row_count, const int count, __global const in
     weigh_vertex(count, points, before, here, after, j - 1, j, j + 1, has_before, has_after, weights, mass, stiffness);
   if (begin == 0) {
     weigh_vertex(count, points, before, here, after, width - 1, 0, 1, has_before, has_after, weights, mass, stiffness);
-    weigh_vertex(count, points, before, here, after, width - 2, width - 1, 0, has_before, has_after, weights, mass, stiffness);
+    weigh_vertex(count, points, before, here, after, width - 2, width - 1, 0, has_before, has_after, weights, mass,
+                 stiffness);
   }
 }
 
@@ -100,12 +108,14 @@ int is_right(const int v, const int other) { return other == v + 1 || other < v 
 
 // NDRange: fans.
 // in   points     out  fan_weights: two floats per triangle, of the edges to its two corners
-// in and out  weights: edges along a row get their whole weight there, none in fan_weights; mass, stiffness: of vertices in
+// in and out  weights: edges along a row get their whole weight there, none in fan_weights; mass, stiffness: of
+// vertices in
 //      no row they begin here
-__kernel void weigh_fans(const int fan_count, const int inner_count, const int count, __global const int* restrict fan_vertices,
-                         __global const int* restrict fan_begin, __global const int* restrict fans, __global const float* restrict points,
-                         __global float* restrict weights, __global float* restrict fan_weights, __global float* restrict mass,
-                         __global float* restrict stiffness) {
+__kernel void weigh_fans(const int fan_count, const int inner_count, const int count,
+                         __global const int* restrict fan_vertices, __global const int* restrict fan_begin,
+                         __global const int* restrict fans, __global const float* restrict points,
+                         __global float* restrict weights, __global float* restrict fan_weights,
+                         __global float* restrict mass, __global float* restrict stiffness) {
   const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, fan_count);
   for (int k = begin + (int)get_local_id(0); k < end; k += get_local_size(0)) {
     const int v = fan_vertices[k];
@@ -129,8 +139,9 @@ __kernel void weigh_fans(const int fan_count, const int inner_count, const int c
 }
 
 // to: the field at the vertices of a coarser lattice (edit/coarsen.h). NDRange: those
-__kernel void pick_vertices(const int coarse_count, const int components, const int count, __global const int* restrict picks,
-                            __global const float* restrict from, __global float* restrict to) {
+__kernel void pick_vertices(const int coarse_count, const int components, const int count,
+                            __global const int* restrict picks, __global const float* restrict from,
+                            __global float* restrict to) {
   const int v = get_global_id(0);
   if (v >= coarse_count) return;
   for (int c = 0; c < components; ++c) to[c * coarse_count + v] = from[c * count + picks[v]];
@@ -143,14 +154,16 @@ void add_cross(const float* restrict e, const float* restrict f, const float sha
   sum[2] += share * (e[0] * f[1] - e[1] * f[0]);
 }
 
-void add_corner_vector(const float* restrict b, const float* restrict c, const float* restrict d, const float share, float* restrict sum) {
+void add_corner_vector(const float* restrict b, const float* restrict c, const float* restrict d, const float share,
+                       float* restrict sum) {
   add_cross(b, c, share, sum);
   add_cross(c, d, share, sum);
   add_cross(b, d, share, sum);
 }
 
-void area_vector_at(const int count, __global const float* restrict points, const int before, const int here, const int after, const int left,
-                    const int j, const int right, const float has_before, const float has_after, __global float* restrict vectors) {
+void area_vector_at(const int count, __global const float* restrict points, const int before, const int here,
+                    const int after, const int left, const int j, const int right, const float has_before,
+                    const float has_after, __global float* restrict vectors) {
   const int v = here + j;
   float e[8][3];
   edge_between(points, count, v, here + right, e[0]);
@@ -171,15 +184,17 @@ void area_vector_at(const int count, __global const float* restrict points, cons
   vectors[2 * count + v] = sum[2];
 }
 
-// Each vertex's third of the area vectors around it, outward. NDRange: rows. in  points     out  vectors: field of three
-__kernel void sum_row_vectors(const int row_count, const int count, __global const int* restrict rows, __global const float* restrict points,
-                              __global float* restrict vectors) {
+// Each vertex's third of the area vectors around it, outward. NDRange: rows. in  points     out  vectors: field of
+// three
+__kernel void sum_row_vectors(const int row_count, const int count, __global const int* restrict rows,
+                              __global const float* restrict points, __global float* restrict vectors) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   const int here = rows[4 * k], width = rows[4 * k + 1], has_before = rows[4 * k + 2], has_after = rows[4 * k + 3];
   const int before = has_before ? here - width : here, after = has_after ? here + width : here;
   const int begin = get_local_id(0), step = get_local_size(0);
-  for (int j = 1 + begin; j < width - 1; j += step) area_vector_at(count, points, before, here, after, j - 1, j, j + 1, has_before, has_after, vectors);
+  for (int j = 1 + begin; j < width - 1; j += step)
+    area_vector_at(count, points, before, here, after, j - 1, j, j + 1, has_before, has_after, vectors);
   if (begin == 0) {
     area_vector_at(count, points, before, here, after, width - 1, 0, 1, has_before, has_after, vectors);
     area_vector_at(count, points, before, here, after, width - 2, width - 1, 0, has_before, has_after, vectors);
@@ -187,8 +202,9 @@ __kernel void sum_row_vectors(const int row_count, const int count, __global con
 }
 
 // NDRange: fans. in  points     in and out  vectors
-__kernel void sum_fan_vectors(const int fan_count, const int inner_count, const int count, __global const int* restrict fan_vertices,
-                              __global const int* restrict fan_begin, __global const int* restrict fans, __global const float* restrict points,
+__kernel void sum_fan_vectors(const int fan_count, const int inner_count, const int count,
+                              __global const int* restrict fan_vertices, __global const int* restrict fan_begin,
+                              __global const int* restrict fans, __global const float* restrict points,
                               __global float* restrict vectors) {
   const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, fan_count);
   for (int k = begin + (int)get_local_id(0); k < end; k += get_local_size(0)) {
@@ -213,7 +229,8 @@ uint scramble(uint h) {
 }
 
 // The slope at a point of the integer lattice, one of twelve (Perlin 2002), times the way from there.
-float slope_times(const int x, const int y, const int z, const uint seed, const float fx, const float fy, const float fz) {
+float slope_times(const int x, const int y, const int z, const uint seed, const float fx, const float fy,
+                  const float fz) {
   const uint h = scramble(scramble(scramble(scramble(seed) + (uint)x) + (uint)y) + (uint)z) % 12u;
   const float first = h < 8u ? fx : fy, second = h < 4u ? fy : fz;
   return (h & 1u ? -first : first) + (h & 2u ? -second : second);
@@ -230,8 +247,10 @@ float gradient_noise(const float x, const float y, const float z, const uint see
   float planes[2];
   for (int k = 0; k < 2; ++k) {
     const float gz = fz - (float)k;
-    const float n00 = slope_times(ix, iy, iz + k, seed, fx, fy, gz), n10 = slope_times(ix + 1, iy, iz + k, seed, fx - 1.0f, fy, gz);
-    const float n01 = slope_times(ix, iy + 1, iz + k, seed, fx, fy - 1.0f, gz), n11 = slope_times(ix + 1, iy + 1, iz + k, seed, fx - 1.0f, fy - 1.0f, gz);
+    const float n00 = slope_times(ix, iy, iz + k, seed, fx, fy, gz),
+                n10 = slope_times(ix + 1, iy, iz + k, seed, fx - 1.0f, fy, gz);
+    const float n01 = slope_times(ix, iy + 1, iz + k, seed, fx, fy - 1.0f, gz),
+                n11 = slope_times(ix + 1, iy + 1, iz + k, seed, fx - 1.0f, fy - 1.0f, gz);
     const float low = n00 + sx * (n10 - n00), high = n01 + sx * (n11 - n01);
     planes[k] = low + sy * (high - low);
   }
@@ -240,13 +259,14 @@ float gradient_noise(const float x, const float y, const float z, const uint see
 
 // Noise at every vertex by its position: octaves of half the wavelength and half the height each. NDRange: vertices.
 // in  points; frequency: 1 / wavelength, in the points' unit     out  heights: field of one
-__kernel void noise_at_points(const int count, const float frequency, const int octaves, const uint seed, __global const float* restrict points,
-                              __global float* restrict heights) {
+__kernel void noise_at_points(const int count, const float frequency, const int octaves, const uint seed,
+                              __global const float* restrict points, __global float* restrict heights) {
   const int v = get_global_id(0);
   if (v >= count) return;
   float sum = 0.0f, height = 1.0f, scale = frequency;
   for (int octave = 0; octave < octaves; ++octave) {
-    sum += height * gradient_noise(scale * points[v], scale * points[count + v], scale * points[2 * count + v], seed + (uint)octave);
+    sum += height * gradient_noise(scale * points[v], scale * points[count + v], scale * points[2 * count + v],
+                                   seed + (uint)octave);
     height *= 0.5f;
     scale *= 2.0f;
   }

@@ -9,21 +9,23 @@
 //   move_points              points a step nearer
 // The quad of a texel lies to the right of it and above it; its corners are numbered 0 (the texel), 1 (right), 2 (right
 // above), 3 (above). Its triangles are 0 1 2 and 0 2 3 with the first diagonal, 0 1 3 and 1 2 3 with the second.
-// A residual is a distance along a normal, linear in the three corners of one triangle: r + n . sum of weight x move. So a
-// texel is coupled to the eight around it by symmetric 3 x 3 blocks w n n^T. Rows 0 and height-1 stay.
-// Planes have the texture's size; several of them lie behind each other in one buffer. Only the system's rows hold what
-// belongs to a texel side by side: a sweep reads every fourth of them or so. Sums are taken per texel over what
-// lies around it, in a fixed order: nothing depends on the order of work-items.
-#include "skeletex_structs.h"
+// A residual is a distance along a normal, linear in the three corners of one triangle: r + n . sum of weight x move.
+// So a texel is coupled to the eight around it by symmetric 3 x 3 blocks w n n^T. Rows 0 and height-1 stay. Planes have
+// the texture's size; several of them lie behind each other in one buffer. Only the system's rows hold what belongs to
+// a texel side by side: a sweep reads every fourth of them or so. Sums are taken per texel over what lies around it, in
+// a fixed order: nothing depends on the order of work-items.
 #include "map_triangle.h"
 #include "mesh_walk.h"
 #include "patch_texels.h"
 #include "quad_diagonal.h"
+#include "skeletex_structs.h"
 
 #define FIT_SAMPLES 4
-#define SAMPLE_PLANES 7     // x, y, z, normal x, y, z, share of the area; the normal is 0 where there is nothing to fit
-#define LATTICE_PLANES 5    // of a triangle's middle: weight (area), residual, normal x, y, z
-#define SYSTEM_STRIDE 36    // floats of a texel's row: 6 own block (xx, xy, xz, yy, yz, zz), 3 right-hand side, 4 x 6 blocks with the texels ahead
+#define SAMPLE_PLANES 7   // x, y, z, normal x, y, z, share of the area; the normal is 0 where there is nothing to fit
+#define LATTICE_PLANES 5  // of a triangle's middle: weight (area), residual, normal x, y, z
+#define SYSTEM_STRIDE \
+  36  // floats of a texel's row: 6 own block (xx, xy, xz, yy, yz, zz), 3 right-hand side, 4 x 6 blocks with the texels
+      // ahead
 #define LARGEST_STEP 0.25f  // cells
 #define LARGEST_MOVE 1.0f   // cells, of all steps together, off the lattice
 #define LARGEST_SLIDE 0.5f  // distances to the nearer neighbours, of all steps together, along the lattice
@@ -32,7 +34,9 @@ float sample_s(int i) { return i & 1 ? 0.75f : 0.25f; }
 float sample_t(int i) { return i & 2 ? 0.75f : 0.25f; }
 
 // Corner k, 0 to 2, of triangle t of a quad.
-int corner_of(int is_second, int t, int k) { return is_second ? (t == 0 ? (k == 2 ? 3 : k) : k + 1) : (t == 0 ? k : (k == 0 ? 0 : k + 1)); }
+int corner_of(int is_second, int t, int k) {
+  return is_second ? (t == 0 ? (k == 2 ? 3 : k) : k + 1) : (t == 0 ? k : (k == 0 ? 0 : k + 1));
+}
 int corner_right(int c) { return c == 1 || c == 2; }
 int corner_up(int c) { return c >= 2; }
 
@@ -43,18 +47,21 @@ void corners_of_quad(global const PatchRecord* restrict p, int texture_width, in
   at[3] = at[0] + texture_width;
 }
 
-// NDRange (texture width, texture height). A sample has a fixed place in its quad; where that is in the map follows from the
-// reading positions of the quad's corners, and from there a walk leads to the triangle that covers it.
-// out  samples: FIT_SAMPLES x SAMPLE_PLANES planes; sample_triangles: FIT_SAMPLES planes
-kernel void read_samples(const int texture_width, const int texture_height, const int triangle_count, global const int* restrict texel_patches,
-                         global const int* restrict texel_triangles, global const int* restrict corners, global const int* restrict turns,
-                         global const int* restrict poles, global const int* restrict across, global const float* restrict u_high,
-                         global const float* restrict u_low, global const float* restrict v_high, global const float* restrict v_low,
-                         global const float* restrict vertex_x, global const float* restrict vertex_y, global const float* restrict vertex_z,
-                         global const PatchRecord* restrict patches, global const float* restrict row_high, global const float* restrict row_low,
-                         global const float* restrict offset_x, global const float* restrict offset_y, global const float* restrict x,
-                         global const float* restrict y, global const float* restrict z, global float* restrict samples,
-                         global int* restrict sample_triangles) {
+// NDRange (texture width, texture height). A sample has a fixed place in its quad; where that is in the map follows
+// from the reading positions of the quad's corners, and from there a walk leads to the triangle that covers it. out
+// samples: FIT_SAMPLES x SAMPLE_PLANES planes; sample_triangles: FIT_SAMPLES planes
+kernel void read_samples(const int texture_width, const int texture_height, const int triangle_count,
+                         global const int* restrict texel_patches, global const int* restrict texel_triangles,
+                         global const int* restrict corners, global const int* restrict turns,
+                         global const int* restrict poles, global const int* restrict across,
+                         global const float* restrict u_high, global const float* restrict u_low,
+                         global const float* restrict v_high, global const float* restrict v_low,
+                         global const float* restrict vertex_x, global const float* restrict vertex_y,
+                         global const float* restrict vertex_z, global const PatchRecord* restrict patches,
+                         global const float* restrict row_high, global const float* restrict row_low,
+                         global const float* restrict offset_x, global const float* restrict offset_y,
+                         global const float* restrict x, global const float* restrict y, global const float* restrict z,
+                         global float* restrict samples, global int* restrict sample_triangles) {
   const int column = (int)get_global_id(0), line = (int)get_global_id(1);
   if (column >= texture_width || line >= texture_height) return;
   const int texel = line * texture_width + column, size = texture_width * texture_height;
@@ -69,17 +76,21 @@ kernel void read_samples(const int texture_width, const int texture_height, cons
   corners_of_quad(p, texture_width, inner, row, at);
   int t = texel_triangles[row == 0 ? at[3] : texel];
   if (t == NO_TRIANGLE) return;
-  const Point normal = cross_of(minus(point_at(x, y, z, at[2]), point_at(x, y, z, at[0])), minus(point_at(x, y, z, at[3]), point_at(x, y, z, at[1])));
+  const Point normal = cross_of(minus(point_at(x, y, z, at[2]), point_at(x, y, z, at[0])),
+                                minus(point_at(x, y, z, at[3]), point_at(x, y, z, at[1])));
   const float share = 0.5f * sqrt(product(normal, normal)) / (float)FIT_SAMPLES;
   for (int i = 0; i < FIT_SAMPLES; ++i) {
     const float s = sample_s(i), q = sample_t(i);
-    const float dx = s + (1.0f - q) * ((1.0f - s) * offset_x[at[0]] + s * offset_x[at[1]]) + q * ((1.0f - s) * offset_x[at[3]] + s * offset_x[at[2]]);
-    const float dy = q + (1.0f - q) * ((1.0f - s) * offset_y[at[0]] + s * offset_y[at[1]]) + q * ((1.0f - s) * offset_y[at[3]] + s * offset_y[at[2]]);
+    const float dx = s + (1.0f - q) * ((1.0f - s) * offset_x[at[0]] + s * offset_x[at[1]]) +
+                     q * ((1.0f - s) * offset_x[at[3]] + s * offset_x[at[2]]);
+    const float dy = q + (1.0f - q) * ((1.0f - s) * offset_y[at[0]] + s * offset_y[at[1]]) +
+                     q * ((1.0f - s) * offset_y[at[3]] + s * offset_y[at[2]]);
     const int rows_up = clamp((int)floor(dy), -row, p->height - 2 - row);
     CornerWeights w = {0.0f, 0.0f};
     for (int steps = 0; steps < 1000; ++steps) {
       const MapTriangle m = load_triangle(t, triangle_count, corners, turns, poles, u_high, u_low, v_high, v_low);
-      const float u = row_offset(m, row_high, row_low, p->row_begin + row + rows_up, clamp(dy - (float)rows_up, 0.0f, 1.0f));
+      const float u =
+          row_offset(m, row_high, row_low, p->row_begin + row + rows_up, clamp(dy - (float)rows_up, 0.0f, 1.0f));
       w = weights_at(m, u, turned_offset(m, inner, dx, p->width));
       const float w0 = 1.0f - w.w1 - w.w2;
       const float least = fmin(w0, fmin(w.w1, w.w2));
@@ -109,11 +120,13 @@ kernel void read_samples(const int texture_width, const int texture_height, cons
   }
 }
 
-// NDRange (texture width, texture height). The decoder's choice; next to seams and poles, where it makes strips, the shorter
-// diagonal.
-kernel void choose_fitted_diagonals(const int texture_width, const int texture_height, global const int* restrict texel_patches,
-                             global const PatchRecord* restrict patches, global const float* restrict x, global const float* restrict y,
-                             global const float* restrict z, global int* restrict diagonals) {
+// NDRange (texture width, texture height). The decoder's choice; next to seams and poles, where it makes strips, the
+// shorter diagonal.
+kernel void choose_fitted_diagonals(const int texture_width, const int texture_height,
+                                    global const int* restrict texel_patches,
+                                    global const PatchRecord* restrict patches, global const float* restrict x,
+                                    global const float* restrict y, global const float* restrict z,
+                                    global int* restrict diagonals) {
   const int column = (int)get_global_id(0), line = (int)get_global_id(1);
   if (column >= texture_width || line >= texture_height) return;
   const int texel = line * texture_width + column;
@@ -126,7 +139,8 @@ kernel void choose_fitted_diagonals(const int texture_width, const int texture_h
   int at[4];
   corners_of_quad(p, texture_width, inner, row, at);
   if (row == 0 || row == p->height - 2) {
-    const Point first = minus(point_at(x, y, z, at[2]), point_at(x, y, z, at[0])), second = minus(point_at(x, y, z, at[3]), point_at(x, y, z, at[1]));
+    const Point first = minus(point_at(x, y, z, at[2]), point_at(x, y, z, at[0])),
+                second = minus(point_at(x, y, z, at[3]), point_at(x, y, z, at[1]));
     diagonals[texel] = product(second, second) < product(first, first);
     return;
   }
@@ -144,12 +158,13 @@ kernel void choose_fitted_diagonals(const int texture_width, const int texture_h
 }
 
 // The point of a quad that is nearest to p: its triangle and weights. Returns the squared distance.
-float nearest_of_quad(Point p, const int at[4], int is_second, global const float* restrict x, global const float* restrict y, global const float* restrict z,
-                      int* triangle, float w[3]) {
+float nearest_of_quad(Point p, const int at[4], int is_second, global const float* restrict x,
+                      global const float* restrict y, global const float* restrict z, int* triangle, float w[3]) {
   float best = INFINITY;
   for (int t = 0; t < 2; ++t) {
     float own[3];
-    const float distance2 = nearest_of_triangle(p, point_at(x, y, z, at[corner_of(is_second, t, 0)]), point_at(x, y, z, at[corner_of(is_second, t, 1)]),
+    const float distance2 = nearest_of_triangle(p, point_at(x, y, z, at[corner_of(is_second, t, 0)]),
+                                                point_at(x, y, z, at[corner_of(is_second, t, 1)]),
                                                 point_at(x, y, z, at[corner_of(is_second, t, 2)]), own);
     if (distance2 < best) {
       best = distance2;
@@ -160,15 +175,17 @@ float nearest_of_quad(Point p, const int at[4], int is_second, global const floa
   return best;
 }
 
-// NDRange (texture width, texture height). Every sample's nearest point of its own quad, or of those beside it where that
-// lies on a side.
-// out  matches: per sample a plane; -1: none, else (1 + quads to the right) + 4 (1 + quads up) + 16 triangle
-//      weights: per sample two planes, of the triangle's corners 1 and 2; residuals: per sample a plane, along the normal
-//      costs: distance x area, summed over the samples of the quad; areas: the sum of their areas
+// NDRange (texture width, texture height). Every sample's nearest point of its own quad, or of those beside it where
+// that lies on a side. out  matches: per sample a plane; -1: none, else (1 + quads to the right) + 4 (1 + quads up) +
+// 16 triangle
+//      weights: per sample two planes, of the triangle's corners 1 and 2; residuals: per sample a plane, along the
+//      normal costs: distance x area, summed over the samples of the quad; areas: the sum of their areas
 kernel void match_samples(const int texture_width, const int texture_height, global const int* restrict texel_patches,
-                          global const PatchRecord* restrict patches, global const float* restrict samples, global const int* restrict diagonals,
-                          global const float* restrict x, global const float* restrict y, global const float* restrict z, global int* restrict matches,
-                          global float* restrict weights, global float* restrict residuals, global float* restrict costs, global float* restrict areas) {
+                          global const PatchRecord* restrict patches, global const float* restrict samples,
+                          global const int* restrict diagonals, global const float* restrict x,
+                          global const float* restrict y, global const float* restrict z, global int* restrict matches,
+                          global float* restrict weights, global float* restrict residuals,
+                          global float* restrict costs, global float* restrict areas) {
   const int column = (int)get_global_id(0), line = (int)get_global_id(1);
   if (column >= texture_width || line >= texture_height) return;
   const int texel = line * texture_width + column, size = texture_width * texture_height;
@@ -195,16 +212,22 @@ kernel void match_samples(const int texture_width, const int texture_height, glo
     for (int k = 0; k < 3; ++k) {
       const int c = corner_of(is_second, triangle, k);
       if (w[k] == 0.0f) continue;
-      if (corner_right(c)) is_left = 0;
-      else is_right = 0;
-      if (corner_up(c)) is_below = 0;
-      else is_above = 0;
+      if (corner_right(c))
+        is_left = 0;
+      else
+        is_right = 0;
+      if (corner_up(c))
+        is_below = 0;
+      else
+        is_above = 0;
     }
     const int side = is_right - is_left, rise = is_above - is_below;
     for (int k = 1; k < 4; ++k) {
       const int dx = k & 1 ? side : 0, dy = k & 2 ? rise : 0;
       if ((k & 1 && side == 0) || (k & 2 && rise == 0) || row + dy < 0 || row + dy > p->height - 2) continue;
-      const int beside = inner + dx < 0 ? inner + dx + p->width : inner + dx >= p->width ? inner + dx - p->width : inner + dx;
+      const int beside = inner + dx < 0           ? inner + dx + p->width
+                         : inner + dx >= p->width ? inner + dx - p->width
+                                                  : inner + dx;
       int other[4], other_triangle = 0;
       float other_w[3];
       corners_of_quad(p, texture_width, beside, row + dy, other);
@@ -217,7 +240,8 @@ kernel void match_samples(const int texture_width, const int texture_height, glo
         for (int c = 0; c < 3; ++c) w[c] = other_w[c];
       }
     }
-    const Point nearest = weighted(w, point_at(x, y, z, at[corner_of(is_second, triangle, 0)]), point_at(x, y, z, at[corner_of(is_second, triangle, 1)]),
+    const Point nearest = weighted(w, point_at(x, y, z, at[corner_of(is_second, triangle, 0)]),
+                                   point_at(x, y, z, at[corner_of(is_second, triangle, 1)]),
                                    point_at(x, y, z, at[corner_of(is_second, triangle, 2)]));
     matches[i * size + texel] = (1 + right) + 4 * (1 + up) + 16 * triangle;
     weights[2 * i * size + texel] = w[1];
@@ -230,15 +254,17 @@ kernel void match_samples(const int texture_width, const int texture_height, glo
   areas[texel] = area;
 }
 
-// NDRange (texture width, texture height). From the middle of each triangle a walk over the mesh, from a triangle that is
-// read near it.
-// out  lattice: per triangle LATTICE_PLANES planes; costs, areas: what the triangles add to those of match_samples
-kernel void match_lattice(const int texture_width, const int texture_height, const int triangle_count, global const int* restrict texel_patches,
-                          global const PatchRecord* restrict patches, global const int* restrict sample_triangles, global const int* restrict corners,
-                          global const int* restrict across, global const float* restrict vertex_x, global const float* restrict vertex_y,
-                          global const float* restrict vertex_z, global const int* restrict diagonals, global const float* restrict x,
-                          global const float* restrict y, global const float* restrict z, global float* restrict lattice, global float* restrict costs,
-                          global float* restrict areas) {
+// NDRange (texture width, texture height). From the middle of each triangle a walk over the mesh, from a triangle that
+// is read near it. out  lattice: per triangle LATTICE_PLANES planes; costs, areas: what the triangles add to those of
+// match_samples
+kernel void match_lattice(const int texture_width, const int texture_height, const int triangle_count,
+                          global const int* restrict texel_patches, global const PatchRecord* restrict patches,
+                          global const int* restrict sample_triangles, global const int* restrict corners,
+                          global const int* restrict across, global const float* restrict vertex_x,
+                          global const float* restrict vertex_y, global const float* restrict vertex_z,
+                          global const int* restrict diagonals, global const float* restrict x,
+                          global const float* restrict y, global const float* restrict z,
+                          global float* restrict lattice, global float* restrict costs, global float* restrict areas) {
   const int column = (int)get_global_id(0), line = (int)get_global_id(1);
   if (column >= texture_width || line >= texture_height) return;
   const int texel = line * texture_width + column, size = texture_width * texture_height;
@@ -254,7 +280,8 @@ kernel void match_lattice(const int texture_width, const int texture_height, con
   for (int i = 0; i < 2; ++i) {
     const int t = sample_triangles[(is_second ? (i == 0 ? 0 : 3) : (i == 0 ? 1 : 2)) * size + texel];
     if (t == NO_TRIANGLE) continue;
-    const Point a = point_at(x, y, z, at[corner_of(is_second, i, 0)]), b = point_at(x, y, z, at[corner_of(is_second, i, 1)]),
+    const Point a = point_at(x, y, z, at[corner_of(is_second, i, 0)]),
+                b = point_at(x, y, z, at[corner_of(is_second, i, 1)]),
                 c = point_at(x, y, z, at[corner_of(is_second, i, 2)]);
     const float third[3] = {1.0f / 3.0f, 1.0f / 3.0f, 1.0f / 3.0f};
     const Point middle = weighted(third, a, b, c);
@@ -263,7 +290,8 @@ kernel void match_lattice(const int texture_width, const int texture_height, con
     float w[3];
     Point nearest = middle, normal = own;
     int end = t;
-    const float best = walk_over_mesh(middle, 0.0f, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &end, &nearest, &normal, w);
+    const float best = walk_over_mesh(middle, 0.0f, triangle_count, corners, across, vertex_x, vertex_y, vertex_z, &end,
+                                      &nearest, &normal, w);
     // On a side or at a corner the way to the point is the direction; within a triangle that is its normal.
     const Point gap = minus(middle, nearest);
     const float distance = sqrt(best);
@@ -288,9 +316,10 @@ typedef struct System {
   float own[6], side[3], ahead[4][6];
 } System;
 
-// What one residual adds to the row of a texel. `own` is the texel's number among the triangle's corners, `quad_x`, `quad_y`
-// where the quad lies from the texel.
-void add_residual(System* s, float weight, float residual, Point n, const float w[3], int is_second, int triangle, int own, int quad_x, int quad_y) {
+// What one residual adds to the row of a texel. `own` is the texel's number among the triangle's corners, `quad_x`,
+// `quad_y` where the quad lies from the texel.
+void add_residual(System* s, float weight, float residual, Point n, const float w[3], int is_second, int triangle,
+                  int own, int quad_x, int quad_y) {
   const float block[6] = {n.x * n.x, n.x * n.y, n.x * n.z, n.y * n.y, n.y * n.z, n.z * n.z};
   const float pull = weight * w[own];
   for (int i = 0; i < 6; ++i) s->own[i] += pull * w[own] * block[i];
@@ -309,10 +338,12 @@ void add_residual(System* s, float weight, float residual, Point n, const float 
 
 // NDRange (texture width, texture height). Texels ahead are those at (right, up) = (1, 0), (-1, 1), (0, 1), (1, 1).
 // out  system: SYSTEM_STRIDE floats per texel
-kernel void assemble(const int texture_width, const int texture_height, const float least_residual, global const int* restrict texel_patches,
-                     global const PatchRecord* restrict patches, global const float* restrict samples, global const int* restrict diagonals,
-                     global const int* restrict matches, global const float* restrict weights, global const float* restrict residuals,
-                     global const float* restrict lattice, global float* restrict system) {
+kernel void assemble(const int texture_width, const int texture_height, const float least_residual,
+                     global const int* restrict texel_patches, global const PatchRecord* restrict patches,
+                     global const float* restrict samples, global const int* restrict diagonals,
+                     global const int* restrict matches, global const float* restrict weights,
+                     global const float* restrict residuals, global const float* restrict lattice,
+                     global float* restrict system) {
   const int column = (int)get_global_id(0), line = (int)get_global_id(1);
   if (column >= texture_width || line >= texture_height) return;
   const int texel = line * texture_width + column, size = texture_width * texture_height;
@@ -343,7 +374,8 @@ kernel void assemble(const int texture_width, const int texture_height, const fl
             const int plane = SAMPLE_PLANES * i * size + quad;
             const Point n = {samples[plane + 3 * size], samples[plane + 4 * size], samples[plane + 5 * size]};
             const float residual = residuals[i * size + quad];
-            add_residual(&s, samples[plane + 6 * size] / (fabs(residual) + least_residual), residual, n, w, is_second, triangle, k, tx, ty);
+            add_residual(&s, samples[plane + 6 * size] / (fabs(residual) + least_residual), residual, n, w, is_second,
+                         triangle, k, tx, ty);
           }
         }
       }
@@ -361,7 +393,8 @@ kernel void assemble(const int texture_width, const int texture_height, const fl
             if (corner_of(is_second, triangle, k) != corner) continue;
             const float residual = lattice[plane + size];
             const Point n = {lattice[plane + 2 * size], lattice[plane + 3 * size], lattice[plane + 4 * size]};
-            add_residual(&s, area / (fabs(residual) + least_residual), residual, n, third, is_second, triangle, k, tx, ty);
+            add_residual(&s, area / (fabs(residual) + least_residual), residual, n, third, is_second, triangle, k, tx,
+                         ty);
           }
         }
       }
@@ -384,8 +417,9 @@ float mean_entry(global const float* restrict own) { return (own[0] + own[3] + o
 
 // NDRange (texture width, texture height). Every texel of a colour takes the move that solves its own row, the others
 // standing: block Gauss-Seidel. To its row come damping, and springs between its move and those of its four neighbours.
-kernel void relax_moves(const int texture_width, const int texture_height, const int colour, const float damping, const float springs,
-                        global const int* restrict texel_patches, global const PatchRecord* restrict patches, global const float* restrict system,
+kernel void relax_moves(const int texture_width, const int texture_height, const int colour, const float damping,
+                        const float springs, global const int* restrict texel_patches,
+                        global const PatchRecord* restrict patches, global const float* restrict system,
                         global float* restrict move_x, global float* restrict move_y, global float* restrict move_z) {
   const int column = (int)get_global_id(0), line = (int)get_global_id(1);
   if (column >= texture_width || line >= texture_height) return;
@@ -426,13 +460,15 @@ kernel void relax_moves(const int texture_width, const int texture_height, const
   move_z[texel] = (c02 * side[0] + c12 * side[1] + c22 * side[2]) / determinant;
 }
 
-// NDRange (texture width, texture height). Steps and moves are limited to parts of a cell: the root of the mean area of the
-// four quads around, at the start.
+// NDRange (texture width, texture height). Steps and moves are limited to parts of a cell: the root of the mean area of
+// the four quads around, at the start.
 kernel void move_points(const int texture_width, const int texture_height, global const int* restrict texel_patches,
-                        global const PatchRecord* restrict patches, global const float* restrict start_x, global const float* restrict start_y,
-                        global const float* restrict start_z, global const float* restrict x, global const float* restrict y,
-                        global const float* restrict z, global const float* restrict move_x, global const float* restrict move_y,
-                        global const float* restrict move_z, global float* restrict out_x, global float* restrict out_y, global float* restrict out_z) {
+                        global const PatchRecord* restrict patches, global const float* restrict start_x,
+                        global const float* restrict start_y, global const float* restrict start_z,
+                        global const float* restrict x, global const float* restrict y, global const float* restrict z,
+                        global const float* restrict move_x, global const float* restrict move_y,
+                        global const float* restrict move_z, global float* restrict out_x, global float* restrict out_y,
+                        global float* restrict out_z) {
   const int column = (int)get_global_id(0), line = (int)get_global_id(1);
   if (column >= texture_width || line >= texture_height) return;
   const int texel = line * texture_width + column;
@@ -451,23 +487,27 @@ kernel void move_points(const int texture_width, const int texture_height, globa
     int at[4];
     const int beside = k & 1 ? (inner > 0 ? inner - 1 : p->width - 1) : inner;
     corners_of_quad(p, texture_width, beside, row - (k >> 1), at);
-    const Point n = cross_of(minus(point_at(start_x, start_y, start_z, at[2]), point_at(start_x, start_y, start_z, at[0])),
-                             minus(point_at(start_x, start_y, start_z, at[3]), point_at(start_x, start_y, start_z, at[1])));
+    const Point n =
+        cross_of(minus(point_at(start_x, start_y, start_z, at[2]), point_at(start_x, start_y, start_z, at[0])),
+                 minus(point_at(start_x, start_y, start_z, at[3]), point_at(start_x, start_y, start_z, at[1])));
     area += 0.125f * sqrt(product(n, n));
   }
   const float cell = sqrt(area);
   const float kept = fmin(1.0f, LARGEST_STEP * cell / sqrt(step2));
   const Point start = point_at(start_x, start_y, start_z, texel);
-  const Point total = {from.x - start.x + kept * move.x, from.y - start.y + kept * move.y, from.z - start.z + kept * move.z};
+  const Point total = {from.x - start.x + kept * move.x, from.y - start.y + kept * move.y,
+                       from.z - start.z + kept * move.z};
   // Off the lattice a cell at most, along it less than what would bring neighbours together.
   const int left = texel_at(p, texture_width, inner - 1, row), right = texel_at(p, texture_width, inner + 1, row);
   const Point around = minus(point_at(start_x, start_y, start_z, right), point_at(start_x, start_y, start_z, left));
-  const Point along = minus(point_at(start_x, start_y, start_z, texel + texture_width), point_at(start_x, start_y, start_z, texel - texture_width));
+  const Point along = minus(point_at(start_x, start_y, start_z, texel + texture_width),
+                            point_at(start_x, start_y, start_z, texel - texture_width));
   const Point normal = cross_of(along, around);
   const float normal2 = product(normal, normal);
   const float off = normal2 > 0.0f ? product(total, normal) / normal2 : 0.0f;
   const Point slide = {total.x - off * normal.x, total.y - off * normal.y, total.z - off * normal.z};
-  const float slid = sqrt(product(slide, slide)), most = 0.5f * LARGEST_SLIDE * sqrt(fmin(product(around, around), product(along, along)));
+  const float slid = sqrt(product(slide, slide)),
+              most = 0.5f * LARGEST_SLIDE * sqrt(fmin(product(around, around), product(along, along)));
   const float share = slid > most ? most / slid : 1.0f;
   const float height = fabs(off) * sqrt(normal2);
   const float rise = height > LARGEST_MOVE * cell ? off * LARGEST_MOVE * cell / height : off;

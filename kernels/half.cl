@@ -1,17 +1,21 @@
 // SPDX-License-Identifier: MIT
-// Texels rounded to half floats (16 bits). The nearest ones move a point by up to half a step of each number, in any direction; but only what leaves
-// the surface is an error. So of the half floats near a texel those are taken whose point stays nearest to the planes of the triangles around it: on smooth
-// parts it slides along the surface, on an edge along that. The mean of the squares over the planes, weighted by area, is a quadratic
-// form of the point's move (quadric error metrics: Garland and Heckbert 1997), and with its derivative one of the texel's.
-#include "skeletex_structs.h"
+// Texels rounded to half floats (16 bits). The nearest ones move a point by up to half a step of each number, in any
+// direction; but only what leaves the surface is an error. So of the half floats near a texel those are taken whose
+// point stays nearest to the planes of the triangles around it: on smooth parts it slides along the surface, on an edge
+// along that. The mean of the squares over the planes, weighted by area, is a quadratic form of the point's move
+// (quadric error metrics: Garland and Heckbert 1997), and with its derivative one of the texel's.
 #include "bone_frame.h"
 #include "row_group.h"
+#include "skeletex_structs.h"
 
-#define MOST_CHANGE 0.4f      // of the triangles around: the root of the sum of squares of how much their heights change, as shares
-#define CHANGE_WEIGHT 0.01f   // of such a change, against a way off the surface as long as their sides
-#define LEAST_SLOPE 0.05f     // cosine between the ways from the foot and from the bone: beyond it a point moves too far to be told
+#define MOST_CHANGE \
+  0.4f  // of the triangles around: the root of the sum of squares of how much their heights change, as shares
+#define CHANGE_WEIGHT 0.01f  // of such a change, against a way off the surface as long as their sides
+#define LEAST_SLOPE \
+  0.05f  // cosine between the ways from the foot and from the bone: beyond it a point moves too far to be told
 #define LEAST_HEIGHT2 1e-12f  // of a triangle, in its side: flatter ones have no plane
-#define LEAST_PART 0x1p-7f     // of the coarsest step: a number that is less is 0 but for rounding, as two of SPD texels are, and stays so
+#define LEAST_PART \
+  0x1p-7f  // of the coarsest step: a number that is less is 0 but for rounding, as two of SPD texels are, and stays so
 #define STEPS 8
 
 // What is added to two of a texel's numbers, in steps of the third; no two in simple proportion.
@@ -33,22 +37,25 @@ float8 nearest_halves(float8 x) {
 
 float product(const float a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-float form_of(float q[3][3], const float t[3]) { return product(q[0], t) * t[0] + product(q[1], t) * t[1] + product(q[2], t) * t[2]; }
+float form_of(float q[3][3], const float t[3]) {
+  return product(q[0], t) * t[0] + product(q[1], t) * t[1] + product(q[2], t) * t[2];
+}
 
-// How a point moves with each of its texel's numbers. With the texel q it moves by m dq + d (d - m g) dq / (g d): d is the direction from the foot, m the
-// length of that way over the texel's, and g the direction away from the bone, along which the point has to move by as much as the texel gets longer.
-// Returns whether that is known.
-int find_moves(const float texel[3], const float point[3], global const PatchRecord* restrict p, RowRecord row, ColumnRecord column, float moves[3][3]) {
-  float foot[3], axes[3][3], d[3], g[3], station = 0.0f;  // axes: along, around, out
+// How a point moves with each of its texel's numbers. With the texel q it moves by m dq + d (d - m g) dq / (g d): d is
+// the direction from the foot, m the length of that way over the texel's, and g the direction away from the bone, along
+// which the point has to move by as much as the texel gets longer. Returns whether that is known.
+int find_moves(const float texel[3], const float point[3], global const PatchRecord* restrict p, RowRecord row,
+               ColumnRecord column, float moves[3][3]) {
+  float foot[3], axes[3][3], d[3], g[3], axial = 0.0f;  // axes: along, around, out
   frame_of(p, row, column, foot, axes[2]);
   for (int i = 0; i < 3; ++i) axes[1][i] = column.cosine * p->b[i] - column.sine * p->s[i];
   for (int i = 0; i < 3; ++i) {
     const int k = (i + 1) % 3, l = (i + 2) % 3;
     axes[0][i] = axes[2][k] * axes[1][l] - axes[2][l] * axes[1][k];
-    station += (point[i] - p->head[i]) * p->axis[i];
+    axial += (point[i] - p->head[i]) * p->axis[i];
   }
-  station = clamp(station, 0.0f, p->length);
-  for (int i = 0; i < 3; ++i) d[i] = point[i] - foot[i], g[i] = point[i] - p->head[i] - station * p->axis[i];
+  axial = clamp(axial, 0.0f, p->length);
+  for (int i = 0; i < 3; ++i) d[i] = point[i] - foot[i], g[i] = point[i] - p->head[i] - axial * p->axis[i];
   const float size = sqrt(product(texel, texel)), way = sqrt(product(d, d)), distance = sqrt(product(g, g));
   if (size == 0.0f || way == 0.0f || distance == 0.0f) return 0;
   for (int i = 0; i < 3; ++i) d[i] /= way, g[i] /= distance;
@@ -72,31 +79,36 @@ void make_of_texel(float moves[3][3], float q[3][3]) {
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k < 3; ++k) half_way[i][k] = product(q[i], moves[k]);
   for (int i = 0; i < 3; ++i)
-    for (int k = 0; k < 3; ++k) q[i][k] = moves[i][0] * half_way[0][k] + moves[i][1] * half_way[1][k] + moves[i][2] * half_way[2][k];
+    for (int k = 0; k < 3; ++k)
+      q[i][k] = moves[i][0] * half_way[0][k] + moves[i][1] * half_way[1][k] + moves[i][2] * half_way[2][k];
 }
 
-// The form of the mean of the squares of distances from the triangles' planes; that of the sum of the squares of how much their heights
-// change, as shares; and the mean of the triangles' double areas, 0 where none has a plane.
+// The form of the mean of the squares of distances from the triangles' planes; that of the sum of the squares of how
+// much their heights change, as shares; and the mean of the triangles' double areas, 0 where none has a plane.
 typedef struct Surroundings {
   float off[3][3], change[3][3], area;
 } Surroundings;
 
 // Of the lattice's triangles at a texel; next to the first and last row those of its neighbours.
 // in   column, row: of the patch
-Surroundings surroundings_of(const float point[3], float moves[3][3], global const PatchRecord* restrict p, int texture_width, int column, int row,
-                             global const float* restrict x, global const float* restrict y, global const float* restrict z,
+Surroundings surroundings_of(const float point[3], float moves[3][3], global const PatchRecord* restrict p,
+                             int texture_width, int column, int row, global const float* restrict x,
+                             global const float* restrict y, global const float* restrict z,
                              global const int* restrict diagonals) {
   const int first = (p->y + row) * texture_width + p->x, above = first + texture_width, below = first - texture_width;
   const int left = (column > 0 ? column : p->width) - 1, right = column + 1 < p->width ? column + 1 : 0;
-  const int has_above = row < p->height - 2, has_below = row > 1;
+  const int has_above = row<p->height - 2, has_below = row> 1;
   // Neighbours in turn, and behind each what a diagonal may join to the texel.
-  const int ring[8] = {first + right, above + right, above + column, above + left, first + left, below + left, below + column, below + right};
-  const int is_joined[8] = {1, has_above && diagonals[first + column] == 0, 1, has_above && diagonals[first + left] != 0,
-                            1, has_below && diagonals[below + left] == 0,   1, has_below && diagonals[below + column] != 0};
+  const int ring[8] = {first + right, above + right, above + column, above + left,
+                       first + left,  below + left,  below + column, below + right};
+  const int is_joined[8] = {
+      1, has_above && diagonals[first + column] == 0, 1, has_above && diagonals[first + left] != 0,
+      1, has_below && diagonals[below + left] == 0,   1, has_below && diagonals[below + column] != 0};
   float sides[9][3];
   int count = 0;
   for (int i = 0; i < 8; ++i) {
-    sides[count][0] = x[ring[i]] - point[0], sides[count][1] = y[ring[i]] - point[1], sides[count][2] = z[ring[i]] - point[2];
+    sides[count][0] = x[ring[i]] - point[0], sides[count][1] = y[ring[i]] - point[1],
+    sides[count][2] = z[ring[i]] - point[2];
     count += is_joined[i];
   }
   for (int i = 0; i < 3; ++i) sides[count][i] = sides[0][i];
@@ -106,12 +118,14 @@ Surroundings surroundings_of(const float point[3], float moves[3][3], global con
   for (int i = 0; i < count; ++i) {
     const float* u = sides[i];
     const float* v = sides[i + 1];
-    const float n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]}, e[3] = {v[0] - u[0], v[1] - u[1], v[2] - u[2]};
+    const float n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]},
+                e[3] = {v[0] - u[0], v[1] - u[1], v[2] - u[2]};
     const float area2 = product(n, n), side2 = product(e, e);
     if (area2 <= LEAST_HEIGHT2 * side2 * side2) continue;
     // From the point to the opposite side, divided by the square of that height.
     const float share = product(u, e) / side2, inverse = side2 / area2;
-    const float height[3] = {(u[0] - share * e[0]) * inverse, (u[1] - share * e[1]) * inverse, (u[2] - share * e[2]) * inverse};
+    const float height[3] = {(u[0] - share * e[0]) * inverse, (u[1] - share * e[1]) * inverse,
+                             (u[2] - share * e[2]) * inverse};
     add_square(n, rsqrt(area2), around.off);
     add_square(height, 1.0f, around.change);
     around.area += sqrt(area2);
@@ -131,25 +145,36 @@ void choose_halves(const float texel[3], Surroundings* around, float moved[3]) {
   float own_steps[3], weights[3];
   for (int i = 0; i < 3; ++i) own_steps[i] = half_step(texel[i]);
   const float coarsest = fmax(own_steps[0], fmax(own_steps[1], own_steps[2]));
-  for (int i = 0; i < 3; ++i) weights[i] = fabs(texel[i]) < LEAST_PART * coarsest ? -1.0f : around->off[i][i] * own_steps[i] * own_steps[i];
-  const int a = weights[2] >= fmax(weights[0], weights[1]) ? 2 : weights[0] >= weights[1] ? 0 : 1, b = a == 0 ? 1 : 0, c = a == 2 ? 1 : 2;
-  const float step_b = weights[b] < 0.0f ? 0.0f : fmax(own_steps[a], own_steps[b]), step_c = weights[c] < 0.0f ? 0.0f : fmax(own_steps[a], own_steps[c]);
+  for (int i = 0; i < 3; ++i)
+    weights[i] = fabs(texel[i]) < LEAST_PART * coarsest ? -1.0f : around->off[i][i] * own_steps[i] * own_steps[i];
+  const int a = weights[2] >= fmax(weights[0], weights[1]) ? 2
+                : weights[0] >= weights[1]                 ? 0
+                                                           : 1,
+            b = a == 0 ? 1 : 0, c = a == 2 ? 1 : 2;
+  const float step_b = weights[b] < 0.0f ? 0.0f : fmax(own_steps[a], own_steps[b]),
+              step_c = weights[c] < 0.0f ? 0.0f : fmax(own_steps[a], own_steps[c]);
   float cost[3][3];
-  for (int i = 0; i < 9; ++i) cost[i / 3][i % 3] = around->off[i / 3][i % 3] + CHANGE_WEIGHT * CHANGE_WEIGHT * around->area * around->change[i / 3][i % 3];
+  for (int i = 0; i < 9; ++i)
+    cost[i / 3][i % 3] =
+        around->off[i / 3][i % 3] + CHANGE_WEIGHT * CHANGE_WEIGHT * around->area * around->change[i / 3][i % 3];
   const float inverse = 1.0f / cost[a][a];
   const float8 c_moves = nearest_halves(texel[c] + step_c * vload8(0, steps)) - texel[c];
   const float8 c_costs = cost[c][c] * c_moves * c_moves, c_changes = around->change[c][c] * c_moves * c_moves;
-  float8 least = (float8)(form_of(cost, moved)), best_a = (float8)(moved[a]), best_b = (float8)(moved[b]), best_c = (float8)(moved[c]);
+  float8 least = (float8)(form_of(cost, moved)), best_a = (float8)(moved[a]), best_b = (float8)(moved[b]),
+         best_c = (float8)(moved[c]);
   for (int i = 0; i < STEPS; ++i) {
     const float b_move = nearest_half(texel[b] + step_b * steps[i]) - texel[b];
     const float8 slopes = cost[a][b] * b_move + cost[a][c] * c_moves;
     const float8 a_moves = nearest_halves(texel[a] - slopes * inverse) - texel[a];
-    const float8 costs = a_moves * (cost[a][a] * a_moves + 2.0f * slopes) + b_move * (cost[b][b] * b_move + 2.0f * cost[b][c] * c_moves) + c_costs;
-    const float8 changes = a_moves * (around->change[a][a] * a_moves + 2.0f * (around->change[a][b] * b_move + around->change[a][c] * c_moves)) +
+    const float8 costs = a_moves * (cost[a][a] * a_moves + 2.0f * slopes) +
+                         b_move * (cost[b][b] * b_move + 2.0f * cost[b][c] * c_moves) + c_costs;
+    const float8 changes = a_moves * (around->change[a][a] * a_moves +
+                                      2.0f * (around->change[a][b] * b_move + around->change[a][c] * c_moves)) +
                            b_move * (around->change[b][b] * b_move + 2.0f * around->change[b][c] * c_moves) + c_changes;
     const int8 is_better = (costs < least) & (changes <= MOST_CHANGE * MOST_CHANGE);
     least = is_better ? costs : least;
-    best_a = is_better ? a_moves : best_a, best_b = is_better ? (float8)(b_move) : best_b, best_c = is_better ? c_moves : best_c;
+    best_a = is_better ? a_moves : best_a, best_b = is_better ? (float8)(b_move) : best_b,
+    best_c = is_better ? c_moves : best_c;
   }
   float lanes[4][8];
   vstore8(least, 0, lanes[0]), vstore8(best_a, 0, lanes[1]), vstore8(best_b, 0, lanes[2]), vstore8(best_c, 0, lanes[3]);
@@ -161,11 +186,15 @@ void choose_halves(const float texel[3], Surroundings* around, float moved[3]) {
 // NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. Rounds the texels of inner rows.
 // in   lattice_rows: inner rows; x, y, z: the texels' points, of all rows; diagonals: see choose_diagonals
 // in and out  along, around, out_plane
-// out  nearest2, chosen2: per texel the mean of the squares of distances from the planes around, for the nearest half floats and for these
-kernel void round_texels(const int row_count, const int texture_width, global const int* restrict lattice_rows, global const PatchRecord* restrict patches,
-                         global const RowRecord* restrict rows, global const ColumnRecord* restrict columns, global const float* restrict x,
-                         global const float* restrict y, global const float* restrict z, global const int* restrict diagonals, global float* restrict along,
-                         global float* restrict around, global float* restrict out_plane, global float* restrict nearest2, global float* restrict chosen2) {
+// out  nearest2, chosen2: per texel the mean of the squares of distances from the planes around, for the nearest half
+// floats and for these
+kernel void round_texels(const int row_count, const int texture_width, global const int* restrict lattice_rows,
+                         global const PatchRecord* restrict patches, global const RowRecord* restrict rows,
+                         global const ColumnRecord* restrict columns, global const float* restrict x,
+                         global const float* restrict y, global const float* restrict z,
+                         global const int* restrict diagonals, global float* restrict along,
+                         global float* restrict around, global float* restrict out_plane,
+                         global float* restrict nearest2, global float* restrict chosen2) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   global const PatchRecord* restrict p = patches + lattice_rows[4 * k];
@@ -173,7 +202,8 @@ kernel void round_texels(const int row_count, const int texture_width, global co
   for (int j = get_local_id(0); j < p->width; j += ROW_ITEMS) {
     const int i = first + j;
     const float texel[3] = {along[i], around[i], out_plane[i]}, point[3] = {x[i], y[i], z[i]};
-    float moved[3] = {nearest_half(texel[0]) - texel[0], nearest_half(texel[1]) - texel[1], nearest_half(texel[2]) - texel[2]};
+    float moved[3] = {nearest_half(texel[0]) - texel[0], nearest_half(texel[1]) - texel[1],
+                      nearest_half(texel[2]) - texel[2]};
     nearest2[i] = chosen2[i] = 0.0f;
     float moves[3][3];
     if (find_moves(texel, point, p, rows[p->row_begin + row], columns[p->column_begin + j], moves)) {
@@ -184,6 +214,7 @@ kernel void round_texels(const int row_count, const int texture_width, global co
         chosen2[i] = form_of(triangles.off, moved);
       }
     }
-    along[i] = nearest_half(texel[0] + moved[0]), around[i] = nearest_half(texel[1] + moved[1]), out_plane[i] = nearest_half(texel[2] + moved[2]);
+    along[i] = nearest_half(texel[0] + moved[0]), around[i] = nearest_half(texel[1] + moved[1]),
+    out_plane[i] = nearest_half(texel[2] + moved[2]);
   }
 }

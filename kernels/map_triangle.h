@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Triangles of maps, for the kernels that read surfaces. Map coordinates are pairs of floats (high + low): differences of
-// near values keep their relative precision, however small the triangle. A triangle's corner 2 is its pole where it has
-// one; corner 0 is the base of all differences.
+// Triangles of maps, for the kernels that read surfaces. Map coordinates are pairs of floats (high + low): differences
+// of near values keep their relative precision, however small the triangle. A triangle's corner 2 is its pole where it
+// has one; corner 0 is the base of all differences.
 #ifndef MAP_TRIANGLE_H
 #define MAP_TRIANGLE_H
 
@@ -13,9 +13,10 @@ typedef struct MapTriangle {
   int pole;  // 0, -1: head's, +1: tail's at corner 2 (then du2 reaches the pole's row and dv2 is unused)
 } MapTriangle;
 
-__attribute__((always_inline)) MapTriangle load_triangle(int t, int triangle_count, global const int* corners, global const int* turns, global const int* poles,
-                          global const float* u_high, global const float* u_low, global const float* v_high,
-                          global const float* v_low) {
+__attribute__((always_inline)) MapTriangle load_triangle(int t, int triangle_count, global const int* corners,
+                                                         global const int* turns, global const int* poles,
+                                                         global const float* u_high, global const float* u_low,
+                                                         global const float* v_high, global const float* v_low) {
   const int a = corners[t], b = corners[triangle_count + t], c = corners[2 * triangle_count + t];
   MapTriangle m;
   m.u_base_high = u_high[a];
@@ -39,17 +40,20 @@ __attribute__((always_inline)) float column_offset(MapTriangle m, int column, in
 }
 
 // u from the triangle's base of a reading position: a row of the table, and the share of the way to the next one.
-__attribute__((always_inline)) float row_offset(MapTriangle m, global const float* row_high, global const float* row_low, int row, float share) {
+__attribute__((always_inline)) float row_offset(MapTriangle m, global const float* row_high,
+                                                global const float* row_low, int row, float share) {
   const int next = share < 0.0f ? row - 1 : share > 0.0f ? row + 1 : row;
   const float span = (row_high[next] - row_high[row]) + (row_low[next] - row_low[row]);
   return ((row_high[row] - m.u_base_high) + (row_low[row] - m.u_base_low)) + fabs(share) * span;
 }
 
 // The same of an inner row: where texels of one row look together, nothing of it is gathered.
-__attribute__((always_inline)) float inner_row_offset(MapTriangle m, global const float* row_high, global const float* row_low, int row, float share) {
+__attribute__((always_inline)) float inner_row_offset(MapTriangle m, global const float* row_high,
+                                                      global const float* row_low, int row, float share) {
   const float before = (row_high[row - 1] - row_high[row]) + (row_low[row - 1] - row_low[row]);
   const float after = (row_high[row + 1] - row_high[row]) + (row_low[row + 1] - row_low[row]);
-  return ((row_high[row] - m.u_base_high) + (row_low[row] - m.u_base_low)) + fabs(share) * (share < 0.0f ? before : after);
+  return ((row_high[row] - m.u_base_high) + (row_low[row] - m.u_base_low)) +
+         fabs(share) * (share < 0.0f ? before : after);
 }
 
 // Weights of corners 1 and 2. (By value: see prefilter.h.)
@@ -57,11 +61,12 @@ typedef struct CornerWeights {
   float w1, w2;
 } CornerWeights;
 
-// Where a map's triangle without a pole has a point at (u, v), both from the triangle's base. Weights are negative, or their sum is above 1, outside
-// the triangle.
+// Where a map's triangle without a pole has a point at (u, v), both from the triangle's base. Weights are negative, or
+// their sum is above 1, outside the triangle.
 __attribute__((always_inline)) CornerWeights plain_weights_at(MapTriangle m, float u, float v) {
   // Scaled by the extents, so that products of tiny differences stay in range.
-  const float scale_u = 1.0f / fmax(fmax(fabs(m.du1), fabs(m.du2)), 1e-30f), scale_v = 1.0f / fmax(fmax(fabs(m.dv1), fabs(m.dv2)), 1e-30f);
+  const float scale_u = 1.0f / fmax(fmax(fabs(m.du1), fabs(m.du2)), 1e-30f),
+              scale_v = 1.0f / fmax(fmax(fabs(m.dv1), fabs(m.dv2)), 1e-30f);
   const float a1 = m.du1 * scale_u, b1 = m.dv1 * scale_v, a2 = m.du2 * scale_u, b2 = m.dv2 * scale_v;
   const float pu = u * scale_u, pv = v * scale_v;
   const float determinant = a1 * b2 - a2 * b1;

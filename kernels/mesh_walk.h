@@ -19,17 +19,19 @@ Point cross_of(Point a, Point b) {
   return n;
 }
 Point weighted(const float w[3], Point a, Point b, Point c) {
-  const Point p = {w[0] * a.x + w[1] * b.x + w[2] * c.x, w[0] * a.y + w[1] * b.y + w[2] * c.y, w[0] * a.z + w[1] * b.z + w[2] * c.z};
+  const Point p = {w[0] * a.x + w[1] * b.x + w[2] * c.x, w[0] * a.y + w[1] * b.y + w[2] * c.y,
+                   w[0] * a.z + w[1] * b.z + w[2] * c.z};
   return p;
 }
 
 float ratio_of(float part, float whole) { return whole > 0.0f ? part / whole : 0.0f; }
 
-// The point of a triangle that is nearest to p, as weights of its corners, 0 exactly where it lies on a side. Returns the
-// squared distance.
+// The point of a triangle that is nearest to p, as weights of its corners, 0 exactly where it lies on a side. Returns
+// the squared distance.
 float nearest_of_triangle(Point p, Point a, Point b, Point c, float w[3]) {
   const Point ab = minus(b, a), ac = minus(c, a), ap = minus(p, a), bp = minus(p, b), cp = minus(p, c);
-  const float d1 = product(ab, ap), d2 = product(ac, ap), d3 = product(ab, bp), d4 = product(ac, bp), d5 = product(ab, cp), d6 = product(ac, cp);
+  const float d1 = product(ab, ap), d2 = product(ac, ap), d3 = product(ab, bp), d4 = product(ac, bp),
+              d5 = product(ab, cp), d6 = product(ac, cp);
   const float va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2;
   w[0] = 0.0f, w[1] = 0.0f, w[2] = 0.0f;
   if (d1 <= 0.0f && d2 <= 0.0f) {
@@ -58,17 +60,20 @@ float nearest_of_triangle(Point p, Point a, Point b, Point c, float w[3]) {
 }
 
 // The same of a triangle of the mesh.
-float nearest_of_number(Point p, int t, int triangle_count, global const int* restrict corners, global const float* restrict vertex_x,
-                        global const float* restrict vertex_y, global const float* restrict vertex_z, float w[3]) {
-  return nearest_of_triangle(p, point_at(vertex_x, vertex_y, vertex_z, corners[t]), point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + t]),
+float nearest_of_number(Point p, int t, int triangle_count, global const int* restrict corners,
+                        global const float* restrict vertex_x, global const float* restrict vertex_y,
+                        global const float* restrict vertex_z, float w[3]) {
+  return nearest_of_triangle(p, point_at(vertex_x, vertex_y, vertex_z, corners[t]),
+                             point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + t]),
                              point_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + t]), w);
 }
 
 // The point of the mesh near p: a walk from a triangle across sides that the nearest point lies on, as long as it comes
 // nearer and is further than the root of `enough2`. It does not leave the patch's map. Returns the squared distance.
 // in/out  at: the triangle where the walk begins; where it ends
-float walk_over_mesh(Point p, float enough2, int triangle_count, global const int* restrict corners, global const int* restrict across,
-                     global const float* restrict vertex_x, global const float* restrict vertex_y, global const float* restrict vertex_z, int* at,
+float walk_over_mesh(Point p, float enough2, int triangle_count, global const int* restrict corners,
+                     global const int* restrict across, global const float* restrict vertex_x,
+                     global const float* restrict vertex_y, global const float* restrict vertex_z, int* at,
                      Point* nearest, Point* normal, float w[3]) {
   int t = *at, last = -1;
   float best = nearest_of_number(p, t, triangle_count, corners, vertex_x, vertex_y, vertex_z, w);
@@ -79,7 +84,8 @@ float walk_over_mesh(Point p, float enough2, int triangle_count, global const in
       if (w[k] != 0.0f) continue;
       const int other = across[k * triangle_count + t];
       if (other < 0 || other == last) continue;
-      const float distance2 = nearest_of_number(p, other, triangle_count, corners, vertex_x, vertex_y, vertex_z, other_w);
+      const float distance2 =
+          nearest_of_number(p, other, triangle_count, corners, vertex_x, vertex_y, vertex_z, other_w);
       if (distance2 < nearer) {
         nearer = distance2, next = other;
         next_w[0] = other_w[0], next_w[1] = other_w[1], next_w[2] = other_w[2];
@@ -91,7 +97,10 @@ float walk_over_mesh(Point p, float enough2, int triangle_count, global const in
     for (int turns = 0, turned = t; turns < 16 && next < 0 && k >= 0; ++turns) {
       turned = across[(k == 2 ? 0 : k + 1) * triangle_count + turned];
       if (turned < 0 || turned == t) break;
-      k = corners[turned] == vertex ? 0 : corners[triangle_count + turned] == vertex ? 1 : corners[2 * triangle_count + turned] == vertex ? 2 : -1;
+      k = corners[turned] == vertex                        ? 0
+          : corners[triangle_count + turned] == vertex     ? 1
+          : corners[2 * triangle_count + turned] == vertex ? 2
+                                                           : -1;
       nearer = nearest_of_number(p, turned, triangle_count, corners, vertex_x, vertex_y, vertex_z, next_w);
       if (nearer < best) next = turned;
     }
@@ -99,7 +108,8 @@ float walk_over_mesh(Point p, float enough2, int triangle_count, global const in
     last = t, t = next, best = nearer;
     w[0] = next_w[0], w[1] = next_w[1], w[2] = next_w[2];
   }
-  const Point d = point_at(vertex_x, vertex_y, vertex_z, corners[t]), e = point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + t]),
+  const Point d = point_at(vertex_x, vertex_y, vertex_z, corners[t]),
+              e = point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + t]),
               f = point_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + t]);
   *at = t;
   *nearest = weighted(w, d, e, f);

@@ -6,15 +6,17 @@
 //       boxes            six vectors per node: least x, y, z and greatest x, y, z of its eight children
 //       blocks           nine vectors per block of eight triangles: first vertex, edge to the second, edge to the third
 //       level_begin      per level of the tree, its first node in `boxes`; level 0 are the blocks
-//                        (layout: core/skeletex/measure/triangle_tree.h)
+//                        (layout: core/skeletex/geometry/triangle_tree.h)
 //       enough_squared   a triangle so near need not be the nearest; 0: always the nearest
-//       bounds_squared   with has_bounds per point how far, squared, the nearest triangle is at most; a point with nothing so near is looked at without
+//       bounds_squared   with has_bounds per point how far, squared, the nearest triangle is at most; a point with
+//       nothing so near is looked at without
 // Out:  nearest          per point, the nearest triangle's place in the tree
 //       nearest_squared  per point, its squared distance, as exact as float32 allows
 // NDRange: one item per `run` consecutive points.
 //
-// Vectors of eight are the width of the tree, not of a pixel: one point against eight boxes or triangles at a time fills
-// the registers of a CPU and is plain scalar code on a GPU. At most 8 levels above the blocks (134 million triangles).
+// Vectors of eight are the width of the tree, not of a pixel: one point against eight boxes or triangles at a time
+// fills the registers of a CPU and is plain scalar code on a GPU. At most 8 levels above the blocks (134 million
+// triangles).
 
 #define STACK_SIZE 64
 #define BEYOND_ALL 1e30f  // less than to the places past the end
@@ -39,7 +41,8 @@ inline uint bits_of(const int8 comparison) {
 inline uint lowest_bit(const uint bits) { return popcount((bits & (0u - bits)) - 1u); }
 
 // Squared distance to eight segments from the origin to (ex, ey, ez); a segment may be a point.
-inline float8 squared_to_edges(const float8 x, const float8 y, const float8 z, const float8 ex, const float8 ey, const float8 ez) {
+inline float8 squared_to_edges(const float8 x, const float8 y, const float8 z, const float8 ex, const float8 ey,
+                               const float8 ez) {
   const float8 squared = max(ex * ex + ey * ey + ez * ez, (float8)(1e-37f));
   const float8 t = clamp((x * ex + y * ey + z * ez) / squared, (float8)(0.0f), (float8)(1.0f));
   const float8 rx = x - t * ex, ry = y - t * ey, rz = z - t * ez;
@@ -73,10 +76,12 @@ inline float8 squared_to_boxes(global const float8* restrict node, const float p
   return dx * dx + dy * dy + dz * dz;
 }
 
-kernel void find_nearest_triangles(global const float* restrict px, global const float* restrict py, global const float* restrict pz,
-                                   const int count, const int run, global const float8* restrict boxes, global const float8* restrict blocks,
-                                   constant int* restrict level_begin, const int top_level, const float enough_squared, const int has_bounds,
-                                   global const float* restrict bounds_squared, global int* restrict nearest, global float* restrict nearest_squared) {
+kernel void find_nearest_triangles(global const float* restrict px, global const float* restrict py,
+                                   global const float* restrict pz, const int count, const int run,
+                                   global const float8* restrict boxes, global const float8* restrict blocks,
+                                   constant int* restrict level_begin, const int top_level, const float enough_squared,
+                                   const int has_bounds, global const float* restrict bounds_squared,
+                                   global int* restrict nearest, global float* restrict nearest_squared) {
   const int begin = (int)get_global_id(0) * run;
   const int end = min(begin + run, count);
   int block = -1;  // the previous point's

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The orientations of an in-between surface: how its surface would have to turn at every vertex to look the way that its
-// sources do there (edit/orientation.h). Vertices, rows and fans as in filter.cl, whose head comment explains them.
+// The orientations of an in-between surface: how its surface would have to turn at every vertex to look the way that
+// its sources do there (edit/orientation.h). Vertices, rows and fans as in filter.cl, whose head comment explains them.
 //
 // A field has planes of `count` floats behind each other. A rotation is a unit quaternion, four planes: w, x, y, z.
 
 #define FAN_CHUNK 64
-#define LEAST_SINE 1e-3f     // of the angle between the two directions of a surface
+#define LEAST_SINE 1e-3f       // of the angle between the two directions of a surface
 #define LEAST_HALF_TURN 1e-3f  // 1 + cosine of the angle between two normals
-// Cosines of half the angles where a rotation counts in full, and no more: 50 and 100 degrees. One so large tells of a map that
-// folds or smears, not of a surface.
+// Cosines of half the angles where a rotation counts in full, and no more: 50 and 100 degrees. One so large tells of a
+// map that folds or smears, not of a surface.
 #define FULL_COSINE 0.90630779f
 #define LAST_COSINE 0.64278761f
 
@@ -29,13 +29,15 @@ void multiply_rotations(const float* restrict p, const float* restrict q, float*
 }
 
 void rotate_vector(const float* restrict q, const float* restrict v, float* restrict rotated) {
-  const float tx = 2.0f * (q[2] * v[2] - q[3] * v[1]), ty = 2.0f * (q[3] * v[0] - q[1] * v[2]), tz = 2.0f * (q[1] * v[1] - q[2] * v[0]);
+  const float tx = 2.0f * (q[2] * v[2] - q[3] * v[1]), ty = 2.0f * (q[3] * v[0] - q[1] * v[2]),
+              tz = 2.0f * (q[1] * v[1] - q[2] * v[0]);
   rotated[0] = v[0] + q[0] * tx + q[2] * tz - q[3] * ty;
   rotated[1] = v[1] + q[0] * ty + q[3] * tx - q[1] * tz;
   rotated[2] = v[2] + q[0] * tz + q[1] * ty - q[2] * tx;
 }
 
-void vector_between(__global const float* restrict points, const int count, const int from, const int to, float* restrict e) {
+void vector_between(__global const float* restrict points, const int count, const int from, const int to,
+                    float* restrict e) {
   e[0] = points[to] - points[from];
   e[1] = points[count + to] - points[count + from];
   e[2] = points[2 * count + to] - points[2 * count + from];
@@ -45,16 +47,18 @@ void vector_between(__global const float* restrict points, const int count, cons
 int unit_normal(const float* restrict along, const float* restrict around, float* restrict n) {
   cross_product(along, around, n);
   const float area2 = dot_product(n, n);
-  if (!(area2 > LEAST_SINE * LEAST_SINE * dot_product(along, along) * dot_product(around, around)) || !(area2 > 0.0f)) return 0;
+  if (!(area2 > LEAST_SINE * LEAST_SINE * dot_product(along, along) * dot_product(around, around)) || !(area2 > 0.0f))
+    return 0;
   const float scale = 1.0f / sqrt(area2);
   for (int i = 0; i < 3; ++i) n[i] *= scale;
   return 1;
 }
 
-// The rotation from a surface's directions to those of another one: the least that takes normal to normal, then about the
-// normal the one that fits both directions best, whatever their lengths. None where a surface has no normal or is upside down.
-void rotation_between(const float* restrict along, const float* restrict around, const float* restrict to_along, const float* restrict to_around,
-                  float* restrict q) {
+// The rotation from a surface's directions to those of another one: the least that takes normal to normal, then about
+// the normal the one that fits both directions best, whatever their lengths. None where a surface has no normal or is
+// upside down.
+void rotation_between(const float* restrict along, const float* restrict around, const float* restrict to_along,
+                      const float* restrict to_around, float* restrict q) {
   float n[3], m[3];
   q[0] = 1.0f;
   q[1] = q[2] = q[3] = 0.0f;
@@ -88,10 +92,11 @@ void rotation_between(const float* restrict along, const float* restrict around,
 }
 
 // Adds the rotations from a surface to a source's, times the source's weights. NDRange: rows.
-// in  facing: per row a rotation, by which the source is to be rotated first; weights: per vertex; points, source: fields of three
-// in and out  sums: four planes
-__kernel void add_rotations(const int row_count, const int count, __global const int* restrict rows, __global const float* restrict facing,
-                            __global const float* restrict weights, __global const float* restrict points, __global const float* restrict source,
+// in  facing: per row a rotation, by which the source is to be rotated first; weights: per vertex; points, source:
+// fields of three in and out  sums: four planes
+__kernel void add_rotations(const int row_count, const int count, __global const int* restrict rows,
+                            __global const float* restrict facing, __global const float* restrict weights,
+                            __global const float* restrict points, __global const float* restrict source,
                             __global float* restrict sums) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
@@ -116,9 +121,10 @@ __kernel void add_rotations(const int row_count, const int count, __global const
   }
 }
 
-// Unit normals of the inner vertices, 0 where they have none. NDRange: rows. in  points     out  normals: field of three
-__kernel void row_normals(const int row_count, const int count, __global const int* restrict rows, __global const float* restrict points,
-                          __global float* restrict normals) {
+// Unit normals of the inner vertices, 0 where they have none. NDRange: rows. in  points     out  normals: field of
+// three
+__kernel void row_normals(const int row_count, const int count, __global const int* restrict rows,
+                          __global const float* restrict points, __global float* restrict normals) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   const int here = rows[4 * k], width = rows[4 * k + 1];
@@ -132,10 +138,10 @@ __kernel void row_normals(const int row_count, const int count, __global const i
   }
 }
 
-// Rotations of the inner vertices from their sums: of unit length, none beyond LAST_COSINE, and as much of them as their row has.
-// NDRange: rows. in  shares: per row     in and out  rotations
-__kernel void settle_rotations(const int row_count, const int count, __global const int* restrict rows, __global const float* restrict shares,
-                           __global float* restrict rotations) {
+// Rotations of the inner vertices from their sums: of unit length, none beyond LAST_COSINE, and as much of them as
+// their row has. NDRange: rows. in  shares: per row     in and out  rotations
+__kernel void settle_rotations(const int row_count, const int count, __global const int* restrict rows,
+                               __global const float* restrict shares, __global float* restrict rotations) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   const int here = rows[4 * k], end = here + rows[4 * k + 1];
@@ -152,10 +158,10 @@ __kernel void settle_rotations(const int row_count, const int count, __global co
   }
 }
 
-// The means of the rotations of each vertex and those next to it in the rows: where a map folds they change from vertex to vertex,
-// which would tear single ones out of the surface. NDRange: rows.
-__kernel void smooth_rotations(const int row_count, const int count, __global const int* restrict rows, __global const float* restrict rotations,
-                           __global float* restrict smoothed) {
+// The means of the rotations of each vertex and those next to it in the rows: where a map folds they change from vertex
+// to vertex, which would tear single ones out of the surface. NDRange: rows.
+__kernel void smooth_rotations(const int row_count, const int count, __global const int* restrict rows,
+                               __global const float* restrict rotations, __global float* restrict smoothed) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   const int here = rows[4 * k], width = rows[4 * k + 1], has_before = rows[4 * k + 2], has_after = rows[4 * k + 3];
@@ -173,8 +179,8 @@ __kernel void smooth_rotations(const int row_count, const int count, __global co
 }
 
 // Rotations the normals of the inner vertices. NDRange: rows. in  rotations     in and out  normals
-__kernel void rotate_normals(const int row_count, const int count, __global const int* restrict rows, __global const float* restrict rotations,
-                           __global float* restrict normals) {
+__kernel void rotate_normals(const int row_count, const int count, __global const int* restrict rows,
+                             __global const float* restrict rotations, __global float* restrict normals) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   const int here = rows[4 * k], end = here + rows[4 * k + 1];
@@ -189,8 +195,9 @@ __kernel void rotate_normals(const int row_count, const int count, __global cons
 
 // At the vertices in no row: the mean of their neighbours in rows, of length 1. NDRange: fans.
 // in and out  field: of three or four components
-__kernel void mean_at_ends(const int fan_count, const int inner_count, const int count, const int components, __global const int* restrict fan_vertices,
-                           __global const int* restrict fan_begin, __global const int* restrict fans, __global float* restrict field) {
+__kernel void mean_at_ends(const int fan_count, const int inner_count, const int count, const int components,
+                           __global const int* restrict fan_vertices, __global const int* restrict fan_begin,
+                           __global const int* restrict fans, __global float* restrict field) {
   const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, fan_count);
   for (int k = begin + (int)get_local_id(0); k < end; k += get_local_size(0)) {
     const int v = fan_vertices[k];
@@ -204,9 +211,10 @@ __kernel void mean_at_ends(const int fan_count, const int inner_count, const int
   }
 }
 
-// How much an edge from one vertex to another stands out from the plane that is normal to the mean of their normals: a length.
-// n: that mean, of unit length; 0 where there is none
-float height_of(const int count, __global const float* restrict normals, const int v, const int other, const float* restrict e, float* restrict n) {
+// How much an edge from one vertex to another stands out from the plane that is normal to the mean of their normals: a
+// length. n: that mean, of unit length; 0 where there is none
+float height_of(const int count, __global const float* restrict normals, const int v, const int other,
+                const float* restrict e, float* restrict n) {
   for (int c = 0; c < 3; ++c) n[c] = normals[c * count + v] + normals[c * count + other];
   const float length = sqrt(dot_product(n, n));
   for (int c = 0; c < 3; ++c) n[c] = length > 0.1f ? n[c] / length : 0.0f;
@@ -214,9 +222,11 @@ float height_of(const int count, __global const float* restrict normals, const i
 }
 
 // Adds the slopes of a source's edges in the fans, times the source's weights at their ends. NDRange: fans.
-// in  weights: per vertex; source; normals: of the source     in and out  slopes: two per triangle of the fans, heights over lengths
-__kernel void add_slopes(const int fan_count, const int count, __global const int* restrict fan_vertices, __global const int* restrict fan_begin,
-                         __global const int* restrict fans, __global const float* restrict weights, __global const float* restrict source,
+// in  weights: per vertex; source; normals: of the source     in and out  slopes: two per triangle of the fans, heights
+// over lengths
+__kernel void add_slopes(const int fan_count, const int count, __global const int* restrict fan_vertices,
+                         __global const int* restrict fan_begin, __global const int* restrict fans,
+                         __global const float* restrict weights, __global const float* restrict source,
                          __global const float* restrict normals, __global float* restrict slopes) {
   const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, fan_count);
   for (int k = begin + (int)get_local_id(0); k < end; k += get_local_size(0)) {
@@ -243,11 +253,12 @@ void matrix_of(__global const float* restrict rotations, const int count, const 
   m[8] = 1.0f - 2.0f * (x * x + y * y);
 }
 
-// What has to be added to L x for edges that are rotated by the mean of the rotations C at their ends: b = time (D - L x) with
-// D(v) = sum of w (C(v) + C(other)) / 2 (x(v) - x(other)). These are the edges of the rows. NDRange: rows.
-// in  rotations; points; weights: of the Laplace operator (filter.cl)     out  b: field of three
-__kernel void pull_rows(const int row_count, const int count, const float time, __global const int* restrict rows, __global const float* restrict weights,
-                        __global const float* restrict rotations, __global const float* restrict points, __global float* restrict b) {
+// What has to be added to L x for edges that are rotated by the mean of the rotations C at their ends: b = time (D - L
+// x) with D(v) = sum of w (C(v) + C(other)) / 2 (x(v) - x(other)). These are the edges of the rows. NDRange: rows. in
+// rotations; points; weights: of the Laplace operator (filter.cl)     out  b: field of three
+__kernel void pull_rows(const int row_count, const int count, const float time, __global const int* restrict rows,
+                        __global const float* restrict weights, __global const float* restrict rotations,
+                        __global const float* restrict points, __global float* restrict b) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   const int here = rows[4 * k], width = rows[4 * k + 1], has_before = rows[4 * k + 2], has_after = rows[4 * k + 3];
@@ -267,19 +278,21 @@ __kernel void pull_rows(const int row_count, const int count, const float time, 
         matrix_of(rotations, count, other, to);
         vector_between(points, count, other, v, e);
         for (int c = 0; c < 3; ++c)
-          for (int i = 0; i < 3; ++i) sum[c] += w * (0.5f * (m[3 * c + i] + to[3 * c + i]) - (c == i ? 1.0f : 0.0f)) * e[i];
+          for (int i = 0; i < 3; ++i)
+            sum[c] += w * (0.5f * (m[3 * c + i] + to[3 * c + i]) - (c == i ? 1.0f : 0.0f)) * e[i];
       }
     for (int c = 0; c < 3; ++c) b[c * count + v] = time * sum[c];
   }
 }
 
-// The same for the triangles of the fans. Edges that touch a seam, vertices from `first_seam` on, get the slopes of the sources'
-// there. NDRange: fans.
-// in  fan_weights; normals: of the rotated surface; slopes     in and out  b
-__kernel void pull_fans(const int fan_count, const int inner_count, const int first_seam, const int count, const float time,
-                        __global const int* restrict fan_vertices, __global const int* restrict fan_begin, __global const int* restrict fans,
-                        __global const float* restrict fan_weights, __global const float* restrict slopes, __global const float* restrict rotations,
-                        __global const float* restrict normals, __global const float* restrict points, __global float* restrict b) {
+// The same for the triangles of the fans. Edges that touch a seam, vertices from `first_seam` on, get the slopes of the
+// sources' there. NDRange: fans. in  fan_weights; normals: of the rotated surface; slopes     in and out  b
+__kernel void pull_fans(const int fan_count, const int inner_count, const int first_seam, const int count,
+                        const float time, __global const int* restrict fan_vertices,
+                        __global const int* restrict fan_begin, __global const int* restrict fans,
+                        __global const float* restrict fan_weights, __global const float* restrict slopes,
+                        __global const float* restrict rotations, __global const float* restrict normals,
+                        __global const float* restrict points, __global float* restrict b) {
   const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, fan_count);
   for (int k = begin + (int)get_local_id(0); k < end; k += get_local_size(0)) {
     const int v = fan_vertices[k];
@@ -293,7 +306,8 @@ __kernel void pull_fans(const int fan_count, const int inner_count, const int fi
       for (int c = 0; c < 3; ++c)
         for (int d = 0; d < 3; ++d) rotated[c] += 0.5f * (m[3 * c + d] + to[3 * c + d]) * e[d];
       const float height = height_of(count, normals, v, other, rotated, n);
-      const float out = v >= first_seam || other >= first_seam ? height - slopes[i] * sqrt(dot_product(rotated, rotated)) : 0.0f;
+      const float out =
+          v >= first_seam || other >= first_seam ? height - slopes[i] * sqrt(dot_product(rotated, rotated)) : 0.0f;
       for (int c = 0; c < 3; ++c) sum[c] += fan_weights[i] * (rotated[c] - out * n[c] - e[c]);
     }
     for (int c = 0; c < 3; ++c) b[c * count + v] = (v < inner_count ? b[c * count + v] : 0.0f) + time * sum[c];

@@ -8,4 +8,6 @@ int texel_at(global const PatchRecord* restrict p, int texture_width, int column
 }
 
 // Colours 0 to 5: texels of one colour are two cells apart or more, also where an odd width wraps round.
-int colour_of(int column, int row, int width) { return 3 * (row & 1) + ((width & 1) && column == width - 1 ? 2 : column & 1); }
+int colour_of(int column, int row, int width) {
+  return 3 * (row & 1) + ((width & 1) && column == width - 1 ? 2 : column & 1);
+}

@@ -1,22 +1,23 @@
 // SPDX-License-Identifier: MIT
 // From texels to surface points in a pose (paper 3.4, 3.6.1, appendix A): kernel displace of reconstruct.cl with a roll
-// about the bone, the posed walls' slopes and the posed bones.
+// about the bone, the posed separation planes' slopes and the posed bones.
 //
-// Rows and launches as in reconstruct.cl: a table of lattice rows, four ints each (patch, row, number of its first vertex,
-// unused), one work-group per row, work-items take columns in turn, plain scalars and selects so that the loop over
-// columns becomes vector instructions on a CPU.
-//   bind_patches, rows, bind_columns   the bind pose's tables; columns as four planes: cosine, sine, slope_head, slope_tail
-//   patches, posed_rows, columns       the pose's; columns as four planes: roll_head, roll_tail, slope_head, slope_tail
-//   along, around, out                 texels
-//   x, y, z                            the points, relative to the origin of the posed patch records
+// Rows and launches as in reconstruct.cl: a table of lattice rows, four ints each (patch, row, number of its first
+// vertex, unused), one work-group per row, work-items take columns in turn, plain scalars and selects so that the loop
+// over columns becomes vector instructions on a CPU.
+//   bind_patches, rows, bind_columns   the bind pose's tables; columns as four planes: cosine, sine, slope_head,
+//   slope_tail patches, posed_rows, columns       the pose's; columns as four planes: roll_head, roll_tail, slope_head,
+//   slope_tail along, around, out                 texels x, y, z                            the points, relative to the
+//   origin of the posed patch records
 #include "pose_math.h"
 #include "skeletex_structs.h"
 
 // Rows whose capsule is the bone's own. The texel's length is its distance from the bone; see displace for the rest.
-__kernel void displace_posed(const int row_count, const int texture_width, const int column_count, __global const int* restrict lattice_rows,
-                             __global const RowRecord* restrict rows, __global const float* restrict bind_columns,
-                             __global const PatchRecord* restrict patches, __global const float* restrict columns,
-                             __global const float* restrict along, __global const float* restrict around, __global const float* restrict out,
+__kernel void displace_posed(const int row_count, const int texture_width, const int column_count,
+                             __global const int* restrict lattice_rows, __global const RowRecord* restrict rows,
+                             __global const float* restrict bind_columns, __global const PatchRecord* restrict patches,
+                             __global const float* restrict columns, __global const float* restrict along,
+                             __global const float* restrict around, __global const float* restrict out,
                              __global float* restrict x, __global float* restrict y, __global float* restrict z) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
@@ -29,9 +30,9 @@ __kernel void displace_posed(const int row_count, const int texture_width, const
   const float b_x = patch->b[0], b_y = patch->b[1], b_z = patch->b[2];
   const float o_x = patch->axis[0], o_y = patch->axis[1], o_z = patch->axis[2];
   __global const RowRecord* restrict record = rows + patch->row_begin + row;
-  const float station = record->station, cap_cos = record->cap_cos, cap_sin = record->cap_sin;
-  const float eased = EASED(station), ahead = station - eased;
-  const float foot = station * patch->length, foot_to_tail = patch->length - foot;
+  const float axial = record->axial, cap_cos = record->cap_cos, cap_sin = record->cap_sin;
+  const float eased = EASED(axial), ahead = axial - eased;
+  const float foot = axial * patch->length, foot_to_tail = patch->length - foot;
   __global const float* restrict cosines = bind_columns + patch->column_begin;
   __global const float* restrict sines = cosines + column_count;
   __global const float* restrict bind_head_slopes = sines + column_count;
@@ -50,8 +51,8 @@ __kernel void displace_posed(const int row_count, const int texture_width, const
     const float cosine = cosines[j] * roll_cosine - sines[j] * roll_sine;
     const float sine = sines[j] * roll_cosine + cosines[j] * roll_sine;
 
-    const float slope =
-        head_slopes[j] + eased * (tail_slopes[j] - head_slopes[j]) + ahead * (bind_tail_slopes[j] - bind_head_slopes[j]);
+    const float slope = head_slopes[j] + eased * (tail_slopes[j] - head_slopes[j]) +
+                        ahead * (bind_tail_slopes[j] - bind_head_slopes[j]);
     const float f_s = cap_cos;
     const float f_o = cap_cos * slope + cap_sin;
     const float f_inverse = 1.0f / sqrt(f_s * f_s + f_o * f_o);
@@ -82,16 +83,17 @@ __kernel void displace_posed(const int row_count, const int texture_width, const
   }
 }
 
-// Any rows. The bind pose's point is restored first: near seams the capsule is drawn out past the bone's ends, in the bind
-// pose and in this one alike (PosedRowRecord), and its radius is the bind point's distance from the drawn-out bone. With
-// is_distance_kept = 0 the point keeps its distance from the foot instead.
-__kernel void displace_posed_from_bind(const int row_count, const int texture_width, const int column_count, const int is_distance_kept,
-                                       __global const int* restrict lattice_rows, __global const PatchRecord* restrict bind_patches,
-                                       __global const RowRecord* restrict rows, __global const float* restrict bind_columns,
-                                       __global const PatchRecord* restrict patches, __global const PosedRowRecord* restrict posed_rows,
-                                       __global const float* restrict columns, __global const float* restrict along,
-                                       __global const float* restrict around, __global const float* restrict out, __global float* restrict x,
-                                       __global float* restrict y, __global float* restrict z) {
+// Any rows. The bind pose's point is restored first: near seams the capsule is drawn out past the bone's ends, in the
+// bind pose and in this one alike (PosedRowRecord), and its radius is the bind point's distance from the drawn-out
+// bone. With is_distance_kept = 0 the point keeps its distance from the foot instead.
+__kernel void displace_posed_from_bind(
+    const int row_count, const int texture_width, const int column_count, const int is_distance_kept,
+    __global const int* restrict lattice_rows, __global const PatchRecord* restrict bind_patches,
+    __global const RowRecord* restrict rows, __global const float* restrict bind_columns,
+    __global const PatchRecord* restrict patches, __global const PosedRowRecord* restrict posed_rows,
+    __global const float* restrict columns, __global const float* restrict along, __global const float* restrict around,
+    __global const float* restrict out, __global float* restrict x, __global float* restrict y,
+    __global float* restrict z) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   __global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
@@ -103,14 +105,15 @@ __kernel void displace_posed_from_bind(const int row_count, const int texture_wi
   const float b_x = patch->b[0], b_y = patch->b[1], b_z = patch->b[2];
   const float o_x = patch->axis[0], o_y = patch->axis[1], o_z = patch->axis[2];
   __global const RowRecord* restrict record = rows + patch->row_begin + row;
-  const float station = record->station, cap_cos = record->cap_cos, cap_sin = record->cap_sin;
-  const float eased = EASED(station), ahead = station - eased;
+  const float axial = record->axial, cap_cos = record->cap_cos, cap_sin = record->cap_sin;
+  const float eased = EASED(axial), ahead = axial - eased;
   __global const PosedRowRecord* restrict posed_row = posed_rows + patch->row_begin + row;
   const float bind_length = bind_patches[lattice_rows[4 * k]].length;
-  const float bind_foot = station * bind_length, bind_foot_to_tail = bind_length - bind_foot;
+  const float bind_foot = axial * bind_length, bind_foot_to_tail = bind_length - bind_foot;
   const float lowest = -posed_row->bind_reach_head, highest = bind_length + posed_row->bind_reach_tail;
-  const float foot = station * patch->length;
-  const float foot_to_lower = foot + posed_row->reach_head, foot_to_upper = patch->length + posed_row->reach_tail - foot;
+  const float foot = axial * patch->length;
+  const float foot_to_lower = foot + posed_row->reach_head,
+              foot_to_upper = patch->length + posed_row->reach_tail - foot;
   __global const float* restrict cosines = bind_columns + patch->column_begin;
   __global const float* restrict sines = cosines + column_count;
   __global const float* restrict bind_head_slopes = sines + column_count;
@@ -128,7 +131,7 @@ __kernel void displace_posed_from_bind(const int row_count, const int texture_wi
     const float e2_inverse = e2 > 0.0f ? 1.0f / e2 : 0.0f;
 
     // The bind point: bind_m times the texel from the bind foot.
-    const float bind_slope = bind_head_slopes[j] + station * (bind_tail_slopes[j] - bind_head_slopes[j]);
+    const float bind_slope = bind_head_slopes[j] + axial * (bind_tail_slopes[j] - bind_head_slopes[j]);
     const float bind_f_o = cap_cos * bind_slope + cap_sin;
     const float bind_f_inverse = 1.0f / sqrt(cap_cos * cap_cos + bind_f_o * bind_f_o);
     const float bind_q_s = (w * cap_cos - a * bind_f_o) * bind_f_inverse;
@@ -138,7 +141,8 @@ __kernel void displace_posed_from_bind(const int row_count, const int texture_wi
     const float bind_rest = bind_q_o < 0.0f ? bind_foot : bind_foot_to_tail;
     const float bind_rest2 = bind_rest * bind_rest;
     const int is_bind_cylinder = bind_q_o * bind_q_o <= bind_rest2 * bind_sin2;
-    const float bind_root = sqrt(is_bind_cylinder ? 1.0f / bind_sin2 : fmax(0.0f, 1.0f - bind_rest2 * e2_inverse * bind_sin2));
+    const float bind_root =
+        sqrt(is_bind_cylinder ? 1.0f / bind_sin2 : fmax(0.0f, 1.0f - bind_rest2 * e2_inverse * bind_sin2));
     const float bind_m = is_bind_cylinder ? bind_root : bind_rest * fabs(bind_q_o) * e2_inverse + bind_root;
 
     // The radius, squared, in units of e^2.
@@ -146,8 +150,8 @@ __kernel void displace_posed_from_bind(const int row_count, const int texture_wi
     const float past = fmax(0.0f, fmax(lowest - bind_z, bind_z - highest));
     const float g = (bind_m * bind_m * bind_across2 + past * past) * e2_inverse;
 
-    const float slope =
-        head_slopes[j] + eased * (tail_slopes[j] - head_slopes[j]) + ahead * (bind_tail_slopes[j] - bind_head_slopes[j]);
+    const float slope = head_slopes[j] + eased * (tail_slopes[j] - head_slopes[j]) +
+                        ahead * (bind_tail_slopes[j] - bind_head_slopes[j]);
     const float f_o = cap_cos * slope + cap_sin;
     const float f_inverse = 1.0f / sqrt(cap_cos * cap_cos + f_o * f_o);
     const float q_s = (w * cap_cos - a * f_o) * f_inverse;

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Flat triangles over points on a surface lie on its inner side where it is convex. So points move by -1/16 of their second differences in
-// both lattice directions, along the lattice's normal. Planes of points; numbers of a point and of its neighbours.
-// (By value: through pointers PoCL's compiler no longer sees that the loops around it may become vector instructions.)
+// Flat triangles over points on a surface lie on its inner side where it is convex. So points move by -1/16 of their
+// second differences in both lattice directions, along the lattice's normal. Planes of points; numbers of a point and
+// of its neighbours. (By value: through pointers PoCL's compiler no longer sees that the loops around it may become
+// vector instructions.)
 typedef struct FilteredPoint {
   float x, y, z;
 } FilteredPoint;
 
-__attribute__((always_inline)) FilteredPoint prefilter_point(global const float* x, global const float* y, global const float* z, int own, int left, int right,
-                     int below, int above) {
+__attribute__((always_inline)) FilteredPoint prefilter_point(global const float* x, global const float* y,
+                                                             global const float* z, int own, int left, int right,
+                                                             int below, int above) {
   const float ux = x[above] - x[below], uy = y[above] - y[below], uz = z[above] - z[below];
   const float vx = x[right] - x[left], vy = y[right] - y[left], vz = z[right] - z[left];
   const float nx = vy * uz - vz * uy, ny = vz * ux - vx * uz, nz = vx * uy - vy * ux;

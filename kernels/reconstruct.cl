@@ -1,24 +1,27 @@
 // SPDX-License-Identifier: MIT
 // From texels to surface points and triangles (paper 3.6, appendix A), and the resampling of texels.
 //
-// Rows. Every kernel runs over a table of lattice rows, so that one launch serves all patches: four ints per row, (patch,
-// row, number of its first vertex in the planes of points, number of its first quad). NDRange: one work-group per row, of
-// any size; work-items take columns in turn, so that neighbours touch neighbouring texels. On a GPU a group of some warps
-// is meant; on a CPU groups of one, where the loop over columns is what the compiler turns into vector instructions:
-// hence plain scalars on separate planes, selects instead of branches, and what belongs to the row loaded before the loop.
-// A texel lies at (patch.y + row) * texture_width + patch.x + column of its plane. The column table comes as four planes
-// of column_count floats behind each other: cosine, sine, slope_head, slope_tail (see ColumnRecord).
-#include "skeletex_structs.h"
+// Rows. Every kernel runs over a table of lattice rows, so that one launch serves all patches: four ints per row,
+// (patch, row, number of its first vertex in the planes of points, number of its first quad). NDRange: one work-group
+// per row, of any size; work-items take columns in turn, so that neighbours touch neighbouring texels. On a GPU a group
+// of some warps is meant; on a CPU groups of one, where the loop over columns is what the compiler turns into vector
+// instructions: hence plain scalars on separate planes, selects instead of branches, and what belongs to the row loaded
+// before the loop. A texel lies at (patch.y + row) * texture_width + patch.x + column of its plane. The column table
+// comes as four planes of column_count floats behind each other: cosine, sine, slope_head, slope_tail (see
+// ColumnRecord).
 #include "quad_diagonal.h"
+#include "skeletex_structs.h"
 
 // in   along, around, out: texels
 // out  x, y, z: the points, relative to the origin of the patch records
 // The point is foot + m q, where q is the texel turned into the bone's own axes (s', o x s', o) and m q leaves the
 // capsule of radius |q| around the bone: its cylinder, or the sphere at the end that q runs towards.
-__kernel void displace(const int row_count, const int texture_width, const int column_count, __global const int* restrict lattice_rows,
-                       __global const PatchRecord* restrict patches, __global const RowRecord* restrict rows,
-                       __global const float* restrict columns, __global const float* restrict along, __global const float* restrict around,
-                       __global const float* restrict out, __global float* restrict x, __global float* restrict y, __global float* restrict z) {
+__kernel void displace(const int row_count, const int texture_width, const int column_count,
+                       __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
+                       __global const RowRecord* restrict rows, __global const float* restrict columns,
+                       __global const float* restrict along, __global const float* restrict around,
+                       __global const float* restrict out, __global float* restrict x, __global float* restrict y,
+                       __global float* restrict z) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   __global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
@@ -30,8 +33,8 @@ __kernel void displace(const int row_count, const int texture_width, const int c
   const float b_x = patch->b[0], b_y = patch->b[1], b_z = patch->b[2];
   const float o_x = patch->axis[0], o_y = patch->axis[1], o_z = patch->axis[2];
   __global const RowRecord* restrict record = rows + patch->row_begin + row;
-  const float station = record->station, cap_cos = record->cap_cos, cap_sin = record->cap_sin;
-  const float foot = station * patch->length, foot_to_tail = patch->length - foot;
+  const float axial = record->axial, cap_cos = record->cap_cos, cap_sin = record->cap_sin;
+  const float foot = axial * patch->length, foot_to_tail = patch->length - foot;
   __global const float* restrict cosines = columns + patch->column_begin;
   __global const float* restrict sines = cosines + column_count;
   __global const float* restrict head_slopes = sines + column_count;
@@ -43,7 +46,7 @@ __kernel void displace(const int row_count, const int texture_width, const int c
     const float a = along[texel + j], c = around[texel + j], w = out[texel + j];
 
     // f = f_s s' + f_o o opens the frame: out = f / |f|, along = (f_s o - f_o s') / |f|, around = o x s'.
-    const float slope = head_slopes[j] + station * (tail_slopes[j] - head_slopes[j]);
+    const float slope = head_slopes[j] + axial * (tail_slopes[j] - head_slopes[j]);
     const float f_s = cap_cos;
     const float f_o = cap_cos * slope + cap_sin;
     const float f_inverse = 1.0f / sqrt(f_s * f_s + f_o * f_o);
@@ -87,7 +90,8 @@ void write_quad(__global int* restrict t, int is_second, const int at[4][4]) {
   t[5] = is_second ? at[2][2] : at[2][1];
 }
 
-// The 4 x 4 vertices around a quad, see quad_diagonal.h. Beyond the first and last inner row they repeat the quad's own.
+// The 4 x 4 vertices around a quad, see quad_diagonal.h. Beyond the first and last inner row they repeat the quad's
+// own.
 void vertices_around(int vertex, int width, int column, int has_before, int has_after, int at[4][4]) {
   const int next = column + 1 < width ? column + 1 : 0;
   const int columns[4] = {column > 0 ? column - 1 : width - 1, column, next, next + 1 < width ? next + 1 : 0};
@@ -102,8 +106,9 @@ void vertices_around(int vertex, int width, int column, int has_before, int has_
 // Both triangles of every quad between a row and the next, by the nearer diagonal.
 // in   x, y, z: the vertices of inner rows; the next row follows its row in them
 // out  triangles: six indices per quad, counter-clockwise from outside (u along, v around is clockwise)
-__kernel void triangulate_quads(const int row_count, __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
-                                __global const float* restrict x, __global const float* restrict y, __global const float* restrict z,
+__kernel void triangulate_quads(const int row_count, __global const int* restrict lattice_rows,
+                                __global const PatchRecord* restrict patches, __global const float* restrict x,
+                                __global const float* restrict y, __global const float* restrict z,
                                 __global int* restrict triangles) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
@@ -119,8 +124,9 @@ __kernel void triangulate_quads(const int row_count, __global const int* restric
 }
 
 // The same by the smoother diagonal, for models whose texels sit on edges of the surface.
-__kernel void triangulate_smoothly(const int row_count, __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
-                                   __global const float* restrict x, __global const float* restrict y, __global const float* restrict z,
+__kernel void triangulate_smoothly(const int row_count, __global const int* restrict lattice_rows,
+                                   __global const PatchRecord* restrict patches, __global const float* restrict x,
+                                   __global const float* restrict y, __global const float* restrict z,
                                    __global int* restrict triangles) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
@@ -137,12 +143,15 @@ __kernel void triangulate_smoothly(const int row_count, __global const int* rest
 
 // One axis of a resampling: out at (new row, column) = sum of weights times in at old rows of the same column.
 // in   taps: per new row of all patches, in the order of the row table, four ints: (first old row, count, first weight,
-//      unused); patches: the new ones; widths, first_in: per patch the row length of `in` and where the patch begins in it
+//      unused); patches: the new ones; widths, first_in: per patch the row length of `in` and where the patch begins in
+//      it
 // out  planes; rows of `widths` columns
-__kernel void filter_rows(const int row_count, __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
-                          __global const int* restrict widths, __global const int* restrict first_in, __global const int* restrict taps,
-                          __global const float* restrict weights, __global const float* restrict in_x, __global const float* restrict in_y,
-                          __global const float* restrict in_z, __global float* restrict out_x, __global float* restrict out_y,
+__kernel void filter_rows(const int row_count, __global const int* restrict lattice_rows,
+                          __global const PatchRecord* restrict patches, __global const int* restrict widths,
+                          __global const int* restrict first_in, __global const int* restrict taps,
+                          __global const float* restrict weights, __global const float* restrict in_x,
+                          __global const float* restrict in_y, __global const float* restrict in_z,
+                          __global float* restrict out_x, __global float* restrict out_y,
                           __global float* restrict out_z) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
@@ -171,13 +180,16 @@ __kernel void filter_rows(const int row_count, __global const int* restrict latt
 }
 
 // The other axis: columns, which wrap round.
-// in   taps: per new column of all patches, in the order of the column table, four ints: (first old column, count, first
+// in   taps: per new column of all patches, in the order of the column table, four ints: (first old column, count,
+// first
 //      weight, unused), the first in [0, old width) and the count at most the old width; the rest as above
 // out  planes; rows as wide as the patches
-__kernel void filter_columns(const int row_count, __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
-                             __global const int* restrict widths, __global const int* restrict first_in, __global const int* restrict taps,
-                             __global const float* restrict weights, __global const float* restrict in_x, __global const float* restrict in_y,
-                             __global const float* restrict in_z, __global float* restrict out_x, __global float* restrict out_y,
+__kernel void filter_columns(const int row_count, __global const int* restrict lattice_rows,
+                             __global const PatchRecord* restrict patches, __global const int* restrict widths,
+                             __global const int* restrict first_in, __global const int* restrict taps,
+                             __global const float* restrict weights, __global const float* restrict in_x,
+                             __global const float* restrict in_y, __global const float* restrict in_z,
+                             __global float* restrict out_x, __global float* restrict out_y,
                              __global float* restrict out_z) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
@@ -204,13 +216,14 @@ __kernel void filter_columns(const int row_count, __global const int* restrict l
   }
 }
 
-// Keeps fitted points near sampled ones: a fitted point is off by at most `share` of an edge of the sampled lattice that
-// ends there, the longer of (the shorter one along the rows, the shorter one around). A least-squares fit moves points by
-// a small part of an edge where the surface is smooth; where it jumps, one edge is long and the fit swings out beside it.
-// in   sampled_x, _y, _z; x, y, z: fitted; both in the order of the rows, all rows of every patch
-// out  x, y, z
-__kernel void limit_fit(const int row_count, const float share, __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
-                        __global const float* restrict sampled_x, __global const float* restrict sampled_y, __global const float* restrict sampled_z,
+// Keeps fitted points near sampled ones: a fitted point is off by at most `share` of an edge of the sampled lattice
+// that ends there, the longer of (the shorter one along the rows, the shorter one around). A least-squares fit moves
+// points by a small part of an edge where the surface is smooth; where it jumps, one edge is long and the fit swings
+// out beside it. in   sampled_x, _y, _z; x, y, z: fitted; both in the order of the rows, all rows of every patch out x,
+// y, z
+__kernel void limit_fit(const int row_count, const float share, __global const int* restrict lattice_rows,
+                        __global const PatchRecord* restrict patches, __global const float* restrict sampled_x,
+                        __global const float* restrict sampled_y, __global const float* restrict sampled_z,
                         __global float* restrict x, __global float* restrict y, __global float* restrict z) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
@@ -226,7 +239,8 @@ __kernel void limit_fit(const int row_count, const float share, __global const i
     const int neighbours[4] = {v + below, v + above, left, right};
     float lengths2[4];
     for (int i = 0; i < 4; ++i) {
-      const float ex = sampled_x[neighbours[i]] - px, ey = sampled_y[neighbours[i]] - py, ez = sampled_z[neighbours[i]] - pz;
+      const float ex = sampled_x[neighbours[i]] - px, ey = sampled_y[neighbours[i]] - py,
+                  ez = sampled_z[neighbours[i]] - pz;
       lengths2[i] = ex * ex + ey * ey + ez * ez;
     }
     const float most2 = share * share * fmax(fmin(lengths2[0], lengths2[1]), fmin(lengths2[2], lengths2[3]));
@@ -243,10 +257,12 @@ __kernel void limit_fit(const int row_count, const float share, __global const i
 // scaled to the distance of the point from the bone.
 // in   x, y, z: points in the bone's own axes: from H along s, b, o
 // out  along, around, out: texels, at their places in the texture
-__kernel void enter_tangent_space(const int row_count, const int texture_width, const int column_count, __global const int* restrict lattice_rows,
+__kernel void enter_tangent_space(const int row_count, const int texture_width, const int column_count,
+                                  __global const int* restrict lattice_rows,
                                   __global const PatchRecord* restrict patches, __global const RowRecord* restrict rows,
-                                  __global const float* restrict columns, __global const float* restrict x, __global const float* restrict y,
-                                  __global const float* restrict z, __global float* restrict along, __global float* restrict around,
+                                  __global const float* restrict columns, __global const float* restrict x,
+                                  __global const float* restrict y, __global const float* restrict z,
+                                  __global float* restrict along, __global float* restrict around,
                                   __global float* restrict out) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
@@ -256,8 +272,8 @@ __kernel void enter_tangent_space(const int row_count, const int texture_width, 
   const int texel = (patch->y + row) * texture_width + patch->x;
   const float bone_length = patch->length;
   __global const RowRecord* restrict record = rows + patch->row_begin + row;
-  const float station = record->station, cap_cos = record->cap_cos, cap_sin = record->cap_sin;
-  const float foot = station * bone_length;
+  const float axial = record->axial, cap_cos = record->cap_cos, cap_sin = record->cap_sin;
+  const float foot = axial * bone_length;
   __global const float* restrict cosines = columns + patch->column_begin;
   __global const float* restrict sines = cosines + column_count;
   __global const float* restrict head_slopes = sines + column_count;
@@ -275,7 +291,7 @@ __kernel void enter_tangent_space(const int row_count, const int texture_width, 
     const float ratio = sqrt((across2 + beyond * beyond) / length2);
     const float scale = length2 > 0.0f ? ratio : 0.0f;
 
-    const float slope = head_slopes[j] + station * (tail_slopes[j] - head_slopes[j]);
+    const float slope = head_slopes[j] + axial * (tail_slopes[j] - head_slopes[j]);
     const float f_s = cap_cos;
     const float f_o = cap_cos * slope + cap_sin;
     const float f_scale = scale / sqrt(f_s * f_s + f_o * f_o);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Segmentation: which bone's cell a point lies in, at every node (design section 2: the cells at a node are the spherical
-// Voronoi cells of the bone directions, label = argmax of a dot product).
+// Segmentation: which bone's cell a point lies in, at every node (design section 2: the cells at a node are the
+// spherical Voronoi cells of the bone directions, label = argmax of a dot product).
 //
 // classify_points, NDRange (points, nodes); any work-group size.
 //   in  x, y, z     [points]      relative to an origin
@@ -9,10 +9,10 @@
 //   in  margin      [nodes]       largest rounding error of the lead of one value over another
 //   out labels      [nodes][points]  cell within the node, counted from 0; 255 where the lead is not above the margin
 
-__kernel void classify_points(__global const float* restrict x, __global const float* restrict y, __global const float* restrict z,
-                              __global const int* restrict cell_begin, __global const float* restrict cells,
-                              __global const float* restrict margin, __global uchar* restrict labels, const int point_count,
-                              const int node_count) {
+__kernel void classify_points(__global const float* restrict x, __global const float* restrict y,
+                              __global const float* restrict z, __global const int* restrict cell_begin,
+                              __global const float* restrict cells, __global const float* restrict margin,
+                              __global uchar* restrict labels, const int point_count, const int node_count) {
   const int p = (int)get_global_id(0);
   const int n = (int)get_global_id(1);
   if (p >= point_count || n >= node_count) return;

@@ -13,32 +13,32 @@ namespace skeletex {
 
 /// One bone's patch of the texture, as the kernels see it. Positions are relative to the model's origin.
 typedef struct PatchRecord {
-  float head[3];           ///< H
-  float length;            ///< L = |T - H|
-  float axis[3];           ///< o = (T - H) / L
-  float s[3];              ///< s, unit, orthogonal to o; angle 0
-  float b[3];              ///< b = o x s; angle pi/2
-  SKELETEX_INT x;          ///< left column of the rectangle in the texture
-  SKELETEX_INT y;          ///< first row of the rectangle in the texture
-  SKELETEX_INT width;      ///< columns, around the bone; v = column / width
-  SKELETEX_INT height;     ///< rows, along the bone; row 0 and row height-1 lie on seams or poles
-  SKELETEX_INT row_begin;  ///< first entry of this patch in the row table (RowRecord)
+  float head[3];              ///< H
+  float length;               ///< L = |T - H|
+  float axis[3];              ///< o = (T - H) / L
+  float s[3];                 ///< s, unit, orthogonal to o; angle 0
+  float b[3];                 ///< b = o x s; angle pi/2
+  SKELETEX_INT x;             ///< left column of the rectangle in the texture
+  SKELETEX_INT y;             ///< first row of the rectangle in the texture
+  SKELETEX_INT width;         ///< columns, around the bone; v = column / width
+  SKELETEX_INT height;        ///< rows, along the bone; row 0 and row height-1 lie on seams or poles
+  SKELETEX_INT row_begin;     ///< first entry of this patch in the row table (RowRecord)
   SKELETEX_INT column_begin;  ///< first entry of this patch in the column table (ColumnRecord)
 } PatchRecord;
 
-/// What the tangent frame needs along u: the foot W = H + station * L * o and the opening of the frame.
+/// What the tangent frame needs along u: the foot W = H + axial parameter * L * o and the opening of the frame.
 typedef struct RowRecord {
   float u;        ///< the row's map coordinate in [0,1]
-  float station;  ///< position of W between head (0) and tail (1)
+  float axial;    ///< position of W between head (0) and tail (1)
   float cap_cos;  ///< cosine of the cap's latitude, 1 outside caps
   float cap_sin;  ///< signed sine of the cap's latitude, > 0 in the tail's cap, < 0 in the head's, 0 outside caps
 } RowRecord;
 
-/// What the tangent frame needs around v: s'(v) = cosine s + sine b and the slopes of the walls.
+/// What the tangent frame needs around v: s'(v) = cosine s + sine b and the slopes of the separation planes.
 typedef struct ColumnRecord {
   float cosine;
   float sine;
-  float slope_head;  ///< k_H(v): the head's wall is met at H + s'(v) + k_H o; 0 at a free end
+  float slope_head;  ///< k_H(v): the head's separation plane is met at H + s'(v) + k_H o; 0 at a free end
   float slope_tail;  ///< k_T(v)
 } ColumnRecord;
 
@@ -51,18 +51,20 @@ typedef struct PosedRowRecord {
   float reach_tail;
 } PosedRowRecord;
 
-/// The share of a bone's length, from a seam on, over which its capsule is drawn out: by (1 - station / share)^2 of what it is at the seam.
+/// The share of a bone's length, from a seam on, over which its capsule is drawn out: by (1 - axial parameter /
+/// share)^2 of what it is at the seam.
 #define POSED_SEAM_SHARE 0.25f
 
 /// What a pose adds to a column, at the bone's head and tail.
 typedef struct PosedColumnRecord {
   float roll_head;  ///< radians, to be added to the column's angle
   float roll_tail;
-  float slope_head;  ///< of the posed walls at the rolled angle
+  float slope_head;  ///< of the posed separation planes at the rolled angle
   float slope_tail;
 } PosedColumnRecord;
 
-/// What holds along an arc of a loop of seams around a bone's end in a pose. Angles are those of the bind pose, radians.
+/// What holds along an arc of a loop of seams around a bone's end in a pose. Angles are those of the bind pose,
+/// radians.
 typedef struct PosedArcRecord {
   float begin;    ///< where it begins, in [0, 2 pi); the first arc of a loop begins at 0, and the last one ends at 2 pi
   float roll;     ///< radians, to be added to the angle where the arc begins
@@ -75,34 +77,36 @@ typedef struct PosedArcRecord {
 typedef struct PosedEndsRecord {
   SKELETEX_INT first_arc[2];  ///< in the table of PosedArcRecord
   SKELETEX_INT arc_count[2];
-  float bind_reach[2];  ///< PosedRowRecord's past the head at the tail's seam, and past the tail at the head's; world units
+  float bind_reach[2];  ///< PosedRowRecord's past the head at the tail's seam, and past the tail at the head's; world
+                        ///< units
   float reach[2];
 } PosedEndsRecord;
 
 /// One joint of a walk along the skeleton, from the bone that a point belongs to towards other bones: see WeightWalks.
 typedef struct WeightStep {
-  float normal[3];       ///< (d_from - d_to) / girth: unit directions away from the joint along the two bones
-  float girth_inverse;   ///< 1 / girth, the median distance of the seams at the joint to their bones
-  float joint[3];        ///< relative to the model's origin
-  float reach;           ///< the largest distance of those seams to the joint
-  SKELETEX_INT bone;     ///< that the step leads to
-  SKELETEX_INT before;   ///< the step before this one in the same walk; -1: it begins at the point's own bone
-  SKELETEX_INT same;     ///< an earlier step of the walk that leads to the same bone; -1: none
+  float normal[3];      ///< (d_from - d_to) / girth: unit directions away from the joint along the two bones
+  float girth_inverse;  ///< 1 / girth, the median distance of the seams at the joint to their bones
+  float joint[3];       ///< relative to the model's origin
+  float reach;          ///< the largest distance of those seams to the joint
+  SKELETEX_INT bone;    ///< that the step leads to
+  SKELETEX_INT before;  ///< the step before this one in the same walk; -1: it begins at the point's own bone
+  SKELETEX_INT same;    ///< an earlier step of the walk that leads to the same bone; -1: none
 } WeightStep;
 
-/// Consecutive vertices of one patch, SKIN_BLOCK at most, and the bones that move them. The weights of bone k of the block
-/// stand behind each other from first_weight + k * SKIN_BLOCK on.
+/// Consecutive vertices of one patch, SKIN_BLOCK at most, and the bones that move them. The weights of bone k of the
+/// block stand behind each other from first_weight + k * SKIN_BLOCK on.
 typedef struct SkinBlock {
   SKELETEX_INT first_vertex;
   SKELETEX_INT vertex_count;
-  SKELETEX_INT bone;  ///< the patch's own
+  SKELETEX_INT bone;        ///< the patch's own
   SKELETEX_INT first_bone;  ///< in the table of the blocks' bones
   SKELETEX_INT bone_count;
   SKELETEX_INT first_weight;
 } SkinBlock;
 #define SKIN_BLOCK 64
 
-/// How a pose moves a bone, as a dual quaternion (w, x, y, z) from bind to posed device coordinates, and how it stretches it.
+/// How a pose moves a bone, as a dual quaternion (w, x, y, z) from bind to posed device coordinates, and how it
+/// stretches it.
 typedef struct BoneMotionRecord {
   float real[4];
   float dual[4];

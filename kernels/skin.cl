@@ -1,19 +1,22 @@
 // SPDX-License-Identifier: MIT
 // Smooth posing: the weights of bones, and bind points moved by blended dual quaternions.
 //
-// One work-group per block of at most SKIN_BLOCK vertices of a patch (SkinBlock). Work-items take vertices in turn, ROW_ITEMS apart, so
-// that neighbours touch neighbouring vertices; on a CPU groups of one, where the inner loop becomes vector instructions. Every
-// work-item reads and writes only its own vertices, so no barriers are needed.
+// One work-group per block of at most SKIN_BLOCK vertices of a patch (SkinBlock). Work-items take vertices in turn,
+// ROW_ITEMS apart, so that neighbours touch neighbouring vertices; on a CPU groups of one, where the inner loop becomes
+// vector instructions. Every work-item reads and writes only its own vertices, so no barriers are needed.
 #include "skeletex_structs.h"
 #include "skin_weight.h"
 
-// The weights of the bones that the walk from each block's own bone leads to (see WeightWalks), those that are 0 included:
-// those of step k of block b from (b * slots + k) * SKIN_BLOCK on, k = 0 the own bone. A step to a bone that an earlier step leads to has none.
+// The weights of the bones that the walk from each block's own bone leads to (see WeightWalks), those that are 0
+// included: those of step k of block b from (b * slots + k) * SKIN_BLOCK on, k = 0 the own bone. A step to a bone that
+// an earlier step leads to has none.
 //   first_block  the number of the block that the first group works on
 //   x, y, z      points in the bind pose, relative to the model's origin
-__kernel void bone_weights(const int block_count, const int first_block, const int slots, __global const SkinBlock* restrict blocks,
-                           __global const int* restrict first_steps, __global const WeightStep* restrict steps, __global const float* restrict x,
-                           __global const float* restrict y, __global const float* restrict z, __global float* restrict weights) {
+__kernel void bone_weights(const int block_count, const int first_block, const int slots,
+                           __global const SkinBlock* restrict blocks, __global const int* restrict first_steps,
+                           __global const WeightStep* restrict steps, __global const float* restrict x,
+                           __global const float* restrict y, __global const float* restrict z,
+                           __global float* restrict weights) {
   const int group = get_group_id(0);
   if (group >= block_count) return;
   __global const SkinBlock* restrict block = blocks + first_block + group;
@@ -33,7 +36,8 @@ __kernel void bone_weights(const int block_count, const int first_block, const i
     for (int i = item; i < count; i += ROW_ITEMS) {
       const float from_x = x[vertex + i] - joint_x, from_y = y[vertex + i] - joint_y, from_z = z[vertex + i] - joint_z;
       const float height = from_x * normal_x + from_y * normal_y + from_z * normal_z;
-      const float excess = fmax(0.0f, sqrt(from_x * from_x + from_y * from_y + from_z * from_z) - reach) * girth_inverse;
+      const float excess =
+          fmax(0.0f, sqrt(from_x * from_x + from_y * from_y + from_z * from_z) - reach) * girth_inverse;
       here[i] = before[i] + SKIN_CROSSING(height, excess);
     }
   }
@@ -65,31 +69,33 @@ __kernel void bone_weights(const int block_count, const int first_block, const i
 #define STORE_1(value, to) *(to) = (value)
 #define LOAD_16(from) vload16(0, from)
 #define STORE_16(value, to) vstore16(value, 0, to)
-#define MOVE_VERTICES(REAL, LOAD, STORE)                                                                                          \
-  {                                                                                                                               \
-    const REAL p_x = LOAD(bind_x + vertex + i), p_y = LOAD(bind_y + vertex + i), p_z = LOAD(bind_z + vertex + i);                 \
-    REAL w = 0.0f, a = 0.0f, b = 0.0f, c = 0.0f, dual_w = 0.0f, dual_a = 0.0f, dual_b = 0.0f, dual_c = 0.0f;                      \
-    REAL stretch_x = 0.0f, stretch_y = 0.0f, stretch_z = 0.0f;                                                                    \
-    for (int k = 0; k < bone_count; ++k) {                                                                                        \
-      __global const BoneMotionRecord* restrict motion = motions + bones[k];                                                      \
-      const REAL weight = LOAD(block_weights + k * SKIN_BLOCK + i);                                                               \
-      w += weight * motion->real[0], a += weight * motion->real[1], b += weight * motion->real[2], c += weight * motion->real[3]; \
-      dual_w += weight * motion->dual[0], dual_a += weight * motion->dual[1];                                                     \
-      dual_b += weight * motion->dual[2], dual_c += weight * motion->dual[3];                                                     \
-      if (is_stretched) {                                                                                                         \
-        const REAL along = (p_x - motion->head[0]) * motion->axis[0] + (p_y - motion->head[1]) * motion->axis[1] +                \
-                           (p_z - motion->head[2]) * motion->axis[2];                                                             \
-        const REAL share = weight * clamp(along, 0.0f, 1.0f);                                                                     \
-        stretch_x += share * motion->stretch[0], stretch_y += share * motion->stretch[1], stretch_z += share * motion->stretch[2]; \
-      }                                                                                                                           \
-    }                                                                                                                             \
-    /* With the quaternion's vector part v: p + 2 (v x t + w d - dual_w v) / |q|^2, where t = v x p + w p + d. */                 \
-    const REAL scale = 2.0f / (w * w + a * a + b * b + c * c);                                                                    \
-    const REAL t_x = b * p_z - c * p_y + w * p_x + dual_a, t_y = c * p_x - a * p_z + w * p_y + dual_b;                            \
-    const REAL t_z = a * p_y - b * p_x + w * p_z + dual_c;                                                                        \
-    STORE(p_x + stretch_x + scale * (b * t_z - c * t_y + w * dual_a - dual_w * a), x + vertex + i);                               \
-    STORE(p_y + stretch_y + scale * (c * t_x - a * t_z + w * dual_b - dual_w * b), y + vertex + i);                               \
-    STORE(p_z + stretch_z + scale * (a * t_y - b * t_x + w * dual_c - dual_w * c), z + vertex + i);                               \
+#define MOVE_VERTICES(REAL, LOAD, STORE)                                                                           \
+  {                                                                                                                \
+    const REAL p_x = LOAD(bind_x + vertex + i), p_y = LOAD(bind_y + vertex + i), p_z = LOAD(bind_z + vertex + i);  \
+    REAL w = 0.0f, a = 0.0f, b = 0.0f, c = 0.0f, dual_w = 0.0f, dual_a = 0.0f, dual_b = 0.0f, dual_c = 0.0f;       \
+    REAL stretch_x = 0.0f, stretch_y = 0.0f, stretch_z = 0.0f;                                                     \
+    for (int k = 0; k < bone_count; ++k) {                                                                         \
+      __global const BoneMotionRecord* restrict motion = motions + bones[k];                                       \
+      const REAL weight = LOAD(block_weights + k * SKIN_BLOCK + i);                                                \
+      w += weight * motion->real[0], a += weight * motion->real[1], b += weight * motion->real[2],                 \
+          c += weight * motion->real[3];                                                                           \
+      dual_w += weight * motion->dual[0], dual_a += weight * motion->dual[1];                                      \
+      dual_b += weight * motion->dual[2], dual_c += weight * motion->dual[3];                                      \
+      if (is_stretched) {                                                                                          \
+        const REAL along = (p_x - motion->head[0]) * motion->axis[0] + (p_y - motion->head[1]) * motion->axis[1] + \
+                           (p_z - motion->head[2]) * motion->axis[2];                                              \
+        const REAL share = weight * clamp(along, 0.0f, 1.0f);                                                      \
+        stretch_x += share * motion->stretch[0], stretch_y += share * motion->stretch[1],                          \
+            stretch_z += share * motion->stretch[2];                                                               \
+      }                                                                                                            \
+    }                                                                                                              \
+    /* With the quaternion's vector part v: p + 2 (v x t + w d - dual_w v) / |q|^2, where t = v x p + w p + d. */  \
+    const REAL scale = 2.0f / (w * w + a * a + b * b + c * c);                                                     \
+    const REAL t_x = b * p_z - c * p_y + w * p_x + dual_a, t_y = c * p_x - a * p_z + w * p_y + dual_b;             \
+    const REAL t_z = a * p_y - b * p_x + w * p_z + dual_c;                                                         \
+    STORE(p_x + stretch_x + scale * (b * t_z - c * t_y + w * dual_a - dual_w * a), x + vertex + i);                \
+    STORE(p_y + stretch_y + scale * (c * t_x - a * t_z + w * dual_b - dual_w * b), y + vertex + i);                \
+    STORE(p_z + stretch_z + scale * (a * t_y - b * t_x + w * dual_c - dual_w * c), z + vertex + i);                \
   }
 
 // Bind points moved by the blend of their bones' motions (Kavan et al. 2008).
@@ -98,10 +104,11 @@ __kernel void bone_weights(const int block_count, const int first_block, const i
 //   bind_x, bind_y, bind_z        points in the bind pose, relative to the model's origin
 //   x, y, z                       points in the pose, relative to the pose's origin
 //   is_stretched                  0 where no bone changes its length
-__kernel void skin(const int block_count, const int is_stretched, __global const SkinBlock* restrict blocks, __global const int* restrict block_bones,
-                   __global const float* restrict weights, __global const BoneMotionRecord* restrict motions, __global const float* restrict bind_x,
-                   __global const float* restrict bind_y, __global const float* restrict bind_z, __global float* restrict x, __global float* restrict y,
-                   __global float* restrict z) {
+__kernel void skin(const int block_count, const int is_stretched, __global const SkinBlock* restrict blocks,
+                   __global const int* restrict block_bones, __global const float* restrict weights,
+                   __global const BoneMotionRecord* restrict motions, __global const float* restrict bind_x,
+                   __global const float* restrict bind_y, __global const float* restrict bind_z,
+                   __global float* restrict x, __global float* restrict y, __global float* restrict z) {
   const int group = get_group_id(0);
   if (group >= block_count) return;
   __global const SkinBlock* restrict block = blocks + group;

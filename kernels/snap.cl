@@ -1,26 +1,28 @@
 // SPDX-License-Identifier: MIT
-// Where texels read: from the even lattice to the mesh's own vertices and creased edges.
+// Where texels read: from the regular grid to the mesh's own vertices and creased edges.
 //   claim_texels, decide_claims, decide_the_rest
 //                               vertices, strongest first, take the nearest texel that is free
-//   place_on_edges              free texels follow their neighbours half way, then go to the nearest point of a creased edge
-//   part_colours                rows by colour, see below; read_snapped in encode.cl has them the other way again
-//   put_listed_back             texels of a list, and what then folds in the map or in space, go back to the even lattice
+//   place_on_edges              free texels follow their neighbours half way, then go to the nearest point of a creased
+//   edge part_colours                rows by colour, see below; read_snapped in encode.cl has them the other way again
+//   put_listed_back             texels of a list, and what then folds in the map or in space, go back to the regular
+//   grid
 // A reading position is an offset from the texel's own place in the lattice, in cells: two planes over the texture, x
 // around, y along. Rows 0 and height-1 stay. `anchors` says what holds a texel: 0 nothing, 1 + i vertex i of the list
-// of vertices, -1 - i edge i. Vertices and edges come with their patch and their place (x, y) in its cells, x unwrapped.
-// While texels snap, each row of a patch has its even columns first, then its odd ones: those of a colour and their neighbours lie side by side.
-// Texels never look at each other's offsets where these may change: claims wait for stronger ones next to them, the other kernels take
-// even and odd rows apart, and in each of them one colour after the other (see row_colour). So nothing depends on the order of work-items.
-#include "skeletex_structs.h"
+// of vertices, -1 - i edge i. Vertices and edges come with their patch and their place (x, y) in its cells, x
+// unwrapped. While texels snap, each row of a patch has its even columns first, then its odd ones: those of a colour
+// and their neighbours lie side by side. Texels never look at each other's offsets where these may change: claims wait
+// for stronger ones next to them, the other kernels take even and odd rows apart, and in each of them one colour after
+// the other (see row_colour). So nothing depends on the order of work-items.
 #include "extremes.h"
 #include "patch_texels.h"
 #include "row_group.h"
+#include "skeletex_structs.h"
 
 #define REACH 0.7f         // cells from where a texel is to where it goes
 #define FURTHEST 1.0f      // cells from a texel's own place, along each axis
 #define LOOSE 0.5f         // the same of texels that nothing holds: where edges look for them
 #define LEAST_CROSS 0.05f  // cells squared: twice the area that the triangles around a texel keep in the map
-#define LEAST_COSINE 0.2f  // between a triangle and the even lattice's quad in space
+#define LEAST_COSINE 0.2f  // between a triangle and the regular grid's quad in space
 #define MARGIN 0.6f        // cells that the rows next to a seam or pole keep from it
 #define LEAST_MOVE 0.01f   // cells: shorter steps of free texels are not worth their test
 #define PLACED 5           // states of a vertex: 0 to 3 the candidate it claims, 4 none is left
@@ -28,7 +30,7 @@
 #define NONE -1            // of a bin's edges
 #define FLATTEST 5.0f      // of edges that texels look for again, see EdgeRecord: dihedral angles of 0.1 rad
 
-// The smallest cross product at the four corners of a quad in the map; 1 in the even lattice.
+// The smallest cross product at the four corners of a quad in the map; 1 in the regular grid.
 float quad_cross(const float x[4], const float y[4]) {
   float least = INFINITY;
   for (int i = 0; i < 4; ++i) {
@@ -62,26 +64,33 @@ __attribute__((always_inline)) float least_cross(float ax, float ay, float bx, f
   return lesser(own, lesser(at_a, at_c));
 }
 
-// The smallest cross product at the corners of the four quads around a texel that depend on its offset, if that were (dx, dy); at most 0 when it
-// would come too near to a seam, whose own samples are not at the columns.
-__attribute__((always_inline)) float cross_around(Neighbours n, int height, int texture_width, int row, float dx, float dy, global const float* offset_x,
+// The smallest cross product at the corners of the four quads around a texel that depend on its offset, if that were
+// (dx, dy); at most 0 when it would come too near to a seam, whose own samples are not at the columns.
+__attribute__((always_inline)) float cross_around(Neighbours n, int height, int texture_width, int row, float dx,
+                                                  float dy, global const float* offset_x,
                                                   global const float* offset_y) {
-  const float rx = 1.0f + offset_x[n.right] - dx, ry = offset_y[n.right] - dy, lx = -1.0f + offset_x[n.left] - dx, ly = offset_y[n.left] - dy;
+  const float rx = 1.0f + offset_x[n.right] - dx, ry = offset_y[n.right] - dy, lx = -1.0f + offset_x[n.left] - dx,
+              ly = offset_y[n.left] - dy;
   const int above = texture_width, below = -texture_width;
   const float ax = offset_x[n.own + above] - dx, ay = 1.0f + offset_y[n.own + above] - dy;
   const float bx = offset_x[n.own + below] - dx, by = -1.0f + offset_y[n.own + below] - dy;
-  const float right_above = least_cross(rx, ry, 1.0f + offset_x[n.right + above] - dx, 1.0f + offset_y[n.right + above] - dy, ax, ay);
-  const float left_above = least_cross(ax, ay, -1.0f + offset_x[n.left + above] - dx, 1.0f + offset_y[n.left + above] - dy, lx, ly);
-  const float left_below = least_cross(lx, ly, -1.0f + offset_x[n.left + below] - dx, -1.0f + offset_y[n.left + below] - dy, bx, by);
-  const float right_below = least_cross(bx, by, 1.0f + offset_x[n.right + below] - dx, -1.0f + offset_y[n.right + below] - dy, rx, ry);
+  const float right_above =
+      least_cross(rx, ry, 1.0f + offset_x[n.right + above] - dx, 1.0f + offset_y[n.right + above] - dy, ax, ay);
+  const float left_above =
+      least_cross(ax, ay, -1.0f + offset_x[n.left + above] - dx, 1.0f + offset_y[n.left + above] - dy, lx, ly);
+  const float left_below =
+      least_cross(lx, ly, -1.0f + offset_x[n.left + below] - dx, -1.0f + offset_y[n.left + below] - dy, bx, by);
+  const float right_below =
+      least_cross(bx, by, 1.0f + offset_x[n.right + below] - dx, -1.0f + offset_y[n.right + below] - dy, rx, ry);
   const int is_near_end = ((float)row + dy < MARGIN) | ((float)row + dy > (float)(height - 1) - MARGIN);
   // No choice between the two: the compiler would put loads of neighbours behind it, each a gather under a mask.
-  return lesser(is_near_end ? 0.0f : INFINITY, lesser(lesser(right_above, left_above), lesser(left_below, right_below)));
+  return lesser(is_near_end ? 0.0f : INFINITY,
+                lesser(lesser(right_above, left_above), lesser(left_below, right_below)));
 }
 
 // The same, compiled once.
-__attribute__((noinline)) float cross_around_one(Neighbours n, int height, int texture_width, int row, float dx, float dy, global const float* offset_x,
-                                                 global const float* offset_y) {
+__attribute__((noinline)) float cross_around_one(Neighbours n, int height, int texture_width, int row, float dx,
+                                                 float dy, global const float* offset_x, global const float* offset_y) {
   return cross_around(n, height, texture_width, row, dx, dy, offset_x, offset_y);
 }
 
@@ -100,8 +109,9 @@ void candidate_of(float x, float y, int k, int* column, int* row, float* dx, flo
 
 // A vertex that is not placed claims the first of its candidates that it can still have.
 // in   least: more than all claims of rounds before; rank: its own by strength, from 1
-__attribute__((always_inline)) void claim_texel(int v, int least, int rank, global const PatchRecord* restrict p, int texture_width, float x, float y,
-                                                global const int* anchors, global int* states, volatile global int* claims) {
+__attribute__((always_inline)) void claim_texel(int v, int least, int rank, global const PatchRecord* restrict p,
+                                                int texture_width, float x, float y, global const int* anchors,
+                                                global int* states, volatile global int* claims) {
   int state = states[v];
   for (; state < 4; ++state) {
     int column, row;
@@ -116,9 +126,11 @@ __attribute__((always_inline)) void claim_texel(int v, int least, int rank, glob
   states[v] = state;
 }
 
-// A claim that is the strongest on its texel and the eight around is decided: it stands when the map does not fold, else the next candidate's turn has come.
-__attribute__((always_inline)) void decide_claim(int v, int least, int rank, global const PatchRecord* restrict p, int texture_width, float x, float y,
-                                                 volatile global const int* claims, global int* states, global int* anchors, global float* offset_x,
+// A claim that is the strongest on its texel and the eight around is decided: it stands when the map does not fold,
+// else the next candidate's turn has come.
+__attribute__((always_inline)) void decide_claim(int v, int least, int rank, global const PatchRecord* restrict p,
+                                                 int texture_width, float x, float y, volatile global const int* claims,
+                                                 global int* states, global int* anchors, global float* offset_x,
                                                  global float* offset_y) {
   int column, row;
   float dx, dy;
@@ -126,7 +138,8 @@ __attribute__((always_inline)) void decide_claim(int v, int least, int rank, glo
   column = (column % p->width + p->width) % p->width;
   int is_strongest = 1;
   for (int i = -1; i <= 1; ++i)
-    for (int j = -1; j <= 1; ++j) is_strongest &= claims[coloured_at(p, texture_width, column + j, row + i)] <= least + rank;
+    for (int j = -1; j <= 1; ++j)
+      is_strongest &= claims[coloured_at(p, texture_width, column + j, row + i)] <= least + rank;
   if (!is_strongest) return;
   const Neighbours n = neighbours_of(p, texture_width, column, row);
   if (cross_around_one(n, p->height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) {
@@ -140,33 +153,39 @@ __attribute__((always_inline)) void decide_claim(int v, int least, int rank, glo
 }
 
 // NDRange (vertices). One round: claims.
-kernel void claim_texels(const int vertex_count, const int texture_width, const int least, global const int* restrict vertex_patches,
-                         global const float* restrict vertex_x, global const float* restrict vertex_y, global const int* restrict ranks,
-                         global const PatchRecord* restrict patches,
-                         global const int* restrict anchors, global int* restrict states, global int* restrict claims) {
+kernel void claim_texels(const int vertex_count, const int texture_width, const int least,
+                         global const int* restrict vertex_patches, global const float* restrict vertex_x,
+                         global const float* restrict vertex_y, global const int* restrict ranks,
+                         global const PatchRecord* restrict patches, global const int* restrict anchors,
+                         global int* restrict states, global int* restrict claims) {
   const int v = (int)get_global_id(0);
   if (v < vertex_count)
-    claim_texel(v, least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v], anchors, states, claims);
+    claim_texel(v, least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v], anchors,
+                states, claims);
 }
 
 // NDRange (vertices). One round: decisions.
-kernel void decide_claims(const int vertex_count, const int texture_width, const int least, global const int* restrict vertex_patches,
-                          global const float* restrict vertex_x, global const float* restrict vertex_y, global const int* restrict ranks,
-                          global const PatchRecord* restrict patches,
-                          global const int* restrict claims, global int* restrict states, global int* restrict anchors, global float* restrict offset_x,
+kernel void decide_claims(const int vertex_count, const int texture_width, const int least,
+                          global const int* restrict vertex_patches, global const float* restrict vertex_x,
+                          global const float* restrict vertex_y, global const int* restrict ranks,
+                          global const PatchRecord* restrict patches, global const int* restrict claims,
+                          global int* restrict states, global int* restrict anchors, global float* restrict offset_x,
                           global float* restrict offset_y) {
   const int v = (int)get_global_id(0);
   if (v < vertex_count && states[v] < 4)
-    decide_claim(v, least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v], claims, states, anchors, offset_x, offset_y);
+    decide_claim(v, least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v], claims,
+                 states, anchors, offset_x, offset_y);
 }
 
-// NDRange: one work-group of ROW_ITEMS. All further rounds, which are of few vertices. Every round decides at least the strongest claim that is open.
-// in   least: of the first of them; step: from one round's to the next
-// out  open: what else the kernel needs, two numbers per vertex
-kernel void decide_the_rest(const int vertex_count, const int texture_width, const int texel_count, const int least, const int step,
-                            global const int* restrict vertex_patches, global const float* restrict vertex_x, global const float* restrict vertex_y,
-                            global const int* restrict ranks, global const PatchRecord* restrict patches, volatile global int* claims, global int* states,
-                            global int* anchors, global float* offset_x, global float* offset_y, global int* open) {
+// NDRange: one work-group of ROW_ITEMS. All further rounds, which are of few vertices. Every round decides at least the
+// strongest claim that is open. in   least: of the first of them; step: from one round's to the next out  open: what
+// else the kernel needs, two numbers per vertex
+kernel void decide_the_rest(const int vertex_count, const int texture_width, const int texel_count, const int least,
+                            const int step, global const int* restrict vertex_patches,
+                            global const float* restrict vertex_x, global const float* restrict vertex_y,
+                            global const int* restrict ranks, global const PatchRecord* restrict patches,
+                            volatile global int* claims, global int* states, global int* anchors,
+                            global float* offset_x, global float* offset_y, global int* open) {
   local int counts[2];
   const int own = (int)get_local_id(0);
   if (own == 0) counts[0] = counts[1] = 0;
@@ -187,14 +206,16 @@ kernel void decide_the_rest(const int vertex_count, const int texture_width, con
     }
     for (int i = own; i < count; i += ROW_ITEMS) {
       const int v = from[i];
-      claim_texel(v, round_least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v], anchors, states, claims);
+      claim_texel(v, round_least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v],
+                  anchors, states, claims);
     }
     WAIT_FOR_GROUP(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
     if (own == 0) counts[list] = 0;
     for (int i = own; i < count; i += ROW_ITEMS) {
       const int v = from[i];
       if (states[v] < 4)
-        decide_claim(v, round_least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v], claims, states, anchors, offset_x, offset_y);
+        decide_claim(v, round_least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v],
+                     claims, states, anchors, offset_x, offset_y);
       if (states[v] < 4) to[atomic_inc(counts + !list)] = v;
     }
     round_least += step;
@@ -205,21 +226,24 @@ typedef struct Offset {
   float x, y;
 } Offset;
 
-// Where a texel that nothing holds goes: half way to the mean of its four neighbours, when that is worth its test and stands it.
-__attribute__((always_inline)) Offset relaxed(Offset own, int is_held, Neighbours n, int height, int texture_width, int row, global const float* offset_x,
-                                              global const float* offset_y) {
+// Where a texel that nothing holds goes: half way to the mean of its four neighbours, when that is worth its test and
+// stands it.
+__attribute__((always_inline)) Offset relaxed(Offset own, int is_held, Neighbours n, int height, int texture_width,
+                                              int row, global const float* offset_x, global const float* offset_y) {
   const int below = n.own - texture_width, above = n.own + texture_width;
   const float mean_x = 0.25f * (offset_x[n.left] + offset_x[n.right] + offset_x[below] + offset_x[above]);
   const float mean_y = 0.25f * (offset_y[n.left] + offset_y[n.right] + offset_y[below] + offset_y[above]);
   const Offset moved = {0.5f * (own.x + mean_x), 0.5f * (own.y + mean_y)};
-  const int is_worth_it = (fabs(moved.x - own.x) + fabs(moved.y - own.y) >= LEAST_MOVE) & (fmax(fabs(moved.x), fabs(moved.y)) <= LOOSE);
+  const int is_worth_it =
+      (fabs(moved.x - own.x) + fabs(moved.y - own.y) >= LEAST_MOVE) & (fmax(fabs(moved.x), fabs(moved.y)) <= LOOSE);
   const int stands = cross_around(n, height, texture_width, row, moved.x, moved.y, offset_x, offset_y) >= LEAST_CROSS;
   const int moves = (is_held == 0) & is_worth_it & stands;
   const Offset now = {moves ? moved.x : own.x, moves ? moved.y : own.y};
   return now;
 }
 
-// Texels of one colour of a row with a neighbour on either side, `first` to `end`, and the left one of the first. The right one is the next after it.
+// Texels of one colour of a row with a neighbour on either side, `first` to `end`, and the left one of the first. The
+// right one is the next after it.
 typedef struct RowColour {
   int first, end, left;
 } RowColour;
@@ -227,18 +251,23 @@ typedef struct RowColour {
 // Columns that wrap round are left out: what is done for the others becomes vector instructions.
 RowColour row_colour(int is_odd, int first, int width) {
   const int odd = first + ((width + 1) >> 1);
-  const RowColour colour = {is_odd ? odd : first + 1, is_odd ? odd + ((width - 1) >> 1) : first + (width >> 1), is_odd ? first : odd};
+  const RowColour colour = {is_odd ? odd : first + 1, is_odd ? odd + ((width - 1) >> 1) : first + (width >> 1),
+                            is_odd ? first : odd};
   return colour;
 }
 
 // The column at an end of a row that comes with a colour; of an odd width the last one comes by itself. -1: none.
-int end_of_colour(int colour, int width) { return colour == 0 ? (width > 1 ? 0 : -1) : colour == 1 ? ((width & 1) ? -1 : width - 1) : width - 1; }
+int end_of_colour(int colour, int width) {
+  return colour == 0 ? (width > 1 ? 0 : -1) : colour == 1 ? ((width & 1) ? -1 : width - 1) : width - 1;
+}
 
 // Texels of one colour relax.
 // in   offset_x, offset_y: the same as own_x, own_y, of which only texels of this colour are read there
-__attribute__((always_inline)) void relax_colour(const RowColour colour, const int height, const int texture_width, const int row,
-                                                 global const int* restrict anchors, global const float* restrict offset_x,
-                                                 global const float* restrict offset_y, global float* restrict own_x, global float* restrict own_y) {
+__attribute__((always_inline)) void relax_colour(const RowColour colour, const int height, const int texture_width,
+                                                 const int row, global const int* restrict anchors,
+                                                 global const float* restrict offset_x,
+                                                 global const float* restrict offset_y, global float* restrict own_x,
+                                                 global float* restrict own_y) {
   for (int i = get_local_id(0); i < colour.end - colour.first; i += ROW_ITEMS) {
     const int texel = colour.first + i;
     const Offset own = {own_x[texel], own_y[texel]};
@@ -250,8 +279,9 @@ __attribute__((always_inline)) void relax_colour(const RowColour colour, const i
 }
 
 // Compiled once.
-__attribute__((noinline)) void relax_at_end(global const PatchRecord* restrict p, const int texture_width, const int column, const int row,
-                                            global const int* restrict anchors, global float* offset_x, global float* offset_y) {
+__attribute__((noinline)) void relax_at_end(global const PatchRecord* restrict p, const int texture_width,
+                                            const int column, const int row, global const int* restrict anchors,
+                                            global float* offset_x, global float* offset_y) {
   const Neighbours n = neighbours_of(p, texture_width, column, row);
   const Offset own = {offset_x[n.own], offset_y[n.own]};
   const Offset now = relaxed(own, anchors[n.own] != 0, n, p->height, texture_width, row, offset_x, offset_y);
@@ -260,12 +290,15 @@ __attribute__((noinline)) void relax_at_end(global const PatchRecord* restrict p
 }
 
 // The free texels of a row relax, one colour after the other.
-__attribute__((always_inline)) void relax_row(global const PatchRecord* restrict p, const int texture_width, const int row,
-                                              global const int* restrict anchors, global float* offset_x, global float* offset_y) {
+__attribute__((always_inline)) void relax_row(global const PatchRecord* restrict p, const int texture_width,
+                                              const int row, global const int* restrict anchors, global float* offset_x,
+                                              global float* offset_y) {
   const int width = p->width, first = (p->y + row) * texture_width + p->x;
   for (int colour = 0; colour < 2 + (width & 1); ++colour) {
     const int at_end = end_of_colour(colour, width);
-    if (colour < 2) relax_colour(row_colour(colour, first, width), p->height, texture_width, row, anchors, offset_x, offset_y, offset_x, offset_y);
+    if (colour < 2)
+      relax_colour(row_colour(colour, first, width), p->height, texture_width, row, anchors, offset_x, offset_y,
+                   offset_x, offset_y);
     if (get_local_id(0) == 0 && at_end >= 0) relax_at_end(p, texture_width, at_end, row, anchors, offset_x, offset_y);
     WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
   }
@@ -281,7 +314,8 @@ typedef struct EdgeRecord {
 } EdgeRecord;
 
 float8 gathered(const int8 at, global const float* from) {
-  return (float8)(from[at.s0], from[at.s1], from[at.s2], from[at.s3], from[at.s4], from[at.s5], from[at.s6], from[at.s7]);
+  return (float8)(from[at.s0], from[at.s1], from[at.s2], from[at.s3], from[at.s4], from[at.s5], from[at.s6],
+                  from[at.s7]);
 }
 
 int8 gathered_ints(const int8 at, global const int* from) {
@@ -292,7 +326,9 @@ int8 gathered_ints(const int8 at, global const int* from) {
 float8 loaded(global const float* plane, const int at_even, const int at_odd) {
   return (float8)(vload4(0, plane + at_even), vload4(0, plane + at_odd));
 }
-int8 loaded_ints(global const int* plane, const int at_even, const int at_odd) { return (int8)(vload4(0, plane + at_even), vload4(0, plane + at_odd)); }
+int8 loaded_ints(global const int* plane, const int at_even, const int at_odd) {
+  return (int8)(vload4(0, plane + at_even), vload4(0, plane + at_odd));
+}
 void store(const float8 values, global float* plane, const int at_even, const int at_odd) {
   vstore4(values.lo, 0, plane + at_even);
   vstore4(values.hi, 0, plane + at_odd);
@@ -302,7 +338,8 @@ void store_ints(const int8 values, global int* plane, const int at_even, const i
   vstore4(values.hi, 0, plane + at_odd);
 }
 
-// Of a bin's edges those that are nearest to eight texels, by distance / weight, and within reach; of two as near the first one.
+// Of a bin's edges those that are nearest to eight texels, by distance / weight, and within reach; of two as near the
+// first one.
 int8 nearest_edges(const float8 x, const float8 y, const int begin, const int end, global const int* restrict bin_edges,
                    global const EdgeRecord* restrict edges) {
   float8 least = (float8)(INFINITY);
@@ -312,7 +349,8 @@ int8 nearest_edges(const float8 x, const float8 y, const int begin, const int en
     global const EdgeRecord* restrict edge = edges + e;
     const float8 to_x = edge->x - x, to_y = edge->y - y;
     const float8 t = clamp(to_x * edge->over_x + to_y * edge->over_y, (float8)(0.0f), (float8)(1.0f));
-    const float8 dx = to_x + t * edge->ex, dy = to_y + t * edge->ey, distance2 = dx * dx + dy * dy, offer = distance2 * edge->flatness;
+    const float8 dx = to_x + t * edge->ex, dy = to_y + t * edge->ey, distance2 = dx * dx + dy * dy,
+                 offer = distance2 * edge->flatness;
     const int8 is_nearer = (offer < least) & (distance2 <= REACH * REACH);
     least = is_nearer ? offer : least;
     nearest = is_nearer ? (int8)(e) : nearest;
@@ -329,8 +367,9 @@ typedef struct EdgeRecords {
 EdgeRecords gathered_edges(const int8 at, global const EdgeRecord* restrict edges) {
   global const float* from = (global const float*)edges;
   const int8 first = at * 8;
-  const EdgeRecords all = {gathered(first, from), gathered(first, from + 1), gathered(first, from + 2), gathered(first, from + 3),
-                           gathered(first, from + 4), gathered(first, from + 5), gathered(first, from + 6), as_int8(gathered(first, from + 7))};
+  const EdgeRecords all = {gathered(first, from),     gathered(first, from + 1),         gathered(first, from + 2),
+                           gathered(first, from + 3), gathered(first, from + 4),         gathered(first, from + 5),
+                           gathered(first, from + 6), as_int8(gathered(first, from + 7))};
   return all;
 }
 
@@ -339,15 +378,18 @@ int8 offers_of(const EdgeRecords edges) { return 2 * edges.number + ((edges.flat
 int number_of_offer(int offer) { return offer >> 1; }
 int is_sharp_offer(int offer) { return offer & 1; }
 
-// A free texel of any column goes where its offer is; if it cannot, and the edge is flat, it has none any more. Compiled once.
-__attribute__((noinline)) void place_one(global const PatchRecord* restrict p, const int texture_width, const int column, const int row,
-                                            global const float* restrict target_x, global const float* restrict target_y, global int* offers,
-                                            global int* restrict anchors, global float* offset_x, global float* offset_y) {
+// A free texel of any column goes where its offer is; if it cannot, and the edge is flat, it has none any more.
+// Compiled once.
+__attribute__((noinline)) void place_one(global const PatchRecord* restrict p, const int texture_width,
+                                         const int column, const int row, global const float* restrict target_x,
+                                         global const float* restrict target_y, global int* offers,
+                                         global int* restrict anchors, global float* offset_x, global float* offset_y) {
   const Neighbours n = neighbours_of(p, texture_width, column, row);
   const int texel = n.own, offer = offers[texel];
   if (offer == NONE) return;
   const float dx = target_x[texel], dy = target_y[texel];
-  if (fmax(fabs(dx), fabs(dy)) > FURTHEST || cross_around(n, p->height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) {
+  if (fmax(fabs(dx), fabs(dy)) > FURTHEST ||
+      cross_around(n, p->height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) {
     if (!is_sharp_offer(offer)) offers[texel] = NONE;
     return;
   }
@@ -357,10 +399,12 @@ __attribute__((noinline)) void place_one(global const PatchRecord* restrict p, c
 
 // Texels of one colour, as for relax_colour, go to the edge that is nearest.
 // out  offers: of those that could not, and are worth another try
-__attribute__((always_inline)) void place_colour(const RowColour colour, const int height, const int texture_width, const int row,
-                                                 global const float* restrict target_x, global const float* restrict target_y,
-                                                 global int* restrict offers, global int* restrict anchors, global const float* restrict offset_x,
-                                                 global const float* restrict offset_y, global float* restrict own_x, global float* restrict own_y) {
+__attribute__((always_inline)) void place_colour(const RowColour colour, const int height, const int texture_width,
+                                                 const int row, global const float* restrict target_x,
+                                                 global const float* restrict target_y, global int* restrict offers,
+                                                 global int* restrict anchors, global const float* restrict offset_x,
+                                                 global const float* restrict offset_y, global float* restrict own_x,
+                                                 global float* restrict own_y) {
   for (int i = get_local_id(0); i < colour.end - colour.first; i += ROW_ITEMS) {
     const int texel = colour.first + i, offer = offers[texel], has_offer = offer != NONE;
     const float from_x = own_x[texel], from_y = own_y[texel], dx = target_x[texel], dy = target_y[texel];
@@ -376,38 +420,51 @@ __attribute__((always_inline)) void place_colour(const RowColour colour, const i
 }
 
 // The same where hardly any texel has an offer.
-__attribute__((always_inline)) void place_few(global const PatchRecord* restrict p, const RowColour colour, const int odd, const int texture_width, const int row,
-                                              global const float* restrict target_x, global const float* restrict target_y, global int* restrict offers,
-                                              global int* restrict anchors, global float* offset_x, global float* offset_y) {
+__attribute__((always_inline)) void place_few(global const PatchRecord* restrict p, const RowColour colour,
+                                              const int odd, const int texture_width, const int row,
+                                              global const float* restrict target_x,
+                                              global const float* restrict target_y, global int* restrict offers,
+                                              global int* restrict anchors, global float* offset_x,
+                                              global float* offset_y) {
   for (int i = get_local_id(0); i < colour.end - colour.first; i += ROW_ITEMS)
     if (offers[colour.first + i] != NONE)
-      place_one(p, texture_width, odd ? 2 * i + 1 : 2 * i + 2, row, target_x, target_y, offers, anchors, offset_x, offset_y);
+      place_one(p, texture_width, odd ? 2 * i + 1 : 2 * i + 2, row, target_x, target_y, offers, anchors, offset_x,
+                offset_y);
 }
 
-// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. Free texels of a row relax, then go to the nearest edge within reach, one colour of the row after
-// the other. A row comes in bins of eight columns, which look for their edges together; bins, of this row alone or of several, have lists of the edges near them.
-// in   rows: patch, row, number of the first bin, 0: inner ones, even or odd; bin_begins: into bin_edges, numbers of edges
-//      is_again: to edges only in bins where a texel could not go to one the time before that is sharp enough (FLATTEST)
-// out  parameters: where on its edge a texel is, 0 to 1; offers, target_x, target_y: what else the kernel needs per texel
-kernel void place_on_edges(const int row_count, const int texture_width, const int is_again, global const int* restrict rows,
-                           global const PatchRecord* restrict patches, global const int* restrict bin_begins, global const int* restrict bin_edges,
-                           global const EdgeRecord* restrict edges, global int* restrict anchors, global float* restrict parameters, global float* offset_x,
-                           global float* offset_y, global int* restrict offers, global float* restrict target_x, global float* restrict target_y) {
+// NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. Free texels of a row relax, then go to the
+// nearest edge within reach, one colour of the row after the other. A row comes in bins of eight columns, which look
+// for their edges together; bins, of this row alone or of several, have lists of the edges near them. in   rows: patch,
+// row, number of the first bin, 0: inner ones, even or odd; bin_begins: into bin_edges, numbers of edges
+//      is_again: to edges only in bins where a texel could not go to one the time before that is sharp enough
+//      (FLATTEST)
+// out  parameters: where on its edge a texel is, 0 to 1; offers, target_x, target_y: what else the kernel needs per
+// texel
+kernel void place_on_edges(const int row_count, const int texture_width, const int is_again,
+                           global const int* restrict rows, global const PatchRecord* restrict patches,
+                           global const int* restrict bin_begins, global const int* restrict bin_edges,
+                           global const EdgeRecord* restrict edges, global int* restrict anchors,
+                           global float* restrict parameters, global float* offset_x, global float* offset_y,
+                           global int* restrict offers, global float* restrict target_x,
+                           global float* restrict target_y) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   global const PatchRecord* restrict p = patches + rows[4 * k];
   const int row = rows[4 * k + 1], width = p->width, height = p->height, first = (p->y + row) * texture_width + p->x;
   const int odd = first + ((width + 1) >> 1);
   relax_row(p, texture_width, row, anchors, offset_x, offset_y);
-  for (int column = 8 * get_local_id(0), bin = rows[4 * k + 2] + get_local_id(0); column < width; column += 8 * ROW_ITEMS, bin += ROW_ITEMS) {
-    // Even columns, then odd ones. The last texels of a row are fewer than eight: each lane beyond them looks at the last one.
+  for (int column = 8 * get_local_id(0), bin = rows[4 * k + 2] + get_local_id(0); column < width;
+       column += 8 * ROW_ITEMS, bin += ROW_ITEMS) {
+    // Even columns, then odd ones. The last texels of a row are fewer than eight: each lane beyond them looks at the
+    // last one.
     const int8 columns = min(column + (int8)(0, 2, 4, 6, 1, 3, 5, 7), (int8)(width - 1));
     const int8 texels = (columns >> 1) + ((columns & 1) == 0 ? (int8)(first) : (int8)(odd));
     const int is_whole = column + 8 <= width, at_even = first + column / 2, at_odd = odd + column / 2;
     if (is_again && is_whole && !any(loaded_ints(offers, at_even, at_odd) != NONE)) continue;
     const float8 x = is_whole ? loaded(offset_x, at_even, at_odd) : gathered(texels, offset_x);
     const float8 y = is_whole ? loaded(offset_y, at_even, at_odd) : gathered(texels, offset_y);
-    const int8 nearest = nearest_edges(convert_float8(columns) + x, (float)row + y, bin_begins[bin], bin_begins[bin + 1], bin_edges, edges);
+    const int8 nearest = nearest_edges(convert_float8(columns) + x, (float)row + y, bin_begins[bin],
+                                       bin_begins[bin + 1], bin_edges, edges);
     const int8 are_held = (is_whole ? loaded_ints(anchors, at_even, at_odd) : gathered_ints(texels, anchors)) != 0;
     const int8 have_offers = (nearest != NONE) & !are_held;
     const EdgeRecords found = gathered_edges(have_offers ? nearest : (int8)(0), edges);
@@ -437,18 +494,22 @@ kernel void place_on_edges(const int row_count, const int texture_width, const i
   for (int colour = 0; colour < 2 + (width & 1); ++colour) {
     const int at_end = end_of_colour(colour, width);
     if (colour < 2 && is_again)
-      place_few(p, row_colour(colour, first, width), colour, texture_width, row, target_x, target_y, offers, anchors, offset_x, offset_y);
+      place_few(p, row_colour(colour, first, width), colour, texture_width, row, target_x, target_y, offers, anchors,
+                offset_x, offset_y);
     else if (colour < 2)
-      place_colour(row_colour(colour, first, width), height, texture_width, row, target_x, target_y, offers, anchors, offset_x, offset_y, offset_x, offset_y);
-    if (get_local_id(0) == 0 && at_end >= 0) place_one(p, texture_width, at_end, row, target_x, target_y, offers, anchors, offset_x, offset_y);
+      place_colour(row_colour(colour, first, width), height, texture_width, row, target_x, target_y, offers, anchors,
+                   offset_x, offset_y, offset_x, offset_y);
+    if (get_local_id(0) == 0 && at_end >= 0)
+      place_one(p, texture_width, at_end, row, target_x, target_y, offers, anchors, offset_x, offset_y);
     WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
   }
 }
 
-// NDRange and rows as for place_on_edges. Offsets with their rows by colour, from `home`, where columns follow each other. They are 0 before, and stay so in rows
-// without any at home: nearly all.
-kernel void part_colours(const int row_count, const int texture_width, global const int* restrict rows, global const PatchRecord* restrict patches,
-                         global const float* restrict home_x, global const float* restrict home_y, global float* restrict offset_x,
+// NDRange and rows as for place_on_edges. Offsets with their rows by colour, from `home`, where columns follow each
+// other. They are 0 before, and stay so in rows without any at home: nearly all.
+kernel void part_colours(const int row_count, const int texture_width, global const int* restrict rows,
+                         global const PatchRecord* restrict patches, global const float* restrict home_x,
+                         global const float* restrict home_y, global float* restrict offset_x,
                          global float* restrict offset_y) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
@@ -461,7 +522,8 @@ kernel void part_colours(const int row_count, const int texture_width, global co
     offset_x[first + i] = home_x[first + 2 * i], offset_x[odd + i] = home_x[first + 2 * i + 1];
     offset_y[first + i] = home_y[first + 2 * i], offset_y[odd + i] = home_y[first + 2 * i + 1];
   }
-  if (get_local_id(0) == 0 && (width & 1)) offset_x[odd - 1] = home_x[first + width - 1], offset_y[odd - 1] = home_y[first + width - 1];
+  if (get_local_id(0) == 0 && (width & 1))
+    offset_x[odd - 1] = home_x[first + width - 1], offset_y[odd - 1] = home_y[first + width - 1];
 }
 
 void cross_product(const float a[3], const float b[3], const float c[3], float n[3]) {
@@ -476,15 +538,19 @@ int is_turned(const float a[3], const float b[3], const float c[3], const float 
   float n[3];
   cross_product(a, b, c, n);
   const float dot = n[0] * direction[0] + n[1] * direction[1] + n[2] * direction[2];
-  const float lengths2 = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) * (direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2]);
+  const float lengths2 = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) *
+                         (direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2]);
   return dot < LEAST_COSINE * sqrt(lengths2);
 }
 
-// Whether the quad to the right of and above a texel folds in the map, or for both its diagonals a triangle is turned from
-// the even lattice's quad where the even lattice's own is not. Quads next to seams and poles take the points of the end rows.
-int is_bad_quad(global const PatchRecord* restrict p, int texture_width, int column, int row, global const float* restrict offset_x,
-                global const float* restrict offset_y, global const float* restrict even_x, global const float* restrict even_y,
-                global const float* restrict even_z, global const float* restrict x, global const float* restrict y, global const float* restrict z) {
+// Whether the quad to the right of and above a texel folds in the map, or for both its diagonals a triangle is turned
+// from the regular grid's quad where the regular grid's own is not. Quads next to seams and poles take the points of
+// the end rows.
+int is_bad_quad(global const PatchRecord* restrict p, int texture_width, int column, int row,
+                global const float* restrict offset_x, global const float* restrict offset_y,
+                global const float* restrict even_x, global const float* restrict even_y,
+                global const float* restrict even_z, global const float* restrict x, global const float* restrict y,
+                global const float* restrict z) {
   const int texel = texel_at(p, texture_width, column, row), right = texel_at(p, texture_width, column + 1, row);
   const int at[4] = {texel, right, right + texture_width, texel + texture_width};
   float map_x[4], map_y[4], even[4][3], now[4][3];
@@ -517,20 +583,23 @@ int quad_at(global const PatchRecord* restrict p, int texture_width, int texel, 
   return texel_at(p, texture_width, *column, *row);
 }
 
-// NDRange: one work-group of ROW_ITEMS. Texels of a list go back, those on vertices only `with_vertices`; and in rounds those of bad quads at texels that
-// have gone back in the round before. Rounds are many, but soon of few texels, and a launch takes longer than most of them. What a
-// texel does within a round does not depend on others, so that their order is any.
-// in   before_x, before_y, before_z: where they were
-// in and out  marks: per texel bits; `taken`: it has gone back, or was there, set in none before; LOOKED_AT: its quad, in none
+// NDRange: one work-group of ROW_ITEMS. Texels of a list go back, those on vertices only `with_vertices`; and in rounds
+// those of bad quads at texels that have gone back in the round before. Rounds are many, but soon of few texels, and a
+// launch takes longer than most of them. What a texel does within a round does not depend on others, so that their
+// order is any. in   before_x, before_y, before_z: where they were in and out  marks: per texel bits; `taken`: it has
+// gone back, or was there, set in none before; LOOKED_AT: its quad, in none
 //              counts: how many are on these lists, 0 before
 // out  back: those that have gone back; bad: quads of a round
-kernel void put_listed_back(const int count, const int with_vertices, const int taken, const int texture_width, global const int* restrict listed,
-                            global const int* restrict texel_patches, global const PatchRecord* restrict patches, global const float* restrict even_x,
-                            global const float* restrict even_y, global const float* restrict even_z, global const float* restrict before_x,
-                            global const float* restrict before_y, global const float* restrict before_z, global const float* restrict home_x,
-                            global const float* restrict home_y, volatile global int* marks, global int* restrict anchors,
-                            global float* offset_x, global float* offset_y, global float* x, global float* y, global float* z,
-                            global int* back, global int* bad, volatile global int* counts) {
+kernel void put_listed_back(const int count, const int with_vertices, const int taken, const int texture_width,
+                            global const int* restrict listed, global const int* restrict texel_patches,
+                            global const PatchRecord* restrict patches, global const float* restrict even_x,
+                            global const float* restrict even_y, global const float* restrict even_z,
+                            global const float* restrict before_x, global const float* restrict before_y,
+                            global const float* restrict before_z, global const float* restrict home_x,
+                            global const float* restrict home_y, volatile global int* marks,
+                            global int* restrict anchors, global float* offset_x, global float* offset_y,
+                            global float* x, global float* y, global float* z, global int* back, global int* bad,
+                            volatile global int* counts) {
   const int own = (int)get_local_id(0);
   for (int begin = 0, end = -1; begin != end;) {
     // The texels of the list in the first round, then those of bad quads.
@@ -571,7 +640,8 @@ kernel void put_listed_back(const int count, const int with_vertices, const int 
     WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
     for (int i = 4 * begin + own; i < 4 * end; i += ROW_ITEMS) {
       int column, row;
-      const int quad = quad_at(patches + texel_patches[back[i >> 2]], texture_width, back[i >> 2], i & 3, &column, &row);
+      const int quad =
+          quad_at(patches + texel_patches[back[i >> 2]], texture_width, back[i >> 2], i & 3, &column, &row);
       atomic_and(marks + quad, ~LOOKED_AT);
     }
     WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Rays of the separation planes driven parameterization (paper 3.2.1). All rays of one column lie in one half-plane that
-// the bone's axis bounds. There the surface is a set of line segments: the sections of the triangles at that angle. So
-// casting a ray against triangles becomes casting it against segments in the plane, and as the rays of a column fan
-// out without crossing, each point of the plane lies between two neighbouring rows.
+// Rays of the separation planes driven parameterization (paper 3.2.1). All rays of one column lie in one half-plane
+// that the bone's axis bounds. There the surface is a set of line segments: the sections of the triangles at that
+// angle. So casting a ray against triangles becomes casting it against segments in the plane, and as the rays of a
+// column fan out without crossing, each point of the plane lies between two neighbouring rows.
 //   cast_rays       per column, its list of triangles -> per texel the triangle that its ray meets, and the distance
 //   find_hidden     per triangle, the list of triangles at its centre's angle -> whether one lies before it
-// Coordinates are those of each bone: x along s, y along b, z along o, from the head, world units. `points` holds nine of
-// them per triangle. Lists of triangles are compressed rows: list i is list_triangles[list_begins[i] .. list_begins[i+1]),
-// with triangle numbers over all charts, increasing.
-// Both triangles at an edge compute the same section point from the same numbers in the same order, and which row a
-// point belongs to depends on the point alone: no ray slips between two triangles. Contraction would break that.
+// Coordinates are those of each bone: x along s, y along b, z along o, from the head, world units. `points` holds nine
+// of them per triangle. Lists of triangles are compressed rows: list i is list_triangles[list_begins[i] ..
+// list_begins[i+1]), with triangle numbers over all charts, increasing. Both triangles at an edge compute the same
+// section point from the same numbers in the same order, and which row a point belongs to depends on the point alone:
+// no ray slips between two triangles. Contraction would break that.
 #pragma OPENCL FP_CONTRACT OFF
 #include "skeletex_structs.h"
 #include "spd_structs.h"
@@ -69,23 +69,27 @@ bool slice_triangle(global const float* restrict points, int triangle, float cos
 
 // How far a point lies from a row's ray on the tail's side, times the length of the ray's direction f.
 float side_of_ray(float x, float z, RowRecord row, float length, float slope_head, float slope_tail) {
-  const float slope = (1.0f - row.station) * slope_head + row.station * slope_tail;
-  return row.cap_cos * (z - row.station * length) - (row.cap_cos * slope + row.cap_sin) * x;
+  const float slope = (1.0f - row.axial) * slope_head + row.axial * slope_tail;
+  return row.cap_cos * (z - row.axial * length) - (row.cap_cos * slope + row.cap_sin) * x;
 }
 
-// The first row in [begin, end) whose ray passes a point on the tail's side. Points at a seam's ray count as between the
-// first and the last row, so that those rays meet the seam.
-int row_of_point(float x, float z, int begin, int end, global const RowRecord* restrict rows, global const int* restrict row_guesses,
-                 const SpdPatch* patch, float slope_head, float slope_tail) {
+// The first row in [begin, end) whose ray passes a point on the tail's side. Points at a seam's ray count as between
+// the first and the last row, so that those rays meet the seam.
+int row_of_point(float x, float z, int begin, int end, global const RowRecord* restrict rows,
+                 global const int* restrict row_guesses, const SpdPatch* patch, float slope_head, float slope_tail) {
   const float length = patch->bone_length;
-  if (begin == 0 && side_of_ray(x, z, rows[0], length, slope_head, slope_tail) < patch->head_tolerance * (1.0f + fabs(slope_head))) return 0;
-  if (end == patch->height && side_of_ray(x, z, rows[end - 1], length, slope_head, slope_tail) >= -patch->tail_tolerance * (1.0f + fabs(slope_tail)))
+  if (begin == 0 &&
+      side_of_ray(x, z, rows[0], length, slope_head, slope_tail) < patch->head_tolerance * (1.0f + fabs(slope_head)))
+    return 0;
+  if (end == patch->height && side_of_ray(x, z, rows[end - 1], length, slope_head, slope_tail) >=
+                                  -patch->tail_tolerance * (1.0f + fabs(slope_tail)))
     return end;
   // Where the point's mark (see SpdPatch) falls among those of the rows, give or take rounding.
   const float above = z - length;
   const float mark = patch->is_tail_free && above > 0.0f ? 1.0f + above / (x + above)
-                     : patch->is_head_free && z < 0.0f   ? z / (x - z)
-                                                         : clamp((z - x * slope_head) / (length + x * (slope_tail - slope_head)), 0.0f, 1.0f);
+                     : patch->is_head_free && z < 0.0f
+                         ? z / (x - z)
+                         : clamp((z - x * slope_head) / (length + x * (slope_tail - slope_head)), 0.0f, 1.0f);
   const int cell = clamp((int)((mark + 1.0f) * patch->guesses_per_mark), 0, patch->guess_count - 2);
   const int low = clamp(row_guesses[cell], begin, end), high = clamp(row_guesses[cell + 1], begin, end);
   const bool is_above_low = low == begin || side_of_ray(x, z, rows[low - 1], length, slope_head, slope_tail) >= 0.0f;
@@ -100,10 +104,13 @@ int row_of_point(float x, float z, int begin, int end, global const RowRecord* r
   return first;
 }
 
-// NDRange (columns of all patches, tiles of tile_rows rows): each work-item owns a column's part and goes through its list.
-kernel void cast_rays(const int column_count, const int tile_rows, const int wants_last, global const SpdPatch* restrict patches,
-                      global const int* restrict column_patches, global const RowRecord* restrict rows, global const int* restrict row_guesses,
-                      global const ColumnRecord* restrict columns, global const int* restrict list_begins, global const int* restrict list_triangles, global const float* restrict points,
+// NDRange (columns of all patches, tiles of tile_rows rows): each work-item owns a column's part and goes through its
+// list.
+kernel void cast_rays(const int column_count, const int tile_rows, const int wants_last,
+                      global const SpdPatch* restrict patches, global const int* restrict column_patches,
+                      global const RowRecord* restrict rows, global const int* restrict row_guesses,
+                      global const ColumnRecord* restrict columns, global const int* restrict list_begins,
+                      global const int* restrict list_triangles, global const float* restrict points,
                       global int* restrict hit_triangles, global float* restrict hit_distances) {
   const int c = (int)get_global_id(0);
   if (c >= column_count) return;
@@ -123,13 +130,15 @@ kernel void cast_rays(const int column_count, const int tile_rows, const int wan
   for (int i = list_begins[c]; i < list_begins[c + 1]; ++i) {
     Section s;
     if (!slice_triangle(points, list_triangles[i], column.cosine, column.sine, &s)) continue;
-    const int ra = row_of_point(s.xa, s.za, begin, end, rows, row_guesses, &patch, column.slope_head, column.slope_tail);
-    const int rb = row_of_point(s.xb, s.zb, begin, end, rows, row_guesses, &patch, column.slope_head, column.slope_tail);
+    const int ra =
+        row_of_point(s.xa, s.za, begin, end, rows, row_guesses, &patch, column.slope_head, column.slope_tail);
+    const int rb =
+        row_of_point(s.xb, s.zb, begin, end, rows, row_guesses, &patch, column.slope_head, column.slope_tail);
     const int last = max(ra, rb);
     for (int r = min(ra, rb); r < last; ++r) {
       const RowRecord row = rows[r];
-      const float foot = row.station * patch.bone_length;
-      const float slope = (1.0f - row.station) * column.slope_head + row.station * column.slope_tail;
+      const float foot = row.axial * patch.bone_length;
+      const float slope = (1.0f - row.axial) * column.slope_head + row.axial * column.slope_tail;
       const float fx = row.cap_cos, fz = row.cap_cos * slope + row.cap_sin;
       const float side_a = fx * (s.za - foot) - fz * s.xa, side_b = fx * (s.zb - foot) - fz * s.xb;
       // Where the rays of a column have crossed, rows are not ordered any more: such a section is no hit.
@@ -150,8 +159,9 @@ kernel void cast_rays(const int column_count, const int tile_rows, const int wan
 
 // NDRange (triangles). Lists are by sector and by slab: slab k of a sector holds the triangles with points at a height
 // z in [k, k + 1) slab_height above the chart's lowest point. `spheres` hold each triangle: centre x, y, z and radius.
-kernel void find_hidden(const int triangle_count, global const SpdSightLine* restrict lines, global const int* restrict list_begins,
-                        global const int* restrict list_triangles, global const float* restrict spheres, global const float* restrict points,
+kernel void find_hidden(const int triangle_count, global const SpdSightLine* restrict lines,
+                        global const int* restrict list_begins, global const int* restrict list_triangles,
+                        global const float* restrict spheres, global const float* restrict points,
                         global int* restrict is_hidden) {
   const int triangle = (int)get_global_id(0);
   if (triangle >= triangle_count) return;
@@ -162,15 +172,20 @@ kernel void find_hidden(const int triangle_count, global const SpdSightLine* res
   for (int i = list_begins[line.first_list]; !found && i < list_begins[line.last_list + 1]; ++i) {
     const int other = list_triangles[i];
     // Most of the list is nowhere near.
-    const float x = spheres[4 * other], y = spheres[4 * other + 1], z = spheres[4 * other + 2] - line.foot, radius = spheres[4 * other + 3];
+    const float x = spheres[4 * other], y = spheres[4 * other + 1], z = spheres[4 * other + 2] - line.foot,
+                radius = spheres[4 * other + 3];
     const float along = x * dx + y * dy + z * dz;
     const float rx = x - along * dx, ry = y - along * dy, rz = z - along * dz;
-    if (rx * rx + ry * ry + rz * rz > radius * radius || along - radius > nearer || along + radius < 0.0f || other == triangle) continue;
+    if (rx * rx + ry * ry + rz * rz > radius * radius || along - radius > nearer || along + radius < 0.0f ||
+        other == triangle)
+      continue;
     Section s;
     if (!slice_triangle(points, other, line.cosine, line.sine, &s)) continue;
-    const float side_a = line.out * (s.za - line.foot) - line.along * s.xa, side_b = line.out * (s.zb - line.foot) - line.along * s.xb;
+    const float side_a = line.out * (s.za - line.foot) - line.along * s.xa,
+                side_b = line.out * (s.zb - line.foot) - line.along * s.xb;
     if ((side_a < 0.0f) == (side_b < 0.0f)) continue;
-    const float t_a = line.out * s.xa + line.along * (s.za - line.foot), t_b = line.out * s.xb + line.along * (s.zb - line.foot);
+    const float t_a = line.out * s.xa + line.along * (s.za - line.foot),
+                t_b = line.out * s.xb + line.along * (s.zb - line.foot);
     const float t = t_a + side_a / (side_a - side_b) * (t_b - t_a);
     found = t >= 0.0f && t < nearer;
   }

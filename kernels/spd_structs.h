@@ -11,20 +11,22 @@
 namespace skeletex {
 #endif
 
-/// One patch whose rays are cast. Rows are looked up by marks, which grow along a column as the rows' rays do: the station
-/// in [0, 1] along the bone, 1 + sin / (sin + cos) of the latitude in the tail's cap, -sin / (sin + cos) in the head's.
+/// One patch whose rays are cast. Rows are looked up by marks, which grow along a column as the rows' rays do: the
+/// axial parameter in [0, 1] along the bone, 1 + sin / (sin + cos) of the latitude in the tail's cap, -sin / (sin +
+/// cos) in the head's.
 typedef struct SpdPatch {
-  float bone_length;       ///< L
-  float tolerance;         ///< rounding of a point's distance to a ray, world units
-  float head_tolerance;    ///< how far a point may miss the first row's ray and still count as on it; 0 at a pole
-  float tail_tolerance;    ///< the same for the last row
-  SKELETEX_INT width;      ///< columns
-  SKELETEX_INT height;     ///< rows
-  SKELETEX_INT row_begin;  ///< first entry in the row table (RowRecord)
+  float bone_length;          ///< L
+  float tolerance;            ///< rounding of a point's distance to a ray, world units
+  float head_tolerance;       ///< how far a point may miss the first row's ray and still count as on it; 0 at a pole
+  float tail_tolerance;       ///< the same for the last row
+  SKELETEX_INT width;         ///< columns
+  SKELETEX_INT height;        ///< rows
+  SKELETEX_INT row_begin;     ///< first entry in the row table (RowRecord)
   SKELETEX_INT column_begin;  ///< first entry in the column table (ColumnRecord) and in the columns' lists of triangles
   SKELETEX_INT texel_begin;   ///< first entry in the results
   SKELETEX_INT is_head_free, is_tail_free;
-  SKELETEX_INT guess_begin;   ///< first entry in the table of guesses: entry i is the first row with a mark >= i / guesses_per_mark - 1
+  SKELETEX_INT guess_begin;  ///< first entry in the table of guesses: entry i is the first row with a mark >= i /
+                             ///< guesses_per_mark - 1
   SKELETEX_INT guess_count;
   float guesses_per_mark;
 } SpdPatch;

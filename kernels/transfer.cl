@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The surface of one model's bone around the bone of another (paper 5). NDRange of both kernels: one work-group per row,
-// of any size; work-items take columns in turn (see reconstruct.cl).
+// The surface of one model's bone around the bone of another (paper 5). NDRange of both kernels: one work-group per
+// row, of any size; work-items take columns in turn (see reconstruct.cl).
 #include "skeletex_structs.h"
 #include "transfer_structs.h"
 
@@ -17,11 +17,11 @@ typedef struct {
 } Place;
 
 // column: of the source, fractions and all
-static Place place_on_source(__global const LaidPatch* restrict from, __global const LaidColumn* restrict here, const float station, const int row,
-                             float* restrict column) {
+static Place place_on_source(__global const LaidPatch* restrict from, __global const LaidColumn* restrict here,
+                             const float axial, const int row, float* restrict column) {
   const float period = (float)from->width, frequency = 1.0f / period;
   const int source_last = from->height - 1;
-  const float lifted = here->head_column + station * (here->tail_column - here->head_column);
+  const float lifted = here->head_column + axial * (here->tail_column - here->head_column);
   *column = lifted - period * floor(lifted * frequency);
   const int left_any = (int)*column;
   const float right_share = *column - (float)left_any;
@@ -49,20 +49,23 @@ static float read_at(const Place* restrict p, __global const float* restrict pla
   return p->w00 * plane[p->v00] + p->w01 * plane[p->v01] + p->w10 * plane[p->v10] + p->w11 * plane[p->v11];
 }
 
-// The source's points, stretched along the bone, scaled across it, sheared where walls differ, and with corrections at
-// both ends.
-// in   lattice_rows: the rows to do, four ints each: patch, row, number of the row's first vertex in the planes of points, unused
+// The source's points, stretched along the bone, scaled across it, sheared where separation planes differ, and with
+// corrections at both ends. in   lattice_rows: the rows to do, four ints each: patch, row, number of the row's first
+// vertex in the planes of points, unused
 //      patches: the result's. laid: per patch of the result. laid_rows: per row to do. columns: see LaidColumn
 //      corrections: planes of column_count floats, [((end * bands + band) * 2 + is_slope) * 3 + axis]: offset where the
 //      part begins (LaidColumn's first_row and last_row) and its change per row from there
 //      in_s, in_b, in_o: points of the source's lattice, all rows, in the axes of their own bones from their heads
 //      target_s, target_b, target_o: the same of the target's
 // out  s, b, o: points in the axes of the result's bones from their heads
-__kernel void lay_part(const int row_count, const int column_count, __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
-                       __global const LaidPatch* restrict laid, __global const LaidRow* restrict laid_rows, __global const LaidColumn* restrict columns,
-                       __global const float* restrict corrections, __global const float* restrict in_s, __global const float* restrict in_b,
-                       __global const float* restrict in_o, __global const float* restrict target_s, __global const float* restrict target_b,
-                       __global const float* restrict target_o, __global float* restrict s, __global float* restrict b, __global float* restrict o) {
+__kernel void lay_part(const int row_count, const int column_count, __global const int* restrict lattice_rows,
+                       __global const PatchRecord* restrict patches, __global const LaidPatch* restrict laid,
+                       __global const LaidRow* restrict laid_rows, __global const LaidColumn* restrict columns,
+                       __global const float* restrict corrections, __global const float* restrict in_s,
+                       __global const float* restrict in_b, __global const float* restrict in_o,
+                       __global const float* restrict target_s, __global const float* restrict target_b,
+                       __global const float* restrict target_o, __global float* restrict s, __global float* restrict b,
+                       __global float* restrict o) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   const int patch = lattice_rows[4 * k], row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
@@ -70,12 +73,12 @@ __kernel void lay_part(const int row_count, const int column_count, __global con
   __global const LaidPatch* restrict from = laid + patch;
   const float sign = from->sign;
   const float frequency = 1.0f / (float)from->width, turn = 1.0f / (float)width;
-  const float station = laid_rows[k].station, scale = laid_rows[k].scale;
+  const float axial = laid_rows[k].axial, scale = laid_rows[k].scale;
 
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
     __global const LaidColumn* restrict here = columns + from->column_begin + j;
     float column;
-    const Place place = place_on_source(from, here, station, row, &column);
+    const Place place = place_on_source(from, here, axial, row, &column);
     const float read_s = read_at(&place, in_s), read_b = read_at(&place, in_b), read_o = read_at(&place, in_o);
 
     // From the source's angle to the one here.
@@ -86,13 +89,15 @@ __kernel void lay_part(const int row_count, const int column_count, __global con
     const float turned_b = sine * read_s + sign * cosine * read_b;
     const float along = sign < 0.0f ? from->source_length - read_o : read_o;
     const float across = turned_s * cos(own) + turned_b * sin(own);
-    const float shear = (1.0f - station) * here->head_shear + station * here->tail_shear;
+    const float shear = (1.0f - axial) * here->head_shear + axial * here->tail_shear;
     float point_o = from->length_offset + from->length_scale * along + shear * across;
-    float point_s = scale * turned_s + from->lean_s * (from->lean_end - point_o), point_b = scale * turned_b + from->lean_b * (from->lean_end - point_o);
+    float point_s = scale * turned_s + from->lean_s * (from->lean_end - point_o),
+          point_b = scale * turned_b + from->lean_b * (from->lean_end - point_o);
 
     if (from->target_begin >= 0) {
-      const float kept = fmin(1.0f, faded(fmax(0.0f, (float)row - here->first_row), from->head_width, from->is_linear) +
-                                        faded(fmax(0.0f, here->last_row - (float)row), from->tail_width, from->is_linear));
+      const float kept =
+          fmin(1.0f, faded(fmax(0.0f, (float)row - here->first_row), from->head_width, from->is_linear) +
+                         faded(fmax(0.0f, here->last_row - (float)row), from->tail_width, from->is_linear));
       const int t = from->target_begin + row * width + j;
       point_s += kept * (target_s[t] - point_s);
       point_b += kept * (target_b[t] - point_b);
@@ -104,7 +109,8 @@ __kernel void lay_part(const int row_count, const int column_count, __global con
       for (int band = 0; band < SKELETEX_TRANSFER_BANDS; ++band, fade_width *= 0.7f) {
         if (rows > 0.0f && rows >= fade_width) break;
         const float fade = faded(rows, fade_width, from->is_linear);
-        __global const float* restrict c = corrections + (end * SKELETEX_TRANSFER_BANDS + band) * 6 * column_count + from->column_begin + j;
+        __global const float* restrict c =
+            corrections + (end * SKELETEX_TRANSFER_BANDS + band) * 6 * column_count + from->column_begin + j;
         point_s += fade * (c[0] + rows * c[3 * column_count]);
         point_b += fade * (c[column_count] + rows * c[4 * column_count]);
         point_o += fade * (c[2 * column_count] + rows * c[5 * column_count]);
@@ -118,17 +124,19 @@ __kernel void lay_part(const int row_count, const int column_count, __global con
 
 // Where the points of lay_part come from: any points of the source's lattice, read at the same places.
 // in   as above; in_x, in_y, in_z: the points     out  x, y, z
-__kernel void read_part(const int row_count, __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
-                        __global const LaidPatch* restrict laid, __global const LaidRow* restrict laid_rows, __global const LaidColumn* restrict columns,
-                        __global const float* restrict in_x, __global const float* restrict in_y, __global const float* restrict in_z,
-                        __global float* restrict x, __global float* restrict y, __global float* restrict z) {
+__kernel void read_part(const int row_count, __global const int* restrict lattice_rows,
+                        __global const PatchRecord* restrict patches, __global const LaidPatch* restrict laid,
+                        __global const LaidRow* restrict laid_rows, __global const LaidColumn* restrict columns,
+                        __global const float* restrict in_x, __global const float* restrict in_y,
+                        __global const float* restrict in_z, __global float* restrict x, __global float* restrict y,
+                        __global float* restrict z) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   const int patch = lattice_rows[4 * k], row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
-  const float station = laid_rows[k].station;
+  const float axial = laid_rows[k].axial;
   for (int j = get_local_id(0); j < patches[patch].width; j += get_local_size(0)) {
     float column;
-    const Place place = place_on_source(laid + patch, columns + laid[patch].column_begin + j, station, row, &column);
+    const Place place = place_on_source(laid + patch, columns + laid[patch].column_begin + j, axial, row, &column);
     x[vertex + j] = read_at(&place, in_x);
     y[vertex + j] = read_at(&place, in_y);
     z[vertex + j] = read_at(&place, in_z);
@@ -138,10 +146,12 @@ __kernel void read_part(const int row_count, __global const int* restrict lattic
 // Where the target keeps its surface: its texels, bit by bit.
 // in   as above; in_along, in_around, in_out: the target's texels
 // out  along, around, out: the result's
-__kernel void keep_target(const int row_count, const int texture_width, __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
-                          __global const LaidPatch* restrict laid, __global const LaidColumn* restrict columns, __global const float* restrict in_along,
-                          __global const float* restrict in_around, __global const float* restrict in_out, __global float* restrict along,
-                          __global float* restrict around, __global float* restrict out) {
+__kernel void keep_target(const int row_count, const int texture_width, __global const int* restrict lattice_rows,
+                          __global const PatchRecord* restrict patches, __global const LaidPatch* restrict laid,
+                          __global const LaidColumn* restrict columns, __global const float* restrict in_along,
+                          __global const float* restrict in_around, __global const float* restrict in_out,
+                          __global float* restrict along, __global float* restrict around,
+                          __global float* restrict out) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
   const int patch = lattice_rows[4 * k], row = lattice_rows[4 * k + 1];

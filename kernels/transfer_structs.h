@@ -26,29 +26,30 @@ typedef struct LaidPatch {
   float length_offset;        ///< where the source's bone begins on the result's
   float lean_s;               ///< what the part leans: moved across the bone per length from lean_end back along it
   float lean_b;
-  float lean_end;             ///< place along the bone that stays
-  float head_width;           ///< rows over which the longest waves of the correction at the head fade; 0: none
+  float lean_end;    ///< place along the bone that stays
+  float head_width;  ///< rows over which the longest waves of the correction at the head fade; 0: none
   float tail_width;
   SKELETEX_INT is_linear;     ///< it fades linearly, else by a cosine
-  SKELETEX_INT target_begin;  ///< of the target's patch in the planes of its points, to be mixed with them by that fade instead; -1: not
+  SKELETEX_INT target_begin;  ///< of the target's patch in the planes of its points, to be mixed with them by that fade
+                              ///< instead; -1: not
 } LaidPatch;
 
 /// One row of the result.
 typedef struct LaidRow {
-  float station;  ///< of the foot: shares the columns of head and tail
-  float scale;    ///< of places across the bone
+  float axial;  ///< of the foot: shares the columns of head and tail
+  float scale;  ///< of places across the bone
 } LaidRow;
 
 /// One column of the result.
 typedef struct LaidColumn {
   float head_column;  ///< of the source at the bone's head, any lift
   float tail_column;
-  float head_shear;   ///< length along the bone per distance from it
+  float head_shear;  ///< length along the bone per distance from it
   float tail_shear;
-  float row_begin;    ///< of the source, in the direction of the result's bone, at row 0
-  float row_step;     ///< source rows per row
-  float first_row;    ///< the target's surface up to this row,
-  float last_row;     ///< and from this one on; in between the source's
+  float row_begin;  ///< of the source, in the direction of the result's bone, at row 0
+  float row_step;   ///< source rows per row
+  float first_row;  ///< the target's surface up to this row,
+  float last_row;   ///< and from this one on; in between the source's
 } LaidColumn;
 
 #ifndef __OPENCL_VERSION__

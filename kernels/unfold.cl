@@ -2,49 +2,62 @@
 // Where the map turns sharply, a lattice that is even in the map folds in space although the map does not. Passes of
 //   find_folds   marks the texels around quads that look against the surface
 //   relax_folds  marked texels read nearer to their neighbours' mean, or go back to their own places
-// Reading positions are offsets from the texel's own place in cells, two planes over the texture, x around, y along. Rows 0 and
-// height-1 stay. A texel changes its own offset alone, and looks at its neighbours' points, which change between the passes: nothing
-// depends on the order of work-items. Folds are few: each pass lists what the next one has to look at, in any order, once each.
-#include "skeletex_structs.h"
+// Reading positions are offsets from the texel's own place in cells, two planes over the texture, x around, y along.
+// Rows 0 and height-1 stay. A texel changes its own offset alone, and looks at its neighbours' points, which change
+// between the passes: nothing depends on the order of work-items. Folds are few: each pass lists what the next one has
+// to look at, in any order, once each.
 #include "map_triangle.h"
 #include "patch_texels.h"
+#include "skeletex_structs.h"
 
 #define LEAST_SURFACE_COSINE 0.1f  // between a triangle and the surface
-#define LEAST_AGREEMENT 0.8f       // squared length of the mean of the normals around; less is an edge of the surface, no fold of the lattice
-#define CLEAR_COSINE 0.9f          // between a quad's triangles and the surface at its first texel: then the others need no look
-#define FURTHEST_UNFOLDED 1.0f     // cells from a texel's own place, along each axis
-#define LARGEST_FOLD_STEP 0.4f     // cells
-#define FOLD_MARGIN 0.3f           // cells that the rows next to a seam or pole keep from it
+#define LEAST_AGREEMENT \
+  0.8f  // squared length of the mean of the normals around; less is an edge of the surface, no fold of the lattice
+#define CLEAR_COSINE \
+  0.9f  // between a quad's triangles and the surface at its first texel: then the others need no look
+#define FURTHEST_UNFOLDED 1.0f  // cells from a texel's own place, along each axis
+#define LARGEST_FOLD_STEP 0.4f  // cells
+#define FOLD_MARGIN 0.3f        // cells that the rows next to a seam or pole keep from it
 
-float3 vector_at(global const float* restrict x, global const float* restrict y, global const float* restrict z, int i) { return (float3)(x[i], y[i], z[i]); }
+float3 vector_at(global const float* restrict x, global const float* restrict y, global const float* restrict z,
+                 int i) {
+  return (float3)(x[i], y[i], z[i]);
+}
 
 // Whether a triangle looks further from a direction than a cosine says.
 int is_off(float3 a, float3 b, float3 c, float3 direction, float least_cosine) {
   const float3 n = cross(b - a, c - a);
   return dot(n, direction) < least_cosine * sqrt(dot(n, n) * dot(direction, direction));
 }
-int is_turned_from(float3 a, float3 b, float3 c, float3 direction) { return is_off(a, b, c, direction, LEAST_SURFACE_COSINE); }
+int is_turned_from(float3 a, float3 b, float3 c, float3 direction) {
+  return is_off(a, b, c, direction, LEAST_SURFACE_COSINE);
+}
 
-float3 normal_of_map(int t, int triangle_count, global const int* restrict corners, global const float* restrict vertex_x, global const float* restrict vertex_y,
+float3 normal_of_map(int t, int triangle_count, global const int* restrict corners,
+                     global const float* restrict vertex_x, global const float* restrict vertex_y,
                      global const float* restrict vertex_z) {
   const float3 a = vector_at(vertex_x, vertex_y, vertex_z, corners[t]);
-  return cross(vector_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + t]) - a, vector_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + t]) - a);
+  return cross(vector_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + t]) - a,
+               vector_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + t]) - a);
 }
 
 // Appends what is not on the list. `is_listed` has a flag for all that can be.
-void append_once(global int* restrict list, volatile global int* count, volatile global int* restrict is_listed, int what) {
+void append_once(global int* restrict list, volatile global int* count, volatile global int* restrict is_listed,
+                 int what) {
   if (atomic_xchg(is_listed + what, 1) == 0) list[atomic_inc(count)] = what;
 }
 
 // NDRange: quad_count[0]. A quad is the one to the right of and above its texel. It is folded when for both diagonals a
-// triangle looks against the surface, whose normal is the mean of those of the triangles that the texels' places lie in. The 16
-// texels around a folded quad are listed as marked. Quads are taken off their list.
-// Out: found[0], folded quads; found[1], marked texels (both 0 before).
+// triangle looks against the surface, whose normal is the mean of those of the triangles that the texels' places lie
+// in. The 16 texels around a folded quad are listed as marked. Quads are taken off their list. Out: found[0], folded
+// quads; found[1], marked texels (both 0 before).
 kernel void find_folds(const int texture_width, const int triangle_count, global const int* restrict texel_patches,
-                       global const PatchRecord* restrict patches, global const int* restrict texel_triangles, global const int* restrict corners,
-                       global const float* restrict vertex_x, global const float* restrict vertex_y, global const float* restrict vertex_z,
-                       global const float* restrict x, global const float* restrict y, global const float* restrict z, global const int* restrict quad_count,
-                       global const int* restrict quads, global int* restrict is_listed, global int* restrict found, global int* restrict marked,
+                       global const PatchRecord* restrict patches, global const int* restrict texel_triangles,
+                       global const int* restrict corners, global const float* restrict vertex_x,
+                       global const float* restrict vertex_y, global const float* restrict vertex_z,
+                       global const float* restrict x, global const float* restrict y, global const float* restrict z,
+                       global const int* restrict quad_count, global const int* restrict quads,
+                       global int* restrict is_listed, global int* restrict found, global int* restrict marked,
                        global int* restrict is_marked) {
   const int i = (int)get_global_id(0);
   if (i >= quad_count[0]) return;
@@ -52,13 +65,16 @@ kernel void find_folds(const int texture_width, const int triangle_count, global
   is_listed[texel] = 0;
   global const PatchRecord* p = patches + texel_patches[texel];
   const int column = texel % texture_width - p->x, row = texel / texture_width - p->y;
-  const int at[4] = {texel, texel_at(p, texture_width, column + 1, row), texel_at(p, texture_width, column + 1, row + 1), texel + texture_width};
+  const int at[4] = {texel, texel_at(p, texture_width, column + 1, row),
+                     texel_at(p, texture_width, column + 1, row + 1), texel + texture_width};
   float3 normal = (float3)(0.0f), q[4];
   for (int k = 0; k < 4; ++k) q[k] = vector_at(x, y, z, at[k]);
   if (row > 0 && texel_triangles[texel] != NO_TRIANGLE) {
     // Normals that agree as below are within 48 degrees of their mean.
     const float3 first = normal_of_map(texel_triangles[texel], triangle_count, corners, vertex_x, vertex_y, vertex_z);
-    if (dot(first, first) > 0.0f && !is_off(q[0], q[1], q[2], first, CLEAR_COSINE) && !is_off(q[0], q[2], q[3], first, CLEAR_COSINE)) return;
+    if (dot(first, first) > 0.0f && !is_off(q[0], q[1], q[2], first, CLEAR_COSINE) &&
+        !is_off(q[0], q[2], q[3], first, CLEAR_COSINE))
+      return;
   }
   float normals = 0.0f;
   for (int k = 0; k < 4; ++k) {
@@ -74,16 +90,19 @@ kernel void find_folds(const int texture_width, const int triangle_count, global
   atomic_inc(found);
   for (int r = -1; r <= 2; ++r)
     for (int c = -1; c <= 2; ++c)
-      if (row + r >= 1 && row + r <= p->height - 2) append_once(marked, found + 1, is_marked, texel_at(p, texture_width, column + c, row + r));
+      if (row + r >= 1 && row + r <= p->height - 2)
+        append_once(marked, found + 1, is_marked, texel_at(p, texture_width, column + c, row + r));
 }
 
-// NDRange: marked_count. Marked texels move towards the mean of their four neighbours, by the least-squares step in the lattice's own
-// directions; with `is_back` they return to their places. Marks are taken off, and the quads around listed.
-// In and out: quad_count[0] (0 before); back_count[0], how many were away from their places and return.
-kernel void relax_folds(const int texture_width, const int marked_count, const int is_back, global const int* restrict marked,
-                        global const int* restrict texel_patches, global const PatchRecord* restrict patches, global const int* restrict texel_triangles,
-                        global const float* restrict x, global const float* restrict y, global const float* restrict z, global int* restrict is_marked,
-                        global float* restrict offset_x, global float* restrict offset_y, global int* restrict quad_count, global int* restrict quads,
+// NDRange: marked_count. Marked texels move towards the mean of their four neighbours, by the least-squares step in the
+// lattice's own directions; with `is_back` they return to their places. Marks are taken off, and the quads around
+// listed. In and out: quad_count[0] (0 before); back_count[0], how many were away from their places and return.
+kernel void relax_folds(const int texture_width, const int marked_count, const int is_back,
+                        global const int* restrict marked, global const int* restrict texel_patches,
+                        global const PatchRecord* restrict patches, global const int* restrict texel_triangles,
+                        global const float* restrict x, global const float* restrict y, global const float* restrict z,
+                        global int* restrict is_marked, global float* restrict offset_x,
+                        global float* restrict offset_y, global int* restrict quad_count, global int* restrict quads,
                         global int* restrict is_listed, global int* restrict back_count) {
   const int i = (int)get_global_id(0);
   if (i >= marked_count) return;
@@ -93,18 +112,21 @@ kernel void relax_folds(const int texture_width, const int marked_count, const i
   global const PatchRecord* p = patches + texel_patches[texel];
   const int column = texel % texture_width - p->x, row = texel / texture_width - p->y;
   for (int r = -1; r <= 0; ++r)
-    for (int c = -1; c <= 0; ++c) append_once(quads, quad_count, is_listed, texel_at(p, texture_width, column + c, row + r));
+    for (int c = -1; c <= 0; ++c)
+      append_once(quads, quad_count, is_listed, texel_at(p, texture_width, column + c, row + r));
   if (is_back) {
     if (offset_x[texel] != 0.0f || offset_y[texel] != 0.0f) atomic_inc(back_count);
     offset_x[texel] = 0.0f, offset_y[texel] = 0.0f;
     return;
   }
-  const float3 left = vector_at(x, y, z, texel_at(p, texture_width, column - 1, row)), right = vector_at(x, y, z, texel_at(p, texture_width, column + 1, row));
+  const float3 left = vector_at(x, y, z, texel_at(p, texture_width, column - 1, row)),
+               right = vector_at(x, y, z, texel_at(p, texture_width, column + 1, row));
   const float3 below = vector_at(x, y, z, texel - texture_width), above = vector_at(x, y, z, texel + texture_width);
   const float3 wanted = 0.25f * (left + right + below + above) - vector_at(x, y, z, texel);
   const float3 dx = 0.5f * (right - left), dy = 0.5f * (above - below);
   const float damping = 0.01f * (dot(dx, dx) + dot(dy, dy));
-  const float xx = dot(dx, dx) + damping, yy = dot(dy, dy) + damping, xy = dot(dx, dy), wx = dot(dx, wanted), wy = dot(dy, wanted);
+  const float xx = dot(dx, dx) + damping, yy = dot(dy, dy) + damping, xy = dot(dx, dy), wx = dot(dx, wanted),
+              wy = dot(dy, wanted);
   const float determinant = xx * yy - xy * xy;
   if (!(determinant > 0.0f)) return;
   const float step_x = clamp((wx * yy - wy * xy) / determinant, -LARGEST_FOLD_STEP, LARGEST_FOLD_STEP);

@@ -2,12 +2,13 @@
 // Vertex-sampling-maximizing maps of all charts together (design: docs/parameterization.md).
 //
 // Vertices of all charts lie in one list: each chart has a block that begins at a multiple of VSM_SLICE and holds its
-// inner vertices first, then its fixed ones. A vertex's map (u, v) is the sum of two floats each: (x, y) + (z, w) of map[vertex].
-// Rows of the sparse systems are the inner vertices. Their entries, one per neighbour, lie in slices of VSM_SLICE rows,
-// column-major inside a slice: entry k of row i is slice_begin[i / VSM_SLICE] + k * VSM_SLICE + i % VSM_SLICE.
-// A row's neighbours that are eliminated later come first, then fixed ones, then those that are eliminated before it.
-// Per entry: column (the neighbour), jump (lifted v of the neighbour = v + jump; VSM_POLE: the neighbour is a pole,
-// which acts through u only), weight = mantissa * 2^exponent. Both directions of an edge carry the same weight bits.
+// inner vertices first, then its fixed ones. A vertex's map (u, v) is the sum of two floats each: (x, y) + (z, w) of
+// map[vertex]. Rows of the sparse systems are the inner vertices. Their entries, one per neighbour, lie in slices of
+// VSM_SLICE rows, column-major inside a slice: entry k of row i is slice_begin[i / VSM_SLICE] + k * VSM_SLICE + i %
+// VSM_SLICE. A row's neighbours that are eliminated later come first, then fixed ones, then those that are eliminated
+// before it. Per entry: column (the neighbour), jump (lifted v of the neighbour = v + jump; VSM_POLE: the neighbour is
+// a pole, which acts through u only), weight = mantissa * 2^exponent. Both directions of an edge carry the same weight
+// bits.
 
 #include "vsm_structs.h"
 
@@ -58,14 +59,14 @@ float texture_area(int t, int count, global const int* corners, global const cha
 // Texture areas of all triangles.
 // In: corners (3 planes of `count` vertices), jumps (2 planes: corners 1 and 2 against corner 0; with a pole the first
 // is VSM_POLE and the second that of corner 2 against corner 1). Out: areas. NDRange: triangles.
-kernel void measure_areas(int count, global const int* restrict corners, global const char* restrict jumps, global const float4* restrict map,
-                          global float* restrict areas) {
+kernel void measure_areas(int count, global const int* restrict corners, global const char* restrict jumps,
+                          global const float4* restrict map, global float* restrict areas) {
   const int t = get_global_id(0);
   if (t < count) areas[t] = texture_area(t, count, corners, jumps, map);
 }
 
-// A positive float as mantissa in [0.5, 1) and exponent; 0 where it is below all normal ones. frexp() and ldexp() are calls that no compiler makes
-// vector instructions of.
+// A positive float as mantissa in [0.5, 1) and exponent; 0 where it is below all normal ones. frexp() and ldexp() are
+// calls that no compiler makes vector instructions of.
 float split_float(float value, int* exponent) {
   const int bits = as_int(value);
   *exponent = (bits >> 23) - 126;
@@ -84,8 +85,10 @@ float power_of_two(int exponent) { return as_float(clamp(exponent + 127, 0, 254)
 #define VSM_BARRIER()
 #define VSM_ITEM 0
 #define VSM_ITEMS 1
-#define VSM_ONCE __attribute__((noinline))  // PoCL makes three copies of a kernel with all that is inlined in it, and compiles each
-#define VSM_LANES VSM_SLICE  // rows of a slice that a work-item takes side by side: loops over them become vector instructions
+#define VSM_ONCE \
+  __attribute__((noinline))  // PoCL makes three copies of a kernel with all that is inlined in it, and compiles each
+#define VSM_LANES \
+  VSM_SLICE  // rows of a slice that a work-item takes side by side: loops over them become vector instructions
 #else
 #define VSM_GROUP
 #define VSM_BARRIER() barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE)
@@ -116,18 +119,22 @@ int longest_row(global const int* restrict row_length, int first) {
 }
 
 #ifdef VSM_SINGLE
-VSM_ONCE void measure_mapped(int begin, int end, int count, global const int* restrict corners, global const char* restrict jumps,
-                                global const float4* restrict map, global float* restrict areas) {
+VSM_ONCE void measure_mapped(int begin, int end, int count, global const int* restrict corners,
+                             global const char* restrict jumps, global const float4* restrict map,
+                             global float* restrict areas) {
   for (int t = begin; t < end; ++t) areas[t] = texture_area(t, count, corners, jumps, map);
 }
 #endif
 
-// Multiplies each entry's weight by (A_left + A_right) * factor, where factor = 1 / A3^alpha, unless `is_frozen`: weights as they are. Then sums each
-// row of the slice: d = 4^half_exponent / inverse_root^2, poles included. values: work space of a group, VSM_SLICE.
-VSM_ONCE void weigh_slice(int slice, int is_frozen, int entries, global const int* restrict slice_begin, global const int* restrict row_length,
-                          global const int* restrict triangles, global const float* restrict factors, global const float* restrict areas,
-                          global float* restrict mantissas, global int* restrict exponents, global float* restrict weights,
-                          global float* restrict inverse_roots, global int* restrict half_exponents, global int* restrict largest, local int* values) {
+// Multiplies each entry's weight by (A_left + A_right) * factor, where factor = 1 / A3^alpha, unless `is_frozen`:
+// weights as they are. Then sums each row of the slice: d = 4^half_exponent / inverse_root^2, poles included. values:
+// work space of a group, VSM_SLICE.
+VSM_ONCE void weigh_slice(int slice, int is_frozen, int entries, global const int* restrict slice_begin,
+                          global const int* restrict row_length, global const int* restrict triangles,
+                          global const float* restrict factors, global const float* restrict areas,
+                          global float* restrict mantissas, global int* restrict exponents,
+                          global float* restrict weights, global float* restrict inverse_roots,
+                          global int* restrict half_exponents, global int* restrict largest, local int* values) {
   const int first = slice * VSM_SLICE + get_local_id(0), longest = longest_row(row_length, first);
   int half_exponent[VSM_LANES];
   for (int i = 0; i < VSM_LANES; ++i) half_exponent[i] = INT_MIN;
@@ -138,11 +145,13 @@ VSM_ONCE void weigh_slice(int slice, int is_frozen, int entries, global const in
         const int e = begin + i;
         int shift, exponent;
         // A common factor of all weights does not count; this one keeps the smallest areas away from a float's end.
-        const float grown = split_float((areas[triangles[e]] + areas[triangles[entries + e]]) * (0x1p40f * factors[e]), &shift);
+        const float grown =
+            split_float((areas[triangles[e]] + areas[triangles[entries + e]]) * (0x1p40f * factors[e]), &shift);
         mantissas[e] = split_float(mantissas[e] * grown, &exponent);
         exponents[e] += shift + exponent;
       }
-    for (int i = 0; i < VSM_LANES; ++i) half_exponent[i] = k < row_length[first + i] ? max(half_exponent[i], exponents[begin + i]) : half_exponent[i];
+    for (int i = 0; i < VSM_LANES; ++i)
+      half_exponent[i] = k < row_length[first + i] ? max(half_exponent[i], exponents[begin + i]) : half_exponent[i];
   }
   float sum[VSM_LANES];
   for (int i = 0; i < VSM_LANES; ++i) {
@@ -153,7 +162,8 @@ VSM_ONCE void weigh_slice(int slice, int is_frozen, int entries, global const in
     const int begin = entry_index(slice_begin, first, k);
     for (int i = 0; i < VSM_LANES; ++i) {
       const int is_entry = k < row_length[first + i];
-      const float weight = is_entry ? mantissas[begin + i] * power_of_two(exponents[begin + i] - 2 * half_exponent[i]) : 0.0f;
+      const float weight =
+          is_entry ? mantissas[begin + i] * power_of_two(exponents[begin + i] - 2 * half_exponent[i]) : 0.0f;
       weights[begin + i] = weight;
       sum[i] += weight;
     }
@@ -166,44 +176,52 @@ VSM_ONCE void weigh_slice(int slice, int is_frozen, int entries, global const in
 }
 
 // Weighs the rows of all slices.
-// In: frozen (per slice: first solve, or a chart that has stopped), triangles (2 planes of `entries`: the two at the edge), factors. In and out:
-// mantissas, exponents. Out: weights in units of 4^half_exponent; inverse_roots, half_exponents; largest (per chart, INT_MIN before), the largest
-// of these.
-// NDRange: slices, in groups of VSM_SLICE / VSM_LANES.
+// In: frozen (per slice: first solve, or a chart that has stopped), triangles (2 planes of `entries`: the two at the
+// edge), factors. In and out: mantissas, exponents. Out: weights in units of 4^half_exponent; inverse_roots,
+// half_exponents; largest (per chart, INT_MIN before), the largest of these. NDRange: slices, in groups of VSM_SLICE /
+// VSM_LANES.
 kernel VSM_GROUP void weigh_rows(int entries, global const int* restrict frozen, global const int* restrict slice_chart,
-                                 global const int* restrict slice_begin, global const int* restrict row_length, global const int* restrict triangles,
-                                 global const float* restrict factors, global const float* restrict areas, global float* restrict mantissas,
-                                 global int* restrict exponents, global float* restrict weights, global float* restrict inverse_roots,
-                                 global int* restrict half_exponents, global int* restrict largest) {
+                                 global const int* restrict slice_begin, global const int* restrict row_length,
+                                 global const int* restrict triangles, global const float* restrict factors,
+                                 global const float* restrict areas, global float* restrict mantissas,
+                                 global int* restrict exponents, global float* restrict weights,
+                                 global float* restrict inverse_roots, global int* restrict half_exponents,
+                                 global int* restrict largest) {
   const int slice = get_group_id(0);
   local int values[VSM_SLICE];
-  weigh_slice(slice, frozen[slice], entries, slice_begin, row_length, triangles, factors, areas, mantissas, exponents, weights, inverse_roots,
-              half_exponents, largest + slice_chart[slice], values);
+  weigh_slice(slice, frozen[slice], entries, slice_begin, row_length, triangles, factors, areas, mantissas, exponents,
+              weights, inverse_roots, half_exponents, largest + slice_chart[slice], values);
 }
 
-// How far each inner vertex of a slice is from the weighted mean of its neighbours, from differences of neighbours, so that it is accurate relative
-// to them however small they are. largest: of the slice's chart.
-VSM_ONCE void form_residual_of_slice(int slice, global const int* restrict slice_begin, global const int* restrict row_length,
-                                     global const int* restrict column, global const char* restrict jumps, global const float* restrict weights,
-                                     global const float* restrict inverse_roots, global const int* restrict half_exponents, int largest,
-                                     global const float* restrict map, global float* restrict roots, global float* restrict residual,
-                                     global int* restrict ratio_of_chart, local int* values) {
+// How far each inner vertex of a slice is from the weighted mean of its neighbours, from differences of neighbours, so
+// that it is accurate relative to them however small they are. largest: of the slice's chart.
+VSM_ONCE void form_residual_of_slice(int slice, global const int* restrict slice_begin,
+                                     global const int* restrict row_length, global const int* restrict column,
+                                     global const char* restrict jumps, global const float* restrict weights,
+                                     global const float* restrict inverse_roots,
+                                     global const int* restrict half_exponents, int largest,
+                                     global const float* restrict map, global float* restrict roots,
+                                     global float* restrict residual, global int* restrict ratio_of_chart,
+                                     local int* values) {
   const int first = slice * VSM_SLICE + get_local_id(0);
   float sums[2 * VSM_LANES], totals[2 * VSM_LANES];  // of u and v for each row
 #ifdef VSM_SINGLE
   // Four rows at once: a neighbour's map is one load, where eight rows side by side would gather each of its parts.
   for (int i = 0; i < VSM_LANES; i += 4) {
-    const int row = first + i, longest = max(max(row_length[row], row_length[row + 1]), max(row_length[row + 2], row_length[row + 3]));
+    const int row = first + i,
+              longest = max(max(row_length[row], row_length[row + 1]), max(row_length[row + 2], row_length[row + 3]));
     const float8 own_low = vload8(0, map + 4 * row), own_high = vload8(0, map + 4 * row + 8);
     const float8 own_u = (float8)(own_low.s0145, own_high.s0145), own_v = (float8)(own_low.s2367, own_high.s2367);
     float8 sum = 0.0f, total = 0.0f;
     for (int k = 0; k < longest; ++k) {
       const int e = entry_index(slice_begin, row, k);
-      const float4 at0 = vload4(column[e], map), at1 = vload4(column[e + 1], map), at2 = vload4(column[e + 2], map), at3 = vload4(column[e + 3], map);
+      const float4 at0 = vload4(column[e], map), at1 = vload4(column[e + 1], map), at2 = vload4(column[e + 2], map),
+                   at3 = vload4(column[e + 3], map);
       const int4 jump = convert_int4(vload4(0, jumps + e));
       // Weights of padding are 0.
       const float4 weight_u = vload4(0, weights + e), weight_v = jump == VSM_POLE ? (float4)0.0f : weight_u;
-      const float8 jump_v = (float8)((float4)0.0f, convert_float4(jump)).s04152637, weight = (float8)(weight_u, weight_v).s04152637;
+      const float8 jump_v = (float8)((float4)0.0f, convert_float4(jump)).s04152637,
+                   weight = (float8)(weight_u, weight_v).s04152637;
       const float8 value = weight * lifted_differences(own_u, own_v, (float8)(at0.xy, at1.xy, at2.xy, at3.xy),
                                                        (float8)(at0.zw, at1.zw, at2.zw, at3.zw), jump_v);
       sum += value;
@@ -234,37 +252,41 @@ VSM_ONCE void form_residual_of_slice(int slice, global const int* restrict slice
     roots[row] = root;
     residual[2 * row] = u * root;
     residual[2 * row + 1] = v * root;
-    const float ratio_u = fabs(u) / (totals[2 * i] * over + 1e-13f), ratio_v = fabs(v) / (totals[2 * i + 1] * over + 1e-13f);
+    const float ratio_u = fabs(u) / (totals[2 * i] * over + 1e-13f),
+                ratio_v = fabs(v) / (totals[2 * i + 1] * over + 1e-13f);
     ratio[i] = max(as_int(ratio_u), as_int(ratio_v));
   }
   raise_to_largest(values, ratio, ratio_of_chart);
 }
 
 // Residuals of all slices.
-// Out: roots_i = sqrt(d_i) in units of about the chart's largest; residual, of the system that these scale to a unit diagonal;
-// ratios (per chart, 0 before): the largest |x_i - mean| / mean |x_i - x_j|, as bits of a float, which order like integers.
-// NDRange: slices, in groups of VSM_SLICE / VSM_LANES.
-kernel VSM_GROUP void form_residual(global const int* restrict slice_chart, global const int* restrict slice_begin, global const int* restrict row_length,
-                                    global const int* restrict column, global const char* restrict jumps, global const float* restrict weights,
-                                    global const float* restrict inverse_roots, global const int* restrict half_exponents,
-                                    global const int* restrict largest, global const float* restrict map, global float* restrict roots,
+// Out: roots_i = sqrt(d_i) in units of about the chart's largest; residual, of the system that these scale to a unit
+// diagonal; ratios (per chart, 0 before): the largest |x_i - mean| / mean |x_i - x_j|, as bits of a float, which order
+// like integers. NDRange: slices, in groups of VSM_SLICE / VSM_LANES.
+kernel VSM_GROUP void form_residual(global const int* restrict slice_chart, global const int* restrict slice_begin,
+                                    global const int* restrict row_length, global const int* restrict column,
+                                    global const char* restrict jumps, global const float* restrict weights,
+                                    global const float* restrict inverse_roots,
+                                    global const int* restrict half_exponents, global const int* restrict largest,
+                                    global const float* restrict map, global float* restrict roots,
                                     global float* restrict residual, global int* restrict ratios) {
   const int slice = get_group_id(0), chart = slice_chart[slice];
   local int values[VSM_SLICE];
-  form_residual_of_slice(slice, slice_begin, row_length, column, jumps, weights, inverse_roots, half_exponents, largest[chart], map, roots, residual,
-                         ratios + chart, values);
+  form_residual_of_slice(slice, slice_begin, row_length, column, jumps, weights, inverse_roots, half_exponents,
+                         largest[chart], map, roots, residual, ratios + chart, values);
 }
 
-// Elimination. To eliminate vertex k of the scaled system is to join its neighbours i and j by a_ik a_kj / d_k more (a star becomes a mesh), where
-// d_k, the diagonal entry then, is the sum of a_kj root_j / root_k over all j that are left, the fixed vertices among them. Nothing is
-// ever subtracted (Grassmann, Taksar and Heyman 1985), so every entry is accurate to a few rounding errors of its own, however far apart weights
-// are, and single precision will do.
-// Vertices are eliminated by fronts (Duff and Reid 1983). A front is a dense matrix of its pivots and its boundary, the sum of entries of the
-// system and of what its children have left between their boundaries. It keeps its pivots' rows, of which columns up to a row's own
-// are 0; its boundary's rows go to its parent. Of these only tiles on and above the diagonal are kept.
+// Elimination. To eliminate vertex k of the scaled system is to join its neighbours i and j by a_ik a_kj / d_k more (a
+// star becomes a mesh), where d_k, the diagonal entry then, is the sum of a_kj root_j / root_k over all j that are
+// left, the fixed vertices among them. Nothing is ever subtracted (Grassmann, Taksar and Heyman 1985), so every entry
+// is accurate to a few rounding errors of its own, however far apart weights are, and single precision will do.
+// Vertices are eliminated by fronts (Duff and Reid 1983). A front is a dense matrix of its pivots and its boundary, the
+// sum of entries of the system and of what its children have left between their boundaries. It keeps its pivots' rows,
+// of which columns up to a row's own are 0; its boundary's rows go to its parent. Of these only tiles on and above the
+// diagonal are kept.
 //
-// A task is a run of fronts that one work-group takes one by one: a subtree. Tasks of one stage are independent; parents are in the same task or in a
-// later stage.
+// A task is a run of fronts that one work-group takes one by one: a subtree. Tasks of one stage are independent;
+// parents are in the same task or in a later stage.
 
 #ifdef VSM_SINGLE
 float8 sums_of_pairs(float8 a, float8 b) { return (float8)(a.even + a.odd, b.even + b.odd); }
@@ -278,7 +300,8 @@ float sum8(float8 x) { return ((x.s0 + x.s1) + (x.s2 + x.s3)) + ((x.s4 + x.s5) +
 #endif
 
 // target[k] (0 if `is_new`) += row k of a tile's rows times x, both from `begin` to `end`.
-void multiply_rows(global const float* rows, int width, int begin, int end, global const float* x, int is_new, global float* target) {
+void multiply_rows(global const float* rows, int width, int begin, int end, global const float* x, int is_new,
+                   global float* target) {
 #ifdef VSM_SINGLE
   float8 sums[VSM_TILE];
 #pragma unroll
@@ -293,15 +316,16 @@ void multiply_rows(global const float* rows, int width, int begin, int end, glob
 #else
   for (int k = VSM_ITEM; k < VSM_TILE; k += VSM_ITEMS) {
     float8 sum = 0.0f;
-    for (int column = begin; column < end; column += VSM_TILE) sum += vload8(0, rows + k * width + column) * vload8(0, x + column);
+    for (int column = begin; column < end; column += VSM_TILE)
+      sum += vload8(0, rows + k * width + column) * vload8(0, x + column);
     target[k] = is_new ? sum8(sum) : target[k] + sum8(sum);
   }
 #endif
 }
 
 // The same of two vectors, without `is_new`: rows are read once.
-void multiply_rows_twice(global const float* rows, int width, int begin, int end, global const float* u, global const float* v, global float* target_u,
-                         global float* target_v) {
+void multiply_rows_twice(global const float* rows, int width, int begin, int end, global const float* u,
+                         global const float* v, global float* target_u, global float* target_v) {
 #ifdef VSM_SINGLE
   float8 sums_u[VSM_TILE], sums_v[VSM_TILE];
 #pragma unroll
@@ -323,8 +347,8 @@ void multiply_rows_twice(global const float* rows, int width, int begin, int end
 #endif
 }
 
-// The next task of a queue, the same for all work-items of a group: any number of groups will do and none waits for another. Which group takes which
-// task has no influence on results.
+// The next task of a queue, the same for all work-items of a group: any number of groups will do and none waits for
+// another. Which group takes which task has no influence on results.
 int take_task(global int* queue, local int* taken) {
   VSM_BARRIER();
   if (VSM_ITEM == 0) *taken = atomic_inc(queue);
@@ -340,10 +364,10 @@ int rest_row(int width, int row) {
   return above * width - above / 2 * (above - VSM_TILE) + (row - above) * (width - above) - above;
 }
 
-// target, a tile (0 if `is_new`), += what the elimination of `pivots` vertices joins its rows and columns by. rows: the pivots' rows, from the first
-// column on.
-void update_tile(global const float* rows, int width, global const float* inverse, int pivots, int row, int column, int is_new, global float* target,
-                 int stride) {
+// target, a tile (0 if `is_new`), += what the elimination of `pivots` vertices joins its rows and columns by. rows: the
+// pivots' rows, from the first column on.
+void update_tile(global const float* rows, int width, global const float* inverse, int pivots, int row, int column,
+                 int is_new, global float* target, int stride) {
   float8 sums[VSM_TILE];
 #pragma unroll
   for (int i = 0; i < VSM_TILE; ++i) sums[i] = is_new ? (float8)0.0f : vload8(0, target + i * stride);
@@ -365,7 +389,7 @@ typedef struct FrontView {
   global float* root;           // of the columns: roots; 1 for the fixed column
   global float* u;              // residual, what is carried up, or solution
   global float* v;
-  global float* inverse;        // 1 / d of the pivots
+  global float* inverse;  // 1 / d of the pivots
 } FrontView;
 
 FrontView view_front(global const FrontRecord* front, global float* matrices, global float* vectors) {
@@ -386,7 +410,8 @@ FrontView view_front(global const FrontRecord* front, global float* matrices, gl
 VSM_ONCE void add_child(FrontView to, FrontView from, int begin, int end, int boundary, global const int* columns) {
   for (int i = begin + VSM_ITEM; i < end; i += VSM_ITEMS) {
     global const float* source = from.rest + rest_row(from.boundary, i);
-    global float* row = columns[i] < to.pivots ? to.rows + columns[i] * to.width : to.rest + rest_row(to.boundary, columns[i] - to.pivots) - to.pivots;
+    global float* row = columns[i] < to.pivots ? to.rows + columns[i] * to.width
+                                               : to.rest + rest_row(to.boundary, columns[i] - to.pivots) - to.pivots;
     for (int j = i + 1; j < boundary; ++j) row[columns[j]] += source[j];
   }
 }
@@ -436,8 +461,8 @@ VSM_ONCE void factor(FrontView front) {
   // What joins the boundary's vertices then; its memory is not written before.
   for (int i = 0; i < front.boundary; i += VSM_TILE)
     for (int j = i + lane * VSM_TILE; j < front.boundary; j += lanes * VSM_TILE)
-      update_tile(front.rows, width, inverse, front.pivots, front.pivots + i, front.pivots + j, 1, front.rest + rest_row(front.boundary, i) + j,
-                  front.boundary - i);
+      update_tile(front.rows, width, inverse, front.pivots, front.pivots + i, front.pivots + j, 1,
+                  front.rest + rest_row(front.boundary, i) + j, front.boundary - i);
 }
 
 // Carries the pivots' residuals to the boundary.
@@ -479,13 +504,17 @@ VSM_ONCE void carry_up(FrontView front) {
   }
 }
 
-// Factors fronts from begin to end (if `is_new`: the weights have changed), all of one chart, and carries the residual up from children to parents.
-VSM_ONCE void eliminate(int begin, int end, int is_new, global const FrontRecord* restrict fronts, global const int* restrict children,
-                        global const int* restrict boundary_rows, global const int* restrict parent_columns, global const int* restrict slice_begin,
-                        global const int* restrict later_end, global const int* restrict fixed_end, global const int* restrict neighbour,
-                        global const char* restrict jumps, global const int* restrict entry_columns, global const float* restrict mantissas,
-                        global const int* restrict exponents, global const float* restrict weights, global const float* restrict inverse_roots,
-                        global const int* restrict half_exponents, global const float* restrict roots, global const float2* restrict residual,
+// Factors fronts from begin to end (if `is_new`: the weights have changed), all of one chart, and carries the residual
+// up from children to parents.
+VSM_ONCE void eliminate(int begin, int end, int is_new, global const FrontRecord* restrict fronts,
+                        global const int* restrict children, global const int* restrict boundary_rows,
+                        global const int* restrict parent_columns, global const int* restrict slice_begin,
+                        global const int* restrict later_end, global const int* restrict fixed_end,
+                        global const int* restrict neighbour, global const char* restrict jumps,
+                        global const int* restrict entry_columns, global const float* restrict mantissas,
+                        global const int* restrict exponents, global const float* restrict weights,
+                        global const float* restrict inverse_roots, global const int* restrict half_exponents,
+                        global const float* restrict roots, global const float2* restrict residual,
                         global float* restrict matrices, global float* restrict vectors) {
   const int lane = VSM_ITEM, lanes = VSM_ITEMS;
   for (int f = begin; f < end; ++f) {
@@ -498,7 +527,10 @@ VSM_ONCE void eliminate(int begin, int end, int is_new, global const FrontRecord
           vstore8(0.0f, 0, front.rows + k * front.width + column);
       for (int j = lane; j < front.width; j += lanes) {
         const int i = j - front.pivots;
-        front.root[j] = j < pivots ? roots[first + j] : j == fixed_column ? 1.0f : i >= 0 && j < fixed_column ? roots[boundary_rows[record->list + i]] : 0.0f;
+        front.root[j] = j < pivots                   ? roots[first + j]
+                        : j == fixed_column          ? 1.0f
+                        : i >= 0 && j < fixed_column ? roots[boundary_rows[record->list + i]]
+                                                     : 0.0f;
       }
       VSM_BARRIER();
       for (int k = lane; k < pivots; k += lanes) {
@@ -510,7 +542,8 @@ VSM_ONCE void eliminate(int begin, int end, int is_new, global const FrontRecord
           // Not from weights, of which one row's may be too small for a float.
           const int e = entry_index(slice_begin, row, n), j = neighbour[e];
           front.rows[k * front.width + entry_columns[e]] =
-              mantissas[e] * (inverse_root * inverse_roots[j]) * power_of_two(exponents[e] - half_exponents[row] - half_exponents[j]);
+              mantissas[e] * (inverse_root * inverse_roots[j]) *
+              power_of_two(exponents[e] - half_exponents[row] - half_exponents[j]);
         }
         for (; n < fixed_end[row]; ++n) {
           const int e = entry_index(slice_begin, row, n);
@@ -521,14 +554,16 @@ VSM_ONCE void eliminate(int begin, int end, int is_new, global const FrontRecord
       VSM_BARRIER();
       for (int c = record->child_begin; c < record->child_end; ++c) {
         global const FrontRecord* child = fronts + children[c];
-        add_child(front, view_front(child, matrices, vectors), 0, child->shared, child->boundary, parent_columns + child->list);
+        add_child(front, view_front(child, matrices, vectors), 0, child->shared, child->boundary,
+                  parent_columns + child->list);
         VSM_BARRIER();
       }
       factor(front);
       VSM_BARRIER();
       for (int c = record->child_begin; c < record->child_end; ++c) {
         global const FrontRecord* child = fronts + children[c];
-        add_child(front, view_front(child, matrices, vectors), child->shared, child->boundary - 1, child->boundary, parent_columns + child->list);
+        add_child(front, view_front(child, matrices, vectors), child->shared, child->boundary - 1, child->boundary,
+                  parent_columns + child->list);
         VSM_BARRIER();
       }
     }
@@ -553,35 +588,37 @@ VSM_ONCE void eliminate(int begin, int end, int is_new, global const FrontRecord
 }
 
 // Eliminates the fronts of tasks, for the charts whose ratio is above `tolerance`.
-// In: tasks (first front and end, 2 ints each), from task_begin to task_end; queue, the one of `queues` to take them from (0); fronts and children
-// (see vsm_structs.h); boundary_rows (the last of a front, the fixed column, has none); parent_columns, the columns of the parent; later_end,
-// fixed_end: entries of a row whose neighbours are eliminated later, and these and fixed ones; entry_columns: of the first, the column in the front
-// of its row.
-// In and out: matrices; vectors, 4 rows per front (see FrontView). NDRange: any number of work-groups.
-kernel VSM_GROUP void eliminate_fronts(int is_new, float tolerance, int task_begin, int task_end, global const int* restrict tasks, int queue,
-                                       global int* restrict queues, global const FrontRecord* restrict fronts, global const int* restrict children,
-                                       global const int* restrict boundary_rows, global const int* restrict parent_columns,
-                                       global const int* restrict slice_begin, global const int* restrict later_end,
-                                       global const int* restrict fixed_end, global const int* restrict neighbour,
-                                       global const char* restrict jumps, global const int* restrict entry_columns,
-                                       global const float* restrict mantissas, global const int* restrict exponents,
-                                       global const float* restrict weights, global const float* restrict inverse_roots,
-                                       global const int* restrict half_exponents, global const float* restrict roots,
-                                       global const float2* restrict residual, global const int* restrict ratios, global float* restrict matrices,
-                                       global float* restrict vectors) {
+// In: tasks (first front and end, 2 ints each), from task_begin to task_end; queue, the one of `queues` to take them
+// from (0); fronts and children (see vsm_structs.h); boundary_rows (the last of a front, the fixed column, has none);
+// parent_columns, the columns of the parent; later_end, fixed_end: entries of a row whose neighbours are eliminated
+// later, and these and fixed ones; entry_columns: of the first, the column in the front of its row. In and out:
+// matrices; vectors, 4 rows per front (see FrontView). NDRange: any number of work-groups.
+kernel VSM_GROUP void eliminate_fronts(
+    int is_new, float tolerance, int task_begin, int task_end, global const int* restrict tasks, int queue,
+    global int* restrict queues, global const FrontRecord* restrict fronts, global const int* restrict children,
+    global const int* restrict boundary_rows, global const int* restrict parent_columns,
+    global const int* restrict slice_begin, global const int* restrict later_end, global const int* restrict fixed_end,
+    global const int* restrict neighbour, global const char* restrict jumps, global const int* restrict entry_columns,
+    global const float* restrict mantissas, global const int* restrict exponents, global const float* restrict weights,
+    global const float* restrict inverse_roots, global const int* restrict half_exponents,
+    global const float* restrict roots, global const float2* restrict residual, global const int* restrict ratios,
+    global float* restrict matrices, global float* restrict vectors) {
   local int taken;
-  for (int task = task_begin + take_task(queues + queue, &taken); task < task_end; task = task_begin + take_task(queues + queue, &taken)) {
+  for (int task = task_begin + take_task(queues + queue, &taken); task < task_end;
+       task = task_begin + take_task(queues + queue, &taken)) {
     const int begin = tasks[2 * task], end = tasks[2 * task + 1];
     if (as_float(ratios[fronts[begin].chart]) > tolerance)
-      eliminate(begin, end, is_new, fronts, children, boundary_rows, parent_columns, slice_begin, later_end, fixed_end, neighbour, jumps, entry_columns,
-                mantissas, exponents, weights, inverse_roots, half_exponents, roots, residual, matrices, vectors);
+      eliminate(begin, end, is_new, fronts, children, boundary_rows, parent_columns, slice_begin, later_end, fixed_end,
+                neighbour, jumps, entry_columns, mantissas, exponents, weights, inverse_roots, half_exponents, roots,
+                residual, matrices, vectors);
   }
 }
 
-// The way back, from parents to children: solves for the pivots of fronts from the last of them on, and adds the result to the map; the rounding
-// error of the sum is kept in its second part.
-VSM_ONCE void substitute(int begin, int end, global const FrontRecord* restrict fronts, global const int* restrict boundary_rows,
-                         global const float* restrict roots, global float* restrict matrices, global float* restrict vectors,
+// The way back, from parents to children: solves for the pivots of fronts from the last of them on, and adds the result
+// to the map; the rounding error of the sum is kept in its second part.
+VSM_ONCE void substitute(int begin, int end, global const FrontRecord* restrict fronts,
+                         global const int* restrict boundary_rows, global const float* restrict roots,
+                         global float* restrict matrices, global float* restrict vectors,
                          global float* restrict solution, global float* restrict map) {
   const int lane = VSM_ITEM, lanes = VSM_ITEMS;
   for (int f = end - 1; f >= begin; --f) {
@@ -633,12 +670,15 @@ VSM_ONCE void substitute(int begin, int end, global const FrontRecord* restrict 
 }
 
 // The way back of the same tasks. In and out: vectors, map. Work space: solution (2 floats per vertex).
-kernel VSM_GROUP void substitute_back(float tolerance, int task_begin, int task_end, global const int* restrict tasks, int queue, global int* restrict queues,
-                                      global const FrontRecord* restrict fronts, global const int* restrict boundary_rows,
-                                      global const float* restrict roots, global const int* restrict ratios, global float* restrict matrices,
-                                      global float* restrict vectors, global float* restrict solution, global float* restrict map) {
+kernel VSM_GROUP void substitute_back(float tolerance, int task_begin, int task_end, global const int* restrict tasks,
+                                      int queue, global int* restrict queues, global const FrontRecord* restrict fronts,
+                                      global const int* restrict boundary_rows, global const float* restrict roots,
+                                      global const int* restrict ratios, global float* restrict matrices,
+                                      global float* restrict vectors, global float* restrict solution,
+                                      global float* restrict map) {
   local int taken;
-  for (int task = task_begin + take_task(queues + queue, &taken); task < task_end; task = task_begin + take_task(queues + queue, &taken)) {
+  for (int task = task_begin + take_task(queues + queue, &taken); task < task_end;
+       task = task_begin + take_task(queues + queue, &taken)) {
     const int begin = tasks[2 * task], end = tasks[2 * task + 1];
     if (as_float(ratios[fronts[begin].chart]) > tolerance)
       substitute(begin, end, fronts, boundary_rows, roots, matrices, vectors, solution, map);
@@ -646,23 +686,23 @@ kernel VSM_GROUP void substitute_back(float tolerance, int task_begin, int task_
 }
 
 #ifdef VSM_SINGLE
-// The same for charts of moderate size, each from its first weights to its last solution by one work-item: what it needs stays in a processor's cache,
-// and it waits for no other chart.
-// In: charts, largest first; queue (0). In and out: steps (per chart, 0), of the solver. All else as for the kernels above. NDRange: any number of
-// work-groups.
-kernel VSM_GROUP void map_charts(int iterations, float intermediate_tolerance, float tolerance, int max_steps, int chart_count,
-                                 global const ChartRecord* restrict charts, global int* restrict queue, int entries, int triangles,
-                                 global const int* restrict slice_begin, global const int* restrict row_length, global const int* restrict later_end,
-                                 global const int* restrict fixed_end, global const int* restrict columns, global const int* restrict entry_triangles,
-                                 global const int* restrict entry_columns, global const char* restrict jumps, global const float* restrict factors,
-                                 global const int* restrict corners, global const char* restrict corner_jumps,
-                                 global const FrontRecord* restrict fronts, global const int* restrict children,
-                                 global const int* restrict boundary_rows, global const int* restrict parent_columns, global float* restrict areas,
-                                 global float* restrict mantissas, global int* restrict exponents, global float* restrict weights,
-                                 global float* restrict inverse_roots, global float* restrict roots, global int* restrict half_exponents,
-                                 global float* restrict residual, global float* restrict solution, global float* restrict matrices,
-                                 global float* restrict vectors, global float* restrict map, global int* restrict largest,
-                                 global int* restrict ratios, global int* restrict steps) {
+// The same for charts of moderate size, each from its first weights to its last solution by one work-item: what it
+// needs stays in a processor's cache, and it waits for no other chart. In: charts, largest first; queue (0). In and
+// out: steps (per chart, 0), of the solver. All else as for the kernels above. NDRange: any number of work-groups.
+kernel VSM_GROUP void map_charts(
+    int iterations, float intermediate_tolerance, float tolerance, int max_steps, int chart_count,
+    global const ChartRecord* restrict charts, global int* restrict queue, int entries, int triangles,
+    global const int* restrict slice_begin, global const int* restrict row_length, global const int* restrict later_end,
+    global const int* restrict fixed_end, global const int* restrict columns,
+    global const int* restrict entry_triangles, global const int* restrict entry_columns,
+    global const char* restrict jumps, global const float* restrict factors, global const int* restrict corners,
+    global const char* restrict corner_jumps, global const FrontRecord* restrict fronts,
+    global const int* restrict children, global const int* restrict boundary_rows,
+    global const int* restrict parent_columns, global float* restrict areas, global float* restrict mantissas,
+    global int* restrict exponents, global float* restrict weights, global float* restrict inverse_roots,
+    global float* restrict roots, global int* restrict half_exponents, global float* restrict residual,
+    global float* restrict solution, global float* restrict matrices, global float* restrict vectors,
+    global float* restrict map, global int* restrict largest, global int* restrict ratios, global int* restrict steps) {
   local int taken, values[VSM_SLICE];
   for (int task = take_task(queue, &taken); task < chart_count; task = take_task(queue, &taken)) {
     const ChartRecord record = charts[task];
@@ -672,22 +712,24 @@ kernel VSM_GROUP void map_charts(int iterations, float intermediate_tolerance, f
       const float wanted = is_last ? tolerance : intermediate_tolerance;
       largest[chart] = INT_MIN;
       for (int slice = record.slice_begin; slice < record.slice_end; ++slice)
-        weigh_slice(slice, iteration == 0, entries, slice_begin, row_length, entry_triangles, factors, areas, mantissas, exponents, weights,
-                    inverse_roots, half_exponents, largest + chart, values);
+        weigh_slice(slice, iteration == 0, entries, slice_begin, row_length, entry_triangles, factors, areas, mantissas,
+                    exponents, weights, inverse_roots, half_exponents, largest + chart, values);
       for (int step = 0;; ++step) {
         ratios[chart] = 0;
         for (int slice = record.slice_begin; slice < record.slice_end; ++slice)
-          form_residual_of_slice(slice, slice_begin, row_length, columns, jumps, weights, inverse_roots, half_exponents, largest[chart], map, roots,
-                                 residual, ratios + chart, values);
+          form_residual_of_slice(slice, slice_begin, row_length, columns, jumps, weights, inverse_roots, half_exponents,
+                                 largest[chart], map, roots, residual, ratios + chart, values);
         if (as_float(ratios[chart]) <= wanted || step == max_steps) break;
         ++steps[chart];
-        eliminate(record.front_begin, record.front_end, step == 0, fronts, children, boundary_rows, parent_columns, slice_begin, later_end, fixed_end,
-                  columns, jumps, entry_columns, mantissas, exponents, weights, inverse_roots, half_exponents, roots, (global const float2*)residual,
-                  matrices, vectors);
-        substitute(record.front_begin, record.front_end, fronts, boundary_rows, roots, matrices, vectors, solution, map);
+        eliminate(record.front_begin, record.front_end, step == 0, fronts, children, boundary_rows, parent_columns,
+                  slice_begin, later_end, fixed_end, columns, jumps, entry_columns, mantissas, exponents, weights,
+                  inverse_roots, half_exponents, roots, (global const float2*)residual, matrices, vectors);
+        substitute(record.front_begin, record.front_end, fronts, boundary_rows, roots, matrices, vectors, solution,
+                   map);
       }
       if (is_last) break;
-      measure_mapped(record.triangle_begin, record.triangle_end, triangles, corners, corner_jumps, (global const float4*)map, areas);
+      measure_mapped(record.triangle_begin, record.triangle_end, triangles, corners, corner_jumps,
+                     (global const float4*)map, areas);
     }
   }
 }

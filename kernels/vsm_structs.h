@@ -13,20 +13,23 @@
 namespace skeletex {
 #endif
 
-/// Vertices that are eliminated together, and what comes of it: a dense matrix whose columns are first the pivots, then the boundary, both padded.
+/// Vertices that are eliminated together, and what comes of it: a dense matrix whose columns are first the pivots, then
+/// the boundary, both padded.
 typedef struct FrontRecord {
   SKELETEX_INT chart;
-  SKELETEX_INT axes;         ///< 1: of the system of u; 2: of v; 3: of both, which are the same here
-  SKELETEX_INT first;        ///< the pivots are rows first to first + pivots - 1 of the system
+  SKELETEX_INT axes;   ///< 1: of the system of u; 2: of v; 3: of both, which are the same here
+  SKELETEX_INT first;  ///< the pivots are rows first to first + pivots - 1 of the system
   SKELETEX_INT pivots;
-  SKELETEX_INT boundary;     ///< vertices that come later and are neighbours; the last column stands for all fixed vertices
-  SKELETEX_INT list;         ///< first entry of the boundary in `boundary_rows` and `parent_columns`
-  SKELETEX_INT shared;       ///< so many of these, the first, are pivots of the parent
-  SKELETEX_INT child_begin;  ///< fronts whose boundaries lie in this front: children[child_begin] to children[child_end - 1]
+  SKELETEX_INT
+      boundary;         ///< vertices that come later and are neighbours; the last column stands for all fixed vertices
+  SKELETEX_INT list;    ///< first entry of the boundary in `boundary_rows` and `parent_columns`
+  SKELETEX_INT shared;  ///< so many of these, the first, are pivots of the parent
+  SKELETEX_INT
+      child_begin;  ///< fronts whose boundaries lie in this front: children[child_begin] to children[child_end - 1]
   SKELETEX_INT child_end;
-  SKELETEX_INT rows;         ///< the pivots' rows in `matrices`, in tiles' rows (VSM_TILE floats)
-  SKELETEX_INT rest;         ///< the boundary's rows there
-  SKELETEX_INT vectors;      ///< four rows of `vectors`, in the same unit
+  SKELETEX_INT rows;     ///< the pivots' rows in `matrices`, in tiles' rows (VSM_TILE floats)
+  SKELETEX_INT rest;     ///< the boundary's rows there
+  SKELETEX_INT vectors;  ///< four rows of `vectors`, in the same unit
 } FrontRecord;
 
 /// A chart, and what of each list is its own.

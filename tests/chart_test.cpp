@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/parameterize/chart.h"
+#include "skeletex/convert/parameterize/chart.h"
 
 #include <gtest/gtest.h>
 
@@ -28,7 +28,8 @@ std::vector<NamedSegment> all_kinds_of_segments() {
   std::mt19937 random(7);
   add("cylinder", revolve(cylinder_profile(9), {.columns = 12}));
   add("smallest tube", revolve(cylinder_profile(2), {.columns = 3}));
-  add("noisy mushroom", revolve(mushroom_profile(15), {.columns = 17, .noise = 0.2, .has_random_diagonals = true, .seed = 3}));
+  add("noisy mushroom",
+      revolve(mushroom_profile(15), {.columns = 17, .noise = 0.2, .has_random_diagonals = true, .seed = 3}));
   add("twisted tube", revolve(cylinder_profile(31), {.columns = 12, .twist_turns = 2.3, .has_random_diagonals = true}));
   add("cap with a vertex at the pole", revolve(cap_profile(12), {.columns = 10}));
   add("noisy cap", revolve(cap_profile(15), {.columns = 11, .noise = 0.1, .seed = 5}));
@@ -52,7 +53,9 @@ std::vector<NamedSegment> all_kinds_of_segments() {
   return all;
 }
 
-Chart chart_of(const MadeSegment& made) { return make_chart(made.segment, made.skeleton, Walls(made.skeleton)); }
+Chart chart_of(const MadeSegment& made) {
+  return make_chart(made.segment, made.skeleton, SeparationPlanes(made.skeleton));
+}
 
 bool is_pole(ChartVertex kind) { return is_twin_pole(kind); }
 
@@ -111,11 +114,12 @@ TEST(Chart, RowsWindOnceInStrictlyGrowingSteps) {
 TEST(Chart, RowsTakeTheAngleAboutTheBone) {
   for (const auto& [name, made] : all_kinds_of_segments()) {
     SCOPED_TRACE(name);
-    const Walls walls(made.skeleton);
-    const Chart chart = make_chart(made.segment, made.skeleton, walls);
+    const SeparationPlanes separation(made.skeleton);
+    const Chart chart = make_chart(made.segment, made.skeleton, separation);
     for (const int e : {0, 1})
       for (const int v : made.segment.loops[e].vertices) {
-        const double angle = walls.turn_of(made.bone(), chart.positions[v] - end_position(made.skeleton, made.bone(), static_cast<BoneEnd>(e)));
+        const double angle = separation.turn_of(
+            made.bone(), chart.positions[v] - end_position(made.skeleton, made.bone(), static_cast<BoneEnd>(e)));
         EXPECT_NEAR(std::remainder(chart.v[v] - angle, 1.0), 0, 1e-15);
       }
   }
@@ -130,7 +134,9 @@ TEST(Chart, SurfaceAndTopologyAreThoseOfTheSegment) {
     const int euler = static_cast<int>(chart.positions.size()) - edges + static_cast<int>(chart.triangles.size());
     const int poles = static_cast<int>(std::count_if(chart.kinds.begin(), chart.kinds.end(), is_pole));
     EXPECT_EQ(euler, poles);
-    EXPECT_EQ(poles, made.segment.topology == SegmentTopology::kAnnulus ? 0 : made.segment.topology == SegmentTopology::kDisk ? 1 : 2);
+    EXPECT_EQ(poles, made.segment.topology == SegmentTopology::kAnnulus ? 0
+                     : made.segment.topology == SegmentTopology::kDisk  ? 1
+                                                                        : 2);
     for (const TwinEdge& e : twin_edges(chart)) {
       EXPECT_LE(e.triangles.size(), 2u);
       if (e.triangles.size() == 2) {
@@ -226,7 +232,8 @@ TEST(Chart, PolesLieWhereTheBoneLeavesTheSurface) {
 
 TEST(Chart, TheLastOfSeveralHitsIsThePole) {
   // A cap with a dent: along the axis only its bottom is hit; moved aside, the ray meets the fold three times.
-  std::vector<ProfilePoint> profile = {{1, 0}, {1, 0.5}, {1, 1}, {0.8, 2}, {0.6, 1.2}, {0.4, 2.2}, {0.2, 2.3}, {0, 2.4}};
+  std::vector<ProfilePoint> profile = {{1, 0},     {1, 0.5},   {1, 1},     {0.8, 2},
+                                       {0.6, 1.2}, {0.4, 2.2}, {0.2, 2.3}, {0, 2.4}};
   profile[4] = {0.75, 2.6};
   profile[5] = {0.2, 2.1};
   profile[6] = {0.5, 3.0};

@@ -86,7 +86,8 @@ class Program : public ::testing::Test {
     if (child == 0) exec(arguments);
     std::string text;
     char buffer[4096];
-    for (::ssize_t count; (count = ::read(terminal, buffer, sizeof(buffer))) > 0;) text.append(buffer, static_cast<std::size_t>(count));
+    for (::ssize_t count; (count = ::read(terminal, buffer, sizeof(buffer))) > 0;)
+      text.append(buffer, static_cast<std::size_t>(count));
     ::close(terminal);
     EXPECT_EQ(code_of(child), 0) << text;
     return text;
@@ -103,25 +104,30 @@ class Program : public ::testing::Test {
     for (const auto& entry : fs::directory_iterator(folder_)) names.insert(entry.path().filename().string());
     return names;
   }
-  /// Runs what must fail: exit code, one message that names every part, nothing on standard output, no file left behind.
-  static void expect_refused(int code, const std::vector<std::string>& arguments, const std::vector<std::string>& parts) {
+  /// Runs what must fail: exit code, one message that names every part, nothing on standard output, no file left
+  /// behind.
+  static void expect_refused(int code, const std::vector<std::string>& arguments,
+                             const std::vector<std::string>& parts) {
     const auto before = files();
     const Outcome outcome = run(arguments);
     std::string line = "skeletex";
     for (const std::string& argument : arguments) line += ' ' + argument;
     EXPECT_EQ(outcome.code, code) << line << '\n' << outcome.err;
     EXPECT_EQ(outcome.out, "") << line;
-    for (const std::string& part : parts) EXPECT_NE(outcome.err.find(part), std::string::npos) << line << ": \"" << part << "\" in\n" << outcome.err;
+    for (const std::string& part : parts)
+      EXPECT_NE(outcome.err.find(part), std::string::npos) << line << ": \"" << part << "\" in\n" << outcome.err;
     EXPECT_EQ(outcome.err.find("terminate"), std::string::npos) << outcome.err;
     EXPECT_EQ(files(), before) << line;
   }
   static void expect_keys(const nlohmann::json& json, const std::vector<std::string>& keys) {
-    for (const std::string& key : keys) EXPECT_TRUE(json.contains(key)) << key << " in\n" << json.dump(1).substr(0, 2000);
+    for (const std::string& key : keys)
+      EXPECT_TRUE(json.contains(key)) << key << " in\n" << json.dump(1).substr(0, 2000);
   }
   static inline fs::path folder_;
 };
 
-const std::vector<std::string> kCommands{"encode", "reconstruct", "filter", "transfer", "lod", "metro", "segment", "validate", "inspect", "devices"};
+const std::vector<std::string> kCommands{"encode", "reconstruct", "filter",   "transfer", "lod",
+                                         "metro",  "segment",     "validate", "inspect",  "devices"};
 
 }  // namespace
 
@@ -144,29 +150,37 @@ TEST_F(Program, SaysItsVersion) { EXPECT_TRUE(run({"--version"}).out.starts_with
 TEST_F(Program, EndsWithTwoOnWrongUsageAndGivesTheNearestName) {
   expect_refused(2, {}, {"skeletex --help"});
   expect_refused(2, {"encoed", "y.ply"}, {"unknown command encoed", "did you mean encode?"});
-  expect_refused(2, {"encode", "--meshod", "vsm"}, {"unknown option --meshod", "did you mean --method?", "skeletex encode --help"});
-  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--iteration=3"}, {"did you mean --iterations?"});
+  expect_refused(2, {"encode", "--meshod", "vsm"},
+                 {"unknown option --meshod", "did you mean --method?", "skeletex encode --help"});
+  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--iteration=3"},
+                 {"did you mean --iterations?"});
   expect_refused(2, {"metro", "y.ply", "y.ply", "--jsno", "-"}, {"did you mean --json?"});
   expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "y.ply", "-q"}, {"-q"});
   expect_refused(2, {"encode", "y.ply", "y.skeleton.json"}, {"--output"});
   expect_refused(2, {"encode", "y.ply", "-o", "a.skx.exr"}, {"SKELETON"});
-  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--method", "hybird"}, {"hybird", "did you mean hybrid?"});
-  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--bone-method", "trunk"}, {"trunk", "BONE=vsm"});
-  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--bone-method", "trunk=vsm"}, {"need --method hybrid"});
-  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--iterations", "many"}, {"--iterations"});
+  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--method", "hybird"},
+                 {"hybird", "did you mean hybrid?"});
+  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--bone-method", "trunk"},
+                 {"trunk", "BONE=vsm"});
+  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--bone-method", "trunk=vsm"},
+                 {"need --method hybrid"});
+  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--iterations", "many"},
+                 {"--iterations"});
   expect_refused(2, {"segment", "y.ply", "y.skeleton.json", "-o", "a.obj"}, {".ply"});
   expect_refused(2, {"metro", "y.ply", "y.ply", "--samples", "0"}, {"--samples"});
 }
 
 TEST_F(Program, RefusesSizesThatAreNone) {
   for (const char* size : {"", "0", "-5", "3", "12x", "x12", "12x3", "512.5", "1e3", "99999", "512x512x3"})
-    expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", std::string("--size=") + size}, {"--size"});
+    expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", std::string("--size=") + size},
+                   {"--size"});
   for (const char* size : {"0", "-5", "3", "many"})
     expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", std::string("--size=") + size}, {"--size"});
 }
 
 TEST_F(Program, EncodesAndReportsWhatTheContractNames) {
-  const nlohmann::json json = json_of({"encode", "y.ply", "y.skeleton.json", "-o", "contract.skx.exr", "--method", "hybrid", "--size", "96x64"});
+  const nlohmann::json json = json_of(
+      {"encode", "y.ply", "y.skeleton.json", "-o", "contract.skx.exr", "--method", "hybrid", "--size", "96x64"});
   expect_keys(json, {"mesh", "bones", "atlas", "times_ms", "device"});
   expect_keys(json["mesh"], {"vertices", "triangles", "diagonal", "genus"});
   expect_keys(json["atlas"], {"size", "used_fraction"});
@@ -175,8 +189,8 @@ TEST_F(Program, EncodesAndReportsWhatTheContractNames) {
   double area = 0;
   long texels = 0;
   for (const auto& bone : json["bones"]) {
-    expect_keys(bone, {"name", "method", "topology", "area", "vertices", "triangles", "rectangle", "unseen_area_fraction", "flipped_triangles",
-                       "sampled_triangle_fraction"});
+    expect_keys(bone, {"name", "method", "topology", "area", "vertices", "triangles", "rectangle",
+                       "unseen_area_fraction", "flipped_triangles", "sampled_triangle_fraction"});
     ASSERT_EQ(bone["rectangle"].size(), 4u);
     area += bone["area"].get<double>();
     texels += bone["rectangle"][2].get<long>() * bone["rectangle"][3].get<long>();
@@ -202,15 +216,19 @@ TEST_F(Program, WritesHalfFloatsNearTheSurface) {
     const nlohmann::json file = json_of({"inspect", "half.skx.exr"});
     EXPECT_EQ(file["encoder"].contains("rounded"), rounding == "surface");
   }
-  EXPECT_LT(of["surface"]["rounding"]["chosen"].get<double>(), 0.5 * of["surface"]["rounding"]["nearest"].get<double>());
+  EXPECT_LT(of["surface"]["rounding"]["chosen"].get<double>(),
+            0.5 * of["surface"]["rounding"]["nearest"].get<double>());
   EXPECT_FALSE(of["nearest"].contains("rounding"));
   EXPECT_LT(means["none"], means["surface"]);
   EXPECT_LT(means["surface"], means["nearest"]);
-  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--rounding", "nearest"}, {"--rounding", "needs --half"});
+  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--rounding", "nearest"},
+                 {"--rounding", "needs --half"});
   // The last one is not rounded: it is made so, alone and with its levels.
   const nlohmann::json later = json_of({"lod", "half.skx.exr", "--size", "128", "--half", "-o", "later.skx.exr"});
-  EXPECT_NEAR(later["rounding"][0]["chosen"].get<double>(), of["surface"]["rounding"]["chosen"].get<double>(), 0.05 * later["rounding"][0]["chosen"].get<double>());
-  EXPECT_LT(fs::file_size(folder_ / "later.skx.exr"), 0.6 * static_cast<double>(fs::file_size(folder_ / "half.skx.exr")));
+  EXPECT_NEAR(later["rounding"][0]["chosen"].get<double>(), of["surface"]["rounding"]["chosen"].get<double>(),
+              0.05 * later["rounding"][0]["chosen"].get<double>());
+  EXPECT_LT(fs::file_size(folder_ / "later.skx.exr"),
+            0.6 * static_cast<double>(fs::file_size(folder_ / "half.skx.exr")));
   EXPECT_EQ(json_of({"lod", "half.skx.exr", "--levels", "--half", "-o", "levels.skx.exr"})["rounding"].size(), 3u);
   EXPECT_EQ(run({"reconstruct", "levels.skx.exr", "--level", "2", "-o", "half.ply"}).code, 0);
   EXPECT_EQ(json_of({"inspect", "half.ply"})["closed_manifold"], true);
@@ -252,29 +270,40 @@ TEST_F(Program, ReconstructsInPosesAndAnimations) {
     return worst;
   };
   EXPECT_GT(difference(positions("posed.ply"), positions("bind.ply")), 0.1);
-  for (const auto& [time, same] : {std::pair{"0", "bind.ply"}, {"-1", "bind.ply"}, {"2", "posed.ply"}, {"7.5", "posed.ply"}}) {
+  for (const auto& [time, same] :
+       {std::pair{"0", "bind.ply"}, {"-1", "bind.ply"}, {"2", "posed.ply"}, {"7.5", "posed.ply"}}) {
     ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "animation.json", "--time", time}).code, 0);
     EXPECT_LT(difference(positions("again.ply"), positions(same)), 1e-5) << time;
   }
-  const nlohmann::json polished = json_of({"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "pose.json", "--polish"});
+  const nlohmann::json polished =
+      json_of({"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "pose.json", "--polish"});
   EXPECT_EQ(polished.at("polish").at("new_folds"), polished.at("pose").at("new_folds"));
   EXPECT_LE(polished.at("polish").at("new_folds"), polished.at("polish").at("new_folds_before"));
-  ASSERT_EQ(run({"render", "y.skx.exr", "-o", "again.png", "--pose", "pose.json", "--polish", "--size", "64x64"}).code, 0);
+  ASSERT_EQ(run({"render", "y.skx.exr", "-o", "again.png", "--pose", "pose.json", "--polish", "--size", "64x64"}).code,
+            0);
   expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--polish"}, {"--pose"});
-  expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--pose", "pose.json", "--polish", "--constant-offset", "0.1"}, {"--polish"});
+  expect_refused(
+      2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--pose", "pose.json", "--polish", "--constant-offset", "0.1"},
+      {"--polish"});
   fs::remove(folder_ / "again.png");
   ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "pose.json", "--deform", "paper"}).code, 0);
   const auto kept = positions("again.ply");
   EXPECT_GT(difference(kept, positions("posed.ply")), 1e-3);
-  ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "pose.json", "--deform", "paper", "--no-distance"}).code, 0);
-  expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "pose.json", "--no-distance"}, {"--no-distance", "--deform paper"});
+  ASSERT_EQ(
+      run({"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "pose.json", "--deform", "paper", "--no-distance"})
+          .code,
+      0);
+  expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "pose.json", "--no-distance"},
+                 {"--no-distance", "--deform paper"});
   EXPECT_GT(difference(positions("again.ply"), kept), 1e-3);
 
   expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--no-distance"}, {"--pose"});
   expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--time", "1"}, {"--pose"});
   std::ofstream(folder_ / "pose.json") << nlohmann::json{{"roll", {{bone + "x", 10}}}};
-  expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--pose", "pose.json"}, {"pose.json", "no bone \"" + bone + "x\"", "did you mean " + bone + "?"});
-  for (const char* name : {"pose.json", "animation.json", "bind.ply", "posed.ply", "again.ply"}) fs::remove(folder_ / name);
+  expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--pose", "pose.json"},
+                 {"pose.json", "no bone \"" + bone + "x\"", "did you mean " + bone + "?"});
+  for (const char* name : {"pose.json", "animation.json", "bind.ply", "posed.ply", "again.ply"})
+    fs::remove(folder_ / name);
 }
 
 TEST_F(Program, ReconstructsAPlaneOfTangentSpace) {
@@ -285,14 +314,18 @@ TEST_F(Program, ReconstructsAPlaneOfTangentSpace) {
   for (const Vec3& p : read_mesh(folder_ / "plane.ply").mesh.positions) {
     double nearest = 1e300;
     for (const Bone& bone : skeleton.bones)
-      nearest = std::min(nearest, distance_to_bone(p, skeleton.nodes[bone.head].position, skeleton.nodes[bone.tail].position));
+      nearest = std::min(nearest,
+                         distance_to_bone(p, skeleton.nodes[bone.head].position, skeleton.nodes[bone.tail].position));
     ASSERT_LT(nearest, 0.05 * diagonal * (1 + 1e-4));
   }
   const std::string bone = skeleton.bones[0].name;
   ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "one.ply", "--constant-offset", "0.05", "--bones", bone}).code, 0);
   for (const Vec3& p : read_mesh(folder_ / "one.ply").mesh.positions)
-    ASSERT_NEAR(distance_to_bone(p, skeleton.nodes[skeleton.bones[0].head].position, skeleton.nodes[skeleton.bones[0].tail].position), 0.05 * diagonal, 1e-4 * diagonal);
-  expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--constant-offset", "0.05", "--bones", "nobody"}, {"no bone \"nobody\""});
+    ASSERT_NEAR(distance_to_bone(p, skeleton.nodes[skeleton.bones[0].head].position,
+                                 skeleton.nodes[skeleton.bones[0].tail].position),
+                0.05 * diagonal, 1e-4 * diagonal);
+  expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--constant-offset", "0.05", "--bones", "nobody"},
+                 {"no bone \"nobody\""});
   expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--bones", bone}, {"--constant-offset"});
   expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--constant-offset", "0"}, {"--constant-offset"});
   for (const char* name : {"plane.ply", "one.ply"}) fs::remove(folder_ / name);
@@ -300,7 +333,8 @@ TEST_F(Program, ReconstructsAPlaneOfTangentSpace) {
 
 TEST_F(Program, FiltersModelsAndReportsWhatTheContractNames) {
   for (const std::string filter : {"smooth", "enhance", "noise"}) {
-    const Outcome outcome = run({"filter", "y.skx.exr", filter, "-o", filter + ".skx.exr", "--bones", y_shape().skeleton.bones[0].name, "--json", "-"});
+    const Outcome outcome = run({"filter", "y.skx.exr", filter, "-o", filter + ".skx.exr", "--bones",
+                                 y_shape().skeleton.bones[0].name, "--json", "-"});
     ASSERT_EQ(outcome.code, 0) << outcome.err;
     const nlohmann::json json = nlohmann::json::parse(outcome.out);
     EXPECT_EQ(json.at("filter"), filter);
@@ -311,14 +345,16 @@ TEST_F(Program, FiltersModelsAndReportsWhatTheContractNames) {
     EXPECT_EQ(run({"inspect", filter + ".skx.exr"}).code, 0);
   }
   ASSERT_EQ(run({"filter", "y.skx.exr", "smooth", "-o", "smooth.ply", "--keep-volume", "--scale", "0.05"}).code, 0);
-  EXPECT_TRUE(nlohmann::json::parse(run({"inspect", "smooth.ply", "--json", "-"}).out).at("closed_manifold").get<bool>());
+  EXPECT_TRUE(
+      nlohmann::json::parse(run({"inspect", "smooth.ply", "--json", "-"}).out).at("closed_manifold").get<bool>());
   ASSERT_EQ(run({"filter", "y.skx.exr", "curvature", "-o", "curvature.ply"}).code, 0);
   EXPECT_NE(text_of(folder_ / "curvature.ply").find("property float nx"), std::string::npos);
   EXPECT_NE(text_of(folder_ / "curvature.ply").find("property float mean_curvature"), std::string::npos);
 }
 
 TEST_F(Program, RefusesOptionsThatAreAnotherFiltersAndBonesThatAreNone) {
-  expect_refused(2, {"filter", "y.skx.exr", "smooth", "-o", "no.ply", "--gain", "2"}, {"--gain is for enhance, not for smooth"});
+  expect_refused(2, {"filter", "y.skx.exr", "smooth", "-o", "no.ply", "--gain", "2"},
+                 {"--gain is for enhance, not for smooth"});
   expect_refused(2, {"filter", "y.skx.exr", "smoth", "-o", "no.ply"}, {"smoth", "smooth"});
   expect_refused(1, {"filter", "y.skx.exr", "smooth", "-o", "no.ply", "--bones", "nose"}, {"nose"});
   expect_refused(2, {"filter", "y.skx.exr", "curvature", "-o", "no.skx.exr"}, {".ply"});
@@ -328,7 +364,8 @@ TEST_F(Program, RefusesOptionsThatAreAnotherFiltersAndBonesThatAreNone) {
 TEST_F(Program, TransfersBonesAndSaysHow) {
   const std::string a = y_shape().skeleton.bones[0].name, b = y_shape().skeleton.bones[1].name;
   for (const std::string blend : {"cosine", "linear", "none"}) {
-    const Outcome outcome = run({"transfer", "y.skx.exr", "y.skx.exr", "--bones", a + "=" + b, "--blend", blend, "--width", "6px", "-o", "t.skx.exr", "--json", "-"});
+    const Outcome outcome = run({"transfer", "y.skx.exr", "y.skx.exr", "--bones", a + "=" + b, "--blend", blend,
+                                 "--width", "6px", "-o", "t.skx.exr", "--json", "-"});
     ASSERT_EQ(outcome.code, 0) << outcome.err;
     const nlohmann::json json = nlohmann::json::parse(outcome.out), &part = json.at("bones").at(0);
     EXPECT_EQ(part.at("source"), a);
@@ -339,8 +376,8 @@ TEST_F(Program, TransfersBonesAndSaysHow) {
     EXPECT_GE(json.at("folded_edges_of_target").get<int>(), 0);
     EXPECT_EQ(run({"inspect", "t.skx.exr"}).code, 0);
   }
-  const Outcome outcome = run({"transfer", "y.skx.exr", "y.skx.exr", "--bones", a + "=" + b, "--scale", "1.5", "--keep", "0.1", "--skip", "0.2", "--limb", "--mirror",
-                               "-o", "t.ply", "--json", "-"});
+  const Outcome outcome = run({"transfer", "y.skx.exr", "y.skx.exr", "--bones", a + "=" + b, "--scale", "1.5", "--keep",
+                               "0.1", "--skip", "0.2", "--limb", "--mirror", "-o", "t.ply", "--json", "-"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const nlohmann::json part = nlohmann::json::parse(outcome.out).at("bones").at(0);
   EXPECT_NEAR(part.at("scale").get<double>(), 1.5, 1e-6);
@@ -399,7 +436,8 @@ TEST_F(Program, WritesSmallerModelsAndChainsOfLevels) {
 
 TEST_F(Program, MeasuresAndReportsWhatTheContractNames) {
   ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "again.ply"}).code, 0);
-  const nlohmann::json json = json_of({"metro", "y.ply", "again.ply", "--samples", "20000", "--csv", "d.csv", "--ply", "d.ply"});
+  const nlohmann::json json =
+      json_of({"metro", "y.ply", "again.ply", "--samples", "20000", "--csv", "d.csv", "--ply", "d.ply"});
   expect_keys(json, {"diagonal", "forward", "backward", "vertex", "seconds"});
   for (const char* part : {"forward", "backward", "vertex"}) {
     expect_keys(json[part], {"mean", "std", "rms", "max"});
@@ -494,11 +532,14 @@ TEST_F(Program, CompilesEachKernelOnceAndNothingInASecondProcess) {
   const fs::path cache = folder_ / "kernels";
   fs::create_directory(cache);
   ::setenv("POCL_CACHE_DIR", cache.c_str(), 1);
-  const auto encode = [] { return run({"encode", "y.ply", "y.skeleton.json", "-o", "c.skx.exr", "--size", "64", "--snap", "--fit"}).code; };
+  const auto encode = [] {
+    return run({"encode", "y.ply", "y.skeleton.json", "-o", "c.skx.exr", "--size", "64", "--snap", "--fit"}).code;
+  };
   const auto compiled = [&] {
     std::map<fs::path, fs::file_time_type> files;
     for (const auto& entry : fs::recursive_directory_iterator(cache))
-      if (entry.path().extension() == ".so" || entry.path().extension() == ".bc") files[entry.path()] = entry.last_write_time();
+      if (entry.path().extension() == ".so" || entry.path().extension() == ".bc")
+        files[entry.path()] = entry.last_write_time();
     return files;
   };
   const int first_code = encode();
@@ -524,8 +565,8 @@ TEST_F(Program, CompilesEachKernelOnceAndNothingInASecondProcess) {
 
 TEST_F(Program, TakesThePapersRecipeAndItsPartsAlike) {
   ASSERT_EQ(run({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64", "--paper-recipe"}).code, 0);
-  ASSERT_EQ(run({"encode", "y.ply", "y.skeleton.json", "-o", "b.skx.exr", "--size", "64", "--rows", "uniform", "--alpha", "0", "--iterations", "1",
-                 "--share", "triangles", "--no-unfold", "--no-prefilter"})
+  ASSERT_EQ(run({"encode", "y.ply", "y.skeleton.json", "-o", "b.skx.exr", "--size", "64", "--rows", "uniform",
+                 "--alpha", "0", "--iterations", "1", "--share", "triangles", "--no-unfold", "--no-prefilter"})
                 .code,
             0);
   EXPECT_TRUE(text_of(folder_ / "a.skx.exr") == text_of(folder_ / "b.skx.exr"));
@@ -535,12 +576,14 @@ TEST_F(Program, TakesThePapersRecipeAndItsPartsAlike) {
 }
 
 TEST_F(Program, SnapsTexelsAndSaysHowMany) {
-  const nlohmann::json snapped = json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64", "--snap", "--no-fit"});
+  const nlohmann::json snapped =
+      json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64", "--snap", "--no-fit"});
   EXPECT_FALSE(snapped.contains("fit"));
   EXPECT_GT(snapped["snap"]["snapped_vertices"], 0);
   EXPECT_LE(snapped["snap"]["snapped_vertices"], snapped["snap"]["vertices"]);
   EXPECT_TRUE(json_of({"inspect", "a.skx.exr"})["encoder"]["snap"]);
-  const nlohmann::json fitted = json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64", "--fit"});
+  const nlohmann::json fitted =
+      json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64", "--fit"});
   EXPECT_GE(fitted["fit"]["residuals"].size(), 2u);
   EXPECT_LE(fitted["turned_triangles"]["lattice"], 64 * 64);
   const nlohmann::json header = json_of({"inspect", "a.skx.exr"});
@@ -548,7 +591,8 @@ TEST_F(Program, SnapsTexelsAndSaysHowMany) {
   EXPECT_EQ(header["encoder"]["fitted"]["residuals"], fitted["fit"]["residuals"]);
   const nlohmann::json chosen = json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64"});
   EXPECT_TRUE(chosen.contains("fit"));
-  const nlohmann::json plain = json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64", "--no-snap", "--no-fit"});
+  const nlohmann::json plain =
+      json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64", "--no-snap", "--no-fit"});
   EXPECT_FALSE(plain.contains("snap") || plain.contains("fit"));
   EXPECT_FALSE(json_of({"inspect", "a.skx.exr"}).contains("diagonals"));
   EXPECT_EQ(json_of({"inspect", "y.ply", "--self-intersections"})["self_intersections"], 0);
@@ -558,23 +602,28 @@ TEST_F(Program, SnapsTexelsAndSaysHowMany) {
 
 TEST_F(Program, NamesTheNearestBone) {
   const std::string name = read_skeleton(folder_ / "y.skeleton.json").bones[0].name;
-  expect_refused(1, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--method", "hybrid", "--bone-method", name + "x=vsm"},
-                 {"no bone \"" + name + "x\"", "did you mean " + name});
+  expect_refused(
+      1,
+      {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--method", "hybrid", "--bone-method", name + "x=vsm"},
+      {"no bone \"" + name + "x\"", "did you mean " + name});
 }
 
 TEST_F(Program, DrawsModelsAndMeshesInEveryMode) {
-  std::ofstream(folder_ / "y.json") << R"({"name": "y", "mesh": "y.ply", "skeleton": "y.skeleton.json", "credits": "", "view": {"azimuth": 60}})";
-  const std::vector<std::vector<std::string>> drawn{{"y.skx.exr"},
-                                                    {"y.skx.exr", "--mode", "segments", "--show-skeleton"},
-                                                    {"y.skx.exr", "--mode", "checker", "--lattice", "32", "--flat"},
-                                                    {"y.skx.exr", "--mode", "map"},
-                                                    {"y.skx.exr", "--mode", "layout"},
-                                                    {"y.ply", "--mode", "normals", "--background", "transparent"},
-                                                    {"y.ply", "--mode", "error", "--against", "y.ply", "--wireframe", "--views", "2"},
-                                                    {"y.json", "--mode", "segments"}};
+  std::ofstream(folder_ / "y.json")
+      << R"({"name": "y", "mesh": "y.ply", "skeleton": "y.skeleton.json", "credits": "", "view": {"azimuth": 60}})";
+  const std::vector<std::vector<std::string>> drawn{
+      {"y.skx.exr"},
+      {"y.skx.exr", "--mode", "segments", "--show-skeleton"},
+      {"y.skx.exr", "--mode", "checker", "--lattice", "32", "--flat"},
+      {"y.skx.exr", "--mode", "map"},
+      {"y.skx.exr", "--mode", "layout"},
+      {"y.ply", "--mode", "normals", "--background", "transparent"},
+      {"y.ply", "--mode", "error", "--against", "y.ply", "--wireframe", "--views", "2"},
+      {"y.json", "--mode", "segments"}};
   for (std::vector<std::string> arguments : drawn) {
     arguments.insert(arguments.begin(), "render");
-    for (const char* more : {"-o", "a.png", "--size", "64x48", "--samples", "1", "--json", "a.json"}) arguments.push_back(more);
+    for (const char* more : {"-o", "a.png", "--size", "64x48", "--samples", "1", "--json", "a.json"})
+      arguments.push_back(more);
     const Outcome outcome = run(arguments);
     ASSERT_EQ(outcome.code, 0) << outcome.err;
     EXPECT_TRUE(text_of(folder_ / "a.png").starts_with("\x89PNG")) << arguments[1];
@@ -601,7 +650,8 @@ TEST_F(Program, RunsAnExperimentOnTheUsersOwnModelResumesAndReplaysIt) {
     {"name": "encode", "run": ["encode", "{mesh}", "{skeleton}", "-o", "{work}/m.skx.exr", "--size", "{size}"]},
     {"name": "shape", "run": ["reconstruct", "{work}/m.skx.exr", "-o", "{work}/m.ply"]}],
     "columns": {"vertices": "shape.vertices", "used": "encode.atlas.used_fraction"}})";
-  const std::vector<std::string> arguments{"run", "e.json", "--mesh", "y.ply", "--skeleton", "y.skeleton.json", "-o", "out", "--resume", "--json", "run.json"};
+  const std::vector<std::string> arguments{"run", "e.json", "--mesh",   "y.ply",  "--skeleton", "y.skeleton.json",
+                                           "-o",  "out",    "--resume", "--json", "run.json"};
   for (const int kept : {0, 2}) {
     const Outcome outcome = run(arguments);
     ASSERT_EQ(outcome.code, 0) << outcome.err;
@@ -644,7 +694,8 @@ TEST_F(Program, EndsWithOneOnInputThatIsMissingOrForeign) {
 TEST_F(Program, RefusesATruncatedModel) {
   const std::string whole = text_of(folder_ / "y.skx.exr");
   for (const double part : {0.0, 0.01, 0.3, 0.6, 0.99}) {
-    std::ofstream(folder_ / "cut.skx.exr", std::ios::binary) << whole.substr(0, static_cast<std::size_t>(part * static_cast<double>(whole.size())));
+    std::ofstream(folder_ / "cut.skx.exr", std::ios::binary)
+        << whole.substr(0, static_cast<std::size_t>(part * static_cast<double>(whole.size())));
     expect_refused(1, {"reconstruct", "cut.skx.exr", "-o", "a.ply"}, {"cut.skx.exr"});
   }
   fs::remove(folder_ / "cut.skx.exr");
@@ -660,8 +711,10 @@ TEST_F(Program, CorrespondsModelsAndSkeletonFiles) {
   EXPECT_NEAR(json.at("cost").get<double>(), 0, 1e-9);
   const std::string first = json.at("bones")[0].at("a");
   expect_refused(2, {"correspond", "y.skx.exr", "y.skx.exr", "--bones", first}, {first, "BONE=BONE"});
-  expect_refused(1, {"correspond", "y.skx.exr", "y.skx.exr", "--bones", first + "=" + first + "x"}, {first + "x", "did you mean " + first});
-  std::ofstream(folder_ / "two.json") << R"({"nodes":[{"name":"p","position":[0,0,0]},{"name":"q","position":[1,0,0]}],"bones":[{"name":"b","head":0,"tail":1}]})";
+  expect_refused(1, {"correspond", "y.skx.exr", "y.skx.exr", "--bones", first + "=" + first + "x"},
+                 {first + "x", "did you mean " + first});
+  std::ofstream(folder_ / "two.json")
+      << R"({"nodes":[{"name":"p","position":[0,0,0]},{"name":"q","position":[1,0,0]}],"bones":[{"name":"b","head":0,"tail":1}]})";
   expect_refused(1, {"correspond", "y.skx.exr", "two.json"}, {"y.skx.exr", "two.json", "joins"});
 }
 
@@ -672,8 +725,12 @@ TEST_F(Program, MorphsToModelsAndMeshes) {
   EXPECT_EQ(run({"reconstruct", "half.skx.exr", "-o", "half.ply"}).code, 0);
   const nlohmann::json frames = json_of({"morph", "y.skx.exr", "half.skx.exr", "--frames", "3", "-o", "frame.ply"});
   ASSERT_EQ(frames.at("results").size(), 3u);
-  for (const char* name : {"frame_000.ply", "frame_001.ply", "frame_002.ply"}) EXPECT_TRUE(fs::remove(folder_ / name)) << name;
-  EXPECT_EQ(run({"morph", "y.skx.exr", "half.skx.exr", "y.skx.exr", "--weights", "0.2,0.3,0.5", "-o", "three.skx.exr", "--size", "32"}).code, 0);
+  for (const char* name : {"frame_000.ply", "frame_001.ply", "frame_002.ply"})
+    EXPECT_TRUE(fs::remove(folder_ / name)) << name;
+  EXPECT_EQ(run({"morph", "y.skx.exr", "half.skx.exr", "y.skx.exr", "--weights", "0.2,0.3,0.5", "-o", "three.skx.exr",
+                 "--size", "32"})
+                .code,
+            0);
   EXPECT_TRUE(fs::remove(folder_ / "three.skx.exr"));
 
   const auto refused = [](int code, std::vector<std::string> more, const std::vector<std::string>& parts) {
@@ -695,13 +752,14 @@ TEST_F(Program, MorphsToModelsAndMeshes) {
 }
 
 TEST_F(Program, TimesStagesBesideTheirReferencesAndReportsWhatTheContractNames) {
-  std::ofstream(folder_ / "y.json") << R"({"name": "Y", "mesh": "y.ply", "skeleton": "y.skeleton.json", "credits": ""})";
+  std::ofstream(folder_ / "y.json")
+      << R"({"name": "Y", "mesh": "y.ply", "skeleton": "y.skeleton.json", "credits": ""})";
   const auto expect_stages = [](const nlohmann::json& rows, const std::vector<std::string>& stages) {
     ASSERT_EQ(rows.size(), stages.size());
     for (std::size_t i = 0; i < stages.size(); ++i) {
       const nlohmann::json& row = rows[i];
-      expect_keys(row, {"stage", "model", "size", "ms", "reference", "reference_ms", "ratio", "wall_ms", "frames_per_second", "ms_min", "ms_max", "device_ms", "launches",
-                        "repeats", "device"});
+      expect_keys(row, {"stage", "model", "size", "ms", "reference", "reference_ms", "ratio", "wall_ms",
+                        "frames_per_second", "ms_min", "ms_max", "device_ms", "launches", "repeats", "device"});
       EXPECT_EQ(row["stage"], stages[i]);
       EXPECT_EQ(row["repeats"], 2);
       if (stages[i] == "snap") {  // a difference
@@ -718,14 +776,16 @@ TEST_F(Program, TimesStagesBesideTheirReferencesAndReportsWhatTheContractNames) 
   const nlohmann::json two = json_of({"bench", "y.skx.exr", "y.skx.exr", "--size", "96", "--repeats", "2"});
   expect_stages(two, {"reconstruct", "pose", "morph", "transfer", "filter"});
   EXPECT_EQ(two[0]["size"], 96);
-  expect_stages(json_of({"bench", "y.json", "--stage", "encode,snap,vsm,metro,segment,spd_rays", "--size", "64", "--repeats", "2"}),
+  expect_stages(json_of({"bench", "y.json", "--stage", "encode,snap,vsm,metro,segment,spd_rays", "--size", "64",
+                         "--repeats", "2"}),
                 {"vsm", "spd_rays", "metro", "segment", "encode", "snap"});
   expect_refused(2, {"bench", "y.skx.exr", "y.skx.exr", "y.skx.exr"}, {"one model, or two"});
   expect_refused(2, {"bench", "y.skx.exr", "--stage", "morph"}, {"--stage", "morph", "two models"});
   expect_refused(2, {"bench", "y.skx.exr", "--stage", "vsm"}, {"--stage", "vsm", "skeleton"});
   expect_refused(2, {"bench", "--stage", "morf"}, {"morf", "morph"});
   expect_refused(1, {"bench", "y.ply"}, {"y.ply"});
-  std::ofstream(folder_ / "gone.json") << R"({"name": "gone", "mesh": "gone.off", "skeleton": "y.skeleton.json", "credits": ""})";
+  std::ofstream(folder_ / "gone.json")
+      << R"({"name": "gone", "mesh": "gone.off", "skeleton": "y.skeleton.json", "credits": ""})";
   expect_refused(1, {"bench", "gone.json"}, {"gone.off", "install-dependencies"});
 }
 
@@ -749,14 +809,18 @@ TEST_F(Program, NeverWritesOverWhatItReads) {
   fs::create_symlink("y.skx.exr", folder_ / "link.exr");
   const std::string mesh = bytes("y.ply"), skeleton = bytes("y.skeleton.json"), model = bytes("y.skx.exr");
   const auto files = count();
-  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--json", "y.skeleton.json"}, {"--json", "SKELETON"});
+  expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--json", "y.skeleton.json"},
+                 {"--json", "SKELETON"});
   expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "y.ply"}, {"--output", "MESH"});
   expect_refused(2, {"metro", "y.ply", "y.ply", "--ply", "y.ply"}, {"--ply", "A"});
   expect_refused(2, {"lod", "y.skx.exr", "--size", "64", "-o", "link.exr"}, {"--output", "MODEL"});
   expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "-"}, {"--output"});
-  expect_refused(2, {"morph", "y.skx.exr", "half.skx.exr", "--frames", "2", "-o", "a.ply", "--json", "a_001.ply"}, {"--json", "a_001.ply"});
-  std::ofstream(folder_ / "config.json") << nlohmann::json{{"name", "y"}, {"mesh", "y.ply"}, {"skeleton", "y.skeleton.json"}, {"credits", "made here"}};
-  expect_refused(2, {"render", "config.json", "-o", "a.png", "--json", "y.skeleton.json"}, {"--json", "skeleton of config.json"});
+  expect_refused(2, {"morph", "y.skx.exr", "half.skx.exr", "--frames", "2", "-o", "a.ply", "--json", "a_001.ply"},
+                 {"--json", "a_001.ply"});
+  std::ofstream(folder_ / "config.json") << nlohmann::json{
+      {"name", "y"}, {"mesh", "y.ply"}, {"skeleton", "y.skeleton.json"}, {"credits", "made here"}};
+  expect_refused(2, {"render", "config.json", "-o", "a.png", "--json", "y.skeleton.json"},
+                 {"--json", "skeleton of config.json"});
   fs::remove(folder_ / "config.json");
   EXPECT_EQ(bytes("y.ply"), mesh);
   EXPECT_EQ(bytes("y.skeleton.json"), skeleton);

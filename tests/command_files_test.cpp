@@ -33,7 +33,8 @@ class CommandFiles : public ::testing::Test {
     static CLI::App app;
     static const bool is_ready = [] {
       add_commands(app);
-      for (CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) command->parse_complete_callback([command] {
+      for (CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+        command->parse_complete_callback([command] {
           check_files(*command);
           throw Checked();
         });
@@ -46,8 +47,11 @@ class CommandFiles : public ::testing::Test {
     return program().get_subcommands([](const CLI::App*) { return true; });
   }
   /// \param given  options and their values; those that the command needs besides get values of their own
-  std::vector<std::string> arguments(const CLI::App& command, std::vector<std::pair<const CLI::Option*, std::string>> given) {
-    const auto is_given = [&](const CLI::Option* option) { return std::any_of(given.begin(), given.end(), [&](const auto& entry) { return entry.first == option; }); };
+  std::vector<std::string> arguments(const CLI::App& command,
+                                     std::vector<std::pair<const CLI::Option*, std::string>> given) {
+    const auto is_given = [&](const CLI::Option* option) {
+      return std::any_of(given.begin(), given.end(), [&](const auto& entry) { return entry.first == option; });
+    };
     const auto file_of = [&](const CLI::Option* option) -> const FileOption* {
       for (const FileOption& file : files_of(command))
         if (file.option == option) return &file;
@@ -56,7 +60,8 @@ class CommandFiles : public ::testing::Test {
     const auto give = [&](const CLI::Option* option) {
       if (is_given(option)) return;
       const FileOption* file = file_of(option);
-      const std::string name = "own_" + std::to_string(given.size()) + (file && !file->endings.empty() ? file->endings[0] : "");
+      const std::string name =
+          "own_" + std::to_string(given.size()) + (file && !file->endings.empty() ? file->endings[0] : "");
       given.emplace_back(option, file ? (folder_ / name).string() : any_value(*option));
     };
     for (std::size_t i = 0; i < given.size(); ++i)
@@ -72,7 +77,8 @@ class CommandFiles : public ::testing::Test {
       for (const auto& [chosen, value] : given) {
         if (chosen != option) continue;
         if (option->get_lnames().empty()) {
-          for (int i = 0; i < std::max(1, option->get_items_expected_min()); ++i) positionals.push_back(i == 0 ? value : (folder_ / ("more_" + std::to_string(i))).string());
+          for (int i = 0; i < std::max(1, option->get_items_expected_min()); ++i)
+            positionals.push_back(i == 0 ? value : (folder_ / ("more_" + std::to_string(i))).string());
         } else {
           words.push_back(option_name(*option));
           if (option->get_items_expected_max() > 0) words.push_back(value);
@@ -105,7 +111,8 @@ class CommandFiles : public ::testing::Test {
 };
 
 TEST_F(CommandFiles, NoOutputIsAnInputOrAnotherOutput) {
-  const fs::path file = folder_ / "precious", symbolic = folder_ / "symbolic", hard = folder_ / "hard", missing = folder_ / "missing", dangling = folder_ / "dangling";
+  const fs::path file = folder_ / "precious", symbolic = folder_ / "symbolic", hard = folder_ / "hard",
+                 missing = folder_ / "missing", dangling = folder_ / "dangling";
   std::ofstream(file) << "a day's work";
   fs::create_symlink(file, symbolic);
   fs::create_hard_link(file, hard);
@@ -117,13 +124,23 @@ TEST_F(CommandFiles, NoOutputIsAnInputOrAnotherOutput) {
     for (const FileOption& output : files_of(*command)) {
       if (!output.is_output) continue;
       for (const FileOption& other : files_of(*command)) {
-        if (&other == &output || output.option->get_excludes().count(const_cast<CLI::Option*>(other.option)) > 0) continue;
+        if (&other == &output || output.option->get_excludes().count(const_cast<CLI::Option*>(other.option)) > 0)
+          continue;
         ++pairs;
-        for (const auto& [first, second] : {std::pair{file, file}, {symbolic, file}, {file, symbolic}, {hard, file}, {roundabout, file}, {missing, missing}, {dangling, missing}}) {
-          const std::vector<std::string> words = arguments(*command, {{output.option, first.string()}, {other.option, second.string()}});
+        for (const auto& [first, second] : {std::pair{file, file},
+                                            {symbolic, file},
+                                            {file, symbolic},
+                                            {hard, file},
+                                            {roundabout, file},
+                                            {missing, missing},
+                                            {dangling, missing}}) {
+          const std::vector<std::string> words =
+              arguments(*command, {{output.option, first.string()}, {other.option, second.string()}});
           const std::string said = complaint(words);
-          EXPECT_TRUE(said.find(option_name(*output.option)) != std::string::npos && said.find(option_name(*other.option)) != std::string::npos)
-              << command->get_name() << " " << option_name(*output.option) << " " << first << ", " << option_name(*other.option) << " " << second << ": \"" << said << '"';
+          EXPECT_TRUE(said.find(option_name(*output.option)) != std::string::npos &&
+                      said.find(option_name(*other.option)) != std::string::npos)
+              << command->get_name() << " " << option_name(*output.option) << " " << first << ", "
+              << option_name(*other.option) << " " << second << ": \"" << said << '"';
         }
       }
     }
@@ -138,15 +155,20 @@ TEST_F(CommandFiles, OutputsEndAsTheyAreWrittenAndOnlyTextGoesToStandardOutput) 
     for (const FileOption& output : files_of(*command)) {
       if (!output.is_output || output.is_folder) continue;
       const std::string streamed = complaint(arguments(*command, {{output.option, "-"}}));
-      EXPECT_EQ(output.can_be_stream, streamed.empty()) << command->get_name() << " " << option_name(*output.option) << ": " << streamed;
+      EXPECT_EQ(output.can_be_stream, streamed.empty())
+          << command->get_name() << " " << option_name(*output.option) << ": " << streamed;
       if (output.endings.empty()) continue;
       ++outputs;
       const std::string said = complaint(arguments(*command, {{output.option, (folder_ / "result.doc").string()}}));
-      for (const std::string& ending : output.endings) EXPECT_NE(said.find(ending), std::string::npos) << command->get_name() << ": " << said;
-      for (const std::string& ending : output.endings) EXPECT_EQ(complaint(arguments(*command, {{output.option, (folder_ / ("result" + ending)).string()}})), "") << command->get_name();
+      for (const std::string& ending : output.endings)
+        EXPECT_NE(said.find(ending), std::string::npos) << command->get_name() << ": " << said;
+      for (const std::string& ending : output.endings)
+        EXPECT_EQ(complaint(arguments(*command, {{output.option, (folder_ / ("result" + ending)).string()}})), "")
+            << command->get_name();
       for (std::string ending : output.endings) {
         for (char& c : ending) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-        EXPECT_EQ(complaint(arguments(*command, {{output.option, (folder_ / ("result" + ending)).string()}})), "") << command->get_name();
+        EXPECT_EQ(complaint(arguments(*command, {{output.option, (folder_ / ("result" + ending)).string()}})), "")
+            << command->get_name();
       }
     }
   EXPECT_GE(outputs, 8);
@@ -158,7 +180,8 @@ TEST_F(CommandFiles, EveryCommandDeclaresItsFiles) {
     for (const CLI::Option* option : command->get_options()) {
       const std::string type = option->get_type_name();
       if (type.find("FILE") == std::string::npos && type.find("FOLDER") == std::string::npos) continue;
-      EXPECT_TRUE(std::any_of(files_of(*command).begin(), files_of(*command).end(), [&](const FileOption& file) { return file.option == option; }))
+      EXPECT_TRUE(std::any_of(files_of(*command).begin(), files_of(*command).end(),
+                              [&](const FileOption& file) { return file.option == option; }))
           << command->get_name() << " " << option_name(*option) << " names a file that it does not declare";
     }
 }
@@ -173,7 +196,8 @@ TEST_F(CommandFiles, NumbersAreFiniteAndWithinTheirLimits) {
       ++options;
       for (const char* bad : {"nan", "inf", "-inf", "1e400", "", "1x", " 1"}) {
         const std::string said = complaint(arguments(*command, {{option, bad}}));
-        EXPECT_NE(said.find(option_name(*option)), std::string::npos) << command->get_name() << " " << option_name(*option) << " \"" << bad << "\": " << said;
+        EXPECT_NE(said.find(option_name(*option)), std::string::npos)
+            << command->get_name() << " " << option_name(*option) << " \"" << bad << "\": " << said;
       }
     }
   EXPECT_GE(options, 30);

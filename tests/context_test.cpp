@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/cl/context.h"
+#include "skeletex/device/context.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-#include "skeletex/cl/kernel_source.h"
+#include "skeletex/device/kernel_source.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
@@ -59,7 +59,9 @@ class Kernels : public ::testing::Test {
     std::filesystem::permissions(folder_, std::filesystem::perms::owner_all, ignored);
     std::filesystem::remove_all(folder_, ignored);
   }
-  void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name, std::ios::binary) << text; }
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+  }
   static std::vector<float> scaled(ClContext& context, const std::string& options = "") {
     auto buffer = context.upload(std::vector<float>{1, 2, 3.5f});
     context.launch({"scale.cl", "scale", options}, 3, buffer, 3, 2.0f);
@@ -157,7 +159,8 @@ TEST(Context, RefusesABufferThatTheDeviceCannotHoldAndSaysHowMuchItCan) {
 TEST(Context, RefusesToWriteMoreThanABufferHolds) {
   ClContext context;
   auto buffer = context.allocate<float>(3);
-  expect_contains(device_error([&] { context.write(buffer, std::vector<float>(4)); }), "4 values do not fit a device buffer of 3");
+  expect_contains(device_error([&] { context.write(buffer, std::vector<float>(4)); }),
+                  "4 values do not fit a device buffer of 3");
 }
 
 TEST(Context, BuildsEveryKernelFileOfTheLibraryAsItStands) {
@@ -165,7 +168,8 @@ TEST(Context, BuildsEveryKernelFileOfTheLibraryAsItStands) {
   for (const EmbeddedKernelFile& file : embedded_kernel_files()) {
     if (!file.name.ends_with(".cl")) continue;
     const std::string text = kernel_source(std::vector<std::string_view>{file.name});
-    const std::size_t begin = text.find("\n__kernel") == std::string::npos ? text.find("\nkernel") : text.find("\n__kernel");
+    const std::size_t begin =
+        text.find("\n__kernel") == std::string::npos ? text.find("\nkernel") : text.find("\n__kernel");
     ASSERT_NE(begin, std::string::npos) << file.name;
     const std::size_t name = text.find("void ", begin) + 5;
     const std::string kernel = text.substr(name, text.find('(', name) - name);
@@ -182,7 +186,8 @@ TEST(Context, BuildsFilesOfOneProgramTogetherAndEachHeaderOnce) {
   for (const EmbeddedKernelFile& file : embedded_kernel_files())
     for (const auto& program : programs_with(file.name))
       if (file.name != program.back()) {
-        EXPECT_EQ(file.text.find("#pragma OPENCL"), std::string_view::npos) << file.name << ": the pragma would hold for the files after it";
+        EXPECT_EQ(file.text.find("#pragma OPENCL"), std::string_view::npos)
+            << file.name << ": the pragma would hold for the files after it";
       }
   const std::string header = "#line 1 \"skeletex_structs.h\"";
   expect_contains(text, header);
@@ -258,7 +263,10 @@ TEST_F(Kernels, RefuseAMissingFileAMissingKernelAndAFileThatIncludesItself) {
   ClContext context;
   auto buffer = context.allocate<float>(1);
   expect_contains(device_error([&] { context.launch({"absent.cl", "scale"}, 1, buffer, 1, 1.0f); }), "absent.cl");
-  expect_contains(device_error([&] { context.launch({"scale.cl", "stretch"}, 1, buffer, 1, 1.0f); }), "scale.cl: kernel stretch");
+  expect_contains(device_error([&] {
+                    context.launch({"scale.cl", "stretch"}, 1, buffer, 1, 1.0f);
+                  }),
+                  "scale.cl: kernel stretch");
   expect_contains(device_error([&] { context.launch({"loop.cl", "loop"}, 1, buffer); }), "includes itself");
 }
 
@@ -267,10 +275,14 @@ TEST_F(Kernels, RefuseArgumentsOfAnotherNumberOrKind) {
   auto buffer = context.upload(std::vector<float>{1});
   const ClKernelName scale{"scale.cl", "scale"};
   expect_contains(device_error([&] { context.launch(scale, 1, buffer, 1); }), "scale takes 3 arguments, not 2");
-  expect_contains(device_error([&] { context.launch(scale, 1, buffer, 1, 2.0f, 3); }), "scale takes 3 arguments, not 4");
-  expect_contains(device_error([&] { context.launch(scale, 1, buffer, 1, 2); }), "argument 2: the kernel takes a float, not an int");
-  expect_contains(device_error([&] { context.launch(scale, 1, 1, 1, 2.0f); }), "argument 0: the kernel takes a buffer, not an int");
-  expect_contains(device_error([&] { context.launch(scale, 1, buffer, buffer, 2.0f); }), "argument 1: the kernel takes an int, not a buffer");
+  expect_contains(device_error([&] { context.launch(scale, 1, buffer, 1, 2.0f, 3); }),
+                  "scale takes 3 arguments, not 4");
+  expect_contains(device_error([&] { context.launch(scale, 1, buffer, 1, 2); }),
+                  "argument 2: the kernel takes a float, not an int");
+  expect_contains(device_error([&] { context.launch(scale, 1, 1, 1, 2.0f); }),
+                  "argument 0: the kernel takes a buffer, not an int");
+  expect_contains(device_error([&] { context.launch(scale, 1, buffer, buffer, 2.0f); }),
+                  "argument 1: the kernel takes an int, not a buffer");
   EXPECT_EQ(context.download(buffer).front(), 1);
 }
 
@@ -278,14 +290,18 @@ TEST_F(Kernels, RefuseAWorkGroupThatTheDeviceCannotRun) {
   ClContext context;
   auto buffer = context.upload(std::vector<float>{1});
   const std::size_t too_large = 2 * context.device().max_work_group_size;
-  const std::string message = device_error([&] { context.launch({"scale.cl", "scale"}, {{too_large, 1}, {too_large, 1}}, buffer, 1, 2.0f); });
+  const std::string message = device_error([&] {
+    context.launch({"scale.cl", "scale"}, {{too_large, 1}, {too_large, 1}}, buffer, 1, 2.0f);
+  });
   expect_contains(message, "scale.cl: kernel scale cannot run in work-groups of " + std::to_string(too_large));
   EXPECT_LE(context.work_group_size({"scale.cl", "scale"}, too_large), context.device().max_work_group_size);
 }
 
 TEST_F(Kernels, AreBuiltAgainWhenSourceOrOptionsChange) {
-  write("scale.cl", "#include \"by.h\"\n__kernel void scale(__global float* restrict values, const int count, const float factor) {\n"
-                    "  const int i = (int)get_global_id(0);\n  if (i < count) values[i] = BY(values[i], factor);\n}\n");
+  write(
+      "scale.cl",
+      "#include \"by.h\"\n__kernel void scale(__global float* restrict values, const int count, const float factor) {\n"
+      "  const int i = (int)get_global_id(0);\n  if (i < count) values[i] = BY(values[i], factor);\n}\n");
   write("by.h", "#ifdef ANOTHER\n#define BY(x, y) ((x) - (y))\n#else\n#define BY(x, y) ((x) * (y))\n#endif\n");
   ClContext context;
   EXPECT_EQ(scaled(context), twice_);

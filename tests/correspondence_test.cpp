@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include "skeletex/skeleton/correspondence.h"
+
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -6,14 +8,15 @@
 #include <numeric>
 #include <random>
 
-#include "skeletex/edit/correspondence.h"
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
 namespace {
 
-Skeleton standard(const std::string& name) { return read_skeleton(std::string(SKELETEX_SOURCE_DIR "/configs/skeletons/") + name + ".skeleton.json"); }
+Skeleton standard(const std::string& name) {
+  return read_skeleton(std::string(SKELETEX_SOURCE_DIR "/configs/skeletons/") + name + ".skeleton.json");
+}
 
 /// The same skeleton with other names, another order of nodes and bones, some bones reversed, rotated and scaled.
 /// `bones[i]` is where bone i went.
@@ -30,7 +33,8 @@ Skeleton disguised(const Skeleton& skeleton, unsigned seed, std::vector<int>& bo
   Skeleton result;
   result.nodes.resize(nodes.size());
   result.bones.resize(bones.size());
-  for (std::size_t i = 0; i < nodes.size(); ++i) result.nodes[nodes[i]] = {"x" + std::to_string(nodes[i]), 3 * (turn * skeleton.nodes[i].position) + Vec3(1, 2, 3)};
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    result.nodes[nodes[i]] = {"x" + std::to_string(nodes[i]), 3 * (turn * skeleton.nodes[i].position) + Vec3(1, 2, 3)};
   for (std::size_t i = 0; i < bones.size(); ++i) {
     reversed[i] = random() % 2;
     Bone bone{"y" + std::to_string(bones[i]), nodes[skeleton.bones[i].head], nodes[skeleton.bones[i].tail], {}};
@@ -55,7 +59,8 @@ void expect_isomorphism(const Skeleton& a, const Skeleton& b, const Corresponden
 }  // namespace
 
 TEST(Correspondence, FindsEveryStandardSkeletonBehindOtherNamesOrderAndDirections) {
-  for (const char* name : {"armadillo", "bear", "bunny00_9", "camel", "cow", "triceratops_17", "knot1", "eight", "eight_theta", "pinion_5"}) {
+  for (const char* name : {"armadillo", "bear", "bunny00_9", "camel", "cow", "triceratops_17", "knot1", "eight",
+                           "eight_theta", "pinion_5"}) {
     const Skeleton skeleton = standard(name);
     std::vector<int> bones;
     std::vector<bool> reversed;
@@ -64,18 +69,22 @@ TEST(Correspondence, FindsEveryStandardSkeletonBehindOtherNamesOrderAndDirection
     expect_isomorphism(skeleton, other, found);
     // A symmetric skeleton may fall onto itself in another way, at no higher cost; bones keep their lengths.
     for (std::size_t i = 0; i < bones.size(); ++i)
-      EXPECT_NEAR(bone_length(other, found.bones[i]), 3 * bone_length(skeleton, static_cast<int>(i)), 0.03 * bone_length(other, found.bones[i])) << name;
+      EXPECT_NEAR(bone_length(other, found.bones[i]), 3 * bone_length(skeleton, static_cast<int>(i)),
+                  0.03 * bone_length(other, found.bones[i]))
+          << name;
   }
 }
 
 TEST(Correspondence, PairsTheModelsThatShareTheirNamesByName) {
-  const std::pair<const char*, const char*> pairs[] = {{"bear", "bear_bis"}, {"man", "homer"},   {"bull", "camel"},
-                                                       {"bull", "diplodocus"}, {"bull", "triceratops_17"}, {"cow", "bull_16"}, {"cow", "camel_16"}};
+  const std::pair<const char*, const char*> pairs[] = {
+      {"bear", "bear_bis"},       {"man", "homer"},   {"bull", "camel"},  {"bull", "diplodocus"},
+      {"bull", "triceratops_17"}, {"cow", "bull_16"}, {"cow", "camel_16"}};
   for (const auto& [first, second] : pairs) {
     const Skeleton a = standard(first), b = standard(second);
     const Correspondence found = find_correspondence(a, b);
     expect_isomorphism(a, b, found);
-    for (std::size_t i = 0; i < a.bones.size(); ++i) EXPECT_EQ(a.bones[i].name, b.bones[found.bones[i]].name) << first << " " << second;
+    for (std::size_t i = 0; i < a.bones.size(); ++i)
+      EXPECT_EQ(a.bones[i].name, b.bones[found.bones[i]].name) << first << " " << second;
   }
 }
 
@@ -86,7 +95,8 @@ TEST(Correspondence, PairsThemWithoutNamesToo) {
     std::vector<std::string> names;
     for (Bone& bone : b.bones) names.push_back(std::exchange(bone.name, "_" + bone.name));
     const Correspondence found = find_correspondence(a, b);
-    for (std::size_t i = 0; i < a.bones.size(); ++i) EXPECT_EQ(a.bones[i].name, names[found.bones[i]]) << first << " " << second;
+    for (std::size_t i = 0; i < a.bones.size(); ++i)
+      EXPECT_EQ(a.bones[i].name, names[found.bones[i]]) << first << " " << second;
   }
 }
 
@@ -95,7 +105,9 @@ TEST(Correspondence, ObeysTheUsersPairs) {
   const Correspondence found = find_correspondence(eight, eight, {{{"left_outer", "right_outer"}}});
   expect_isomorphism(eight, eight, found);
   for (std::size_t i = 0; i < eight.bones.size(); ++i)
-    if (eight.bones[i].name == "left_outer") { EXPECT_EQ(eight.bones[found.bones[i]].name, "right_outer"); }
+    if (eight.bones[i].name == "left_outer") {
+      EXPECT_EQ(eight.bones[found.bones[i]].name, "right_outer");
+    }
 }
 
 TEST(Correspondence, RefusesPairsThatCannotHold) {
@@ -127,7 +139,9 @@ TEST(Correspondence, NeighbourIntervalsFillATurn) {
         const auto order = neighbour_order(skeleton, {bone, end});
         double turns = 0;
         for (const NeighbourInterval& interval : order) turns += interval.turns;
-        if (!order.empty()) { EXPECT_NEAR(turns, 1, 1e-12); }
+        if (!order.empty()) {
+          EXPECT_NEAR(turns, 1, 1e-12);
+        }
       }
   }
 }

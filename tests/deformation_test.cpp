@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/measure/deformation.h"
+#include "skeletex/analysis/deformation.h"
 
 #include <gtest/gtest.h>
 
@@ -47,7 +47,8 @@ std::vector<Vec3> moved(const TriangleMesh& mesh, const auto& map) {
 TEST(Deformation, ARigidMotionChangesNothing) {
   const BindSurface bind = make_bind_surface(tube(9, 12, 1, 8));
   const Eigen::Quaterniond rotation(Eigen::AngleAxisd(1.2, Vec3(1, 2, -1).normalized()));
-  const DeformationReport report = measure_deformation(bind, moved(bind.mesh, [&](const Vec3& p) -> Vec3 { return rotation * p + Vec3(5, 6, 7); }));
+  const DeformationReport report =
+      measure_deformation(bind, moved(bind.mesh, [&](const Vec3& p) -> Vec3 { return rotation * p + Vec3(5, 6, 7); }));
   EXPECT_EQ(report.new_folds, 0);
   EXPECT_EQ(report.new_intersections, 0);
   EXPECT_NEAR(report.energy_mean, 1, 1e-12);
@@ -57,17 +58,20 @@ TEST(Deformation, ARigidMotionChangesNothing) {
 
 TEST(Deformation, EnergyAndVolumeOfAScalingAreKnown) {
   const BindSurface bind = make_bind_surface(tube(9, 12, 1, 8));
-  const DeformationReport report = measure_deformation(bind, moved(bind.mesh, [](const Vec3& p) -> Vec3 { return 2 * p; }));
+  const DeformationReport report =
+      measure_deformation(bind, moved(bind.mesh, [](const Vec3& p) -> Vec3 { return 2 * p; }));
   EXPECT_NEAR(report.energy_mean, 0.25 * (8 + 0.5), 1e-12);
   EXPECT_NEAR(report.energy_99, 0.25 * (8 + 0.5), 1e-12);
   EXPECT_NEAR(report.volume_ratio, 8, 1e-12);
 }
 
 TEST(Deformation, OnlyWhatIsNewCounts) {
-  // The end at x = 8 is pushed through the tube to x = -1: its wall turns back, and the other end is pierced.
+  // The end at x = 8 is pushed through the tube to x = -1: its separation plane turns back, and the other end is
+  // pierced.
   const BindSurface bind = make_bind_surface(tube(9, 12, 1, 8));
   std::vector<Vec3> pushed = bind.mesh.positions;
-  for (int j = 0; j < 12; ++j) pushed[8 * 12 + j] = Vec3(-1, 0.5 * pushed[8 * 12 + j].y(), 0.5 * pushed[8 * 12 + j].z());
+  for (int j = 0; j < 12; ++j)
+    pushed[8 * 12 + j] = Vec3(-1, 0.5 * pushed[8 * 12 + j].y(), 0.5 * pushed[8 * 12 + j].z());
   pushed.back() = Vec3(-1, 0, 0);
   const DeformationReport report = measure_deformation(bind, pushed);
   EXPECT_GE(report.new_folds, 12);
@@ -103,7 +107,9 @@ TEST(Deformation, AnotherMeshIsRefused) {
 TEST(Polish, TakesFoldsAwayAndLeavesTheRest) {
   // One vertex in the middle of a bent tube is pulled over its neighbours.
   const TriangleMesh bind = tube(17, 24, 1, 8);
-  const auto posed = moved(bind, [](const Vec3& p) -> Vec3 { return p.x() > 4 ? Vec3(Vec3(4, 0, 0) + Eigen::AngleAxisd(0.4, Vec3::UnitZ()) * (p - Vec3(4, 0, 0))) : p; });
+  const auto posed = moved(bind, [](const Vec3& p) -> Vec3 {
+    return p.x() > 4 ? Vec3(Vec3(4, 0, 0) + Eigen::AngleAxisd(0.4, Vec3::UnitZ()) * (p - Vec3(4, 0, 0))) : p;
+  });
   std::vector<Vec3> folded = posed, polished;
   const int pulled = 4 * 24 + 3;
   folded[pulled] += Vec3(1.3, 0, 0);
@@ -126,7 +132,8 @@ TEST(Polish, TakesFoldsAwayAndLeavesTheRest) {
 
 TEST(Polish, APoseWithoutFoldsStaysAsItIs) {
   const TriangleMesh bind = tube(9, 12, 1, 8);
-  const auto posed = moved(bind, [](const Vec3& p) -> Vec3 { return Eigen::AngleAxisd(1.2, Vec3::UnitZ()) * p + Vec3(0, 3, 0); });
+  const auto posed =
+      moved(bind, [](const Vec3& p) -> Vec3 { return Eigen::AngleAxisd(1.2, Vec3::UnitZ()) * p + Vec3(0, 3, 0); });
   std::vector<Vec3> polished = posed;
   const PolishReport report = polish_pose(bind, polished);
   EXPECT_EQ(polished, posed);
@@ -141,10 +148,13 @@ TEST(Polish, NeverMakesFoldsOrIntersectionsMore) {
   for (const double size : {0.2, 0.4, 0.8}) {
     std::uint32_t state = 7;
     const auto next = [&] { return (state = state * 1664525u + 1013904223u) / 4294967296.0 - 0.5; };
-    const auto thrown = moved(bind, [&](const Vec3& p) -> Vec3 { return p.x() > 3 && p.x() < 5 ? Vec3(p + size * Vec3(next(), next(), next())) : p; });
+    const auto thrown = moved(bind, [&](const Vec3& p) -> Vec3 {
+      return p.x() > 3 && p.x() < 5 ? Vec3(p + size * Vec3(next(), next(), next())) : p;
+    });
     std::vector<Vec3> polished = thrown;
     const PolishReport report = polish_pose(bind, polished);
-    const DeformationReport before = measure_deformation(surface, thrown), after = measure_deformation(surface, polished);
+    const DeformationReport before = measure_deformation(surface, thrown),
+                            after = measure_deformation(surface, polished);
     EXPECT_EQ(before.new_folds, report.folds_before);
     EXPECT_EQ(after.new_folds, report.folds_after);
     EXPECT_LE(after.new_folds, before.new_folds);

@@ -4,10 +4,10 @@
 #include <numbers>
 #include <random>
 
-#include "skeletex/encode/read_texels.h"
-#include "skeletex/encode/row_profile.h"
-#include "skeletex/encode/sample_seams.h"
-#include "skeletex/model/frame.h"
+#include "skeletex/convert/layout/row_profile.h"
+#include "skeletex/convert/sample/read_texels.h"
+#include "skeletex/convert/sample/sample_seams.h"
+#include "skeletex/skeleton/frame.h"
 #include "support/encode_twin.h"
 
 namespace skeletex {
@@ -24,7 +24,8 @@ Skeleton straight_chain(int bones) {
 
 /// A map that is a jittered lattice of rows x columns vertices, squeezed towards u = 0 by `power`, of a bumpy tube
 /// around a bone; with poles it is closed at both ends. Random diagonals.
-Chart jittered_chart(const Skeleton& skeleton, const Walls& walls, int bone, int rows, int columns, double power, bool has_poles, unsigned seed) {
+Chart jittered_chart(const Skeleton& skeleton, const SeparationPlanes& separation, int bone, int rows, int columns,
+                     double power, bool has_poles, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> jitter(-0.35, 0.35);
   Chart chart;
@@ -33,7 +34,7 @@ Chart jittered_chart(const Skeleton& skeleton, const Walls& walls, int bone, int
   const Vec3 head = end_position(skeleton, bone, BoneEnd::kHead), tail = end_position(skeleton, bone, BoneEnd::kTail);
   const auto place = [&](double u, double v) {
     const double radius = has_poles ? 0.4 * std::sin(kPi * (0.02 + 0.96 * u)) : 0.4 + 0.05 * std::sin(6 * kPi * v);
-    return Vec3(head + u * (tail - head) + radius * walls.spoke(bone, v));
+    return Vec3(head + u * (tail - head) + radius * separation.radial(bone, v));
   };
   const int begin = has_poles ? 1 : 0, end = has_poles ? rows - 1 : rows;
   for (int r = begin; r < end; ++r)
@@ -54,8 +55,10 @@ Chart jittered_chart(const Skeleton& skeleton, const Walls& walls, int bone, int
     for (int j = 0; j < columns; ++j) {
       const int k = (j + 1) % columns, t = j + 1 == columns ? 1 : 0;
       const int a = r * columns + j, b = r * columns + k, c = (r + 1) * columns + k, d = (r + 1) * columns + j;
-      if (random() % 2) add(a, 0, b, t, c, t), add(a, 0, c, t, d, 0);
-      else add(a, 0, b, t, d, 0), add(b, t, c, t, d, 0);
+      if (random() % 2)
+        add(a, 0, b, t, c, t), add(a, 0, c, t, d, 0);
+      else
+        add(a, 0, b, t, d, 0), add(b, t, c, t, d, 0);
     }
   if (has_poles) {
     const int head_pole = static_cast<int>(chart.u.size()), tail_pole = head_pole + 1;
@@ -84,24 +87,29 @@ struct Setting {
 Setting random_setting(unsigned seed, double power) {
   Setting s;
   s.skeleton = straight_chain(1);
-  const Walls walls(s.skeleton);
+  const SeparationPlanes separation(s.skeleton);
   std::mt19937 random(seed);
   const int rows = 5 + static_cast<int>(random() % 12), columns = 3 + static_cast<int>(random() % 14);
-  s.charts.push_back(jittered_chart(s.skeleton, walls, 0, rows, columns, power, true, seed));
+  s.charts.push_back(jittered_chart(s.skeleton, separation, 0, rows, columns, power, true, seed));
   const int width = 4 + static_cast<int>(random() % 60), height = 4 + static_cast<int>(random() % 60);
-  s.patches.push_back({{static_cast<int>(random() % 5), static_cast<int>(random() % 7), width, height}, Method::kVsm, SegmentTopology::kSphere,
+  s.patches.push_back({{static_cast<int>(random() % 5), static_cast<int>(random() % 7), width, height},
+                       Method::kVsm,
+                       SegmentTopology::kSphere,
                        spread_rows_by_length(row_profile(s.charts[0]), height)});
   s.hits.resize(1);
-  s.end_points.push_back({std::vector<Vec3>{s.charts[0].positions[s.charts[0].positions.size() - 2]}, std::vector<Vec3>{s.charts[0].positions.back()}});
+  s.end_points.push_back({std::vector<Vec3>{s.charts[0].positions[s.charts[0].positions.size() - 2]},
+                          std::vector<Vec3>{s.charts[0].positions.back()}});
   return s;
 }
 
-Vec3 decoded(const Setting& s, const Walls& walls, const DisplacementTexture& texture, int row, int column) {
+Vec3 decoded(const Setting& s, const SeparationPlanes& separation, const DisplacementTexture& texture, int row,
+             int column) {
   const Patch& patch = s.patches[0];
   const std::size_t at = static_cast<std::size_t>(patch.rectangle.y + row) * texture.width + patch.rectangle.x + column;
-  const TangentFrame frame = tangent_frame(s.skeleton, walls, 0, patch.row_u[row], static_cast<double>(column) / patch.rectangle.width);
-  return decode_texel(frame, Vec3(texture.along[at], texture.around[at], texture.out[at]), end_position(s.skeleton, 0, BoneEnd::kHead),
-                      end_position(s.skeleton, 0, BoneEnd::kTail));
+  const TangentFrame frame =
+      tangent_frame(s.skeleton, separation, 0, patch.row_u[row], static_cast<double>(column) / patch.rectangle.width);
+  return decode_texel(frame, Vec3(texture.along[at], texture.around[at], texture.out[at]),
+                      end_position(s.skeleton, 0, BoneEnd::kHead), end_position(s.skeleton, 0, BoneEnd::kTail));
 }
 
 }  // namespace
@@ -112,14 +120,15 @@ TEST(Encode, TexelsOfRandomMapsDecodeToThePointsThatTheTwinFinds) {
     SCOPED_TRACE(seed);
     // Powers above 1 squeeze the first rows of triangles to sizes far below single precision's.
     const Setting s = random_setting(seed, seed % 4 == 0 ? 9.0 : 1.0);
-    const Walls walls(s.skeleton);
-    const TexelResult result =
-        read_texels(context, s.skeleton, walls, {s.charts, s.patches, s.hits, s.end_points}, 72, 80, Vec3(0, 0.2, 0.5), {.has_prefilter = false});
+    const SeparationPlanes separation(s.skeleton);
+    const TexelResult result = read_texels(context, s.skeleton, separation, {s.charts, s.patches, s.hits, s.end_points},
+                                           72, 80, Vec3(0, 0.2, 0.5), {.has_prefilter = false});
     EXPECT_EQ(result.report.missed_texels[0], 0);
     for (int row = 1; row + 1 < s.patches[0].rectangle.height; ++row)
       for (int j = 0; j < s.patches[0].rectangle.width; ++j) {
-        const Vec3 expected = twin::surface_point(s.charts[0], s.patches[0].row_u[row], static_cast<double>(j) / s.patches[0].rectangle.width);
-        EXPECT_LT((decoded(s, walls, result.texture, row, j) - expected).norm(), 2e-6) << row << " " << j;
+        const Vec3 expected = twin::surface_point(s.charts[0], s.patches[0].row_u[row],
+                                                  static_cast<double>(j) / s.patches[0].rectangle.width);
+        EXPECT_LT((decoded(s, separation, result.texture, row, j) - expected).norm(), 2e-6) << row << " " << j;
       }
   }
 }
@@ -127,11 +136,14 @@ TEST(Encode, TexelsOfRandomMapsDecodeToThePointsThatTheTwinFinds) {
 TEST(Encode, PolesAndEndRowsHoldTheirPoints) {
   ClContext context;
   const Setting s = random_setting(7, 1);
-  const Walls walls(s.skeleton);
-  const TexelResult result = read_texels(context, s.skeleton, walls, {s.charts, s.patches, s.hits, s.end_points}, 72, 80, Vec3::Zero());
+  const SeparationPlanes separation(s.skeleton);
+  const TexelResult result =
+      read_texels(context, s.skeleton, separation, {s.charts, s.patches, s.hits, s.end_points}, 72, 80, Vec3::Zero());
   for (int j = 0; j < s.patches[0].rectangle.width; ++j) {
-    EXPECT_LT((decoded(s, walls, result.texture, 0, j) - s.end_points[0][0][0]).norm(), 1e-6);
-    EXPECT_LT((decoded(s, walls, result.texture, s.patches[0].rectangle.height - 1, j) - s.end_points[0][1][0]).norm(), 1e-6);
+    EXPECT_LT((decoded(s, separation, result.texture, 0, j) - s.end_points[0][0][0]).norm(), 1e-6);
+    EXPECT_LT(
+        (decoded(s, separation, result.texture, s.patches[0].rectangle.height - 1, j) - s.end_points[0][1][0]).norm(),
+        1e-6);
   }
 }
 
@@ -139,21 +151,25 @@ TEST(Encode, PrefilterMovesPointsAsItsTwinDoes) {
   ClContext context;
   for (unsigned seed = 30; seed < 34; ++seed) {
     const Setting s = random_setting(seed, 1);
-    const Walls walls(s.skeleton);
+    const SeparationPlanes separation(s.skeleton);
     const int rows = s.patches[0].rectangle.height, columns = s.patches[0].rectangle.width;
     const TexelSources sources{s.charts, s.patches, s.hits, s.end_points};
-    const TexelResult plain = read_texels(context, s.skeleton, walls, sources, 72, 80, Vec3::Zero(), {.has_prefilter = false});
-    const TexelResult filtered = read_texels(context, s.skeleton, walls, sources, 72, 80, Vec3::Zero());
+    const TexelResult plain =
+        read_texels(context, s.skeleton, separation, sources, 72, 80, Vec3::Zero(), {.has_prefilter = false});
+    const TexelResult filtered = read_texels(context, s.skeleton, separation, sources, 72, 80, Vec3::Zero());
     std::vector<Vec3> points;
     for (int r = 0; r < rows; ++r)
-      for (int j = 0; j < columns; ++j) points.push_back(decoded(s, walls, plain.texture, r, j));
+      for (int j = 0; j < columns; ++j) points.push_back(decoded(s, separation, plain.texture, r, j));
     const std::vector<Vec3> expected = twin::prefiltered(points, rows, columns);
     for (int r = 1; r + 1 < rows; ++r)
       for (int j = 0; j < columns; ++j) {
         // Where the lattice is nearly a line its normal is noise; the twin's input carries that of single precision.
-        const Vec3 normal = (points[r * columns + (j + 1) % columns] - points[r * columns + (j + columns - 1) % columns])
-                                .cross(points[(r + 1) * columns + j] - points[(r - 1) * columns + j]);
-        if (normal.norm() > 1e-3) { EXPECT_LT((decoded(s, walls, filtered.texture, r, j) - expected[r * columns + j]).norm(), 2e-5) << seed; }
+        const Vec3 normal =
+            (points[r * columns + (j + 1) % columns] - points[r * columns + (j + columns - 1) % columns])
+                .cross(points[(r + 1) * columns + j] - points[(r - 1) * columns + j]);
+        if (normal.norm() > 1e-3) {
+          EXPECT_LT((decoded(s, separation, filtered.texture, r, j) - expected[r * columns + j]).norm(), 2e-5) << seed;
+        }
       }
   }
 }
@@ -161,24 +177,28 @@ TEST(Encode, PrefilterMovesPointsAsItsTwinDoes) {
 TEST(Encode, SpdTexelsAreHeightsAndMissesAreFilledFromTheirColumn) {
   ClContext context;
   Setting s = random_setting(5, 1);
-  const Walls walls(s.skeleton);
+  const SeparationPlanes separation(s.skeleton);
   s.patches[0].method = Method::kSpd;
   const Rectangle r = s.patches[0].rectangle;
   s.patches[0].row_u = spread_rows_uniformly(r.height);
   std::mt19937 random(9);
   s.hits[0].triangles.assign(static_cast<std::size_t>(r.width) * r.height, 0);
-  for (std::size_t i = 0; i < s.hits[0].triangles.size(); ++i) s.hits[0].distances.push_back(0.2f + 1e-3f * static_cast<float>(random() % 100));
+  for (std::size_t i = 0; i < s.hits[0].triangles.size(); ++i)
+    s.hits[0].distances.push_back(0.2f + 1e-3f * static_cast<float>(random() % 100));
   const std::size_t miss = 2 * r.width + 1;
   s.hits[0].triangles[miss] = -1;
   s.hits[0].distances[miss] = 0;
-  const TexelResult result = read_texels(context, s.skeleton, walls, {s.charts, s.patches, s.hits, s.end_points}, 72, 80, Vec3::Zero(), {.has_prefilter = false});
+  const TexelResult result = read_texels(context, s.skeleton, separation, {s.charts, s.patches, s.hits, s.end_points},
+                                         72, 80, Vec3::Zero(), {.has_prefilter = false});
   EXPECT_EQ(result.report.missed_texels[0], 1);
   for (int row = 1; row + 1 < r.height; ++row)
     for (int j = 0; j < r.width; ++j) {
       const std::size_t at = static_cast<std::size_t>(row) * r.width + j;
-      const double distance = at == miss ? 0.5 * (s.hits[0].distances[at - r.width] + s.hits[0].distances[at + r.width]) : s.hits[0].distances[at];
-      const TangentFrame frame = tangent_frame(s.skeleton, walls, 0, s.patches[0].row_u[row], static_cast<double>(j) / r.width);
-      EXPECT_LT((decoded(s, walls, result.texture, row, j) - (frame.foot + distance * frame.out)).norm(), 1e-6);
+      const double distance = at == miss ? 0.5 * (s.hits[0].distances[at - r.width] + s.hits[0].distances[at + r.width])
+                                         : s.hits[0].distances[at];
+      const TangentFrame frame =
+          tangent_frame(s.skeleton, separation, 0, s.patches[0].row_u[row], static_cast<double>(j) / r.width);
+      EXPECT_LT((decoded(s, separation, result.texture, row, j) - (frame.foot + distance * frame.out)).norm(), 1e-6);
       const std::size_t texel = static_cast<std::size_t>(r.y + row) * 72 + r.x + j;
       EXPECT_LT(std::abs(result.texture.along[texel]) + std::abs(result.texture.around[texel]), 2e-6);
     }
@@ -186,10 +206,11 @@ TEST(Encode, SpdTexelsAreHeightsAndMissesAreFilledFromTheirColumn) {
 
 TEST(RowProfile, OfALongCylinderIsLinearWhateverTheTriangles) {
   const Skeleton skeleton = straight_chain(1);
-  const Walls walls(skeleton);
-  Chart chart = jittered_chart(skeleton, walls, 0, 9, 12, 1, false, 3);
+  const SeparationPlanes separation(skeleton);
+  Chart chart = jittered_chart(skeleton, separation, 0, 9, 12, 1, false, 3);
   // On a cylinder of height 100 and radius 0.1 every meridian is 100 long, however the triangles lie.
-  for (std::size_t i = 0; i < chart.u.size(); ++i) chart.positions[i] = 0.1 * walls.spoke(0, chart.v[i]) + 100 * chart.u[i] * walls.bases()[0].o;
+  for (std::size_t i = 0; i < chart.u.size(); ++i)
+    chart.positions[i] = 0.1 * separation.radial(0, chart.v[i]) + 100 * chart.u[i] * separation.bases()[0].o;
   const RowProfile profile = row_profile(chart);
   EXPECT_NEAR(profile.length, 100, 0.01);
   const std::vector<double> rows = spread_rows_by_length(profile, 33);

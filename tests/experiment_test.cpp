@@ -37,7 +37,13 @@ class Runner : public ::testing::Test {
     return "accepted";
   }
   RunSummary run(const Experiment& experiment, bool is_resumed = false, int jobs = 1) {
-    return run_experiment(experiment, {.program = "/bin/false", .folder = folder_ / "out", .is_resumed = is_resumed, .jobs = jobs, .device = "", .source = {}, .progress = {}});
+    return run_experiment(experiment, {.program = "/bin/false",
+                                       .folder = folder_ / "out",
+                                       .is_resumed = is_resumed,
+                                       .jobs = jobs,
+                                       .device = "",
+                                       .source = {},
+                                       .progress = {}});
   }
   static constexpr const char* kModel = R"({"name": "y", "mesh": "y.ply", "skeleton": "y.skeleton.json"})";
   ScratchFolder folder_;
@@ -56,7 +62,8 @@ TEST_F(Runner, EveryModelAndEveryCombinationIsAnItemOfItsOwn) {
   EXPECT_EQ(keys, (std::set<std::string>{"y-32-a", "y-32-b", "y-64-a", "y-64-b"}));
   for (const Item& item : items)
     if (item.key == "y-64-b") {
-      EXPECT_EQ(fill_arguments(experiment, item, experiment.steps[0].run, {}), (std::vector<std::string>{"y", "--x", "64", "64.b"}));
+      EXPECT_EQ(fill_arguments(experiment, item, experiment.steps[0].run, {}),
+                (std::vector<std::string>{"y", "--x", "64", "64.b"}));
       EXPECT_EQ(fill_arguments(experiment, item, {"{other}"}, {}), std::vector<std::string>{"o"});
     }
 }
@@ -72,7 +79,9 @@ TEST_F(Runner, SaysWhatIsWrongWithAnExperimentAndWhatWasMeant) {
   EXPECT_TRUE(holds(refusal(R"({"name": "e", "columns": {"c": "t.x"}, )" + steps + "}"), "no step"));
   EXPECT_TRUE(holds(refusal(R"({"name": "e", "models": ["absent.json"], )" + steps + "}"), "absent.json"));
   EXPECT_TRUE(holds(refusal("{\n\"name\": }"), "line 2"));
-  EXPECT_TRUE(holds(refusal(R"({"name": "e", )" + steps + "}", {.settings = {"size"}, .is_quick = false, .only = {}, .models = {}}), "KEY=VALUE"));
+  EXPECT_TRUE(holds(
+      refusal(R"({"name": "e", )" + steps + "}", {.settings = {"size"}, .is_quick = false, .only = {}, .models = {}}),
+      "KEY=VALUE"));
   EXPECT_EQ(refusal(R"({"name": "e", )" + steps + "}"), "accepted");
   const Experiment experiment = read_experiment(write(R"({"name": "e", "sweep": {"a": ["{a}"]}, )" + steps + "}"));
   EXPECT_THROW(fill_arguments(experiment, plan_items(experiment)[0], {"{absent}"}, {}), IoError);
@@ -81,10 +90,15 @@ TEST_F(Runner, SaysWhatIsWrongWithAnExperimentAndWhatWasMeant) {
 
 TEST_F(Runner, SettingsQuickAndOnlyChangeTheExperiment) {
   const std::filesystem::path file = write(fmt::format(
-      R"({{"name": "e", "models": [{}], "sweep": {{"size": [32, 64]}}, "steps": [{{"name": "s", "run": []}}], "quick": {{"sweep.size": [8]}}}})", kModel));
+      R"({{"name": "e", "models": [{}], "sweep": {{"size": [32, 64]}}, "steps": [{{"name": "s", "run": []}}], "quick": {{"sweep.size": [8]}}}})",
+      kModel));
   EXPECT_EQ(plan_items(read_experiment(file)).size(), 2u);
-  EXPECT_EQ(plan_items(read_experiment(file, {.settings = {}, .is_quick = true, .only = {}, .models = {}}))[0].key, "y-8");
-  EXPECT_EQ(plan_items(read_experiment(file, {.settings = {"sweep.size=[1,2,3]"}, .is_quick = true, .only = {}, .models = {}})).size(), 3u);
+  EXPECT_EQ(plan_items(read_experiment(file, {.settings = {}, .is_quick = true, .only = {}, .models = {}}))[0].key,
+            "y-8");
+  EXPECT_EQ(plan_items(
+                read_experiment(file, {.settings = {"sweep.size=[1,2,3]"}, .is_quick = true, .only = {}, .models = {}}))
+                .size(),
+            3u);
   EXPECT_THROW(read_experiment(file, {.settings = {}, .is_quick = false, .only = {"z"}, .models = {}}), InputError);
 }
 
@@ -98,15 +112,19 @@ TEST_F(Runner, RecordsAFailureWithItsReasonAndGoesOn) {
   const OrderedJson& rows = summary.results.at("rows");
   EXPECT_EQ(rows[0].at("columns").at("bytes"), 5);
   EXPECT_EQ(rows[1].at("reason"), "because");
-  for (const char* file : {"results.json", "results.csv", "record.json", "items/0.json", "items/3.json"}) EXPECT_TRUE(std::filesystem::exists(folder_ / "out" / file)) << file;
+  for (const char* file : {"results.json", "results.csv", "record.json", "items/0.json", "items/3.json"})
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "out" / file)) << file;
   EXPECT_TRUE(holds(read_file(folder_ / "out/results.csv"), "because"));
   const OrderedJson record = OrderedJson::parse(read_file(folder_ / "out/record.json"));
-  for (const char* key : {"source", "experiment", "inputs", "git", "compiler", "device", "machine", "seconds", "peak_memory_mb"}) EXPECT_TRUE(record.contains(key)) << key;
+  for (const char* key :
+       {"source", "experiment", "inputs", "git", "compiler", "device", "machine", "seconds", "peak_memory_mb"})
+    EXPECT_TRUE(record.contains(key)) << key;
 }
 
 TEST_F(Runner, ResumesWhatIsDoneUnlessCommandsOrInputsChanged) {
   const std::string text = fmt::format(
-      R"({{"name": "e", "models": [{}], "sweep": {{"n": [1, 2]}}, "steps": [{{"name": "s", "tool": "sh", "run": ["-c", "echo x >> {{out}}/log; test {{n}} = 1"]}}]}})", kModel);
+      R"({{"name": "e", "models": [{}], "sweep": {{"n": [1, 2]}}, "steps": [{{"name": "s", "tool": "sh", "run": ["-c", "echo x >> {{out}}/log; test {{n}} = 1"]}}]}})",
+      kModel);
   const auto runs = [&] { return read_file(folder_ / "out/log").size() / 2; };
   run(read_experiment(write(text)));
   EXPECT_EQ(runs(), 2u);
@@ -119,7 +137,9 @@ TEST_F(Runner, ResumesWhatIsDoneUnlessCommandsOrInputsChanged) {
 
 TEST_F(Runner, ComparesNumbersByToleranceAndLeavesTimesOut) {
   const auto results = [](double mean, double ms, const char* status) {
-    return OrderedJson{{"rows", {{{"key", "a"}, {"status", status}, {"columns", {{"mean", mean}, {"encode_ms", ms}, {"closed", true}}}}}}};
+    return OrderedJson{
+        {"rows",
+         {{{"key", "a"}, {"status", status}, {"columns", {{"mean", mean}, {"encode_ms", ms}, {"closed", true}}}}}}};
   };
   EXPECT_TRUE(compare_results(results(1, 5, "done"), results(1.01, 50, "done"), 0.02).empty());
   EXPECT_EQ(compare_results(results(1, 5, "done"), results(1.1, 5, "done"), 0.02).size(), 1u);
@@ -132,16 +152,19 @@ TEST(ExperimentFiles, EveryCommittedExperimentCanBePlannedAndHasKnownCommands) {
   for (const auto& entry : std::filesystem::directory_iterator(SKELETEX_SOURCE_DIR "/configs/experiments")) {
     SCOPED_TRACE(entry.path().string());
     for (const bool is_quick : {false, true}) {
-      const Experiment experiment = read_experiment(entry.path(), {.settings = {}, .is_quick = is_quick, .only = {}, .models = {}});
+      const Experiment experiment =
+          read_experiment(entry.path(), {.settings = {}, .is_quick = is_quick, .only = {}, .models = {}});
       EXPECT_EQ(experiment.name, entry.path().stem());
       for (const Item& item : plan_items(experiment))
         for (const Step& step : experiment.steps)
-          EXPECT_NO_THROW(fill_arguments(experiment, item, step.run, {{"work", "w"}, {"out", "o"}, {"view", "v"}, {"config", "c"}}));
+          EXPECT_NO_THROW(fill_arguments(experiment, item, step.run,
+                                         {{"work", "w"}, {"out", "o"}, {"view", "v"}, {"config", "c"}}));
     }
     ++count;
   }
   EXPECT_GT(count, 0);
-  for (const std::filesystem::path& file : experiment_files(SKELETEX_SOURCE_DIR "/configs/paper.json")) EXPECT_TRUE(std::filesystem::exists(file)) << file;
+  for (const std::filesystem::path& file : experiment_files(SKELETEX_SOURCE_DIR "/configs/paper.json"))
+    EXPECT_TRUE(std::filesystem::exists(file)) << file;
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/edit/filter.h"
+#include "skeletex/edit/filter/filter.h"
 
 #include <gtest/gtest.h>
 
@@ -12,10 +12,10 @@
 #include <random>
 #include <set>
 
-#include "skeletex/edit/coarsen.h"
-#include "skeletex/edit/differential.h"
-#include "skeletex/encode/encode_model.h"
-#include "skeletex/measure/metro.h"
+#include "skeletex/analysis/metro.h"
+#include "skeletex/convert/encode_model.h"
+#include "skeletex/edit/filter/coarsen.h"
+#include "skeletex/edit/filter/differential.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/store_positions.h"
@@ -34,7 +34,8 @@ ClContext& device() {
 }
 
 SkeletexModel synthetic(const Skeleton& skeleton, int width, int height, double radius = 0.25, double relief = 1) {
-  return SyntheticSurface(skeleton, radius, relief).model(std::vector<std::pair<int, int>>(skeleton.bones.size(), {width, height}));
+  return SyntheticSurface(skeleton, radius, relief)
+      .model(std::vector<std::pair<int, int>>(skeleton.bones.size(), {width, height}));
 }
 
 /// The model with its vertices where `place` puts them.
@@ -61,7 +62,8 @@ TwinSurface twin_surface(const SkeletexModel& model) {
 }
 
 std::vector<SkeletexModel> twin_models() {
-  std::vector<SkeletexModel> models{synthetic(lone_bone(), 12, 9), synthetic(y_branch(), 4, 4), synthetic(ring_with_arm(5), 21, 17),
+  std::vector<SkeletexModel> models{synthetic(lone_bone(), 12, 9), synthetic(y_branch(), 4, 4),
+                                    synthetic(ring_with_arm(5), 21, 17),
                                     SyntheticSurface(cross(6), 0.3).model(random_sizes(6, 4, 40, 3))};
   // Ugly: texels all over the place, and some of them at one point.
   SkeletexModel ugly = synthetic(chain(2), 16, 16);
@@ -92,11 +94,15 @@ double norm_of_difference(const std::vector<float>& a, const Eigen::VectorXd& b)
   return std::sqrt(sum);
 }
 
-ClBuffer<float> everywhere(const ModelSurface& surface) { return device().upload(std::vector<float>(surface.neighbours.vertex_count, 1.f)); }
+ClBuffer<float> everywhere(const ModelSurface& surface) {
+  return device().upload(std::vector<float>(surface.neighbours.vertex_count, 1.f));
+}
 
 /// RMS over the area of a vertex value against a closed form, relative to that form's.
-double relative_rms(const ModelSurface& surface, const std::vector<float>& values, const std::function<double(const Vec3&)>& exact) {
-  const std::vector<float> areas = device().download(make_surface_operator(device(), surface.neighbours, surface.points).mass);
+double relative_rms(const ModelSurface& surface, const std::vector<float>& values,
+                    const std::function<double(const Vec3&)>& exact) {
+  const std::vector<float> areas =
+      device().download(make_surface_operator(device(), surface.neighbours, surface.points).mass);
   double error = 0, size = 0;
   for (std::size_t i = 0; i < values.size(); ++i) {
     const double expected = exact(surface.positions[i]);
@@ -167,21 +173,27 @@ TEST(SurfaceOperator, EqualsTheCotangentLaplacianOfItsTriangles) {
     const SurfaceOperator surface = make_surface_operator(device(), twin.surface.neighbours, twin.surface.points);
     // Relative rounding of a cotangent grows with the thinness of its triangle, here to 1 / 1.2e-4.
     const double tolerance = 2e-4;
-    EXPECT_LT(norm_of_difference(device().download(surface.mass), twin.matrices.mass), 1e-5 * twin.matrices.mass.norm());
-    EXPECT_LT(norm_of_difference(device().download(surface.stiffness), twin.matrices.laplace.diagonal()), tolerance * twin.matrices.laplace.diagonal().norm());
+    EXPECT_LT(norm_of_difference(device().download(surface.mass), twin.matrices.mass),
+              1e-5 * twin.matrices.mass.norm());
+    EXPECT_LT(norm_of_difference(device().download(surface.stiffness), twin.matrices.laplace.diagonal()),
+              tolerance * twin.matrices.laplace.diagonal().norm());
     for (const int components : {1, 3}) {
       const std::vector<float> x = random_values(static_cast<std::size_t>(components) * count, 5);
-      const std::vector<float> q =
-          device().download(apply_operator(device(), surface, 0.5f, 0.01f, everywhere(twin.surface), {components, device().upload(x)}).values);
+      const std::vector<float> q = device().download(
+          apply_operator(device(), surface, 0.5f, 0.01f, everywhere(twin.surface), {components, device().upload(x)})
+              .values);
       for (int c = 0; c < components; ++c) {
         Eigen::VectorXd value(count);
         for (int i = 0; i < count; ++i) value[i] = x[static_cast<std::size_t>(c) * count + i];
-        const Eigen::VectorXd expected = 0.5 * twin.matrices.mass.cwiseProduct(value) + 0.01 * (twin.matrices.laplace * value);
-        EXPECT_LT(norm_of_difference({q.begin() + c * count, q.begin() + (c + 1) * count}, expected), tolerance * expected.norm());
+        const Eigen::VectorXd expected =
+            0.5 * twin.matrices.mass.cwiseProduct(value) + 0.01 * (twin.matrices.laplace * value);
+        EXPECT_LT(norm_of_difference({q.begin() + c * count, q.begin() + (c + 1) * count}, expected),
+                  tolerance * expected.norm());
       }
     }
     std::vector<float> ones(count, 1.f);
-    for (const float value : device().download(apply_operator(device(), surface, 0, 1, everywhere(twin.surface), {1, device().upload(ones)}).values))
+    for (const float value : device().download(
+             apply_operator(device(), surface, 0, 1, everywhere(twin.surface), {1, device().upload(ones)}).values))
       EXPECT_EQ(value, 0) << "constants have no Laplacian";
   }
 }
@@ -195,7 +207,8 @@ TEST(SurfaceOperator, SolvesDiffusionAsADirectSolverDoes) {
     for (int i = 0; i < count; i += 7) is_free[i] = 0;
     const std::vector<float> b = random_values(count, 6);
     const float time = 0.01f;
-    const SolveResult solved = solve_diffusion(device(), surface, time, device().upload(is_free), {1, device().upload(b)}, 1e-6);
+    const SolveResult solved =
+        solve_diffusion(device(), surface, time, device().upload(is_free), {1, device().upload(b)}, 1e-6);
     EXPECT_LE(solved.report.residual, 1e-6);
     EXPECT_LT(solved.report.steps, 400);
 
@@ -204,7 +217,8 @@ TEST(SurfaceOperator, SolvesDiffusionAsADirectSolverDoes) {
     Eigen::VectorXd right(count);
     for (int column = 0; column < matrix.outerSize(); ++column)
       for (Eigen::SparseMatrix<double>::InnerIterator entry(matrix, column); entry; ++entry)
-        if (is_free[entry.row()] == 0 || is_free[entry.col()] == 0) entry.valueRef() = entry.row() == entry.col() ? 1 : 0;
+        if (is_free[entry.row()] == 0 || is_free[entry.col()] == 0)
+          entry.valueRef() = entry.row() == entry.col() ? 1 : 0;
     for (int i = 0; i < count; ++i) right[i] = static_cast<double>(is_free[i] * b[i]);
     const Eigen::VectorXd expected = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>(matrix).solve(right);
     EXPECT_LT(norm_of_difference(device().download(solved.x.values), expected), 1e-3 * expected.norm());
@@ -214,10 +228,13 @@ TEST(SurfaceOperator, SolvesDiffusionAsADirectSolverDoes) {
 TEST(SurfaceOperator, TakesHardlyMoreStepsAtFourTimesTheSize) {
   std::map<int, int> steps;
   for (const int size : {64, 256}) {
-    const SkeletexModel model = SyntheticSurface(cross(5), 0.2).model(std::vector<std::pair<int, int>>(5, {size, size}));
+    const SkeletexModel model =
+        SyntheticSurface(cross(5), 0.2).model(std::vector<std::pair<int, int>>(5, {size, size}));
     const ModelSurface surface = upload_surface(device(), model);
     const SurfaceOperator laplace = make_surface_operator(device(), surface.neighbours, surface.points);
-    steps[size] = solve_diffusion(device(), laplace, 9e-4f, everywhere(surface), apply_operator(device(), laplace, 0, 1, everywhere(surface), surface.points)).report.steps;
+    steps[size] = solve_diffusion(device(), laplace, 9e-4f, everywhere(surface),
+                                  apply_operator(device(), laplace, 0, 1, everywhere(surface), surface.points))
+                      .report.steps;
   }
   EXPECT_LT(steps[256], 2 * steps[64] + 4) << steps[64] << " steps at a quarter of the size";
 }
@@ -253,7 +270,8 @@ TEST(CoarseLattice, ContinuesASmoothFieldOverSeamsAndPoles) {
   double largest = 0;
   for (int v = 0; v < lattice.vertex_count; ++v) {
     Vec3 mixed = Vec3::Zero();
-    for (int i = 0; i < 4; ++i) mixed += static_cast<double>(coarse.shares[v][i]) * coarse.positions[coarse.sources[v][i]];
+    for (int i = 0; i < 4; ++i)
+      mixed += static_cast<double>(coarse.shares[v][i]) * coarse.positions[coarse.sources[v][i]];
     largest = std::max(largest, (mixed - positions[v]).norm());
   }
   EXPECT_LT(largest, 0.01 * model.diagonal);
@@ -262,7 +280,8 @@ TEST(CoarseLattice, ContinuesASmoothFieldOverSeamsAndPoles) {
 TEST(SurfaceOperator, SumsAreaVectorsToTheVolume) {
   for (const SkeletexModel& model : twin_models()) {
     const TwinSurface twin = twin_surface(model);
-    const std::vector<Vec3> vectors = download_vectors(device(), area_vectors(device(), twin.surface.neighbours, twin.surface.points));
+    const std::vector<Vec3> vectors =
+        download_vectors(device(), area_vectors(device(), twin.surface.neighbours, twin.surface.points));
     const std::vector<Vec3> expected = twin::area_vectors(twin.triangles, twin.points);
     Vec3 sum = Vec3::Zero();
     double size = 0;
@@ -280,7 +299,8 @@ TEST(Noise, EqualsItsTwinAndStaysWithinBounds) {
   for (float& x : points) x *= 30;
   const auto heights = device().allocate<float>(5000);
   for (const unsigned seed : {0u, 77u}) {
-    device().launch({"filter.cl", "noise_at_points"}, ClRange(5000), 5000, 0.7f, 1, seed, device().upload(points), heights);
+    device().launch({"filter.cl", "noise_at_points"}, ClRange(5000), 5000, 0.7f, 1, seed, device().upload(points),
+                    heights);
     const std::vector<float> values = device().download(heights);
     double square = 0;
     for (int i = 0; i < 5000; ++i) {
@@ -297,9 +317,12 @@ TEST(Curvature, OfASphereIsThatOfTheSphereOverSeamsCornersAndPoles) {
   // 512 x 512 texels altogether: one bone with two poles; three bones, two corners, three poles.
   const std::vector<std::tuple<Skeleton, int, int>> cases{{lone_bone(), 512, 512}, {y_branch(), 296, 296}};
   for (const auto& [skeleton, width, height] : cases) {
-    const Vec3 centre = skeleton.bones.size() == 1 ? Vec3(0.5 * (skeleton.nodes[0].position + skeleton.nodes[1].position)) : skeleton.nodes[0].position;
+    const Vec3 centre = skeleton.bones.size() == 1
+                            ? Vec3(0.5 * (skeleton.nodes[0].position + skeleton.nodes[1].position))
+                            : skeleton.nodes[0].position;
     const double radius = 2;
-    SkeletexModel model = placed(synthetic(skeleton, width, height, 0.25, 0), [&](const Vec3& p) { return Vec3(centre + radius * (p - centre).normalized()); });
+    SkeletexModel model = placed(synthetic(skeleton, width, height, 0.25, 0),
+                                 [&](const Vec3& p) { return Vec3(centre + radius * (p - centre).normalized()); });
     model.diagonal = 2 * radius * std::numbers::sqrt3;
     const ModelSurface surface = upload_surface(device(), model);
     const CurvatureResult result = mean_curvature(device(), model, surface);
@@ -308,7 +331,8 @@ TEST(Curvature, OfASphereIsThatOfTheSphereOverSeamsCornersAndPoles) {
     EXPECT_LT(rms, 0.02) << skeleton.bones.size() << " bones";
     double largest = 0;
     const std::vector<Vec3> normals = vertex_normals(device(), surface);
-    for (std::size_t i = 0; i < normals.size(); ++i) largest = std::max(largest, (normals[i] - (surface.positions[i] - centre) / radius).norm());
+    for (std::size_t i = 0; i < normals.size(); ++i)
+      largest = std::max(largest, (normals[i] - (surface.positions[i] - centre) / radius).norm());
     EXPECT_LT(largest, 0.05);
   }
 }
@@ -385,13 +409,16 @@ TEST(Smooth, TreatsABumpOfAnEncodedMeshAlikeOnASeamAndAwayFromSeams) {
   SmoothOptions options;
   options.scale = 0.03;
   std::vector<TriangleMesh> smoothed;
-  for (const double joint : {0.0, 0.9}) smoothed.push_back(reconstruct_mesh(device(), smooth_model(device(), encode_model(device(), mesh, tube(joint), encoding).model, options).model));
+  for (const double joint : {0.0, 0.9})
+    smoothed.push_back(reconstruct_mesh(
+        device(), smooth_model(device(), encode_model(device(), mesh, tube(joint), encoding).model, options).model));
   std::vector<Vec3> near_bump;
   for (const Vec3& p : smoothed[0].positions)
     if ((p - Vec3(radius, 0, 0)).norm() < 3 * width) near_bump.push_back(p);
   ASSERT_GT(near_bump.size(), 1000u);
   double sum = 0;
-  for (const float distance : closest_distances(device(), smoothed[1], near_bump)) sum += static_cast<double>(distance * distance);
+  for (const float distance : closest_distances(device(), smoothed[1], near_bump))
+    sum += static_cast<double>(distance * distance);
   EXPECT_LT(std::sqrt(sum / static_cast<double>(near_bump.size())), 0.01 * height);
 }
 
@@ -399,7 +426,8 @@ TEST(Smooth, InStepsShrinksASphereAsTheFlowDoes) {
   // A step of implicit Euler makes R of R / (1 + 2 t / R^2); in ever smaller steps that becomes R^2 - 4 t.
   const Skeleton skeleton = y_branch();
   const Vec3 centre = skeleton.nodes[0].position;
-  SkeletexModel model = placed(synthetic(skeleton, 64, 64, 0.25, 0), [&](const Vec3& p) { return Vec3(centre + (p - centre).normalized()); });
+  SkeletexModel model = placed(synthetic(skeleton, 64, 64, 0.25, 0),
+                               [&](const Vec3& p) { return Vec3(centre + (p - centre).normalized()); });
   model.diagonal = 2 * std::numbers::sqrt3;
   SmoothOptions options;
   options.scale = 0.06;
@@ -456,14 +484,16 @@ TEST(Filters, GiveTheSameWhenBonesAreRenamedAndReordered) {
 }
 
 TEST(Filters, KeepModelsClosedAtEverySize) {
-  const std::vector<Skeleton> skeletons{lone_bone(), y_branch(), cross(7), ring(5), ring_with_arm(6), random_tree(20, 6)};
+  const std::vector<Skeleton> skeletons{lone_bone(), y_branch(),       cross(7),
+                                        ring(5),     ring_with_arm(6), random_tree(20, 6)};
   for (const Skeleton& skeleton : skeletons) {
     const SyntheticSurface surface(skeleton, 0.2);
     for (const int side : {4, 9, 30}) {
       const SkeletexModel model = surface.model(std::vector<std::pair<int, int>>(skeleton.bones.size(), {side, side}));
       NoiseOptions noise;
       noise.amplitude = 0.02;
-      for (const FilterResult& result : {smooth_model(device(), model), enhance_model(device(), model), add_noise(device(), model, noise)}) {
+      for (const FilterResult& result :
+           {smooth_model(device(), model), enhance_model(device(), model), add_noise(device(), model, noise)}) {
         const TriangleMesh mesh = reconstruct_mesh(device(), result.model);
         EXPECT_EQ(broken_rule(mesh, surface.genus()), "") << skeleton.bones.size() << " bones, side " << side;
         for (const Vec3& p : mesh.positions) ASSERT_TRUE(p.allFinite());
@@ -515,7 +545,8 @@ TEST(Filters, OfSnappedModelsTakeTheSolverNoLongerAndLeaveTheRestBitByBit) {
     for (int row = 0; row < height; ++row)
       for (int j = 0; j < width; ++j) {
         const std::size_t texel = static_cast<std::size_t>(y + row) * snapped.texture.width + x + j;
-        const bool is_same = part.texture.out[texel] == snapped.texture.out[texel] && part.texture.along[texel] == snapped.texture.along[texel];
+        const bool is_same = part.texture.out[texel] == snapped.texture.out[texel] &&
+                             part.texture.along[texel] == snapped.texture.along[texel];
         EXPECT_TRUE(is_same || bone == 1) << bone << " " << row << " " << j;
         changed += !is_same;
       }
@@ -531,8 +562,9 @@ TEST(Filters, OfNoEffectChangeNoBit) {
   enhance.gain = 0;
   NoiseOptions noise;
   noise.amplitude = 0;
-  for (const SkeletexModel& same : {smooth_model(device(), model, smooth).model, enhance_model(device(), model, enhance).model,
-                                    add_noise(device(), model, noise).model})
+  for (const SkeletexModel& same :
+       {smooth_model(device(), model, smooth).model, enhance_model(device(), model, enhance).model,
+        add_noise(device(), model, noise).model})
     expect_same_texels(same, model, 0);
 }
 
@@ -546,7 +578,8 @@ TEST(Filters, LeaveOtherBonesBitByBitAndFadeOutTowardsThem) {
   for (const int bone : {0, 2})
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
       for (const int v : end_row(model, lattice, bone, end)) EXPECT_EQ(weights[v], 0);
-  for (int v = lattice.first_sample[0]; v < lattice.vertex_count; ++v) EXPECT_EQ(weights[v], 0) << "all seams lead out of the region";
+  for (int v = lattice.first_sample[0]; v < lattice.vertex_count; ++v)
+    EXPECT_EQ(weights[v], 0) << "all seams lead out of the region";
   const Neighbours table = find_neighbours(model, lattice, end_triangles(model, lattice, positions));
   for (std::size_t k = 0; k < table.fan_vertices.size(); ++k)
     for (int i = table.fan_begin[k]; i < table.fan_begin[k + 1]; ++i)
@@ -566,7 +599,8 @@ TEST(Filters, LeaveOtherBonesBitByBitAndFadeOutTowardsThem) {
       }
   }
   for (std::size_t a = 0; a < model.arcs.size(); ++a)
-    for (std::size_t i = 0; i < model.arcs[a].samples.size(); ++i) EXPECT_EQ(result.model.arcs[a].samples[i].distance, model.arcs[a].samples[i].distance);
+    for (std::size_t i = 0; i < model.arcs[a].samples.size(); ++i)
+      EXPECT_EQ(result.model.arcs[a].samples[i].distance, model.arcs[a].samples[i].distance);
   EXPECT_GT(result.report.largest_move, 0.005);
   EXPECT_EQ(broken_rule(reconstruct_mesh(device(), result.model), 0), "");
 }
@@ -575,7 +609,8 @@ TEST(Filters, TakeAwayWithANegativeGainWhatSmoothingTakesAway) {
   const SkeletexModel model = synthetic(chain(3), 40, 48);
   EnhanceOptions enhance;
   enhance.gain = -1;
-  expect_same_texels(enhance_model(device(), model, enhance).model, smooth_model(device(), model).model, 1e-6 * model.diagonal);
+  expect_same_texels(enhance_model(device(), model, enhance).model, smooth_model(device(), model).model,
+                     1e-6 * model.diagonal);
 }
 
 TEST(Filters, GiveTheSameBytesTwice) {

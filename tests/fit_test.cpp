@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include "skeletex/convert/fit/fit.h"
+
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -6,12 +8,11 @@
 #include <numbers>
 #include <random>
 
-#include "skeletex/encode/encode_model.h"
-#include "skeletex/encode/fit.h"
-#include "skeletex/encode/row_profile.h"
-#include "skeletex/measure/manifold.h"
-#include "skeletex/measure/metro.h"
-#include "skeletex/measure/self_intersection.h"
+#include "skeletex/analysis/manifold.h"
+#include "skeletex/analysis/metro.h"
+#include "skeletex/convert/encode_model.h"
+#include "skeletex/convert/layout/row_profile.h"
+#include "skeletex/geometry/self_intersection.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "support/fit_twin.h"
 #include "support/load_model.h"
@@ -36,7 +37,8 @@ struct RandomPatch {
 
   RandomPatch(const Rectangle& r, unsigned seed) {
     patches.push_back({r, Method::kVsm, SegmentTopology::kSphere, spread_rows_uniformly(r.height)});
-    layout = upload_layout(device(), patches, frame_tables(skeleton, Walls(skeleton), patches, Vec3::Zero()), kTextureWidth, kTextureHeight);
+    layout = upload_layout(device(), patches, frame_tables(skeleton, SeparationPlanes(skeleton), patches, Vec3::Zero()),
+                           kTextureWidth, kTextureHeight);
     std::mt19937 random(seed);
     std::normal_distribution<float> normal(0, 1);
     std::uniform_real_distribution<float> unit(0, 1);
@@ -55,9 +57,16 @@ struct RandomPatch {
       for (int j = 0; j < r.width; ++j)
         for (int i = 0; i < 4; ++i) {
           const double angle = 2 * std::numbers::pi * (j + 0.25 + 0.5 * (i & 1)) / r.width;
-          const Vec3 direction = Vec3(std::cos(angle) + 0.3 * normal(random), std::sin(angle) + 0.3 * normal(random), 0.3 * normal(random)).normalized();
-          const double values[7] = {std::cos(angle) + 0.1 * normal(random), std::sin(angle) + 0.1 * normal(random),
-                                    0.4 * (row + 0.25 + 0.25 * (i & 2)) + 0.1 * normal(random), direction[0], direction[1], direction[2], 0.5 + unit(random)};
+          const Vec3 direction =
+              Vec3(std::cos(angle) + 0.3 * normal(random), std::sin(angle) + 0.3 * normal(random), 0.3 * normal(random))
+                  .normalized();
+          const double values[7] = {std::cos(angle) + 0.1 * normal(random),
+                                    std::sin(angle) + 0.1 * normal(random),
+                                    0.4 * (row + 0.25 + 0.25 * (i & 2)) + 0.1 * normal(random),
+                                    direction[0],
+                                    direction[1],
+                                    direction[2],
+                                    0.5 + unit(random)};
           for (int k = 0; k < 7; ++k) samples[(7 * i + k) * size + texel(j, row)] = static_cast<float>(values[k]);
         }
   }
@@ -78,29 +87,33 @@ struct Solved {
   std::vector<float> weights, residuals, system;
   std::array<std::vector<float>, 3> moves;
 };
-Solved solve(const RandomPatch& patch, int sweeps, std::size_t group, float damping, float springs, float least_residual) {
+Solved solve(const RandomPatch& patch, int sweeps, std::size_t group, float damping, float springs,
+             float least_residual) {
   ClContext& c = device();
   const DeviceLayout& layout = patch.layout;
   const std::size_t size = layout.size();
   const ClRange range({kTextureWidth, kTextureHeight}, {group, 1});
-  const auto x = c.upload(patch.points[0]), y = c.upload(patch.points[1]), z = c.upload(patch.points[2]), samples = c.upload(patch.samples);
+  const auto x = c.upload(patch.points[0]), y = c.upload(patch.points[1]), z = c.upload(patch.points[2]),
+             samples = c.upload(patch.samples);
   auto diagonals = c.allocate<int>(size), matches = c.allocate<int>(4 * size);
-  auto weights = c.allocate<float>(8 * size), residuals = c.allocate<float>(4 * size), costs = c.allocate<float>(size), areas = c.allocate<float>(size);
+  auto weights = c.allocate<float>(8 * size), residuals = c.allocate<float>(4 * size), costs = c.allocate<float>(size),
+       areas = c.allocate<float>(size);
   auto lattice = c.allocate<float>(10 * size), system = c.allocate<float>(36 * size);
   c.fill(lattice, 0.f), c.fill(system, 0.f), c.fill(weights, 0.f), c.fill(residuals, 0.f);
-  c.launch({"fit.cl", "choose_fitted_diagonals"}, range, kTextureWidth, kTextureHeight, layout.texel_patches, layout.patches, x, y, z, diagonals);
-  c.launch({"fit.cl", "match_samples"}, range, kTextureWidth, kTextureHeight, layout.texel_patches, layout.patches, samples, diagonals, x, y, z, matches,
-           weights, residuals, costs, areas);
-  c.launch({"fit.cl", "assemble"}, range, kTextureWidth, kTextureHeight, least_residual, layout.texel_patches, layout.patches, samples, diagonals, matches,
-           weights, residuals, lattice, system);
+  c.launch({"fit.cl", "choose_fitted_diagonals"}, range, kTextureWidth, kTextureHeight, layout.texel_patches,
+           layout.patches, x, y, z, diagonals);
+  c.launch({"fit.cl", "match_samples"}, range, kTextureWidth, kTextureHeight, layout.texel_patches, layout.patches,
+           samples, diagonals, x, y, z, matches, weights, residuals, costs, areas);
+  c.launch({"fit.cl", "assemble"}, range, kTextureWidth, kTextureHeight, least_residual, layout.texel_patches,
+           layout.patches, samples, diagonals, matches, weights, residuals, lattice, system);
   auto move_x = c.allocate<float>(size), move_y = c.allocate<float>(size), move_z = c.allocate<float>(size);
   c.fill(move_x, 0.f), c.fill(move_y, 0.f), c.fill(move_z, 0.f);
   for (int sweep = 0; sweep < sweeps; ++sweep)
     for (int colour = 0; colour < 6; ++colour)
-      c.launch({"fit.cl", "relax_moves"}, range, kTextureWidth, kTextureHeight, colour, damping, springs, layout.texel_patches, layout.patches, system, move_x,
-               move_y, move_z);
-  return {c.download(diagonals), c.download(matches), c.download(weights), c.download(residuals), c.download(system),
-          {c.download(move_x), c.download(move_y), c.download(move_z)}};
+      c.launch({"fit.cl", "relax_moves"}, range, kTextureWidth, kTextureHeight, colour, damping, springs,
+               layout.texel_patches, layout.patches, system, move_x, move_y, move_z);
+  return {c.download(diagonals), c.download(matches), c.download(weights),
+          c.download(residuals), c.download(system),  {c.download(move_x), c.download(move_y), c.download(move_z)}};
 }
 
 }  // namespace
@@ -127,14 +140,16 @@ TEST(FitKernels, ASampleIsMatchedWithAPointOfTheLatticeAsNearAsTheTwinFinds) {
         Vec3 matched = Vec3::Zero();
         for (int k = 0; k < 3; ++k) matched += w[k] * point(column + corners[k][0], up + corners[k][1]);
         EXPECT_NEAR(got.residuals[i * size + at], normal.dot(matched - sample), 1e-5);
-        // Not further than anything in the sample's own quad; the quads beside it are only searched across the nearest side.
+        // Not further than anything in the sample's own quad; the quads beside it are only searched across the nearest
+        // side.
         const double own = twin::nearest_in_quad(point, j, row, got.diagonals[at] != 0, sample);
         EXPECT_LE((matched - sample).norm(), own + 1e-5);
         double best = own;
         for (int dy = -1; dy <= 1; ++dy)
           for (int dx = -1; dx <= 1; ++dx)
             if (row + dy >= 0 && row + dy <= r.height - 2)
-              best = std::min(best, twin::nearest_in_quad(point, j + dx, row + dy, got.diagonals[patch.texel(j + dx, row + dy)] != 0, sample));
+              best = std::min(best, twin::nearest_in_quad(point, j + dx, row + dy,
+                                                          got.diagonals[patch.texel(j + dx, row + dy)] != 0, sample));
         nearest += (matched - sample).norm() < best + 1e-5;
       }
   EXPECT_GT(nearest, 0.9 * count);
@@ -155,14 +170,17 @@ TEST(FitKernels, TheSweepsEndAtTheSolutionOfTheTwinsDenseSystem) {
         const auto corners = twin::triangle_corners(got.diagonals[patch.texel(column, up)] != 0, match >> 4);
         const double w1 = got.weights[2 * i * size + at], w2 = got.weights[(2 * i + 1) * size + at];
         const auto value = [&](int k) { return static_cast<double>(patch.samples[(7 * i + k) * size + at]); };
-        system.add({value(3), value(4), value(5)}, got.residuals[i * size + at], value(6), kLeast, column, up, corners, {1 - w1 - w2, w1, w2});
+        system.add({value(3), value(4), value(5)}, got.residuals[i * size + at], value(6), kLeast, column, up, corners,
+                   {1 - w1 - w2, w1, w2});
       }
   const Eigen::VectorXd expected = system.solve(kDamping, kSprings);
   const double largest = expected.cwiseAbs().maxCoeff();
   ASSERT_GT(largest, 1e-3);
   for (int row = 0; row < r.height; ++row)
     for (int j = 0; j < r.width; ++j)
-      for (int k = 0; k < 3; ++k) EXPECT_NEAR(got.moves[k][patch.texel(j, row)], expected[3 * (row * r.width + j) + k], 2e-3 * largest) << row << " " << j;
+      for (int k = 0; k < 3; ++k)
+        EXPECT_NEAR(got.moves[k][patch.texel(j, row)], expected[3 * (row * r.width + j) + k], 2e-3 * largest)
+            << row << " " << j;
 }
 
 TEST(FitKernels, TheSizeOfWorkGroupsDoesNotShow) {
@@ -185,8 +203,10 @@ TEST(Fit, LowersTheResidualStepByStepAndTheMeanErrorWithIt) {
   ASSERT_GE(report.residuals.size(), 3u);
   for (std::size_t i = 1; i < report.residuals.size(); ++i) EXPECT_LT(report.residuals[i], report.residuals[i - 1]);
   EXPECT_LT(report.residuals.back(), 0.4 * report.residuals.front());
-  const TriangleMesh plain_mesh = reconstruct_mesh(device(), plain.model), mesh = reconstruct_mesh(device(), fitted.model);
-  const MetroReport before = measure_metro(device(), model.mesh, plain_mesh), after = measure_metro(device(), model.mesh, mesh);
+  const TriangleMesh plain_mesh = reconstruct_mesh(device(), plain.model),
+                     mesh = reconstruct_mesh(device(), fitted.model);
+  const MetroReport before = measure_metro(device(), model.mesh, plain_mesh),
+                    after = measure_metro(device(), model.mesh, mesh);
   EXPECT_LT(symmetric_mean(after), 0.8 * symmetric_mean(before));
   EXPECT_LT(after.vertex.mean, 0.7 * before.vertex.mean);
   EXPECT_TRUE(measure_manifold(mesh).is_closed_manifold());
@@ -216,10 +236,13 @@ TEST(Fit, LeavesSeamsAndPolesBitForBitAndGivesTheSameModelTwice) {
     for (int row = 0; row < r.height; ++row)
       for (int j = 0; j < r.width; ++j) {
         const std::size_t at = static_cast<std::size_t>(r.y + row) * fitted.texture.width + r.x + j;
-        const bool is_same = plain.texture.along[at] == fitted.texture.along[at] && plain.texture.around[at] == fitted.texture.around[at] &&
+        const bool is_same = plain.texture.along[at] == fitted.texture.along[at] &&
+                             plain.texture.around[at] == fitted.texture.around[at] &&
                              plain.texture.out[at] == fitted.texture.out[at];
-        if (row == 0 || row == r.height - 1) { EXPECT_TRUE(is_same); }
-        else moved += !is_same;
+        if (row == 0 || row == r.height - 1) {
+          EXPECT_TRUE(is_same);
+        } else
+          moved += !is_same;
       }
   }
   EXPECT_GT(moved, 96 * 96 / 2);
@@ -242,7 +265,9 @@ TEST(Fit, LeavesALatticeAloneThatIsTheMesh) {
       const double t = 0.25 * (j % 4) * 2 - 1;  // from corner to corner of a side
       const Vec3 sides[4] = {{1, t, 0}, {-t, 1, 0}, {-1, -t, 0}, {t, -1, 0}};
       chart.positions.push_back(sides[j / 4] + Vec3(0, 0, 0.5 * row));
-      chart.kinds.push_back(row == 0 ? ChartVertex::kHeadRow : row == kRows - 1 ? ChartVertex::kTailRow : ChartVertex::kInner);
+      chart.kinds.push_back(row == 0           ? ChartVertex::kHeadRow
+                            : row == kRows - 1 ? ChartVertex::kTailRow
+                                               : ChartVertex::kInner);
     }
   for (int row = 0; row + 1 < kRows; ++row)
     for (int j = 0; j < kColumns; ++j) {
@@ -254,7 +279,8 @@ TEST(Fit, LeavesALatticeAloneThatIsTheMesh) {
       chart.turns.push_back({0, turn, 0});
     }
   const Skeleton skeleton{{{"head", Vec3(0, 0, 0)}, {"tail", Vec3(0, 0, 4)}}, {{"bone", 0, 1, Vec3(1, 0, 0)}}};
-  const std::vector<Patch> patches{{{2, 1, kColumns, kRows}, Method::kVsm, SegmentTopology::kAnnulus, spread_rows_uniformly(kRows)}};
+  const std::vector<Patch> patches{
+      {{2, 1, kColumns, kRows}, Method::kVsm, SegmentTopology::kAnnulus, spread_rows_uniformly(kRows)}};
   std::vector<std::array<std::vector<Vec3>, 2>> ends(1);
   ends[0][0].assign(chart.positions.begin(), chart.positions.begin() + kColumns);
   ends[0][1].assign(chart.positions.end() - kColumns, chart.positions.end());
@@ -262,7 +288,8 @@ TEST(Fit, LeavesALatticeAloneThatIsTheMesh) {
   const std::vector<Chart> charts{chart};
   const std::vector<SpdHits> hits(1);
   const auto read = [&](bool has_fit) {
-    return read_texels(device(), skeleton, Walls(skeleton), {charts, patches, hits, ends}, 24, 12, Vec3::Zero(), {.has_prefilter = false, .has_fit = has_fit});
+    return read_texels(device(), skeleton, SeparationPlanes(skeleton), {charts, patches, hits, ends}, 24, 12,
+                       Vec3::Zero(), {.has_prefilter = false, .has_fit = has_fit});
   };
   const TexelResult plain = read(false), fitted = read(true);
   EXPECT_LT(fitted.report.fit->residuals.front(), 1e-6);
@@ -273,30 +300,34 @@ TEST(Fit, LeavesALatticeAloneThatIsTheMesh) {
   }
 }
 
-TEST(Guard, NeitherTheMaximumNorFoldsAreAboveThoseOfTheEvenLattice) {
+TEST(Guard, NeitherTheMaximumNorFoldsAreAboveThoseOfTheRegularGrid) {
   const TestModel model = load_standard_model("bear");
   // The furthest of middles of triangles and sides, and of the mesh's vertices.
   const auto furthest = [&](const TriangleMesh& mesh) {
     std::vector<Vec3> points;
     for (const auto& [a, b, c] : mesh.triangles) {
       const Vec3 &p = mesh.positions[a], &q = mesh.positions[b], &r = mesh.positions[c];
-      for (const Vec3& point : {Vec3((p + q + r) / 3), Vec3((p + q) / 2), Vec3((q + r) / 2), Vec3((r + p) / 2)}) points.push_back(point);
+      for (const Vec3& point : {Vec3((p + q + r) / 3), Vec3((p + q) / 2), Vec3((q + r) / 2), Vec3((r + p) / 2)})
+        points.push_back(point);
     }
     float most = 0;
     for (const float distance : closest_distances(device(), model.mesh, points)) most = std::max(most, distance);
-    for (const float distance : closest_distances(device(), mesh, model.mesh.positions)) most = std::max(most, distance);
+    for (const float distance : closest_distances(device(), mesh, model.mesh.positions))
+      most = std::max(most, distance);
     return most;
   };
   EncodeOptions options;
   options.width = options.height = 192;
-  const TriangleMesh plain = reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model);
+  const TriangleMesh plain =
+      reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model);
   options.has_snap = options.has_fit = true;
   const EncodeResult encoded = encode_model(device(), model.mesh, model.skeleton, options);
   const TriangleMesh mesh = reconstruct_mesh(device(), encoded.model);
   EXPECT_GT(encoded.report.fit->texels_put_back, 0);
-  // Quads of the even lattice may have their other diagonal beside moved ones.
+  // Quads of the regular grid may have their other diagonal beside moved ones.
   EXPECT_LT(furthest(mesh), 1.02f * furthest(plain));
-  EXPECT_LE(static_cast<double>(count_self_intersections(mesh)), 1.2 * static_cast<double>(count_self_intersections(plain)) + 10);
+  EXPECT_LE(static_cast<double>(count_self_intersections(mesh)),
+            1.2 * static_cast<double>(count_self_intersections(plain)) + 10);
   EXPECT_LE(encoded.report.turned_triangles, 1.2 * encoded.report.even_turned_triangles + 10);
 }
 

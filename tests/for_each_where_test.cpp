@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/model/for_each_where.h"
+#include "skeletex/geometry/for_each_where.h"
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,9 @@ TEST(ForEachWhere, CallsForAllThatHoldInOrderWhateverTheirNumber) {
         values[i] = holds(random) ? 1.5f : 1;
         if (values[i] > 1) expected.push_back(i);
       }
-      for_each_where(std::span<const float>(values), [](float value) { return value > 1; }, [&](std::size_t i) { got.push_back(i); });
+      for_each_where(
+          std::span<const float>(values), [](float value) { return value > 1; },
+          [&](std::size_t i) { got.push_back(i); });
       EXPECT_EQ(got, expected) << size << " values, " << share;
     }
 }
@@ -30,7 +32,8 @@ TEST(ForEachWhere, FindsALastOneByItself) {
     std::vector<int> values(size, 0);
     values.back() = 1;
     std::vector<std::size_t> got;
-    for_each_where(std::span<const int>(values), [](int value) { return value != 0; }, [&](std::size_t i) { got.push_back(i); });
+    for_each_where(
+        std::span<const int>(values), [](int value) { return value != 0; }, [&](std::size_t i) { got.push_back(i); });
     EXPECT_EQ(got, std::vector{size - 1});
   }
 }

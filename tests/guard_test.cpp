@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the guard of the finished lattice stands on: lattices whose points move, their crossings, and distances found from nearby.
+// What the guard of the finished lattice stands on: lattices whose points move, their crossings, and distances found
+// from nearby.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -7,13 +8,13 @@
 #include <random>
 #include <set>
 
-#include "skeletex/encode/device_maps.h"
-#include "skeletex/encode/encode_model.h"
-#include "skeletex/encode/row_profile.h"
-#include "skeletex/measure/lattice_crossings.h"
-#include "skeletex/measure/point_triangle.h"
-#include "skeletex/measure/self_intersection.h"
-#include "skeletex/reconstruct/lattice_mesh.h"
+#include "skeletex/convert/encode_model.h"
+#include "skeletex/convert/layout/row_profile.h"
+#include "skeletex/convert/sample/device_maps.h"
+#include "skeletex/convert/snap/lattice_crossings.h"
+#include "skeletex/convert/snap/lattice_mesh.h"
+#include "skeletex/geometry/point_triangle.h"
+#include "skeletex/geometry/self_intersection.h"
 #include "support/load_model.h"
 
 namespace skeletex {
@@ -37,7 +38,8 @@ struct Points {
   std::array<std::vector<float>, 3> planes;
   DevicePlanes on_device;
   Points(const SkeletexModel& model, double noise, std::mt19937& random)
-      : patches(device().upload(frame_tables(model.skeleton, Walls(model.skeleton), model.patches, model.origin).patches)) {
+      : patches(device().upload(
+            frame_tables(model.skeleton, SeparationPlanes(model.skeleton), model.patches, model.origin).patches)) {
     std::uniform_real_distribution<double> unit(-1, 1);
     const Lattice lattice = number_lattice(model);
     const std::vector<Vec3> positions = lattice_positions(device(), model);
@@ -58,7 +60,8 @@ struct Points {
     upload();
   }
   void upload() { on_device = {device().upload(planes[0]), device().upload(planes[1]), device().upload(planes[2])}; }
-  LatticeMesh lattice(const SkeletexModel& model, DiagonalRule rule, LatticeMesh::Parts parts = LatticeMesh::Parts::kAll) const {
+  LatticeMesh lattice(const SkeletexModel& model, DiagonalRule rule,
+                      LatticeMesh::Parts parts = LatticeMesh::Parts::kAll) const {
     return {device(), model, rule, frame_lattice(model), patches, on_device, parts};
   }
   std::array<ClMapping<float>, 3> map() const {
@@ -72,7 +75,8 @@ struct Points {
     for (const Patch& patch : model.patches)
       for (int row = 1; row + 1 < patch.rectangle.height; ++row)
         for (int j = 0; j < patch.rectangle.width; ++j)
-          if (count++ % step == 0) taken.push_back((patch.rectangle.y + row) * model.texture.width + patch.rectangle.x + j);
+          if (count++ % step == 0)
+            taken.push_back((patch.rectangle.y + row) * model.texture.width + patch.rectangle.x + j);
     for (int axis = 0; axis < 3; ++axis) {
       for (const int texel : taken) planes[axis][texel] = others.planes[axis][texel];
       device().write(axis == 0 ? on_device.x : axis == 1 ? on_device.y : on_device.z, planes[axis]);
@@ -181,7 +185,8 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
     int size;
     double noise;
   };
-  for (const Case& each : {Case{"man", 128, 0}, Case{"man", 96, 1e-3}, Case{"eight", 64, 5e-3}, Case{"bear", 40, 0.1}, Case{"armadillo", 160, 0}}) {
+  for (const Case& each : {Case{"man", 128, 0}, Case{"man", 96, 1e-3}, Case{"eight", 64, 5e-3}, Case{"bear", 40, 0.1},
+                           Case{"armadillo", 160, 0}}) {
     const SkeletexModel model = encoded(each.name, each.size);
     Points points(model, each.noise, random);
     const Points others(model, each.noise + 2e-3, random);
@@ -196,7 +201,8 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
     crossings.measure(lattice);
     Pairs found = crossings.find(lattice, numbers);
     EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
-    for (auto& pair : found) pair = {std::min(places[pair[0]], places[pair[1]]), std::max(places[pair[0]], places[pair[1]])};
+    for (auto& pair : found)
+      pair = {std::min(places[pair[0]], places[pair[1]]), std::max(places[pair[0]], places[pair[1]])};
     std::sort(found.begin(), found.end());
     const Pairs expected = find_self_intersections(mesh);
     ASSERT_GT(expected.size(), 10u) << each.name;
@@ -208,7 +214,8 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
     EXPECT_TRUE(std::includes(expected_apart.begin(), expected_apart.end(), apart.begin(), apart.end())) << each.name;
     EXPECT_GE(static_cast<double>(apart.size()), 0.99 * static_cast<double>(expected_apart.size())) << each.name;
     // At a vertex that they share, contact in the last digits of single precision counts, or not.
-    EXPECT_NEAR(static_cast<double>(found.size()), static_cast<double>(expected.size()), 2 + 0.05 * static_cast<double>(expected.size()))
+    EXPECT_NEAR(static_cast<double>(found.size()), static_cast<double>(expected.size()),
+                2 + 0.05 * static_cast<double>(expected.size()))
         << each.name;
 
     lattice.release();
@@ -230,11 +237,13 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
     std::sort(some.begin(), some.end());
     Pairs with_some = all;
     std::erase_if(with_some, [&](const auto& pair) {
-      return !std::binary_search(some.begin(), some.end(), pair[0]) && !std::binary_search(some.begin(), some.end(), pair[1]);
+      return !std::binary_search(some.begin(), some.end(), pair[0]) &&
+             !std::binary_search(some.begin(), some.end(), pair[1]);
     });
     EXPECT_FALSE(with_some.empty()) << each.name;
     EXPECT_EQ(crossings.find(lattice, some), with_some) << each.name;
-    const LatticeCrossings::Others same = crossings.find_between_same(all, lattice, 1), different = crossings.find_between_same(all, other_lattice, 1);
+    const LatticeCrossings::Others same = crossings.find_between_same(all, lattice, 1),
+                                   different = crossings.find_between_same(all, other_lattice, 1);
     EXPECT_EQ(same.pairs, all) << each.name;
     EXPECT_EQ(same.given_there, all.size()) << each.name;
     EXPECT_EQ(same.counted, all.size()) << each.name;
@@ -246,7 +255,8 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
     // Of a lattice whose triangles are not there yet it asks for those that it needs.
     LatticeMesh asked_of = others.lattice(model, DiagonalRule::kNearest, LatticeMesh::Parts::kAsked);
     for (const int share : {1, 3}) {
-      const LatticeCrossings::Others of_whole = crossings.find_between_same(all, other_lattice, share), of_asked = crossings.find_between_same(all, asked_of, share);
+      const LatticeCrossings::Others of_whole = crossings.find_between_same(all, other_lattice, share),
+                                     of_asked = crossings.find_between_same(all, asked_of, share);
       EXPECT_EQ(of_asked.pairs, of_whole.pairs) << each.name;
       EXPECT_EQ(of_asked.counted, of_whole.counted) << each.name;
       EXPECT_EQ(of_asked.given_there, of_whole.given_there) << each.name;
@@ -256,10 +266,13 @@ TEST(LatticeCrossings, AreThoseThatTheTreeFinds) {
     EXPECT_LT(different.given_there, all.size()) << each.name;
     if (each.noise < 0.05) {
       const Pairs all_of_other = all_of(other_lattice);
-      EXPECT_TRUE(std::includes(all_of_other.begin(), all_of_other.end(), different.pairs.begin(), different.pairs.end())) << each.name;
+      EXPECT_TRUE(
+          std::includes(all_of_other.begin(), all_of_other.end(), different.pairs.begin(), different.pairs.end()))
+          << each.name;
     }
     const std::set<int> is_changed(changed.begin(), changed.end());
-    std::erase_if(all, [&](const auto& pair) { return !is_changed.contains(pair[0]) && !is_changed.contains(pair[1]); });
+    std::erase_if(all,
+                  [&](const auto& pair) { return !is_changed.contains(pair[0]) && !is_changed.contains(pair[1]); });
     EXPECT_EQ(found_of_changed, all) << each.name;
   }
 }
@@ -280,13 +293,17 @@ TEST(TriangleBlock, LeavesOutOnlyPairsThatDoNotMeet) {
       TriangleBlock& block = blocks[b];
       for (BlockBox* box : {&around[b], &around_asked[b]}) box->least.fill(2), box->greatest.fill(-2);
       for (int i = 0; i < TriangleBlock::kSize; ++i) {
-        const int first = vertex(random), second = (first + 1 + vertex(random) % 13) % 40, third = (second + 1 + vertex(random) % 13) % 40;
+        const int first = vertex(random), second = (first + 1 + vertex(random) % 13) % 40,
+                  third = (second + 1 + vertex(random) % 13) % 40;
         const Triangle triangle{first, second, third};
         block.numbers[i] = i, block.is_asked[i] = unit(random) < share ? 1 : 0;
         for (int axis = 0; axis < 3; ++axis) {
-          for (int corner = 0; corner < 3; ++corner) block.vertices[corner][i] = triangle[corner], block.corners[corner][axis][i] = points[triangle[corner]][axis];
+          for (int corner = 0; corner < 3; ++corner)
+            block.vertices[corner][i] = triangle[corner],
+            block.corners[corner][axis][i] = points[triangle[corner]][axis];
           const auto [low, high] = std::minmax({points[first][axis], points[second][axis], points[third][axis]});
-          block.least[axis][i] = static_cast<float>(low) - 1e-6f, block.greatest[axis][i] = static_cast<float>(high) + 1e-6f;
+          block.least[axis][i] = static_cast<float>(low) - 1e-6f,
+          block.greatest[axis][i] = static_cast<float>(high) + 1e-6f;
           for (BlockBox* box : {&around[b], &around_asked[b]})
             if (box == &around[b] || block.is_asked[i] != 0) {
               box->least[axis] = std::min(box->least[axis], block.least[axis][i]);
@@ -310,11 +327,13 @@ TEST(TriangleBlock, LeavesOutOnlyPairsThatDoNotMeet) {
           bool is_asked = one.is_asked[i] != 0 || other.is_asked[j] != 0;
           if (b == 0) is_asked = is_asked && i < j;
           for (int axis = 0; axis < 3; ++axis)
-            is_asked = is_asked && one.least[axis][i] <= other.greatest[axis][j] && other.least[axis][j] <= one.greatest[axis][i];
+            is_asked = is_asked && one.least[axis][i] <= other.greatest[axis][j] &&
+                       other.least[axis][j] <= one.greatest[axis][i];
           overlapping += is_asked, unsettled += is_found;
           if (!is_asked) {
             EXPECT_FALSE(is_found);
-          } else if (do_triangles_intersect(one.triangle(i), one.corners_of(i), other.triangle(j), other.corners_of(j))) {
+          } else if (do_triangles_intersect(one.triangle(i), one.corners_of(i), other.triangle(j),
+                                            other.corners_of(j))) {
             EXPECT_TRUE(is_found);
             ++met;
           }
@@ -329,13 +348,14 @@ TEST(TriangleBlock, LeavesOutOnlyPairsThatDoNotMeet) {
 struct TubeAndLattice {
   static constexpr int kAround = 9, kRings = 7, kWidth = 15, kHeight = 12;
   Chart chart;
-  std::vector<Patch> patches{{{2, 1, kWidth, kHeight}, Method::kVsm, SegmentTopology::kAnnulus, spread_rows_uniformly(kHeight)}};
+  std::vector<Patch> patches{
+      {{2, 1, kWidth, kHeight}, Method::kVsm, SegmentTopology::kAnnulus, spread_rows_uniformly(kHeight)}};
   Skeleton skeleton{{{"head", Vec3(0, 0, 0)}, {"tail", Vec3(0, 0, 4)}}, {{"bone", 0, 1, Vec3(1, 0, 0)}}};
   DeviceLayout layout;
   DeviceMaps maps;
-  TriangleMesh lattice;         // vertices are texels
-  std::vector<int> numbers;     // of its triangles: of texel t 2 t and 2 t + 1
-  std::vector<int> diagonals;   // per texel
+  TriangleMesh lattice;        // vertices are texels
+  std::vector<int> numbers;    // of its triangles: of texel t 2 t and 2 t + 1
+  std::vector<int> diagonals;  // per texel
   ClBuffer<int> texel_triangles;
   std::array<ClBuffer<float>, 3> points;
   std::vector<int> seeds;  // per texel
@@ -349,7 +369,9 @@ struct TubeAndLattice {
       for (int k = 0; k < kAround; ++k) {
         chart.u.push_back(ring / (kRings - 1.0)), chart.v.push_back(static_cast<double>(k) / kAround);
         chart.positions.push_back(shaken(on_tube(chart.u.back(), chart.v.back())));
-        chart.kinds.push_back(ring == 0 ? ChartVertex::kHeadRow : ring == kRings - 1 ? ChartVertex::kTailRow : ChartVertex::kInner);
+        chart.kinds.push_back(ring == 0            ? ChartVertex::kHeadRow
+                              : ring == kRings - 1 ? ChartVertex::kTailRow
+                                                   : ChartVertex::kInner);
       }
     if (noise > 0) chart.positions[2 * kAround + 3] = chart.positions[2 * kAround + 4];
     for (int ring = 0; ring + 1 < kRings; ++ring)
@@ -361,7 +383,8 @@ struct TubeAndLattice {
         chart.triangles.push_back({a, b + kAround, a + kAround});
         chart.turns.push_back({0, turn, 0});
       }
-    layout = upload_layout(device(), patches, frame_tables(skeleton, Walls(skeleton), patches, Vec3::Zero()), 20, 14);
+    layout = upload_layout(device(), patches, frame_tables(skeleton, SeparationPlanes(skeleton), patches, Vec3::Zero()),
+                           20, 14);
     chart.half_edges = link_half_edges(chart.triangles, static_cast<int>(chart.positions.size()));
     maps = upload_maps(device(), {&chart, 1}, patches, Vec3::Zero());
     seeds.assign(layout.size(), 0x7fffffff);
@@ -376,7 +399,8 @@ struct TubeAndLattice {
       }
     for (int row = 1; row + 2 < kHeight; ++row)
       for (int j = 0; j < kWidth; ++j) {
-        const int own = texel(row, j), right = texel(row, j + 1), above = texel(row + 1, j), beyond = texel(row + 1, j + 1);
+        const int own = texel(row, j), right = texel(row, j + 1), above = texel(row + 1, j),
+                  beyond = texel(row + 1, j + 1);
         const bool is_second = diagonals[own] != 0;
         lattice.triangles.push_back({own, right, is_second ? above : beyond}), numbers.push_back(2 * own);
         lattice.triangles.push_back({is_second ? right : own, beyond, above}), numbers.push_back(2 * own + 1);
@@ -397,12 +421,14 @@ struct TubeAndLattice {
   }
 };
 
-void launch_measuring(const TubeAndLattice& tube, const ClBuffer<int>& listed, int count, float middle_enough2, float worth_a_look2, float enough2,
-                      ClBuffer<float>& distances, ClBuffer<int>& turned, const std::array<std::vector<float>, 3>& ends = {{{0}, {0}, {0}}}) {
-  device().launch({"guard.cl", "measure_triangles"}, ClRange(count), count, static_cast<int>(tube.layout.size()), middle_enough2, worth_a_look2, enough2,
-                  tube.maps.triangle_count, listed, tube.texel_triangles, tube.maps.corners, tube.maps.across, tube.maps.x, tube.maps.y, tube.maps.z,
-                  tube.points[0], tube.points[1], tube.points[2], device().upload(ends[0]), device().upload(ends[1]), device().upload(ends[2]), distances,
-                  turned);
+void launch_measuring(const TubeAndLattice& tube, const ClBuffer<int>& listed, int count, float middle_enough2,
+                      float worth_a_look2, float enough2, ClBuffer<float>& distances, ClBuffer<int>& turned,
+                      const std::array<std::vector<float>, 3>& ends = {{{0}, {0}, {0}}}) {
+  device().launch({"guard.cl", "measure_triangles"}, ClRange(count), count, static_cast<int>(tube.layout.size()),
+                  middle_enough2, worth_a_look2, enough2, tube.maps.triangle_count, listed, tube.texel_triangles,
+                  tube.maps.corners, tube.maps.across, tube.maps.x, tube.maps.y, tube.maps.z, tube.points[0],
+                  tube.points[1], tube.points[2], device().upload(ends[0]), device().upload(ends[1]),
+                  device().upload(ends[2]), distances, turned);
 }
 
 TEST(GuardKernels, AWalkIsNeverNearerThanTheMeshAndOnASmoothOneAsFar) {
@@ -413,7 +439,8 @@ TEST(GuardKernels, AWalkIsNeverNearerThanTheMeshAndOnASmoothOneAsFar) {
     std::vector<int> listed(count);
     for (int i = 0; i < count; ++i) listed[i] = (7 * i) % count;
     std::vector<int> listed_corners;
-    for (const int i : listed) listed_corners.insert(listed_corners.end(), tube.lattice.triangles[i].begin(), tube.lattice.triangles[i].end());
+    for (const int i : listed)
+      listed_corners.insert(listed_corners.end(), tube.lattice.triangles[i].begin(), tube.lattice.triangles[i].end());
     for (const float worth : {0.0f, 1e9f}) {
       auto distances = device().allocate<float>(count);
       auto turned = device().allocate<int>(count);
@@ -423,7 +450,8 @@ TEST(GuardKernels, AWalkIsNeverNearerThanTheMeshAndOnASmoothOneAsFar) {
       int further = 0, differently_turned = 0;
       for (int i = 0; i < count; ++i) {
         const Triangle& t = tube.lattice.triangles[listed[i]];
-        const Vec3 &a = tube.lattice.positions[t[0]], ab = tube.lattice.positions[t[1]] - a, ac = tube.lattice.positions[t[2]] - a;
+        const Vec3 &a = tube.lattice.positions[t[0]], ab = tube.lattice.positions[t[1]] - a,
+                   ac = tube.lattice.positions[t[2]] - a;
         std::vector<std::array<double, 2>> places{{1 / 3.0, 1 / 3.0}};
         if (worth == 0)
           places.insert(places.end(), {{0, 0},
@@ -478,19 +506,26 @@ TEST(FitKernels, TheWayFromATriangleOfTheLatticeLeadsToThePointOfTheMeshThatTheW
     const std::size_t size = tube.layout.size();
     std::vector<int> starts;  // four planes
     for (int i = 0; i < 4; ++i) starts.insert(starts.end(), tube.seeds.begin(), tube.seeds.end());
-    auto lattice = device().allocate<float>(2 * kPlanes * size), costs = device().allocate<float>(size), areas = device().allocate<float>(size);
+    auto lattice = device().allocate<float>(2 * kPlanes * size), costs = device().allocate<float>(size),
+         areas = device().allocate<float>(size);
     device().fill(costs, 0.f), device().fill(areas, 0.f);
-    device().launch({"fit.cl", "match_lattice"}, tube.layout.range(), tube.layout.width, tube.layout.height, tube.maps.triangle_count, tube.layout.texel_patches,
-                    tube.layout.patches, device().upload(starts), tube.maps.corners, tube.maps.across, tube.maps.x, tube.maps.y, tube.maps.z,
-                    device().upload(tube.diagonals), tube.points[0], tube.points[1], tube.points[2], lattice, costs, areas);
+    device().launch({"fit.cl", "match_lattice"}, tube.layout.range(), tube.layout.width, tube.layout.height,
+                    tube.maps.triangle_count, tube.layout.texel_patches, tube.layout.patches, device().upload(starts),
+                    tube.maps.corners, tube.maps.across, tube.maps.x, tube.maps.y, tube.maps.z,
+                    device().upload(tube.diagonals), tube.points[0], tube.points[1], tube.points[2], lattice, costs,
+                    areas);
     const std::vector<float> found = device().download(lattice);
     for (std::size_t i = 0; i < tube.lattice.triangles.size(); ++i) {
       const Triangle& t = tube.lattice.triangles[i];
-      const auto value = [&](int plane) { return found[(kPlanes * (tube.numbers[i] % 2) + plane) * size + tube.numbers[i] / 2]; };
-      const Vec3 middle = (tube.lattice.positions[t[0]] + tube.lattice.positions[t[1]] + tube.lattice.positions[t[2]]) / 3;
+      const auto value = [&](int plane) {
+        return found[(kPlanes * (tube.numbers[i] % 2) + plane) * size + tube.numbers[i] / 2];
+      };
+      const Vec3 middle =
+          (tube.lattice.positions[t[0]] + tube.lattice.positions[t[1]] + tube.lattice.positions[t[2]]) / 3;
       const Vec3 led_to = middle - value(1) * Vec3(value(2), value(3), value(4));
       double least = 1e9;
-      for (const Triangle& m : tube.chart.triangles) least = std::min(least, tube.distance(led_to, m, tube.chart.positions));
+      for (const Triangle& m : tube.chart.triangles)
+        least = std::min(least, tube.distance(led_to, m, tube.chart.positions));
       EXPECT_LT(least, 2e-5) << noise << " " << i;
     }
   }
@@ -503,26 +538,31 @@ TEST(GuardKernels, AVertexIsMeasuredToTheQuadsAroundItsPlace) {
   std::vector<float> places;
   for (int i = 0; i < static_cast<int>(tube.chart.positions.size()); ++i) {
     vertices.push_back(i), patches.push_back(0);
-    places.push_back(static_cast<float>(tube.chart.v[i] * TubeAndLattice::kWidth + (i % 3 - 1) * TubeAndLattice::kWidth));
+    places.push_back(
+        static_cast<float>(tube.chart.v[i] * TubeAndLattice::kWidth + (i % 3 - 1) * TubeAndLattice::kWidth));
     places.push_back(static_cast<float>(tube.chart.u[i] * (TubeAndLattice::kHeight - 1)));
   }
   const int count = static_cast<int>(vertices.size());
   const auto measure = [&](float limit2) {
     auto distances = device().allocate<float>(count);
     auto nearest = device().allocate<int>(count);
-    device().launch({"guard.cl", "measure_vertices"}, ClRange(count), count, tube.layout.width, limit2, device().upload(vertices),
-                    device().upload(patches), device().upload(places), tube.layout.patches, device().upload(tube.diagonals), tube.maps.x, tube.maps.y,
-                    tube.maps.z, tube.points[0], tube.points[1], tube.points[2], distances, nearest);
+    device().launch({"guard.cl", "measure_vertices"}, ClRange(count), count, tube.layout.width, limit2,
+                    device().upload(vertices), device().upload(patches), device().upload(places), tube.layout.patches,
+                    device().upload(tube.diagonals), tube.maps.x, tube.maps.y, tube.maps.z, tube.points[0],
+                    tube.points[1], tube.points[2], distances, nearest);
     return device().download(distances, nearest);
   };
   const auto [found2, found] = measure(0);
   for (int i = 0; i < count; ++i) {
     double expected = 1e9;
-    for (const Triangle& t : tube.lattice.triangles) expected = std::min(expected, tube.distance(tube.chart.positions[i], t, tube.lattice.positions));
+    for (const Triangle& t : tube.lattice.triangles)
+      expected = std::min(expected, tube.distance(tube.chart.positions[i], t, tube.lattice.positions));
     EXPECT_NEAR(std::sqrt(found2[i]), expected, 1e-4) << i;
     const auto number = std::find(tube.numbers.begin(), tube.numbers.end(), found[i]) - tube.numbers.begin();
     ASSERT_LT(number, std::ssize(tube.numbers));
-    EXPECT_NEAR(tube.distance(tube.chart.positions[i], tube.lattice.triangles[number], tube.lattice.positions), expected, 1e-4) << i;
+    EXPECT_NEAR(tube.distance(tube.chart.positions[i], tube.lattice.triangles[number], tube.lattice.positions),
+                expected, 1e-4)
+        << i;
   }
   // What is near enough is not looked at more closely, and what is not is found as without that.
   std::vector<float> sorted = found2;
@@ -623,7 +663,8 @@ TEST(GuardKernels, AWalkThatGoesAstrayIsBegunFromTheOtherCorners) {
       for (int corner = 0; corner < 3; ++corner) {
         from_one.push_back(corner == k ? t[corner] : texels + static_cast<int>(ends[0].size()));
         if (corner == k) continue;
-        for (int axis = 0; axis < 3; ++axis) ends[axis].push_back(static_cast<float>(tube.lattice.positions[t[corner]][axis]));
+        for (int axis = 0; axis < 3; ++axis)
+          ends[axis].push_back(static_cast<float>(tube.lattice.positions[t[corner]][axis]));
       }
     launch_measuring(tube, device().upload(from_one), count, 0, 1e30f, 0, distances, turned, ends);
     const std::vector<float> own2 = device().download(distances);
@@ -647,26 +688,35 @@ TEST(GuardKernels, SuspicionsAreWhereTheMeshsPlanesMeet) {
   std::mt19937 random(9);
   const TubeAndLattice tube(random, 0.2);
   const int quads = static_cast<int>(tube.lattice.triangles.size()) / 2, triangle_count = tube.maps.triangle_count;
-  auto normals = device().allocate<float>(3 * static_cast<std::size_t>(triangle_count)), suspicions = device().allocate<float>(tube.layout.size());
+  auto normals = device().allocate<float>(3 * static_cast<std::size_t>(triangle_count)),
+       suspicions = device().allocate<float>(tube.layout.size());
   const int texels = static_cast<int>(tube.layout.size());
   auto texel_normals = device().allocate<float>(3 * tube.layout.size());
-  device().launch({"guard.cl", "find_normals"}, ClRange(triangle_count), triangle_count, tube.maps.corners, tube.maps.x, tube.maps.y, tube.maps.z,
-                  normals);
-  device().launch({"guard.cl", "normals_of_texels"}, ClRange(texels), texels, triangle_count, tube.texel_triangles, normals, texel_normals);
+  device().launch({"guard.cl", "find_normals"}, ClRange(triangle_count), triangle_count, tube.maps.corners, tube.maps.x,
+                  tube.maps.y, tube.maps.z, normals);
+  device().launch({"guard.cl", "normals_of_texels"}, ClRange(texels), texels, triangle_count, tube.texel_triangles,
+                  normals, texel_normals);
   std::vector<LatticeRow> rows;
   for (int row = 1; row + 2 < TubeAndLattice::kHeight; ++row) rows.push_back({0, row, 0, 0});
-  device().launch({"guard.cl", "suspect_quads"}, row_range(device(), rows.size()), static_cast<int>(rows.size()), tube.layout.width, texels,
-                  device().upload(rows), tube.layout.patches, device().upload(tube.diagonals), tube.texel_triangles, texel_normals, tube.points[0],
-                  tube.points[1], tube.points[2], suspicions);
+  device().launch({"guard.cl", "suspect_quads"}, row_range(device(), rows.size()), static_cast<int>(rows.size()),
+                  tube.layout.width, texels, device().upload(rows), tube.layout.patches,
+                  device().upload(tube.diagonals), tube.texel_triangles, texel_normals, tube.points[0], tube.points[1],
+                  tube.points[2], suspicions);
   const std::vector<float> found2 = device().download(suspicions);
   int against = 0;
-  const auto normal_at = [&](int vertex) { return tube.normal(tube.chart.triangles[tube.seeds[vertex]], tube.chart.positions); };
-  // Points of a side in both planes' half spaces: the least height over it where one of the planes is reached, at the crease.
+  const auto normal_at = [&](int vertex) {
+    return tube.normal(tube.chart.triangles[tube.seeds[vertex]], tube.chart.positions);
+  };
+  // Points of a side in both planes' half spaces: the least height over it where one of the planes is reached, at the
+  // crease.
   const auto height_over = [&](int from, int to) {
     const Vec3 along = tube.lattice.positions[to] - tube.lattice.positions[from];
-    const auto rise = [&](const Vec3& n) { return n.norm() > 1e-6 ? std::abs(along.dot(n.normalized())) : along.lpNorm<1>(); };
+    const auto rise = [&](const Vec3& n) {
+      return n.norm() > 1e-6 ? std::abs(along.dot(n.normalized())) : along.lpNorm<1>();
+    };
     double most = 0;
-    for (double share = 0; share <= 1; share += 1e-3) most = std::max(most, std::min(share * rise(normal_at(from)), (1 - share) * rise(normal_at(to))));
+    for (double share = 0; share <= 1; share += 1e-3)
+      most = std::max(most, std::min(share * rise(normal_at(from)), (1 - share) * rise(normal_at(to))));
     return most;
   };
   for (int quad = 0; quad < quads; ++quad) {
@@ -696,22 +746,26 @@ TEST(GuardKernels, SuspicionsAreWhereTheMeshsPlanesMeet) {
   std::vector<int> listed;
   for (int quad = quads - 1; quad >= 0; quad -= 3) listed.push_back(tube.numbers[2 * quad] / 2);
   auto suspicions_of_listed = device().allocate<float>(listed.size());
-  device().launch({"guard.cl", "suspect_listed_quads"}, ClRange(listed.size()), static_cast<int>(listed.size()), tube.layout.width, texels,
-                  device().upload(listed), tube.layout.texel_patches, tube.layout.patches, device().upload(tube.diagonals), tube.texel_triangles, texel_normals,
-                  tube.points[0], tube.points[1], tube.points[2], suspicions_of_listed);
+  device().launch({"guard.cl", "suspect_listed_quads"}, ClRange(listed.size()), static_cast<int>(listed.size()),
+                  tube.layout.width, texels, device().upload(listed), tube.layout.texel_patches, tube.layout.patches,
+                  device().upload(tube.diagonals), tube.texel_triangles, texel_normals, tube.points[0], tube.points[1],
+                  tube.points[2], suspicions_of_listed);
   const std::vector<float> of_listed2 = device().download(suspicions_of_listed);
   for (std::size_t i = 0; i < listed.size(); ++i) EXPECT_FLOAT_EQ(of_listed2[i], found2[listed[i]]) << listed[i];
 
   // Before diagonals are chosen: triangles of either count, and the sides that begin at the texel.
-  device().launch({"guard.cl", "suspect_any_quads"}, row_range(device(), rows.size()), static_cast<int>(rows.size()), tube.layout.width, texels,
-                  device().upload(rows), tube.layout.patches, tube.texel_triangles, texel_normals, tube.points[0], tube.points[1], tube.points[2], suspicions);
+  device().launch({"guard.cl", "suspect_any_quads"}, row_range(device(), rows.size()), static_cast<int>(rows.size()),
+                  tube.layout.width, texels, device().upload(rows), tube.layout.patches, tube.texel_triangles,
+                  texel_normals, tube.points[0], tube.points[1], tube.points[2], suspicions);
   const std::vector<float> any2 = device().download(suspicions);
   int looser = 0, measured = 0;
   for (int quad = 0; quad < quads; ++quad) {
     const int own = tube.numbers[2 * quad] / 2, line = own - own % tube.layout.width + 2, column = own - line;
-    const int right = line + (column + 1) % TubeAndLattice::kWidth, above = own + tube.layout.width, beyond = right + tube.layout.width;
+    const int right = line + (column + 1) % TubeAndLattice::kWidth, above = own + tube.layout.width,
+              beyond = right + tube.layout.width;
     bool is_either_against = false, is_unsure = false;
-    for (const Triangle& t : {Triangle{own, right, beyond}, Triangle{own, beyond, above}, Triangle{own, right, above}, Triangle{right, beyond, above}})
+    for (const Triangle& t : {Triangle{own, right, beyond}, Triangle{own, beyond, above}, Triangle{own, right, above},
+                              Triangle{right, beyond, above}})
       for (const int vertex : t) {
         const double product = tube.normal(t, tube.lattice.positions).dot(normal_at(vertex));
         is_either_against = is_either_against || product < -1e-4;
@@ -728,9 +782,11 @@ TEST(GuardKernels, SuspicionsAreWhereTheMeshsPlanesMeet) {
   EXPECT_GT(measured, quads / 10);
 }
 
-// Walks over a mesh with thin legs end on the wrong side of one, far too far away; what the furthest seems to be then must not decide which others are measured.
-TEST(Guard, DoesNotTakeTheEvenLatticeForNearerThanItIs) {
-  for (const auto& [name, size] : {std::pair("triceratops", 64), std::pair("triceratops_17", 128), std::pair("diplodocus", 192)}) {
+// Walks over a mesh with thin legs end on the wrong side of one, far too far away; what the furthest seems to be then
+// must not decide which others are measured.
+TEST(Guard, DoesNotTakeTheRegularGridForNearerThanItIs) {
+  for (const auto& [name, size] :
+       {std::pair("triceratops", 64), std::pair("triceratops_17", 128), std::pair("diplodocus", 192)}) {
     const TestModel model = load_standard_model(name);
     EncodeOptions options;
     options.width = options.height = size;
@@ -749,7 +805,10 @@ TEST(Guard, LeavesNoPairsOfTrianglesThatSnappingHasMadeIntersect) {
     EncodeOptions options;
     options.width = options.height = 512;
     options.has_snap = options.has_fit = false;
-    const auto pairs = [&] { return count_self_intersections(reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model)); };
+    const auto pairs = [&] {
+      return count_self_intersections(
+          reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model));
+    };
     const auto even = pairs();
     options.has_snap = true;
     EXPECT_LE(pairs(), even) << name;

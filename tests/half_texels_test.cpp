@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/encode/half_texels.h"
+#include "skeletex/convert/sample/half_texels.h"
 
 #include <Imath/half.h>
-#include <gtest/gtest.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
-#include "skeletex/encode/encode_model.h"
+#include "skeletex/convert/encode_model.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "support/load_model.h"
@@ -38,8 +37,8 @@ void for_each_inner(const SkeletexModel& model, const Lattice& lattice, const Ac
     const Rectangle& r = model.patches[bone].rectangle;
     for (int row = 1; row + 1 < r.height; ++row)
       for (int j = 0; j < r.width; ++j)
-        act(static_cast<std::size_t>(r.y + row) * model.texture.width + r.x + j, lattice.first_inner[bone] + (row - 1) * r.width + j,
-            row == 1 || row == r.height - 2);
+        act(static_cast<std::size_t>(r.y + row) * model.texture.width + r.x + j,
+            lattice.first_inner[bone] + (row - 1) * r.width + j, row == 1 || row == r.height - 2);
   }
 }
 
@@ -65,7 +64,8 @@ Encoded encode(const std::string& name, EncodeMethod method, int size, bool has_
   return encoded;
 }
 
-/// The root of the mean over inner texels of the squared distances from the planes of the exact mesh's triangles around, weighted by area.
+/// The root of the mean over inner texels of the squared distances from the planes of the exact mesh's triangles
+/// around, weighted by area.
 double distance_from_planes(const Encoded& encoded, const SkeletexModel& model) {
   const std::vector<Vec3> points = lattice_positions(device(), model);
   std::vector<double> squares(points.size(), 0), areas(points.size(), 0);
@@ -98,7 +98,8 @@ TEST(HalfTexels, ArePointsNearTheSurfaceAsTheReportSays) {
   for (const char* const name : {"bear", "armadillo"})
     for (const int size : {128, 300}) {
       const Encoded encoded = encode(name, EncodeMethod::kVsm, size);
-      const double chosen = distance_from_planes(encoded, encoded.rounded), nearest = distance_from_planes(encoded, with_nearest(encoded.exact));
+      const double chosen = distance_from_planes(encoded, encoded.rounded),
+                   nearest = distance_from_planes(encoded, with_nearest(encoded.exact));
       EXPECT_LT(chosen, 0.5 * nearest) << name << size;
       // By the derivative of points by texels, on the device, with the decoder's diagonals.
       EXPECT_NEAR(encoded.report.nearest, nearest, 0.05 * nearest) << name << size;
@@ -132,7 +133,9 @@ TEST(HalfTexels, TurnNoMoreTrianglesThanTheNearest) {
     const auto turned = [&](const SkeletexModel& model) {
       const std::vector<Vec3> points = lattice_positions(device(), model);
       return std::count_if(encoded.mesh.triangles.begin(), encoded.mesh.triangles.end(), [&](const Triangle& t) {
-        const auto normal_of = [&](const std::vector<Vec3>& p) -> Vec3 { return (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]); };
+        const auto normal_of = [&](const std::vector<Vec3>& p) -> Vec3 {
+          return (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]);
+        };
         return normal_of(points).dot(normal_of(encoded.mesh.positions)) < 0;
       });
     };

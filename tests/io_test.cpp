@@ -8,8 +8,8 @@
 #include <filesystem>
 #include <limits>
 
+#include "skeletex/analysis/manifold.h"
 #include "skeletex/io/atomic_file.h"
-#include "skeletex/measure/manifold.h"
 #include "skeletex/model/error.h"
 #include "support/corrupted.h"
 #include "support/full_disk.h"
@@ -53,16 +53,24 @@ void put(std::string& bytes, T value, bool is_big_endian = false) {
 const std::vector<Vec3> kTetrahedron{{0, 0, 0}, {1, 0, 0}, {0, 1.5, 0}, {0, 0, -2.25}};
 const std::vector<Triangle> kTetrahedronFaces{{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {1, 3, 2}};
 
-const std::string kObj = "# a tetrahedron\nmtllib none.mtl\nv 0 0 0\nv 1 0 0 0.5 0.5 0.5\nv 0 1.5 0\nvn 0 0 1\nv 0 0 -2.25\nf 1 2 3\nf 1//1 4//1 2//1\nf -4 -2 -1\nf 2/7/1 4/8/1 3/9\n";
-const std::string kOff = "OFF\n# a tetrahedron\n4 4 0\n0 0 0\n1 0 0 # second\n0 1.5 0\n\n0 0 -2.25\n3 0 1 2\n3 0 3 1 255 0 0\n3 0 2 3\n3 1 3 2\n";
-const std::string kPly = "ply\nformat ascii 1.0\ncomment made by hand\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 4\n"
-                         "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1.5 0\n0 0 -2.25\n3 0 1 2\n3 0 3 1\n3 0 2 3\n3 1 3 2\n";
+const std::string kObj =
+    "# a tetrahedron\nmtllib none.mtl\nv 0 0 0\nv 1 0 0 0.5 0.5 0.5\nv 0 1.5 0\nvn 0 0 1\nv 0 0 -2.25\nf 1 2 3\nf 1//1 "
+    "4//1 2//1\nf -4 -2 -1\nf 2/7/1 4/8/1 3/9\n";
+const std::string kOff =
+    "OFF\n# a tetrahedron\n4 4 0\n0 0 0\n1 0 0 # second\n0 1.5 0\n\n0 0 -2.25\n3 0 1 2\n3 0 3 1 255 0 0\n3 0 2 3\n3 1 "
+    "3 2\n";
+const std::string kPly =
+    "ply\nformat ascii 1.0\ncomment made by hand\nelement vertex 4\nproperty float x\nproperty float y\nproperty float "
+    "z\nelement face 4\n"
+    "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1.5 0\n0 0 -2.25\n3 0 1 2\n3 0 3 1\n3 0 2 "
+    "3\n3 1 3 2\n";
 
 std::string stl_ascii() {
   std::string text = "solid an outer shell\n";
   for (const Triangle& t : kTetrahedronFaces) {
     text += "facet normal nan 0 0\n  outer loop\n";
-    for (const int i : t) text += fmt::format("    vertex {} {} {}\n", kTetrahedron[i][0], kTetrahedron[i][1], kTetrahedron[i][2]);
+    for (const int i : t)
+      text += fmt::format("    vertex {} {} {}\n", kTetrahedron[i][0], kTetrahedron[i][1], kTetrahedron[i][2]);
     text += "  endloop\nendfacet\n";
   }
   return text + "endsolid\n";
@@ -84,9 +92,12 @@ std::string stl_binary(const std::vector<Triangle>& triangles = kTetrahedronFace
 /// With all that PLY allows: other types, lists at vertices, properties before the indices, elements of no use.
 std::string ply_binary(bool is_big_endian) {
   std::string bytes = std::string("ply\nformat binary_") + (is_big_endian ? "big" : "little") +
-                      "_endian 1.0\nobj_info x\nelement camera 2\nproperty list ushort short what\nproperty float64 f\nelement vertex 4\nproperty uchar red\nproperty double x\n"
-                      "property float32 y\nproperty float z\nproperty list uint8 double weights\nelement nothing 2000000000\nelement face 4\nproperty uchar intensity\n"
-                      "property list uint ushort vertex_index\nproperty list char float uv\nelement edge 1\nproperty int a\nend_header\n";
+                      "_endian 1.0\nobj_info x\nelement camera 2\nproperty list ushort short what\nproperty float64 "
+                      "f\nelement vertex 4\nproperty uchar red\nproperty double x\n"
+                      "property float32 y\nproperty float z\nproperty list uint8 double weights\nelement nothing "
+                      "2000000000\nelement face 4\nproperty uchar intensity\n"
+                      "property list uint ushort vertex_index\nproperty list char float uv\nelement edge 1\nproperty "
+                      "int a\nend_header\n";
   for (int i = 0; i < 2; ++i) {
     put(bytes, static_cast<std::uint16_t>(i), is_big_endian);
     for (int k = 0; k < i; ++k) put(bytes, std::int16_t{-3}, is_big_endian);
@@ -111,8 +122,13 @@ std::string ply_binary(bool is_big_endian) {
 }
 
 const std::vector<std::pair<std::string, std::string>>& small_files() {
-  static const std::vector<std::pair<std::string, std::string>> files{{".obj", kObj}, {".off", kOff}, {".ply", kPly}, {".stl", stl_ascii()}, {".stl", stl_binary()},
-                                                                      {".ply", ply_binary(false)}, {".ply", ply_binary(true)}};
+  static const std::vector<std::pair<std::string, std::string>> files{{".obj", kObj},
+                                                                      {".off", kOff},
+                                                                      {".ply", kPly},
+                                                                      {".stl", stl_ascii()},
+                                                                      {".stl", stl_binary()},
+                                                                      {".ply", ply_binary(false)},
+                                                                      {".ply", ply_binary(true)}};
   return files;
 }
 
@@ -151,16 +167,20 @@ TEST(MeshFiles, TextMayHaveAnyLineEndsSpacesAndContinuations) {
     EXPECT_EQ(read_as(folder, extension, text.substr(0, text.size() - 1)).mesh.triangles.size(), 4u);
   }
   EXPECT_EQ(read_as(folder, ".OBJ", "v 0 0 \\\n0\nv +1 0 0\nv 0 1e0 0\nf 1 \\\r\n 2 3\n").triangles, 1);
-  EXPECT_EQ(read_as(folder, ".off", "\n# first\nCOFF 3 1\n0 0 0 1 1 1\n1 0 0 .5 .5 .5\n0 1 0 0 0 0\n3 0 1 2").triangles, 1);
+  EXPECT_EQ(read_as(folder, ".off", "\n# first\nCOFF 3 1\n0 0 0 1 1 1\n1 0 0 .5 .5 .5\n0 1 0 0 0 0\n3 0 1 2").triangles,
+            1);
 }
 
 TEST(MeshFiles, PolygonsBecomeFansAndFacesAreCountedInAndOut) {
   const ScratchFolder folder;
-  const MeshFile file = read_as(folder, ".off", "OFF\n6 5 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0.5 2 0\n5 5 5\n4 0 1 2 3\n5 0 1 2 4 3\n3 0 1 1\n2 0 1\n4 0 1 1 2\n");
+  const MeshFile file = read_as(
+      folder, ".off",
+      "OFF\n6 5 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0.5 2 0\n5 5 5\n4 0 1 2 3\n5 0 1 2 4 3\n3 0 1 1\n2 0 1\n4 0 1 1 2\n");
   EXPECT_EQ(file.faces_in_file, 5);
   EXPECT_EQ(file.degenerate_faces, 2);
   EXPECT_EQ(file.triangles, 2 + 3 + 1);
-  EXPECT_EQ(file.mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}, {0, 1, 2}, {0, 2, 4}, {0, 4, 3}, {0, 1, 2}}));
+  EXPECT_EQ(file.mesh.triangles,
+            (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}, {0, 1, 2}, {0, 2, 4}, {0, 4, 3}, {0, 1, 2}}));
   EXPECT_EQ(file.mesh.positions.size(), 6u) << "a vertex without faces is kept for validation";
   const MeshFile obj = read_as(folder, ".obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\nf 1 2 2\nf 1 2\nf\n");
   EXPECT_EQ(obj.faces_in_file, 4);
@@ -184,9 +204,14 @@ TEST(MeshFiles, NumbersThatAreNoneAreLeftToValidation) {
   const ScratchFolder folder;
   for (const std::string extension : {".obj", ".off", ".ply"}) {
     const std::string v = extension == ".obj" ? "v " : "";
-    std::string text = extension == ".off" ? "OFF\n3 1 0\n" : extension == ".ply" ? "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-                                                                                    "element face 1\nproperty list uchar int vertex_indices\nend_header\n" : "";
-    text += v + "0 nan 0\n" + v + "1 0 -inf\n" + v + "1e400 1e39 1e-400\n" + (extension == ".obj" ? "f 1 2 3\n" : "3 0 1 2\n");
+    std::string text =
+        extension == ".off" ? "OFF\n3 1 0\n"
+        : extension == ".ply"
+            ? "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+              "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+            : "";
+    text += v + "0 nan 0\n" + v + "1 0 -inf\n" + v + "1e400 1e39 1e-400\n" +
+            (extension == ".obj" ? "f 1 2 3\n" : "3 0 1 2\n");
     const MeshFile file = read_as(folder, extension, text);
     ASSERT_EQ(file.mesh.positions.size(), 3u);
     EXPECT_TRUE(std::isnan(file.mesh.positions[0][1]));
@@ -203,7 +228,9 @@ TEST(MeshFiles, ErrorsNameFileLineAndReason) {
     std::string extension, bytes;
     std::vector<std::string> parts;
   };
-  const auto replaced = [](std::string text, const std::string& from, const std::string& to) { return text.replace(text.find(from), from.size(), to); };
+  const auto replaced = [](std::string text, const std::string& from, const std::string& to) {
+    return text.replace(text.find(from), from.size(), to);
+  };
   const std::vector<Case> cases{
       {".off", replaced(kOff, "1.5", "1,5"), {"mesh.off: line 6:", "\"1,5\""}},
       {".off", replaced(kOff, "3 0 2 3", "3 0 2 4"), {"line 11:", "vertex 4 does not exist", "0 to 3"}},
@@ -244,7 +271,8 @@ TEST(MeshFiles, ErrorsNameFileLineAndReason) {
   for (const Case& c : cases) {
     const std::string message = message_as(folder, c.extension, c.bytes);
     EXPECT_TRUE(contains(message, "mesh" + c.extension)) << message;
-    for (const std::string& part : c.parts) EXPECT_TRUE(contains(message, part)) << "expected \"" << part << "\" in: " << message;
+    for (const std::string& part : c.parts)
+      EXPECT_TRUE(contains(message, part)) << "expected \"" << part << "\" in: " << message;
   }
   EXPECT_TRUE(contains(error_of([&] { read_mesh(folder / "none.obj"); }), "cannot open"));
   EXPECT_TRUE(contains(error_of([&] { read_mesh(folder.path()); }), "folder"));
@@ -302,13 +330,16 @@ TEST(MeshFiles, WrittenMeshesComeBackAsTheyWere) {
 TEST(MeshFiles, PlyCarriesColoursAndAProperty) {
   const ScratchFolder folder;
   const TriangleMesh mesh{kTetrahedron, kTetrahedronFaces};
-  const std::vector<VertexColour> vertex_colours{{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {10, 11, 12}}, face_colours{{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {9, 9, 9}};
+  const std::vector<VertexColour> vertex_colours{{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {10, 11, 12}},
+      face_colours{{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {9, 9, 9}};
   const std::vector<float> distances{0.25f, 0.5f, 1, 2};
   write_mesh(folder / "m.ply", mesh, {vertex_colours, face_colours, "distance", distances, {}});
   const std::string bytes = read_bytes(folder / "m.ply");
   const std::string header =
-      "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n"
-      "property uchar blue\nproperty float distance\nelement face 4\nproperty list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n";
+      "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float "
+      "z\nproperty uchar red\nproperty uchar green\n"
+      "property uchar blue\nproperty float distance\nelement face 4\nproperty list uchar int vertex_indices\nproperty "
+      "uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n";
   ASSERT_EQ(bytes.substr(0, header.size()), header);
   ASSERT_EQ(bytes.size(), header.size() + 4 * (12 + 3 + 4) + 4 * (1 + 12 + 3));
   std::string second;
@@ -318,8 +349,14 @@ TEST(MeshFiles, PlyCarriesColoursAndAProperty) {
   EXPECT_EQ(bytes.substr(header.size() + 19, 19), second);
   EXPECT_EQ(bytes.substr(bytes.size() - 3), "\t\t\t");
   EXPECT_EQ(read_mesh(folder / "m.ply").mesh.positions, kTetrahedron);
-  EXPECT_TRUE(contains(error_of([&] { write_mesh(folder / "n.ply", mesh, {vertex_colours, {}, "", distances, {}}); }), "name"));
-  EXPECT_TRUE(contains(error_of([&] { write_mesh(folder / "n.ply", mesh, {std::span(vertex_colours).first(3), {}, "", {}, {}}); }), "as many"));
+  EXPECT_TRUE(contains(error_of([&] {
+                         write_mesh(folder / "n.ply", mesh, {vertex_colours, {}, "", distances, {}});
+                       }),
+                       "name"));
+  EXPECT_TRUE(contains(error_of([&] {
+                         write_mesh(folder / "n.ply", mesh, {std::span(vertex_colours).first(3), {}, "", {}, {}});
+                       }),
+                       "as many"));
   EXPECT_EQ(folder.file_count(), 1);
 }
 
@@ -360,7 +397,8 @@ TEST(AtomicFiles, SayWhatIsWrongWithTheFolderOrTheName) {
   EXPECT_TRUE(contains(error_of([&] { write_text_atomically("", "x"); }), "not a file name"));
   EXPECT_TRUE(contains(error_of([&] { write_text_atomically(folder / std::string(300, 'a'), "x"); }), "cannot write"));
   if (::geteuid() != 0) {  // whom permissions do not bind
-    std::filesystem::permissions(folder.path(), std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
+    std::filesystem::permissions(folder.path(),
+                                 std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
     EXPECT_TRUE(contains(error_of([&] { write_text_atomically(folder / "new", "x"); }), "cannot write in"));
     std::filesystem::permissions(folder.path(), std::filesystem::perms::owner_all);
   }
@@ -399,7 +437,8 @@ TEST(SkeletonFiles, NameNodesByIndexOrNameAndComeBackBitByBit) {
   EXPECT_EQ(*skeleton.bones[0].s, Vec3(1, 0, 0));
   EXPECT_FALSE(skeleton.bones[1].s.has_value());
   const Skeleton again = skeleton_from_json(nlohmann::json::parse(skeleton_to_json(skeleton).dump()), "again");
-  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(std::memcmp(again.nodes[i].position.data(), skeleton.nodes[i].position.data(), 3 * sizeof(double)), 0);
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_EQ(std::memcmp(again.nodes[i].position.data(), skeleton.nodes[i].position.data(), 3 * sizeof(double)), 0);
   EXPECT_EQ(skeleton_to_json(again), skeleton_to_json(skeleton));
 }
 
@@ -429,7 +468,8 @@ TEST(SkeletonFiles, ErrorsNameLineOrEntry) {
       {"\"bones\"", "\"bodies\"", "\"bones\" is missing"},
       {"{\"mesh\": \"x.off\",", "[", "s.json: line"},
   };
-  for (const auto& [from, to, part] : cases) EXPECT_TRUE(contains(message(from, to), part)) << part << ": " << message(from, to);
+  for (const auto& [from, to, part] : cases)
+    EXPECT_TRUE(contains(message(from, to), part)) << part << ": " << message(from, to);
   write_bytes(folder / "s.json", R"({"nodes":[],"bones":[]})");
   EXPECT_TRUE(contains(error_of([&] { read_skeleton(folder / "s.json"); }), "no bones"));
   write_bytes(folder / "s.json", std::string(200000, '['));

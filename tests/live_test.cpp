@@ -9,14 +9,14 @@
 #include <limits>
 #include <random>
 
-#include "skeletex/edit/blend.h"
-#include "skeletex/edit/transfer.h"
-#include "skeletex/encode/encode_model.h"
-#include "skeletex/measure/manifold.h"
+#include "skeletex/analysis/manifold.h"
+#include "skeletex/convert/encode_model.h"
+#include "skeletex/edit/transfer/blend.h"
+#include "skeletex/edit/transfer/transfer.h"
 #include "skeletex/model/error.h"
-#include "skeletex/model/pose.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/skeleton/pose.h"
 #include "support/load_model.h"
 
 namespace skeletex {
@@ -49,7 +49,9 @@ SkeletexModel with_texels(const Queue& queue) {
   return model;
 }
 
-bool same_bits(const std::vector<float>& a, const std::vector<float>& b) { return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0; }
+bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
+}
 
 void expect_same_texels(const SkeletexModel& a, const SkeletexModel& b, const std::string& what) {
   EXPECT_TRUE(same_bits(a.texture.along, b.texture.along)) << what;
@@ -73,7 +75,9 @@ TEST(LiveMorph, IsTheMorphAtItsKeysBitByBitAndNearItInBetween) {
     const LiveMorph live(device(), morph, {{1, 0}, {0, 1}});
     for (const double t : {0.0, 0.25, 0.5, 0.8125, 1.0}) {
       const std::string what = std::string(first) + " " + std::to_string(t);
-      const SkeletexModel exact = with_texels([&](DevicePlanes& texels) { return morph.queue(std::vector{1 - t, t}, texels); });
+      const SkeletexModel exact = with_texels([&](DevicePlanes& texels) {
+        return morph.queue(std::vector{1 - t, t}, texels);
+      });
       const SkeletexModel between = with_texels([&](DevicePlanes& texels) { return live.queue(t, texels); });
       if (t != 0.8125) expect_same_texels(exact, between, what);
       if (t == 0) expect_same_texels(a, between, what);
@@ -81,8 +85,10 @@ TEST(LiveMorph, IsTheMorphAtItsKeysBitByBitAndNearItInBetween) {
       expect_closed(live_mesh, what);
       ASSERT_EQ(mesh.positions.size(), live_mesh.positions.size()) << what;
       double sum = 0;
-      for (std::size_t i = 0; i < mesh.positions.size(); ++i) sum += (mesh.positions[i] - live_mesh.positions[i]).norm();
-      EXPECT_LT(sum / static_cast<double>(mesh.positions.size()), (t == 0.8125 ? 1.2e-3 : 1e-15) * exact.diagonal) << what;
+      for (std::size_t i = 0; i < mesh.positions.size(); ++i)
+        sum += (mesh.positions[i] - live_mesh.positions[i]).norm();
+      EXPECT_LT(sum / static_cast<double>(mesh.positions.size()), (t == 0.8125 ? 1.2e-3 : 1e-15) * exact.diagonal)
+          << what;
     }
   }
 }
@@ -97,9 +103,12 @@ TEST(LiveMorph, ComesNearerTheMorphTheMoreKeysThereAre) {
       double worst = 0;
       for (const double place : {0.2, 0.5, 0.8}) {
         const double t = (std::floor(place * steps) + 0.5) / steps;  // half-way between keys
-        const SkeletexModel exact = with_texels([&](DevicePlanes& texels) { return morph.queue(std::vector{1 - t, t}, texels); });
+        const SkeletexModel exact = with_texels([&](DevicePlanes& texels) {
+          return morph.queue(std::vector{1 - t, t}, texels);
+        });
         const SkeletexModel between = with_texels([&](DevicePlanes& texels) { return live.queue(t, texels); });
-        const std::vector<Vec3> wanted = lattice_positions(device(), exact), found = lattice_positions(device(), between);
+        const std::vector<Vec3> wanted = lattice_positions(device(), exact),
+                                found = lattice_positions(device(), between);
         double sum = 0;
         for (std::size_t i = 0; i < wanted.size(); ++i) sum += (wanted[i] - found[i]).norm();
         worst = std::max(worst, sum / static_cast<double>(wanted.size()) / exact.diagonal);
@@ -125,7 +134,8 @@ TEST(LiveMorph, GoesAlongAPathAndStopsAtItsEnds) {
   const LiveMorph live(device(), morph, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, 2);
   EXPECT_EQ(live.weights(1.25), (std::vector{0.0, 0.75, 0.25}));
   for (const auto& [t, model] : {std::pair{-1.0, &a}, {0.0, &a}, {1.0, &b}, {2.0, &c}, {7.0, &c}})
-    expect_same_texels(*model, with_texels([&, t = t](DevicePlanes& texels) { return live.queue(t, texels); }), std::to_string(t));
+    expect_same_texels(*model, with_texels([&, t = t](DevicePlanes& texels) { return live.queue(t, texels); }),
+                       std::to_string(t));
 }
 
 TEST(LiveMorph, FramesArePosedLikeAnyModel) {
@@ -133,7 +143,8 @@ TEST(LiveMorph, FramesArePosedLikeAnyModel) {
   const LiveMorph live(device(), morph, {{1, 0}, {0, 1}}, 2);
   const SkeletexModel frame = with_texels([&](DevicePlanes& texels) { return live.queue(0.3, texels); });
   Pose pose;
-  for (const Node& node : frame.skeleton.nodes) pose.nodes.push_back(Eigen::AngleAxisd(0.3 * node.position.y() / frame.diagonal, Vec3::UnitX()) * node.position);
+  for (const Node& node : frame.skeleton.nodes)
+    pose.nodes.push_back(Eigen::AngleAxisd(0.3 * node.position.y() / frame.diagonal, Vec3::UnitX()) * node.position);
   expect_closed(reconstruct_mesh(device(), frame, apply_pose(frame.skeleton, pose)), "posed");
 }
 
@@ -152,7 +163,9 @@ TEST(LiveBlend, GoesFromATransfersTargetToItsResult) {
   for (const bool has_limbs : {false, true}) {
     TransferOptions options;
     options.has_limbs = has_limbs;
-    const SkeletexModel result = transfer(device(), source, target, {{has_limbs ? "left_shoulder" : "left_leg", has_limbs ? "left_shoulder" : "left_leg"}}, options);
+    const SkeletexModel result =
+        transfer(device(), source, target,
+                 {{has_limbs ? "left_shoulder" : "left_leg", has_limbs ? "left_shoulder" : "left_leg"}}, options);
     const LiveBlend live(device(), target, result);
     for (const double share : {0.0, 0.35, 1.0}) {
       const SkeletexModel frame = live.at(share);
@@ -162,7 +175,8 @@ TEST(LiveBlend, GoesFromATransfersTargetToItsResult) {
       expect_same_texels(end, frame, std::to_string(share));
       for (std::size_t p = 0; p < end.patches.size(); ++p) EXPECT_EQ(end.patches[p].row_u, frame.patches[p].row_u);
       for (std::size_t a = 0; a < end.arcs.size(); ++a)
-        for (std::size_t i = 0; i < end.arcs[a].samples.size(); ++i) EXPECT_EQ(end.arcs[a].samples[i].distance, frame.arcs[a].samples[i].distance);
+        for (std::size_t i = 0; i < end.arcs[a].samples.size(); ++i)
+          EXPECT_EQ(end.arcs[a].samples[i].distance, frame.arcs[a].samples[i].distance);
     }
   }
 }
@@ -181,7 +195,8 @@ TEST(LiveBlend, RefusesModelsThatDifferInMoreThanTheirSurface) {
 TEST(Mix, KernelAndTwinAgreeOnRandomAndUglyTexels) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> unit(-1, 1);
-  const float ugly[] = {0.0f, -0.0f, 1e-40f, 1e30f, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()};
+  const float ugly[] = {
+      0.0f, -0.0f, 1e-40f, 1e30f, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()};
   for (const auto& [width, height] : {std::pair{1, 1}, {7, 3}, {257, 9}}) {
     std::array<std::vector<float>, 6> planes;
     for (auto& plane : planes)
@@ -191,7 +206,8 @@ TEST(Mix, KernelAndTwinAgreeOnRandomAndUglyTexels) {
     for (const float share : {0.0f, 0.3f, 1.0f}) {
       DevicePlanes mixed;
       mix_texels(device(), first, second, share, width, mixed);
-      const std::vector<float> out[3] = {device().download(mixed.x), device().download(mixed.y), device().download(mixed.z)};
+      const std::vector<float> out[3] = {device().download(mixed.x), device().download(mixed.y),
+                                         device().download(mixed.z)};
       for (int c = 0; c < 3; ++c) {
         if (share == 0 || share == 1) {
           EXPECT_TRUE(same_bits(out[c], planes[share == 0 ? c : c + 3]));
@@ -199,8 +215,10 @@ TEST(Mix, KernelAndTwinAgreeOnRandomAndUglyTexels) {
         }
         for (std::size_t i = 0; i < out[c].size(); ++i) {
           const double expected = (1 - share) * planes[c][i] + share * planes[c + 3][i];
-          if (std::isfinite(expected)) ASSERT_NEAR(out[c][i], expected, 1e-6 * std::max(1.0, std::abs(expected)));
-          else ASSERT_FALSE(std::isfinite(out[c][i]));
+          if (std::isfinite(expected))
+            ASSERT_NEAR(out[c][i], expected, 1e-6 * std::max(1.0, std::abs(expected)));
+          else
+            ASSERT_FALSE(std::isfinite(out[c][i]));
         }
       }
     }

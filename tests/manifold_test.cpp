@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/measure/manifold.h"
+#include "skeletex/analysis/manifold.h"
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,8 @@ namespace {
 
 TriangleMesh tetrahedron(const Vec3& offset = Vec3::Zero()) {
   TriangleMesh mesh;
-  for (const Vec3& p : {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)}) mesh.positions.push_back(p + offset);
+  for (const Vec3& p : {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)})
+    mesh.positions.push_back(p + offset);
   mesh.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
   return mesh;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/measure/metro.h"
+#include "skeletex/analysis/metro.h"
 
 #include <gtest/gtest.h>
 
@@ -11,11 +11,11 @@
 #include <set>
 
 #include "bench/stages/embree_scene.h"
-#include "skeletex/measure/hilbert_order.h"
-#include "skeletex/measure/point_triangle.h"
-#include "skeletex/measure/triangle_tree.h"
+#include "skeletex/geometry/hilbert_order.h"
+#include "skeletex/geometry/parallel.h"
+#include "skeletex/geometry/point_triangle.h"
+#include "skeletex/geometry/triangle_tree.h"
 #include "skeletex/model/error.h"
-#include "skeletex/model/parallel.h"
 #include "support/load_model.h"
 #include "support/metro_twin.h"
 #include "support/shapes.h"
@@ -34,10 +34,13 @@ TriangleMesh sphere(double radius, int rings, int around) {
   for (int i = 1; i < rings; ++i)
     for (int j = 0; j < around; ++j) {
       const double a = std::numbers::pi * i / rings, b = 2 * std::numbers::pi * j / around;
-      mesh.positions.emplace_back(radius * std::sin(a) * std::cos(b), radius * std::sin(a) * std::sin(b), radius * std::cos(a));
+      mesh.positions.emplace_back(radius * std::sin(a) * std::cos(b), radius * std::sin(a) * std::sin(b),
+                                  radius * std::cos(a));
     }
   mesh.positions.emplace_back(0, 0, -radius);
-  const auto at = [&](int i, int j) { return i == 0 ? 0 : i == rings ? static_cast<int>(mesh.positions.size()) - 1 : 1 + (i - 1) * around + j % around; };
+  const auto at = [&](int i, int j) {
+    return i == 0 ? 0 : i == rings ? static_cast<int>(mesh.positions.size()) - 1 : 1 + (i - 1) * around + j % around;
+  };
   for (int i = 0; i < rings; ++i)
     for (int j = 0; j < around; ++j) {
       if (i + 1 < rings) mesh.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
@@ -104,8 +107,8 @@ TEST(Metro, ShiftedCubesGiveTheClosedForm) {
     SCOPED_TRACE(t);
     const TriangleMesh a = unit_cube({5, 6, 7}), b = unit_cube({5 + t, 6, 7});
     const MetroReport report = measure_metro(context(), a, b, {.samples = 200000});
-    // Of A's faces, one lies t before B; the opposite one inside B, nearer to B's sides around its rim; four lie on B but for
-    // a strip of width t.
+    // Of A's faces, one lies t before B; the opposite one inside B, nearer to B's sides around its rim; four lie on B
+    // but for a strip of width t.
     const double mean = (t + (1 - std::pow(1 - 2 * t, 3)) / 6 + 2 * t * t) / 6;
     const double mean_square = (t * t + t * t - 8 * t * t * t / 3 + 2 * std::pow(t, 4) + 4 * t * t * t / 3) / 6;
     const double diagonal = std::sqrt(3.0);
@@ -186,7 +189,8 @@ TEST(Metro, ARigidMotionOfBothMeshesChangesNothing) {
   map.scale = 1;
   map.translation = Vec3(300, -200, 100);
   const MetroReport moved = measure_metro(context(), transformed(a, map), transformed(b, map));
-  for (std::size_t v = 0; v < a.positions.size(); ++v) EXPECT_NEAR(still.vertex_distances[v], moved.vertex_distances[v], kFloatChoice * still.diagonal);
+  for (std::size_t v = 0; v < a.positions.size(); ++v)
+    EXPECT_NEAR(still.vertex_distances[v], moved.vertex_distances[v], kFloatChoice * still.diagonal);
   // The box turns with the mesh, and so do the diagonal and the curve that the samples follow.
   const double unit = moved.diagonal / still.diagonal;
   EXPECT_NEAR(still.vertex.mean, moved.vertex.mean * unit, 1e-9);
@@ -198,7 +202,8 @@ TEST(Metro, UnitsDoNotMatter) {
   const TriangleMesh a = y_shape().mesh, b = transformed(a, {.translation = Vec3(0.01, 0.02, -0.03)});
   const MetroReport metres = measure_metro(context(), a, b);
   for (const double scale : {1e-15, 1e-3, 1e12}) {
-    const MetroReport other = measure_metro(context(), transformed(a, {.scale = scale}), transformed(b, {.scale = scale}));
+    const MetroReport other =
+        measure_metro(context(), transformed(a, {.scale = scale}), transformed(b, {.scale = scale}));
     EXPECT_NEAR(other.forward.mean, metres.forward.mean, 1e-6 * metres.forward.mean) << scale;
     EXPECT_NEAR(other.vertex.max, metres.vertex.max, 1e-6 * metres.vertex.max) << scale;
   }
@@ -222,7 +227,8 @@ TEST(Metro, PointsOnFacesEdgesAndVerticesAreAtNoDistance) {
     const double s = random.uniform(0, 1), u = random.uniform(0, 1 - s);
     points.push_back(mesh.positions[a]);
     points.push_back(mesh.positions[a] + s * (mesh.positions[b] - mesh.positions[a]));
-    points.push_back(mesh.positions[a] + s * (mesh.positions[b] - mesh.positions[a]) + u * (mesh.positions[c] - mesh.positions[a]));
+    points.push_back(mesh.positions[a] + s * (mesh.positions[b] - mesh.positions[a]) +
+                     u * (mesh.positions[c] - mesh.positions[a]));
   }
   const std::vector<float> distances = closest_distances(context(), mesh, points);
   double sum = 0;
@@ -260,7 +266,8 @@ TEST(Metro, TheKernelFindsTheTwinsTriangles) {
       for (int i = 0; i < 300; ++i) {
         const auto [a, b, c] = mesh.triangles[i % triangles];
         points.push_back(random.in_box(i % 5 == 0 ? 30 : 1.2));
-        points.push_back(mesh.positions[a] + random.uniform(0, 1) * (mesh.positions[b] - mesh.positions[c]) + 1e-6 * random.normal());
+        points.push_back(mesh.positions[a] + random.uniform(0, 1) * (mesh.positions[b] - mesh.positions[c]) +
+                         1e-6 * random.normal());
       }
       std::vector<float> x, y, z;
       std::vector<double> expected;
@@ -274,23 +281,32 @@ TEST(Metro, TheKernelFindsTheTwinsTriangles) {
       // Whatever the points an item follows one another with: the first has no block to start from, the others do.
       // Bounds, as shares of the distance: none, wide and narrow ones, and one that nothing lies within.
       for (const int run : {1, 3, 1000})
-        for (const auto& [enough, bound] : {std::pair(0.0, 0.0), {0.05 * tree.scale, 0.0}, {0.0, 3.0}, {0.0, 1.001}, {0.0, 0.5}, {0.05 * tree.scale, 1.001}}) {
+        for (const auto& [enough, bound] : {std::pair(0.0, 0.0),
+                                            {0.05 * tree.scale, 0.0},
+                                            {0.0, 3.0},
+                                            {0.0, 1.001},
+                                            {0.0, 0.5},
+                                            {0.05 * tree.scale, 1.001}}) {
           const int count = static_cast<int>(points.size());
           const auto enough_squared = static_cast<float>(enough / tree.scale * enough / tree.scale);
           auto nearest = context().allocate<int>(count);
           auto squared = context().allocate<float>(count);
           std::vector<float> bounds_squared;
-          for (const double distance : expected) bounds_squared.push_back(static_cast<float>(std::pow(bound * distance / tree.scale + 1e-5, 2)));
-          context().launch({"metro.cl", "find_nearest_triangles"}, ClRange(block_count(count, run)), context().upload(x), context().upload(y),
-                           context().upload(z), count, run, context().upload(tree.boxes), context().upload(tree.blocks), context().upload(tree.level_begin),
-                           tree.top_level(), enough_squared, static_cast<int>(bound > 0), context().upload(bounds_squared), nearest, squared);
+          for (const double distance : expected)
+            bounds_squared.push_back(static_cast<float>(std::pow(bound * distance / tree.scale + 1e-5, 2)));
+          context().launch({"metro.cl", "find_nearest_triangles"}, ClRange(block_count(count, run)),
+                           context().upload(x), context().upload(y), context().upload(z), count, run,
+                           context().upload(tree.boxes), context().upload(tree.blocks),
+                           context().upload(tree.level_begin), tree.top_level(), enough_squared,
+                           static_cast<int>(bound > 0), context().upload(bounds_squared), nearest, squared);
           const std::vector<int> places = context().download(nearest);
           const std::vector<float> squares = context().download(squared);
           for (int i = 0; i < count; ++i) {
             ASSERT_GE(places[i], 0);
             ASSERT_LT(places[i], triangles);
             const auto [a, b, c] = mesh.triangles[tree.order[places[i]]];
-            const double found = static_cast<double>(twin_distance_to_triangle(points[i], mesh.positions[a], mesh.positions[b], mesh.positions[c]));
+            const double found = static_cast<double>(
+                twin_distance_to_triangle(points[i], mesh.positions[a], mesh.positions[b], mesh.positions[c]));
             const double measured = std::sqrt(squares[i]) * tree.scale;
             // Far away single precision is relative to the distance. A sliver's edges may stand in for its inside.
             const double tolerance = kFloatChoice * (tree.scale + expected[i]) + 2e-6 * largest;
@@ -352,7 +368,9 @@ TEST(Metro, TheHilbertCurveVisitsEveryCellFromANeighbour) {
 
 namespace {
 
-double twin_distance(const Vec3& point, const Vec3& a, const Vec3& b, const Vec3& c) { return static_cast<double>(twin_distance_to_triangle(point, a, b, c)); }
+double twin_distance(const Vec3& point, const Vec3& a, const Vec3& b, const Vec3& c) {
+  return static_cast<double>(twin_distance_to_triangle(point, a, b, c));
+}
 
 /// Distances by Embree's tree, with the twin at its leaves.
 std::vector<double> embree_distances(const TriangleMesh& mesh, const std::vector<Vec3>& points) {
@@ -376,7 +394,8 @@ TEST(Metro, EmbreeAgreesOnRealModels) {
       for (Vec3& p : other.positions) p += noise * diagonal * random.normal();
       // Vertices and centres of the disturbed mesh against the mesh.
       std::vector<Vec3> points = other.positions;
-      for (const auto& [a, b, c] : other.triangles) points.push_back((other.positions[a] + other.positions[b] + other.positions[c]) / 3);
+      for (const auto& [a, b, c] : other.triangles)
+        points.push_back((other.positions[a] + other.positions[b] + other.positions[c]) / 3);
       const std::vector<double> expected = embree_distances(mesh, points);
       const std::vector<float> distances = closest_distances(context(), mesh, points);
       double sum = 0, expected_sum = 0;
@@ -389,7 +408,8 @@ TEST(Metro, EmbreeAgreesOnRealModels) {
       const MetroReport report = measure_metro(context(), other, mesh, {.samples = 1000});
       double vertex_sum = 0;
       for (std::size_t v = 0; v < other.positions.size(); ++v) vertex_sum += expected[v];
-      EXPECT_NEAR(report.vertex.mean * report.diagonal, vertex_sum / static_cast<double>(other.positions.size()), 2e-9 * diagonal);
+      EXPECT_NEAR(report.vertex.mean * report.diagonal, vertex_sum / static_cast<double>(other.positions.size()),
+                  2e-9 * diagonal);
     }
   }
 }
@@ -416,7 +436,9 @@ TEST(Metro, MeshesThatCannotBeMeasuredAreNamed) {
   for (Vec3& p : bad.positions) p.y() = p.z() = 0;
   EXPECT_NE(message(good, bad).find("no area"), std::string::npos);
   EXPECT_NE(message(good, good, -1).find("-1"), std::string::npos);
-  EXPECT_THROW(closest_distances(context(), good, std::vector<Vec3>{Vec3(0, std::numeric_limits<double>::infinity(), 0)}), InputError);
+  EXPECT_THROW(
+      closest_distances(context(), good, std::vector<Vec3>{Vec3(0, std::numeric_limits<double>::infinity(), 0)}),
+      InputError);
   EXPECT_TRUE(closest_distances(context(), good, {}).empty());
 }
 

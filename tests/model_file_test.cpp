@@ -34,10 +34,13 @@ class Numbers {
   std::mt19937_64 random_;
 };
 
-void add_patch(SkeletexModel& model, Rectangle rectangle, SegmentTopology topology, PatchEnd head, PatchEnd tail, Numbers& numbers) {
+void add_patch(SkeletexModel& model, Rectangle rectangle, SegmentTopology topology, PatchEnd head, PatchEnd tail,
+               Numbers& numbers) {
   Patch patch{rectangle, model.patches.size() % 2 == 0 ? Method::kVsm : Method::kSpd, topology, {}};
   for (int row = 0; row < rectangle.height; ++row)
-    patch.row_u.push_back(row == 0 ? 0 : row == rectangle.height - 1 ? 1 : (row + 0.5 * numbers.uniform()) / (rectangle.height - 1));
+    patch.row_u.push_back(row == 0                      ? 0
+                          : row == rectangle.height - 1 ? 1
+                                                        : (row + 0.5 * numbers.uniform()) / (rectangle.height - 1));
   model.patches.push_back(std::move(patch));
   model.ends.push_back({std::move(head), std::move(tail)});
 }
@@ -66,14 +69,27 @@ void fill(SkeletexModel& model, int width, int height, Numbers& numbers) {
 SkeletexModel branch_model(int width = 40, int height = 20) {
   Numbers numbers(kSeed);
   SkeletexModel model;
-  model.skeleton = {{{"stem", Vec3(0, -2, 0)}, {"fork \"\xc3\xbc\"", Vec3::Zero()}, {"left", Vec3(-1.0 / 3, 1, 0)}, {"right", Vec3(1, 1.1, 0)}, {"tip", Vec3(2, 2, 0.1)}},
-                    {{"stem", 0, 1, Vec3(1, 0.1, numbers.uniform())}, {"left", 1, 2, Vec3(0, 0, 1)}, {"right", 1, 3, Vec3(0, 0, 1)}, {"tip", 3, 4, Vec3(0, 0, -1)}}};
+  model.skeleton = {{{"stem", Vec3(0, -2, 0)},
+                     {"fork \"\xc3\xbc\"", Vec3::Zero()},
+                     {"left", Vec3(-1.0 / 3, 1, 0)},
+                     {"right", Vec3(1, 1.1, 0)},
+                     {"tip", Vec3(2, 2, 0.1)}},
+                    {{"stem", 0, 1, Vec3(1, 0.1, numbers.uniform())},
+                     {"left", 1, 2, Vec3(0, 0, 1)},
+                     {"right", 1, 3, Vec3(0, 0, 1)},
+                     {"tip", 3, 4, Vec3(0, 0, -1)}}};
   model.corners = {{1, {0, 1, 2}, samples(1, numbers)[0]}, {1, {0, 1, 2}, samples(1, numbers)[0]}};
-  model.arcs = {{1, {1, 2}, {0, 1}, samples(5, numbers)}, {1, {0, 2}, {0, 1}, samples(1, numbers)}, {1, {0, 1}, {1, 0}, samples(7, numbers)}, {3, {2, 3}, {-1, -1}, samples(9, numbers)}};
+  model.arcs = {{1, {1, 2}, {0, 1}, samples(5, numbers)},
+                {1, {0, 2}, {0, 1}, samples(1, numbers)},
+                {1, {0, 1}, {1, 0}, samples(7, numbers)},
+                {3, {2, 3}, {-1, -1}, samples(9, numbers)}};
   add_patch(model, {0, 0, width / 2, height / 2}, SegmentTopology::kDisk, {}, {{{1, false}, {2, false}}}, numbers);
-  add_patch(model, {width / 2, 0, width - width / 2, height / 2}, SegmentTopology::kDisk, {{{0, false}, {2, false}}}, {}, numbers);
-  add_patch(model, {0, height / 2, width / 2, height - height / 2}, SegmentTopology::kAnnulus, {{{0, true}, {1, false}}}, {{{3, false}}}, numbers);
-  add_patch(model, {width / 2, height / 2, width - width / 2, height - height / 2}, SegmentTopology::kDisk, {{{3, false}}}, {}, numbers);
+  add_patch(model, {width / 2, 0, width - width / 2, height / 2}, SegmentTopology::kDisk, {{{0, false}, {2, false}}},
+            {}, numbers);
+  add_patch(model, {0, height / 2, width / 2, height - height / 2}, SegmentTopology::kAnnulus,
+            {{{0, true}, {1, false}}}, {{{3, false}}}, numbers);
+  add_patch(model, {width / 2, height / 2, width - width / 2, height - height / 2}, SegmentTopology::kDisk,
+            {{{3, false}}}, {}, numbers);
   fill(model, width, height, numbers);
   return model;
 }
@@ -190,7 +206,10 @@ TEST(ModelFile, HalfTexelsAreTheNearestHalvesAndAllElseStaysExact) {
   SkeletexModel large = model;
   large.diagonal = 1e6;
   large.texture.out[3] = 1e6f;
-  EXPECT_TRUE(contains(error_of([&] { write_model(folder / "large.skx.exr", large, {TexelFormat::kHalf, ExrCompression::kZip}); }), "half"));
+  EXPECT_TRUE(contains(error_of([&] {
+                         write_model(folder / "large.skx.exr", large, {TexelFormat::kHalf, ExrCompression::kZip});
+                       }),
+                       "half"));
   EXPECT_EQ(folder.file_count(), 1);
 }
 
@@ -202,13 +221,15 @@ TEST(ModelFile, WeightsOfBonesAreLayersOfTheirOwn) {
     std::vector<float>& plane = model.bone_weights.emplace_back(texels);
     for (std::size_t i = 0; i < texels; ++i) plane[i] = static_cast<float>((i * (bone + 3)) % 17) / 16;
   }
-  EXPECT_EQ(weight_channels(model.skeleton), (std::vector<std::string>{"weights.stem", "weights.left", "weights.right", "weights.left_hand__tip"}));
+  EXPECT_EQ(weight_channels(model.skeleton),
+            (std::vector<std::string>{"weights.stem", "weights.left", "weights.right", "weights.left_hand__tip"}));
   const ScratchFolder scratch;
   const auto path = scratch / "weights.skx.exr";
   write_model(path, model);
   const SkeletexModel back = read_model(path);
   ASSERT_EQ(back.bone_weights.size(), model.bone_weights.size());
-  for (std::size_t bone = 0; bone < model.bone_weights.size(); ++bone) EXPECT_TRUE(same_bits(back.bone_weights[bone], model.bone_weights[bone])) << bone;
+  for (std::size_t bone = 0; bone < model.bone_weights.size(); ++bone)
+    EXPECT_TRUE(same_bits(back.bone_weights[bone], model.bone_weights[bone])) << bone;
   expect_same(back, model);
 
   model.bone_weights[1][5] = -0.1f;
@@ -288,7 +309,10 @@ TEST(ModelFile, RefusesModelsWhosePartsDoNotFitTogether) {
       {"ends.head", [](SkeletexModel& m) { m.ends[2][0].arcs[0].arc = 4; }},
       {"ends.head", [](SkeletexModel& m) { m.ends[2][0].arcs[0].arc = -1; }},
       {"ends.head", [](SkeletexModel& m) { m.ends[2][0].arcs[0].is_reversed = false; }},
-      {"ends.head", [](SkeletexModel& m) { m.ends[0][0].arcs.push_back({3, false}); }},
+      {"ends.head",
+       [](SkeletexModel& m) {
+         m.ends[0][0].arcs.push_back({3, false});
+       }},
       {"ends.tail", [](SkeletexModel& m) { m.ends[2][1].arcs.clear(); }},
       {"arcs[0]", [](SkeletexModel& m) { m.arcs[0].bones[1] = 3; }},
       {"arcs[0]", [](SkeletexModel& m) { m.arcs[0].corners[1] = 2; }},
@@ -320,18 +344,36 @@ TEST(ModelFile, EditedHeadersAreRefusedOrGiveFiniteMeshes) {
   const SkeletexModel model = SyntheticSurface(y_branch(), 0.25).model({{24, 11}, {24, 11}, {24, 11}});
   const nlohmann::json header = model_to_json(model, "header");
   const auto at = [](const char* pointer) { return nlohmann::json::json_pointer(pointer); };
-  const nlohmann::json first_head = header.at(at("/skeleton/nodes/0/position")), other = header.at(at("/skeleton/nodes/2/position"));
+  const nlohmann::json first_head = header.at(at("/skeleton/nodes/0/position")),
+                       other = header.at(at("/skeleton/nodes/2/position"));
   const std::vector<std::pair<std::string, nlohmann::json>> edits{
-      {"/skeleton/nodes/0/position", other},                        // a bone folded back on its neighbour, of the same length
-      {"/skeleton/nodes/0/position", {0.3 * other[0].get<double>(), 0.3 * other[1].get<double>(), 0.3 * other[2].get<double>()}},  // and shorter
-      {"/skeleton/nodes/0/position/0", 1e30},    {"/skeleton/nodes/0/position/1", -1e30}, {"/skeleton/nodes/0/position/2", 1e300},
-      {"/skeleton/nodes/0/position/2", nullptr}, {"/skeleton/nodes/1/position", first_head}, {"/skeleton/nodes/2/position/0", 1e5},
-      {"/skeleton/bones/0/tail", 0},             {"/skeleton/bones/0/s", {0, 0, 0}},       {"/skeleton/bones/0/s/0", 1e300},
-      {"/skeleton/bones/1/s/1", 1e-300},         {"/origin/0", 1e300},                     {"/origin/1", 1e30},
-      {"/origin/2", "x"},                        {"/diagonal", 0},                         {"/diagonal", -1},
-      {"/diagonal", 1e300},                      {"/diagonal", 1e-300},                    {"/arcs/0/samples/1", 1e39},
-      {"/arcs/0/samples/1", -1},                 {"/arcs/0/samples/0", 1e300},             {"/arcs/1/samples/3", 1e300},
-      {"/corners/0/sample/1", 1e39},             {"/corners/1/sample/0", -0.5},            {"/patches/0/row_u/3", 1e300},
+      {"/skeleton/nodes/0/position", other},  // a bone folded back on its neighbour, of the same length
+      {"/skeleton/nodes/0/position",
+       {0.3 * other[0].get<double>(), 0.3 * other[1].get<double>(), 0.3 * other[2].get<double>()}},  // and shorter
+      {"/skeleton/nodes/0/position/0", 1e30},
+      {"/skeleton/nodes/0/position/1", -1e30},
+      {"/skeleton/nodes/0/position/2", 1e300},
+      {"/skeleton/nodes/0/position/2", nullptr},
+      {"/skeleton/nodes/1/position", first_head},
+      {"/skeleton/nodes/2/position/0", 1e5},
+      {"/skeleton/bones/0/tail", 0},
+      {"/skeleton/bones/0/s", {0, 0, 0}},
+      {"/skeleton/bones/0/s/0", 1e300},
+      {"/skeleton/bones/1/s/1", 1e-300},
+      {"/origin/0", 1e300},
+      {"/origin/1", 1e30},
+      {"/origin/2", "x"},
+      {"/diagonal", 0},
+      {"/diagonal", -1},
+      {"/diagonal", 1e300},
+      {"/diagonal", 1e-300},
+      {"/arcs/0/samples/1", 1e39},
+      {"/arcs/0/samples/1", -1},
+      {"/arcs/0/samples/0", 1e300},
+      {"/arcs/1/samples/3", 1e300},
+      {"/corners/0/sample/1", 1e39},
+      {"/corners/1/sample/0", -0.5},
+      {"/patches/0/row_u/3", 1e300},
       {"/genus", -1}};
   ClContext device;
   int refused = 0;
@@ -388,7 +430,8 @@ TEST(ModelFile, SaysWhatIsWrongWithForeignTruncatedAndNewerFiles) {
     return bytes.replace(at, from.size(), to);
   };
   EXPECT_TRUE(contains(message_for(with("\"version\":1", "\"version\":2")), "newer"));
-  EXPECT_TRUE(contains(message_for(with(std::string("skeletex\0string", 15), std::string("skeletix\0string", 15))), "not a model"));
+  EXPECT_TRUE(contains(message_for(with(std::string("skeletex\0string", 15), std::string("skeletix\0string", 15))),
+                       "not a model"));
   EXPECT_TRUE(contains(message_for(with("\"width\":40", "\"width\":41")), "resized"));
   std::string window(16, '\0');
   const int corner[2] = {39, 19};
@@ -408,7 +451,10 @@ TEST(ModelFile, ReadsOrRefusesDamagedFilesButNeverCrashes) {
   for (const ExrCompression compression : {ExrCompression::kNone, ExrCompression::kZip, ExrCompression::kPiz}) {
     write_model(path, branch_model(), {TexelFormat::kFloat, compression});
     // Also with the JSON short, so that the damage hits the rest of the header more often.
-    for (const std::string& good : {read_bytes(path), [&] { write_model(path, lone_bone_model(), {TexelFormat::kHalf, compression}); return read_bytes(path); }()})
+    for (const std::string& good : {read_bytes(path), [&] {
+                                      write_model(path, lone_bone_model(), {TexelFormat::kHalf, compression});
+                                      return read_bytes(path);
+                                    }()})
       for_each_corruption(good, 1000, kSeed, [&](const std::string& bytes) {
         write_bytes(path, bytes);
         try {
@@ -436,7 +482,8 @@ TEST(ModelFile, DamagedJsonIsReadOrRefusedButNeverCrashes) {
   EXPECT_GT(refused, 100);
   // Every value in turn replaced by one of another kind.
   const nlohmann::json flat = nlohmann::json::parse(good).flatten();
-  for (const nlohmann::json& value : {nlohmann::json(), nlohmann::json("x"), nlohmann::json(-1), nlohmann::json(1e300), nlohmann::json(18446744073709551615u), nlohmann::json(true)})
+  for (const nlohmann::json& value : {nlohmann::json(), nlohmann::json("x"), nlohmann::json(-1), nlohmann::json(1e300),
+                                      nlohmann::json(18446744073709551615u), nlohmann::json(true)})
     for (const auto& [key, old] : flat.items()) {
       if (key.starts_with("/conventions") || key.starts_with("/encoder")) continue;
       nlohmann::json json = nlohmann::json::parse(good);
@@ -453,7 +500,8 @@ TEST(ModelFile, LeavesNothingBehindOnAFullDiskOrWithoutAFolder) {
   const SkeletexModel model = branch_model(200, 100);
   write_model(folder / "m.skx.exr", model);
   const std::string good = read_bytes(folder / "m.skx.exr");
-  for (const std::size_t space : {std::size_t{0}, std::size_t{100}, std::size_t{5000}, good.size() / 2, good.size() - 1}) {
+  for (const std::size_t space :
+       {std::size_t{0}, std::size_t{100}, std::size_t{5000}, good.size() / 2, good.size() - 1}) {
     const FullDisk disk(space);
     EXPECT_TRUE(contains(error_of([&] { write_model(folder / "m.skx.exr", model); }), "cannot write")) << space;
     EXPECT_TRUE(contains(error_of([&] { write_model(folder / "new.skx.exr", model); }), "cannot write")) << space;

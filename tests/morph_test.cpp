@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include "skeletex/edit/morph/morph.h"
+
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -6,15 +8,14 @@
 #include <map>
 #include <random>
 
-#include "skeletex/edit/blend.h"
-#include "skeletex/edit/morph.h"
-#include "skeletex/edit/seam_network.h"
-#include "skeletex/edit/surface_map.h"
-#include "skeletex/encode/encode_model.h"
-#include "skeletex/measure/manifold.h"
-#include "skeletex/measure/metro.h"
+#include "skeletex/analysis/manifold.h"
+#include "skeletex/analysis/metro.h"
+#include "skeletex/convert/encode_model.h"
+#include "skeletex/edit/morph/seam_network.h"
+#include "skeletex/edit/morph/surface_map.h"
+#include "skeletex/edit/regular_grid.h"
+#include "skeletex/edit/transfer/blend.h"
 #include "skeletex/model/error.h"
-#include "skeletex/reconstruct/even_lattice.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "support/blend_twin.h"
 #include "support/load_model.h"
@@ -82,8 +83,8 @@ double mean_distance(const TriangleMesh& a, const TriangleMesh& b) {
   return measure_metro(device(), a, b, options).forward.mean;
 }
 
-/// How far the vertices of one mesh lie from the other surface, at most, in diagonals. (Triangles at seams depend on where
-/// arcs begin.)
+/// How far the vertices of one mesh lie from the other surface, at most, in diagonals. (Triangles at seams depend on
+/// where arcs begin.)
 double largest_distance(const TriangleMesh& from, const TriangleMesh& to) {
   const std::vector<float> distances = closest_distances(device(), to, from.positions);
   return *std::max_element(distances.begin(), distances.end()) / bounding_box(to).diagonal();
@@ -93,8 +94,11 @@ struct Pair {
   const char *a, *b;
   EncodeMethod method;
 };
-const Pair kPairs[] = {{"man", "homer", EncodeMethod::kVsm},   {"bear", "bear_bis", EncodeMethod::kVsm}, {"bear", "bear_bis", EncodeMethod::kSpd},
-                       {"bull", "camel", EncodeMethod::kVsm}, {"cow", "bull_16", EncodeMethod::kVsm}};
+const Pair kPairs[] = {{"man", "homer", EncodeMethod::kVsm},
+                       {"bear", "bear_bis", EncodeMethod::kVsm},
+                       {"bear", "bear_bis", EncodeMethod::kSpd},
+                       {"bull", "camel", EncodeMethod::kVsm},
+                       {"cow", "bull_16", EncodeMethod::kVsm}};
 
 }  // namespace
 
@@ -104,13 +108,14 @@ TEST(Morph, EndsAtTheModelsThemselvesTexelByTexel) {
     const Morph morph = morph_of(a, b);
     for (const int end : {0, 1}) {
       const SkeletexModel result = at(morph, end);
-      const SkeletexModel model = even_lattice(device(), end == 0 ? a : b);  // itself, but where it is snapped
+      const SkeletexModel model = regular_grid(device(), end == 0 ? a : b);  // itself, but where it is snapped
       EXPECT_EQ(result.texture.along, model.texture.along) << pair.a << " " << end;
       EXPECT_EQ(result.texture.around, model.texture.around) << pair.a << " " << end;
       EXPECT_EQ(result.texture.out, model.texture.out) << pair.a << " " << end;
       for (std::size_t i = 0; i < model.patches.size(); ++i)
         EXPECT_LT(std::abs(result.patches[i].row_u[1] - model.patches[i].row_u[1]), 1e-15);
-      EXPECT_LT(largest_distance(reconstruct_mesh(device(), result), reconstruct_mesh(device(), model)), 1e-6) << pair.a << " " << end;
+      EXPECT_LT(largest_distance(reconstruct_mesh(device(), result), reconstruct_mesh(device(), model)), 1e-6)
+          << pair.a << " " << end;
     }
   }
 }
@@ -136,8 +141,10 @@ TEST(Morph, ArrivesSteadilyAtItsEnds) {
   for (const Pair& pair : {kPairs[0], kPairs[3]}) {
     const SkeletexModel &a = standard(pair.a, pair.method), &b = standard(pair.b, pair.method);
     const Morph morph = morph_of(a, b);
-    EXPECT_LT(mean_distance(reconstruct_mesh(device(), a), reconstruct_mesh(device(), at(morph, 1e-4))), 3e-4) << pair.a;
-    EXPECT_LT(mean_distance(reconstruct_mesh(device(), b), reconstruct_mesh(device(), at(morph, 1 - 1e-4))), 3e-4) << pair.b;
+    EXPECT_LT(mean_distance(reconstruct_mesh(device(), a), reconstruct_mesh(device(), at(morph, 1e-4))), 3e-4)
+        << pair.a;
+    EXPECT_LT(mean_distance(reconstruct_mesh(device(), b), reconstruct_mesh(device(), at(morph, 1 - 1e-4))), 3e-4)
+        << pair.b;
   }
 }
 
@@ -151,7 +158,9 @@ TEST(Morph, OfAModelAndItsMovedCopyIsTheModelOnTheWay) {
   Vec3 centre = Vec3::Zero(), far_centre = Vec3::Zero();
   for (const Node& node : a.skeleton.nodes) centre += node.position / static_cast<double>(a.skeleton.nodes.size());
   far_centre = Eigen::AngleAxisd(2.2, axis) * centre + shift;
-  const Skeleton expected = moved(a, Eigen::Quaterniond(Eigen::AngleAxisd(1.1, axis)), 0.5 * (centre + far_centre) - Eigen::AngleAxisd(1.1, axis) * centre).skeleton;
+  const Skeleton expected = moved(a, Eigen::Quaterniond(Eigen::AngleAxisd(1.1, axis)),
+                                  0.5 * (centre + far_centre) - Eigen::AngleAxisd(1.1, axis) * centre)
+                                .skeleton;
   for (std::size_t n = 0; n < expected.nodes.size(); ++n)
     EXPECT_LT((half.skeleton.nodes[n].position - expected.nodes[n].position).norm(), 1e-9 * a.diagonal);
   TriangleMesh turned = reconstruct_mesh(device(), a);
@@ -172,7 +181,8 @@ TEST(Morph, DoesNotCareAboutNamesOrderAndDirectionsOfBones) {
   const SkeletexModel a = standard("man"), b = encoded(source.mesh, other, EncodeMethod::kVsm, 96);
   const TriangleMesh mesh = reconstruct_mesh(device(), at(morph_of(a, b), 0.4));
   EXPECT_LT(mean_distance(source.mesh, mesh), 2 * mean_distance(source.mesh, reconstruct_mesh(device(), a)));
-  const Distortion distortion = measure_distortion(reconstruct_mesh(device(), a), map_surface(device(), a, b, find_correspondence(a.skeleton, b.skeleton)));
+  const Distortion distortion = measure_distortion(
+      reconstruct_mesh(device(), a), map_surface(device(), a, b, find_correspondence(a.skeleton, b.skeleton)));
   EXPECT_LT(distortion.dirichlet_median, 1.25);
 }
 
@@ -181,7 +191,9 @@ TEST(Morph, IsTheSameFromEitherSide) {
     const SkeletexModel &a = standard(pair.a, pair.method), &b = standard(pair.b, pair.method);
     const Morph there = morph_of(a, b), back = morph_of(b, a);
     for (const double t : {0.2, 0.7}) {
-      EXPECT_LT(largest_distance(reconstruct_mesh(device(), at(there, t)), reconstruct_mesh(device(), at(back, 1 - t))), 1e-6) << pair.a << " " << t;
+      EXPECT_LT(largest_distance(reconstruct_mesh(device(), at(there, t)), reconstruct_mesh(device(), at(back, 1 - t))),
+                1e-6)
+          << pair.a << " " << t;
     }
   }
 }
@@ -189,7 +201,8 @@ TEST(Morph, IsTheSameFromEitherSide) {
 TEST(Morph, IsClosedAtEveryTime) {
   for (const Pair& pair : kPairs) {
     const Morph morph = morph_of(standard(pair.a, pair.method), standard(pair.b, pair.method));
-    for (const double t : {0.0, 0.1, 0.25, 0.5, 0.6, 0.9, 1.0}) expect_valid(at(morph, t), 0, std::string(pair.a) + " " + std::to_string(t));
+    for (const double t : {0.0, 0.1, 0.25, 0.5, 0.6, 0.9, 1.0})
+      expect_valid(at(morph, t), 0, std::string(pair.a) + " " + std::to_string(t));
   }
 }
 
@@ -200,9 +213,11 @@ TEST(Morph, RowsEndOnTheSeamsAsThoseOfTheModelsDo) {
     const Morph morph = morph_of(a, b);
     const auto widest = [&](const SkeletexModel& model) {
       const std::vector<test::SeamGap> gaps = test::seam_gaps(device(), model);
-      return *std::max_element(gaps.begin(), gaps.end(), [](const auto& p, const auto& q) { return p.at_columns < q.at_columns; });
+      return *std::max_element(gaps.begin(), gaps.end(),
+                               [](const auto& p, const auto& q) { return p.at_columns < q.at_columns; });
     };
-    const double own = std::max(widest(even_lattice(device(), a)).at_columns, widest(even_lattice(device(), b)).at_columns);
+    const double own =
+        std::max(widest(regular_grid(device(), a)).at_columns, widest(regular_grid(device(), b)).at_columns);
     double widest_gap = 0;
     for (const double t : {0.25, 0.5, 0.75}) {
       const test::SeamGap gap = widest(at(morph, t));
@@ -210,7 +225,8 @@ TEST(Morph, RowsEndOnTheSeamsAsThoseOfTheModelsDo) {
       EXPECT_LT(gap.at_columns, own + 1.5e-3) << pair.a << " " << t << " bone " << a.skeleton.bones[gap.bone].name;
       EXPECT_LT(gap.row_to_seam, 0.01) << pair.a << " " << t;
     }
-    RecordProperty(std::string(pair.a) + (pair.method == EncodeMethod::kSpd ? "_spd" : "_vsm"), std::to_string(widest_gap) + " between, " + std::to_string(own) + " of the models");
+    RecordProperty(std::string(pair.a) + (pair.method == EncodeMethod::kSpd ? "_spd" : "_vsm"),
+                   std::to_string(widest_gap) + " between, " + std::to_string(own) + " of the models");
   }
 }
 
@@ -227,13 +243,16 @@ TEST(Morph, IsSymmetricHalfWay) {
 
 TEST(Morph, IsClosedFromTheSmallestSizesToLargeOnes) {
   const SkeletexModel &a = standard("bear"), &b = standard("bear_bis");
-  for (const int size : {32, 64, 1024}) expect_valid(at(morph_of(a, b, {.layout = {}, .size = size}), 0.5), 0, std::to_string(size));
+  for (const int size : {32, 64, 1024})
+    expect_valid(at(morph_of(a, b, {.layout = {}, .size = size}), 0.5), 0, std::to_string(size));
   expect_valid(at(morph_of(a, b, {.layout = {}, .size = 2048, .is_smooth = false}), 0.5), 0, "2048");
 }
 
 TEST(Morph, OfSeveralModelsIsClosedWhateverTheWeights) {
   const SkeletexModel &a = standard("man"), &b = standard("homer"), &c = standard("man", EncodeMethod::kSpd);
-  const Morph morph(device(), {a, b, c}, std::vector{find_correspondence(a.skeleton, b.skeleton), find_correspondence(a.skeleton, c.skeleton)});
+  const Morph morph(
+      device(), {a, b, c},
+      std::vector{find_correspondence(a.skeleton, b.skeleton), find_correspondence(a.skeleton, c.skeleton)});
   std::mt19937 random(4);
   std::uniform_real_distribution<double> unit(0, 1);
   for (int round = 0; round < 5; ++round) {
@@ -256,8 +275,10 @@ TEST(Morph, KeepsTheGenusOfCyclicSkeletons) {
 }
 
 TEST(Morph, MixesSizesMethodsAndThreeModels) {
-  const SkeletexModel &a = standard("bear", EncodeMethod::kVsm), &b = standard("bear_bis", EncodeMethod::kSpd), &c = standard("bear", EncodeMethod::kVsm, 48);
-  const std::vector<Correspondence> from_first{find_correspondence(a.skeleton, b.skeleton), find_correspondence(a.skeleton, c.skeleton)};
+  const SkeletexModel &a = standard("bear", EncodeMethod::kVsm), &b = standard("bear_bis", EncodeMethod::kSpd),
+                      &c = standard("bear", EncodeMethod::kVsm, 48);
+  const std::vector<Correspondence> from_first{find_correspondence(a.skeleton, b.skeleton),
+                                               find_correspondence(a.skeleton, c.skeleton)};
   const Morph morph(device(), {a, b, c}, from_first);
   const SkeletexModel mean = morph.at(std::vector<double>{0.3, 0.45, 0.25});
   EXPECT_EQ(mean.texture.width, 96);
@@ -305,8 +326,8 @@ TEST(Morph, DistortionOfAStretchIsThatOfItsSingularValues) {
 TEST(SeamNetwork, HasTheSeamsOfEncodedModels) {
   for (const char* name : {"bear", "man", "camel", "eight"}) {
     const SkeletexModel& model = standard(name);
-    const Walls walls(model.skeleton);
-    const SeamNetwork network = seam_network(model.skeleton, walls);
+    const SeparationPlanes separation(model.skeleton);
+    const SeamNetwork network = seam_network(model.skeleton, separation);
     EXPECT_EQ(network.arcs.size(), model.arcs.size()) << name;
     EXPECT_EQ(network.corners.size(), model.corners.size()) << name;
     SkeletexModel drawn = model;
@@ -325,18 +346,21 @@ TEST(SeamNetwork, ClosesAroundRandomAndCocircularDirections) {
     for (int round = 0; round < 20; ++round) {
       std::vector<Vec3> directions = test::spread_directions(count, 0.3, random);
       if (round == 0)
-        for (int i = 0; i < count; ++i) directions[i] = Vec3(std::cos(6.283185307179586 * i / count), std::sin(6.283185307179586 * i / count), 0);
+        for (int i = 0; i < count; ++i)
+          directions[i] = Vec3(std::cos(6.283185307179586 * i / count), std::sin(6.283185307179586 * i / count), 0);
       const Skeleton skeleton = test::star_skeleton(directions, random);
-      const Walls walls(skeleton);
-      const SeamNetwork network = seam_network(skeleton, walls);
+      const SeparationPlanes separation(skeleton);
+      const SeamNetwork network = seam_network(skeleton, separation);
       EXPECT_EQ(network.corners.size(), 2u * count - 4);
       EXPECT_EQ(network.arcs.size(), 3u * count - 6);
       for (std::size_t c = 0; c < network.corners.size(); ++c)
         for (const int bone : network.corners[c].bones) {
           const BoneEnd end = skeleton.bones[bone].head == 0 ? BoneEnd::kHead : BoneEnd::kTail;
-          const double turn = walls.turn_of(bone, network.directions[c]);
-          const Vec3 on_wall = (walls.spoke(bone, turn) + walls.slope(bone, end, turn) * walls.bases()[bone].o).normalized();
-          EXPECT_LT((on_wall - network.directions[c]).norm(), 1e-4) << count << " " << round;
+          const double turn = separation.turn_of(bone, network.directions[c]);
+          const Vec3 on_separation_plane =
+              (separation.radial(bone, turn) + separation.slope(bone, end, turn) * separation.bases()[bone].o)
+                  .normalized();
+          EXPECT_LT((on_separation_plane - network.directions[c]).norm(), 1e-4) << count << " " << round;
         }
     }
 }
@@ -367,34 +391,47 @@ TEST(Blend, KernelAndTwinAgreeOnRandomPlacesAndUglyWidths) {
   const std::vector<LatticeRow> rows = lattice_rows(patches, RowChoice::kAll);
   for (int s = 0; s < 3; ++s) {
     for (const Patch& patch : patches) {
-      BlendSource source{static_cast<int>(random() % 1000), 50, 4 + static_cast<int>(random() % 40), 4 + static_cast<int>(random() % 60),
-                         static_cast<int>(tables.columns.size()), -1, random() % 2 ? 1.0f : -1.0f};
+      BlendSource source{static_cast<int>(random() % 1000),
+                         50,
+                         4 + static_cast<int>(random() % 40),
+                         4 + static_cast<int>(random() % 60),
+                         static_cast<int>(tables.columns.size()),
+                         -1,
+                         random() % 2 ? 1.0f : -1.0f};
       if (random() % 3 > 0) {
         source.slope_begin = static_cast<int>(tables.slopes.size() / 2);
         for (int k = 0; k < 2 * source.width; ++k) tables.slopes.push_back(2 * unit(random));
       }
       tables.sources.push_back(source);
       for (int j = 0; j < patch.rectangle.width; ++j) {
-        const auto place = [&] { return j % 3 == 0 ? static_cast<float>(random() % 90) - 45 : 3.0f * static_cast<float>(source.width) * unit(random); };
+        const auto place = [&] {
+          return j % 3 == 0 ? static_cast<float>(random() % 90) - 45
+                            : 3.0f * static_cast<float>(source.width) * unit(random);
+        };
         const float head = place(), even_head = place(), tail = place(), even_tail = place();
-        tables.columns.push_back({head, even_head, tail, even_tail, unit(random), unit(random), unit(random), unit(random)});
+        tables.columns.push_back(
+            {head, even_head, tail, even_tail, unit(random), unit(random), unit(random), unit(random)});
       }
     }
     for (const LatticeRow& row : rows) {
       const int height = tables.sources[s * patches.size() + row[0]].height;
-      tables.rows.push_back({random() % 4 == 0 ? static_cast<float>(height - 1) : static_cast<float>(height - 1) * std::abs(unit(random)), unit(random)});
+      tables.rows.push_back(
+          {random() % 4 == 0 ? static_cast<float>(height - 1) : static_cast<float>(height - 1) * std::abs(unit(random)),
+           unit(random)});
     }
   }
-  FrameTables frames = frame_tables(skeleton, Walls(skeleton), patches, Vec3::Zero());
-  for (ColumnRecord& column : frames.columns) column.slope_head = 2 * unit(random), column.slope_tail = 2 * unit(random);
+  FrameTables frames = frame_tables(skeleton, SeparationPlanes(skeleton), patches, Vec3::Zero());
+  for (ColumnRecord& column : frames.columns)
+    column.slope_head = 2 * unit(random), column.slope_tail = 2 * unit(random);
   const DevicePlanes texels{device().upload(in[0]), device().upload(in[1]), device().upload(in[2])};
   DevicePlanes blended = allocate_planes(device(), static_cast<std::size_t>(texture_width) * y);
   blend_texels(device(), tables, rows, frames, texture_width, texels, blended);
-  const std::vector<float> out[3] = {device().download(blended.x), device().download(blended.y), device().download(blended.z)};
+  const std::vector<float> out[3] = {device().download(blended.x), device().download(blended.y),
+                                     device().download(blended.z)};
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const auto [bone, row, vertex, quad] = rows[k];
     const Rectangle& rectangle = patches[bone].rectangle;
-    const double station = frames.rows[frames.patches[bone].row_begin + row].station;
+    const double axial = frames.rows[frames.patches[bone].row_begin + row].axial;
     for (int j = 0; j < rectangle.width; ++j) {
       std::vector<twin::BlendRead> reads;
       for (int s = 0; s < 3; ++s) {
@@ -402,18 +439,22 @@ TEST(Blend, KernelAndTwinAgreeOnRandomPlacesAndUglyWidths) {
         const BlendColumn& column = tables.columns[source.column_begin + j];
         const ColumnRecord& slopes = frames.columns[frames.patches[bone].column_begin + j];
         const auto smooth = [](double x) { return x * x * (3 - 2 * x); };
-        const double eased = smooth(station), near_head = smooth(std::max(0.0, 1 - station / 0.3)), near_tail = smooth(std::max(0.0, 1 - (1 - station) / 0.3));
+        const double eased = smooth(axial), near_head = smooth(std::max(0.0, 1 - axial / 0.3)),
+                     near_tail = smooth(std::max(0.0, 1 - (1 - axial) / 0.3));
         const auto mix = [&](double head, double even_head, double tail, double even_tail) {
-          return (1 - eased) * (near_head * head + (1 - near_head) * even_head) + eased * (near_tail * tail + (1 - near_tail) * even_tail);
+          return (1 - eased) * (near_head * head + (1 - near_head) * even_head) +
+                 eased * (near_tail * tail + (1 - near_tail) * even_tail);
         };
-        reads.push_back({source, tables.rows[s * rows.size() + k], mix(column.head, column.even_head, column.tail, column.even_tail),
-                         (1 - station) * slopes.slope_head + station * slopes.slope_tail,
-                         mix(column.head_rise, column.even_head_rise, column.tail_rise, column.even_tail_rise), station});
+        reads.push_back({source, tables.rows[s * rows.size() + k],
+                         mix(column.head, column.even_head, column.tail, column.even_tail),
+                         (1 - axial) * slopes.slope_head + axial * slopes.slope_tail,
+                         mix(column.head_rise, column.even_head_rise, column.tail_rise, column.even_tail_rise), axial});
       }
       const Vec3 expected = twin::blend(reads, tables.slopes, in[0], in[1], in[2]);
       const std::size_t texel = static_cast<std::size_t>(rectangle.y + row) * texture_width + rectangle.x + j;
       // Columns of up to 150 are exact to 1e-5 in single precision, texels differ by up to 2 from column to column.
-      for (int c = 0; c < 3; ++c) ASSERT_NEAR(out[c][texel], expected[c], 3 * 3 * 1e-4) << bone << " " << row << " " << j;
+      for (int c = 0; c < 3; ++c)
+        ASSERT_NEAR(out[c][texel], expected[c], 3 * 3 * 1e-4) << bone << " " << row << " " << j;
     }
   }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/edit/orientation.h"
+#include "skeletex/edit/morph/orientation.h"
 
 #include <gtest/gtest.h>
 
@@ -9,10 +9,10 @@
 #include <numbers>
 #include <random>
 
-#include "skeletex/edit/morph.h"
-#include "skeletex/edit/surface_map.h"
-#include "skeletex/encode/encode_model.h"
-#include "skeletex/measure/manifold.h"
+#include "skeletex/analysis/manifold.h"
+#include "skeletex/convert/encode_model.h"
+#include "skeletex/edit/morph/morph.h"
+#include "skeletex/edit/morph/surface_map.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "support/creases.h"
 #include "support/load_model.h"
@@ -40,7 +40,8 @@ const SkeletexModel& standard(const std::string& name, int size) {
 
 Morph morph_of(const std::string& a, const std::string& b, int size, bool is_smooth) {
   const SkeletexModel &first = standard(a, size), &second = standard(b, size);
-  return Morph(device(), {first, second}, std::vector{find_correspondence(first.skeleton, second.skeleton)}, {.layout = 0, .size = 0, .is_smooth = is_smooth});
+  return Morph(device(), {first, second}, std::vector{find_correspondence(first.skeleton, second.skeleton)},
+               {.layout = 0, .size = 0, .is_smooth = is_smooth});
 }
 
 /// An in-between model with its creases, and where its vertices lie on its sources.
@@ -51,7 +52,8 @@ struct InBetween {
 InBetween in_between(const std::string& a, const std::string& b, int size, double t) {
   const Morph morph = morph_of(a, b, size, false);
   InBetween result{morph.at(std::vector{1 - t, t}), {}};
-  for (const int m : {0, 1}) result.sources.push_back(map_surface(device(), result.model, morph.models()[m], morph.correspondence(0, m)));
+  for (const int m : {0, 1})
+    result.sources.push_back(map_surface(device(), result.model, morph.models()[m], morph.correspondence(0, m)));
   return result;
 }
 
@@ -66,13 +68,17 @@ TEST(Orientation, EqualsItsTwinOnAMorphAndOnNoise) {
     const SurfaceOperator laplace = make_surface_operator(device(), surface.neighbours, surface.points);
     const std::vector<double> weights{0.6, 0.4};
     std::vector<OrientationSource> sources;
-    for (const int m : {0, 1}) sources.push_back(whole_source(device(), given.model, surface, laplace, given.sources[m], weights[m]));
-    const OrientationPull pull = pull_orientations(device(), surface, laplace, sources, shares_without_tips(given.model, surface.lattice), 0.1);
+    for (const int m : {0, 1})
+      sources.push_back(whole_source(device(), given.model, surface, laplace, given.sources[m], weights[m]));
+    const OrientationPull pull =
+        pull_orientations(device(), surface, laplace, sources, shares_without_tips(given.model, surface.lattice), 0.1);
 
     const std::vector<Vec3> points = download_vectors(device(), surface.points);
     const std::vector<Triangle> ends = end_triangles(given.model, surface.lattice, surface.positions);
-    const twin::SurfaceMatrices matrices = twin::surface_matrices(twin::surface_triangles(given.model, surface.lattice, ends), points);
-    const twin::OrientationPull expected = twin::pull_orientations(given.model, surface.lattice, points, ends, matrices, given.sources, weights, 0.1);
+    const twin::SurfaceMatrices matrices =
+        twin::surface_matrices(twin::surface_triangles(given.model, surface.lattice, ends), points);
+    const twin::OrientationPull expected =
+        twin::pull_orientations(given.model, surface.lattice, points, ends, matrices, given.sources, weights, 0.1);
 
     const std::vector<float> rotations = device().download(pull.rotations.values);
     const std::vector<Vec3> normals = download_vectors(device(), pull.normals), b = download_vectors(device(), pull.b);
@@ -116,9 +122,11 @@ TEST(Orientation, AtAWeightOfOneEveryTexelStaysBitByBit) {
 TEST(Orientation, TakesMostOfTheCreasesOffSeamsThatAreSmoothInBothModels) {
   for (const auto& [a, b] : {std::pair("bear", "bear_bis"), std::pair("bull", "camel")}) {
     const std::vector<double> half{0.5, 0.5};
-    const double creased = mean_crease(device(), morph_of(a, b, 128, false).at(half)), smooth = mean_crease(device(), morph_of(a, b, 128, true).at(half));
+    const double creased = mean_crease(device(), morph_of(a, b, 128, false).at(half)),
+                 smooth = mean_crease(device(), morph_of(a, b, 128, true).at(half));
     const double own = 0.5 * (mean_crease(device(), standard(a, 128)) + mean_crease(device(), standard(b, 128)));
-    EXPECT_LT(smooth - own, 0.6 * (creased - own)) << a << ": own " << own << ", creased " << creased << ", smooth " << smooth;
+    EXPECT_LT(smooth - own, 0.6 * (creased - own))
+        << a << ": own " << own << ", creased " << creased << ", smooth " << smooth;
     RecordProperty(a, std::to_string(own) + " " + std::to_string(creased) + " " + std::to_string(smooth));
     const ManifoldReport report = measure_manifold(reconstruct_mesh(device(), morph_of(a, b, 128, true).at(half)));
     EXPECT_TRUE(report.is_closed_manifold()) << a;
@@ -127,7 +135,8 @@ TEST(Orientation, TakesMostOfTheCreasesOffSeamsThatAreSmoothInBothModels) {
 
 TEST(Orientation, HardlyMovesASurfaceNextToASource) {
   const InBetween given = in_between("bear", "bear_bis", 64, 0.02);
-  EXPECT_LT(blend_orientations(device(), given.model, given.sources, std::vector{0.98, 0.02}).report.largest_move, 2e-3);
+  EXPECT_LT(blend_orientations(device(), given.model, given.sources, std::vector{0.98, 0.02}).report.largest_move,
+            2e-3);
 }
 
 }  // namespace

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/pack/pack_atlas.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 #include <random>
 #include <string>
 
+#include "skeletex/convert/layout/pack_atlas.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
@@ -35,7 +34,8 @@ void expect_tiling(const AtlasLayout& layout, int width, int height) {
     EXPECT_TRUE(a.x >= 0 && a.y >= 0 && a.x + a.width <= width && a.y + a.height <= height);
     for (std::size_t j = 0; j < i; ++j) {
       const Rectangle& b = layout.rectangles[j];
-      EXPECT_TRUE(a.x + a.width <= b.x || b.x + b.width <= a.x || a.y + a.height <= b.y || b.y + b.height <= a.y) << i << " and " << j;
+      EXPECT_TRUE(a.x + a.width <= b.x || b.x + b.width <= a.x || a.y + a.height <= b.y || b.y + b.height <= a.y)
+          << i << " and " << j;
     }
   }
   EXPECT_EQ(area, static_cast<double>(width) * height);
@@ -45,7 +45,8 @@ void expect_tiling(const AtlasLayout& layout, int width, int height) {
 }  // namespace
 
 TEST(Pack, FillsEveryTextureWithoutGapOrOverlap) {
-  for (const auto& [width, height] : {std::pair{64, 64}, {100, 100}, {128, 512}, {1000, 64}, {777, 513}, {4096, 4096}, {4096, 256}})
+  for (const auto& [width, height] :
+       {std::pair{64, 64}, {100, 100}, {128, 512}, {1000, 64}, {777, 513}, {4096, 4096}, {4096, 256}})
     for (const int count : {1, 2, 3, 4, 7, 15, 23, 40, 60}) {
       SCOPED_TRACE(std::to_string(count) + " patches, " + std::to_string(width) + " x " + std::to_string(height));
       const AtlasLayout layout = pack_atlas(random_demands(count, 7u * count), width, height);
@@ -110,7 +111,8 @@ TEST(Pack, MatchesWantedSideRatios) {
       const AtlasLayout layout = pack_atlas(demands, 512, 512);
       for (int i = 0; i < count; ++i) {
         const Rectangle& r = layout.rectangles[i];
-        mismatch += demands[i].share / sum * std::abs(std::log(static_cast<double>(r.width) / r.height / demands[i].columns_per_row));
+        mismatch += demands[i].share / sum *
+                    std::abs(std::log(static_cast<double>(r.width) / r.height / demands[i].columns_per_row));
       }
     }
     EXPECT_LT(mismatch / layouts, 0.25) << count;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/model/parallel.h"
+#include "skeletex/geometry/parallel.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/encode/patch_demands.h"
+#include "skeletex/convert/layout/patch_demands.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <numbers>
 #include <random>
 
-#include "skeletex/encode/encode_model.h"
-#include "skeletex/measure/metro.h"
+#include "skeletex/analysis/metro.h"
+#include "skeletex/convert/encode_model.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "support/load_model.h"
 
@@ -17,7 +17,8 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// A tube of radius `radius(u)` about z, as facets, its map even in height and angle. Every second diagonal may be turned.
+/// A tube of radius `radius(u)` about z, as facets, its map even in height and angle. Every second diagonal may be
+/// turned.
 template <class Radius>
 Chart tube(int rings, int around, double length, const Radius& radius) {
   Chart chart;
@@ -26,7 +27,9 @@ Chart tube(int rings, int around, double length, const Radius& radius) {
       const double u = static_cast<double>(r) / (rings - 1), v = static_cast<double>(j) / around;
       chart.u.push_back(u), chart.v.push_back(v);
       chart.positions.push_back({radius(u) * std::cos(2 * kPi * v), -radius(u) * std::sin(2 * kPi * v), length * u});
-      chart.kinds.push_back(r == 0 ? ChartVertex::kHeadRow : r == rings - 1 ? ChartVertex::kTailRow : ChartVertex::kInner);
+      chart.kinds.push_back(r == 0           ? ChartVertex::kHeadRow
+                            : r == rings - 1 ? ChartVertex::kTailRow
+                                             : ChartVertex::kInner);
     }
   for (int r = 0; r + 1 < rings; ++r)
     for (int j = 0; j < around; ++j) {
@@ -59,10 +62,12 @@ TEST(ExpectedError, OfASurfaceOfRevolutionHasBothCurvatures) {
   constexpr int kSteps = 20000;
   for (int i = 0; i < kSteps; ++i) {
     const double u = (i + 0.5) / kSteps, wave = 2 * kPi * waves;
-    const double slope = depth * wave * std::cos(wave * u) / length, bend = std::abs(depth * wave * wave * std::sin(wave * u)) / (length * length);
+    const double slope = depth * wave * std::cos(wave * u) / length,
+                 bend = std::abs(depth * wave * wave * std::sin(wave * u)) / (length * length);
     // Curvature times the square of the meridian's length per u, times the area.
     const double stretch = std::sqrt(1 + slope * slope);
-    expected += bend / (stretch * stretch * stretch) * (length * stretch) * (length * stretch) * 2 * kPi * profile(u) * length * stretch / kSteps;
+    expected += bend / (stretch * stretch * stretch) * (length * stretch) * (length * stretch) * 2 * kPi * profile(u) *
+                length * stretch / kSteps;
   }
   EXPECT_NEAR(error.along, expected, 0.1 * expected);
 }
@@ -80,17 +85,20 @@ TEST(ExpectedError, GoesWithTheCubeOfSizeAndTurnsWithTheMap) {
   // The best ratio is the best.
   const double best = error.with_ratio(error.best_ratio());
   for (const double factor : {0.5, 0.9, 1.1, 2.0}) EXPECT_GT(error.with_ratio(factor * error.best_ratio()), best);
-  EXPECT_NEAR(error.with_ratio(2.5) / 1000, error.around / 2500 + error.along / 400 + 2 * error.both / 1000, 1e-9 * error.around);
+  EXPECT_NEAR(error.with_ratio(2.5) / 1000, error.around / 2500 + error.along / 400 + 2 * error.both / 1000,
+              1e-9 * error.around);
 }
 
 TEST(PatchDemands, GiveAnotherModelTheSameWhateverItsSize) {
-  const Chart thin = tube(20, 30, 4, [](double u) { return 0.2 + 0.05 * std::sin(9 * u); }), wide = tube(20, 30, 1, [](double u) { return 0.8 - 0.1 * u; });
+  const Chart thin = tube(20, 30, 4, [](double u) { return 0.2 + 0.05 * std::sin(9 * u); }),
+              wide = tube(20, 30, 1, [](double u) { return 0.8 - 0.1 * u; });
   const auto demands_at = [&](double scale, Method method) {
     static Chart charts[2];
     charts[0] = thin, charts[1] = wide;
     for (Chart& chart : charts)
       for (Vec3& p : chart.positions) p *= scale;
-    const std::vector<PatchSource> sources{{Method::kVsm, charts, 1140, 5.0 * scale * scale, 4 * scale}, {method, charts + 1, 1140, 4.7 * scale * scale, scale}};
+    const std::vector<PatchSource> sources{{Method::kVsm, charts, 1140, 5.0 * scale * scale, 4 * scale},
+                                           {method, charts + 1, 1140, 4.7 * scale * scale, scale}};
     return patch_demands(sources, {}, TexelShare::kError);
   };
   for (const Method method : {Method::kVsm, Method::kSpd}) {
@@ -105,7 +113,8 @@ TEST(PatchDemands, GiveAnotherModelTheSameWhateverItsSize) {
 
 TEST(PatchDemands, OfWhatBendsAroundTheBoneAloneStayNearGirthToLength) {
   const Chart cylinder = tube(20, 64, 4, [](double) { return 0.2; });
-  const std::vector<PatchDemand> demands = patch_demands(std::vector<PatchSource>{{Method::kVsm, &cylinder, 2432, 5, 4}}, {}, TexelShare::kError);
+  const std::vector<PatchDemand> demands =
+      patch_demands(std::vector<PatchSource>{{Method::kVsm, &cylinder, 2432, 5, 4}}, {}, TexelShare::kError);
   EXPECT_DOUBLE_EQ(demands[0].columns_per_row, 2 * 5.0 / 16);
   EXPECT_TRUE(std::isfinite(demands[0].share) && demands[0].share > 0);
 }

@@ -7,11 +7,11 @@
 #include <numeric>
 #include <set>
 
-#include "skeletex/encode/encode_model.h"
-#include "skeletex/encode/encoding_kernels.h"
+#include "skeletex/analysis/manifold.h"
+#include "skeletex/analysis/metro.h"
+#include "skeletex/convert/encode_model.h"
+#include "skeletex/convert/sample/encoding_kernels.h"
 #include "skeletex/io/model_file.h"
-#include "skeletex/measure/manifold.h"
-#include "skeletex/measure/metro.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "support/load_model.h"
 #include "support/shapes.h"
@@ -19,14 +19,16 @@
 namespace skeletex {
 namespace {
 
-const char* const kStandardModels[] = {"armadillo", "bear",       "bear_bis", "bull",           "bull_16", "bunny00",     "bunny00_9", "cactus",
-                                       "camel",     "camel_16",   "cow",      "diplodocus",     "double_torus", "eight",  "eight_dumbbell", "eight_theta",
-                                       "homer",     "knot1",      "man",      "pinion",         "pinion_5", "triceratops", "triceratops_17"};
+const char* const kStandardModels[] = {
+    "armadillo", "bear",     "bear_bis", "bull",       "bull_16",      "bunny00",     "bunny00_9",      "cactus",
+    "camel",     "camel_16", "cow",      "diplodocus", "double_torus", "eight",       "eight_dumbbell", "eight_theta",
+    "homer",     "knot1",    "man",      "pinion",     "pinion_5",     "triceratops", "triceratops_17"};
 
 void expect_watertight(const TriangleMesh& mesh, int genus, const std::string& what) {
   const ManifoldReport report = measure_manifold(mesh);
-  EXPECT_TRUE(report.is_closed_manifold()) << what << ": " << report.boundary_edges.size() << " boundary edges, " << report.non_manifold_edges.size()
-                                           << " non-manifold edges, " << report.misoriented_edges.size() << " misoriented";
+  EXPECT_TRUE(report.is_closed_manifold())
+      << what << ": " << report.boundary_edges.size() << " boundary edges, " << report.non_manifold_edges.size()
+      << " non-manifold edges, " << report.misoriented_edges.size() << " misoriented";
   EXPECT_EQ(report.components, 1) << what;
   EXPECT_EQ(report.genus, genus) << what;
   EXPECT_TRUE(report.non_finite_vertices.empty()) << what;
@@ -50,11 +52,15 @@ TEST_P(StandardModel, ComesBackClosedByEveryMethod) {
     double area = 0;
     for (const BoneReport& bone : encoded.report.bones) {
       area += bone.area;
-      if (bone.method == Method::kVsm) { EXPECT_EQ(bone.flipped_triangles, 0) << what << " " << bone.name; }
+      if (bone.method == Method::kVsm) {
+        EXPECT_EQ(bone.flipped_triangles, 0) << what << " " << bone.name;
+      }
     }
     EXPECT_NEAR(area, surface_area(model.mesh), 1e-9 * area) << what;
     expect_watertight(reconstruct_mesh(context, encoded.model), encoded.report.genus, what);
-    for (const int size : {32, 81}) expect_watertight(reconstruct_mesh(context, resample_model(context, encoded.model, size)), encoded.report.genus, what + " at " + std::to_string(size));
+    for (const int size : {32, 81})
+      expect_watertight(reconstruct_mesh(context, resample_model(context, encoded.model, size)), encoded.report.genus,
+                        what + " at " + std::to_string(size));
   }
 }
 
@@ -68,7 +74,8 @@ TEST_P(StandardModel, ComesBackClosedWithTexelsThatAreSnappedAndFitted) {
   expect_watertight(reconstruct_mesh(context, encoded.model), encoded.report.genus, model.name);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, StandardModel, testing::ValuesIn(kStandardModels), [](const auto& parameter) { return std::string(parameter.param); });
+INSTANTIATE_TEST_SUITE_P(All, StandardModel, testing::ValuesIn(kStandardModels),
+                         [](const auto& parameter) { return std::string(parameter.param); });
 
 TEST(Pipeline, ErrorFallsAsTheTextureGrows) {
   ClContext context;
@@ -94,7 +101,9 @@ TEST(Hybrid, StaysWithinHalfAsMuchAgainOfVsmWhereSpdLosesMost) {
       options.method = method;
       options.width = options.height = 1024;
       options.has_snap = false;  // which SPD cannot do
-      return symmetric_mean(measure_metro(context, model.mesh, reconstruct_mesh(context, encode_model(context, model.mesh, model.skeleton, options).model)));
+      return symmetric_mean(
+          measure_metro(context, model.mesh,
+                        reconstruct_mesh(context, encode_model(context, model.mesh, model.skeleton, options).model)));
     };
     const double ratio = mean_error(EncodeMethod::kHybrid) / mean_error(EncodeMethod::kVsm);
     RecordProperty(name, std::to_string(ratio));
@@ -113,10 +122,12 @@ TEST(Pipeline, LaunchesNoKernelThatIsNotListedForIt) {
       options.has_half_texels = true;
       ClContext context;
       std::set<std::string> listed;
-      for (const KernelVariant& kernel : encoding_kernels(context, options)) listed.insert(std::string(kernel.name.file) + ":" + std::string(kernel.name.kernel));
+      for (const KernelVariant& kernel : encoding_kernels(context, options))
+        listed.insert(std::string(kernel.name.file) + ":" + std::string(kernel.name.kernel));
       encode_model(context, model.mesh, model.skeleton, options);
       for (const ClProfileEntry& launched : context.profile())
-        EXPECT_TRUE(listed.contains(launched.kernel)) << launched.kernel << " by method " << static_cast<int>(method) << ", snapped " << is_snapped;
+        EXPECT_TRUE(listed.contains(launched.kernel))
+            << launched.kernel << " by method " << static_cast<int>(method) << ", snapped " << is_snapped;
     }
 }
 
@@ -125,7 +136,8 @@ TEST(Pipeline, KernelsCompiledAheadDoNothing) {
   EncodeOptions options;
   options.method = EncodeMethod::kHybrid;
   options.has_snap = options.has_fit = options.has_half_texels = true;
-  for (const KernelVariant& kernel : encoding_kernels(context, options)) EXPECT_NO_THROW(context.compile(kernel.name, kernel.range)) << kernel.name.kernel;
+  for (const KernelVariant& kernel : encoding_kernels(context, options))
+    EXPECT_NO_THROW(context.compile(kernel.name, kernel.range)) << kernel.name.kernel;
   EXPECT_TRUE(context.profile().empty());
 }
 
@@ -134,7 +146,8 @@ TEST(Pipeline, ASecondEncodeGivesTheSameBytes) {
   const TestModel model = load_standard_model("eight");
   EncodeOptions options;
   options.width = 96, options.height = 64;
-  const EncodeResult first = encode_model(context, model.mesh, model.skeleton, options), second = encode_model(context, model.mesh, model.skeleton, options);
+  const EncodeResult first = encode_model(context, model.mesh, model.skeleton, options),
+                     second = encode_model(context, model.mesh, model.skeleton, options);
   EXPECT_EQ(first.model.texture.along, second.model.texture.along);
   EXPECT_EQ(first.model.texture.around, second.model.texture.around);
   EXPECT_EQ(first.model.texture.out, second.model.texture.out);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/model/pose.h"
+#include "skeletex/skeleton/pose.h"
 
 #include <gtest/gtest.h>
 
@@ -13,10 +13,10 @@
 #include "skeletex/io/pose_file.h"
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/model/error.h"
-#include "skeletex/model/posed_frame.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/skeleton/posed_frame.h"
 #include "support/mesh_topology.h"
 #include "support/synthetic_model.h"
 
@@ -32,9 +32,17 @@ struct NamedSkeleton {
 };
 
 std::vector<NamedSkeleton> all_skeletons() {
-  return {{"lone bone", lone_bone(), 0.3},   {"chain of two", chain(2), 0.2},           {"chain of five", chain(5), 0.2}, {"Y", y_branch(), 0.25},
-          {"cross of 4", cross(4), 0.3},     {"cross of 6", cross(6), 0.3},             {"cross of 11", cross(11), 0.3},  {"ring of 3", ring(3), 0.2},
-          {"ring of 7", ring(7), 0.2},       {"ring with an arm", ring_with_arm(6), 0.2}, {"tree of 12", random_tree(12, 3), 0.15}};
+  return {{"lone bone", lone_bone(), 0.3},
+          {"chain of two", chain(2), 0.2},
+          {"chain of five", chain(5), 0.2},
+          {"Y", y_branch(), 0.25},
+          {"cross of 4", cross(4), 0.3},
+          {"cross of 6", cross(6), 0.3},
+          {"cross of 11", cross(11), 0.3},
+          {"ring of 3", ring(3), 0.2},
+          {"ring of 7", ring(7), 0.2},
+          {"ring with an arm", ring_with_arm(6), 0.2},
+          {"tree of 12", random_tree(12, 3), 0.15}};
 }
 
 bool is_tree(const Skeleton& skeleton) { return skeleton.nodes.size() == skeleton.bones.size() + 1; }
@@ -55,8 +63,10 @@ Pose random_pose(const Skeleton& skeleton, double largest, unsigned seed) {
     for (std::size_t i = 0; i < skeleton.bones.size(); ++i) pose.rotations.push_back(random_rotation(random, largest));
   } else {
     double shortest = 1e9;
-    for (int i = 0; i < static_cast<int>(skeleton.bones.size()); ++i) shortest = std::min(shortest, bone_length(skeleton, i));
-    for (const Node& node : skeleton.nodes) pose.nodes.push_back(node.position + largest / 3 * shortest * Vec3(unit(random), unit(random), unit(random)));
+    for (int i = 0; i < static_cast<int>(skeleton.bones.size()); ++i)
+      shortest = std::min(shortest, bone_length(skeleton, i));
+    for (const Node& node : skeleton.nodes)
+      pose.nodes.push_back(node.position + largest / 3 * shortest * Vec3(unit(random), unit(random), unit(random)));
   }
   for (std::size_t i = 0; i < skeleton.bones.size(); ++i) pose.rolls.push_back(0.3 * unit(random));
   return pose;
@@ -73,18 +83,21 @@ Vec3 texel_of(const SkeletexModel& model, int bone, int row, int column) {
 }
 
 /// All points of a model in a pose: texels of every row, then samples, then corners.
-std::vector<Vec3> all_points(const SkeletexModel& model, const Skeleton& posed, DistanceRule rule = DistanceRule::kFromBone) {
-  const Walls bind(model.skeleton);
-  const PosedWalls walls(model, posed);
+std::vector<Vec3> all_points(const SkeletexModel& model, const Skeleton& posed,
+                             DistanceRule rule = DistanceRule::kFromBone) {
+  const SeparationPlanes bind(model.skeleton);
+  const PosedPlanes separation(model, posed);
   std::vector<Vec3> points;
   for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
     for (int r = 0; r < model.patches[bone].rectangle.height; ++r)
       for (int j = 0; j < model.patches[bone].rectangle.width; ++j)
-        points.push_back(posed_point(model, bind, walls, bone, model.patches[bone].row_u[r], static_cast<double>(j) / model.patches[bone].rectangle.width,
+        points.push_back(posed_point(model, bind, separation, bone, model.patches[bone].row_u[r],
+                                     static_cast<double>(j) / model.patches[bone].rectangle.width,
                                      texel_of(model, bone, r, j), rule));
   for (int a = 0; a < static_cast<int>(model.arcs.size()); ++a)
-    for (int i = 0; i < static_cast<int>(model.arcs[a].samples.size()); ++i) points.push_back(walls.sample_point(a, i, rule));
-  for (int c = 0; c < static_cast<int>(model.corners.size()); ++c) points.push_back(walls.corner_point(c, rule));
+    for (int i = 0; i < static_cast<int>(model.arcs[a].samples.size()); ++i)
+      points.push_back(separation.sample_point(a, i, rule));
+  for (int c = 0; c < static_cast<int>(model.corners.size()); ++c) points.push_back(separation.corner_point(c, rule));
   return points;
 }
 
@@ -177,7 +190,8 @@ std::string message_of(const nlohmann::json& json, const Skeleton& skeleton) {
 TEST(Pose, RandomPosesAreWhatTheirSeedSays) {
   const Skeleton skeleton = random_tree(12, 3);
   const double largest = 0.7;
-  const Pose pose = make_random_pose(skeleton, largest, 5), same = make_random_pose(skeleton, largest, 5), other = make_random_pose(skeleton, largest, 6);
+  const Pose pose = make_random_pose(skeleton, largest, 5), same = make_random_pose(skeleton, largest, 5),
+             other = make_random_pose(skeleton, largest, 6);
   const int root = root_nodes(skeleton)[0];
   bool is_other = false;
   for (std::size_t i = 0; i < skeleton.bones.size(); ++i) {
@@ -196,7 +210,8 @@ TEST(Pose, EveryPoseOfTheProjectFitsItsSkeleton) {
   int count = 0;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(configs / "poses")) {
     if (entry.path().extension() != ".json") continue;
-    // bear_bis_walk belongs to bear_bis, evaluation/man to man: the longest name of a skeleton that the file's begins with.
+    // bear_bis_walk belongs to bear_bis, evaluation/man to man: the longest name of a skeleton that the file's begins
+    // with.
     const std::string stem = entry.path().stem().string();
     std::string model;
     for (const auto& file : std::filesystem::directory_iterator(configs / "skeletons")) {
@@ -205,7 +220,8 @@ TEST(Pose, EveryPoseOfTheProjectFitsItsSkeleton) {
     }
     const Skeleton skeleton = read_skeleton(configs / "skeletons" / (model + ".skeleton.json"));
     const PoseAnimation animation = read_animation(entry.path(), skeleton);
-    for (const PoseFrame& frame : animation.frames) EXPECT_EQ(apply_pose(skeleton, frame.pose).nodes.size(), skeleton.nodes.size());
+    for (const PoseFrame& frame : animation.frames)
+      EXPECT_EQ(apply_pose(skeleton, frame.pose).nodes.size(), skeleton.nodes.size());
     ++count;
   }
   EXPECT_GE(count, 40);
@@ -228,14 +244,27 @@ TEST(Pose, BindPoseLeavesEveryPointWhereItWas) {
         for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
           for (int r = 0; r < model.patches[bone].rectangle.height; ++r)
             for (int j = 0; j < model.patches[bone].rectangle.width; ++j)
-              worst = std::max(worst, (points[next++] - surface.point(bone, model.patches[bone].row_u[r], static_cast<double>(j) / model.patches[bone].rectangle.width)).norm());
+              worst = std::max(
+                  worst, (points[next++] - surface.point(bone, model.patches[bone].row_u[r],
+                                                         static_cast<double>(j) / model.patches[bone].rectangle.width))
+                             .norm());
         for (const SeamArc& arc : model.arcs)
           for (const SeamSample& sample : arc.samples)
-            worst = std::max(worst, (points[next++] - surface.walls().seam_point(arc.bones[0], model.skeleton.bones[arc.bones[0]].head == arc.node ? BoneEnd::kHead : BoneEnd::kTail,
-                                                                                   sample.turn, sample.distance)).norm());
+            worst = std::max(worst,
+                             (points[next++] -
+                              surface.separation().seam_point(
+                                  arc.bones[0],
+                                  model.skeleton.bones[arc.bones[0]].head == arc.node ? BoneEnd::kHead : BoneEnd::kTail,
+                                  sample.turn, sample.distance))
+                                 .norm());
         for (const SeamCorner& corner : model.corners)
-          worst = std::max(worst, (points[next++] - surface.walls().seam_point(corner.bones[0], model.skeleton.bones[corner.bones[0]].head == corner.node ? BoneEnd::kHead : BoneEnd::kTail,
-                                                                                corner.sample.turn, corner.sample.distance)).norm());
+          worst = std::max(
+              worst, (points[next++] -
+                      surface.separation().seam_point(
+                          corner.bones[0],
+                          model.skeleton.bones[corner.bones[0]].head == corner.node ? BoneEnd::kHead : BoneEnd::kTail,
+                          corner.sample.turn, corner.sample.distance))
+                         .norm());
         EXPECT_LT(worst, 1e-6 * model.diagonal) << named.name;
       }
     }
@@ -252,7 +281,8 @@ TEST(Pose, ARigidMotionOfTheNodesMovesEveryPointWithThem) {
       const Eigen::Quaterniond rotation = random_rotation(random, kPi);
       const Vec3 shift(0.3 * i, -2, 1);
       for (const double bend : {0.0, 0.8}) {  // of the bind pose, and of a pose
-        const Skeleton start = apply_pose(model.skeleton, bend > 0 ? random_pose(model.skeleton, bend, 50 + i) : Pose{});
+        const Skeleton start =
+            apply_pose(model.skeleton, bend > 0 ? random_pose(model.skeleton, bend, 50 + i) : Pose{});
         Pose pose, moved;
         for (const Node& node : start.nodes) {
           pose.nodes.push_back(node.position);
@@ -260,7 +290,8 @@ TEST(Pose, ARigidMotionOfTheNodesMovesEveryPointWithThem) {
         }
         std::vector<Vec3> expected = all_points(model, apply_pose(model.skeleton, pose));
         for (Vec3& p : expected) p = rotation * p + shift;
-        EXPECT_LT(largest_difference(all_points(model, apply_pose(model.skeleton, moved)), expected), 1e-9) << named.name << " " << i << " bend " << bend;
+        EXPECT_LT(largest_difference(all_points(model, apply_pose(model.skeleton, moved)), expected), 1e-9)
+            << named.name << " " << i << " bend " << bend;
       }
     }
   }
@@ -292,28 +323,33 @@ TEST(Pose, BothSidesOfEverySeamAgree) {
     double worst = 0, worst_row = 0;
     for (unsigned seed = 0; seed < 200; ++seed) {
       const Skeleton posed = apply_pose(model.skeleton, random_pose(model.skeleton, kPi / 3, seed));
-      const Walls bind(model.skeleton);
-      const PosedWalls walls(model, posed);
+      const SeparationPlanes bind(model.skeleton);
+      const PosedPlanes separation(model, posed);
       for (const DistanceRule rule : {DistanceRule::kFromBone, DistanceRule::kFromFoot}) {
         for (int a = 0; a < static_cast<int>(model.arcs.size()); ++a)
           for (int i = 0; i < static_cast<int>(model.arcs[a].samples.size()); ++i) {
-            const Vec3 p = walls.sample_point(a, i, rule, 0);
+            const Vec3 p = separation.sample_point(a, i, rule, 0);
             ASSERT_TRUE(p.allFinite()) << named.name << " seed " << seed;
-            worst = std::max(worst, (p - walls.sample_point(a, i, rule, 1)).norm());
+            worst = std::max(worst, (p - separation.sample_point(a, i, rule, 1)).norm());
             // The texel that the bone itself would have there: the rows run into the seam.
             const SeamArc& arc = model.arcs[a];
             for (const int side : {0, 1}) {
               const int bone = arc.bones[side];
               const BoneEnd end = model.skeleton.bones[bone].head == arc.node ? BoneEnd::kHead : BoneEnd::kTail;
-              const Vec3 bound = bind.seam_point(arc.bones[0], model.skeleton.bones[arc.bones[0]].head == arc.node ? BoneEnd::kHead : BoneEnd::kTail,
-                                                 arc.samples[i].turn, arc.samples[i].distance);
-              const double turn = bind.turn_of(bone, bound - model.skeleton.nodes[arc.node].position), u = end == BoneEnd::kHead ? 0 : 1;
-              const Vec3 texel = encode_texel(tangent_frame(model.skeleton, bind, bone, u, turn), bound, end_position(model.skeleton, bone, BoneEnd::kHead),
+              const Vec3 bound = bind.seam_point(
+                  arc.bones[0], model.skeleton.bones[arc.bones[0]].head == arc.node ? BoneEnd::kHead : BoneEnd::kTail,
+                  arc.samples[i].turn, arc.samples[i].distance);
+              const double turn = bind.turn_of(bone, bound - model.skeleton.nodes[arc.node].position),
+                           u = end == BoneEnd::kHead ? 0 : 1;
+              const Vec3 texel = encode_texel(tangent_frame(model.skeleton, bind, bone, u, turn), bound,
+                                              end_position(model.skeleton, bone, BoneEnd::kHead),
                                               end_position(model.skeleton, bone, BoneEnd::kTail));
-              worst_row = std::max(worst_row, (posed_point(model, bind, walls, bone, u, turn, texel, rule) - p).norm());
+              worst_row =
+                  std::max(worst_row, (posed_point(model, bind, separation, bone, u, turn, texel, rule) - p).norm());
             }
           }
-        for (int c = 0; c < static_cast<int>(model.corners.size()); ++c) ASSERT_TRUE(walls.corner_point(c, rule).allFinite());
+        for (int c = 0; c < static_cast<int>(model.corners.size()); ++c)
+          ASSERT_TRUE(separation.corner_point(c, rule).allFinite());
       }
     }
     EXPECT_LT(worst, 1e-9) << named.name;
@@ -329,19 +365,23 @@ TEST(Pose, DistancesToTheBonesAreKept) {
     int kept = 0, all = 0;
     for (unsigned seed = 0; seed < 40; ++seed) {
       const Skeleton posed = apply_pose(model.skeleton, random_pose(model.skeleton, kPi / 3, seed));
-      const Walls bind(model.skeleton);
-      const PosedWalls walls(model, posed);
+      const SeparationPlanes bind(model.skeleton);
+      const PosedPlanes separation(model, posed);
       for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
         for (int r = 0; r < 17; ++r)
           for (int j = 0; j < 16; ++j) {
             const double u = model.patches[bone].row_u[r];
             const Vec3 texel = texel_of(model, bone, r, j);
-            const Vec3 p = posed_point(model, bind, walls, bone, u, j / 16.0, texel, DistanceRule::kFromBone);
+            const Vec3 p = posed_point(model, bind, separation, bone, u, j / 16.0, texel, DistanceRule::kFromBone);
             ASSERT_TRUE(p.allFinite());
-            const double error = std::abs(distance_to_bone(p, end_position(posed, bone, BoneEnd::kHead), end_position(posed, bone, BoneEnd::kTail)) - texel.norm());
-            const Station at = station_of(u, bind.is_free(bone, BoneEnd::kHead), bind.is_free(bone, BoneEnd::kTail));
+            const double error = std::abs(distance_to_bone(p, end_position(posed, bone, BoneEnd::kHead),
+                                                           end_position(posed, bone, BoneEnd::kTail)) -
+                                          texel.norm());
+            const Axial at = axial_of(u, bind.is_free(bone, BoneEnd::kHead), bind.is_free(bone, BoneEnd::kTail));
             ++all;
-            if ((at.station < 0.25 && !bind.is_free(bone, BoneEnd::kHead)) || (at.station > 0.75 && !bind.is_free(bone, BoneEnd::kTail))) continue;
+            if ((at.axial < 0.25 && !bind.is_free(bone, BoneEnd::kHead)) ||
+                (at.axial > 0.75 && !bind.is_free(bone, BoneEnd::kTail)))
+              continue;
             ++kept;
             worst = std::max(worst, error);
           }
@@ -358,12 +398,15 @@ TEST(Pose, ReversingABoneChangesNothing) {
     for (int bone = 0; bone < std::min(5, static_cast<int>(model.patches.size())); ++bone) {
       const SkeletexModel reversed = with_bone_reversed(model, bone);
       Pose pose;
-      for (const Node& node : apply_pose(model.skeleton, random_pose(model.skeleton, 0.9, 20 + bone)).nodes) pose.nodes.push_back(node.position);
+      for (const Node& node : apply_pose(model.skeleton, random_pose(model.skeleton, 0.9, 20 + bone)).nodes)
+        pose.nodes.push_back(node.position);
       pose.rolls.assign(model.skeleton.bones.size(), 0);
       pose.rolls[bone] = 0.3;
       Pose mirrored = pose;
       mirrored.rolls[bone] = -0.3;
-      EXPECT_LT(farthest_from(all_points(model, apply_pose(model.skeleton, pose)), all_points(reversed, apply_pose(reversed.skeleton, mirrored))), 1e-6)
+      EXPECT_LT(farthest_from(all_points(model, apply_pose(model.skeleton, pose)),
+                              all_points(reversed, apply_pose(reversed.skeleton, mirrored))),
+                1e-6)
           << named.name << " bone " << bone;
     }
   }
@@ -385,7 +428,9 @@ TEST(Pose, RenamingAndReorderingBonesChangesNothing) {
         if (!pose.rotations.empty()) other.rotations[place[i]] = pose.rotations[i];
         other.rolls[place[i]] = pose.rolls[i];
       }
-      EXPECT_LT(farthest_from(all_points(model, apply_pose(model.skeleton, pose)), all_points(reordered, apply_pose(reordered.skeleton, other))), 1e-6)
+      EXPECT_LT(farthest_from(all_points(model, apply_pose(model.skeleton, pose)),
+                              all_points(reordered, apply_pose(reordered.skeleton, other))),
+                1e-6)
           << named.name << " seed " << seed;
     }
   }
@@ -396,10 +441,10 @@ TEST(Pose, MeshesAreClosedInRandomPosesAndTheKernelsAgreeWithTheirTwin) {
     const SyntheticSurface surface(named.skeleton, named.radius);
     const SkeletexModel model = model_of(surface, 13, 9);
     const Lattice lattice = number_lattice(model);
-    const Walls bind(model.skeleton);
+    const SeparationPlanes bind(model.skeleton);
     for (unsigned seed = 0; seed < 50; ++seed) {
       const Skeleton posed = apply_pose(model.skeleton, random_pose(model.skeleton, kPi / 3, 1000 + seed));
-      const PosedWalls walls(model, posed);
+      const PosedPlanes separation(model, posed);
       const DistanceRule rule = seed % 4 == 3 ? DistanceRule::kFromFoot : DistanceRule::kFromBone;
       const TriangleMesh mesh = reconstruct_mesh(device(), model, posed, {Deformation::kPaper, rule});
       for (const Vec3& p : mesh.positions) ASSERT_TRUE(p.allFinite()) << named.name << " seed " << seed;
@@ -409,11 +454,13 @@ TEST(Pose, MeshesAreClosedInRandomPosesAndTheKernelsAgreeWithTheirTwin) {
       for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
         for (int r = 1; r + 1 < 9; ++r)
           for (int j = 0; j < 13; ++j) {
-            const Vec3 expected = posed_point(model, bind, walls, bone, model.patches[bone].row_u[r], j / 13.0, texel_of(model, bone, r, j), rule);
+            const Vec3 expected = posed_point(model, bind, separation, bone, model.patches[bone].row_u[r], j / 13.0,
+                                              texel_of(model, bone, r, j), rule);
             largest = std::max(largest, (expected - posed.nodes[0].position).norm());
             worst = std::max(worst, (mesh.positions[lattice.first_inner[bone] + (r - 1) * 13 + j] - expected).norm());
           }
-      // Single precision; a wall between bones that nearly lie on each other is steep, which takes some digits.
+      // Single precision; a separation plane between bones that nearly lie on each other is steep, which takes some
+      // digits.
       EXPECT_LT(worst, 2e-5 * largest) << named.name << " seed " << seed;
     }
   }
@@ -425,7 +472,11 @@ TEST(Pose, TheKernelsLeaveTheBindPoseAlone) {
     const SkeletexModel model = model_of(surface, 33, 17);
     const TriangleMesh bound = reconstruct_mesh(device(), model);
     for (const DistanceRule rule : {DistanceRule::kFromBone, DistanceRule::kFromFoot})
-      EXPECT_LT(largest_difference(reconstruct_mesh(device(), model, apply_pose(model.skeleton, Pose{}), {Deformation::kPaper, rule}).positions, bound.positions), 1e-6 * model.diagonal)
+      EXPECT_LT(largest_difference(
+                    reconstruct_mesh(device(), model, apply_pose(model.skeleton, Pose{}), {Deformation::kPaper, rule})
+                        .positions,
+                    bound.positions),
+                1e-6 * model.diagonal)
           << named.name;
   }
 }
@@ -442,14 +493,19 @@ TEST(Pose, APlaneOfConstantOffsetLiesAtThatDistanceFromItsBones) {
     EXPECT_EQ(mesh.triangles.size(), 2u * 20 * 39);
     int inner = 0;
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-      const Station at = station_of(model.patches[0].row_u[i / 20], model.ends[0][0].arcs.empty(), model.ends[0][1].arcs.empty());
-      if (at.station < 0.25 || at.station > 0.75) continue;
+      const Axial at =
+          axial_of(model.patches[0].row_u[i / 20], model.ends[0][0].arcs.empty(), model.ends[0][1].arcs.empty());
+      if (at.axial < 0.25 || at.axial > 0.75) continue;
       ++inner;
-      EXPECT_NEAR(distance_to_bone(mesh.positions[i], end_position(posed, 0, BoneEnd::kHead), end_position(posed, 0, BoneEnd::kTail)), offset, 1e-6) << named.name;
+      EXPECT_NEAR(distance_to_bone(mesh.positions[i], end_position(posed, 0, BoneEnd::kHead),
+                                   end_position(posed, 0, BoneEnd::kTail)),
+                  offset, 1e-6)
+          << named.name;
     }
     EXPECT_GT(inner, 100);
   }
-  EXPECT_THROW(constant_offset_mesh(device(), model_of(SyntheticSurface(y_branch(), 0.2)), y_branch(), {}, 0), InputError);
+  EXPECT_THROW(constant_offset_mesh(device(), model_of(SyntheticSurface(y_branch(), 0.2)), y_branch(), {}, 0),
+               InputError);
 }
 
 TEST(Pose, WhatChangesAtOneEndOfABoneIsFeltAtTheOtherOnlyToSecondOrder) {
@@ -458,12 +514,14 @@ TEST(Pose, WhatChangesAtOneEndOfABoneIsFeltAtTheOtherOnlyToSecondOrder) {
   pose.rotations.assign(3, Eigen::Quaterniond::Identity());
   pose.rotations[2] = Eigen::AngleAxisd(0.9, Vec3(1, 2, 3).normalized());
   const Skeleton posed = apply_pose(model.skeleton, pose);
-  const Walls bind(model.skeleton);
-  const PosedWalls walls(model, posed), still(model, model.skeleton);
+  const SeparationPlanes bind(model.skeleton);
+  const PosedPlanes separation(model, posed), still(model, model.skeleton);
   for (const double turn : {0.05, 0.3, 0.55, 0.8}) {
     const auto moved = [&](double u) {
       const Vec3 texel(0.02, -0.03, 0.15);
-      return (posed_point(model, bind, walls, 1, u, turn, texel, DistanceRule::kFromBone) - posed_point(model, bind, still, 1, u, turn, texel, DistanceRule::kFromBone)).norm();
+      return (posed_point(model, bind, separation, 1, u, turn, texel, DistanceRule::kFromBone) -
+              posed_point(model, bind, still, 1, u, turn, texel, DistanceRule::kFromBone))
+          .norm();
     };
     EXPECT_LT(moved(0), 1e-12);
     EXPECT_LT(moved(0.01), 0.3 * moved(0.02)) << turn;
@@ -481,10 +539,10 @@ TEST(Pose, ATwistIsSharedByTheTwoBonesOfAJoint) {
   for (const double roll : {0.0, 0.2}) {
     pose.rolls = {0, roll};
     const Skeleton posed = apply_pose(model.skeleton, pose);
-    const PosedWalls walls(model, posed);
-    EXPECT_NEAR(walls.spoke(0, BoneEnd::kTail, 0.3).roll * 2 * kPi, (0.5 + roll) / 2, 1e-12);
-    EXPECT_NEAR(walls.spoke(1, BoneEnd::kHead, 0.3).roll * 2 * kPi, -(0.5 + roll) / 2, 1e-12);
-    EXPECT_EQ(walls.spoke(0, BoneEnd::kHead, 0.3).roll, 0);
+    const PosedPlanes separation(model, posed);
+    EXPECT_NEAR(separation.radial(0, BoneEnd::kTail, 0.3).roll * 2 * kPi, (0.5 + roll) / 2, 1e-12);
+    EXPECT_NEAR(separation.radial(1, BoneEnd::kHead, 0.3).roll * 2 * kPi, -(0.5 + roll) / 2, 1e-12);
+    EXPECT_EQ(separation.radial(0, BoneEnd::kHead, 0.3).roll, 0);
   }
 }
 
@@ -493,24 +551,35 @@ TEST(Pose, ArcsAroundANodeOfThreeBonesAreHalfATurnInEveryPose) {
   const SkeletexModel model = model_of(surface);
   for (unsigned seed = 0; seed < 50; ++seed) {
     const Skeleton posed = apply_pose(model.skeleton, random_pose(model.skeleton, 1.5, seed));
-    const PosedWalls walls(model, posed);
+    const PosedPlanes separation(model, posed);
     for (int bone = 0; bone < 3; ++bone) {
       const BoneEnd end = model.ends[bone][0].arcs.empty() ? BoneEnd::kTail : BoneEnd::kHead;
-      const double first = walls.spoke(bone, end, 0).roll;
-      for (int j = 1; j < 12; ++j) EXPECT_NEAR(std::remainder(walls.spoke(bone, end, j / 12.0).roll - first, 1.0), 0, 1e-9);
+      const double first = separation.radial(bone, end, 0).roll;
+      for (int j = 1; j < 12; ++j)
+        EXPECT_NEAR(std::remainder(separation.radial(bone, end, j / 12.0).roll - first, 1.0), 0, 1e-9);
     }
   }
 }
 
 TEST(Pose, AnimationsInterpolateBoneByBoneAndNodeByNode) {
   const Skeleton skeleton = y_branch();
-  const auto json = nlohmann::json::parse(R"({"frames":[{"time":1,"pose":{"rotations":{"bone1":{"axis":[0,0,2],"degrees":40}}}},
+  const auto json =
+      nlohmann::json::parse(R"({"frames":[{"time":1,"pose":{"rotations":{"bone1":{"axis":[0,0,2],"degrees":40}}}},
     {"time":3,"pose":{"roll":{"bone2":20}}},{"time":4,"pose":{"nodes":{"end0":[0,0,-2]}}}]})");
   const PoseAnimation animation = animation_from_json(json, skeleton, "animation");
-  EXPECT_NEAR(pose_at(skeleton, animation, 2).rotations[1].angularDistance(Eigen::Quaterniond(Eigen::AngleAxisd(kPi / 9, Vec3(0, 0, 1)))), 0, 1e-12);
+  EXPECT_NEAR(pose_at(skeleton, animation, 2)
+                  .rotations[1]
+                  .angularDistance(Eigen::Quaterniond(Eigen::AngleAxisd(kPi / 9, Vec3(0, 0, 1)))),
+              0, 1e-12);
   EXPECT_NEAR(pose_at(skeleton, animation, 2).rolls[2], kPi / 18, 1e-12);
-  EXPECT_NEAR((pose_at(skeleton, animation, 3.25).nodes[1] - (0.75 * skeleton.nodes[1].position + 0.25 * Vec3(0, 0, -2))).norm(), 0, 1e-12);
-  EXPECT_NEAR(pose_at(skeleton, animation, 0).rotations[1].angularDistance(Eigen::Quaterniond(Eigen::AngleAxisd(kPi * 2 / 9, Vec3(0, 0, 1)))), 0, 1e-12);
+  EXPECT_NEAR(
+      (pose_at(skeleton, animation, 3.25).nodes[1] - (0.75 * skeleton.nodes[1].position + 0.25 * Vec3(0, 0, -2)))
+          .norm(),
+      0, 1e-12);
+  EXPECT_NEAR(pose_at(skeleton, animation, 0)
+                  .rotations[1]
+                  .angularDistance(Eigen::Quaterniond(Eigen::AngleAxisd(kPi * 2 / 9, Vec3(0, 0, 1)))),
+              0, 1e-12);
   EXPECT_EQ(pose_at(skeleton, animation, 9).nodes.size(), skeleton.nodes.size());
   const PoseAnimation mixed{{animation.frames[0], {2, animation.frames[2].pose}}};
   EXPECT_THROW(pose_at(skeleton, mixed, 1.5), InputError);

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/reconstruct/reconstruct_mesh.h"
-
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -11,6 +9,7 @@
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/lattice.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/seam_strip.h"
 #include "support/mesh_topology.h"
 #include "support/reconstruct_twin.h"
@@ -31,10 +30,17 @@ struct NamedSkeleton {
 };
 
 std::vector<NamedSkeleton> all_skeletons() {
-  return {{"lone bone", lone_bone(), 0.3},      {"chain of two", chain(2), 0.2},   {"chain of five", chain(5), 0.2},
-          {"Y", y_branch(), 0.25},              {"cross of 4", cross(4), 0.3},     {"cross of 6", cross(6), 0.3},
-          {"cross of 11", cross(11), 0.3},      {"ring of 3", ring(3), 0.2},       {"ring of 7", ring(7), 0.2},
-          {"ring with an arm", ring_with_arm(6), 0.2}, {"tree of 12", random_tree(12, 3), 0.15}};
+  return {{"lone bone", lone_bone(), 0.3},
+          {"chain of two", chain(2), 0.2},
+          {"chain of five", chain(5), 0.2},
+          {"Y", y_branch(), 0.25},
+          {"cross of 4", cross(4), 0.3},
+          {"cross of 6", cross(6), 0.3},
+          {"cross of 11", cross(11), 0.3},
+          {"ring of 3", ring(3), 0.2},
+          {"ring of 7", ring(7), 0.2},
+          {"ring with an arm", ring_with_arm(6), 0.2},
+          {"tree of 12", random_tree(12, 3), 0.15}};
 }
 
 std::vector<std::pair<int, int>> same_sizes(const Skeleton& skeleton, int width, int height) {
@@ -80,13 +86,17 @@ TEST(Reconstruct, VerticesLieOnTheSurfaceThatWasSampled) {
           worst = std::max(worst, (mesh.positions[vertex] - expected).norm());
         }
       for (int end = 0; end < 2; ++end)
-        if (lattice.poles[bone][end] >= 0) worst = std::max(worst, (mesh.positions[lattice.poles[bone][end]] - surface.point(bone, end, 0)).norm());
+        if (lattice.poles[bone][end] >= 0)
+          worst = std::max(worst, (mesh.positions[lattice.poles[bone][end]] - surface.point(bone, end, 0)).norm());
     }
-    for (int v = lattice.first_sample.empty() ? lattice.first_corner : lattice.first_sample[0]; v < lattice.vertex_count; ++v) {
+    for (int v = lattice.first_sample.empty() ? lattice.first_corner : lattice.first_sample[0];
+         v < lattice.vertex_count; ++v) {
       double nearest = 1e9;
       for (const Node& node : surface.skeleton().nodes) {
         const Vec3 d = (mesh.positions[v] - node.position).normalized();
-        nearest = std::min(nearest, (surface.seam_point(static_cast<int>(&node - surface.skeleton().nodes.data()), d) - mesh.positions[v]).norm());
+        nearest = std::min(nearest, (surface.seam_point(static_cast<int>(&node - surface.skeleton().nodes.data()), d) -
+                                     mesh.positions[v])
+                                        .norm());
       }
       worst = std::max(worst, nearest);
     }
@@ -102,7 +112,7 @@ TEST(Reconstruct, VolumeOfACapsuleComesOutPositiveAndConvergesToItsClosedForm) {
   double last = 1;
   for (const int size : {16, 32, 64, 128}) {
     const double missing = 1 - signed_volume(reconstruct_mesh(device(), surface.model({{size, size}}))) / exact;
-    EXPECT_GT(missing, 0) << size;        // inscribed
+    EXPECT_GT(missing, 0) << size;           // inscribed
     EXPECT_LT(missing, 0.3 * last) << size;  // second order
     last = missing;
   }
@@ -111,7 +121,8 @@ TEST(Reconstruct, VolumeOfACapsuleComesOutPositiveAndConvergesToItsClosedForm) {
 TEST(Reconstruct, VolumeIsPositiveWhereTheSurfaceIsEmbedded) {
   for (const NamedSkeleton& named : all_skeletons()) {
     const SyntheticSurface surface(named.skeleton, named.radius);
-    EXPECT_GT(signed_volume(reconstruct_mesh(device(), surface.model(same_sizes(named.skeleton, 24, 12)))), 0) << named.name;
+    EXPECT_GT(signed_volume(reconstruct_mesh(device(), surface.model(same_sizes(named.skeleton, 24, 12)))), 0)
+        << named.name;
   }
 }
 
@@ -135,7 +146,8 @@ TEST(Reconstruct, TrianglesOfAPlainRingOfBonesAllFaceOutward) {
       Vec3 foot;
       double nearest = 1e9;
       for (int bone = 0; bone < 7; ++bone) {
-        const Vec3 head = end_position(surface.skeleton(), bone, BoneEnd::kHead), axis = end_position(surface.skeleton(), bone, BoneEnd::kTail) - head;
+        const Vec3 head = end_position(surface.skeleton(), bone, BoneEnd::kHead),
+                   axis = end_position(surface.skeleton(), bone, BoneEnd::kTail) - head;
         const Vec3 q = head + std::clamp((centre - head).dot(axis) / axis.squaredNorm(), 0.0, 1.0) * axis;
         if ((centre - q).norm() < nearest) {
           nearest = (centre - q).norm();
@@ -156,7 +168,8 @@ TEST(Reconstruct, GarbageInTheTextureChangesPositionsOnly) {
     for (auto* plane : {&model.texture.along, &model.texture.around, &model.texture.out})
       for (float& value : *plane) value = scale * normal(random);
     for (SeamArc& arc : model.arcs)
-      for (SeamSample& sample : arc.samples) sample = {std::uniform_real_distribution<double>(0, 1)(random), scale * std::abs(normal(random))};
+      for (SeamSample& sample : arc.samples)
+        sample = {std::uniform_real_distribution<double>(0, 1)(random), scale * std::abs(normal(random))};
     EXPECT_EQ(broken_rule(reconstruct_mesh(device(), model), 1), "") << "scale " << scale;
   }
 }
@@ -187,7 +200,8 @@ TEST(SeamStrip, JoinsAnyTwoRingsWithEveryEdgeOnceAndNoneTwice) {
   std::mt19937 random(20);
   std::uniform_real_distribution<double> unit(0, 1);
   for (int trial = 0; trial < 3000; ++trial) {
-    const int m = 3 + static_cast<int>(random() % (trial % 3 ? 6 : 60)), n = 4 + static_cast<int>(random() % (trial % 2 ? 4 : 60));
+    const int m = 3 + static_cast<int>(random() % (trial % 3 ? 6 : 60)),
+              n = 4 + static_cast<int>(random() % (trial % 2 ? 4 : 60));
     Ring seam, row;
     std::vector<Vec3> positions;
     std::vector<double> turns;
@@ -258,8 +272,10 @@ TEST(SeamStrip, HasNoCapsWhereAMergeWithoutIsAboutAsShort) {
     const double angle = 2 * 3.14159265358979 * turn;
     return Vec3(std::cos(angle), std::sin(angle), height);
   };
-  for (int i = 0; i < m; ++i) positions.push_back(place((i + 0.5) / m, -0.1)), seam.vertices.push_back(i), seam.turns.push_back((i + 0.5) / m);
-  for (int j = 0; j < n; ++j) positions.push_back(place(1.0 * j / n, 0)), row.vertices.push_back(m + j), row.turns.push_back(1.0 * j / n);
+  for (int i = 0; i < m; ++i)
+    positions.push_back(place((i + 0.5) / m, -0.1)), seam.vertices.push_back(i), seam.turns.push_back((i + 0.5) / m);
+  for (int j = 0; j < n; ++j)
+    positions.push_back(place(1.0 * j / n, 0)), row.vertices.push_back(m + j), row.turns.push_back(1.0 * j / n);
   for (const int column : {0, 7, 22}) {
     positions[2 * column + 1] = 0.5 * (positions[m + column] + positions[m + column + 1]);
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
@@ -268,7 +284,9 @@ TEST(SeamStrip, HasNoCapsWhereAMergeWithoutIsAboutAsShort) {
       EXPECT_EQ(static_cast<int>(triangles.size()), m + n);
       for (const Triangle& t : triangles) {
         const Vec3 a = positions[t[0]], b = positions[t[1]], c = positions[t[2]];
-        EXPECT_GT((b - a).cross(c - a).norm(), 0.01 * std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()})) << column;
+        EXPECT_GT((b - a).cross(c - a).norm(),
+                  0.01 * std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()}))
+            << column;
       }
     }
   }
@@ -286,7 +304,8 @@ TEST(SeamStrip, AnglesUnwrapToOneTurnThatNeverGoesBack) {
       turns.push_back(turn - std::floor(turn));
     }
     std::vector<Vec3> points;
-    for (const double turn : turns) points.push_back(Vec3(std::cos(2 * std::numbers::pi * turn), std::sin(2 * std::numbers::pi * turn), 0));
+    for (const double turn : turns)
+      points.push_back(Vec3(std::cos(2 * std::numbers::pi * turn), std::sin(2 * std::numbers::pi * turn), 0));
     const std::vector<double> result = seam_turns(points, turns);
     for (int i = 0; i + 1 < m; ++i) {
       EXPECT_LE(result[i], result[i + 1]);
@@ -320,14 +339,16 @@ TEST(ReconstructKernels, DisplaceAgreesWithItsTwinOnRandomAndUglyTexels) {
       case 4: texel = {1e-25f, 0, 1e-25f}; break;
       case 5: texel = {1e15f, 0, -1e15f}; break;
     }
-    std::tie(model.texture.along[i], model.texture.around[i], model.texture.out[i]) = std::tie(texel[0], texel[1], texel[2]);
+    std::tie(model.texture.along[i], model.texture.around[i], model.texture.out[i]) =
+        std::tie(texel[0], texel[1], texel[2]);
   }
-  const FrameTables tables = frame_tables(model.skeleton, surface.walls(), model.patches, model.origin);
+  const FrameTables tables = frame_tables(model.skeleton, surface.separation(), model.patches, model.origin);
   for (const RowChoice choice : {RowChoice::kAll, RowChoice::kInner}) {
     const DeviceLattice lattice = upload_lattice(device(), tables, model.patches, model.texture, choice);
     DevicePlanes points = allocate_planes(device(), lattice.vertex_count);
     displace(device(), lattice, points);
-    const std::vector<float> x = device().download(points.x), y = device().download(points.y), z = device().download(points.z);
+    const std::vector<float> x = device().download(points.x), y = device().download(points.y),
+                             z = device().download(points.z);
     std::size_t vertex = 0;
     for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
       const PatchRecord& patch = tables.patches[bone];
@@ -336,20 +357,23 @@ TEST(ReconstructKernels, DisplaceAgreesWithItsTwinOnRandomAndUglyTexels) {
         for (int j = 0; j < patch.width; ++j, ++vertex) {
           const std::size_t at = static_cast<std::size_t>(patch.y + r) * model.texture.width + patch.x + j;
           const Vec3 texel(model.texture.along[at], model.texture.around[at], model.texture.out[at]);
-          const auto expected = twin::displace(patch, tables.rows[patch.row_begin + r], tables.columns[patch.column_begin + j], texel);
+          const auto expected =
+              twin::displace(patch, tables.rows[patch.row_begin + r], tables.columns[patch.column_begin + j], texel);
           // A texel's direction d is exact to a few eps. The exit moves by at most (reach + reach^2 / e) per unit of d:
           // at the cylinder reach = e / sin, and d(reach) = reach / sin; the spheres are met less obliquely.
           const double eps = 1.2e-7;
           const double head = Vec3(patch.head[0], patch.head[1], patch.head[2]).norm();
           const double reach = expected.reach, e = expected.size;
-          const double tolerance = 16 * eps * (head + patch.length + reach + (e > 0 ? reach * std::min(reach / e, 1 / eps) : 0));
+          const double tolerance =
+              16 * eps * (head + patch.length + reach + (e > 0 ? reach * std::min(reach / e, 1 / eps) : 0));
           const Vec3 got(x[vertex], y[vertex], z[vertex]);
           // Squares of less than the smallest float are zero: such texels end anywhere between foot and exit.
           if (e < 1e-17) {
             EXPECT_LE((got - expected.point).norm(), tolerance + reach + patch.length);
             continue;
           }
-          ASSERT_LE((got - expected.point).norm(), tolerance) << "bone " << bone << " row " << r << " column " << j << " texel " << texel.transpose();
+          ASSERT_LE((got - expected.point).norm(), tolerance)
+              << "bone " << bone << " row " << r << " column " << j << " texel " << texel.transpose();
         }
     }
     EXPECT_EQ(vertex, lattice.vertex_count);
@@ -373,11 +397,16 @@ TEST(ReconstructKernels, QuadsAgreeWithTheirTwinOnRandomPoints) {
       ASSERT_EQ(lattice.first_quad[bone], quad);
       for (int r = 1; r + 2 < height; ++r)
         for (int j = 0; j < width; ++j, ++quad) {
-          const auto number = [&](int row, int column) { return lattice.first_inner[bone] + (row - 1) * width + (column + width) % width; };
-          const auto point = [&](int row, int column) { return Vec3(mesh.positions[number(row, column)] - model.origin); };
+          const auto number = [&](int row, int column) {
+            return lattice.first_inner[bone] + (row - 1) * width + (column + width) % width;
+          };
+          const auto point = [&](int row, int column) {
+            return Vec3(mesh.positions[number(row, column)] - model.origin);
+          };
           bool is_clear = false;
-          const bool is_second = rule == DiagonalRule::kSmooth ? twin::takes_smoother_diagonal(point, r, j, height, is_clear)
-                                                               : twin::takes_second_diagonal(point, r, j, height, is_clear);
+          const bool is_second = rule == DiagonalRule::kSmooth
+                                     ? twin::takes_smoother_diagonal(point, r, j, height, is_clear)
+                                     : twin::takes_second_diagonal(point, r, j, height, is_clear);
           unclear += !is_clear;
           if (!is_clear) continue;
           const int v00 = number(r, j), v01 = number(r, j + 1), v10 = number(r + 1, j), v11 = number(r + 1, j + 1);
@@ -395,7 +424,8 @@ TEST(ReconstructKernels, QuadsOfASquareLatticeAllTakeTheSameDiagonal) {
   SkeletexModel model = surface.model({{16, 40}});
   const TriangleMesh mesh = reconstruct_mesh(device(), model);
   const Lattice lattice = number_lattice(model);
-  for (int quad = 0; quad < lattice.quad_count; ++quad) EXPECT_EQ(mesh.triangles[2 * quad][0], mesh.triangles[2 * quad + 1][0]) << quad;
+  for (int quad = 0; quad < lattice.quad_count; ++quad)
+    EXPECT_EQ(mesh.triangles[2 * quad][0], mesh.triangles[2 * quad + 1][0]) << quad;
 }
 
 }  // namespace skeletex

@@ -6,15 +6,15 @@
 #include <fstream>
 #include <numbers>
 
-#include "skeletex/encode/encode_model.h"
+#include "skeletex/convert/encode_model.h"
 #include "skeletex/model/error.h"
-#include "skeletex/model/pose.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/render/draw.h"
 #include "skeletex/render/gpu_model.h"
 #include "skeletex/render/scene.h"
 #include "skeletex/render/texture_image.h"
+#include "skeletex/skeleton/pose.h"
 #include "support/scratch.h"
 #include "support/shapes.h"
 
@@ -44,7 +44,8 @@ double largest_difference(const std::vector<Vec3>& a, const std::vector<Vec3>& b
 }
 
 TEST(Render, ShaderAndLibraryPlaceEveryVertexAlikeInEveryPose) {
-  for (const NamedShape& named : {NamedShape{"creature", 0, creature_shape()}, {"torus", 1, torus_shape()}, {"capsule", 0, capsule_shape()}})
+  for (const NamedShape& named :
+       {NamedShape{"creature", 0, creature_shape()}, {"torus", 1, torus_shape()}, {"capsule", 0, capsule_shape()}})
     for (const Method method : {Method::kVsm, Method::kSpd}) {
       SCOPED_TRACE(named.name + " " + to_string(method));
       const SkeletexModel model = model_of(named.shape, method);
@@ -57,19 +58,24 @@ TEST(Render, ShaderAndLibraryPlaceEveryVertexAlikeInEveryPose) {
       if (named.genus > 0) continue;  // rotations are for trees
       Pose pose;
       for (std::size_t i = 0; i < model.skeleton.bones.size(); ++i)
-        pose.rotations.push_back(Eigen::Quaterniond(Eigen::AngleAxisd(0.3 + 0.1 * static_cast<double>(i % 5), Vec3(1, static_cast<double>(i % 3), 0.5).normalized())));
+        pose.rotations.push_back(Eigen::Quaterniond(Eigen::AngleAxisd(
+            0.3 + 0.1 * static_cast<double>(i % 5), Vec3(1, static_cast<double>(i % 3), 0.5).normalized())));
       const Skeleton posed = apply_pose(model.skeleton, pose);
       for (const DistanceRule rule : {DistanceRule::kFromBone, DistanceRule::kFromFoot}) {
         displace(gl(), device, model, posed, rule, surface);
-        EXPECT_LT(largest_difference(download_positions(surface), reconstruct_mesh(cl(), model, posed, {Deformation::kPaper, rule}).positions), 1e-5 * model.diagonal);
+        EXPECT_LT(largest_difference(download_positions(surface),
+                                     reconstruct_mesh(cl(), model, posed, {Deformation::kPaper, rule}).positions),
+                  1e-5 * model.diagonal);
       }
-      const Skin skin = make_skin(cl(), model, displace_inner(cl(), model, Walls(model.skeleton), number_lattice(model)));
+      const Skin skin =
+          make_skin(cl(), model, displace_inner(cl(), model, SeparationPlanes(model.skeleton), number_lattice(model)));
       const GpuSkin gpu_skin = upload_skin(skin, bind);
       Skeleton stretched = posed;
       for (Node& node : stretched.nodes) node.position *= 1.3;
       for (const Skeleton& skeleton : {posed, stretched}) {
         pose_skin(gl(), gpu_skin, skin, bone_motions(model.skeleton, skeleton), skeleton, surface);
-        EXPECT_LT(largest_difference(download_positions(surface), reconstruct_mesh(cl(), model, skeleton).positions), 1e-5 * model.diagonal);
+        EXPECT_LT(largest_difference(download_positions(surface), reconstruct_mesh(cl(), model, skeleton).positions),
+                  1e-5 * model.diagonal);
       }
     }
 }
@@ -82,7 +88,8 @@ std::vector<bool> rasterize(const TriangleMesh& mesh, const Camera& camera, int 
     for (int c = 0; c < 3; ++c) {
       const Vec3 q = mesh.positions[t[c]] - camera.eye;
       const double depth = camera.is_orthographic ? 1 : -camera.back.dot(q);
-      p[c] = {(0.5 + 0.5 * camera.right.dot(q) / (camera.tan_x * depth)) * width, (0.5 - 0.5 * camera.up.dot(q) / (camera.tan_y * depth)) * height};
+      p[c] = {(0.5 + 0.5 * camera.right.dot(q) / (camera.tan_x * depth)) * width,
+              (0.5 - 0.5 * camera.up.dot(q) / (camera.tan_y * depth)) * height};
     }
     const auto cross = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); };
     const double area = cross(p[1] - p[0], p[2] - p[0]);
@@ -107,7 +114,8 @@ TEST(Render, CoversThePixelsThatAnIndependentRasterizerCovers) {
     const View view{.azimuth_deg = 40, .elevation_deg = 20, .fov_deg = fov};
     const int width = 320, height = 200;
     const Camera camera = fit_camera(view, shape.mesh.positions, width, height);
-    const Image image = draw(gl(), surface, {}, camera, {.width = width, .height = height, .samples = 1, .sky_lights = 8});
+    const Image image =
+        draw(gl(), surface, {}, camera, {.width = width, .height = height, .samples = 1, .sky_lights = 8});
     const std::vector<bool> mask = rasterize(shape.mesh, camera, width, height);
     int covered = 0, different = 0;
     for (int y = 0; y < height; ++y)
@@ -127,7 +135,8 @@ TEST(Render, FitsEveryPointIntoThePictureAndFillsIt) {
     for (const auto& [width, height] : {std::array{400, 200}, {200, 400}, {300, 300}})
       for (const double azimuth : {0.0, 77.0, 200.0})
         for (const double elevation : {-90.0, 0.0, 35.0, 90.0}) {
-          const Camera camera = fit_camera({.azimuth_deg = azimuth, .elevation_deg = elevation, .fov_deg = fov}, shape.mesh.positions, width, height);
+          const Camera camera = fit_camera({.azimuth_deg = azimuth, .elevation_deg = elevation, .fov_deg = fov},
+                                           shape.mesh.positions, width, height);
           const Eigen::Matrix4d matrix = view_projection(camera, Vec3::Zero());
           double largest = 0;
           for (const Vec3& p : shape.mesh.positions) {
@@ -158,14 +167,17 @@ TEST(Render, NormalsOfARoundShapeAreRadial) {
   for (std::size_t i = 0; i < shape.mesh.positions.size(); ++i) {
     const Vec3 p = shape.mesh.positions[i];
     const Vec3 foot(0, 0, std::clamp(p.z(), -1.0, 1.0));
-    largest = std::max(largest, (Vec3(normals[3 * i], normals[3 * i + 1], normals[3 * i + 2]) - (p - foot).normalized()).norm());
+    largest = std::max(largest,
+                       (Vec3(normals[3 * i], normals[3 * i + 1], normals[3 * i + 2]) - (p - foot).normalized()).norm());
   }
   EXPECT_LT(largest, 0.05);
 }
 
 TEST(Render, NormalsInTheFlatCornerOfACapAreThoseAroundIt) {
-  // A plane, and in it between A and B a triangle that stands on edge: at the third vertex its angle is nearly half a turn.
-  TriangleMesh mesh{{Vec3(0, 0, 0), Vec3(2, 0, 0), Vec3(1, 0, 1e-3), Vec3(1, 1, 0), Vec3(1, -1, 0)}, {{0, 2, 3}, {2, 1, 3}, {0, 1, 2}, {0, 4, 1}}};
+  // A plane, and in it between A and B a triangle that stands on edge: at the third vertex its angle is nearly half a
+  // turn.
+  TriangleMesh mesh{{Vec3(0, 0, 0), Vec3(2, 0, 0), Vec3(1, 0, 1e-3), Vec3(1, 1, 0), Vec3(1, -1, 0)},
+                    {{0, 2, 3}, {2, 1, 3}, {0, 1, 2}, {0, 4, 1}}};
   const GpuSurface surface = upload_surface(gl(), mesh);
   std::vector<float> normals(3 * mesh.positions.size());
   surface.normals.read(normals.size() * sizeof(float), normals.data());
@@ -176,7 +188,8 @@ TEST(Render, APartInShadowIsDarkerThanTheSamePartInTheOpen) {
   // A plate below the camera's light, with and without a smaller plate between.
   const auto plate = [](double size, double z, TriangleMesh& mesh) {
     const int first = static_cast<int>(mesh.positions.size());
-    for (const auto& [x, y] : {std::array{-1, -1}, {1, -1}, {1, 1}, {-1, 1}}) mesh.positions.emplace_back(size * x, size * y, z);
+    for (const auto& [x, y] : {std::array{-1, -1}, {1, -1}, {1, 1}, {-1, 1}})
+      mesh.positions.emplace_back(size * x, size * y, z);
     mesh.triangles.push_back({first, first + 1, first + 2});
     mesh.triangles.push_back({first, first + 2, first + 3});
   };
@@ -261,7 +274,8 @@ TEST(View, RefusesWhatIsNoView) {
   const View view = parse(R"({"azimuth": 10, "fov": 0, "up": [0, 0, 1], "front": [0, -1, 0]})");
   EXPECT_EQ(view.azimuth_deg, 10);
   EXPECT_EQ(view.up, Vec3::UnitZ());
-  for (const char* text : {"[1]", R"({"azimut": 1})", R"({"zoom": 0})", R"({"up": [0, 1]})", R"({"elevation": "high"})"})
+  for (const char* text :
+       {"[1]", R"({"azimut": 1})", R"({"zoom": 0})", R"({"up": [0, 1]})", R"({"elevation": "high"})"})
     EXPECT_THROW(parse(text), IoError) << text;
   EXPECT_THROW(fit_camera({.up = Vec3::Zero()}, {}, 10, 10), InputError);
   EXPECT_THROW(fit_camera({.up = Vec3::UnitY(), .front = Vec3::UnitY()}, {}, 10, 10), InputError);

@@ -31,7 +31,8 @@ std::vector<double> apply_taps(const FilterTaps& taps, const std::vector<double>
   std::vector<double> result;
   for (const auto& tap : taps.taps) {
     double sum = 0;
-    for (int i = 0; i < tap[1]; ++i) sum += static_cast<double>(taps.weights[tap[2] + i]) * old[(tap[0] + i) % old.size()];
+    for (int i = 0; i < tap[1]; ++i)
+      sum += static_cast<double>(taps.weights[tap[2] + i]) * old[(tap[0] + i) % old.size()];
     result.push_back(sum);
   }
   return result;
@@ -49,12 +50,14 @@ TEST(Resample, ToTheSameSizeChangesNothing) {
   EXPECT_EQ(same.texture.around, model.texture.around);
   EXPECT_EQ(same.texture.out, model.texture.out);
   ASSERT_EQ(same.arcs.size(), model.arcs.size());
-  for (std::size_t a = 0; a < model.arcs.size(); ++a) EXPECT_EQ(same.arcs[a].samples.size(), model.arcs[a].samples.size());
+  for (std::size_t a = 0; a < model.arcs.size(); ++a)
+    EXPECT_EQ(same.arcs[a].samples.size(), model.arcs[a].samples.size());
 }
 
 TEST(Resample, IsClosedAtEverySizeWithTheSameGenus) {
-  const std::vector<std::pair<Skeleton, double>> cases{{lone_bone(), 0.3}, {y_branch(), 0.25},        {cross(7), 0.3},
-                                                       {ring(5), 0.2},     {ring_with_arm(6), 0.2}, {random_tree(20, 6), 0.15}};
+  const std::vector<std::pair<Skeleton, double>> cases{{lone_bone(), 0.3},      {y_branch(), 0.25},
+                                                       {cross(7), 0.3},         {ring(5), 0.2},
+                                                       {ring_with_arm(6), 0.2}, {random_tree(20, 6), 0.15}};
   for (const auto& [skeleton, radius] : cases) {
     const SyntheticSurface surface(skeleton, radius);
     const int bones = static_cast<int>(skeleton.bones.size());
@@ -129,7 +132,8 @@ TEST(Resample, CoarserVolumeStaysCloserThanThatOfSampledPoints) {
   const double exact = 0.3 * 0.3 * std::numbers::pi * (bone_length(surface.skeleton(), 0) + 0.4);
   const SkeletexModel model = surface.model({{256, 256}});
   for (const int size : {16, 32, 64}) {
-    const double projected = signed_volume(reconstruct_mesh(device(), resample_model(device(), model, size))) / exact - 1;
+    const double projected =
+        signed_volume(reconstruct_mesh(device(), resample_model(device(), model, size))) / exact - 1;
     const double sampled = signed_volume(reconstruct_mesh(device(), surface.model({{size, size}}))) / exact - 1;
     EXPECT_LT(std::abs(projected), 0.25 * std::abs(sampled)) << size;
   }
@@ -148,7 +152,7 @@ TEST(Resample, ASurfaceThatJumpsGrowsNoSpikes) {
   }
 }
 
-TEST(Resample, SeamSamplesStayOnTheWallAndNearTheOldPolyline) {
+TEST(Resample, SeamSamplesStayOnTheSeparationPlaneAndNearTheOldPolyline) {
   const SyntheticSurface surface(cross(6), 0.3);
   const SkeletexModel model = surface.model(std::vector<std::pair<int, int>>(6, {60, 20}));
   const int size = std::max(model.texture.width, model.texture.height);
@@ -162,19 +166,21 @@ TEST(Resample, SeamSamplesStayOnTheWallAndNearTheOldPolyline) {
       const auto corner = [&](int index) {
         const SeamCorner& c = model.corners[index];
         const BoneEnd at = model.skeleton.bones[c.bones[0]].head == c.node ? BoneEnd::kHead : BoneEnd::kTail;
-        return surface.walls().seam_point(c.bones[0], at, c.sample.turn, c.sample.distance);
+        return surface.separation().seam_point(c.bones[0], at, c.sample.turn, c.sample.distance);
       };
       std::vector<Vec3> line{corner(was.corners[0])};
-      for (const SeamSample& s : was.samples) line.push_back(surface.walls().seam_point(was.bones[0], end, s.turn, s.distance));
+      for (const SeamSample& s : was.samples)
+        line.push_back(surface.separation().seam_point(was.bones[0], end, s.turn, s.distance));
       line.push_back(corner(was.corners[1]));
       double cell = 0;
       for (std::size_t i = 0; i + 1 < line.size(); ++i) cell += (line[i + 1] - line[i]).norm();
       cell /= static_cast<double>(std::min(is.samples.size(), was.samples.size()) + 1);  // the longer of old and new
       for (const SeamSample& s : is.samples) {
-        EXPECT_EQ(surface.walls().neighbour(was.bones[0], end, s.turn), was.bones[1]);
-        const Vec3 p = surface.walls().seam_point(was.bones[0], end, s.turn, s.distance);
+        EXPECT_EQ(surface.separation().neighbour(was.bones[0], end, s.turn), was.bones[1]);
+        const Vec3 p = surface.separation().seam_point(was.bones[0], end, s.turn, s.distance);
         double nearest = 1e9;
-        for (std::size_t i = 0; i + 1 < line.size(); ++i) nearest = std::min(nearest, distance_to_segment(p, line[i], line[i + 1]));
+        for (std::size_t i = 0; i + 1 < line.size(); ++i)
+          nearest = std::min(nearest, distance_to_segment(p, line[i], line[i + 1]));
         // The fitted polygon straddles the curve: off by a share of its sagitta, cell^2 / (8 radius).
         EXPECT_LT(nearest, cell * cell / (4 * 0.3)) << "arc " << a << " at " << other_size;
       }
@@ -193,7 +199,8 @@ TEST(FilterTaps, KeepConstantsAndStraightLines) {
       for (int i = 0; i < to; ++i) EXPECT_NEAR(result[i], static_cast<double>(i) * (from - 1) / (to - 1), 1e-5 * from);
       EXPECT_EQ(result.front(), 0);
       EXPECT_EQ(result.back(), from - 1);
-      for (const double one : apply_taps(filter_taps(from, to, true, filter, 1.0 / 16), std::vector<double>(from, 1.0))) EXPECT_NEAR(one, 1, 1e-6);
+      for (const double one : apply_taps(filter_taps(from, to, true, filter, 1.0 / 16), std::vector<double>(from, 1.0)))
+        EXPECT_NEAR(one, 1, 1e-6);
     }
 }
 
@@ -266,10 +273,12 @@ TEST(ResamplePolyline, KeepsEndsAndEvenSpacing) {
 
 TEST(ResamplePolyline, ProjectionOfACircleKeepsItsAreaToFourthOrder) {
   std::vector<Vec3> points;
-  for (int i = 0; i < 4000; ++i) points.push_back(Vec3(std::cos(2 * std::numbers::pi * i / 4000), std::sin(2 * std::numbers::pi * i / 4000), 0));
+  for (int i = 0; i < 4000; ++i)
+    points.push_back(Vec3(std::cos(2 * std::numbers::pi * i / 4000), std::sin(2 * std::numbers::pi * i / 4000), 0));
   const auto area = [](const std::vector<Vec3>& p) {
     double sum = 0;
-    for (std::size_t i = 0; i < p.size(); ++i) sum += 0.5 * (p[i].x() * p[(i + 1) % p.size()].y() - p[i].y() * p[(i + 1) % p.size()].x());
+    for (std::size_t i = 0; i < p.size(); ++i)
+      sum += 0.5 * (p[i].x() * p[(i + 1) % p.size()].y() - p[i].y() * p[(i + 1) % p.size()].x());
     return sum;
   };
   for (const int cells : {6, 12, 24}) {
@@ -286,8 +295,9 @@ TEST(ResampleKernels, FiltersAgreeWithTheirTwinOnRandomPlanes) {
   const std::vector<std::pair<int, int>> old_sizes = random_sizes(6, 4, 150, 2), new_sizes = random_sizes(6, 4, 150, 3);
   std::vector<std::pair<int, int>> middle_sizes = old_sizes;
   for (std::size_t i = 0; i < 6; ++i) middle_sizes[i].second = new_sizes[i].second;
-  const SkeletexModel old_model = surface.model(old_sizes), middle = surface.model(middle_sizes), target = surface.model(new_sizes);
-  const FrameTables tables = frame_tables(target.skeleton, surface.walls(), target.patches, Vec3::Zero());
+  const SkeletexModel old_model = surface.model(old_sizes), middle = surface.model(middle_sizes),
+                      target = surface.model(new_sizes);
+  const FrameTables tables = frame_tables(target.skeleton, surface.separation(), target.patches, Vec3::Zero());
   std::mt19937 random(12);
   std::normal_distribution<float> normal;
 
@@ -296,8 +306,9 @@ TEST(ResampleKernels, FiltersAgreeWithTheirTwinOnRandomPlanes) {
     std::vector<int> widths, first_in;
     std::size_t in_size = 0, out_size = 0;
     for (std::size_t i = 0; i < 6; ++i) {
-      const FilterTaps one = is_rows ? filter_taps(old_sizes[i].second, new_sizes[i].second, false, ResampleFilter::kProject, 1.0 / 16)
-                                     : filter_taps(old_sizes[i].first, new_sizes[i].first, true, ResampleFilter::kProject, 1.0 / 16);
+      const FilterTaps one =
+          is_rows ? filter_taps(old_sizes[i].second, new_sizes[i].second, false, ResampleFilter::kProject, 1.0 / 16)
+                  : filter_taps(old_sizes[i].first, new_sizes[i].first, true, ResampleFilter::kProject, 1.0 / 16);
       for (std::array<int, 4> tap : one.taps) {
         tap[2] += static_cast<int>(taps.weights.size());
         taps.taps.push_back(tap);
@@ -316,10 +327,12 @@ TEST(ResampleKernels, FiltersAgreeWithTheirTwinOnRandomPlanes) {
     const std::vector<LatticeRow> rows = lattice_rows(is_rows ? middle.patches : target.patches, RowChoice::kAll);
     DevicePlanes out = allocate_planes(device(), out_size);
     device().launch({"reconstruct.cl", is_rows ? "filter_rows" : "filter_columns"}, row_range(device(), rows.size()),
-                    static_cast<int>(rows.size()), device().upload(rows), device().upload(tables.patches), device().upload(widths),
-                    device().upload(first_in), device().upload(taps.taps), device().upload(taps.weights), device().upload(planes[0]),
-                    device().upload(planes[1]), device().upload(planes[2]), out.x, out.y, out.z);
-    const std::vector<float> results[3] = {device().download(out.x), device().download(out.y), device().download(out.z)};
+                    static_cast<int>(rows.size()), device().upload(rows), device().upload(tables.patches),
+                    device().upload(widths), device().upload(first_in), device().upload(taps.taps),
+                    device().upload(taps.weights), device().upload(planes[0]), device().upload(planes[1]),
+                    device().upload(planes[2]), out.x, out.y, out.z);
+    const std::vector<float> results[3] = {device().download(out.x), device().download(out.y),
+                                           device().download(out.z)};
     std::size_t at = 0;
     for (std::size_t i = 0; i < 6; ++i)
       for (int r = 0; r < new_sizes[i].second; ++r)
@@ -330,7 +343,8 @@ TEST(ResampleKernels, FiltersAgreeWithTheirTwinOnRandomPlanes) {
             const int count = is_rows ? old_sizes[i].second : old_sizes[i].first;
             double magnitude = 0;
             for (int k = 0; k < tap[1]; ++k)
-              magnitude += std::abs(double(taps.weights[tap[2] + k]) * planes[p][first + (tap[0] + k) % count * stride]);
+              magnitude +=
+                  std::abs(double(taps.weights[tap[2] + k]) * planes[p][first + (tap[0] + k) % count * stride]);
             const double expected = twin::filter(tap, taps.weights, planes[p], first, stride, count);
             // n products and n sums, each exact to half an ulp of a partial sum.
             ASSERT_NEAR(results[p][at], expected, 6e-8 * (tap[1] + 2) * magnitude);
@@ -342,39 +356,50 @@ TEST(ResampleKernels, FiltersAgreeWithTheirTwinOnRandomPlanes) {
 TEST(ResampleKernels, FitsAreLimitedAsByTheirTwin) {
   const SyntheticSurface surface(random_tree(6, 1), 0.2);
   const SkeletexModel model = surface.model(random_sizes(6, 4, 90, 9));
-  const FrameTables tables = frame_tables(model.skeleton, surface.walls(), model.patches, model.origin);
+  const FrameTables tables = frame_tables(model.skeleton, surface.separation(), model.patches, model.origin);
   const std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kAll);
   std::size_t size = 0;
-  for (const Patch& patch : model.patches) size += static_cast<std::size_t>(patch.rectangle.width) * patch.rectangle.height;
+  for (const Patch& patch : model.patches)
+    size += static_cast<std::size_t>(patch.rectangle.width) * patch.rectangle.height;
   std::mt19937 random(14);
   std::normal_distribution<float> normal;
   std::vector<float> sampled[3], fitted[3];
   for (auto* planes : {sampled, fitted})
     for (int p = 0; p < 3; ++p)
-      for (std::size_t i = 0; i < size; ++i) planes[p].push_back((planes == fitted ? sampled[p][i] + 0.3f * normal(random) : normal(random)));
+      for (std::size_t i = 0; i < size; ++i)
+        planes[p].push_back((planes == fitted ? sampled[p][i] + 0.3f * normal(random) : normal(random)));
   for (int p = 0; p < 3; ++p) {
     sampled[p][7] = sampled[p][8] = sampled[p][6];  // edges of no length
     fitted[p][20] = sampled[p][20];
   }
   DevicePlanes points{device().upload(fitted[0]), device().upload(fitted[1]), device().upload(fitted[2])};
-  device().launch({"reconstruct.cl", "limit_fit"}, row_range(device(), rows.size()), static_cast<int>(rows.size()), 0.25f, device().upload(rows),
-                  device().upload(tables.patches), device().upload(sampled[0]), device().upload(sampled[1]), device().upload(sampled[2]), points.x,
-                  points.y, points.z);
-  const std::vector<float> x = device().download(points.x), y = device().download(points.y), z = device().download(points.z);
+  device().launch({"reconstruct.cl", "limit_fit"}, row_range(device(), rows.size()), static_cast<int>(rows.size()),
+                  0.25f, device().upload(rows), device().upload(tables.patches), device().upload(sampled[0]),
+                  device().upload(sampled[1]), device().upload(sampled[2]), points.x, points.y, points.z);
+  const std::vector<float> x = device().download(points.x), y = device().download(points.y),
+                           z = device().download(points.z);
   std::size_t first = 0;
   for (const Patch& patch : model.patches) {
     const int width = patch.rectangle.width, height = patch.rectangle.height;
     const auto at = [&](const std::vector<float>* planes, int r, int j) {
-      const std::size_t i = first + static_cast<std::size_t>(r < 0 ? 1 : r == height ? height - 2 : r) * width + (j + width) % width;
+      const std::size_t i = first +
+                            static_cast<std::size_t>(r < 0         ? 1
+                                                     : r == height ? height - 2
+                                                                   : r) *
+                                width +
+                            (j + width) % width;
       return Vec3(planes[0][i], planes[1][i], planes[2][i]);
     };
     for (int r = 0; r < height; ++r)
       for (int j = 0; j < width; ++j) {
         const Vec3 here = at(sampled, r, j);
         const Vec3 expected = twin::limit_fit(here, at(fitted, r, j),
-                                              {at(sampled, r - 1, j) - here, at(sampled, r + 1, j) - here, at(sampled, r, j - 1) - here, at(sampled, r, (j + 1) % width) - here}, 0.25);
+                                              {at(sampled, r - 1, j) - here, at(sampled, r + 1, j) - here,
+                                               at(sampled, r, j - 1) - here, at(sampled, r, (j + 1) % width) - here},
+                                              0.25);
         const std::size_t i = first + static_cast<std::size_t>(r) * width + j;
-        ASSERT_LE((Vec3(x[i], y[i], z[i]) - expected).norm(), 1e-6 * (here.norm() + expected.norm())) << "row " << r << " column " << j;
+        ASSERT_LE((Vec3(x[i], y[i], z[i]) - expected).norm(), 1e-6 * (here.norm() + expected.norm()))
+            << "row " << r << " column " << j;
       }
     first += static_cast<std::size_t>(width) * height;
   }
@@ -383,10 +408,11 @@ TEST(ResampleKernels, FitsAreLimitedAsByTheirTwin) {
 TEST(ResampleKernels, TangentSpaceIsEnteredAsByItsTwin) {
   const SyntheticSurface surface(random_tree(8, 5), 0.2);
   const SkeletexModel model = surface.model(random_sizes(8, 4, 150, 6));
-  const FrameTables tables = frame_tables(model.skeleton, surface.walls(), model.patches, model.origin);
+  const FrameTables tables = frame_tables(model.skeleton, surface.separation(), model.patches, model.origin);
   const std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kAll);
   std::size_t size = 0;
-  for (const Patch& patch : model.patches) size += static_cast<std::size_t>(patch.rectangle.width) * patch.rectangle.height;
+  for (const Patch& patch : model.patches)
+    size += static_cast<std::size_t>(patch.rectangle.width) * patch.rectangle.height;
   std::mt19937 random(13);
   std::normal_distribution<float> normal;
   std::vector<float> p[3];
@@ -398,23 +424,28 @@ TEST(ResampleKernels, TangentSpaceIsEnteredAsByItsTwin) {
   const DeviceTables device_tables = upload_tables(device(), tables);
   const std::size_t area = static_cast<std::size_t>(model.texture.width) * model.texture.height;
   DevicePlanes texels = allocate_planes(device(), area);
-  device().launch({"reconstruct.cl", "enter_tangent_space"}, row_range(device(), rows.size()), static_cast<int>(rows.size()),
-                  model.texture.width, device_tables.column_count, device().upload(rows), device_tables.patches, device_tables.rows,
-                  device_tables.columns, device().upload(p[0]), device().upload(p[1]), device().upload(p[2]), texels.x, texels.y, texels.z);
-  const std::vector<float> along = device().download(texels.x), around = device().download(texels.y), out = device().download(texels.z);
+  device().launch({"reconstruct.cl", "enter_tangent_space"}, row_range(device(), rows.size()),
+                  static_cast<int>(rows.size()), model.texture.width, device_tables.column_count, device().upload(rows),
+                  device_tables.patches, device_tables.rows, device_tables.columns, device().upload(p[0]),
+                  device().upload(p[1]), device().upload(p[2]), texels.x, texels.y, texels.z);
+  const std::vector<float> along = device().download(texels.x), around = device().download(texels.y),
+                           out = device().download(texels.z);
   std::size_t at = 0;
   for (const PatchRecord& patch : tables.patches)
     for (int r = 0; r < patch.height; ++r)
       for (int j = 0; j < patch.width; ++j, ++at) {
         const Vec3 point(p[0][at], p[1][at], p[2][at]);
-        const Vec3 expected = twin::enter_tangent_space(patch, tables.rows[patch.row_begin + r], tables.columns[patch.column_begin + j], point);
+        const Vec3 expected = twin::enter_tangent_space(patch, tables.rows[patch.row_begin + r],
+                                                        tables.columns[patch.column_begin + j], point);
         const std::size_t texel = static_cast<std::size_t>(patch.y + r) * model.texture.width + patch.x + j;
         const Vec3 got(along[texel], around[texel], out[texel]);
         // The foot is exact to eps times the bone's length; where the point is that close to it, its direction is lost.
-        const double foot = tables.rows[patch.row_begin + r].station * patch.length, length = (point - Vec3(0, 0, foot)).norm();
+        const double foot = tables.rows[patch.row_begin + r].axial * patch.length,
+                     length = (point - Vec3(0, 0, foot)).norm();
         const double eps = 1.2e-7;
-        ASSERT_LE((got - expected).norm(), 16 * eps * expected.norm() * (1 + (point.norm() + patch.length) / std::max(length, 1e-30)) +
-                                               16 * eps * (point.norm() + patch.length))
+        ASSERT_LE((got - expected).norm(),
+                  16 * eps * expected.norm() * (1 + (point.norm() + patch.length) / std::max(length, 1e-30)) +
+                      16 * eps * (point.norm() + patch.length))
             << point.transpose();
       }
 }

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/segment/segment_mesh.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -10,12 +8,13 @@
 #include <random>
 #include <set>
 
-#include "skeletex/measure/manifold.h"
+#include "skeletex/analysis/manifold.h"
+#include "skeletex/convert/segment/cells.h"
+#include "skeletex/convert/segment/segment_mesh.h"
+#include "skeletex/geometry/half_edge.h"
 #include "skeletex/model/error.h"
-#include "skeletex/model/walls.h"
-#include "skeletex/segment/cells.h"
-#include "skeletex/segment/check_skeleton.h"
-#include "skeletex/segment/half_edge.h"
+#include "skeletex/skeleton/check_skeleton.h"
+#include "skeletex/skeleton/separation_planes.h"
 #include "support/load_model.h"
 #include "support/random_skeleton.h"
 #include "support/segment_twin.h"
@@ -74,12 +73,12 @@ void expect_sound(const TriangleMesh& mesh, const Skeleton& skeleton, const Segm
   for (const double area : bone_areas(s)) sum += area;
   EXPECT_NEAR(sum, surface_area(mesh), 1e-9 * surface_area(mesh));
 
-  const Walls walls(skeleton);
+  const SeparationPlanes separation(skeleton);
   const auto at_nodes = bones_at_nodes(skeleton);
   std::vector<int> uses(s.arcs.size(), 0);
   for (const Arc& arc : s.arcs) {
     EXPECT_GE(arc.vertices.size(), 3u);
-    // On the wall, to the perturbation of 1e-7 diagonals over |d_i - d_j|.
+    // On the separation plane, to the perturbation of 1e-7 diagonals over |d_i - d_j|.
     Vec3 d[2];
     for (int k = 0; k < 2; ++k) {
       const BoneEnd end = skeleton.bones[arc.bones[k]].head == arc.node ? BoneEnd::kHead : BoneEnd::kTail;
@@ -87,10 +86,13 @@ void expect_sound(const TriangleMesh& mesh, const Skeleton& skeleton, const Segm
       d[k] = direction_from(skeleton, {arc.bones[k], end});
     }
     for (const int v : arc.vertices)
-      EXPECT_LE(std::abs((s.cut_mesh.positions[v] - skeleton.nodes[arc.node].position).dot(d[0] - d[1])), 1.01e-7 * diagonal);
+      EXPECT_LE(std::abs((s.cut_mesh.positions[v] - skeleton.nodes[arc.node].position).dot(d[0] - d[1])),
+                1.01e-7 * diagonal);
     // In the direction of growing angle: from corner to corner in the middle at least (single steps may turn back).
     double turning = 0;
-    const auto turn = [&](int v) { return walls.turn_of(arc.bones[0], s.cut_mesh.positions[v] - skeleton.nodes[arc.node].position); };
+    const auto turn = [&](int v) {
+      return separation.turn_of(arc.bones[0], s.cut_mesh.positions[v] - skeleton.nodes[arc.node].position);
+    };
     const std::size_t steps = arc.is_closed ? arc.vertices.size() : arc.vertices.size() - 1;
     for (std::size_t k = 0; k < steps; ++k) {
       const double step = turn(arc.vertices[(k + 1) % arc.vertices.size()]) - turn(arc.vertices[k]);
@@ -108,7 +110,9 @@ void expect_sound(const TriangleMesh& mesh, const Skeleton& skeleton, const Segm
     EXPECT_EQ(segment.source_vertices.size(), segment.mesh.positions.size());
     const ManifoldReport report = measure_manifold(segment.mesh);
     EXPECT_EQ(report.components, 1) << name;
-    EXPECT_TRUE(report.non_manifold_edges.empty() && report.misoriented_edges.empty() && report.degenerate_triangles.empty()) << name;
+    EXPECT_TRUE(report.non_manifold_edges.empty() && report.misoriented_edges.empty() &&
+                report.degenerate_triangles.empty())
+        << name;
     EXPECT_TRUE(report.unreferenced_vertices.empty()) << name;
     std::size_t boundary = 0;
     int loops = 0;
@@ -124,7 +128,9 @@ void expect_sound(const TriangleMesh& mesh, const Skeleton& skeleton, const Segm
       EXPECT_EQ(source, loop_through_arcs(s, loop)) << name;
       double turning = 0;
       for (std::size_t k = 0; k < source.size(); ++k) {
-        const auto turn = [&](int v) { return walls.turn_of(segment.bone, s.cut_mesh.positions[v] - skeleton.nodes[node].position); };
+        const auto turn = [&](int v) {
+          return separation.turn_of(segment.bone, s.cut_mesh.positions[v] - skeleton.nodes[node].position);
+        };
         const double step = turn(source[(k + 1) % source.size()]) - turn(source[k]);
         turning += step - std::round(step);
       }
@@ -138,7 +144,9 @@ void expect_sound(const TriangleMesh& mesh, const Skeleton& skeleton, const Segm
     EXPECT_EQ(report.boundary_edges.size(), boundary) << name;
     const int euler = report.vertices - report.edges + report.triangles;
     EXPECT_EQ(euler, 2 - loops) << name;
-    EXPECT_EQ(segment.topology, loops == 2 ? SegmentTopology::kAnnulus : loops == 1 ? SegmentTopology::kDisk : SegmentTopology::kSphere);
+    EXPECT_EQ(segment.topology, loops == 2   ? SegmentTopology::kAnnulus
+                                : loops == 1 ? SegmentTopology::kDisk
+                                             : SegmentTopology::kSphere);
     for (const Triangle& t : segment.mesh.triangles) EXPECT_GT(area_vector(segment.mesh, t).norm(), 0) << name;
   }
   for (std::size_t a = 0; a < uses.size(); ++a) EXPECT_EQ(uses[a], 2) << "arc " << a;
@@ -176,7 +184,8 @@ std::string refusal(const TriangleMesh& mesh, const Skeleton& skeleton) {
 
 testing::AssertionResult mentions(const std::string& message, const std::vector<std::string>& parts) {
   for (const std::string& part : parts)
-    if (message.find(part) == std::string::npos) return testing::AssertionFailure() << "no '" << part << "' in: " << message;
+    if (message.find(part) == std::string::npos)
+      return testing::AssertionFailure() << "no '" << part << "' in: " << message;
   return testing::AssertionSuccess();
 }
 
@@ -184,7 +193,8 @@ testing::AssertionResult mentions(const std::string& message, const std::vector<
 Skeleton skeleton_of(const std::vector<Vec3>& nodes, const std::vector<std::array<int, 2>>& bones) {
   Skeleton skeleton;
   for (std::size_t n = 0; n < nodes.size(); ++n) skeleton.nodes.push_back({"n" + std::to_string(n), nodes[n]});
-  for (std::size_t b = 0; b < bones.size(); ++b) skeleton.bones.push_back({"b" + std::to_string(b), bones[b][0], bones[b][1], std::nullopt});
+  for (std::size_t b = 0; b < bones.size(); ++b)
+    skeleton.bones.push_back({"b" + std::to_string(b), bones[b][0], bones[b][1], std::nullopt});
   return skeleton;
 }
 
@@ -193,7 +203,9 @@ TriangleMesh octahedron() {
           {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}}};
 }
 
-TriangleMesh tetrahedron() { return {{{1, 1, 1}, {-1, -1, 1}, {-1, 1, -1}, {1, -1, -1}}, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}}; }
+TriangleMesh tetrahedron() {
+  return {{{1, 1, 1}, {-1, -1, 1}, {-1, 1, -1}, {1, -1, -1}}, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
+}
 
 }  // namespace
 
@@ -205,9 +217,10 @@ TEST_P(SegmentModel, IsCutIntoTubesAndCapsThatAddUp) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Real, SegmentModel,
-                         testing::Values("armadillo", "bear", "bear_bis", "bull", "bull_16", "bunny00", "bunny00_9", "cactus", "camel", "camel_16", "cow",
-                                         "diplodocus", "double_torus", "eight", "eight_dumbbell", "eight_theta", "homer", "knot1", "man", "pinion",
-                                         "pinion_5", "triceratops", "triceratops_17"),
+                         testing::Values("armadillo", "bear", "bear_bis", "bull", "bull_16", "bunny00", "bunny00_9",
+                                         "cactus", "camel", "camel_16", "cow", "diplodocus", "double_torus", "eight",
+                                         "eight_dumbbell", "eight_theta", "homer", "knot1", "man", "pinion", "pinion_5",
+                                         "triceratops", "triceratops_17"),
                          [](const auto& test) { return std::string(test.param); });
 
 TEST(Segment, CutsEveryGeneratedShape) {
@@ -237,7 +250,7 @@ TEST(Segment, CutsCoarseBodiesWhoseTrianglesHoldWholeCells) {
 }
 
 TEST(Segment, CutsCoCircularDirectionsThroughVerticesAndEdgesOfTheMesh) {
-  // The octahedron's own axes and diagonals: every wall runs through vertices, edges or along both.
+  // The octahedron's own axes and diagonals: every separation plane runs through vertices, edges or along both.
   std::vector<std::vector<Vec3>> stars{
       {{1, 0, 0}, {-1, 0, 0}},
       {{1, 0, 0}, {0, 1, 0}},
@@ -283,14 +296,17 @@ TEST(Segment, GivesSegmentsThatDoNotDependOnNumbering) {
     const auto bones = random_permutation(static_cast<int>(model.skeleton.bones.size()), seed + 2);
     const auto nodes = random_permutation(static_cast<int>(model.skeleton.nodes.size()), seed + 3);
     TriangleMesh mesh = with_triangles_renumbered(with_vertices_renumbered(model.mesh, vertices), triangles);
-    for (std::size_t t = 0; t < mesh.triangles.size(); t += 3) std::rotate(mesh.triangles[t].begin(), mesh.triangles[t].begin() + 1, mesh.triangles[t].end());
+    for (std::size_t t = 0; t < mesh.triangles.size(); t += 3)
+      std::rotate(mesh.triangles[t].begin(), mesh.triangles[t].begin() + 1, mesh.triangles[t].end());
     Skeleton skeleton = with_nodes_renumbered(with_bones_renumbered(model.skeleton, bones), nodes);
-    for (std::size_t b = 0; b < skeleton.bones.size(); b += 2) std::swap(skeleton.bones[b].head, skeleton.bones[b].tail);
+    for (std::size_t b = 0; b < skeleton.bones.size(); b += 2)
+      std::swap(skeleton.bones[b].head, skeleton.bones[b].tail);
 
     const Segmentation s = segment(mesh, skeleton);
     expect_sound(mesh, skeleton, s);
     const std::vector<double> renumbered = bone_areas(s);
-    for (std::size_t b = 0; b < areas.size(); ++b) EXPECT_NEAR(renumbered[bones[b]], areas[b], 1e-9 * total) << "bone " << b;
+    for (std::size_t b = 0; b < areas.size(); ++b)
+      EXPECT_NEAR(renumbered[bones[b]], areas[b], 1e-9 * total) << "bone " << b;
   }
 }
 
@@ -300,7 +316,8 @@ TEST(Segment, FollowsARigidMotionAndAScaling) {
   for (const std::uint64_t seed : {1, 2, 3}) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Similarity map = random_similarity(seed);
-    const std::vector<double> moved = bone_areas(segment(transformed(model.mesh, map), transformed(model.skeleton, map)));
+    const std::vector<double> moved =
+        bone_areas(segment(transformed(model.mesh, map), transformed(model.skeleton, map)));
     // The perturbation is dealt out anew: each boundary, shorter than two diagonals, moves by less than 1e-7 diagonals.
     const double tolerance = 4 * 1e-7 * std::pow(bounding_box(model.mesh).diagonal(), 2);
     for (std::size_t b = 0; b < areas.size(); ++b) EXPECT_NEAR(moved[b] / (map.scale * map.scale), areas[b], tolerance);
@@ -323,9 +340,10 @@ TEST(Segment, LeavesALoneBoneItsWholeMesh) {
   EXPECT_TRUE(s.arcs.empty());
 }
 
-TEST(Segment, DoesNotCutAnotherLimbThatTheWallReaches) {
-  // A hairpin: the wall in the middle of one leg reaches through the other.
-  const Skeleton hairpin = skeleton_of({{0, 0, 0}, {2, 0, 0}, {4, 0, 0}, {4, 2, 0}, {0, 2, 0}}, {{0, 1}, {1, 2}, {2, 3}, {3, 4}});
+TEST(Segment, DoesNotCutAnotherLimbThatTheSeparationPlaneReaches) {
+  // A hairpin: the separation plane in the middle of one leg reaches through the other.
+  const Skeleton hairpin =
+      skeleton_of({{0, 0, 0}, {2, 0, 0}, {4, 0, 0}, {4, 2, 0}, {0, 2, 0}}, {{0, 1}, {1, 2}, {2, 3}, {3, 4}});
   const TriangleMesh mesh = thickened(hairpin, {0.5, 0.5, 0.5, 0.5, 0.5}, 0.1, 0.2);
   const Segmentation s = segment(mesh, hairpin);
   expect_sound(mesh, hairpin, s);
@@ -339,7 +357,8 @@ TEST(Segment, DoesNotCutAnotherLimbThatTheWallReaches) {
 TEST(SegmentRefusal, NamesANodeOutsideAndItsBone) {
   Shape y = y_shape();
   y.skeleton.nodes[2].position = {-2.5, 3.2, 0};
-  EXPECT_TRUE(mentions(refusal(y.mesh, y.skeleton), {"node \"left\"", "bone \"left\"", "outside", "(-2.5, 3.2, 0)", "move"}));
+  EXPECT_TRUE(
+      mentions(refusal(y.mesh, y.skeleton), {"node \"left\"", "bone \"left\"", "outside", "(-2.5, 3.2, 0)", "move"}));
 }
 
 TEST(SegmentRefusal, SaysThatTheMeshIsInsideOut) {
@@ -349,13 +368,15 @@ TEST(SegmentRefusal, SaysThatTheMeshIsInsideOut) {
 
 TEST(SegmentRefusal, NamesABoneThatLeavesTheMeshAndThePlace) {
   const Shape chain = chain_shape(3, 0.9);
-  const Skeleton shortcut{chain.skeleton.nodes, {{"shortcut", chain.skeleton.bones[0].head, chain.skeleton.bones[2].tail, std::nullopt}}};
+  const Skeleton shortcut{chain.skeleton.nodes,
+                          {{"shortcut", chain.skeleton.bones[0].head, chain.skeleton.bones[2].tail, std::nullopt}}};
   EXPECT_TRUE(mentions(refusal(chain.mesh, shortcut), {"bone \"shortcut\" leaves the mesh at (", "move"}));
 }
 
-TEST(SegmentRefusal, NamesTheBoneWhoseWallsCross) {
+TEST(SegmentRefusal, NamesTheBoneWhoseSeparationPlanesCross) {
   const TriangleMesh ball = capsule_shape(0.01, 1).mesh;
-  const Skeleton skeleton = skeleton_of({{-0.6, -0.5, 0}, {-0.05, 0, 0}, {0.05, 0, 0}, {0.6, -0.5, 0}}, {{0, 1}, {1, 2}, {2, 3}});
+  const Skeleton skeleton =
+      skeleton_of({{-0.6, -0.5, 0}, {-0.05, 0, 0}, {0.05, 0, 0}, {0.6, -0.5, 0}}, {{0, 1}, {1, 2}, {2, 3}});
   EXPECT_TRUE(mentions(refusal(ball, skeleton), {"bone \"b1\"", "\"n1\"", "\"n2\"", "cross", "at (", "move"}));
 }
 
@@ -371,8 +392,11 @@ TEST(SegmentRefusal, NamesTheBonesWhereAHandleHasNoRing) {
 
 TEST(SegmentRefusal, NamesBonesApartAndBonesInOneDirection) {
   const TriangleMesh ball = capsule_shape(0.01, 1).mesh;
-  EXPECT_TRUE(mentions(refusal(ball, skeleton_of({{-0.5, 0, 0}, {-0.2, 0, 0}, {0.2, 0, 0}, {0.5, 0, 0}}, {{0, 1}, {2, 3}})), {"\"b1\"", "\"b0\"", "node"}));
-  EXPECT_TRUE(mentions(refusal(ball, skeleton_of({{0, 0, 0}, {0.2, 0, 0}, {0.5, 0, 0}}, {{0, 1}, {0, 2}})), {"\"b0\"", "\"b1\"", "\"n0\"", "direction"}));
+  EXPECT_TRUE(
+      mentions(refusal(ball, skeleton_of({{-0.5, 0, 0}, {-0.2, 0, 0}, {0.2, 0, 0}, {0.5, 0, 0}}, {{0, 1}, {2, 3}})),
+               {"\"b1\"", "\"b0\"", "node"}));
+  EXPECT_TRUE(mentions(refusal(ball, skeleton_of({{0, 0, 0}, {0.2, 0, 0}, {0.5, 0, 0}}, {{0, 1}, {0, 2}})),
+                       {"\"b0\"", "\"b1\"", "\"n0\"", "direction"}));
   EXPECT_THROW(segment(ball, skeleton_of({{0, 0, 0}, {0, 0, 0}}, {{0, 1}})), InputError);
   EXPECT_THROW(segment(ball, Skeleton{}), InputError);
 }
@@ -389,7 +413,8 @@ TEST(SegmentRefusal, NeverCrashesOnMovedNodes) {
       SCOPED_TRACE(name + std::to_string(run));
       Skeleton skeleton = model.skeleton;
       const double amplitude = diagonal * std::pow(10.0, -1.3 - 0.15 * run);
-      for (Node& node : skeleton.nodes) node.position += amplitude * test::random_between(random, 0, 1) * test::random_direction(random);
+      for (Node& node : skeleton.nodes)
+        node.position += amplitude * test::random_between(random, 0, 1) * test::random_direction(random);
       try {
         const Segmentation s = segment(model.mesh, skeleton);
         expect_sound(model.mesh, skeleton, s);
@@ -488,9 +513,11 @@ TEST(WindingNumber, IsTheSolidAngle) {
     double angle = 0;
     for (const Triangle& t : mesh.triangles) {
       const Vec3 a = mesh.positions[t[0]] - p, b = mesh.positions[t[1]] - p, c = mesh.positions[t[2]] - p;
-      angle += 2 * std::atan2(a.dot(b.cross(c)), a.norm() * b.norm() * c.norm() + a.dot(b) * c.norm() + b.dot(c) * a.norm() + c.dot(a) * b.norm());
+      angle += 2 * std::atan2(a.dot(b.cross(c)), a.norm() * b.norm() * c.norm() + a.dot(b) * c.norm() +
+                                                     b.dot(c) * a.norm() + c.dot(a) * b.norm());
     }
-    EXPECT_EQ(winding_number(half_edges.positions, half_edges.origins, p), std::lround(angle / (4 * std::numbers::pi))) << p.transpose();
+    EXPECT_EQ(winding_number(half_edges.positions, half_edges.origins, p), std::lround(angle / (4 * std::numbers::pi)))
+        << p.transpose();
   }
 }
 
@@ -499,7 +526,7 @@ TEST(ClassifyPoints, AgreesWithItsTwinOutsideTheMarginAndIsNeverWrong) {
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
   for (int run = 0; run < 6; ++run) {
-    // Stars of 2 to 60 bones; points all over, on the walls, at the nodes, far off, and the same one often.
+    // Stars of 2 to 60 bones; points all over, on the separation planes, at the nodes, far off, and the same one often.
     Skeleton skeleton;
     std::vector<Vec3> points;
     for (int star = 0; star < 4; ++star) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/measure/self_intersection.h"
+#include "skeletex/geometry/self_intersection.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <numbers>
 #include <random>
 
-#include "skeletex/measure/manifold.h"
-#include "skeletex/measure/predicates.h"
+#include "skeletex/analysis/manifold.h"
+#include "skeletex/geometry/predicates.h"
 #include "support/load_model.h"
 #include "support/shapes.h"
 
@@ -53,7 +53,9 @@ bool do_polygons_meet(const std::vector<Int3>& a, const std::vector<Int3>& b) {
 
 bool has_area(const std::vector<Int3>& t) { return !(t[1] - t[0]).cross(t[2] - t[0]).isZero(); }
 
-TriangleMesh pair_of(const std::vector<Vec3>& positions, Triangle first, Triangle second) { return {positions, {first, second}}; }
+TriangleMesh pair_of(const std::vector<Vec3>& positions, Triangle first, Triangle second) {
+  return {positions, {first, second}};
+}
 
 }  // namespace
 
@@ -87,7 +89,8 @@ TEST(SelfIntersection, TrianglesAtAVertexMeetWhereTheirConesDo) {
   for (int round = 0; round < 60000; ++round) {
     std::uniform_int_distribution<int> coordinate(-3, 3);
     std::vector<Int3> p;
-    for (int k = 0; k < 4; ++k) p.emplace_back(coordinate(random), coordinate(random), round % 4 == 0 ? 0 : coordinate(random));
+    for (int k = 0; k < 4; ++k)
+      p.emplace_back(coordinate(random), coordinate(random), round % 4 == 0 ? 0 : coordinate(random));
     const Int3 zero = Int3::Zero();
     const std::vector<Int3> a{zero, p[0], p[1]}, b{zero, p[2], p[3]};
     if (!has_area(a) || !has_area(b)) continue;
@@ -111,7 +114,8 @@ TEST(SelfIntersection, TrianglesAtAnEdgeMeetOnlyWhenFoldedFlat) {
 }
 
 TEST(SelfIntersection, ATriangleWithoutAreaIsASegment) {
-  const std::vector<Vec3> p{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.2, 0.2, -1}, {0.2, 0.2, 1}, {0.2, 0.2, 0.5}, {3, 3, 1}, {3, 3, -1}};
+  const std::vector<Vec3> p{{0, 0, 0},     {1, 0, 0},       {0, 1, 0}, {0.2, 0.2, -1},
+                            {0.2, 0.2, 1}, {0.2, 0.2, 0.5}, {3, 3, 1}, {3, 3, -1}};
   EXPECT_TRUE(do_triangles_intersect(pair_of(p, {0, 1, 2}, {3, 4, 5}), 0, 1));
   EXPECT_FALSE(do_triangles_intersect(pair_of(p, {0, 1, 2}, {6, 7, 7}), 0, 1));
   EXPECT_FALSE(do_triangles_intersect(pair_of(p, {3, 4, 5}, {6, 7, 7}), 0, 1));
@@ -149,8 +153,10 @@ TEST(SelfIntersection, OfACrumpledTorusTheTreeFindsThePairsOfBruteForce) {
     constexpr int kAround = 24, kAlong = 14;
     for (int i = 0; i < kAround; ++i)
       for (int j = 0; j < kAlong; ++j) {
-        const double a = 2 * std::numbers::pi * i / kAround, b = 2 * std::numbers::pi * j / kAlong, r = 1 + 0.4 * std::cos(b);
-        mesh.positions.push_back(Vec3(r * std::cos(a), r * std::sin(a), 0.4 * std::sin(b)) + (0.02 + 0.03 * seed) * Vec3(normal(random), normal(random), normal(random)));
+        const double a = 2 * std::numbers::pi * i / kAround, b = 2 * std::numbers::pi * j / kAlong,
+                     r = 1 + 0.4 * std::cos(b);
+        mesh.positions.push_back(Vec3(r * std::cos(a), r * std::sin(a), 0.4 * std::sin(b)) +
+                                 (0.02 + 0.03 * seed) * Vec3(normal(random), normal(random), normal(random)));
         const int right = (i + 1) % kAround, up = (j + 1) % kAlong;
         mesh.triangles.push_back({kAlong * i + j, kAlong * right + j, kAlong * right + up});
         mesh.triangles.push_back({kAlong * i + j, kAlong * right + up, kAlong * i + up});
@@ -203,7 +209,8 @@ TEST(SelfIntersection, TheCountDoesNotDependOnTheOrderOfTheTriangles) {
   EXPECT_GT(count, 0);
   const std::vector<int> order = random_permutation(static_cast<int>(mesh.triangles.size()), 9);
   TriangleMesh shuffled = mesh;
-  for (std::size_t t = 0; t < order.size(); ++t) shuffled.triangles[t] = {mesh.triangles[order[t]][1], mesh.triangles[order[t]][2], mesh.triangles[order[t]][0]};
+  for (std::size_t t = 0; t < order.size(); ++t)
+    shuffled.triangles[t] = {mesh.triangles[order[t]][1], mesh.triangles[order[t]][2], mesh.triangles[order[t]][0]};
   EXPECT_EQ(count_self_intersections(shuffled), count);
 }
 

@@ -6,7 +6,7 @@
 #include <Eigen/Geometry>
 #include <numbers>
 
-#include "skeletex/measure/manifold.h"
+#include "skeletex/analysis/manifold.h"
 
 namespace skeletex {
 namespace {
@@ -24,7 +24,8 @@ TEST(Shapes, AreClosedOrientedManifoldsOfOneComponentAndOfTheGenusTheyName) {
     for (const Triangle& t : named.shape.mesh.triangles)
       for (int i = 0; i < 3; ++i) {
         const Vec3& p = named.shape.mesh.positions[t[i]];
-        const Vec3 a = named.shape.mesh.positions[t[(i + 1) % 3]] - p, b = named.shape.mesh.positions[t[(i + 2) % 3]] - p;
+        const Vec3 a = named.shape.mesh.positions[t[(i + 1) % 3]] - p,
+                   b = named.shape.mesh.positions[t[(i + 2) % 3]] - p;
         smallest_angle = std::min(smallest_angle, std::atan2(a.cross(b).norm(), a.dot(b)));
       }
     EXPECT_GT(smallest_angle, 0.02);
@@ -39,7 +40,8 @@ TEST(Shapes, ThickenedSkeletonHasTheVolumeOfItsCapsule) {
   const double h = 0.1;
   const TriangleMesh mesh = thickened(skeleton, {r, r}, 0.1, h);
   EXPECT_NEAR(signed_volume(mesh), expected, expected * 3 * h * h / (8 * r * r));
-  for (const Vec3& p : mesh.positions) EXPECT_NEAR(distance_to_bone(p, skeleton.nodes[0].position, skeleton.nodes[1].position), r, 1e-5);
+  for (const Vec3& p : mesh.positions)
+    EXPECT_NEAR(distance_to_bone(p, skeleton.nodes[0].position, skeleton.nodes[1].position), r, 1e-5);
 }
 
 TEST(Shapes, SimilaritiesScaleAreaAndVolumeAndRenumberingKeepsThem) {

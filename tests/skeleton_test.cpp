@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/model/skeleton.h"
+#include "skeletex/skeleton/skeleton.h"
 
 #include <gtest/gtest.h>
 
@@ -18,7 +18,9 @@ Skeleton single_bone(const Vec3& head, const Vec3& tail, std::optional<Vec3> s =
   return {{{"a", head}, {"b", tail}}, {{"bone", 0, 1, s}}};
 }
 
-Vec3 spoke_of(const BoneBasis& basis, double turn) { return std::cos(2 * M_PI * turn) * basis.s + std::sin(2 * M_PI * turn) * basis.b; }
+Vec3 radial_of(const BoneBasis& basis, double turn) {
+  return std::cos(2 * M_PI * turn) * basis.s + std::sin(2 * M_PI * turn) * basis.b;
+}
 
 }  // namespace
 
@@ -39,7 +41,8 @@ TEST(Skeleton, BasesAreOrthonormalAndRightHanded) {
 }
 
 TEST(Skeleton, NothingTwistsAtANodeOfTwoBones) {
-  // A point of the wall at v about the one bone lies at v about the other, or at -v where both have the same end there.
+  // A point of the separation plane at v about the one bone lies at v about the other, or at -v where both have the
+  // same end there.
   std::mt19937 random(2);
   for (int trial = 0; trial < 400; ++trial) {
     const Skeleton skeleton = star_skeleton(test::spread_directions(2, 0.2, random), random);
@@ -48,10 +51,11 @@ TEST(Skeleton, NothingTwistsAtANodeOfTwoBones) {
     const Vec3 normal = direction_from(skeleton, at[0]) - direction_from(skeleton, at[1]);
     const double sigma = at[0].end == at[1].end ? -1 : 1;
     for (const double turn : {0.0, 0.1, 0.35, 0.77}) {
-      const Vec3 spoke = spoke_of(bases[0], turn);
-      const Vec3 f = spoke - spoke.dot(normal) / bases[0].o.dot(normal) * bases[0].o;
+      const Vec3 radial = radial_of(bases[0], turn);
+      const Vec3 f = radial - radial.dot(normal) / bases[0].o.dot(normal) * bases[0].o;
       const double other = std::atan2(f.dot(bases[1].b), f.dot(bases[1].s)) / (2 * M_PI);
-      // Angles in the wall are conditioned by the wall's tilt, 1 / sin(half the angle between the bones).
+      // Angles in the separation plane are conditioned by the separation plane's tilt, 1 / sin(half the angle between
+      // the bones).
       EXPECT_LT(test::turn_distance(other, sigma * turn), 1e-13);
     }
   }
@@ -79,7 +83,8 @@ TEST(Skeleton, StraightNodesAreNoSpecialCase) {
 }
 
 TEST(Skeleton, KeepsAGivenDirectionAndCarriesItOn) {
-  Skeleton skeleton{{{"a", {0, 0, 0}}, {"b", {1, 0, 0}}, {"c", {1, 1, 0}}}, {{"ab", 0, 1, Vec3(5, 0, 2)}, {"bc", 1, 2, {}}}};
+  Skeleton skeleton{{{"a", {0, 0, 0}}, {"b", {1, 0, 0}}, {"c", {1, 1, 0}}},
+                    {{"ab", 0, 1, Vec3(5, 0, 2)}, {"bc", 1, 2, {}}}};
   auto bases = bone_bases(skeleton);
   EXPECT_LT((bases[0].s - Vec3(0, 0, 1)).norm(), 1e-15);
   EXPECT_LT((bases[1].s - Vec3(0, 0, 1)).norm(), 1e-15);
@@ -123,7 +128,8 @@ TEST(Skeleton, NamesABoneWithoutLengthOrWithAParallelDirection) {
     return "";
   };
   EXPECT_NE(message(single_bone({1, 2, 3}, {1, 2, 3})).find("\"bone\" has no length"), std::string::npos);
-  EXPECT_NE(message(single_bone({0, 0, 0}, {0, 0, 1}, Vec3(0, 0, -2))).find("\"bone\": its \"s\" is parallel"), std::string::npos);
+  EXPECT_NE(message(single_bone({0, 0, 0}, {0, 0, 1}, Vec3(0, 0, -2))).find("\"bone\": its \"s\" is parallel"),
+            std::string::npos);
   EXPECT_NE(message(single_bone({0, 0, 0}, {0, 0, 1}, Vec3(0, 0, 0))), "");
   EXPECT_NE(message(single_bone({0, 0, 0}, {0, 0, std::nan("")})), "");
 }
@@ -131,7 +137,8 @@ TEST(Skeleton, NamesABoneWithoutLengthOrWithAParallelDirection) {
 TEST(Skeleton, MeasuresTheDistanceToABoneAsThatToItsNearestPoint) {
   std::mt19937 random(4);
   for (int trial = 0; trial < 200; ++trial) {
-    const Vec3 head = test::random_direction(random), tail = 2 * test::random_direction(random), point = 3 * test::random_direction(random);
+    const Vec3 head = test::random_direction(random), tail = 2 * test::random_direction(random),
+               point = 3 * test::random_direction(random);
     double least = 1e9;
     for (int i = 0; i <= 2000; ++i) least = std::min(least, (head + i / 2000.0 * (tail - head) - point).norm());
     EXPECT_LE(distance_to_bone(point, head, tail), least + 1e-15);

@@ -9,12 +9,12 @@
 #include <numbers>
 #include <random>
 
-#include "skeletex/measure/manifold.h"
-#include "skeletex/model/pose.h"
-#include "skeletex/model/walls.h"
-#include "skeletex/model/weight_walk.h"
+#include "skeletex/analysis/manifold.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/skeleton/pose.h"
+#include "skeletex/skeleton/separation_planes.h"
+#include "skeletex/skeleton/weight_walk.h"
 #include "support/synthetic_model.h"
 
 namespace skeletex {
@@ -27,8 +27,14 @@ struct NamedSkeleton {
 };
 
 std::vector<NamedSkeleton> all_skeletons() {
-  return {{"lone bone", lone_bone(), 0.3}, {"chain of two", chain(2), 0.2}, {"chain of nine", chain(9), 0.2},           {"Y", y_branch(), 0.25},
-          {"cross of 6", cross(6), 0.3},   {"ring of 3", ring(3), 0.2},     {"ring with an arm", ring_with_arm(6), 0.2}, {"tree of 12", random_tree(12, 3), 0.15}};
+  return {{"lone bone", lone_bone(), 0.3},
+          {"chain of two", chain(2), 0.2},
+          {"chain of nine", chain(9), 0.2},
+          {"Y", y_branch(), 0.25},
+          {"cross of 6", cross(6), 0.3},
+          {"ring of 3", ring(3), 0.2},
+          {"ring with an arm", ring_with_arm(6), 0.2},
+          {"tree of 12", random_tree(12, 3), 0.15}};
 }
 
 SkeletexModel model_of(const NamedSkeleton& named) {
@@ -63,7 +69,8 @@ Skeleton moved(const Skeleton& skeleton, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(-0.3, 0.3);
   Pose pose;
-  for (const Node& node : skeleton.nodes) pose.nodes.push_back(node.position + Vec3(unit(random), unit(random), unit(random)));
+  for (const Node& node : skeleton.nodes)
+    pose.nodes.push_back(node.position + Vec3(unit(random), unit(random), unit(random)));
   return apply_pose(skeleton, pose);
 }
 
@@ -71,11 +78,11 @@ TEST(Skin, WeightsAgreeOnBothSidesOfEverySeam) {
   for (const NamedSkeleton& named : all_skeletons()) {
     SCOPED_TRACE(named.name);
     const SkeletexModel model = model_of(named);
-    const Walls walls(model.skeleton);
+    const SeparationPlanes separation(model.skeleton);
     const WeightWalks walks = make_weight_walks(model);
     const auto check = [&](int node, const auto& bones, const SeamSample& sample) {
       const BoneEnd end = model.skeleton.bones[bones[0]].head == node ? BoneEnd::kHead : BoneEnd::kTail;
-      const Vec3 point = walls.seam_point(bones[0], end, sample.turn, sample.distance) - model.origin;
+      const Vec3 point = separation.seam_point(bones[0], end, sample.turn, sample.distance) - model.origin;
       const auto weights = bone_weights(walks, bones[0], point);
       for (const int other : bones) EXPECT_LT(largest_difference(weights, bone_weights(walks, other, point)), 1e-5);
     };
@@ -122,8 +129,10 @@ TEST(Skin, KernelsMoveVerticesAsTheHostDoesInDoublePrecision) {
     EXPECT_EQ(mesh.triangles, bind.triangles);
     for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
       const Rectangle& rectangle = model.patches[bone].rectangle;
-      for (int i = lattice.first_inner[bone]; i < lattice.first_inner[bone] + rectangle.width * (rectangle.height - 2); ++i) {
-        const Vec3 expected = blend_motions(motions, bone_weights(walks, bone, bind.positions[i] - model.origin), bind.positions[i]);
+      for (int i = lattice.first_inner[bone]; i < lattice.first_inner[bone] + rectangle.width * (rectangle.height - 2);
+           ++i) {
+        const Vec3 expected =
+            blend_motions(motions, bone_weights(walks, bone, bind.positions[i] - model.origin), bind.positions[i]);
         ASSERT_LT((mesh.positions[i] - expected).norm(), 1e-5 * model.diagonal) << "vertex " << i;
       }
     }
@@ -138,7 +147,8 @@ TEST(Skin, BindPoseAndRigidMotionsAreExactAndEveryPoseIsClosed) {
     const Eigen::Quaterniond rotation(Eigen::AngleAxisd(2.1, Vec3(1, -2, 0.5).normalized()));
     Pose rigid;
     for (const Node& node : model.skeleton.nodes) rigid.nodes.push_back(rotation * node.position + Vec3(3, 2, 1));
-    const TriangleMesh same = reconstruct_mesh(device(), model, apply_pose(model.skeleton, Pose{})), turned = reconstruct_mesh(device(), model, apply_pose(model.skeleton, rigid));
+    const TriangleMesh same = reconstruct_mesh(device(), model, apply_pose(model.skeleton, Pose{})),
+                       turned = reconstruct_mesh(device(), model, apply_pose(model.skeleton, rigid));
     for (std::size_t i = 0; i < bind.positions.size(); ++i) {
       ASSERT_LT((same.positions[i] - bind.positions[i]).norm(), 1e-6 * model.diagonal);
       // The nodes of a lone bone leave its turn about itself open.
@@ -147,14 +157,16 @@ TEST(Skin, BindPoseAndRigidMotionsAreExactAndEveryPoseIsClosed) {
     }
     for (unsigned seed = 0; seed < 5; ++seed) {
       const ManifoldReport report = measure_manifold(reconstruct_mesh(device(), model, moved(model.skeleton, seed)));
-      EXPECT_TRUE(report.is_closed_manifold() && report.genus == model.genus && report.non_finite_vertices.empty()) << seed;
+      EXPECT_TRUE(report.is_closed_manifold() && report.genus == model.genus && report.non_finite_vertices.empty())
+          << seed;
     }
   }
 }
 
 double largest_distance(const TriangleMesh& a, const TriangleMesh& b) {
   double largest = 0;
-  for (std::size_t i = 0; i < a.positions.size(); ++i) largest = std::max(largest, (a.positions[i] - b.positions[i]).norm());
+  for (std::size_t i = 0; i < a.positions.size(); ++i)
+    largest = std::max(largest, (a.positions[i] - b.positions[i]).norm());
   return largest;
 }
 
@@ -198,7 +210,8 @@ TEST(Skin, PaintedWeightsFollowToOtherSizes) {
   SkeletexModel plain = large;
   plain.bone_weights.clear();
   const Skeleton posed = moved(model.skeleton, 5);
-  EXPECT_LT(largest_distance(reconstruct_mesh(device(), large, posed), reconstruct_mesh(device(), plain, posed)), 0.02 * model.diagonal);
+  EXPECT_LT(largest_distance(reconstruct_mesh(device(), large, posed), reconstruct_mesh(device(), plain, posed)),
+            0.02 * model.diagonal);
 }
 
 TEST(Skin, ABoneThatGetsLongerTakesItsSurfaceAlong) {
@@ -213,7 +226,8 @@ TEST(Skin, ABoneThatGetsLongerTakesItsSurfaceAlong) {
   EXPECT_LT((blend_motions(motions, left, Vec3(0.5, 0.2, 0)) - Vec3(0.75, 0.2, 0)).norm(), 1e-12);
   EXPECT_LT((blend_motions(motions, left, Vec3(-0.1, 0.2, 0)) - Vec3(-0.1, 0.2, 0)).norm(), 1e-12);
   // At the joint the two bones agree.
-  EXPECT_LT((blend_motions(motions, left, Vec3(1, 0.2, 0)) - blend_motions(motions, right, Vec3(1, 0.2, 0))).norm(), 1e-12);
+  EXPECT_LT((blend_motions(motions, left, Vec3(1, 0.2, 0)) - blend_motions(motions, right, Vec3(1, 0.2, 0))).norm(),
+            1e-12);
 }
 
 TEST(Skin, HalfWeightsHalveTheTurnAndSignsFollowTheSkeleton) {
@@ -221,9 +235,11 @@ TEST(Skin, HalfWeightsHalveTheTurnAndSignsFollowTheSkeleton) {
   const Skeleton skeleton = chain(6);
   Pose pose;
   for (std::size_t i = 0; i < skeleton.bones.size(); ++i)
-    pose.rotations.push_back(Eigen::Quaterniond(Eigen::AngleAxisd(i == 0 ? 0 : 80 * std::numbers::pi / 180, Vec3::UnitZ())));
+    pose.rotations.push_back(
+        Eigen::Quaterniond(Eigen::AngleAxisd(i == 0 ? 0 : 80 * std::numbers::pi / 180, Vec3::UnitZ())));
   const std::vector<BoneMotion> motions = bone_motions(skeleton, apply_pose(skeleton, pose));
-  for (std::size_t i = 0; i + 1 < motions.size(); ++i) EXPECT_GT(motions[i].rotation.dot(motions[i + 1].rotation), 0.7) << i;
+  for (std::size_t i = 0; i + 1 < motions.size(); ++i)
+    EXPECT_GT(motions[i].rotation.dot(motions[i + 1].rotation), 0.7) << i;
   const Vec3 joint = skeleton.nodes[skeleton.bones[0].tail].position;
   const std::vector<BoneWeight> half{{0, 0.5}, {1, 0.5}};
   const Vec3 expected = joint + Eigen::AngleAxisd(40 * std::numbers::pi / 180, Vec3::UnitZ()) * Vec3(0.1, 0.2, 0.3);

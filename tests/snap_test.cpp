@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include "skeletex/convert/snap/snap.h"
+
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -7,12 +9,11 @@
 #include <numeric>
 #include <random>
 
-#include "skeletex/encode/encode_model.h"
-#include "skeletex/encode/row_profile.h"
-#include "skeletex/encode/snap.h"
-#include "skeletex/measure/manifold.h"
-#include "skeletex/measure/metro.h"
-#include "skeletex/measure/self_intersection.h"
+#include "skeletex/analysis/manifold.h"
+#include "skeletex/analysis/metro.h"
+#include "skeletex/convert/encode_model.h"
+#include "skeletex/convert/layout/row_profile.h"
+#include "skeletex/geometry/self_intersection.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "support/load_model.h"
 #include "support/snap_twin.h"
@@ -35,10 +36,13 @@ struct OnePatch {
 
   explicit OnePatch(const Rectangle& rectangle) {
     patches.push_back({rectangle, Method::kVsm, SegmentTopology::kSphere, spread_rows_uniformly(rectangle.height)});
-    layout = upload_layout(device(), patches, frame_tables(skeleton, Walls(skeleton), patches, Vec3::Zero()), kTextureWidth, kTextureHeight);
+    layout = upload_layout(device(), patches, frame_tables(skeleton, SeparationPlanes(skeleton), patches, Vec3::Zero()),
+                           kTextureWidth, kTextureHeight);
   }
   const Rectangle& rectangle() const { return patches[0].rectangle; }
-  std::size_t texel(int column, int row) const { return static_cast<std::size_t>(rectangle().y + row) * kTextureWidth + rectangle().x + column; }
+  std::size_t texel(int column, int row) const {
+    return static_cast<std::size_t>(rectangle().y + row) * kTextureWidth + rectangle().x + column;
+  }
 };
 
 /// Vertices and edges anywhere in a patch, some beyond v = 0 or 1, some of the edges long and some of no length.
@@ -51,14 +55,19 @@ SnapFeatures random_features(const Rectangle& r, std::mt19937& random) {
   for (int i = 0; i < count; ++i) {
     const double x = (1.4 * unit(random) - 0.2) * r.width, y = unit(random) * (r.height - 1);
     const double angle = 7 * unit(random), length = i % 10 == 0 ? 8 : 2 * unit(random);
-    features.edges.push_back({0, {2 * i, 2 * i + 1}, {x, x + length * std::cos(angle)}, {y, std::clamp(y + length * std::sin(angle), 0.0, r.height - 1.0)}, 2 * std::pow(unit(random), 3)});
+    features.edges.push_back({0,
+                              {2 * i, 2 * i + 1},
+                              {x, x + length * std::cos(angle)},
+                              {y, std::clamp(y + length * std::sin(angle), 0.0, r.height - 1.0)},
+                              2 * std::pow(unit(random), 3)});
   }
   return features;
 }
 
 Rectangle random_rectangle(std::mt19937& random) {
   const int width = 4 + static_cast<int>(random() % 50), height = 4 + static_cast<int>(random() % 40);
-  return {static_cast<int>(random() % (kTextureWidth - width + 1)), static_cast<int>(random() % (kTextureHeight - height + 1)), width, height};
+  return {static_cast<int>(random() % (kTextureWidth - width + 1)),
+          static_cast<int>(random() % (kTextureHeight - height + 1)), width, height};
 }
 
 /// A plane that has its even columns first, then its odd ones.
@@ -67,7 +76,8 @@ std::vector<T> by_columns(const OnePatch& patch, const std::vector<T>& by_colour
   std::vector<T> plane = by_colour;
   for (int row = 1; row + 1 < patch.rectangle().height; ++row)
     for (int column = 0; column < patch.rectangle().width; ++column)
-      plane[patch.texel(column, row)] = by_colour[patch.texel(column / 2 + column % 2 * ((patch.rectangle().width + 1) / 2), row)];
+      plane[patch.texel(column, row)] =
+          by_colour[patch.texel(column / 2 + column % 2 * ((patch.rectangle().width + 1) / 2), row)];
   return plane;
 }
 
@@ -76,11 +86,14 @@ struct HostPositions {
   std::vector<int> anchors;
 };
 /// \param home_x, home_y  of all texels of the texture; 0 without
-HostPositions snapped(const OnePatch& patch, const SnapFeatures& features, const std::vector<float>& home_x = {}, const std::vector<float>& home_y = {}) {
+HostPositions snapped(const OnePatch& patch, const SnapFeatures& features, const std::vector<float>& home_x = {},
+                      const std::vector<float>& home_y = {}) {
   ReadingPositions positions = even_positions(device(), patch.layout);
   device().write(positions.home_x, home_x), device().write(positions.home_y, home_y);
-  const SnappedPositions snapped = snap_positions(device(), patch.layout, upload_tables(device(), tables_of(features, patch.patches)), positions);
-  return {by_columns(patch, device().download(snapped.x)), by_columns(patch, device().download(snapped.y)), by_columns(patch, device().download(snapped.parameters)),
+  const SnappedPositions snapped =
+      snap_positions(device(), patch.layout, upload_tables(device(), tables_of(features, patch.patches)), positions);
+  return {by_columns(patch, device().download(snapped.x)), by_columns(patch, device().download(snapped.y)),
+          by_columns(patch, device().download(snapped.parameters)),
           by_columns(patch, device().download(snapped.anchors))};
 }
 
@@ -95,7 +108,9 @@ Chart square_tube(int rows) {
       chart.u.push_back(static_cast<double>(r) / (rows - 1));
       chart.v.push_back(j / 8.0);
       chart.positions.emplace_back(side[j][0], side[j][1], 0.25 * r);
-      chart.kinds.push_back(r == 0 ? ChartVertex::kHeadRow : r == rows - 1 ? ChartVertex::kTailRow : ChartVertex::kInner);
+      chart.kinds.push_back(r == 0          ? ChartVertex::kHeadRow
+                            : r == rows - 1 ? ChartVertex::kTailRow
+                                            : ChartVertex::kInner);
     }
   for (int r = 0; r + 1 < rows; ++r)
     for (int j = 0; j < 8; ++j) {
@@ -127,13 +142,15 @@ TEST(SnapFeatures, OfASquareTubeAreItsFourEdgesAndTheVerticesOnThem) {
   EXPECT_EQ(features.vertices.size(), 4u * 5);
   ASSERT_EQ(found.vertices[0].size(), features.vertices.size());
   for (const SnapFeatures::Vertex& vertex : features.vertices) EXPECT_NEAR(std::fmod(vertex.x, 5), 2.5, 1e-12);
-  for (const MapFeatures::Vertex& vertex : found.vertices[0]) EXPECT_NEAR(vertex.strength, std::numbers::pi / 2 * 0.5, 1e-12);
+  for (const MapFeatures::Vertex& vertex : found.vertices[0])
+    EXPECT_NEAR(vertex.strength, std::numbers::pi / 2 * 0.5, 1e-12);
 }
 
 TEST(SnapFeatures, RankVerticesOfAllPatchesByStrength) {
   std::vector charts{square_tube(7), square_tube(4)};
   for (Chart& chart : charts)
-    for (std::size_t i = 0; i < chart.positions.size(); ++i) chart.positions[i] *= 1 + 0.3 * std::sin(3.0 * static_cast<double>(i));
+    for (std::size_t i = 0; i < chart.positions.size(); ++i)
+      chart.positions[i] *= 1 + 0.3 * std::sin(3.0 * static_cast<double>(i));
   const MapFeatures features = find_features(charts, std::vector{Method::kVsm, Method::kVsm}, 0.1);
   std::vector<std::pair<int, double>> by_rank;
   for (const auto& vertices : features.vertices)
@@ -142,7 +159,9 @@ TEST(SnapFeatures, RankVerticesOfAllPatchesByStrength) {
   ASSERT_EQ(by_rank.size(), 8u * 5 + 8 * 2);
   for (std::size_t i = 0; i < by_rank.size(); ++i) {
     EXPECT_EQ(by_rank[i].first, static_cast<int>(i) + 1);
-    if (i > 0) { EXPECT_GE(by_rank[i].second, by_rank[i - 1].second); }
+    if (i > 0) {
+      EXPECT_GE(by_rank[i].second, by_rank[i - 1].second);
+    }
   }
 }
 
@@ -156,12 +175,16 @@ TEST(SnapFeatures, ComeByRowsAndAlongThemWhateverTheOrderOfTrianglesAndTheTurn) 
       for (std::int8_t& corner : turns) corner = static_cast<std::int8_t>(corner + turn);
     chart.half_edges = link_half_edges(chart.triangles, static_cast<int>(chart.positions.size()));
     const std::vector charts{chart};
-    const SnapFeatures features = place_features(find_features(charts, std::vector{Method::kVsm}, 0.1), charts, patch.patches);
+    const SnapFeatures features =
+        place_features(find_features(charts, std::vector{Method::kVsm}, 0.1), charts, patch.patches);
     ASSERT_EQ(features.edges.size(), 4u * 6);
     using Place = std::pair<int, int>;  // row, bin of eight columns
-    const auto place_of = [](double x, double y) { return Place(static_cast<int>(y), (static_cast<int>(std::floor(x)) % 20 + 20) % 20 / 8); };
+    const auto place_of = [](double x, double y) {
+      return Place(static_cast<int>(y), (static_cast<int>(std::floor(x)) % 20 + 20) % 20 / 8);
+    };
     std::vector<Place> of_edges, of_vertices;
-    for (const SnapFeatures::Edge& edge : features.edges) of_edges.push_back(place_of(std::min(edge.x[0], edge.x[1]), std::min(edge.y[0], edge.y[1])));
+    for (const SnapFeatures::Edge& edge : features.edges)
+      of_edges.push_back(place_of(std::min(edge.x[0], edge.x[1]), std::min(edge.y[0], edge.y[1])));
     for (const SnapFeatures::Vertex& vertex : features.vertices) of_vertices.push_back(place_of(vertex.x, vertex.y));
     EXPECT_TRUE(std::is_sorted(of_edges.begin(), of_edges.end())) << turn;
     EXPECT_TRUE(std::is_sorted(of_vertices.begin(), of_vertices.end())) << turn;
@@ -174,7 +197,8 @@ TEST(SnapFeatures, LieInTheRowsThatBisectionFinds) {
   for (const int height : {3, 4, 5, 17, 300}) {
     for (const double unevenness : {0.0, 1.0, 6.0}) {
       std::vector<double> row_u(height);
-      for (int row = 0; row < height; ++row) row_u[row] = std::pow(static_cast<double>(row) / (height - 1), 1 + unevenness);
+      for (int row = 0; row < height; ++row)
+        row_u[row] = std::pow(static_cast<double>(row) / (height - 1), 1 + unevenness);
       if (height > 10) row_u[5] = row_u[6] = row_u[7];  // rows of no length
       std::vector<double> u{0, 1};
       for (int i = 0; i < 1000; ++i) u.push_back(uniform(random));
@@ -185,7 +209,9 @@ TEST(SnapFeatures, LieInTheRowsThatBisectionFinds) {
       for (std::size_t i = 0; i < u.size(); ++i) {
         const auto above = std::upper_bound(row_u.begin() + 1, row_u.end() - 1, u[i]);
         const double low = *(above - 1), high = *above;
-        EXPECT_EQ(rows[i], static_cast<double>(above - 1 - row_u.begin()) + (high > low ? (u[i] - low) / (high - low) : 0)) << height << " " << u[i];
+        EXPECT_EQ(rows[i],
+                  static_cast<double>(above - 1 - row_u.begin()) + (high > low ? (u[i] - low) / (high - low) : 0))
+            << height << " " << u[i];
       }
     }
   }
@@ -205,13 +231,14 @@ TEST(Snap, PutsTexelsWhereItsTwinDoes) {
     for (SnapFeatures::Edge& edge : features.edges)
       if (is_flat) edge.dihedral = 0.09;
     twin::SnapLattice expected(patch.rectangle().width, patch.rectangle().height);
-    // Where the even lattice is unfolded: in few rows.
+    // Where the regular grid is unfolded: in few rows.
     std::vector<float> home_x(patch.layout.size(), 0), home_y(patch.layout.size(), 0);
     std::uniform_real_distribution<float> unfolded(-0.2f, 0.2f);
     for (int r = 1; r + 1 < expected.height; r += 3)
       for (int j = static_cast<int>(seed) % 5; j < expected.width; j += 5) {
         home_x[patch.texel(j, r)] = unfolded(random), home_y[patch.texel(j, r)] = unfolded(random);
-        expected.x[expected.at(j, r)] = home_x[patch.texel(j, r)], expected.y[expected.at(j, r)] = home_y[patch.texel(j, r)];
+        expected.x[expected.at(j, r)] = home_x[patch.texel(j, r)],
+                                  expected.y[expected.at(j, r)] = home_y[patch.texel(j, r)];
       }
     const HostPositions got = snapped(patch, features, home_x, home_y);
     expected.snap(features);
@@ -220,7 +247,8 @@ TEST(Snap, PutsTexelsWhereItsTwinDoes) {
     for (int r = 0; r < expected.height; ++r)
       for (int j = 0; j < expected.width; ++j) {
         const std::size_t texel = patch.texel(j, r);
-        different += got.anchors[texel] != expected.anchors[expected.at(j, r)] || std::abs(got.x[texel] - expected.x[expected.at(j, r)]) > 1e-4 ||
+        different += got.anchors[texel] != expected.anchors[expected.at(j, r)] ||
+                     std::abs(got.x[texel] - expected.x[expected.at(j, r)]) > 1e-4 ||
                      std::abs(got.y[texel] - expected.y[expected.at(j, r)]) > 1e-4;
       }
     EXPECT_LE(different, expected.width * expected.height / 200);
@@ -260,7 +288,9 @@ TEST(Snap, NeverFoldsTheMapAndHoldsTexelsExactlyOnTheirVertexOrEdge) {
         const double dx = got.x[texel], dy = got.y[texel];
         lattice.x[lattice.at(j, r)] = dx, lattice.y[lattice.at(j, r)] = dy;
         EXPECT_LE(std::max(std::abs(dx), std::abs(dy)), 1);
-        if (r == 0 || r == height - 1) { EXPECT_TRUE(dx == 0 && dy == 0); }
+        if (r == 0 || r == height - 1) {
+          EXPECT_TRUE(dx == 0 && dy == 0);
+        }
         const int anchor = got.anchors[texel];
         if (anchor == 0) continue;
         ++anchored;
@@ -269,12 +299,15 @@ TEST(Snap, NeverFoldsTheMapAndHoldsTexelsExactlyOnTheirVertexOrEdge) {
           x = features.vertices[anchor - 1].x, y = features.vertices[anchor - 1].y;
         } else {
           const SnapFeatures::Edge& edge = features.edges[-1 - anchor];
-          x = edge.x[0] + got.parameters[texel] * (edge.x[1] - edge.x[0]), y = edge.y[0] + got.parameters[texel] * (edge.y[1] - edge.y[0]);
+          x = edge.x[0] + got.parameters[texel] * (edge.x[1] - edge.x[0]),
+          y = edge.y[0] + got.parameters[texel] * (edge.y[1] - edge.y[0]);
         }
         EXPECT_NEAR(std::remainder(j + dx - x, width), 0, 2e-5);
         EXPECT_NEAR(r + dy, y, 2e-5);
       }
-    if (width * height > 60) { EXPECT_GT(anchored, 0); }
+    if (width * height > 60) {
+      EXPECT_GT(anchored, 0);
+    }
     for (int r = 0; r + 1 < height; ++r)
       for (int j = 0; j < width; ++j) EXPECT_GE(lattice.quad_cross(j, r), 0.05 - 1e-4) << r << " " << j;
   }
@@ -325,12 +358,16 @@ TEST(Snap, WithTexelsThatGoBackGoesWhatThenFoldsAndNothingElse) {
   std::vector<int> back;
   std::shuffle(marked.begin(), marked.end(), random);
   for (std::size_t call = 0, third = marked.size() / 3 + 1; call < 3; ++call) {
-    const std::vector<int> some(marked.begin() + std::min(marked.size(), call * third), marked.begin() + std::min(marked.size(), (call + 1) * third));
-    const std::vector<int> more = put_back_listed(device(), patch.layout, even_points, even_points, some, true, returns, positions, points).texels;
+    const std::vector<int> some(marked.begin() + std::min(marked.size(), call * third),
+                                marked.begin() + std::min(marked.size(), (call + 1) * third));
+    const std::vector<int> more =
+        put_back_listed(device(), patch.layout, even_points, even_points, some, true, returns, positions, points)
+            .texels;
     EXPECT_FALSE(more.empty());
     back.insert(back.end(), more.begin(), more.end());
   }
-  const std::array<std::vector<float>, 3> got{device().download(points.x), device().download(points.y), device().download(points.z)};
+  const std::array<std::vector<float>, 3> got{device().download(points.x), device().download(points.y),
+                                              device().download(points.z)};
 
   const auto point = [&](const std::array<std::vector<float>, 3>& planes, int j, int r) {
     const std::size_t texel = patch.texel((j + width) % width, r);
@@ -339,17 +376,26 @@ TEST(Snap, WithTexelsThatGoBackGoesWhatThenFoldsAndNothingElse) {
   // The tube's own quads are flat but for their bend of 2 pi / 31: none of its triangles is turned itself.
   const auto is_bad = [&](const std::array<std::vector<float>, 3>& planes, int j, int r) {
     const Vec3 e[4] = {point(even, j, r), point(even, j + 1, r), point(even, j + 1, r + 1), point(even, j, r + 1)};
-    const Vec3 n[4] = {point(planes, j, r), point(planes, j + 1, r), point(planes, j + 1, r + 1), point(planes, j, r + 1)};
+    const Vec3 n[4] = {point(planes, j, r), point(planes, j + 1, r), point(planes, j + 1, r + 1),
+                       point(planes, j, r + 1)};
     const Vec3 direction = (e[2] - e[0]).cross(e[3] - e[1]).normalized();
-    const auto cosine = [&](int a, int b, int c) { return (n[b] - n[a]).cross(n[c] - n[a]).normalized().dot(direction); };
+    const auto cosine = [&](int a, int b, int c) {
+      return (n[b] - n[a]).cross(n[c] - n[a]).normalized().dot(direction);
+    };
     return std::min(cosine(0, 1, 2), cosine(0, 2, 3)) < 0.2 && std::min(cosine(0, 1, 3), cosine(1, 2, 3)) < 0.2;
   };
-  const auto is_back = [&](int j, int r) { return point(moved, j, r) != point(even, j, r) && point(got, j, r) == point(even, j, r); };
-  const auto backs_of_quad = [&](int j, int r) { return is_back(j, r) + is_back(j + 1, r) + is_back(j, r + 1) + is_back(j + 1, r + 1); };
+  const auto is_back = [&](int j, int r) {
+    return point(moved, j, r) != point(even, j, r) && point(got, j, r) == point(even, j, r);
+  };
+  const auto backs_of_quad = [&](int j, int r) {
+    return is_back(j, r) + is_back(j + 1, r) + is_back(j, r + 1) + is_back(j + 1, r + 1);
+  };
   int counted = 0, unmarked = 0, still_bad = 0;
   for (int r = 1; r + 1 < height; ++r)
     for (int j = 0; j < width; ++j) {
-      if (is_bad(got, j, r)) { EXPECT_EQ(backs_of_quad(j, r), 0) << r << " " << j; }
+      if (is_bad(got, j, r)) {
+        EXPECT_EQ(backs_of_quad(j, r), 0) << r << " " << j;
+      }
       still_bad += is_bad(got, j, r);
       counted += is_back(j, r);
       if (!is_back(j, r)) {
@@ -357,7 +403,8 @@ TEST(Snap, WithTexelsThatGoBackGoesWhatThenFoldsAndNothingElse) {
         EXPECT_TRUE(!marks[patch.texel(j, r)] || point(got, j, r) == point(even, j, r));
       } else if (!marks[patch.texel(j, r)]) {
         ++unmarked;
-        EXPECT_TRUE(backs_of_quad(j, r) > 1 || backs_of_quad(j - 1, r) > 1 || backs_of_quad(j, r - 1) > 1 || backs_of_quad(j - 1, r - 1) > 1);
+        EXPECT_TRUE(backs_of_quad(j, r) > 1 || backs_of_quad(j - 1, r) > 1 || backs_of_quad(j, r - 1) > 1 ||
+                    backs_of_quad(j - 1, r - 1) > 1);
       }
     }
   EXPECT_EQ(static_cast<int>(back.size()), counted);
@@ -370,27 +417,31 @@ TEST(Snap, BringsABearToAThirdOfTheErrorWithoutFoldingIt) {
   EncodeOptions options;
   options.width = options.height = 256;
   options.has_snap = options.has_fit = false;
-  const TriangleMesh plain = reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model);
+  const TriangleMesh plain =
+      reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model);
   options.has_snap = true;
   const EncodeResult encoded = encode_model(device(), model.mesh, model.skeleton, options);
   const TriangleMesh snapped_mesh = reconstruct_mesh(device(), encoded.model);
   const SnapReport& report = encoded.report.snap.value();
   EXPECT_GT(report.snapped_vertices, 0.95 * report.vertices);
   EXPECT_LT(report.texels_put_back, 0.02 * 256 * 256);
-  const MetroReport before = measure_metro(device(), model.mesh, plain), after = measure_metro(device(), model.mesh, snapped_mesh);
+  const MetroReport before = measure_metro(device(), model.mesh, plain),
+                    after = measure_metro(device(), model.mesh, snapped_mesh);
   EXPECT_LT(symmetric_mean(after), 0.3 * symmetric_mean(before));
   EXPECT_LT(after.vertex.mean, 0.05 * before.vertex.mean);
   // Without the prefilter every texel lies on the mesh, wherever it reads.
   options.has_prefilter = false;
   const EncodeResult unfiltered = encode_model(device(), model.mesh, model.skeleton, options);
   EXPECT_LT(measure_metro(device(), reconstruct_mesh(device(), unfiltered.model), model.mesh).vertex.max, 2e-6);
-  // With it only what goes back to the even lattice lies elsewhere.
+  // With it only what goes back to the regular grid lies elsewhere.
   int differing = 0;
-  for (std::size_t i = 0; i < unfiltered.model.texture.out.size(); ++i) differing += unfiltered.model.texture.out[i] != encoded.model.texture.out[i];
+  for (std::size_t i = 0; i < unfiltered.model.texture.out.size(); ++i)
+    differing += unfiltered.model.texture.out[i] != encoded.model.texture.out[i];
   EXPECT_LE(differing, report.texels_put_back + unfiltered.report.snap->texels_put_back);
   options.has_prefilter = true;
   EXPECT_TRUE(measure_manifold(snapped_mesh).is_closed_manifold());
-  EXPECT_LE(static_cast<double>(count_self_intersections(snapped_mesh)), 1.2 * static_cast<double>(count_self_intersections(plain)) + 10);
+  EXPECT_LE(static_cast<double>(count_self_intersections(snapped_mesh)),
+            1.2 * static_cast<double>(count_self_intersections(plain)) + 10);
   const EncodeResult again = encode_model(device(), model.mesh, model.skeleton, options);
   EXPECT_EQ(encoded.model.texture.out, again.model.texture.out);
   EXPECT_EQ(encoded.model.texture.around, again.model.texture.around);
@@ -407,7 +458,8 @@ TEST(Snap, AndFitAreOnWhereTheyPayUnlessToldOtherwise) {
   };
   const auto nothing = [](EncodeOptions&) {};
   const int vertices = static_cast<int>(model.mesh.positions.size());
-  const int few = (3 * vertices - 1) / 256, some = (3 * vertices + 255) / 256, less = (2 * vertices - 1) / 128, enough = (2 * vertices + 127) / 128;
+  const int few = (3 * vertices - 1) / 256, some = (3 * vertices + 255) / 256, less = (2 * vertices - 1) / 128,
+            enough = (2 * vertices + 127) / 128;
   EXPECT_EQ(reported(128, few, nothing), std::pair(false, true));
   EXPECT_EQ(reported(128, some, nothing), std::pair(true, true));
   EXPECT_EQ(reported(128, less, [](EncodeOptions& o) { o.has_fit = false; }), std::pair(false, false));
@@ -415,7 +467,8 @@ TEST(Snap, AndFitAreOnWhereTheyPayUnlessToldOtherwise) {
   EXPECT_EQ(reported(256, 257, nothing), std::pair(true, false));
   EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.has_snap = false; }), std::pair(false, true));
   EXPECT_EQ(reported(128, few, [](EncodeOptions& o) { o.has_snap = true, o.has_fit = false; }), std::pair(true, false));
-  EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.has_prefilter = false; }), std::pair(true, false));  // texels on the mesh were asked for
+  EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.has_prefilter = false; }),
+            std::pair(true, false));  // texels on the mesh were asked for
   EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.method = EncodeMethod::kSpd; }), std::pair(false, false));
 }
 
@@ -432,7 +485,8 @@ TEST(Snap, LeavesNoWideGapsBetweenSeamSamples) {
     for (std::size_t arc = 0; arc < encoded.arcs.size(); ++arc) {
       std::vector<double> gaps;
       for (std::size_t i = 1; i < encoded.arcs[arc].samples.size(); ++i)
-        gaps.push_back((positions[lattice.first_sample[arc] + i] - positions[lattice.first_sample[arc] + i - 1]).norm());
+        gaps.push_back(
+            (positions[lattice.first_sample[arc] + i] - positions[lattice.first_sample[arc] + i - 1]).norm());
       if (gaps.size() < 20) continue;
       const double mean = std::accumulate(gaps.begin(), gaps.end(), 0.0) / static_cast<double>(gaps.size());
       const double widest = *std::max_element(gaps.begin(), gaps.end()) / mean;

@@ -8,8 +8,8 @@
 #include <random>
 
 #include "skeletex/model/error.h"
-#include "skeletex/model/walls.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/skeleton/separation_planes.h"
 #include "support/mesh_topology.h"
 #include "support/synthetic_model.h"
 
@@ -21,7 +21,9 @@ ClContext& device() {
   return context;
 }
 
-std::vector<Skeleton> skeletons() { return {lone_bone(), chain(3), y_branch(), cross(6), ring(4), ring_with_arm(5), random_tree(12, 4)}; }
+std::vector<Skeleton> skeletons() {
+  return {lone_bone(), chain(3), y_branch(), cross(6), ring(4), ring_with_arm(5), random_tree(12, 4)};
+}
 
 SkeletexModel model_of(const Skeleton& skeleton) {
   return SyntheticSurface(skeleton, 0.25).model(random_sizes(static_cast<int>(skeleton.bones.size()), 8, 40, 5));
@@ -75,7 +77,8 @@ TEST(StorePositions, BringsBackEveryVertexThatMayLieWhereItIsPut) {
       moved[at] = node + (1 + any(random)) * (old[at] - node);
     }
     const SkeletexModel stored = store_positions(device(), model, moved);
-    EXPECT_LT(largest_distance(lattice_positions(device(), stored), moved), 1e-6 * model.diagonal) << skeleton.bones.size() << " bones";
+    EXPECT_LT(largest_distance(lattice_positions(device(), stored), moved), 1e-6 * model.diagonal)
+        << skeleton.bones.size() << " bones";
     EXPECT_EQ(broken_rule(reconstruct_mesh(device(), stored), model.genus), "");
   }
 }
@@ -95,10 +98,10 @@ TEST(StorePositions, ChangesNoTexelThatHasNotMoved) {
 }
 
 TEST(StorePositions, LetsEndRowsFollowSeamsAndPoles) {
-  // Everything nearer to the seam's node, which keeps the seam in its wall.
+  // Everything nearer to the seam's node, which keeps the seam in its separation plane.
   const SkeletexModel model = model_of(chain(2));
   const Lattice lattice = number_lattice(model);
-  const Walls walls(model.skeleton);
+  const SeparationPlanes separation(model.skeleton);
   const Vec3 node = model.skeleton.nodes[model.arcs[0].node].position;
   std::vector<Vec3> moved = lattice_positions(device(), model);
   for (Vec3& p : moved) p = node + 0.9 * (p - node);
@@ -108,13 +111,16 @@ TEST(StorePositions, LetsEndRowsFollowSeamsAndPoles) {
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
       const Rectangle& r = model.patches[bone].rectangle;
       const bool is_head = end == BoneEnd::kHead;
-      const std::vector<int> loop =
-          walls.is_free(bone, end) ? std::vector<int>{lattice.poles[bone][is_head ? 0 : 1]} : end_loop(model, lattice, bone, end);
+      const std::vector<int> loop = separation.is_free(bone, end)
+                                        ? std::vector<int>{lattice.poles[bone][is_head ? 0 : 1]}
+                                        : end_loop(model, lattice, bone, end);
       for (int j = 0; j < r.width; ++j) {
-        const std::size_t at = static_cast<std::size_t>(r.y + (is_head ? 0 : r.height - 1)) * model.texture.width + r.x + j;
+        const std::size_t at =
+            static_cast<std::size_t>(r.y + (is_head ? 0 : r.height - 1)) * model.texture.width + r.x + j;
         const Vec3 texel(stored.texture.along[at], stored.texture.around[at], stored.texture.out[at]);
-        const Vec3 point = decode_texel(tangent_frame(model.skeleton, walls, bone, is_head ? 0 : 1, static_cast<double>(j) / r.width), texel,
-                                        end_position(model.skeleton, bone, BoneEnd::kHead), end_position(model.skeleton, bone, BoneEnd::kTail));
+        const Vec3 point = decode_texel(
+            tangent_frame(model.skeleton, separation, bone, is_head ? 0 : 1, static_cast<double>(j) / r.width), texel,
+            end_position(model.skeleton, bone, BoneEnd::kHead), end_position(model.skeleton, bone, BoneEnd::kTail));
         double distance = (point - now[loop[0]]).norm();
         for (std::size_t i = 0; loop.size() > 1 && i < loop.size(); ++i)
           distance = std::min(distance, distance_to_bone(point, now[loop[i]], now[loop[(i + 1) % loop.size()]]));
@@ -123,7 +129,7 @@ TEST(StorePositions, LetsEndRowsFollowSeamsAndPoles) {
     }
 }
 
-TEST(StorePositions, SlidesSeamsIntoTheirWallsAlongTheSurface) {
+TEST(StorePositions, SlidesSeamsIntoTheirSeparationPlanesAlongTheSurface) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> any(-0.01, 0.01);
   for (const Skeleton& skeleton : {chain(3), y_branch(), cross(6), ring(4)}) {
@@ -134,19 +140,22 @@ TEST(StorePositions, SlidesSeamsIntoTheirWallsAlongTheSurface) {
     for (Vec3& p : moved) p += Vec3(any(random), any(random), any(random));
     std::vector<Vec3> slid = moved;
     const std::vector<Vec3> normals(moved.size(), Vec3(0.2, 0.9, 0.3).normalized());
-    slide_to_walls(model, normals, slid);
+    slide_to_separation(model, normals, slid);
     for (int i = 0; i < lattice.inner_count; ++i) EXPECT_EQ(slid[i], moved[i]);
     for (std::size_t a = 0; a < model.arcs.size(); ++a) {
       const Vec3& node = model.skeleton.nodes[model.arcs[a].node].position;
-      Vec3 wall = Vec3::Zero();
+      Vec3 separation_plane = Vec3::Zero();
       for (const int side : {0, 1}) {
         const int bone = model.arcs[a].bones[side];
-        wall += (side == 0 ? 1 : -1) * direction_from(skeleton, {bone, skeleton.bones[bone].head == model.arcs[a].node ? BoneEnd::kHead : BoneEnd::kTail});
+        separation_plane +=
+            (side == 0 ? 1 : -1) *
+            direction_from(skeleton,
+                           {bone, skeleton.bones[bone].head == model.arcs[a].node ? BoneEnd::kHead : BoneEnd::kTail});
       }
       for (std::size_t i = 0; i < model.arcs[a].samples.size(); ++i) {
         const std::size_t v = lattice.first_sample[a] + i;
-        EXPECT_NEAR(wall.normalized().dot(slid[v] - node), 0, 1e-12);
-        if (std::abs(wall.normalized().dot(normals[v])) < 0.9) {
+        EXPECT_NEAR(separation_plane.normalized().dot(slid[v] - node), 0, 1e-12);
+        if (std::abs(separation_plane.normalized().dot(normals[v])) < 0.9) {
           EXPECT_NEAR(normals[v].dot(slid[v] - moved[v]), 0, 1e-12);
         }
         EXPECT_LT((slid[v] - moved[v]).norm(), 4 * (moved[v] - before[v]).norm());

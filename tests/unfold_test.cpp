@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/encode/unfold.h"
+#include "skeletex/convert/sample/unfold.h"
 
 #include <gtest/gtest.h>
 
@@ -7,10 +7,10 @@
 #include <numeric>
 #include <random>
 
-#include "skeletex/encode/encode_model.h"
-#include "skeletex/encode/row_profile.h"
-#include "skeletex/measure/metro.h"
-#include "skeletex/measure/self_intersection.h"
+#include "skeletex/analysis/metro.h"
+#include "skeletex/convert/encode_model.h"
+#include "skeletex/convert/layout/row_profile.h"
+#include "skeletex/geometry/self_intersection.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "support/load_model.h"
 #include "support/unfold_twin.h"
@@ -28,15 +28,18 @@ ClContext& device() {
 /// A patch that fills its texture, over one triangle of the plane z = 0.
 struct PlanePatch {
   Skeleton skeleton{{{"head", Vec3(0, 0, 0)}, {"tail", Vec3(0, 0, 1)}}, {{"bone", 0, 1, Vec3(1, 0, 0)}}};
-  std::vector<Patch> patches{{{0, 0, kWidth, kHeight}, Method::kVsm, SegmentTopology::kSphere, spread_rows_uniformly(kHeight)}};
-  DeviceLayout layout = upload_layout(device(), patches, frame_tables(skeleton, Walls(skeleton), patches, Vec3::Zero()), kWidth, kHeight);
+  std::vector<Patch> patches{
+      {{0, 0, kWidth, kHeight}, Method::kVsm, SegmentTopology::kSphere, spread_rows_uniformly(kHeight)}};
+  DeviceLayout layout = upload_layout(
+      device(), patches, frame_tables(skeleton, SeparationPlanes(skeleton), patches, Vec3::Zero()), kWidth, kHeight);
   DeviceMaps maps;
   ClBuffer<int> triangles = device().upload(std::vector<int>(kWidth * kHeight, 0));
 
   PlanePatch() {
     maps.triangle_count = 1;
     maps.corners = device().upload(std::vector<int>{0, 1, 2});
-    maps.x = device().upload(std::vector<float>{0, 1, 0}), maps.y = device().upload(std::vector<float>{0, 0, 1}), maps.z = device().upload(std::vector<float>{0, 0, 0});
+    maps.x = device().upload(std::vector<float>{0, 1, 0}), maps.y = device().upload(std::vector<float>{0, 0, 1}),
+    maps.z = device().upload(std::vector<float>{0, 0, 0});
   }
 };
 
@@ -47,7 +50,8 @@ TexelPoints upload_points(const std::vector<Vec3>& points) {
   return {device().upload(planes[0]), device().upload(planes[1]), device().upload(planes[2])};
 }
 
-/// A plane that turns about (20, 15) by an angle that falls with the distance: as a map it is one to one, but turns by up to `most` radians.
+/// A plane that turns about (20, 15) by an angle that falls with the distance: as a map it is one to one, but turns by
+/// up to `most` radians.
 Vec3 swirl(double x, double y, double most) {
   const double dx = x - 20, dy = y - 15, r2 = dx * dx + dy * dy, angle = most * std::exp(-r2 / 4);
   return {20 + std::cos(angle) * dx - std::sin(angle) * dy, 15 + std::sin(angle) * dx + std::cos(angle) * dy, 0};
@@ -64,7 +68,10 @@ TEST(Unfold, FindsAndMovesWhatItsTwinDoes) {
     const PlanePatch patch;
     std::vector<Vec3> points;
     for (int r = 0; r < kHeight; ++r)
-      for (int j = 0; j < kWidth; ++j) points.push_back(Vec3(j + 0.15 * seed * unit(random), r + 0.15 * seed * unit(random), 0.1 * unit(random)).cast<float>().cast<double>());
+      for (int j = 0; j < kWidth; ++j)
+        points.push_back(Vec3(j + 0.15 * seed * unit(random), r + 0.15 * seed * unit(random), 0.1 * unit(random))
+                             .cast<float>()
+                             .cast<double>());
     const twin::Folds expected = twin::find_folds(points, kWidth, kHeight);
     if (expected.is_close) continue;
     ++compared;
@@ -72,10 +79,13 @@ TEST(Unfold, FindsAndMovesWhatItsTwinDoes) {
     const std::vector<int> none(points.size(), 0);
     std::vector<int> all(points.size() - kWidth);
     std::iota(all.begin(), all.end(), 0);
-    auto quads = device().upload(all), quad_count = device().upload(std::vector{static_cast<int>(all.size())}), is_listed = device().upload(std::vector<int>(points.size(), 1));
-    auto marked = device().allocate<int>(points.size()), is_marked = device().upload(none), found = device().upload(std::vector{0, 0});
-    device().launch({"unfold.cl", "find_folds"}, ClRange(all.size()), kWidth, 1, patch.layout.texel_patches, patch.layout.patches, patch.triangles, patch.maps.corners,
-                    patch.maps.x, patch.maps.y, patch.maps.z, on_device.x, on_device.y, on_device.z, quad_count, quads, is_listed, found, marked, is_marked);
+    auto quads = device().upload(all), quad_count = device().upload(std::vector{static_cast<int>(all.size())}),
+         is_listed = device().upload(std::vector<int>(points.size(), 1));
+    auto marked = device().allocate<int>(points.size()), is_marked = device().upload(none),
+         found = device().upload(std::vector{0, 0});
+    device().launch({"unfold.cl", "find_folds"}, ClRange(all.size()), kWidth, 1, patch.layout.texel_patches,
+                    patch.layout.patches, patch.triangles, patch.maps.corners, patch.maps.x, patch.maps.y, patch.maps.z,
+                    on_device.x, on_device.y, on_device.z, quad_count, quads, is_listed, found, marked, is_marked);
     EXPECT_EQ(device().download(found)[0], expected.count);
     EXPECT_GT(expected.count, 0);
     EXPECT_EQ(device().download(is_marked), expected.marks);
@@ -89,7 +99,8 @@ TEST(Unfold, FindsAndMovesWhatItsTwinDoes) {
     EXPECT_EQ(flags_of(device().download(marked), marks), expected.marks);
 
     std::vector<float> x, y;
-    for (std::size_t i = 0; i < points.size(); ++i) x.push_back(static_cast<float>(unit(random))), y.push_back(static_cast<float>(0.5 * unit(random)));
+    for (std::size_t i = 0; i < points.size(); ++i)
+      x.push_back(static_cast<float>(unit(random))), y.push_back(static_cast<float>(0.5 * unit(random)));
     auto offset_x = device().upload(x), offset_y = device().upload(y);
     // Flags are off again but for the last row, which has no quads.
     std::vector<int> flags = device().download(is_listed);
@@ -97,8 +108,9 @@ TEST(Unfold, FindsAndMovesWhatItsTwinDoes) {
     device().write(is_listed, none);
     device().fill(quad_count, 0);
     auto back_count = device().upload(std::vector{0});
-    device().launch({"unfold.cl", "relax_folds"}, ClRange(marks), kWidth, marks, 0, marked, patch.layout.texel_patches, patch.layout.patches, patch.triangles, on_device.x,
-                    on_device.y, on_device.z, is_marked, offset_x, offset_y, quad_count, quads, is_listed, back_count);
+    device().launch({"unfold.cl", "relax_folds"}, ClRange(marks), kWidth, marks, 0, marked, patch.layout.texel_patches,
+                    patch.layout.patches, patch.triangles, on_device.x, on_device.y, on_device.z, is_marked, offset_x,
+                    offset_y, quad_count, quads, is_listed, back_count);
     const std::vector<float> new_x = device().download(offset_x), new_y = device().download(offset_y);
     std::vector<int> around = none;
     for (int r = 0; r < kHeight; ++r)
@@ -107,7 +119,8 @@ TEST(Unfold, FindsAndMovesWhatItsTwinDoes) {
         if (expected.marks[i])
           for (const int row : {r - 1, r})
             for (const int column : {(j + kWidth - 1) % kWidth, j}) around[row * kWidth + column] = 1;
-        const Eigen::Vector2d before(x[i], y[i]), wanted = expected.marks[i] ? twin::relaxed(points, kWidth, kHeight, j, r, before) : before;
+        const Eigen::Vector2d before(x[i], y[i]),
+            wanted = expected.marks[i] ? twin::relaxed(points, kWidth, kHeight, j, r, before) : before;
         EXPECT_NEAR(new_x[i], wanted.x(), 2e-4);
         EXPECT_NEAR(new_y[i], wanted.y(), 2e-4);
       }
@@ -142,7 +155,8 @@ TEST(Unfold, TakesTheFoldsOutOfALatticeOverASwirlAndTouchesNothingElse) {
     }
     device().write(points.x, x), device().write(points.y, y);
   };
-  const UnfoldReport report = unfold_lattice(device(), patch.layout, patch.patches, patch.maps, device().upload(triangles), read, positions, points);
+  const UnfoldReport report = unfold_lattice(device(), patch.layout, patch.patches, patch.maps,
+                                             device().upload(triangles), read, positions, points);
   EXPECT_GT(report.folded_quads, 0);
   EXPECT_EQ(report.left, 0);
   const std::vector<float> x = device().download(points.x), y = device().download(points.y);
@@ -154,7 +168,8 @@ TEST(Unfold, TakesTheFoldsOutOfALatticeOverASwirlAndTouchesNothingElse) {
       EXPECT_EQ((after.back() - even[i].cast<float>().cast<double>()).norm(), 0);
     }
   }
-  const twin::Folds before_folds = twin::find_folds(even, kWidth, kHeight), after_folds = twin::find_folds(after, kWidth, kHeight);
+  const twin::Folds before_folds = twin::find_folds(even, kWidth, kHeight),
+                    after_folds = twin::find_folds(after, kWidth, kHeight);
   EXPECT_EQ(before_folds.count - report.folded_quads, after_folds.count);
 }
 
@@ -168,13 +183,15 @@ TEST(Unfold, TakesMostSelfIntersectionsFromABearAndStaysOnIt) {
   EXPECT_GT(report.folded_quads, 10);
   EXPECT_LT(4 * report.left, report.folded_quads);
   options.has_unfold = false;
-  const auto crossing = count_self_intersections(reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model));
+  const auto crossing = count_self_intersections(
+      reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model));
   EXPECT_GT(crossing, 10);
   EXPECT_LT(4 * count_self_intersections(reconstruct_mesh(device(), encoded.model)), crossing);
   // Without the prefilter every vertex is a point of the mesh.
   options.has_unfold = true;
   options.has_prefilter = false;
-  const TriangleMesh mesh = reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model);
+  const TriangleMesh mesh =
+      reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model);
   EXPECT_LT(measure_metro(device(), mesh, model.mesh, {.samples = 1000}).vertex.max, 2e-6);
 }
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/validate/validate_input.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,11 +8,12 @@
 #include <regex>
 #include <set>
 
-#include "skeletex/encode/encode_model.h"
+#include "skeletex/analysis/findings.h"
+#include "skeletex/analysis/manifold.h"
+#include "skeletex/analysis/surface_probe.h"
+#include "skeletex/analysis/validate_input.h"
+#include "skeletex/convert/encode_model.h"
 #include "skeletex/model/error.h"
-#include "skeletex/measure/manifold.h"
-#include "skeletex/validate/findings.h"
-#include "skeletex/validate/surface_probe.h"
 #include "support/load_model.h"
 #include "support/shapes.h"
 
@@ -26,13 +25,17 @@ ClContext& context() {
   return instance;
 }
 
-std::vector<Finding> validated(TriangleMesh mesh, const Skeleton& skeleton) { return validate_input(context(), mesh, skeleton); }
+std::vector<Finding> validated(TriangleMesh mesh, const Skeleton& skeleton) {
+  return validate_input(context(), mesh, skeleton);
+}
 
 std::string text_of(const std::vector<Finding>& findings) {
   std::string text;
   for (const Finding& f : findings)
-    text += std::string(f.severity == Severity::kError ? "error" : f.severity == Severity::kWarning ? "warning" : "note") + " [" + f.rule + "] " + f.message + ". " +
-            f.remedy + ".\n";
+    text += std::string(f.severity == Severity::kError     ? "error"
+                        : f.severity == Severity::kWarning ? "warning"
+                                                           : "note") +
+            " [" + f.rule + "] " + f.message + ". " + f.remedy + ".\n";
   return text;
 }
 
@@ -54,7 +57,8 @@ std::set<std::string> rules(const std::vector<Finding>& findings) {
 Vec3 point_in(const std::string& text) {
   const std::regex triple(R"(\(([-+.e\d]+), ([-+.e\d]+), ([-+.e\d]+)\))");
   Vec3 point(std::numeric_limits<double>::quiet_NaN(), 0, 0);
-  for (std::sregex_iterator it(text.begin(), text.end(), triple), end; it != end; ++it) point = Vec3(std::stod((*it)[1]), std::stod((*it)[2]), std::stod((*it)[3]));
+  for (std::sregex_iterator it(text.begin(), text.end(), triple), end; it != end; ++it)
+    point = Vec3(std::stod((*it)[1]), std::stod((*it)[2]), std::stod((*it)[3]));
   return point;
 }
 
@@ -83,11 +87,13 @@ Shape two_bones() {
 
 TEST(Validate, GeneratedShapesHaveNothingWrong) {
   EXPECT_EQ(text_of(validated(two_bones().mesh, two_bones().skeleton)), "");
-  for (const NamedShape& shape : all_shapes()) EXPECT_EQ(text_of(validated(shape.shape.mesh, shape.shape.skeleton)), "") << shape.name;
+  for (const NamedShape& shape : all_shapes())
+    EXPECT_EQ(text_of(validated(shape.shape.mesh, shape.shape.skeleton)), "") << shape.name;
 }
 
 TEST(Validate, StandardModelsHaveNoErrors) {
-  for (const char* name : {"bear", "bunny00", "armadillo", "man", "camel", "cow", "eight", "double_torus", "knot1", "pinion"}) {
+  for (const char* name :
+       {"bear", "bunny00", "armadillo", "man", "camel", "cow", "eight", "double_torus", "knot1", "pinion"}) {
     const TestModel model = load_standard_model(name);
     const auto findings = validated(model.mesh, model.skeleton);
     EXPECT_FALSE(has_errors(findings)) << name << ":\n" << text_of(findings);
@@ -143,12 +149,15 @@ TEST(Validate, TheTreeItHandsOverIsThatOfTheMeshAsItIsThen) {
 TEST(Validate, AHoleIsFoundWithItsPlace) {
   Shape shape = two_bones();
   // A triangle in the middle of the tube.
-  const auto hit = std::min_element(shape.mesh.triangles.begin(), shape.mesh.triangles.end(), [&](const Triangle& a, const Triangle& b) {
-    return (shape.mesh.positions[a[0]] - Vec3(0.5, 0, 0)).norm() < (shape.mesh.positions[b[0]] - Vec3(0.5, 0, 0)).norm();
-  });
+  const auto hit = std::min_element(shape.mesh.triangles.begin(), shape.mesh.triangles.end(),
+                                    [&](const Triangle& a, const Triangle& b) {
+                                      return (shape.mesh.positions[a[0]] - Vec3(0.5, 0, 0)).norm() <
+                                             (shape.mesh.positions[b[0]] - Vec3(0.5, 0, 0)).norm();
+                                    });
   shape.mesh.triangles.erase(hit);
   const auto findings = validated(shape.mesh, shape.skeleton);
-  EXPECT_EQ(rules(findings), std::set<std::string>{"closed"}) << "nodes and bones are judged all the same:\n" << text_of(findings);
+  EXPECT_EQ(rules(findings), std::set<std::string>{"closed"}) << "nodes and bones are judged all the same:\n"
+                                                              << text_of(findings);
   const Finding f = finding(findings, "closed");
   EXPECT_EQ(f.severity, Severity::kError);
   EXPECT_MENTIONS(f.message, "3 edges");
@@ -185,7 +194,8 @@ TEST(Validate, EdgesAndVerticesOfTooManySheetsAreFound) {
   fin.positions.emplace_back(4, 4, 4);
   fin.triangles.push_back({t[0], t[1], static_cast<int>(fin.positions.size()) - 1});
   const auto with_fin = validated(fin, shape.skeleton);
-  EXPECT_MENTIONS(finding(with_fin, "manifold").message, "vertices " + std::to_string(std::min(t[0], t[1])) + " and " + std::to_string(std::max(t[0], t[1])));
+  EXPECT_MENTIONS(finding(with_fin, "manifold").message,
+                  "vertices " + std::to_string(std::min(t[0], t[1])) + " and " + std::to_string(std::max(t[0], t[1])));
 
   // Two bodies that share one vertex.
   TriangleMesh pair = joined(shape.mesh, capsule_shape(1, 0.2, 8, 6).mesh, Vec3(7, 8, 9));
@@ -288,7 +298,8 @@ TEST(Validate, ASkeletonInAnotherFrameIsSuspectedAsOne) {
   for (Node& node : shape.skeleton.nodes) node.position = 100 * node.position + Vec3(500, 0, 0);
   const auto findings = validated(shape.mesh, shape.skeleton);
   EXPECT_MENTIONS(finding(findings, "frame").remedy, "units, axes and origin");
-  EXPECT_EQ(std::count_if(findings.begin(), findings.end(), [](const Finding& f) { return f.rule == "node-inside"; }), 3);
+  EXPECT_EQ(std::count_if(findings.begin(), findings.end(), [](const Finding& f) { return f.rule == "node-inside"; }),
+            3);
 }
 
 TEST(Validate, ABoneThroughTheSurfaceIsShownWithAllItsCrossings) {
@@ -302,8 +313,10 @@ TEST(Validate, ABoneThroughTheSurfaceIsShownWithAllItsCrossings) {
   EXPECT_MENTIONS(f.message, "out at (");
   EXPECT_MENTIONS(f.message, "in at (");
   const SurfaceProbe probe(shape.mesh);
-  EXPECT_GT(probe.winding_numbers(std::vector<Vec3>{point_in(f.remedy)}, true)[0], 0.99) << "the new node lies in the body: " << f.remedy;
-  EXPECT_MENTIONS(finding(findings, "genus").message, "1 handle (its genus), but the skeleton has 2 independent cycles");
+  EXPECT_GT(probe.winding_numbers(std::vector<Vec3>{point_in(f.remedy)}, true)[0], 0.99)
+      << "the new node lies in the body: " << f.remedy;
+  EXPECT_MENTIONS(finding(findings, "genus").message,
+                  "1 handle (its genus), but the skeleton has 2 independent cycles");
   EXPECT_FALSE(rules(findings).contains("node-inside"));
 }
 
@@ -345,16 +358,18 @@ TEST(Validate, ANodeOfNoBoneIsAWarning) {
 TEST(Validate, BonesOnTopOfEachOtherAreNamed) {
   Shape shape = two_bones();
   shape.skeleton.bones.push_back({"again", 1, 0, {}});
-  EXPECT_MENTIONS(finding(validated(shape.mesh, shape.skeleton), "bone-duplicate").message, "bone \"lower\" and bone \"again\"");
+  EXPECT_MENTIONS(finding(validated(shape.mesh, shape.skeleton), "bone-duplicate").message,
+                  "bone \"lower\" and bone \"again\"");
 
   shape = two_bones();
   shape.skeleton.nodes.push_back({"here", Vec3(0, 0, 1)});
   shape.skeleton.nodes.push_back({"there", Vec3(0, 0.1, 1.2)});
   shape.skeleton.bones.push_back({"tip", 3, 4, {}});
-  EXPECT_MENTIONS(finding(validated(shape.mesh, shape.skeleton), "node-duplicate").message, "node \"high\" and node \"here\"");
+  EXPECT_MENTIONS(finding(validated(shape.mesh, shape.skeleton), "node-duplicate").message,
+                  "node \"high\" and node \"here\"");
 }
 
-TEST(Validate, BonesInOneDirectionHaveNoWallBetween) {
+TEST(Validate, BonesInOneDirectionHaveNoSeparationPlaneBetween) {
   Shape shape = two_bones();
   shape.skeleton.nodes.push_back({"beside", Vec3(0.02501, 0, 0.5)});
   shape.skeleton.bones.push_back({"shadow", 1, 3, {}});
@@ -398,7 +413,7 @@ TEST(Validate, BadIndicesAndNumbersOfASkeletonAreNamed) {
   EXPECT_TRUE(rules(validated({}, two_bones().skeleton)).contains("empty"));
 }
 
-TEST(Validate, WallsThatCrossInsideTheBodyAreFoundByTrying) {
+TEST(Validate, SeparationPlanesThatCrossInsideTheBodyAreFoundByTrying) {
   // A short bone in a fat body with sharp bends at both ends.
   Shape shape = two_bones();
   shape.skeleton.nodes = {{"a", {-0.2, 0, -0.1}}, {"b", {-0.1, 0, 0.1}}, {"c", {0.1, 0, 0.1}}, {"d", {0.2, 0, -0.1}}};
@@ -419,7 +434,7 @@ TEST(Validate, EverythingIsSaidAtOnce) {
   shape.skeleton.nodes.push_back({"spare", Vec3(0, 0, 0.1)});
   shape.skeleton.bones.push_back({"again", 0, 1, {}});
   shape.skeleton.bones[0].s = Vec3::Zero();
-  const std::set<std::string> expected{"closed",        "orientation", "components",  "unreferenced",  "node-inside",
+  const std::set<std::string> expected{"closed",        "orientation", "components", "unreferenced",  "node-inside",
                                        "bone-crossing", "node-unused", "bone-angle", "bone-duplicate"};
   const auto findings = validated(shape.mesh, shape.skeleton);
   EXPECT_EQ(rules(findings), expected) << text_of(findings);
@@ -429,7 +444,8 @@ TEST(Validate, TheSurfaceProbeKnowsInsideNearestAndCrossings) {
   const TriangleMesh mesh = torus_shape().mesh;  // core radius 2, tube 0.5
   const SurfaceProbe probe(mesh);
   for (const bool is_closed : {true, false}) {
-    const std::vector<double> windings = probe.winding_numbers(std::vector<Vec3>{{2, 0, 0}, {0, 0, 0}, {0, 2.3, 0.1}, {9, 9, 9}}, is_closed);
+    const std::vector<double> windings =
+        probe.winding_numbers(std::vector<Vec3>{{2, 0, 0}, {0, 0, 0}, {0, 2.3, 0.1}, {9, 9, 9}}, is_closed);
     EXPECT_NEAR(windings[0], 1, 1e-9);
     EXPECT_NEAR(windings[1], 0, 1e-9);
     EXPECT_NEAR(windings[2], 1, 1e-9);

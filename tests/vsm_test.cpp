@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/parameterize/vsm.h"
+#include "skeletex/convert/parameterize/vsm.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "skeletex/segment/segment_mesh.h"
+#include "skeletex/convert/segment/segment_mesh.h"
 #include "support/load_model.h"
 #include "support/segments.h"
 #include "support/vsm_twin.h"
@@ -23,15 +23,19 @@ ClContext& context() {
   return the_context;
 }
 
-Chart chart_of(const MadeSegment& made) { return make_chart(made.segment, made.skeleton, Walls(made.skeleton)); }
+Chart chart_of(const MadeSegment& made) {
+  return make_chart(made.segment, made.skeleton, SeparationPlanes(made.skeleton));
+}
 
 std::vector<std::pair<std::string, MadeSegment>> all_kinds_of_segments() {
   std::vector<std::pair<std::string, MadeSegment>> all;
   std::mt19937 random(7);
   all.emplace_back("cylinder", revolve(cylinder_profile(9), {.columns = 12}));
   all.emplace_back("smallest tube", revolve(cylinder_profile(2), {.columns = 3}));
-  all.emplace_back("noisy mushroom", revolve(mushroom_profile(25), {.columns = 17, .noise = 0.2, .has_random_diagonals = true, .seed = 3}));
-  all.emplace_back("twisted tube", revolve(cylinder_profile(31), {.columns = 12, .twist_turns = 2.3, .has_random_diagonals = true}));
+  all.emplace_back("noisy mushroom", revolve(mushroom_profile(25),
+                                             {.columns = 17, .noise = 0.2, .has_random_diagonals = true, .seed = 3}));
+  all.emplace_back("twisted tube",
+                   revolve(cylinder_profile(31), {.columns = 12, .twist_turns = 2.3, .has_random_diagonals = true}));
   all.emplace_back("noisy cap", revolve(cap_profile(25), {.columns = 21, .noise = 0.1, .seed = 5}));
   all.emplace_back("capsule", revolve(capsule_profile(22), {.columns = 18, .noise = 0.02}));
   MadeSegment rough = revolve(mushroom_profile(12), {.columns = 12, .noise = 0.1});
@@ -43,8 +47,10 @@ std::vector<std::pair<std::string, MadeSegment>> all_kinds_of_segments() {
   MadeSegment cap = revolve(cap_profile(12), {.columns = 12, .noise = 0.05});
   flip_random_edges(cap.segment, 300, random);
   insert_random_vertices(cap.segment, 200, random);
-  for (int i = 0; i < 20; ++i) cap.segment.mesh.positions[random() % 100] = cap.segment.mesh.positions[random() % 100];  // no surface area
-  for (const int v : cap.segment.loops[0].vertices) cap.segment.mesh.positions[v] = revolve(cap_profile(12), {.columns = 12}).segment.mesh.positions[v];
+  for (int i = 0; i < 20; ++i)
+    cap.segment.mesh.positions[random() % 100] = cap.segment.mesh.positions[random() % 100];  // no surface area
+  for (const int v : cap.segment.loops[0].vertices)
+    cap.segment.mesh.positions[v] = revolve(cap_profile(12), {.columns = 12}).segment.mesh.positions[v];
   all.emplace_back("rough cap with triangles of no area", cap);
   MadeSegment hub = revolve(cap_profile(12), {.columns = 200});
   hub.skeleton.nodes[2].position = {0.4, 0.1, 1.0};
@@ -69,7 +75,8 @@ double relative_difference(const Chart& a, const Chart& b) {
   }
   double largest = 0;
   for (std::size_t i = 0; i < b.v.size(); ++i)
-    if (b.kinds[i] == ChartVertex::kInner) largest = std::max(largest, std::hypot(a.u[i] - b.u[i], a.v[i] - b.v[i] - shift) * edges[i] / total[i]);
+    if (b.kinds[i] == ChartVertex::kInner)
+      largest = std::max(largest, std::hypot(a.u[i] - b.u[i], a.v[i] - b.v[i] - shift) * edges[i] / total[i]);
   return largest;
 }
 
@@ -98,7 +105,9 @@ TEST(Vsm, AgreesWithADirectSolutionInDoublePrecision) {
       SCOPED_TRACE(name + ", iterations " + std::to_string(iterations));
       std::vector<Chart> charts{chart_of(made)};
       Chart expected = charts[0];
-      const auto report = solve_vsm(context(), charts, {.iterations = iterations, .tolerance = 1e-6, .intermediate_tolerance = 1e-6}).at(0);
+      const auto report =
+          solve_vsm(context(), charts, {.iterations = iterations, .tolerance = 1e-6, .intermediate_tolerance = 1e-6})
+              .at(0);
       EXPECT_LE(report.residual, 1e-6);
       twin_vsm(expected, iterations, 0.5);
       EXPECT_LT(relative_difference(charts[0], expected), iterations == 0 ? 1e-3 : 2e-3);
@@ -116,7 +125,8 @@ TEST(Vsm, ARegularCylinderMapsToHeightAndAngle) {
 }
 
 TEST(Vsm, ReweightingEvensOutAreas) {
-  const Chart chart = chart_of(revolve(cap_profile(40), {.columns = 30, .noise = 0.05, .has_random_diagonals = true, .seed = 3}));
+  const Chart chart =
+      chart_of(revolve(cap_profile(40), {.columns = 30, .noise = 0.05, .has_random_diagonals = true, .seed = 3}));
   double last = HUGE_VAL;
   for (const int iterations : {0, 1, 2, 4, 8, 12}) {
     std::vector<Chart> charts{chart};
@@ -131,13 +141,16 @@ TEST(Vsm, OneReweightingEvensOutARegularCapCompletely) {
   const Chart chart = chart_of(revolve(cap_profile(40), {.columns = 30}));
   for (const int iterations : {1, 2, 12}) {
     std::vector<Chart> charts{chart};
-    const auto report = solve_vsm(context(), charts, {.iterations = iterations, .alpha = 0, .tolerance = 1e-5, .intermediate_tolerance = 1e-5})[0];
+    const auto report =
+        solve_vsm(context(), charts,
+                  {.iterations = iterations, .alpha = 0, .tolerance = 1e-5, .intermediate_tolerance = 1e-5})[0];
     EXPECT_LT(report.spread, 1e-4) << iterations;
   }
 }
 
 TEST(Vsm, StopsWhenTheSpreadHasSettled) {
-  std::vector<Chart> charts{chart_of(revolve(cylinder_profile(30), {.columns = 20, .noise = 0.01})), chart_of(revolve(mushroom_profile(30), {.columns = 20}))};
+  std::vector<Chart> charts{chart_of(revolve(cylinder_profile(30), {.columns = 20, .noise = 0.01})),
+                            chart_of(revolve(mushroom_profile(30), {.columns = 20}))};
   std::vector<Chart> free = charts;
   const auto reports = solve_vsm(context(), charts, {.iterations = 30, .stop_spread_change = 0.05});
   for (std::size_t k = 0; k < charts.size(); ++k) {
@@ -166,7 +179,8 @@ TEST(Vsm, ChartsDoNotInfluenceEachOther) {
 }
 
 TEST(Vsm, TheSameInputGivesTheSameBitsAndEveryWorkGroupSizeTheSameMap) {
-  const std::vector<Chart> before{chart_of(revolve(mushroom_profile(25), {.columns = 30, .noise = 0.05})), chart_of(revolve(cap_profile(8), {.columns = 9})),
+  const std::vector<Chart> before{chart_of(revolve(mushroom_profile(25), {.columns = 30, .noise = 0.05})),
+                                  chart_of(revolve(cap_profile(8), {.columns = 9})),
                                   chart_of(revolve(cylinder_profile(2), {.columns = 3}))};
   VsmOptions exact{.iterations = 2, .tolerance = 1e-6, .intermediate_tolerance = 1e-6, .work_group_size = 1};
   std::vector<Chart> alone = before;
@@ -197,7 +211,8 @@ TEST(Vsm, MovingTurningScalingAndRenumberingChangeNothing) {
     solve_vsm(context(), moved, exact);
     ASSERT_EQ(charts[0].triangles, moved[0].triangles);
     moved[0].turns = charts[0].turns;  // the cut may lie elsewhere
-    for (std::size_t i = 0; i < charts[0].v.size(); ++i) moved[0].v[i] = charts[0].v[i] + std::remainder(moved[0].v[i] - charts[0].v[i], 1.0);
+    for (std::size_t i = 0; i < charts[0].v.size(); ++i)
+      moved[0].v[i] = charts[0].v[i] + std::remainder(moved[0].v[i] - charts[0].v[i], 1.0);
     EXPECT_LT(relative_difference(moved[0], charts[0]), 5e-3);
 
     if (made.segment.topology == SegmentTopology::kSphere) continue;
@@ -222,7 +237,8 @@ TEST(Vsm, AnUnfinishedSolutionIsReplacedByADirectOne) {
       if (charts[0].kinds[i] == ChartVertex::kInner) charts[0].u[i] = charts[0].v[i] = 0.3;  // a bad guess
     Chart expected = charts[0];
     const auto report = solve_vsm(context(), charts, {.iterations = 2, .max_steps = 0}).at(0);
-    EXPECT_EQ(report.used_direct_solver, std::count(expected.kinds.begin(), expected.kinds.end(), ChartVertex::kInner) > 0);
+    EXPECT_EQ(report.used_direct_solver,
+              std::count(expected.kinds.begin(), expected.kinds.end(), ChartVertex::kInner) > 0);
     EXPECT_EQ(report.solver_steps, 0);
     EXPECT_EQ(report.flipped_triangles, 0);
     twin_vsm(expected, 2, 0.5);
@@ -234,10 +250,10 @@ TEST(Vsm, NoChartsAreNoWork) { EXPECT_TRUE(solve_vsm(context(), {}).empty()); }
 
 std::vector<Chart> charts_of_model(const std::string& name) {
   const TestModel model = load_standard_model(name);
-  const Walls walls(model.skeleton);
+  const SeparationPlanes separation(model.skeleton);
   std::vector<Chart> charts;
   for (const Segment& segment : segment_mesh(context(), model.mesh, model.skeleton).segments)
-    charts.push_back(make_chart(segment, model.skeleton, walls));
+    charts.push_back(make_chart(segment, model.skeleton, separation));
   return charts;
 }
 
@@ -261,7 +277,8 @@ TEST(Vsm, RealModelsAreMappedWithoutFlipsByAnyRecipe) {
     const std::vector<Chart> before = charts_of_model(name);
     for (const double alpha : {0.0, 0.5})
       for (const int iterations : {0, 1, 12}) {
-        SCOPED_TRACE(std::string(name) + ", iterations " + std::to_string(iterations) + ", alpha " + std::to_string(alpha));
+        SCOPED_TRACE(std::string(name) + ", iterations " + std::to_string(iterations) + ", alpha " +
+                     std::to_string(alpha));
         std::vector<Chart> charts = before;
         const auto reports = solve_vsm(context(), charts, {.iterations = iterations, .alpha = alpha});
         for (std::size_t k = 0; k < charts.size(); ++k) {

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Filters on the device, beside a device copy of as many floats: smoothing, noise, and one application of the surface's operator.
+// Filters on the device, beside a device copy of as many floats: smoothing, noise, and one application of the surface's
+// operator.
 #include <fmt/format.h>
 
-#include "skeletex/edit/differential.h"
-#include "skeletex/edit/filter.h"
+#include "skeletex/edit/filter/differential.h"
+#include "skeletex/edit/filter/filter.h"
 #include "stage_benchmarks.h"
 
 namespace skeletex {
@@ -33,7 +34,9 @@ Stage apply_stage(TextureInputPointer input) {
   };
   const auto made = std::make_shared<Operator>(input->model);
   Stage stage = stage_on("apply", *input, 2 * made->surface.points.values.size);
-  stage.run = [made] { apply_operator(bench_device(), made->laplace, 1, 1e-4f, made->everywhere, made->surface.points); };
+  stage.run = [made] {
+    apply_operator(bench_device(), made->laplace, 1, 1e-4f, made->everywhere, made->surface.points);
+  };
   return stage;
 }
 
@@ -46,7 +49,8 @@ Stage noise_stage(TextureInputPointer input) {
 void register_all() {
   for (const std::string name : {"bunny00", "armadillo", "armadillo_fine"})
     for (const int size : {256, 512, 1024, 2048, 4096}) {
-      register_stage(fmt::format("filter/{}/{}", name, size), [=] { return filter_stage(bench_device(), bench_texture(name, size)); });
+      register_stage(fmt::format("filter/{}/{}", name, size),
+                     [=] { return filter_stage(bench_device(), bench_texture(name, size)); });
       register_stage(fmt::format("noise/{}/{}", name, size), [=] { return noise_stage(bench_texture(name, size)); });
       register_stage(fmt::format("apply/{}/{}", name, size), [=] { return apply_stage(bench_texture(name, size)); });
     }

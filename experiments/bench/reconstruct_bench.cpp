@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Frames: bind pose and a pose, beside a device copy of as many bytes; and the whole way from a model to a mesh, or to another size.
+// Frames: bind pose and a pose, beside a device copy of as many bytes; and the whole way from a model to a mesh, or to
+// another size.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
@@ -16,19 +17,25 @@ void whole_mesh(benchmark::State& state, const std::string& name, int size) {
 
 void resample(benchmark::State& state, const std::string& name, int size, int new_size) {
   const TextureInputPointer input = bench_texture(name, size);
-  for (auto _ : state) benchmark::DoNotOptimize(resample_model(bench_device(), input->model, new_size).texture.out.data());
+  for (auto _ : state)
+    benchmark::DoNotOptimize(resample_model(bench_device(), input->model, new_size).texture.out.data());
 }
 
 void register_all() {
   for (const std::string name : {"bunny00", "armadillo", "armadillo_fine"})
     for (const int size : {256, 512, 1024, 2048, 4096}) {
-      register_stage(fmt::format("reconstruct/{}/{}", name, size), [=] { return reconstruct_stage(bench_device(), bench_texture(name, size)); });
-      register_stage(fmt::format("pose/{}/{}", name, size), [=] { return pose_stage(bench_device(), bench_texture(name, size)); });
+      register_stage(fmt::format("reconstruct/{}/{}", name, size),
+                     [=] { return reconstruct_stage(bench_device(), bench_texture(name, size)); });
+      register_stage(fmt::format("pose/{}/{}", name, size),
+                     [=] { return pose_stage(bench_device(), bench_texture(name, size)); });
     }
   for (const int size : {512, 2048})
-    benchmark::RegisterBenchmark(fmt::format("mesh/armadillo/{}", size).c_str(), whole_mesh, "armadillo", size)->UseRealTime()->Unit(benchmark::kMillisecond);
+    benchmark::RegisterBenchmark(fmt::format("mesh/armadillo/{}", size).c_str(), whole_mesh, "armadillo", size)
+        ->UseRealTime()
+        ->Unit(benchmark::kMillisecond);
   for (const auto& [size, new_size] : {std::pair{512, 128}, {2048, 512}, {2048, 64}, {512, 1024}})
-    benchmark::RegisterBenchmark(fmt::format("resample/armadillo/{}/{}", size, new_size).c_str(), resample, "armadillo", size, new_size)
+    benchmark::RegisterBenchmark(fmt::format("resample/armadillo/{}/{}", size, new_size).c_str(), resample, "armadillo",
+                                 size, new_size)
         ->UseRealTime()
         ->Unit(benchmark::kMillisecond);
 }

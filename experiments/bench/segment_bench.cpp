@@ -3,7 +3,7 @@
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
-#include "skeletex/segment/half_edge.h"
+#include "skeletex/geometry/half_edge.h"
 #include "stage_benchmarks.h"
 
 namespace skeletex {
@@ -17,7 +17,9 @@ void half_edges(benchmark::State& state, const std::string& name) {
 void register_all() {
   for (const std::string name : {"bunny00", "armadillo", "armadillo_fine"}) {
     register_stage(fmt::format("segment/{}", name), [=] { return segment_stage(bench_device(), bench_mesh(name)); });
-    benchmark::RegisterBenchmark(fmt::format("half_edges/{}", name).c_str(), half_edges, name)->UseRealTime()->Unit(benchmark::kMillisecond);
+    benchmark::RegisterBenchmark(fmt::format("half_edges/{}", name).c_str(), half_edges, name)
+        ->UseRealTime()
+        ->Unit(benchmark::kMillisecond);
   }
 }
 

@@ -31,7 +31,8 @@ TextureInputPointer bench_texture(const std::string& name, int size) {
 }
 
 void register_stage(const std::string& name, std::function<Stage()> make) {
-  // Google Benchmark calls a function several times until it knows how often to repeat; only the stage of the moment is kept.
+  // Google Benchmark calls a function several times until it knows how often to repeat; only the stage of the moment is
+  // kept.
   static std::optional<Stage> stage;
   static std::string stage_name;
   const auto run = [name, make = std::move(make)](benchmark::State& state) {
@@ -62,7 +63,8 @@ int run_benchmarks(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
   const OrderedJson record = describe_build_and_machine("");
-  for (const char* key : {"name", "driver"}) benchmark::AddCustomContext(std::string("device_") + key, record.at("device").at(key).get<std::string>());
+  for (const char* key : {"name", "driver"})
+    benchmark::AddCustomContext(std::string("device_") + key, record.at("device").at(key).get<std::string>());
   benchmark::AddCustomContext("compiler", record.at("compiler").get<std::string>());
   benchmark::AddCustomContext("git", record.at("git").dump());
   benchmark::RunSpecifiedBenchmarks();

@@ -7,10 +7,10 @@
 
 #include "bench/stages/subdivide.h"
 #include "simplify.h"
+#include "skeletex/analysis/manifold.h"
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/same_file.h"
-#include "skeletex/measure/manifold.h"
 #include "skeletex/model/error.h"
 
 namespace {
@@ -27,40 +27,54 @@ skeletex::TriangleMesh subdivided_to(skeletex::TriangleMesh mesh, int vertices) 
 
 void run(const Arguments& arguments) {
   using namespace skeletex;
-  for (const std::string& output : {arguments.output, arguments.json}) check_not_an_input(output, {arguments.mesh, arguments.like});
+  for (const std::string& output : {arguments.output, arguments.json})
+    check_not_an_input(output, {arguments.mesh, arguments.like});
   const TriangleMesh mesh = read_mesh(arguments.mesh).mesh;
   const ManifoldReport report = measure_manifold(mesh);
-  if (!report.is_closed_manifold()) throw InputError(arguments.mesh + ": not a closed manifold; skeletex validate says where");
+  if (!report.is_closed_manifold())
+    throw InputError(arguments.mesh + ": not a closed manifold; skeletex validate says where");
   const int present = static_cast<int>(mesh.positions.size());
-  const int wanted = !arguments.like.empty() ? static_cast<int>(read_mesh(arguments.like).mesh.positions.size()) : arguments.vertices > 0 ? arguments.vertices : present;
+  const int wanted = !arguments.like.empty()  ? static_cast<int>(read_mesh(arguments.like).mesh.positions.size())
+                     : arguments.vertices > 0 ? arguments.vertices
+                                              : present;
   const bool can_grow = arguments.method == "remesh" || arguments.method == "subdivide";
   if (!can_grow && wanted > present)
-    throw InputError(fmt::format("{} has {} vertices, {} cannot make {}", arguments.mesh, present, arguments.method, wanted));
+    throw InputError(
+        fmt::format("{} has {} vertices, {} cannot make {}", arguments.mesh, present, arguments.method, wanted));
   const auto begin = std::chrono::steady_clock::now();
-  const TriangleMesh result = arguments.method == "decimate"   ? decimate(mesh, wanted)
-                              : arguments.method == "simplify" ? simplify(mesh, wanted)
-                              : arguments.method == "remesh"   ? remesh(mesh, wanted)
+  const TriangleMesh result = arguments.method == "decimate"    ? decimate(mesh, wanted)
+                              : arguments.method == "simplify"  ? simplify(mesh, wanted)
+                              : arguments.method == "remesh"    ? remesh(mesh, wanted)
                               : arguments.method == "subdivide" ? subdivided_to(mesh, wanted)
-                                                               : mesh;
+                                                                : mesh;
   const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
   write_mesh(arguments.output, result);
-  const nlohmann::ordered_json json{{"vertices", result.positions.size()}, {"triangles", result.triangles.size()}, {"ms", ms},
+  const nlohmann::ordered_json json{{"vertices", result.positions.size()},
+                                    {"triangles", result.triangles.size()},
+                                    {"ms", ms},
                                     {"closed_manifold", measure_manifold(result).is_closed_manifold()}};
   if (!arguments.json.empty()) write_text_atomically(arguments.json, json.dump(2) + "\n");
-  fmt::print("{} vertices, {} triangles, {:.0f} ms: {}\n", result.positions.size(), result.triangles.size(), ms, arguments.output);
+  fmt::print("{} vertices, {} triangles, {:.0f} ms: {}\n", result.positions.size(), result.triangles.size(), ms,
+             arguments.output);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App program("Meshes with a given number of vertices by other libraries, for comparison with reconstructions.", "peers");
+  CLI::App program("Meshes with a given number of vertices by other libraries, for comparison with reconstructions.",
+                   "peers");
   Arguments arguments;
-  program.add_option("METHOD", arguments.method, "decimate (OpenMesh, quadrics), simplify (meshoptimizer, quadrics), remesh (CGAL, isotropic), subdivide (every triangle into four, at least as many as wanted) or copy (as it is)")
+  program
+      .add_option("METHOD", arguments.method,
+                  "decimate (OpenMesh, quadrics), simplify (meshoptimizer, quadrics), remesh (CGAL, isotropic), "
+                  "subdivide (every triangle into four, at least as many as wanted) or copy (as it is)")
       ->required()
       ->check(CLI::IsMember({"decimate", "simplify", "remesh", "subdivide", "copy"}));
   program.add_option("MESH", arguments.mesh, "closed triangle mesh")->required();
   program.add_option("-o,--output", arguments.output, "the result: .ply or .obj")->required();
-  CLI::Option* vertices = program.add_option("--vertices", arguments.vertices, "how many vertices (default: as many as there are)")->check(CLI::Range(4, 100000000));
+  CLI::Option* vertices =
+      program.add_option("--vertices", arguments.vertices, "how many vertices (default: as many as there are)")
+          ->check(CLI::Range(4, 100000000));
   program.add_option("--like", arguments.like, "as many vertices as this mesh has")->excludes(vertices);
   program.add_option("--json", arguments.json, "write vertices, triangles, ms, closed_manifold to this file");
   try {

@@ -6,12 +6,12 @@
 #include <nlohmann/json.hpp>
 
 #include "peers/skinning.h"
+#include "skeletex/analysis/deformation.h"
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/pose_file.h"
 #include "skeletex/io/same_file.h"
-#include "skeletex/measure/deformation.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/reconstruct/polish.h"
@@ -37,15 +37,20 @@ std::vector<int> own_bones(const SkeletexModel& model) {
   const Lattice lattice = number_lattice(model);
   std::vector<int> own;
   for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
-    own.insert(own.end(), static_cast<std::size_t>(model.patches[bone].rectangle.width) * (model.patches[bone].rectangle.height - 2), bone);
+    own.insert(
+        own.end(),
+        static_cast<std::size_t>(model.patches[bone].rectangle.width) * (model.patches[bone].rectangle.height - 2),
+        bone);
   const std::vector<int> shared = bones_of_shared_vertices(model, lattice);
   own.insert(own.end(), shared.begin(), shared.end());
   return own;
 }
 
-void measure(Rule& rule, const BindSurface& bind, const std::vector<bool>& is_seam, const PoseFrame& frame, const Skeleton& posed, const std::string& folder) {
+void measure(Rule& rule, const BindSurface& bind, const std::vector<bool>& is_seam, const PoseFrame& frame,
+             const Skeleton& posed, const std::string& folder) {
   const std::vector<Vec3> positions = rule.pose(posed);
-  if (!folder.empty()) write_mesh(fmt::format("{}/{}.{}.ply", folder, frame.name, rule.name), {positions, bind.mesh.triangles});
+  if (!folder.empty())
+    write_mesh(fmt::format("{}/{}.{}.ply", folder, frame.name, rule.name), {positions, bind.mesh.triangles});
   const DeformationReport report = measure_deformation(bind, positions);
   const double bend = added_bend(bind, positions, is_seam, 0.99);
   rule.poses.push_back({{"time", frame.time},
@@ -68,32 +73,41 @@ void measure(Rule& rule, const BindSurface& bind, const std::vector<bool>& is_se
 int poses_not_worse(const Rule& rule, const Rule& other) {
   int count = 0;
   for (std::size_t i = 0; i < rule.poses.size(); ++i)
-    count += rule.poses[i]["new_folds"] <= other.poses[i]["new_folds"] && rule.poses[i]["new_intersections"] <= other.poses[i]["new_intersections"];
+    count += rule.poses[i]["new_folds"] <= other.poses[i]["new_folds"] &&
+             rule.poses[i]["new_intersections"] <= other.poses[i]["new_intersections"];
   return count;
 }
 
-Json run(const std::string& model_path, const std::string& pose_path, const std::string& device, const std::string& folder) {
+Json run(const std::string& model_path, const std::string& pose_path, const std::string& device,
+         const std::string& folder) {
   const SkeletexModel model = read_model(model_path);
   const PoseAnimation animation = read_animation(pose_path, model.skeleton);
   ClContext context(device);
   const BindSurface bind = make_bind_surface(reconstruct_mesh(context, model));
-  const int first_seam = number_lattice(model).first_sample.empty() ? number_lattice(model).first_corner : number_lattice(model).first_sample[0];
+  const int first_seam = number_lattice(model).first_sample.empty() ? number_lattice(model).first_corner
+                                                                    : number_lattice(model).first_sample[0];
   std::vector<bool> is_seam;
   for (const auto& [a, b] : bind.edges.vertices) is_seam.push_back(b >= first_seam);  // vertices of seams come last
 
   std::vector<Rule> rules;
   for (const Deformation deformation : {Deformation::kSmooth, Deformation::kCoordinates, Deformation::kPaper})
-    rules.push_back({to_string(deformation), [&, deformation](const Skeleton& posed) { return reconstruct_mesh(context, model, posed, {deformation}).positions; }});
+    rules.push_back({to_string(deformation), [&, deformation](const Skeleton& posed) {
+                       return reconstruct_mesh(context, model, posed, {deformation}).positions;
+                     }});
   rules.push_back({"polished", [&](const Skeleton& posed) {
                      std::vector<Vec3> positions = reconstruct_mesh(context, model, posed).positions;
                      polish_pose(bind.mesh, positions);
                      return positions;
                    }});
   const std::vector<int> own = own_bones(model);
-  const auto weights = [&](double width) { return diffused_weights(bind.mesh, own, static_cast<int>(model.skeleton.bones.size()), width * model.diagonal); };
+  const auto weights = [&](double width) {
+    return diffused_weights(bind.mesh, own, static_cast<int>(model.skeleton.bones.size()), width * model.diagonal);
+  };
   const VertexWeights wide = weights(0.05), narrow = weights(0.025);
   const auto add_peer = [&](const char* name, const auto& skin, const VertexWeights& peer_weights) {
-    rules.push_back({name, [&, skin](const Skeleton& posed) { return skin(bind.mesh.positions, peer_weights, bone_motions(model.skeleton, posed)); }});
+    rules.push_back({name, [&, skin](const Skeleton& posed) {
+                       return skin(bind.mesh.positions, peer_weights, bone_motions(model.skeleton, posed));
+                     }});
   };
   add_peer("linear", skin_linearly, wide);
   add_peer("dual_quaternions", skin_by_dual_quaternions, wide);
@@ -104,8 +118,11 @@ Json run(const std::string& model_path, const std::string& pose_path, const std:
   }
   Json json;
   for (const Rule& rule : rules) {
-    fmt::print("{:24} {:6} new folds {:6} new intersections, energy {:.2f}, volume {:.3f} to {:.3f}, seams bend by {:.1f} degrees\n", rule.name, rule.new_folds,
-               rule.new_intersections, energy_below(rule.energies, 0.99), rule.lowest_volume, rule.highest_volume, rule.seam_bend);
+    fmt::print(
+        "{:24} {:6} new folds {:6} new intersections, energy {:.2f}, volume {:.3f} to {:.3f}, seams bend by {:.1f} "
+        "degrees\n",
+        rule.name, rule.new_folds, rule.new_intersections, energy_below(rule.energies, 0.99), rule.lowest_volume,
+        rule.highest_volume, rule.seam_bend);
     json[rule.name] = {{"new_folds", rule.new_folds},
                        {"new_intersections", rule.new_intersections},
                        {"energy_99", energy_below(rule.energies, 0.99)},
@@ -122,14 +139,17 @@ Json run(const std::string& model_path, const std::string& pose_path, const std:
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App program("What poses do to a model's surface by each rule of this project, and by linear and dual quaternion skinning with each vertex' own bone diffused over 0.05 "
-                   "(narrow: 0.025) diagonals.",
-                   "pose_rules");
+  CLI::App program(
+      "What poses do to a model's surface by each rule of this project, and by linear and dual quaternion skinning "
+      "with each vertex' own bone diffused over 0.05 "
+      "(narrow: 0.025) diagonals.",
+      "pose_rules");
   std::string model, poses, json, device, folder;
   program.add_option("MODEL", model, "model: .skx.exr")->required();
   program.add_option("POSES", poses, "animation of which each frame is a pose: .json")->required();
   program.add_option("--json", json, "write the numbers of every rule, and of every pose, to this file");
-  program.add_option("--meshes", folder, "write the mesh of every pose by every rule to this folder: POSE.RULE.ply")->check(CLI::ExistingDirectory);
+  program.add_option("--meshes", folder, "write the mesh of every pose by every rule to this folder: POSE.RULE.ply")
+      ->check(CLI::ExistingDirectory);
   program.add_option("--device", device, "OpenCL device, as for skeletex");
   try {
     program.parse(argc, argv);

@@ -32,7 +32,8 @@ TriangleMesh from_cgal(SurfaceMesh& surface) {
   for (const auto face : surface.faces()) {
     Triangle triangle{};
     int corner = 0;
-    for (const auto vertex : surface.vertices_around_face(surface.halfedge(face))) triangle[corner++] = static_cast<int>(vertex.idx());
+    for (const auto vertex : surface.vertices_around_face(surface.halfedge(face)))
+      triangle[corner++] = static_cast<int>(vertex.idx());
     mesh.triangles.push_back(triangle);
   }
   return mesh;
@@ -47,7 +48,8 @@ TriangleMesh remesh(const TriangleMesh& mesh, int vertices) {
   SurfaceMesh surface;
   for (int i = 0; i < kTries; ++i) {
     surface = to_cgal(mesh);
-    CGAL::Polygon_mesh_processing::isotropic_remeshing(surface.faces(), edge, surface, CGAL::parameters::number_of_iterations(kIterations));
+    CGAL::Polygon_mesh_processing::isotropic_remeshing(surface.faces(), edge, surface,
+                                                       CGAL::parameters::number_of_iterations(kIterations));
     const double ratio = static_cast<double>(surface.number_of_vertices()) / vertices;
     if (std::abs(ratio - 1) < 0.02) break;
     edge *= std::sqrt(ratio);

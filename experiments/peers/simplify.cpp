@@ -15,9 +15,11 @@ TriangleMesh simplify(const TriangleMesh& mesh, int vertices) {
   for (const Vec3& p : mesh.positions)
     for (int k = 0; k < 3; ++k) positions.push_back(static_cast<float>(p[k]));
   // Collapsing edges keeps the Euler characteristic: V - F/2 stays.
-  const std::size_t triangles = mesh.triangles.size() - 2 * (mesh.positions.size() - static_cast<std::size_t>(vertices));
+  const std::size_t triangles =
+      mesh.triangles.size() - 2 * (mesh.positions.size() - static_cast<std::size_t>(vertices));
   std::vector<unsigned> kept(indices.size());
-  kept.resize(meshopt_simplify(kept.data(), indices.data(), indices.size(), positions.data(), mesh.positions.size(), 3 * sizeof(float), 3 * triangles, 1.0f, 0, nullptr));
+  kept.resize(meshopt_simplify(kept.data(), indices.data(), indices.size(), positions.data(), mesh.positions.size(),
+                               3 * sizeof(float), 3 * triangles, 1.0f, 0, nullptr));
 
   TriangleMesh result;
   std::vector<int> numbers(mesh.positions.size(), -1);

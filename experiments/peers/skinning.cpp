@@ -17,7 +17,8 @@ VertexWeights diffused_weights(const TriangleMesh& bind, std::span<const int> ow
     const double area = std::max(area_vector(bind, t).norm(), 1e-300);
     for (int c = 0; c < 3; ++c) {
       const int k = t[c], i = t[(c + 1) % 3], j = t[(c + 2) % 3];
-      const double half_cotangent = time * 0.5 * (bind.positions[i] - bind.positions[k]).dot(bind.positions[j] - bind.positions[k]) / (2 * area);
+      const double half_cotangent =
+          time * 0.5 * (bind.positions[i] - bind.positions[k]).dot(bind.positions[j] - bind.positions[k]) / (2 * area);
       entries.emplace_back(i, j, -half_cotangent);
       entries.emplace_back(j, i, -half_cotangent);
       entries.emplace_back(i, i, half_cotangent);
@@ -47,14 +48,17 @@ VertexWeights diffused_weights(const TriangleMesh& bind, std::span<const int> ow
   return weights;
 }
 
-std::vector<Vec3> skin_linearly(std::span<const Vec3> bind, const VertexWeights& weights, std::span<const BoneMotion> motions) {
+std::vector<Vec3> skin_linearly(std::span<const Vec3> bind, const VertexWeights& weights,
+                                std::span<const BoneMotion> motions) {
   std::vector<Vec3> positions(bind.size(), Vec3::Zero());
   for (std::size_t i = 0; i < bind.size(); ++i)
-    for (const auto& [bone, weight] : weights[i]) positions[i] += weight * (motions[bone].rotation * bind[i] + motions[bone].translation);
+    for (const auto& [bone, weight] : weights[i])
+      positions[i] += weight * (motions[bone].rotation * bind[i] + motions[bone].translation);
   return positions;
 }
 
-std::vector<Vec3> skin_by_dual_quaternions(std::span<const Vec3> bind, const VertexWeights& weights, std::span<const BoneMotion> motions) {
+std::vector<Vec3> skin_by_dual_quaternions(std::span<const Vec3> bind, const VertexWeights& weights,
+                                           std::span<const BoneMotion> motions) {
   std::vector<Vec3> positions;
   positions.reserve(bind.size());
   for (std::size_t i = 0; i < bind.size(); ++i) positions.push_back(blend_motions(motions, weights[i], bind[i]));

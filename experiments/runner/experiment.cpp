@@ -9,13 +9,14 @@
 
 #include "skeletex/io/json_file.h"
 #include "skeletex/io/read_file.h"
-#include "skeletex/model/error.h"
 #include "skeletex/io/suggestion.h"
+#include "skeletex/model/error.h"
 
 namespace skeletex {
 namespace {
 
-const std::vector<std::string> kKeys{"name", "title", "paper", "models", "sweep", "steps", "columns", "quick", "$schema"};
+const std::vector<std::string> kKeys{"name",  "title",   "paper", "models", "sweep",
+                                     "steps", "columns", "quick", "$schema"};
 const std::vector<std::string> kStepKeys{"name", "run", "tool", "exit_code", "file_sizes"};
 const std::vector<std::string> kValueKeys{"label", "arguments", "values"};
 const std::vector<std::string> kModelKeys{"name", "mesh", "skeleton", "credits", "view"};
@@ -33,7 +34,8 @@ void check_keys(const OrderedJson& json, const std::vector<std::string>& known, 
       throw IoError(fmt::format("{}: unknown key \"{}\"{}", where, key, did_you_mean(key, known)));
 }
 
-std::string text_of(const OrderedJson& json, const char* key, const std::string& where, const char* fallback = nullptr) {
+std::string text_of(const OrderedJson& json, const char* key, const std::string& where,
+                    const char* fallback = nullptr) {
   if (!json.contains(key)) {
     if (fallback) return fallback;
     throw IoError(fmt::format("{}: \"{}\" is missing", where, key));
@@ -67,12 +69,14 @@ SweepValue value_of(const OrderedJson& json, const std::string& where) {
     if (!json.contains("label")) throw IoError(where + ": \"label\" is missing");
     value.label = json.at("label");
     if (json.contains("values")) value.values = dictionary_of(json.at("values"), where + ": \"values\"");
-    value.arguments = json.contains("arguments") ? texts_of(json.at("arguments"), where + ": \"arguments\"") : std::vector{label_text(value.label)};
+    value.arguments = json.contains("arguments") ? texts_of(json.at("arguments"), where + ": \"arguments\"")
+                                                 : std::vector{label_text(value.label)};
   } else {
     value.label = json;
     value.arguments = {label_text(json)};
   }
-  if (value.label.is_structured() || value.label.is_null()) throw IoError(where + " must be a number, a string, true, false or an object with \"label\"");
+  if (value.label.is_structured() || value.label.is_null())
+    throw IoError(where + " must be a number, a string, true, false or an object with \"label\"");
   return value;
 }
 
@@ -83,7 +87,8 @@ void set_at(OrderedJson& json, const std::string& path, const OrderedJson& value
   while (true) {
     const std::size_t dot = path.find('.', begin);
     const std::string key = path.substr(begin, dot - begin);
-    if (key.empty() || !(at->is_object() || at->is_null())) throw IoError(fmt::format("{}: \"{}\" is no place in it", where, path));
+    if (key.empty() || !(at->is_object() || at->is_null()))
+      throw IoError(fmt::format("{}: \"{}\" is no place in it", where, path));
     at = &(*at)[key];
     if (dot == std::string::npos) break;
     begin = dot + 1;
@@ -95,7 +100,8 @@ ModelConfig model_from(const OrderedJson& json, const std::filesystem::path& fol
   if (json.is_string()) return find_model(json.get<std::string>(), folder);
   check_keys(json, kModelKeys, where);
   const auto file = [&](const char* key) { return (folder / text_of(json, key, where)).lexically_normal(); };
-  return {text_of(json, "name", where), file("mesh"), file("skeleton"), text_of(json, "credits", where, ""), nlohmann::json(json.value("view", OrderedJson()))};
+  return {text_of(json, "name", where), file("mesh"), file("skeleton"), text_of(json, "credits", where, ""),
+          nlohmann::json(json.value("view", OrderedJson()))};
 }
 
 }  // namespace
@@ -106,8 +112,10 @@ ModelConfig find_model(const std::string& name, const std::filesystem::path& fol
   if (std::filesystem::exists(path)) return read_model_config(path);
   std::vector<std::string> names;
   std::error_code ignored;
-  for (const auto& entry : std::filesystem::directory_iterator(models, ignored)) names.push_back(entry.path().stem().string());
-  throw IoError(fmt::format("there is no model \"{}\" in {}{}", name, models.lexically_normal().string(), did_you_mean(name, names)));
+  for (const auto& entry : std::filesystem::directory_iterator(models, ignored))
+    names.push_back(entry.path().stem().string());
+  throw IoError(fmt::format("there is no model \"{}\" in {}{}", name, models.lexically_normal().string(),
+                            did_you_mean(name, names)));
 }
 
 std::vector<std::filesystem::path> experiment_files(const std::filesystem::path& path) {
@@ -115,7 +123,8 @@ std::vector<std::filesystem::path> experiment_files(const std::filesystem::path&
   if (!json.is_object() || !json.contains("experiments")) return {path};
   check_keys(json, {"name", "title", "experiments", "$schema"}, path.string());
   std::vector<std::filesystem::path> files;
-  for (const std::string& file : texts_of(json.at("experiments"), path.string() + ": \"experiments\"")) files.push_back((path.parent_path() / file).lexically_normal());
+  for (const std::string& file : texts_of(json.at("experiments"), path.string() + ": \"experiments\""))
+    files.push_back((path.parent_path() / file).lexically_normal());
   return files;
 }
 
@@ -130,7 +139,8 @@ Experiment read_experiment(const std::filesystem::path& path, const ExperimentCh
   }
   for (const std::string& setting : changes.settings) {
     const std::size_t equals = setting.find('=');
-    if (equals == std::string::npos) throw InputError(fmt::format("--set {}: give KEY=VALUE, e.g. sweep.size=[64,128]", setting));
+    if (equals == std::string::npos)
+      throw InputError(fmt::format("--set {}: give KEY=VALUE, e.g. sweep.size=[64,128]", setting));
     const std::string text = setting.substr(equals + 1);
     OrderedJson value = OrderedJson::parse(text, nullptr, false);
     set_at(json, setting.substr(0, equals), value.is_discarded() ? OrderedJson(text) : value, "--set");
@@ -140,14 +150,16 @@ Experiment read_experiment(const std::filesystem::path& path, const ExperimentCh
   Experiment experiment;
   experiment.folder = path.parent_path();
   experiment.name = text_of(json, "name", where);
-  if (experiment.name.empty() || experiment.name.find('/') != std::string::npos) throw IoError(where + ": \"name\" must be fit for a folder");
+  if (experiment.name.empty() || experiment.name.find('/') != std::string::npos)
+    throw IoError(where + ": \"name\" must be fit for a folder");
   experiment.title = text_of(json, "title", where, "");
   experiment.paper = text_of(json, "paper", where, "");
   if (!changes.models.empty()) {
     experiment.models = changes.models;
   } else if (json.contains("models")) {
     if (!json.at("models").is_array()) throw IoError(where + ": \"models\" must be a list");
-    for (const OrderedJson& model : json.at("models")) experiment.models.push_back(model_from(model, experiment.folder, where + ": \"models\""));
+    for (const OrderedJson& model : json.at("models"))
+      experiment.models.push_back(model_from(model, experiment.folder, where + ": \"models\""));
   }
   for (const std::string& name : changes.only) {
     std::vector<std::string> names;
@@ -156,19 +168,23 @@ Experiment read_experiment(const std::filesystem::path& path, const ExperimentCh
       throw InputError(fmt::format("{} has no model \"{}\"{}", experiment.name, name, did_you_mean(name, names)));
   }
   if (!changes.only.empty())
-    std::erase_if(experiment.models, [&](const ModelConfig& model) { return std::find(changes.only.begin(), changes.only.end(), model.name) == changes.only.end(); });
+    std::erase_if(experiment.models, [&](const ModelConfig& model) {
+      return std::find(changes.only.begin(), changes.only.end(), model.name) == changes.only.end();
+    });
 
   if (json.contains("sweep")) {
     if (!json.at("sweep").is_object()) throw IoError(where + ": \"sweep\" must be an object of lists");
     for (const auto& [name, values] : json.at("sweep").items()) {
       const std::string place = fmt::format("{}: \"sweep.{}\"", where, name);
       SweepParameter parameter{name, {}};
-      for (const OrderedJson& value : values.is_array() ? values : OrderedJson::array({values})) parameter.values.push_back(value_of(value, place));
+      for (const OrderedJson& value : values.is_array() ? values : OrderedJson::array({values}))
+        parameter.values.push_back(value_of(value, place));
       if (parameter.values.empty()) throw IoError(place + " has no values");
       experiment.sweep.push_back(std::move(parameter));
     }
   }
-  if (!json.contains("steps") || !json.at("steps").is_array() || json.at("steps").empty()) throw IoError(where + ": \"steps\" must be a list of commands");
+  if (!json.contains("steps") || !json.at("steps").is_array() || json.at("steps").empty())
+    throw IoError(where + ": \"steps\" must be a list of commands");
   for (const OrderedJson& entry : json.at("steps")) {
     const std::string place = fmt::format("{}: step {}", where, experiment.steps.size() + 1);
     check_keys(entry, kStepKeys, place);
@@ -179,12 +195,14 @@ Experiment read_experiment(const std::filesystem::path& path, const ExperimentCh
     }
     if (!entry.contains("run")) throw IoError(place + ": \"run\" is missing");
     step.run = texts_of(entry.at("run"), place + ": \"run\"");
-    if (entry.contains("file_sizes")) step.file_sizes = dictionary_of(entry.at("file_sizes"), place + ": \"file_sizes\"");
+    if (entry.contains("file_sizes"))
+      step.file_sizes = dictionary_of(entry.at("file_sizes"), place + ": \"file_sizes\"");
     for (const Step& other : experiment.steps)
       if (other.name == step.name) throw IoError(fmt::format("{}: there is another step \"{}\"", place, step.name));
     experiment.steps.push_back(std::move(step));
   }
-  if (json.contains("columns") && !json.at("columns").is_object()) throw IoError(where + ": \"columns\" must be an object of places");
+  if (json.contains("columns") && !json.at("columns").is_object())
+    throw IoError(where + ": \"columns\" must be an object of places");
   if (json.contains("columns"))
     for (const auto& [column, value] : json.at("columns").items()) {
       const std::string place = text_of(json.at("columns"), column.c_str(), where + ": \"columns\"");
@@ -223,14 +241,17 @@ std::vector<Item> plan_items(const Experiment& experiment) {
       if (item.key.empty()) item.key = experiment.name;
       for (char& c : item.key)
         if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-' && c != '_' && c != '.') c = '_';
-      if (!keys.insert(item.key).second) throw IoError(fmt::format("{}: two items are called \"{}\"; give models or values other names", experiment.name, item.key));
+      if (!keys.insert(item.key).second)
+        throw IoError(fmt::format("{}: two items are called \"{}\"; give models or values other names", experiment.name,
+                                  item.key));
       items.push_back(std::move(item));
     }
   }
   return items;
 }
 
-std::vector<std::string> fill_arguments(const Experiment& experiment, const Item& item, const std::vector<std::string>& arguments,
+std::vector<std::string> fill_arguments(const Experiment& experiment, const Item& item,
+                                        const std::vector<std::string>& arguments,
                                         const std::map<std::string, std::string>& more) {
   const auto value_of_name = [&](const std::string& name) -> std::string {
     if (const auto found = more.find(name); found != more.end()) return found->second;
@@ -238,7 +259,8 @@ std::vector<std::string> fill_arguments(const Experiment& experiment, const Item
     const std::size_t colon = name.find(':');
     const std::string what = name.substr(0, colon);
     if ((what == "model" || what == "mesh" || what == "skeleton") && (colon != std::string::npos || item.model >= 0)) {
-      const ModelConfig model = colon != std::string::npos ? find_model(name.substr(colon + 1), experiment.folder) : experiment.models[item.model];
+      const ModelConfig model = colon != std::string::npos ? find_model(name.substr(colon + 1), experiment.folder)
+                                                           : experiment.models[item.model];
       return what == "model" ? model.name : what == "mesh" ? model.mesh.string() : model.skeleton.string();
     }
     throw IoError(fmt::format("{}: nothing sets the placeholder {{{}}}", experiment.name, name));
@@ -247,13 +269,15 @@ std::vector<std::string> fill_arguments(const Experiment& experiment, const Item
   for (const std::string& argument : arguments) {
     if (argument.size() > 2 && argument.front() == '{' && argument.back() == '}')
       if (const auto list = item.lists.find(argument.substr(1, argument.size() - 2)); list != item.lists.end()) {
-        const std::vector<std::string> nested = fill_arguments(experiment, {item.key, item.model, item.parameters, item.placeholders, {}}, list->second, more);
+        const std::vector<std::string> nested = fill_arguments(
+            experiment, {item.key, item.model, item.parameters, item.placeholders, {}}, list->second, more);
         filled.insert(filled.end(), nested.begin(), nested.end());
         continue;
       }
     std::string text = argument;
     for (int replaced = 0;; ++replaced) {  // innermost first, so that {mesh:{a}} works
-      if (replaced == 100) throw IoError(fmt::format("{}: a placeholder of \"{}\" stands for itself", experiment.name, argument));
+      if (replaced == 100)
+        throw IoError(fmt::format("{}: a placeholder of \"{}\" stands for itself", experiment.name, argument));
       const std::size_t end = text.find('}');
       const std::size_t begin = end == std::string::npos ? end : text.rfind('{', end);
       if (begin == std::string::npos) break;

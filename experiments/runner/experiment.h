@@ -14,9 +14,9 @@ using OrderedJson = nlohmann::ordered_json;
 
 /// One value of a swept parameter: how rows call it, and what {parameter} stands for in arguments.
 struct SweepValue {
-  OrderedJson label;                           ///< a number, a string or a truth value
-  std::vector<std::string> arguments;          ///< what an argument that is just {parameter} becomes; else it is the label
-  std::map<std::string, std::string> values;   ///< further placeholders that this value sets
+  OrderedJson label;                   ///< a number, a string or a truth value
+  std::vector<std::string> arguments;  ///< what an argument that is just {parameter} becomes; else it is the label
+  std::map<std::string, std::string> values;  ///< further placeholders that this value sets
 };
 struct SweepParameter {
   std::string name;
@@ -32,15 +32,16 @@ struct Step {
   std::map<std::string, std::string> file_sizes;  ///< result name -> file whose bytes are counted
 };
 
-/// An experiment as its file describes it (configs/schema/experiment.schema.json): every model x every combination of the
-/// sweep is an item, and an item is a list of commands.
+/// An experiment as its file describes it (configs/schema/experiment.schema.json): every model x every combination of
+/// the sweep is an item, and an item is a list of commands.
 struct Experiment {
   std::string name, title, paper;
   std::vector<ModelConfig> models;  ///< may be empty: then items have no model
   std::vector<SweepParameter> sweep;
   std::vector<Step> steps;
-  std::vector<std::pair<std::string, std::string>> columns;  ///< column name -> place in the steps' JSON, e.g. metro.forward.mean
-  std::filesystem::path folder;                                  ///< of the file: names of models are looked up beside it
+  std::vector<std::pair<std::string, std::string>>
+      columns;                   ///< column name -> place in the steps' JSON, e.g. metro.forward.mean
+  std::filesystem::path folder;  ///< of the file: names of models are looked up beside it
 };
 
 struct ExperimentChanges {
@@ -68,10 +69,11 @@ struct Item {
 /// \throw IoError when two items would have the same key
 std::vector<Item> plan_items(const Experiment& experiment);
 
-/// A step's arguments for an item. Placeholders: parameters; {model}, {mesh}, {skeleton} and {config} of the item's model or, as
-/// {mesh:NAME}, of any; {work}, a folder that is the item's own and goes when it ends; {out}, the folder of the results.
-/// \throw IoError naming a placeholder that nothing sets
-std::vector<std::string> fill_arguments(const Experiment& experiment, const Item& item, const std::vector<std::string>& arguments,
+/// A step's arguments for an item. Placeholders: parameters; {model}, {mesh}, {skeleton} and {config} of the item's
+/// model or, as {mesh:NAME}, of any; {work}, a folder that is the item's own and goes when it ends; {out}, the folder
+/// of the results. \throw IoError naming a placeholder that nothing sets
+std::vector<std::string> fill_arguments(const Experiment& experiment, const Item& item,
+                                        const std::vector<std::string>& arguments,
                                         const std::map<std::string, std::string>& more);
 
 }  // namespace skeletex

@@ -22,7 +22,8 @@ constexpr std::size_t kErrorBytes = 4000;
 
 }  // namespace
 
-ProcessResult run_process(const std::string& program, const std::vector<std::string>& arguments, const std::map<std::string, std::string>& environment,
+ProcessResult run_process(const std::string& program, const std::vector<std::string>& arguments,
+                          const std::map<std::string, std::string>& environment,
                           const std::filesystem::path& error_file) {
   std::vector<std::string> texts;
   for (char** entry = ::environ; *entry; ++entry) {

@@ -8,15 +8,16 @@
 namespace skeletex {
 
 struct ProcessResult {
-  int exit_code = -1;       ///< 128 + the signal's number when a signal ended it
-  double seconds = 0;       ///< wall clock
+  int exit_code = -1;  ///< 128 + the signal's number when a signal ended it
+  double seconds = 0;  ///< wall clock
   double peak_memory_mb = 0;
-  std::string errors;       ///< the end of its standard error
+  std::string errors;  ///< the end of its standard error
 };
 
 /// Runs a program to its end; standard output goes nowhere. \param environment  set on top of this process's own
 /// \throw IoError when it cannot be started
-ProcessResult run_process(const std::string& program, const std::vector<std::string>& arguments, const std::map<std::string, std::string>& environment,
+ProcessResult run_process(const std::string& program, const std::vector<std::string>& arguments,
+                          const std::map<std::string, std::string>& environment,
                           const std::filesystem::path& error_file);
 
 }  // namespace skeletex

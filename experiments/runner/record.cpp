@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT
 #include "record.h"
 
-#include <CL/opencl.hpp>
-#include <Eigen/Core>
 #include <OpenEXR/OpenEXRConfig.h>
 #include <OpenMesh/Core/System/config.h>
 #include <fmt/format.h>
 #include <sys/utsname.h>
 
+#include <CL/opencl.hpp>
+#include <Eigen/Core>
 #include <array>
 #include <cstdio>
 #include <fstream>
 #include <memory>
 #include <thread>
 
-#include "skeletex/cl/context.h"
+#include "skeletex/device/context.h"
 #include "skeletex/io/read_file.h"
 
 namespace skeletex {
@@ -53,18 +53,22 @@ OrderedJson describe_build_and_machine(const std::string& device_selector) {
   utsname system{};
   ::uname(&system);
   const std::string commit = output_of("git rev-parse HEAD 2>/dev/null");
-  return {{"version", SKELETEX_VERSION},
-          {"git", {{"commit", commit}, {"changed_files", commit.empty() ? "" : output_of("git status --porcelain 2>/dev/null | wc -l")}}},
-          {"compiler", SKELETEX_COMPILER},
-          {"libraries",
-           {{"eigen", fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
-            {"openmesh", fmt::format("{:x}", OM_VERSION)},
-            {"openexr", OPENEXR_VERSION_STRING}}},
-          {"device", {{"name", device.name}, {"platform", device.platform}, {"version", device.version}, {"driver", device.driver}}},
-          {"machine",
-           {{"system", fmt::format("{} {} {}", system.sysname, system.release, system.machine)},
-            {"processor", processor_name()},
-            {"cores", std::thread::hardware_concurrency()}}}};
+  return {
+      {"version", SKELETEX_VERSION},
+      {"git",
+       {{"commit", commit},
+        {"changed_files", commit.empty() ? "" : output_of("git status --porcelain 2>/dev/null | wc -l")}}},
+      {"compiler", SKELETEX_COMPILER},
+      {"libraries",
+       {{"eigen", fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
+        {"openmesh", fmt::format("{:x}", OM_VERSION)},
+        {"openexr", OPENEXR_VERSION_STRING}}},
+      {"device",
+       {{"name", device.name}, {"platform", device.platform}, {"version", device.version}, {"driver", device.driver}}},
+      {"machine",
+       {{"system", fmt::format("{} {} {}", system.sysname, system.release, system.machine)},
+        {"processor", processor_name()},
+        {"cores", std::thread::hardware_concurrency()}}}};
 }
 
 }  // namespace skeletex

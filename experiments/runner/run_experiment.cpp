@@ -25,7 +25,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void write_json_file(const fs::path& path, const OrderedJson& json) { write_text_atomically(path, json.dump(1, ' ', false, OrderedJson::error_handler_t::replace) + "\n"); }
+void write_json_file(const fs::path& path, const OrderedJson& json) {
+  write_text_atomically(path, json.dump(1, ' ', false, OrderedJson::error_handler_t::replace) + "\n");
+}
 
 std::optional<OrderedJson> read_json_file(const fs::path& path) {
   std::error_code ignored;
@@ -40,22 +42,31 @@ OrderedJson value_at(const OrderedJson& json, const std::string& place) {
   for (std::size_t begin = 0; begin <= place.size();) {
     const std::size_t dot = std::min(place.find('.', begin), place.size());
     const std::string key = place.substr(begin, dot - begin);
-    if (at->is_object() && at->contains(key)) at = &at->at(key);
-    else if (at->is_array() && !key.empty() && std::all_of(key.begin(), key.end(), ::isdigit) && std::stoul(key) < at->size()) at = &at->at(std::stoul(key));
-    else return nullptr;
+    if (at->is_object() && at->contains(key))
+      at = &at->at(key);
+    else if (at->is_array() && !key.empty() && std::all_of(key.begin(), key.end(), ::isdigit) &&
+             std::stoul(key) < at->size())
+      at = &at->at(std::stoul(key));
+    else
+      return nullptr;
     begin = dot + 1;
   }
   return *at;
 }
 
 /// What an item's result depends on: its commands, with the work and result folders left open, and its inputs.
-OrderedJson signature_of(const Experiment& experiment, const Item& item, const std::map<fs::path, std::string>& hashes) {
+OrderedJson signature_of(const Experiment& experiment, const Item& item,
+                         const std::map<fs::path, std::string>& hashes) {
   OrderedJson commands = OrderedJson::array();
   for (const Step& step : experiment.steps)
-    commands.push_back({{"tool", step.tool}, {"run", fill_arguments(experiment, item, step.run, {{"work", "<work>"}, {"out", "<out>"}, {"view", "<view>"}, {"config", "<config>"}})}});
+    commands.push_back(
+        {{"tool", step.tool},
+         {"run", fill_arguments(experiment, item, step.run,
+                                {{"work", "<work>"}, {"out", "<out>"}, {"view", "<view>"}, {"config", "<config>"}})}});
   OrderedJson inputs = OrderedJson::object();
   if (item.model >= 0)
-    for (const fs::path& path : {experiment.models[item.model].mesh, experiment.models[item.model].skeleton}) inputs[path.filename().string()] = hashes.at(path);
+    for (const fs::path& path : {experiment.models[item.model].mesh, experiment.models[item.model].skeleton})
+      inputs[path.filename().string()] = hashes.at(path);
   return {{"commands", commands}, {"inputs", inputs}};
 }
 
@@ -65,11 +76,12 @@ std::string program_of(const Step& step, const RunOptions& options) {
   return fs::is_regular_file(beside) ? beside.string() : step.tool;
 }
 
-OrderedJson run_item(const Experiment& experiment, const Item& item, const RunOptions& options, const OrderedJson& signature,
-                     const std::map<std::string, std::string>& environment) {
+OrderedJson run_item(const Experiment& experiment, const Item& item, const RunOptions& options,
+                     const OrderedJson& signature, const std::map<std::string, std::string>& environment) {
   const WorkFolder work;
   std::map<std::string, std::string> more{{"work", work.path().string()}, {"out", options.folder.string()}};
-  OrderedJson result{{"key", item.key}, {"model", item.model < 0 ? OrderedJson() : OrderedJson(experiment.models[item.model].name)}};
+  OrderedJson result{{"key", item.key},
+                     {"model", item.model < 0 ? OrderedJson() : OrderedJson(experiment.models[item.model].name)}};
   for (const auto& [name, label] : item.parameters) result["parameters"][name] = label;
   result["signature"] = signature;
   if (item.model >= 0) {
@@ -77,8 +89,11 @@ OrderedJson run_item(const Experiment& experiment, const Item& item, const RunOp
     more["view"] = (work.path() / "view.json").string();
     write_json_file(more["view"], model.view.is_null() ? OrderedJson::object() : OrderedJson(model.view));
     more["config"] = (work.path() / "model.json").string();
-    write_json_file(more["config"], {{"name", model.name}, {"mesh", fs::absolute(model.mesh).string()}, {"skeleton", fs::absolute(model.skeleton).string()},
-                                     {"credits", model.credits}, {"view", model.view.is_null() ? OrderedJson::object() : OrderedJson(model.view)}});
+    write_json_file(more["config"], {{"name", model.name},
+                                     {"mesh", fs::absolute(model.mesh).string()},
+                                     {"skeleton", fs::absolute(model.skeleton).string()},
+                                     {"credits", model.credits},
+                                     {"view", model.view.is_null() ? OrderedJson::object() : OrderedJson(model.view)}});
   }
   result["status"] = "done";
   double seconds = 0, peak = 0;
@@ -95,7 +110,9 @@ OrderedJson run_item(const Experiment& experiment, const Item& item, const RunOp
     try {
       process = run_process(program_of(step, options), arguments, environment, work.path() / "errors.txt");
       if (process.exit_code != step.exit_code)
-        reason = process.exit_code > 128 ? fmt::format("ended by signal {}", process.exit_code - 128) : process.errors.empty() ? fmt::format("exit code {}", process.exit_code) : process.errors;
+        reason = process.exit_code > 128  ? fmt::format("ended by signal {}", process.exit_code - 128)
+                 : process.errors.empty() ? fmt::format("exit code {}", process.exit_code)
+                                          : process.errors;
     } catch (const Error& error) {
       reason = error.what();
     }
@@ -124,7 +141,10 @@ OrderedJson run_item(const Experiment& experiment, const Item& item, const RunOp
 }
 
 OrderedJson row_of(const Experiment& experiment, const OrderedJson& item) {
-  OrderedJson row{{"key", item.at("key")}, {"model", item.at("model")}, {"parameters", item.value("parameters", OrderedJson::object())}, {"status", item.at("status")}};
+  OrderedJson row{{"key", item.at("key")},
+                  {"model", item.at("model")},
+                  {"parameters", item.value("parameters", OrderedJson::object())},
+                  {"status", item.at("status")}};
   if (item.contains("reason")) row["reason"] = item.at("reason");
   OrderedJson columns = OrderedJson::object();
   for (const auto& [column, place] : experiment.columns) columns[column] = value_at(item.at("steps"), place);
@@ -151,10 +171,12 @@ std::string csv_of(const Experiment& experiment, const OrderedJson& rows) {
   text += ",seconds,peak_memory_mb,reason\n";
   for (const OrderedJson& row : rows) {
     text += csv_cell(row.at("model"));
-    for (const SweepParameter& parameter : experiment.sweep) text += "," + csv_cell(row.at("parameters").value(parameter.name, OrderedJson()));
+    for (const SweepParameter& parameter : experiment.sweep)
+      text += "," + csv_cell(row.at("parameters").value(parameter.name, OrderedJson()));
     text += "," + csv_cell(row.at("status"));
     for (const auto& [column, place] : experiment.columns) text += "," + csv_cell(row.at("columns").at(column));
-    text += fmt::format(",{:.3f},{:.1f},{}\n", row.at("seconds").get<double>(), row.at("peak_memory_mb").get<double>(), csv_cell(row.value("reason", OrderedJson())));
+    text += fmt::format(",{:.3f},{:.1f},{}\n", row.at("seconds").get<double>(), row.at("peak_memory_mb").get<double>(),
+                        csv_cell(row.value("reason", OrderedJson())));
   }
   return text;
 }
@@ -163,12 +185,22 @@ OrderedJson experiment_json(const Experiment& experiment) {
   OrderedJson json{{"name", experiment.name}, {"title", experiment.title}, {"paper", experiment.paper}};
   json["models"] = OrderedJson::array();
   for (const ModelConfig& model : experiment.models)
-    json["models"].push_back({{"name", model.name}, {"mesh", model.mesh.filename().string()}, {"skeleton", model.skeleton.filename().string()}, {"credits", model.credits}});
+    json["models"].push_back({{"name", model.name},
+                              {"mesh", model.mesh.filename().string()},
+                              {"skeleton", model.skeleton.filename().string()},
+                              {"credits", model.credits}});
   for (const SweepParameter& parameter : experiment.sweep) {
     json["sweep"][parameter.name] = OrderedJson::array();
-    for (const SweepValue& value : parameter.values) json["sweep"][parameter.name].push_back({{"label", value.label}, {"arguments", value.arguments}, {"values", value.values}});
+    for (const SweepValue& value : parameter.values)
+      json["sweep"][parameter.name].push_back(
+          {{"label", value.label}, {"arguments", value.arguments}, {"values", value.values}});
   }
-  for (const Step& step : experiment.steps) json["steps"].push_back({{"name", step.name}, {"run", step.run}, {"tool", step.tool}, {"exit_code", step.exit_code}, {"file_sizes", step.file_sizes}});
+  for (const Step& step : experiment.steps)
+    json["steps"].push_back({{"name", step.name},
+                             {"run", step.run},
+                             {"tool", step.tool},
+                             {"exit_code", step.exit_code},
+                             {"file_sizes", step.file_sizes}});
   for (const auto& [column, place] : experiment.columns) json["columns"][column] = place;
   return json;
 }
@@ -192,7 +224,8 @@ RunSummary run_experiment(const Experiment& experiment, const RunOptions& option
   for (std::size_t i = 0; i < items.size(); ++i) {
     const OrderedJson signature = signature_of(experiment, items[i], hashes);
     if (options.is_resumed)
-      if (auto old = read_json_file(options.folder / "items" / (items[i].key + ".json")); old && old->value("status", "") == "done" && old->value("signature", OrderedJson()) == signature) {
+      if (auto old = read_json_file(options.folder / "items" / (items[i].key + ".json"));
+          old && old->value("status", "") == "done" && old->value("signature", OrderedJson()) == signature) {
         results[i] = std::move(*old);
         ++summary.kept;
         continue;
@@ -209,7 +242,8 @@ RunSummary run_experiment(const Experiment& experiment, const RunOptions& option
     // Processes that share PoCL's kernel cache have crashed.
     if (options.jobs > 1) {
       const char* base = std::getenv("POCL_CACHE_DIR");
-      const fs::path folder = fs::path(base ? base : (fs::temp_directory_path() / "skeletex-pocl").string()) / fmt::format("job-{}", job);
+      const fs::path folder =
+          fs::path(base ? base : (fs::temp_directory_path() / "skeletex-pocl").string()) / fmt::format("job-{}", job);
       fs::create_directories(folder);
       environment["POCL_CACHE_DIR"] = folder.string();
     }
@@ -223,7 +257,8 @@ RunSummary run_experiment(const Experiment& experiment, const RunOptions& option
         const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
         results[open[k]] = std::move(result);
         if (options.progress)
-          options.progress(summary.kept + finished, static_cast<int>(items.size()), item.key, elapsed / finished * static_cast<double>(open.size() - finished));
+          options.progress(summary.kept + finished, static_cast<int>(items.size()), item.key,
+                           elapsed / finished * static_cast<double>(open.size() - finished));
       }
     } catch (...) {
       const std::lock_guard lock(mutex);
@@ -244,10 +279,14 @@ RunSummary run_experiment(const Experiment& experiment, const RunOptions& option
     rows.push_back(row_of(experiment, result));
     peak = std::max(peak, result.at("peak_memory_mb").get<double>());
   }
-  summary.results = {{"experiment", experiment.name}, {"title", experiment.title}, {"paper", experiment.paper}, {"rows", std::move(rows)}};
+  summary.results = {{"experiment", experiment.name},
+                     {"title", experiment.title},
+                     {"paper", experiment.paper},
+                     {"rows", std::move(rows)}};
   write_json_file(options.folder / "results.json", summary.results);
   write_text_atomically(options.folder / "results.csv", csv_of(experiment, summary.results.at("rows")));
-  OrderedJson record{{"source", options.source}, {"experiment", experiment_json(experiment)}, {"inputs", OrderedJson::object()}};
+  OrderedJson record{
+      {"source", options.source}, {"experiment", experiment_json(experiment)}, {"inputs", OrderedJson::object()}};
   for (const auto& [path, hash] : hashes) record["inputs"][path.filename().string()] = hash;
   record.update(describe_build_and_machine(options.device));
   record["jobs"] = options.jobs;
@@ -270,12 +309,14 @@ std::vector<std::string> compare_results(const OrderedJson& expected, const Orde
       continue;
     }
     if (row.at("status") != other->second->at("status"))
-      differences.push_back(fmt::format("{}: was {}, is {}", key, row.at("status").get<std::string>(), other->second->at("status").get<std::string>()));
+      differences.push_back(fmt::format("{}: was {}, is {}", key, row.at("status").get<std::string>(),
+                                        other->second->at("status").get<std::string>()));
     for (const auto& [column, value] : row.at("columns").items()) {
       if (column.ends_with("_ms") || column.ends_with("_s") || column.ends_with("_mb")) continue;
       const OrderedJson now = other->second->at("columns").value(column, OrderedJson());
       const bool is_same = value.is_number() && now.is_number()
-                               ? std::abs(value.get<double>() - now.get<double>()) <= tolerance * std::max(std::abs(value.get<double>()), std::abs(now.get<double>()))
+                               ? std::abs(value.get<double>() - now.get<double>()) <=
+                                     tolerance * std::max(std::abs(value.get<double>()), std::abs(now.get<double>()))
                                : value == now;
       if (!is_same) differences.push_back(fmt::format("{}: {} was {}, is {}", key, column, value.dump(), now.dump()));
     }

@@ -7,12 +7,12 @@
 namespace skeletex {
 
 struct RunOptions {
-  std::string program;            ///< this program, which the steps call
-  std::filesystem::path folder;   ///< of the results
-  bool is_resumed = false;        ///< keep items that are done and whose commands and inputs have not changed
+  std::string program;           ///< this program, which the steps call
+  std::filesystem::path folder;  ///< of the results
+  bool is_resumed = false;       ///< keep items that are done and whose commands and inputs have not changed
   int jobs = 1;
-  std::string device;             ///< --device of every step; "" for the default
-  OrderedJson source;             ///< for the record: the file and the changes that the experiment was made of
+  std::string device;  ///< --device of every step; "" for the default
+  OrderedJson source;  ///< for the record: the file and the changes that the experiment was made of
   /// After each item: how many are done, of how many, which one, seconds left (< 0: unknown).
   std::function<void(int done, int total, const std::string& key, double seconds_left)> progress;
 };
@@ -22,8 +22,8 @@ struct RunSummary {
   OrderedJson results;  ///< what results.json holds
 };
 
-/// Runs every item, each in processes of its own, so that one that fails or crashes is recorded with its reason and does not
-/// stop the rest. Writes, all atomically and in `folder`:
+/// Runs every item, each in processes of its own, so that one that fails or crashes is recorded with its reason and
+/// does not stop the rest. Writes, all atomically and in `folder`:
 ///   items/KEY.json   parameters, commands, the steps' JSON, seconds, peak memory; written as soon as the item ends
 ///   results.json     one row per item: model, parameters, status, columns
 ///   results.csv      the same as a table
@@ -31,8 +31,8 @@ struct RunSummary {
 /// \throw IoError when the folder cannot be written or a placeholder is unknown
 RunSummary run_experiment(const Experiment& experiment, const RunOptions& options);
 
-/// Differences between two results.json: rows that only one has, columns that differ by more than `tolerance` (relative).
-/// Columns whose names end in _ms, _s or _mb are times and memory and not compared. Empty: they agree.
+/// Differences between two results.json: rows that only one has, columns that differ by more than `tolerance`
+/// (relative). Columns whose names end in _ms, _s or _mb are times and memory and not compared. Empty: they agree.
 std::vector<std::string> compare_results(const OrderedJson& expected, const OrderedJson& found, double tolerance);
 
 }  // namespace skeletex

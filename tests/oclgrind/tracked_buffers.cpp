@@ -1,23 +1,26 @@
 // SPDX-License-Identifier: MIT
-// Loaded before Oclgrind 21.10, whose check for uninitialised values does not see fills and copies of buffers, and keeps the size of an old
-// buffer for the new one in its place. So fills and copies become writes, and no buffer is given back.
+// Loaded before Oclgrind 21.10, whose check for uninitialised values does not see fills and copies of buffers, and
+// keeps the size of an old buffer for the new one in its place. So fills and copies become writes, and no buffer is
+// given back.
 #include <CL/cl.h>
 
 #include <cstring>
 #include <vector>
 
-cl_int clEnqueueFillBuffer(cl_command_queue queue, cl_mem buffer, const void* pattern, size_t pattern_size, size_t offset, size_t size, cl_uint wait_count,
-                           const cl_event* waits, cl_event* event) {
+cl_int clEnqueueFillBuffer(cl_command_queue queue, cl_mem buffer, const void* pattern, size_t pattern_size,
+                           size_t offset, size_t size, cl_uint wait_count, const cl_event* waits, cl_event* event) {
   std::vector<char> bytes(size);
   for (size_t i = 0; i < size; i += pattern_size) std::memcpy(bytes.data() + i, pattern, pattern_size);
   return clEnqueueWriteBuffer(queue, buffer, CL_TRUE, offset, size, bytes.data(), wait_count, waits, event);
 }
 
-cl_int clEnqueueCopyBuffer(cl_command_queue queue, cl_mem from, cl_mem to, size_t from_offset, size_t to_offset, size_t size, cl_uint wait_count,
-                           const cl_event* waits, cl_event* event) {
+cl_int clEnqueueCopyBuffer(cl_command_queue queue, cl_mem from, cl_mem to, size_t from_offset, size_t to_offset,
+                           size_t size, cl_uint wait_count, const cl_event* waits, cl_event* event) {
   std::vector<char> bytes(size);
-  const cl_int code = clEnqueueReadBuffer(queue, from, CL_TRUE, from_offset, size, bytes.data(), wait_count, waits, nullptr);
-  return code == CL_SUCCESS ? clEnqueueWriteBuffer(queue, to, CL_TRUE, to_offset, size, bytes.data(), 0, nullptr, event) : code;
+  const cl_int code =
+      clEnqueueReadBuffer(queue, from, CL_TRUE, from_offset, size, bytes.data(), wait_count, waits, nullptr);
+  return code == CL_SUCCESS ? clEnqueueWriteBuffer(queue, to, CL_TRUE, to_offset, size, bytes.data(), 0, nullptr, event)
+                            : code;
 }
 
 cl_int clReleaseMemObject(cl_mem) { return CL_SUCCESS; }

@@ -11,13 +11,16 @@
 
 namespace skeletex {
 
-/// Mean over the length of a model's seams, or of some arcs, of the angle between the two triangles at each of their edges, degrees.
-inline double mean_crease(ClContext& context, const SkeletexModel& model, const std::function<bool(const SeamArc&)>& is_meant = {}) {
+/// Mean over the length of a model's seams, or of some arcs, of the angle between the two triangles at each of their
+/// edges, degrees.
+inline double mean_crease(ClContext& context, const SkeletexModel& model,
+                          const std::function<bool(const SeamArc&)>& is_meant = {}) {
   const TriangleMesh mesh = reconstruct_mesh(context, model);
   const Lattice lattice = number_lattice(model);
   std::map<std::pair<int, int>, Vec3> normals;
   for (const Triangle& t : mesh.triangles) {
-    const Vec3 normal = (mesh.positions[t[1]] - mesh.positions[t[0]]).cross(mesh.positions[t[2]] - mesh.positions[t[0]]);
+    const Vec3 normal =
+        (mesh.positions[t[1]] - mesh.positions[t[0]]).cross(mesh.positions[t[2]] - mesh.positions[t[0]]);
     for (int i = 0; i < 3; ++i) normals[{t[i], t[(i + 1) % 3]}] = normal;
   }
   double sum = 0, length = 0;

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <vector>
 
-#include "skeletex/model/frame.h"
-#include "skeletex/parameterize/chart.h"
+#include "skeletex/convert/parameterize/chart.h"
+#include "skeletex/skeleton/frame.h"
 
 namespace skeletex::twin {
 
@@ -54,9 +54,12 @@ inline std::vector<Vec3> prefiltered(const std::vector<Vec3>& points, int rows, 
     for (int j = 0; j < columns; ++j) {
       const Vec3& p = points[r * columns + j];
       const Vec3 &above = points[(r + 1) * columns + j], &below = points[(r - 1) * columns + j];
-      const Vec3 &right = points[r * columns + (j + 1) % columns], &left = points[r * columns + (j + columns - 1) % columns];
+      const Vec3 &right = points[r * columns + (j + 1) % columns],
+                 &left = points[r * columns + (j + columns - 1) % columns];
       const Vec3 normal = (right - left).cross(above - below);
-      if (normal.squaredNorm() > 0) result[r * columns + j] -= normal * normal.dot(above + below + right + left - 4 * p) / normal.squaredNorm() / 16;
+      if (normal.squaredNorm() > 0)
+        result[r * columns + j] -=
+            normal * normal.dot(above + below + right + left - 4 * p) / normal.squaredNorm() / 16;
     }
   return result;
 }

@@ -18,17 +18,20 @@ struct SharedTriangle {
   double share = 1;
 };
 
-/// What the kernels of filter.cl and diffusion.cl take for the surface, as one list: both triangulations of every quad between inner rows,
-/// half each, and the triangles at the ends.
-inline std::vector<SharedTriangle> surface_triangles(const SkeletexModel& model, const Lattice& lattice, std::span<const Triangle> end_triangles) {
+/// What the kernels of filter.cl and diffusion.cl take for the surface, as one list: both triangulations of every quad
+/// between inner rows, half each, and the triangles at the ends.
+inline std::vector<SharedTriangle> surface_triangles(const SkeletexModel& model, const Lattice& lattice,
+                                                     std::span<const Triangle> end_triangles) {
   std::vector<SharedTriangle> triangles;
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
     const auto [x, y, width, height] = model.patches[bone].rectangle;
     for (int row = 0; row + 3 < height; ++row)
       for (int j = 0; j < width; ++j) {
-        const int a = lattice.first_inner[bone] + row * width + j, b = lattice.first_inner[bone] + row * width + (j + 1) % width;
+        const int a = lattice.first_inner[bone] + row * width + j,
+                  b = lattice.first_inner[bone] + row * width + (j + 1) % width;
         const int c = b + width, d = a + width;
-        for (const Triangle& t : {Triangle{a, b, c}, Triangle{a, c, d}, Triangle{a, b, d}, Triangle{b, c, d}}) triangles.push_back({t, 0.5});
+        for (const Triangle& t : {Triangle{a, b, c}, Triangle{a, c, d}, Triangle{a, b, d}, Triangle{b, c, d}})
+          triangles.push_back({t, 0.5});
       }
   }
   for (const Triangle& t : end_triangles) triangles.push_back({t, 1});
@@ -49,7 +52,8 @@ inline SurfaceMatrices surface_matrices(const std::vector<SharedTriangle>& trian
     for (int i = 0; i < 3; ++i) edges2 += (points[t[(i + 1) % 3]] - points[t[i]]).squaredNorm();
     for (int i = 0; i < 3; ++i) {
       const int a = t[(i + 1) % 3], b = t[(i + 2) % 3];
-      const double weight = 0.5 * share * (points[a] - points[t[i]]).dot(points[b] - points[t[i]]) / std::max(twice, 1.2e-4 * 0.5 * edges2);
+      const double weight = 0.5 * share * (points[a] - points[t[i]]).dot(points[b] - points[t[i]]) /
+                            std::max(twice, 1.2e-4 * 0.5 * edges2);
       entries.emplace_back(a, b, -weight);
       entries.emplace_back(b, a, -weight);
       entries.emplace_back(a, a, weight);
@@ -70,8 +74,18 @@ inline std::vector<Vec3> area_vectors(const std::vector<SharedTriangle>& triangl
 
 /// Perlin's improved noise with another hash: corner by corner.
 inline double gradient_noise(const Vec3& p, std::uint32_t seed) {
-  static constexpr std::array<std::array<int, 3>, 12> kSlopes{
-      {{1, 1, 0}, {-1, 1, 0}, {1, -1, 0}, {-1, -1, 0}, {1, 0, 1}, {-1, 0, 1}, {1, 0, -1}, {-1, 0, -1}, {0, 1, 1}, {0, -1, 1}, {0, 1, -1}, {0, -1, -1}}};
+  static constexpr std::array<std::array<int, 3>, 12> kSlopes{{{1, 1, 0},
+                                                               {-1, 1, 0},
+                                                               {1, -1, 0},
+                                                               {-1, -1, 0},
+                                                               {1, 0, 1},
+                                                               {-1, 0, 1},
+                                                               {1, 0, -1},
+                                                               {-1, 0, -1},
+                                                               {0, 1, 1},
+                                                               {0, -1, 1},
+                                                               {0, 1, -1},
+                                                               {0, -1, -1}}};
   const auto scramble = [](std::uint32_t h) {
     h = (h ^ (h >> 16)) * 0x7feb352du;
     h = (h ^ (h >> 15)) * 0x846ca68bu;

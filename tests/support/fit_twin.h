@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "skeletex/model/mesh.h"
+#include "skeletex/geometry/mesh.h"
 
 namespace skeletex::twin {
 
@@ -40,23 +40,29 @@ double nearest_in_quad(const Points& point, int column, int row, bool is_second,
   double best = std::numeric_limits<double>::infinity();
   for (const int t : {0, 1}) {
     const auto c = triangle_corners(is_second, t);
-    best = std::min(best, distance_to_triangle(p, point(column + c[0][0], row + c[0][1]), point(column + c[1][0], row + c[1][1]),
-                                               point(column + c[2][0], row + c[2][1])));
+    best = std::min(
+        best, distance_to_triangle(p, point(column + c[0][0], row + c[0][1]), point(column + c[1][0], row + c[1][1]),
+                                   point(column + c[2][0], row + c[2][1])));
   }
   return best;
 }
 
-/// The least-squares system of one patch, dense: unknown 3 (row width + column) + axis. Rows 0 and height-1 do not move.
+/// The least-squares system of one patch, dense: unknown 3 (row width + column) + axis. Rows 0 and height-1 do not
+/// move.
 class FitSystem {
  public:
   FitSystem(int width, int height)
-      : width_(width), height_(height), matrix_(Eigen::MatrixXd::Zero(3 * width * height, 3 * width * height)), side_(Eigen::VectorXd::Zero(3 * width * height)) {}
+      : width_(width),
+        height_(height),
+        matrix_(Eigen::MatrixXd::Zero(3 * width * height, 3 * width * height)),
+        side_(Eigen::VectorXd::Zero(3 * width * height)) {}
 
   /// area / (|residual| + least) x (residual + normal . weighted moves)^2
-  void add(const Vec3& normal, double residual, double area, double least, int column, int row, const std::array<std::array<int, 2>, 3>& corners,
-           const std::array<double, 3>& weights) {
+  void add(const Vec3& normal, double residual, double area, double least, int column, int row,
+           const std::array<std::array<int, 2>, 3>& corners, const std::array<double, 3>& weights) {
     Eigen::VectorXd line = Eigen::VectorXd::Zero(side_.size());
-    for (int k = 0; k < 3; ++k) line.segment<3>(first(column + corners[k][0], row + corners[k][1])) += weights[k] * normal;
+    for (int k = 0; k < 3; ++k)
+      line.segment<3>(first(column + corners[k][0], row + corners[k][1])) += weights[k] * normal;
     const double weight = area / (std::abs(residual) + least);
     matrix_ += weight * line * line.transpose();
     side_ -= weight * residual * line;

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "skeletex/model/mesh.h"
+#include "skeletex/geometry/mesh.h"
 
 namespace skeletex {
 
@@ -27,13 +27,15 @@ inline std::string broken_rule(const TriangleMesh& mesh, int genus) {
       const int a = t[i], b = t[(i + 1) % 3], c = t[(i + 2) % 3];
       if (a < 0 || a >= vertices) return "index out of range";
       if (a == b) return "a triangle holds vertex " + std::to_string(a) + " twice";
-      if (!next.emplace(std::pair{a, b}, c).second) return "edge " + std::to_string(a) + "-" + std::to_string(b) + " is run through twice";
+      if (!next.emplace(std::pair{a, b}, c).second)
+        return "edge " + std::to_string(a) + "-" + std::to_string(b) + " is run through twice";
       ++corners[a];
       start[a] = b;
       parent[root(a)] = root(b);
     }
   for (const auto& [edge, third] : next)
-    if (!next.count({edge.second, edge.first})) return "edge " + std::to_string(edge.first) + "-" + std::to_string(edge.second) + " is open";
+    if (!next.count({edge.second, edge.first}))
+      return "edge " + std::to_string(edge.first) + "-" + std::to_string(edge.second) + " is open";
   for (int v = 0; v < vertices; ++v) {
     if (corners[v] == 0) return "vertex " + std::to_string(v) + " is not used";
     int around = 0;

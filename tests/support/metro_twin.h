@@ -4,11 +4,12 @@
 #include <Eigen/Geometry>
 #include <limits>
 
-#include "skeletex/model/mesh.h"
+#include "skeletex/geometry/mesh.h"
 
 namespace skeletex {
 
-inline long double twin_distance_to_triangle(const Vec3& point, const Vec3& first, const Vec3& second, const Vec3& third) {
+inline long double twin_distance_to_triangle(const Vec3& point, const Vec3& first, const Vec3& second,
+                                             const Vec3& third) {
   using Real3 = Eigen::Matrix<long double, 3, 1>;
   const Real3 p = point.cast<long double>();
   const Real3 corners[3] = {first.cast<long double>(), second.cast<long double>(), third.cast<long double>()};

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "skeletex/edit/best_rotation.h"
+#include "skeletex/geometry/best_rotation.h"
 #include "support/filter_twin.h"
 
 namespace skeletex::twin {
@@ -16,8 +16,9 @@ struct OrientationPull {
 };
 
 /// The kernels of orientation.cl from their definition, by vertex and by edge.
-inline OrientationPull pull_orientations(const SkeletexModel& model, const Lattice& lattice, const std::vector<Vec3>& points,
-                                         const std::vector<Triangle>& ends, const SurfaceMatrices& matrices, std::vector<std::vector<Vec3>> sources,
+inline OrientationPull pull_orientations(const SkeletexModel& model, const Lattice& lattice,
+                                         const std::vector<Vec3>& points, const std::vector<Triangle>& ends,
+                                         const SurfaceMatrices& matrices, std::vector<std::vector<Vec3>> sources,
                                          const std::vector<double>& weights, double scale) {
   const int count = static_cast<int>(points.size()), inner = lattice.inner_count;
   const int first_seam = lattice.first_sample.empty() ? count : lattice.first_sample[0];
@@ -43,7 +44,9 @@ inline OrientationPull pull_orientations(const SkeletexModel& model, const Latti
   };
   const auto directions = [&](const std::vector<Vec3>& p, int bone, int row, int j) {
     const auto [x, y, width, height] = model.patches[bone].rectangle;
-    const auto at = [&](int r, int c) { return p[lattice.first_inner[bone] + (std::clamp(r, 1, height - 2) - 1) * width + (c + width) % width]; };
+    const auto at = [&](int r, int c) {
+      return p[lattice.first_inner[bone] + (std::clamp(r, 1, height - 2) - 1) * width + (c + width) % width];
+    };
     Directions d{at(row + 1, j) - at(row - 1, j), at(row, j + 1) - at(row, j - 1), Vec3::Zero()};
     if (d.has_normal()) d.normal = d.along.cross(d.around).normalized();
     return d;
@@ -53,7 +56,8 @@ inline OrientationPull pull_orientations(const SkeletexModel& model, const Latti
     for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
       for (int row = 1; row + 1 < model.patches[bone].rectangle.height; ++row)
         for (int j = 0; j < model.patches[bone].rectangle.width; ++j)
-          normals[lattice.first_inner[bone] + (row - 1) * model.patches[bone].rectangle.width + j] = directions(p, bone, row, j).normal;
+          normals[lattice.first_inner[bone] + (row - 1) * model.patches[bone].rectangle.width + j] =
+              directions(p, bone, row, j).normal;
     return normals;
   };
   std::vector<std::vector<int>> inner_neighbours(count);
@@ -73,7 +77,8 @@ inline OrientationPull pull_orientations(const SkeletexModel& model, const Latti
     }
   };
 
-  OrientationPull pull{std::vector<Eigen::Quaterniond>(count, Eigen::Quaterniond::Identity()), normals_of(points), std::vector<Vec3>(count, Vec3::Zero())};
+  OrientationPull pull{std::vector<Eigen::Quaterniond>(count, Eigen::Quaterniond::Identity()), normals_of(points),
+                       std::vector<Vec3>(count, Vec3::Zero())};
   for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
     const auto [x, y, width, height] = model.patches[bone].rectangle;
     for (int row = 1; row + 1 < height; ++row)
@@ -104,7 +109,8 @@ inline OrientationPull pull_orientations(const SkeletexModel& model, const Latti
         const Eigen::Quaterniond mean(Eigen::Vector4d(sum.normalized()));
         const double degrees50 = std::cos(25 * M_PI / 180), degrees100 = std::cos(50 * M_PI / 180);
         const double share = step((0.9 - from_seam) / 0.5) * step((mean.w() - degrees100) / (degrees50 - degrees100));
-        pull.rotations[v].coeffs() = ((1 - share) * Eigen::Quaterniond::Identity().coeffs() + share * mean.coeffs()).normalized();
+        pull.rotations[v].coeffs() =
+            ((1 - share) * Eigen::Quaterniond::Identity().coeffs() + share * mean.coeffs()).normalized();
       }
   }
   for (int pass = 0; pass < 2; ++pass) {
@@ -115,7 +121,8 @@ inline OrientationPull pull_orientations(const SkeletexModel& model, const Latti
         for (int j = 0; j < width; ++j) {
           Eigen::Vector4d sum = Eigen::Vector4d::Zero();
           for (int r = std::max(1, row - 1); r <= std::min(height - 2, row + 1); ++r)
-            for (const int c : {j + width - 1, j, j + 1}) sum += before[lattice.first_inner[bone] + (r - 1) * width + c % width].coeffs();
+            for (const int c : {j + width - 1, j, j + 1})
+              sum += before[lattice.first_inner[bone] + (r - 1) * width + c % width].coeffs();
           pull.rotations[lattice.first_inner[bone] + (row - 1) * width + j].coeffs() = sum.normalized();
         }
     }

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "skeletex/model/frame.h"
+#include "skeletex/skeleton/frame.h"
 
 namespace skeletex::twin {
 
@@ -16,16 +16,17 @@ struct DisplacedPoint {
 };
 
 /// Kernel displace, one texel: the frame spelt out as vectors, the capsule as cylinder and spheres (paper appendix A).
-inline DisplacedPoint displace(const PatchRecord& patch, const RowRecord& row, const ColumnRecord& column, const Vec3& texel) {
-  const auto vector = [](const float (&v)[3]) { return Vec3(v[0], v[1], v[2]); };
+inline DisplacedPoint displace(const PatchRecord& patch, const RowRecord& row, const ColumnRecord& column,
+                               const Vec3& texel) {
+  const auto vector = [](const float(&v)[3]) { return Vec3(v[0], v[1], v[2]); };
   const Vec3 o = vector(patch.axis), head = vector(patch.head), tail = head + patch.length * o;
-  const Vec3 spoke = double(column.cosine) * vector(patch.s) + double(column.sine) * vector(patch.b);
-  const double k = (1 - double(row.station)) * column.slope_head + double(row.station) * column.slope_tail;
+  const Vec3 radial = double(column.cosine) * vector(patch.s) + double(column.sine) * vector(patch.b);
+  const double k = (1 - double(row.axial)) * column.slope_head + double(row.axial) * column.slope_tail;
   TangentFrame frame;
-  frame.out = (double(row.cap_cos) * (spoke + k * o) + double(row.cap_sin) * o).normalized();
-  frame.around = o.cross(spoke).normalized();
+  frame.out = (double(row.cap_cos) * (radial + k * o) + double(row.cap_sin) * o).normalized();
+  frame.around = o.cross(radial).normalized();
   frame.along = frame.out.cross(frame.around);
-  frame.foot = head + double(row.station) * patch.length * o;
+  frame.foot = head + double(row.axial) * patch.length * o;
   const Vec3 point = decode_texel(frame, texel, head, tail);
   return {point, (point - frame.foot).norm(), texel.norm()};
 }
@@ -43,7 +44,8 @@ bool takes_second_diagonal(const Vertices& vertex, int row, int column, int heig
   const double weights[4] = {-1.0 / 16, 9.0 / 16, 9.0 / 16, -1.0 / 16};
   for (int i = 0; i < 4; ++i)
     for (int k = 0; k < 4; ++k) centre += weights[i] * weights[k] * point(row - 1 + i, column - 1 + k);
-  const Vec3 a = point(row, column), b = point(row, column + 1), c = point(row + 1, column), d = point(row + 1, column + 1);
+  const Vec3 a = point(row, column), b = point(row, column + 1), c = point(row + 1, column),
+             d = point(row + 1, column + 1);
   const Vec3 normal = (d - a).cross(c - b).normalized();
   const double blur = 3e-7 * centre.lpNorm<1>() + 1e-4 * (d - a).norm();
   const double first = (std::abs((0.5 * (a + d) - centre).dot(normal)) + 0.9 * blur) * (d - a).squaredNorm();
@@ -75,16 +77,19 @@ bool takes_smoother_diagonal(const Vertices& vertex, int row, int column, int he
       costs[diagonal] += std::min((own - first).norm(), (own - second).norm());
     }
   }
-  const double blur = 1e-6 * vertex(row, column).template lpNorm<1>() / (vertex(row + 1, column + 1) - vertex(row, column)).norm();
+  const double blur =
+      1e-6 * vertex(row, column).template lpNorm<1>() / (vertex(row + 1, column + 1) - vertex(row, column)).norm();
   const double margin = 10 * blur + 1e-5;
   const bool is_nearer = takes_second_diagonal(vertex, row, column, height, is_clear);
   const bool is_second = costs[1] < 0.8 * costs[0], is_first = costs[0] < 0.8 * costs[1];
-  is_clear = std::abs(costs[1] - 0.8 * costs[0]) > margin && std::abs(costs[0] - 0.8 * costs[1]) > margin && (is_second || is_first || is_clear);
+  is_clear = std::abs(costs[1] - 0.8 * costs[0]) > margin && std::abs(costs[0] - 0.8 * costs[1]) > margin &&
+             (is_second || is_first || is_clear);
   return is_second || (!is_first && is_nearer);
 }
 
 /// Kernels filter_rows and filter_columns, one new sample of one plane: `stride` between old samples.
-inline double filter(const std::array<int, 4>& tap, const std::vector<float>& weights, const std::vector<float>& in, int first, int stride, int count) {
+inline double filter(const std::array<int, 4>& tap, const std::vector<float>& weights, const std::vector<float>& in,
+                     int first, int stride, int count) {
   double sum = 0;
   for (int i = 0; i < tap[1]; ++i) sum += double(weights[tap[2] + i]) * in[first + (tap[0] + i) % count * stride];
   return sum;
@@ -92,20 +97,22 @@ inline double filter(const std::array<int, 4>& tap, const std::vector<float>& we
 
 /// Kernel limit_fit, one point: `edges` are the sampled lattice's edges from there to before, after, left and right.
 inline Vec3 limit_fit(const Vec3& sampled, const Vec3& fitted, const std::array<Vec3, 4>& edges, double share) {
-  const double most = share * std::max(std::min(edges[0].norm(), edges[1].norm()), std::min(edges[2].norm(), edges[3].norm()));
+  const double most =
+      share * std::max(std::min(edges[0].norm(), edges[1].norm()), std::min(edges[2].norm(), edges[3].norm()));
   const Vec3 move = fitted - sampled;
   return move.norm() > most ? Vec3(sampled + most / move.norm() * move) : fitted;
 }
 
 /// Kernel enter_tangent_space, one texel; the point in the bone's own axes.
-inline Vec3 enter_tangent_space(const PatchRecord& patch, const RowRecord& row, const ColumnRecord& column, const Vec3& point) {
-  const Vec3 o(0, 0, 1), spoke(column.cosine, column.sine, 0), tail(0, 0, patch.length);
-  const double k = (1 - double(row.station)) * column.slope_head + double(row.station) * column.slope_tail;
+inline Vec3 enter_tangent_space(const PatchRecord& patch, const RowRecord& row, const ColumnRecord& column,
+                                const Vec3& point) {
+  const Vec3 o(0, 0, 1), radial(column.cosine, column.sine, 0), tail(0, 0, patch.length);
+  const double k = (1 - double(row.axial)) * column.slope_head + double(row.axial) * column.slope_tail;
   TangentFrame frame;
-  frame.out = (double(row.cap_cos) * (spoke + k * o) + double(row.cap_sin) * o).normalized();
-  frame.around = o.cross(spoke).normalized();
+  frame.out = (double(row.cap_cos) * (radial + k * o) + double(row.cap_sin) * o).normalized();
+  frame.around = o.cross(radial).normalized();
   frame.along = frame.out.cross(frame.around);
-  frame.foot = double(row.station) * tail;
+  frame.foot = double(row.axial) * tail;
   return encode_texel(frame, point, Vec3::Zero(), tail);
 }
 

@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "skeletex/segment/cells.h"
+#include "skeletex/convert/segment/cells.h"
 
 namespace skeletex {
 
@@ -18,7 +18,8 @@ std::vector<std::uint8_t> classify_points_twin(const ClassifyTables& tables) {
       int best = 0;
       for (int c = tables.cell_begin[n]; c < tables.cell_begin[n + 1]; ++c) {
         const float* cell = &tables.cells[4 * static_cast<std::size_t>(c)];
-        const T value = T(tables.x[p]) * T(cell[0]) + T(tables.y[p]) * T(cell[1]) + T(tables.z[p]) * T(cell[2]) + T(cell[3]);
+        const T value =
+            T(tables.x[p]) * T(cell[0]) + T(tables.y[p]) * T(cell[1]) + T(tables.z[p]) * T(cell[2]) + T(cell[3]);
         if (value > first) {
           second = first;
           first = value;

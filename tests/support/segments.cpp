@@ -24,7 +24,7 @@ MadeSegment revolve(const std::vector<ProfilePoint>& profile, const RevolveOptio
   for (int i = 0; i + 1 < static_cast<int>(skeleton.nodes.size()); ++i)
     skeleton.bones.push_back({skeleton.nodes[i].name + "-" + skeleton.nodes[i + 1].name, i, i + 1, Vec3(1, 0, 0)});
   segment.bone = is_head_free ? 0 : 1;
-  segment.topology = is_head_free && is_tail_free ? SegmentTopology::kSphere
+  segment.topology = is_head_free && is_tail_free   ? SegmentTopology::kSphere
                      : is_head_free || is_tail_free ? SegmentTopology::kDisk
                                                     : SegmentTopology::kAnnulus;
   const int rows = static_cast<int>(profile.size()), columns = options.columns;
@@ -33,8 +33,8 @@ MadeSegment revolve(const std::vector<ProfilePoint>& profile, const RevolveOptio
     const int count = profile[i].r == 0 ? 1 : columns;
     for (int j = 0; j < count; ++j) {
       const double turn = static_cast<double>(j) / columns + options.twist_turns * i / (rows - 1);
-      const bool is_wall = (i == 0 && !is_head_free) || (i == rows - 1 && !is_tail_free);
-      const double r = profile[i].r * (1 + (is_wall ? 0 : options.noise * unit(random)));
+      const bool is_separation_plane = (i == 0 && !is_head_free) || (i == rows - 1 && !is_tail_free);
+      const double r = profile[i].r * (1 + (is_separation_plane ? 0 : options.noise * unit(random)));
       const double angle = 2 * std::numbers::pi * turn;
       grid[i].push_back(static_cast<int>(segment.mesh.positions.size()));
       segment.mesh.positions.push_back({r * std::cos(angle), r * std::sin(angle), profile[i].z});
@@ -181,7 +181,8 @@ void flip_random_edges(Segment& segment, int count, std::mt19937& random) {
     for (const int u : at[a])
       for (int k = 0; k < 3; ++k)
         if (triangles[u][k] == b && triangles[u][(k + 1) % 3] == a) other = u, y = triangles[u][(k + 2) % 3];
-    if (other < 0 || x == y || degree[a] <= 4 || degree[b] <= 4 || edges.contains({std::min(x, y), std::max(x, y)})) continue;
+    if (other < 0 || x == y || degree[a] <= 4 || degree[b] <= 4 || edges.contains({std::min(x, y), std::max(x, y)}))
+      continue;
     edges.erase({std::min(a, b), std::max(a, b)});
     edges.insert({std::min(x, y), std::max(x, y)});
     --degree[a], --degree[b], ++degree[x], ++degree[y];
@@ -218,7 +219,8 @@ std::vector<int> renumber(Segment& segment, std::mt19937& random) {
   std::shuffle(segment.mesh.triangles.begin(), segment.mesh.triangles.end(), random);
   for (BoundaryLoop& loop : segment.loops) {
     for (int& v : loop.vertices) v = new_index[v];
-    if (!loop.vertices.empty()) std::rotate(loop.vertices.begin(), loop.vertices.begin() + random() % loop.vertices.size(), loop.vertices.end());
+    if (!loop.vertices.empty())
+      std::rotate(loop.vertices.begin(), loop.vertices.begin() + random() % loop.vertices.size(), loop.vertices.end());
   }
   return new_index;
 }

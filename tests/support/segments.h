@@ -4,10 +4,11 @@
 #include <vector>
 
 #include "skeletex/model/segment.h"
-#include "skeletex/model/walls.h"
+#include "skeletex/skeleton/separation_planes.h"
 
 /// Segments made by hand, with the bone along z (s = x, b = y) from (0, 0, 0) to (0, 0, 1) and neighbours in line with
-/// it, so that walls are the planes z = 0 and z = 1. Later stages need no segmentation to be tested on them.
+/// it, so that separation planes are the planes z = 0 and z = 1. Later stages need no segmentation to be tested on
+/// them.
 namespace skeletex::testing {
 
 struct MadeSegment {
@@ -32,7 +33,7 @@ MadeSegment revolve(const std::vector<ProfilePoint>& profile, const RevolveOptio
 
 /// An open tube of radius 1 and length 1.
 std::vector<ProfilePoint> cylinder_profile(int rows);
-/// A tube whose wall folds back like a mushroom's hat: no height field over the bone.
+/// A tube whose separation plane folds back like a mushroom's hat: no height field over the bone.
 std::vector<ProfilePoint> mushroom_profile(int rows);
 /// A tube with a hemispherical cap around the tail.
 std::vector<ProfilePoint> cap_profile(int rows);

@@ -20,7 +20,9 @@ int add_node(Skeleton& skeleton, const std::string& name, const Vec3& position) 
   return static_cast<int>(skeleton.nodes.size()) - 1;
 }
 
-void add_bone(Skeleton& skeleton, const std::string& name, int head, int tail) { skeleton.bones.push_back({name, head, tail, std::nullopt}); }
+void add_bone(Skeleton& skeleton, const std::string& name, int head, int tail) {
+  skeleton.bones.push_back({name, head, tail, std::nullopt});
+}
 
 /// Surface of revolution about z of a profile (radius, z) from the lower pole to the upper one, whose radii are 0.
 TriangleMesh revolved(const std::vector<std::array<double, 2>>& profile, int around) {
@@ -50,7 +52,8 @@ class Thickness {
  public:
   Thickness(const Skeleton& skeleton, const std::vector<double>& radii, double blend) : blend_(blend) {
     for (const Bone& bone : skeleton.bones)
-      cones_.push_back({skeleton.nodes[bone.head].position, skeleton.nodes[bone.tail].position, radii[bone.head], radii[bone.tail]});
+      cones_.push_back(
+          {skeleton.nodes[bone.head].position, skeleton.nodes[bone.tail].position, radii[bone.head], radii[bone.tail]});
   }
   double operator()(const Vec3& x) const {
     double result = 1e30;
@@ -67,7 +70,8 @@ class Thickness {
   Vec3 gradient(const Vec3& x) const {
     constexpr double kStep = 1e-5;
     Vec3 g;
-    for (int i = 0; i < 3; ++i) g[i] = ((*this)(x + kStep * Vec3::Unit(i)) - (*this)(x - kStep * Vec3::Unit(i))) / (2 * kStep);
+    for (int i = 0; i < 3; ++i)
+      g[i] = ((*this)(x + kStep * Vec3::Unit(i)) - (*this)(x - kStep * Vec3::Unit(i))) / (2 * kStep);
     return g;
   }
 
@@ -139,7 +143,8 @@ class Marcher {
 
   int cut(int p, int q) {
     const auto [low, high] = std::minmax(p, q);
-    const auto [found, is_new] = cuts_.try_emplace(static_cast<std::int64_t>(low) << 32 | high, static_cast<int>(mesh.positions.size()));
+    const auto [found, is_new] =
+        cuts_.try_emplace(static_cast<std::int64_t>(low) << 32 | high, static_cast<int>(mesh.positions.size()));
     if (is_new) {
       // Away from the lattice points, so that no two vertices fall together.
       const double t = std::clamp(values_[low] / (values_[low] - values_[high]), 0.1, 0.9);
@@ -183,7 +188,8 @@ std::vector<std::array<double, 2>> rounded(std::vector<std::array<double, 2>> li
     std::vector<std::array<double, 2>> next{line.front()};
     for (std::size_t i = 0; i + 1 < line.size(); ++i) {
       const auto mix = [&](double t) {
-        return std::array<double, 2>{(1 - t) * line[i][0] + t * line[i + 1][0], (1 - t) * line[i][1] + t * line[i + 1][1]};
+        return std::array<double, 2>{(1 - t) * line[i][0] + t * line[i + 1][0],
+                                     (1 - t) * line[i][1] + t * line[i + 1][1]};
       };
       if (i > 0) next.push_back(mix(0.25));
       if (i + 2 < line.size()) next.push_back(mix(0.75));
@@ -233,7 +239,8 @@ Shape capsule_shape(double length, double radius, int around, int rings) {
       profile.push_back({radius, at - arc - z});
   }
   Skeleton skeleton;
-  add_bone(skeleton, "bone", add_node(skeleton, "low", {0, 0, -0.5 * length}), add_node(skeleton, "high", {0, 0, 0.5 * length}));
+  add_bone(skeleton, "bone", add_node(skeleton, "low", {0, 0, -0.5 * length}),
+           add_node(skeleton, "high", {0, 0, 0.5 * length}));
   return {revolved(profile, around), std::move(skeleton)};
 }
 
@@ -292,8 +299,10 @@ Shape creature_shape(double cell) {
   add_bone(skeleton, "tip", tail, tip);
   for (const auto& [name, side] : {std::pair{"left", 1.0}, std::pair{"right", -1.0}}) {
     const std::string prefix = name;
-    const int elbow = node(prefix + "_elbow", 3.2, side * 1.0, -1.0, 0.3), hand = node(prefix + "_hand", 3.3, side * 1.1, -2.3, 0.25);
-    const int knee = node(prefix + "_knee", -0.1, side * 1.0, -1.0, 0.32), foot = node(prefix + "_foot", -0.2, side * 1.1, -2.3, 0.25);
+    const int elbow = node(prefix + "_elbow", 3.2, side * 1.0, -1.0, 0.3),
+              hand = node(prefix + "_hand", 3.3, side * 1.1, -2.3, 0.25);
+    const int knee = node(prefix + "_knee", -0.1, side * 1.0, -1.0, 0.32),
+              foot = node(prefix + "_foot", -0.2, side * 1.1, -2.3, 0.25);
     add_bone(skeleton, prefix + "_arm", chest, elbow);
     add_bone(skeleton, prefix + "_forearm", elbow, hand);
     add_bone(skeleton, prefix + "_thigh", hips, knee);
@@ -316,7 +325,7 @@ Shape torus_shape(int bones, double core_radius, double tube_radius, int along, 
       shape.mesh.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
       shape.mesh.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
     }
-  // Nodes off the rows of vertices, so that a wall through vertices is not the only case.
+  // Nodes off the rows of vertices, so that a separation plane through vertices is not the only case.
   for (int i = 0; i < bones; ++i) {
     const double phi = 2 * kPi * (i + 0.13) / bones;
     add_node(shape.skeleton, "n" + std::to_string(i), {core_radius * std::cos(phi), core_radius * std::sin(phi), 0});
@@ -338,10 +347,12 @@ Shape theta_shape(double cell) {
 }
 
 Shape mushroom_shape(int around) {
-  const std::vector<std::array<double, 2>> profile{{0, -1}, {0.9, -1}, {1, 0}, {1, 1}, {1, 2}, {1, 3}, {1, 4}, {1, 5}, {1.2, 5.2}, {1.8, 4.2}, {2.3, 3.6},
-                                                   {2.8, 3.8}, {2.7, 5}, {2, 6}, {1, 6.2}, {1, 7}, {1, 8}, {1, 9}, {1, 10}, {0.9, 11}, {0, 11}};
+  const std::vector<std::array<double, 2>> profile{
+      {0, -1},    {0.9, -1}, {1, 0}, {1, 1},   {1, 2}, {1, 3}, {1, 4}, {1, 5},  {1.2, 5.2}, {1.8, 4.2}, {2.3, 3.6},
+      {2.8, 3.8}, {2.7, 5},  {2, 6}, {1, 6.2}, {1, 7}, {1, 8}, {1, 9}, {1, 10}, {0.9, 11},  {0, 11}};
   Shape shape{revolved(rounded(profile, 2), around), {}};
-  for (const double z : {0.0, 2.5, 7.5, 10.0}) add_node(shape.skeleton, "z" + std::to_string(shape.skeleton.nodes.size()), {0, 0, z});
+  for (const double z : {0.0, 2.5, 7.5, 10.0})
+    add_node(shape.skeleton, "z" + std::to_string(shape.skeleton.nodes.size()), {0, 0, z});
   add_bone(shape.skeleton, "foot", 0, 1);
   add_bone(shape.skeleton, "brim", 1, 2);
   add_bone(shape.skeleton, "top", 2, 3);
@@ -349,15 +360,24 @@ Shape mushroom_shape(int around) {
 }
 
 std::vector<NamedShape> all_shapes() {
-  return {{"capsule", 0, capsule_shape()}, {"chain", 0, chain_shape()}, {"y", 0, y_shape()}, {"x", 0, x_shape()},
-          {"creature", 0, creature_shape()}, {"torus", 1, torus_shape()}, {"theta", 2, theta_shape()}, {"mushroom", 0, mushroom_shape()}};
+  return {{"capsule", 0, capsule_shape()},
+          {"chain", 0, chain_shape()},
+          {"y", 0, y_shape()},
+          {"x", 0, x_shape()},
+          {"creature", 0, creature_shape()},
+          {"torus", 1, torus_shape()},
+          {"theta", 2, theta_shape()},
+          {"mushroom", 0, mushroom_shape()}};
 }
 
 Similarity random_similarity(std::uint64_t seed) {
   std::mt19937_64 random(seed);
-  const auto uniform = [&](double lower, double upper) { return lower + (upper - lower) * static_cast<double>(random() >> 11) * 0x1p-53; };
+  const auto uniform = [&](double lower, double upper) {
+    return lower + (upper - lower) * static_cast<double>(random() >> 11) * 0x1p-53;
+  };
   const double a = uniform(0, 1), b = uniform(0, 2 * kPi), c = uniform(0, 2 * kPi);  // a uniform unit quaternion
-  const Eigen::Quaterniond q(std::sqrt(a) * std::cos(c), std::sqrt(1 - a) * std::sin(b), std::sqrt(1 - a) * std::cos(b), std::sqrt(a) * std::sin(c));
+  const Eigen::Quaterniond q(std::sqrt(a) * std::cos(c), std::sqrt(1 - a) * std::sin(b), std::sqrt(1 - a) * std::cos(b),
+                             std::sqrt(a) * std::sin(c));
   Similarity map;
   map.rotation = q.normalized().toRotationMatrix();
   map.scale = std::exp(uniform(-std::log(5), std::log(5)));
@@ -379,7 +399,9 @@ Skeleton transformed(const Skeleton& skeleton, const Similarity& map) {
   return result;
 }
 
-Shape transformed(const Shape& shape, const Similarity& map) { return {transformed(shape.mesh, map), transformed(shape.skeleton, map)}; }
+Shape transformed(const Shape& shape, const Similarity& map) {
+  return {transformed(shape.mesh, map), transformed(shape.skeleton, map)};
+}
 
 std::vector<int> random_permutation(int count, std::uint64_t seed) {
   std::mt19937_64 random(seed);

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "skeletex/model/mesh.h"
-#include "skeletex/model/skeleton.h"
+#include "skeletex/geometry/mesh.h"
+#include "skeletex/skeleton/skeleton.h"
 
 namespace skeletex {
 
@@ -22,7 +22,7 @@ struct Shape {
 Shape capsule_shape(double length = 2, double radius = 0.5, int around = 32, int rings = 24);
 
 /// A chain of bones of length 1.5, each turned against the one before by `bend_rad` about y: linear nodes only, caps at
-/// both ends. With bend_rad = 0 straight, so that all walls are parallel.
+/// both ends. With bend_rad = 0 straight, so that all separation planes are parallel.
 Shape chain_shape(int bones = 3, double bend_rad = 0.5, double cell = 0.16);
 
 /// Three bones of different length at one node, in a plane (the two corners lie opposite each other), one head and two
@@ -33,9 +33,8 @@ Shape y_shape(double cell = 0.16);
 /// segments meet (exactly co-circular directions).
 Shape x_shape(double cell = 0.16);
 
-/// Two nodes of four bones each (body and neck or tail, two legs), limbs of two bones, a head: 13 bones. The skeleton is
-/// mirror-symmetric
-/// in y = 0, the mesh nearly so.
+/// Two nodes of four bones each (body and neck or tail, two legs), limbs of two bones, a head: 13 bones. The skeleton
+/// is mirror-symmetric in y = 0, the mesh nearly so.
 Shape creature_shape(double cell = 0.13);
 
 /// A torus about z with a ring of bones on its core circle: a cyclic skeleton, no free end, genus 1. Points lie on the
@@ -45,8 +44,8 @@ Shape torus_shape(int bones = 5, double core_radius = 2, double tube_radius = 0.
 /// Two nodes that three bones join, as the Greek letter theta: branches and cycles in one, genus 2.
 Shape theta_shape(double cell = 0.16);
 
-/// A tube about z with a brim that droops like a mushroom's: three bones in a chain, and in the middle one's segment (an
-/// annulus) rays from the axis meet the surface three times, so it is no height field.
+/// A tube about z with a brim that droops like a mushroom's: three bones in a chain, and in the middle one's segment
+/// (an annulus) rays from the axis meet the surface three times, so it is no height field.
 Shape mushroom_shape(int around = 40);
 
 struct NamedShape {

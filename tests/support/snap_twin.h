@@ -5,7 +5,7 @@
 #include <map>
 #include <vector>
 
-#include "skeletex/encode/snap.h"
+#include "skeletex/convert/snap/snap.h"
 
 namespace skeletex::twin {
 
@@ -15,7 +15,8 @@ struct SnapLattice {
   std::vector<double> x, y;  ///< offsets, row by row
   std::vector<int> anchors;
 
-  SnapLattice(int columns, int rows) : width(columns), height(rows), x(columns * rows, 0), y(columns * rows, 0), anchors(columns * rows, 0) {}
+  SnapLattice(int columns, int rows)
+      : width(columns), height(rows), x(columns * rows, 0), y(columns * rows, 0), anchors(columns * rows, 0) {}
   int at(int column, int row) const { return row * width + (column % width + width) % width; }
 
   /// Smallest cross product at the corners of the quad to the right of and above a texel.
@@ -60,8 +61,10 @@ struct SnapLattice {
       const double bx = std::floor(vertices[v].x), by = std::floor(vertices[v].y);
       for (int i = 0; i < 2; ++i)
         for (int j = 0; j < 2; ++j)
-          found.push_back({std::hypot(vertices[v].x - bx - j, vertices[v].y - by - i), static_cast<int>(bx) + j, static_cast<int>(by) + i});
-      std::stable_sort(found.begin(), found.end(), [](const Candidate& a, const Candidate& b) { return a.distance < b.distance; });
+          found.push_back({std::hypot(vertices[v].x - bx - j, vertices[v].y - by - i), static_cast<int>(bx) + j,
+                           static_cast<int>(by) + i});
+      std::stable_sort(found.begin(), found.end(),
+                       [](const Candidate& a, const Candidate& b) { return a.distance < b.distance; });
       return found;
     };
     for (bool is_open = true; is_open;) {
@@ -105,7 +108,8 @@ struct SnapLattice {
           double mean_x = 0, mean_y = 0;
           for (const int n : around) mean_x += x[n] / 4, mean_y += y[n] / 4;
           const double dx = (x[texel] + mean_x) / 2, dy = (y[texel] + mean_y) / 2;
-          if (std::abs(dx - x[texel]) + std::abs(dy - y[texel]) >= 0.01 && std::max(std::abs(dx), std::abs(dy)) <= 0.5) move(j, row, dx, dy);
+          if (std::abs(dx - x[texel]) + std::abs(dy - y[texel]) >= 0.01 && std::max(std::abs(dx), std::abs(dy)) <= 0.5)
+            move(j, row, dx, dy);
         }
   }
 
@@ -153,8 +157,10 @@ struct SnapLattice {
           if (e < 0 || colour(j, row) != c) continue;
           double dx = 0, dy = 0;
           nearest(edges[e], j, row, dx, dy);
-          if (std::abs(dx) <= 1 && std::abs(dy) <= 1 && move(j, row, dx, dy)) anchors[at(j, row)] = -1 - e;
-          else if (edges[e].dihedral < 0.1) chosen[at(j, row)] = -1;
+          if (std::abs(dx) <= 1 && std::abs(dy) <= 1 && move(j, row, dx, dy))
+            anchors[at(j, row)] = -1 - e;
+          else if (edges[e].dihedral < 0.1)
+            chosen[at(j, row)] = -1;
         }
   }
 

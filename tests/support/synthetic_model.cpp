@@ -34,15 +34,16 @@ Skeleton star(const std::vector<Vec3>& directions) {
 }  // namespace
 
 SyntheticSurface::SyntheticSurface(Skeleton skeleton, double radius, double relief)
-    : skeleton_(std::move(skeleton)), radius_(radius), relief_(relief), walls_(skeleton_) {
-  const std::vector<BoneBasis> bases = walls_.bases();
+    : skeleton_(std::move(skeleton)), radius_(radius), relief_(relief), separation_(skeleton_) {
+  const std::vector<BoneBasis> bases = separation_.bases();
   for (std::size_t i = 0; i < bases.size(); ++i) skeleton_.bones[i].s = bases[i].s;
-  walls_ = Walls(skeleton_);
+  separation_ = SeparationPlanes(skeleton_);
 }
 
 double SyntheticSurface::seam_radius(int node, const Vec3& direction) const {
   const Vec3 a(0.6, -0.7, 0.2), b(-0.3, 0.5, 0.8);
-  return radius_ * (1 + 0.1 * relief_ * std::sin(2.5 * direction.dot(a) + node) + 0.06 * relief_ * std::cos(3 * direction.dot(b)));
+  return radius_ * (1 + 0.1 * relief_ * std::sin(2.5 * direction.dot(a) + node) +
+                    0.06 * relief_ * std::cos(3 * direction.dot(b)));
 }
 
 Vec3 SyntheticSurface::seam_point(int node, const Vec3& direction) const {
@@ -50,21 +51,26 @@ Vec3 SyntheticSurface::seam_point(int node, const Vec3& direction) const {
 }
 
 Vec3 SyntheticSurface::point(int bone, double u, double turn) const {
-  const TangentFrame frame = tangent_frame(skeleton_, walls_, bone, u, turn);
+  const TangentFrame frame = tangent_frame(skeleton_, separation_, bone, u, turn);
   std::array<double, 2> ends;
   for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
     double& r = ends[static_cast<int>(end)];
     r = radius_;
-    if (!walls_.is_free(bone, end))
-      r = seam_radius(end_node(skeleton_, bone, end), tangent_frame(skeleton_, walls_, bone, end == BoneEnd::kHead ? 0 : 1, turn).out);
+    if (!separation_.is_free(bone, end))
+      r = seam_radius(end_node(skeleton_, bone, end),
+                      tangent_frame(skeleton_, separation_, bone, end == BoneEnd::kHead ? 0 : 1, turn).out);
   }
   const double t = smoothstep(u), bump = std::sin(kPi * u) * std::sin(kPi * u);
-  const double r = (1 - t) * ends[0] + t * ends[1] + 0.1 * relief_ * radius_ * bump * std::cos(2 * kPi * (2 * turn + u));
-  const Vec3 lean = 0.1 * relief_ * radius_ * bump * (std::sin(2 * kPi * turn) * frame.along + std::cos(2 * kPi * 3 * turn) * frame.around);
+  const double r =
+      (1 - t) * ends[0] + t * ends[1] + 0.1 * relief_ * radius_ * bump * std::cos(2 * kPi * (2 * turn + u));
+  const Vec3 lean = 0.1 * relief_ * radius_ * bump *
+                    (std::sin(2 * kPi * turn) * frame.along + std::cos(2 * kPi * 3 * turn) * frame.around);
   return frame.foot + r * frame.out + lean;
 }
 
-int SyntheticSurface::genus() const { return static_cast<int>(skeleton_.bones.size()) - static_cast<int>(skeleton_.nodes.size()) + 1; }
+int SyntheticSurface::genus() const {
+  return static_cast<int>(skeleton_.bones.size()) - static_cast<int>(skeleton_.nodes.size()) + 1;
+}
 
 SkeletexModel SyntheticSurface::model(const std::vector<std::pair<int, int>>& sizes) const {
   const int count = static_cast<int>(skeleton_.bones.size());
@@ -92,8 +98,10 @@ SkeletexModel SyntheticSurface::model(const std::vector<std::pair<int, int>>& si
     patch.rectangle = {x, y, width, height};
     x += width;
     high = std::max(high, height);
-    const bool is_free[2] = {walls_.is_free(bone, BoneEnd::kHead), walls_.is_free(bone, BoneEnd::kTail)};
-    patch.topology = is_free[0] && is_free[1] ? SegmentTopology::kSphere : is_free[0] || is_free[1] ? SegmentTopology::kDisk : SegmentTopology::kAnnulus;
+    const bool is_free[2] = {separation_.is_free(bone, BoneEnd::kHead), separation_.is_free(bone, BoneEnd::kTail)};
+    patch.topology = is_free[0] && is_free[1]   ? SegmentTopology::kSphere
+                     : is_free[0] || is_free[1] ? SegmentTopology::kDisk
+                                                : SegmentTopology::kAnnulus;
     for (int r = 0; r < height; ++r) {
       const double t = static_cast<double>(r) / (height - 1);
       patch.row_u.push_back(t + 0.04 * std::sin(2 * kPi * t));  // rows are not even in u
@@ -116,8 +124,9 @@ SkeletexModel SyntheticSurface::model(const std::vector<std::pair<int, int>>& si
         const Vec3 p = point(bone, u, turn);
         box.lower = box.lower.cwiseMin(p);
         box.upper = box.upper.cwiseMax(p);
-        const Vec3 texel = encode_texel(tangent_frame(skeleton_, walls_, bone, u, turn), p, end_position(skeleton_, bone, BoneEnd::kHead),
-                                        end_position(skeleton_, bone, BoneEnd::kTail));
+        const Vec3 texel =
+            encode_texel(tangent_frame(skeleton_, separation_, bone, u, turn), p,
+                         end_position(skeleton_, bone, BoneEnd::kHead), end_position(skeleton_, bone, BoneEnd::kTail));
         const std::size_t at = static_cast<std::size_t>(patch.rectangle.y + r) * texture.width + patch.rectangle.x + j;
         texture.along[at] = static_cast<float>(texel[0]);
         texture.around[at] = static_cast<float>(texel[1]);
@@ -136,18 +145,18 @@ SkeletexModel SyntheticSurface::model(const std::vector<std::pair<int, int>>& si
   };
   std::map<std::tuple<int, int, int>, StoredArc> arc_at;  // node, bones
   const auto direction = [&](int bone, BoneEnd end, double turn) {
-    const Vec3& s = walls_.spoke(bone, turn);
-    return Vec3((s + walls_.slope(bone, end, turn) * walls_.bases()[bone].o).normalized());
+    const Vec3& s = separation_.radial(bone, turn);
+    return Vec3((s + separation_.slope(bone, end, turn) * separation_.bases()[bone].o).normalized());
   };
   const auto sample = [&](int bone, BoneEnd end, double turn) {
     const int node = end_node(skeleton_, bone, end);
     const Vec3 p = seam_point(node, direction(bone, end, turn));
     turn -= std::floor(turn);
-    return SeamSample{turn < 1 ? turn : 0, walls_.half_line_distance(bone, end, p)};
+    return SeamSample{turn < 1 ? turn : 0, separation_.half_line_distance(bone, end, p)};
   };
   for (int bone = 0; bone < count; ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
-      if (walls_.is_free(bone, end)) continue;
+      if (separation_.is_free(bone, end)) continue;
       const int node = end_node(skeleton_, bone, end);
       struct Interval {
         double begin;
@@ -155,14 +164,14 @@ SkeletexModel SyntheticSurface::model(const std::vector<std::pair<int, int>>& si
       };
       std::vector<Interval> intervals;
       constexpr int kScan = 20000;
-      int before = walls_.neighbour(bone, end, (kScan - 1.0) / kScan);
+      int before = separation_.neighbour(bone, end, (kScan - 1.0) / kScan);
       for (int k = 0; k < kScan; ++k) {
-        const int here = walls_.neighbour(bone, end, static_cast<double>(k) / kScan);
+        const int here = separation_.neighbour(bone, end, static_cast<double>(k) / kScan);
         if (here != before) {
           double low = (k - 1.0) / kScan, high_turn = static_cast<double>(k) / kScan;
           for (int step = 0; step < 60; ++step) {
             const double middle = 0.5 * (low + high_turn);
-            (walls_.neighbour(bone, end, middle) == before ? low : high_turn) = middle;
+            (separation_.neighbour(bone, end, middle) == before ? low : high_turn) = middle;
           }
           intervals.push_back({high_turn, here});
         }
@@ -188,7 +197,9 @@ SkeletexModel SyntheticSurface::model(const std::vector<std::pair<int, int>>& si
       }
       for (std::size_t k = 0; k < intervals.size(); ++k) {
         const Interval& here = intervals[k];
-        const double until = is_closed ? here.begin + 1 : k + 1 < intervals.size() ? intervals[k + 1].begin : intervals[0].begin + 1;
+        const double until = is_closed                  ? here.begin + 1
+                             : k + 1 < intervals.size() ? intervals[k + 1].begin
+                                                        : intervals[0].begin + 1;
         const std::tuple<int, int, int> key{node, std::min(bone, here.neighbour), std::max(bone, here.neighbour)};
         const auto found = arc_at.find(key);
         if (found == arc_at.end()) {
@@ -198,7 +209,8 @@ SkeletexModel SyntheticSurface::model(const std::vector<std::pair<int, int>>& si
           if (!is_closed) arc.corners = {corners[k], corners[(k + 1) % corners.size()]};
           const int wider = std::max(sizes[bone].first, sizes[here.neighbour].first);
           const int cells = std::max(is_closed ? 3 : 2, static_cast<int>(std::lround((until - here.begin) * wider)));
-          for (int i = is_closed ? 0 : 1; i < cells; ++i) arc.samples.push_back(sample(bone, end, here.begin + (until - here.begin) * i / cells));
+          for (int i = is_closed ? 0 : 1; i < cells; ++i)
+            arc.samples.push_back(sample(bone, end, here.begin + (until - here.begin) * i / cells));
           arc_at[key] = {static_cast<int>(model.arcs.size()), direction(bone, end, here.begin)};
           model.ends[bone][static_cast<int>(end)].arcs.push_back({static_cast<int>(model.arcs.size()), false});
           model.arcs.push_back(std::move(arc));
@@ -208,9 +220,12 @@ SkeletexModel SyntheticSurface::model(const std::vector<std::pair<int, int>>& si
         bool is_reversed = false;
         if (is_closed) {
           // Angles of the first two samples about this bone: does it grow with the arc?
-          const BoneEnd other_end = end_node(skeleton_, arc.bones[0], BoneEnd::kHead) == node ? BoneEnd::kHead : BoneEnd::kTail;
+          const BoneEnd other_end =
+              end_node(skeleton_, arc.bones[0], BoneEnd::kHead) == node ? BoneEnd::kHead : BoneEnd::kTail;
           const auto turn_here = [&](int i) {
-            return walls_.turn_of(bone, walls_.seam_point(arc.bones[0], other_end, arc.samples[i].turn, arc.samples[i].distance) - skeleton_.nodes[node].position);
+            return separation_.turn_of(
+                bone, separation_.seam_point(arc.bones[0], other_end, arc.samples[i].turn, arc.samples[i].distance) -
+                          skeleton_.nodes[node].position);
           };
           const double step = turn_here(1) - turn_here(0);
           is_reversed = step - std::floor(step) > 0.5;
@@ -255,7 +270,8 @@ Skeleton cross(int arms) {
   std::vector<Vec3> directions;
   for (int i = 0; i < arms; ++i) {
     const double z = 1 - (2 * i + 1.0) / arms, angle = 2.4 * i + 0.1 * i * i;
-    directions.push_back((1 + 0.1 * i) * Vec3(std::sqrt(1 - z * z) * std::cos(angle), std::sqrt(1 - z * z) * std::sin(angle), z));
+    directions.push_back((1 + 0.1 * i) *
+                         Vec3(std::sqrt(1 - z * z) * std::cos(angle), std::sqrt(1 - z * z) * std::sin(angle), z));
   }
   return star(directions);
 }
@@ -264,7 +280,8 @@ Skeleton ring(int bones) {
   Skeleton skeleton;
   for (int i = 0; i < bones; ++i) {
     const double angle = 2 * kPi * i / bones;
-    skeleton.nodes.push_back({"n" + std::to_string(i), Vec3(1.5 * std::cos(angle), 1.2 * std::sin(angle), 0.1 * std::sin(2 * angle))});
+    skeleton.nodes.push_back(
+        {"n" + std::to_string(i), Vec3(1.5 * std::cos(angle), 1.2 * std::sin(angle), 0.1 * std::sin(2 * angle))});
     skeleton.bones.push_back({"b" + std::to_string(i), i, (i + 1) % bones, {}});
   }
   return skeleton;
@@ -287,7 +304,8 @@ Skeleton random_tree(int bones, unsigned seed) {
   while (static_cast<int>(skeleton.bones.size()) < bones) {
     const int from = static_cast<int>(random() % skeleton.nodes.size());
     const Vec3 d = Vec3(normal(random), normal(random), normal(random)).normalized();
-    if (std::any_of(away[from].begin(), away[from].end(), [&](const Vec3& other) { return other.dot(d) > 0.5; })) continue;
+    if (std::any_of(away[from].begin(), away[from].end(), [&](const Vec3& other) { return other.dot(d) > 0.5; }))
+      continue;
     const int to = static_cast<int>(skeleton.nodes.size());
     skeleton.nodes.push_back({"n" + std::to_string(to), skeleton.nodes[from].position + length(random) * d});
     away[from].push_back(d);

@@ -3,8 +3,8 @@
 #include <utility>
 #include <vector>
 
-#include "skeletex/model/frame.h"
 #include "skeletex/model/texture.h"
+#include "skeletex/skeleton/frame.h"
 
 namespace skeletex {
 
@@ -20,7 +20,7 @@ class SyntheticSurface {
   SyntheticSurface& operator=(const SyntheticSurface&) = delete;
 
   const Skeleton& skeleton() const { return skeleton_; }
-  const Walls& walls() const { return walls_; }
+  const SeparationPlanes& separation() const { return separation_; }
   /// The surface point at map coordinates (u, turn) of a bone.
   Vec3 point(int bone, double u, double turn) const;
   /// The seam point in a unit direction from a node.
@@ -35,16 +35,16 @@ class SyntheticSurface {
   double seam_radius(int node, const Vec3& direction) const;
   Skeleton skeleton_;
   double radius_, relief_;
-  Walls walls_;
+  SeparationPlanes separation_;
 };
 
 /// Skeletons by name. All without "s": it is carried.
 Skeleton lone_bone();
-Skeleton chain(int bones);         ///< bent by some degrees at every node
-Skeleton y_branch();               ///< three bones at one node: two corners
-Skeleton cross(int arms);          ///< arms in general position at one node
-Skeleton ring(int bones);          ///< cyclic: a torus
-Skeleton ring_with_arm(int bones); ///< cyclic with a branch node
+Skeleton chain(int bones);          ///< bent by some degrees at every node
+Skeleton y_branch();                ///< three bones at one node: two corners
+Skeleton cross(int arms);           ///< arms in general position at one node
+Skeleton ring(int bones);           ///< cyclic: a torus
+Skeleton ring_with_arm(int bones);  ///< cyclic with a branch node
 /// A random tree whose bones turn away from each other, as far as the seed allows.
 Skeleton random_tree(int bones, unsigned seed);
 

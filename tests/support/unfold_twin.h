@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "skeletex/model/mesh.h"
+#include "skeletex/geometry/mesh.h"
 
 /// kernels/unfold.cl for one patch that fills its texture, over a flat surface with the normal z, in double.
 namespace skeletex::twin {
@@ -22,7 +22,8 @@ inline Folds find_folds(const std::vector<Vec3>& points, int width, int height) 
   Folds folds{std::vector<int>(points.size(), 0), 0, false};
   for (int row = 0; row + 1 < height; ++row)
     for (int column = 0; column < width; ++column) {
-      const std::array<Vec3, 4> q{points[at(column, row)], points[at(column + 1, row)], points[at(column + 1, row + 1)], points[at(column, row + 1)]};
+      const std::array<Vec3, 4> q{points[at(column, row)], points[at(column + 1, row)], points[at(column + 1, row + 1)],
+                                  points[at(column, row + 1)]};
       const auto is_turned = [&](int a, int b, int c) {
         const Vec3 n = (q[b] - q[a]).cross(q[c] - q[a]);
         const double beyond = n.z() - 0.1 * n.norm();
@@ -39,14 +40,19 @@ inline Folds find_folds(const std::vector<Vec3>& points, int width, int height) 
 }
 
 /// The new offset of a texel from its neighbours' points.
-inline Eigen::Vector2d relaxed(const std::vector<Vec3>& points, int width, int height, int column, int row, const Eigen::Vector2d& offset) {
+inline Eigen::Vector2d relaxed(const std::vector<Vec3>& points, int width, int height, int column, int row,
+                               const Eigen::Vector2d& offset) {
   const auto at = [&](int j, int r) { return points[static_cast<std::size_t>(r) * width + (j + width) % width]; };
-  const Vec3 left = at(column - 1, row), right = at(column + 1, row), below = at(column, row - 1), above = at(column, row + 1);
+  const Vec3 left = at(column - 1, row), right = at(column + 1, row), below = at(column, row - 1),
+             above = at(column, row + 1);
   Eigen::Matrix<double, 3, 2> directions;
   directions << (right - left) / 2, (above - below) / 2;
   const Eigen::Matrix2d squares = directions.transpose() * directions;
   const Eigen::Matrix2d damped = squares + 0.01 * squares.trace() * Eigen::Matrix2d::Identity();
-  const Eigen::Vector2d step = (damped.inverse() * directions.transpose() * ((left + right + below + above) / 4 - at(column, row))).cwiseMax(-0.4).cwiseMin(0.4);
+  const Eigen::Vector2d step =
+      (damped.inverse() * directions.transpose() * ((left + right + below + above) / 4 - at(column, row)))
+          .cwiseMax(-0.4)
+          .cwiseMin(0.4);
   Eigen::Vector2d moved = (offset + step).cwiseMax(-1).cwiseMin(1);
   moved.y() = std::clamp(row + moved.y(), 0.3, height - 1 - 0.3) - row;
   return moved;

@@ -8,8 +8,8 @@
 #include <map>
 #include <vector>
 
-#include "skeletex/parameterize/chart.h"
-#include "skeletex/parameterize/vsm.h"
+#include "skeletex/convert/parameterize/chart.h"
+#include "skeletex/convert/parameterize/vsm.h"
 
 /// VSM once more, short and in double precision with a sparse factorization: what the device is compared with.
 namespace skeletex::testing {
@@ -62,7 +62,8 @@ inline void twin_solve(Chart& chart, const std::vector<TwinEdge>& edges, bool is
   Eigen::VectorXd rhs = Eigen::VectorXd::Zero(size);
   const int pinned = !is_u && !has_row ? 0 : -1;  // a lone bone's v is free to turn
   for (int k = 0; k < size; ++k) entries.emplace_back(k, k, k == pinned ? 2.0 : 1.0);
-  const double pin_value = pinned < 0 ? 0 : chart.v[std::find(unknown.begin(), unknown.end(), pinned) - unknown.begin()];
+  const double pin_value =
+      pinned < 0 ? 0 : chart.v[std::find(unknown.begin(), unknown.end(), pinned) - unknown.begin()];
   if (pinned >= 0) rhs[pinned] += pin_value * std::sqrt(diagonal[pinned]);
   for (const TwinEdge& e : edges) {
     if (!is_u && (is_twin_pole(chart.kinds[e.i]) || is_twin_pole(chart.kinds[e.j]))) continue;

@@ -6,14 +6,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "skeletex/edit/blend.h"
+#include "skeletex/edit/transfer/blend.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
 namespace {
 
 DevicePlanes take_texels(ClContext& context, SkeletexModel& model) {
-  DevicePlanes planes{context.upload(model.texture.along), context.upload(model.texture.around), context.upload(model.texture.out)};
+  DevicePlanes planes{context.upload(model.texture.along), context.upload(model.texture.around),
+                      context.upload(model.texture.out)};
   model.texture = {model.texture.width, model.texture.height, {}, {}, {}};
   return planes;
 }
@@ -21,19 +22,33 @@ DevicePlanes take_texels(ClContext& context, SkeletexModel& model) {
 /// Where the two differ in what a blend of texels cannot bridge; nullptr: nowhere.
 const char* difference(const SkeletexModel& a, const SkeletexModel& b) {
   const auto same_nodes = [](const Node& p, const Node& q) { return p.position == q.position; };
-  const auto same_bones = [](const Bone& p, const Bone& q) { return p.head == q.head && p.tail == q.tail && p.s == q.s; };
-  const auto same_rectangles = [](const Patch& p, const Patch& q) {
-    return p.rectangle.x == q.rectangle.x && p.rectangle.y == q.rectangle.y && p.rectangle.width == q.rectangle.width && p.rectangle.height == q.rectangle.height;
+  const auto same_bones = [](const Bone& p, const Bone& q) {
+    return p.head == q.head && p.tail == q.tail && p.s == q.s;
   };
-  const auto same_arcs = [](const SeamArc& p, const SeamArc& q) { return p.bones == q.bones && p.corners == q.corners && p.samples.size() == q.samples.size(); };
-  const auto same_corners = [](const SeamCorner& p, const SeamCorner& q) { return p.node == q.node && p.bones == q.bones; };
-  if (!std::ranges::equal(a.skeleton.nodes, b.skeleton.nodes, same_nodes) || !std::ranges::equal(a.skeleton.bones, b.skeleton.bones, same_bones)) return "skeletons";
-  if (a.texture.width != b.texture.width || a.texture.height != b.texture.height || !std::ranges::equal(a.patches, b.patches, same_rectangles)) return "layouts";
-  if (!std::ranges::equal(a.arcs, b.arcs, same_arcs) || !std::ranges::equal(a.corners, b.corners, same_corners)) return "seams";
+  const auto same_rectangles = [](const Patch& p, const Patch& q) {
+    return p.rectangle.x == q.rectangle.x && p.rectangle.y == q.rectangle.y && p.rectangle.width == q.rectangle.width &&
+           p.rectangle.height == q.rectangle.height;
+  };
+  const auto same_arcs = [](const SeamArc& p, const SeamArc& q) {
+    return p.bones == q.bones && p.corners == q.corners && p.samples.size() == q.samples.size();
+  };
+  const auto same_corners = [](const SeamCorner& p, const SeamCorner& q) {
+    return p.node == q.node && p.bones == q.bones;
+  };
+  if (!std::ranges::equal(a.skeleton.nodes, b.skeleton.nodes, same_nodes) ||
+      !std::ranges::equal(a.skeleton.bones, b.skeleton.bones, same_bones))
+    return "skeletons";
+  if (a.texture.width != b.texture.width || a.texture.height != b.texture.height ||
+      !std::ranges::equal(a.patches, b.patches, same_rectangles))
+    return "layouts";
+  if (!std::ranges::equal(a.arcs, b.arcs, same_arcs) || !std::ranges::equal(a.corners, b.corners, same_corners))
+    return "seams";
   return nullptr;
 }
 
-double between(double a, double b, double share) { return a == b || share == 0 ? a : share == 1 ? b : (1 - share) * a + share * b; }
+double between(double a, double b, double share) {
+  return a == b || share == 0 ? a : share == 1 ? b : (1 - share) * a + share * b;
+}
 
 SeamSample between(const SeamSample& a, const SeamSample& b, double share) {
   const double there = b.turn - std::round(b.turn - a.turn);  // the short way round
@@ -46,10 +61,14 @@ SeamSample between(const SeamSample& a, const SeamSample& b, double share) {
 LiveMorph::LiveMorph(ClContext& context, const Morph& morph, std::vector<std::vector<double>> path, int steps)
     : context_(&context), morph_(&morph), path_(std::move(path)), steps_(steps) {
   if (!morph.layout()) throw InputError("a live morph keeps one layout on its way; give the number of the model whose");
-  if (path_.size() < 2 || steps < 1) throw InputError("a live morph goes from one set of weights to another in one step or more");
+  if (path_.size() < 2 || steps < 1)
+    throw InputError("a live morph goes from one set of weights to another in one step or more");
   for (const std::vector<double>& weights : path_)
-    if (weights.size() != morph.models().size()) throw InputError(fmt::format("{} weights for {} models; give one per model", weights.size(), morph.models().size()));
-  for (std::size_t key = 0; key <= steps_ * (path_.size() - 1); ++key) morph.queue(weights(static_cast<double>(key) / steps_), keys_.emplace_back());
+    if (weights.size() != morph.models().size())
+      throw InputError(
+          fmt::format("{} weights for {} models; give one per model", weights.size(), morph.models().size()));
+  for (std::size_t key = 0; key <= steps_ * (path_.size() - 1); ++key)
+    morph.queue(weights(static_cast<double>(key) / steps_), keys_.emplace_back());
 }
 
 std::vector<double> LiveMorph::weights(double t) const {
@@ -65,12 +84,15 @@ SkeletexModel LiveMorph::queue(double t, DevicePlanes& texels) const {
   const double place = std::clamp(t * steps_, 0.0, static_cast<double>(keys_.size() - 1));
   const std::size_t key = std::min(static_cast<std::size_t>(place), keys_.size() - 2);
   // First, so that the device mixes while the host finds the seams.
-  mix_texels(*context_, keys_[key], keys_[key + 1], place - static_cast<double>(key), morph_->models()[*morph_->layout()].texture.width, texels);
+  mix_texels(*context_, keys_[key], keys_[key + 1], place - static_cast<double>(key),
+             morph_->models()[*morph_->layout()].texture.width, texels);
   return morph_->without_texels(weights(t));
 }
 
-LiveBlend::LiveBlend(ClContext& context, SkeletexModel first, const SkeletexModel& second) : context_(&context), first_(std::move(first)), second_(second) {
-  if (const char* what = difference(first_, second_)) throw InputError(fmt::format("the two models have different {}; a live blend needs the same", what));
+LiveBlend::LiveBlend(ClContext& context, SkeletexModel first, const SkeletexModel& second)
+    : context_(&context), first_(std::move(first)), second_(second) {
+  if (const char* what = difference(first_, second_))
+    throw InputError(fmt::format("the two models have different {}; a live blend needs the same", what));
   first_texels_ = take_texels(context, first_);
   second_texels_ = take_texels(context, second_);
 }
@@ -84,7 +106,8 @@ SkeletexModel LiveBlend::queue(double share, DevicePlanes& texels) const {
   for (std::size_t a = 0; a < model.arcs.size(); ++a)
     for (std::size_t i = 0; i < model.arcs[a].samples.size(); ++i)
       model.arcs[a].samples[i] = between(first_.arcs[a].samples[i], second_.arcs[a].samples[i], share);
-  for (std::size_t c = 0; c < model.corners.size(); ++c) model.corners[c].sample = between(first_.corners[c].sample, second_.corners[c].sample, share);
+  for (std::size_t c = 0; c < model.corners.size(); ++c)
+    model.corners[c].sample = between(first_.corners[c].sample, second_.corners[c].sample, share);
   mix_texels(*context_, first_texels_, second_texels_, share, model.texture.width, texels);
   return model;
 }

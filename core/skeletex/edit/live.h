@@ -2,18 +2,18 @@
 #pragma once
 #include <vector>
 
-#include "skeletex/edit/morph.h"
+#include "skeletex/edit/morph/morph.h"
 
 namespace skeletex {
 
-// Edits for live use: what does not change from frame to frame is made once, and a frame is one pass over two textures on the
-// device. What comes out is a model like any other, to be reconstructed, posed or drawn:
+// Edits for live use: what does not change from frame to frame is made once, and a frame is one pass over two textures
+// on the device. What comes out is a model like any other, to be reconstructed, posed or drawn:
 //
 //   const LiveMorph live(context, morph, {{1, 0}, {0, 1}});
 //   const SkeletexModel frame = live.queue(0.3, lattice.texels);
 
-/// A morph along a path of weights. At its keys (whole numbers of steps) the texels are those of Morph::queue bit by bit; in
-/// between they go straight from one key to the next. Skeleton, rows and seams are the morph's at every time.
+/// A morph along a path of weights. At its keys (whole numbers of steps) the texels are those of Morph::queue bit by
+/// bit; in between they go straight from one key to the next. Skeleton, rows and seams are the morph's at every time.
 class LiveMorph {
  public:
   /// \param morph  must outlive this, and have a layout (MorphOptions::layout)
@@ -23,7 +23,8 @@ class LiveMorph {
   LiveMorph(ClContext& context, const Morph& morph, std::vector<std::vector<double>> path, int steps = 8);
 
   std::vector<double> weights(double t) const;
-  /// The model at t, which is clamped to the path. \param texels  of the layout's size, allocated where it is not; the model has none of its own
+  /// The model at t, which is clamped to the path. \param texels  of the layout's size, allocated where it is not; the
+  /// model has none of its own
   SkeletexModel queue(double t, DevicePlanes& texels) const;
 
  private:
@@ -34,8 +35,8 @@ class LiveMorph {
   std::vector<DevicePlanes> keys_;
 };
 
-/// Between two models of one skeleton, one layout and one network of seams: the target of a transfer and its result, a model and the
-/// filtered one. Texels, rows and seams go straight from the first to the second.
+/// Between two models of one skeleton, one layout and one network of seams: the target of a transfer and its result, a
+/// model and the filtered one. Texels, rows and seams go straight from the first to the second.
 class LiveBlend {
  public:
   /// \throw InputError when the two differ in more than texels, rows and places of seams; DeviceError

@@ -55,7 +55,8 @@ void write_atomically(const fs::path& path, const std::function<void(const fs::p
     return;
   }
   const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
-  if (!fs::is_directory(folder, error)) throw IoError(fmt::format("{}: the folder {} does not exist; create it first", path.string(), folder.string()));
+  if (!fs::is_directory(folder, error))
+    throw IoError(fmt::format("{}: the folder {} does not exist; create it first", path.string(), folder.string()));
 
   static std::atomic<unsigned> counter{0};
   Remover temporary{folder / fmt::format(".{}.{}-{}.part", target.filename().string(), ::getpid(), counter++)};
@@ -83,7 +84,8 @@ void write_text_atomically(const fs::path& path, std::string_view text) {
   });
 }
 
-OutputFile::OutputFile(const fs::path& temporary, const fs::path& target) : target_(target), buffer_(kBuffer), file_(std::fopen(temporary.c_str(), "wb")) {
+OutputFile::OutputFile(const fs::path& temporary, const fs::path& target)
+    : target_(target), buffer_(kBuffer), file_(std::fopen(temporary.c_str(), "wb")) {
   if (file_ == nullptr) fail();
   std::setvbuf(file_, buffer_.data(), _IOFBF, buffer_.size());
 }

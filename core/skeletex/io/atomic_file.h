@@ -13,7 +13,8 @@ namespace skeletex {
 /// the temporary file is removed and `path` is as it was. A symbolic link is followed; a device or a pipe is written
 /// in place.
 /// \throw IoError when the folder is missing or not writable, or the disk is full
-void write_atomically(const std::filesystem::path& path, const std::function<void(const std::filesystem::path& temporary)>& write);
+void write_atomically(const std::filesystem::path& path,
+                      const std::function<void(const std::filesystem::path& temporary)>& write);
 void write_text_atomically(const std::filesystem::path& path, std::string_view text);
 
 /// A file being written, every call checked: for use inside write_atomically.

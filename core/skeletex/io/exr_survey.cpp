@@ -59,7 +59,9 @@ class Reader {
     return result;
   }
   [[noreturn]] void fail(const std::string& what) const { throw IoError(fmt::format("{}: {}", where_, what)); }
-  [[noreturn]] void truncated() const { fail(fmt::format("the file ends early, after {} bytes; it was not copied or written completely", size_)); }
+  [[noreturn]] void truncated() const {
+    fail(fmt::format("the file ends early, after {} bytes; it was not copied or written completely", size_));
+  }
 
  private:
   std::string where_;
@@ -78,8 +80,7 @@ int rows_per_chunk(unsigned char compression) {
       return 16;
     case 4:  // PIZ
       return 32;
-    default:
-      return 0;
+    default: return 0;
   }
 }
 
@@ -89,7 +90,8 @@ ExrSurvey read_header(Reader& in) {
   for (std::string name; !(name = in.name()).empty();) {
     ExrSurvey::Attribute attribute{in.name(), {}};
     const auto size = in.number<std::int32_t>();
-    if (size < 0 || static_cast<std::uintmax_t>(size) > kMaxAttributeBytes) in.fail(fmt::format("the header is damaged (attribute \"{}\" of {} bytes)", name, size));
+    if (size < 0 || static_cast<std::uintmax_t>(size) > kMaxAttributeBytes)
+      in.fail(fmt::format("the header is damaged (attribute \"{}\" of {} bytes)", name, size));
     attribute.value = in.bytes(static_cast<std::uint64_t>(size));
     survey.attributes[name] = std::move(attribute);
   }
@@ -100,7 +102,8 @@ ExrSurvey read_header(Reader& in) {
 int check_header(const Reader& in, int max_size, bool is_one_of_several, ExrSurvey& survey) {
   const auto required = [&](const char* name, const char* type, std::size_t size) -> const std::string& {
     const auto found = survey.attributes.find(name);
-    if (found == survey.attributes.end() || found->second.type != type || found->second.value.size() != size) in.fail(fmt::format("the header is damaged (no \"{}\")", name));
+    if (found == survey.attributes.end() || found->second.type != type || found->second.value.size() != size)
+      in.fail(fmt::format("the header is damaged (no \"{}\")", name));
     return found->second.value;
   };
   // OpenEXR allocates by these two kinds of attribute before it looks at what follows.
@@ -109,11 +112,14 @@ int check_header(const Reader& in, int max_size, bool is_one_of_several, ExrSurv
     if (attribute.type == "preview") {
       std::uint32_t size[2] = {0, 0};
       if (value.size() >= 8) std::memcpy(size, value.data(), 8);
-      if (size[0] > 4096 || size[1] > 4096 || value.size() != 8 + std::size_t{4} * size[0] * size[1]) in.fail("the header is damaged (preview image)");
+      if (size[0] > 4096 || size[1] > 4096 || value.size() != 8 + std::size_t{4} * size[0] * size[1])
+        in.fail("the header is damaged (preview image)");
     } else if (attribute.type == "chlist") {
       int channels = 0;
-      for (std::size_t at = 0; at < value.size() && value[at] != '\0'; ++channels) at = value.find('\0', at) == std::string::npos ? value.size() : value.find('\0', at) + 17;
-      if (channels > kMaxChannels) in.fail(fmt::format("an image of {} channels; a model has at most {}", channels, kMaxChannels));
+      for (std::size_t at = 0; at < value.size() && value[at] != '\0'; ++channels)
+        at = value.find('\0', at) == std::string::npos ? value.size() : value.find('\0', at) + 17;
+      if (channels > kMaxChannels)
+        in.fail(fmt::format("an image of {} channels; a model has at most {}", channels, kMaxChannels));
     }
   }
   std::int32_t window[4];
@@ -121,16 +127,19 @@ int check_header(const Reader& in, int max_size, bool is_one_of_several, ExrSurv
   const std::int64_t width = std::int64_t{window[2]} - window[0] + 1, height = std::int64_t{window[3]} - window[1] + 1;
   if (width < 1 || height < 1 || width > max_size || height > max_size)
     in.fail(fmt::format("an image of {} x {} texels; models have sides from 1 to {}", width, height, max_size));
-  if (window[0] != 0 || window[1] != 0) in.fail("the image does not begin at (0, 0); it was cropped or moved by another program");
+  if (window[0] != 0 || window[1] != 0)
+    in.fail("the image does not begin at (0, 0); it was cropped or moved by another program");
   survey.width = static_cast<int>(width);
   survey.height = static_cast<int>(height);
   const int rows = rows_per_chunk(static_cast<unsigned char>(required("compression", "compression", 1)[0]));
   if (rows == 0) in.fail("the image is compressed with a lossy method; save it with ZIP or PIZ");
   if (is_one_of_several) {
-    if (required("type", "string", kScanlines.size()) != kScanlines) in.fail("a part of the file is tiled or deep; the levels of a model are scanline images");
+    if (required("type", "string", kScanlines.size()) != kScanlines)
+      in.fail("a part of the file is tiled or deep; the levels of a model are scanline images");
     std::int32_t chunks;
     std::memcpy(&chunks, required("chunkCount", "int", sizeof chunks).data(), sizeof chunks);
-    if (chunks != (height + rows - 1) / rows) in.fail(fmt::format("the header is damaged ({} chunks for {} rows)", chunks, height));
+    if (chunks != (height + rows - 1) / rows)
+      in.fail(fmt::format("the header is damaged ({} chunks for {} rows)", chunks, height));
   }
   return rows;
 }
@@ -143,7 +152,8 @@ std::vector<ExrSurvey> survey_exr(const std::filesystem::path& path, int max_siz
   constexpr std::string_view kMagic("\x76\x2f\x31\x01", 4);
   if (in.size() < 8 || in.bytes(4) != kMagic) in.fail("not an OpenEXR file, which a model is (.skx.exr)");
   const auto version = in.number<std::uint32_t>();
-  if ((version & 0xff) != 2 || (version & ~(0xffu | kLongNames | kSeveralParts)) != 0) in.fail("a tiled or deep OpenEXR file; a model is a scanline image");
+  if ((version & 0xff) != 2 || (version & ~(0xffu | kLongNames | kSeveralParts)) != 0)
+    in.fail("a tiled or deep OpenEXR file; a model is a scanline image");
   const bool has_several = (version & kSeveralParts) != 0;
 
   std::vector<ExrSurvey> parts;
@@ -167,12 +177,16 @@ std::vector<ExrSurvey> survey_exr(const std::filesystem::path& path, int max_siz
       const std::size_t row = i * static_cast<std::size_t>(rows[part]);
       std::uint64_t offset;
       std::memcpy(&offset, tables[part].data() + 8 * i, 8);
-      const auto missing = [&] { in.fail(fmt::format("the file ends early: texel rows from {} on are missing; it was not copied or written completely", row)); };
+      const auto missing = [&] {
+        in.fail(fmt::format(
+            "the file ends early: texel rows from {} on are missing; it was not copied or written completely", row));
+      };
       if (offset == 0 || offset > in.size()) missing();
       if (offset < begin) in.fail(fmt::format("damaged (the texel rows from {} on lie inside the header)", row));
       if (in.size() - offset < (has_several ? 12 : 8)) missing();
       in.seek(offset);
-      if (has_several && in.number<std::int32_t>() != static_cast<std::int32_t>(part)) in.fail(fmt::format("damaged (at texel row {} of part {})", row, part));
+      if (has_several && in.number<std::int32_t>() != static_cast<std::int32_t>(part))
+        in.fail(fmt::format("damaged (at texel row {} of part {})", row, part));
       const auto y = in.number<std::int32_t>();
       const auto bytes = in.number<std::int32_t>();
       if (y != static_cast<std::int64_t>(row) || bytes < 0) in.fail(fmt::format("damaged (at texel row {})", row));

@@ -19,7 +19,8 @@ nlohmann::json parse_json(std::string_view text, const std::string& where) {
     std::string what = error.what();  // "[json.exception.parse_error.101] parse error at line L, column C: reason"
     if (const std::size_t colon = what.find(": "); colon != std::string::npos) what.erase(0, colon + 2);
     // The reason may quote bytes of a binary file; messages stay printable.
-    std::erase_if(what, [](char c) { return static_cast<unsigned char>(c) < 32 || static_cast<unsigned char>(c) > 126; });
+    std::erase_if(what,
+                  [](char c) { return static_cast<unsigned char>(c) < 32 || static_cast<unsigned char>(c) > 126; });
     if (what.size() > 200) what.resize(200);
     throw IoError(fmt::format("{}: line {}: not JSON: {}", where, line, what));
   } catch (const nlohmann::json::exception& error) {
@@ -46,7 +47,8 @@ double json_number(const nlohmann::json& value, const std::string& where) {
 }
 
 int json_int(const nlohmann::json& value, int lower, int upper, const std::string& where) {
-  const bool is_int = value.is_number_integer() && (!value.is_number_unsigned() || value.get<std::uint64_t>() <= std::uint64_t{INT64_MAX});
+  const bool is_int = value.is_number_integer() &&
+                      (!value.is_number_unsigned() || value.get<std::uint64_t>() <= std::uint64_t{INT64_MAX});
   const std::int64_t number = is_int ? value.get<std::int64_t>() : 0;
   if (!is_int || number < lower || number > upper)
     throw IoError(upper < lower ? fmt::format("{}: there is nothing that an index could name", where)

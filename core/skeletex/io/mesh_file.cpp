@@ -26,7 +26,8 @@ namespace {
 
 std::string lower_extension(const std::filesystem::path& path) {
   std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return extension;
 }
 
@@ -53,22 +54,17 @@ class Silence {
 bool read_with_openmesh(MeshFormat format, std::istream& stream, MeshImporter& importer) {
   OpenMesh::IO::Options options;
   switch (format) {
-    case MeshFormat::kObj:
-      return OpenMesh::IO::OBJReader().read(stream, importer, options);
-    case MeshFormat::kOff:
-      break;
-    case MeshFormat::kPly:
-      return OpenMesh::IO::PLYReader().read(stream, importer, options);
-    case MeshFormat::kStlBinary:
-      options += OpenMesh::IO::Options::Binary;
-      [[fallthrough]];
-    case MeshFormat::kStlAscii:
-      return OpenMesh::IO::STLReader().read(stream, importer, options);
+    case MeshFormat::kObj: return OpenMesh::IO::OBJReader().read(stream, importer, options);
+    case MeshFormat::kOff: break;
+    case MeshFormat::kPly: return OpenMesh::IO::PLYReader().read(stream, importer, options);
+    case MeshFormat::kStlBinary: options += OpenMesh::IO::Options::Binary; [[fallthrough]];
+    case MeshFormat::kStlAscii: return OpenMesh::IO::STLReader().read(stream, importer, options);
   }
   return false;
 }
 
-/// The plain OFF text of a survey: OpenMesh reads it word by word through a stream, which takes longer than all the rest.
+/// The plain OFF text of a survey: OpenMesh reads it word by word through a stream, which takes longer than all the
+/// rest.
 void take_off(const MeshSurvey& survey, MeshImporter& importer) {
   const char *at = survey.plain.data(), *const end = at + survey.plain.size();
   const auto next = [&]<class Number>(Number& value) {
@@ -126,26 +122,33 @@ void check_finite(const TriangleMesh& mesh, const PlyAttributes& attributes, con
   for (std::size_t i = 0; i < mesh.positions.size(); ++i)
     for (int axis = 0; axis < 3; ++axis)
       if (!is_good(mesh.positions[i][axis]))
-        throw IoError(fmt::format("{}: {} of vertex {} is {}, which the file cannot hold; nothing was written", where, "xyz"[axis], i, mesh.positions[i][axis]));
+        throw IoError(fmt::format("{}: {} of vertex {} is {}, which the file cannot hold; nothing was written", where,
+                                  "xyz"[axis], i, mesh.positions[i][axis]));
   for (std::size_t i = 0; i < attributes.vertex_normals.size(); ++i)
-    if (!attributes.vertex_normals[i].allFinite()) throw IoError(fmt::format("{}: the normal of vertex {} is not finite; nothing was written", where, i));
+    if (!attributes.vertex_normals[i].allFinite())
+      throw IoError(fmt::format("{}: the normal of vertex {} is not finite; nothing was written", where, i));
   for (std::size_t i = 0; i < attributes.vertex_property.size(); ++i)
     if (!std::isfinite(attributes.vertex_property[i]))
-      throw IoError(fmt::format("{}: {} of vertex {} is not finite; nothing was written", where, attributes.vertex_property_name, i));
+      throw IoError(fmt::format("{}: {} of vertex {} is not finite; nothing was written", where,
+                                attributes.vertex_property_name, i));
 }
 
 void write_ply(OutputFile& file, const TriangleMesh& mesh, const PlyAttributes& attributes) {
   constexpr const char* kColour = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
-  std::string header = fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n", mesh.positions.size());
+  std::string header = fmt::format(
+      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n",
+      mesh.positions.size());
   if (!attributes.vertex_normals.empty()) header += "property float nx\nproperty float ny\nproperty float nz\n";
   if (!attributes.vertex_colours.empty()) header += kColour;
-  if (!attributes.vertex_property.empty()) header += fmt::format("property float {}\n", attributes.vertex_property_name);
+  if (!attributes.vertex_property.empty())
+    header += fmt::format("property float {}\n", attributes.vertex_property_name);
   header += fmt::format("element face {}\nproperty list uchar int vertex_indices\n", mesh.triangles.size());
   if (!attributes.face_colours.empty()) header += kColour;
   file.write(header + "end_header\n");
   write_blocks(file, mesh.positions.size(), [&](std::size_t i, std::string& out) {
     for (const double x : mesh.positions[i]) append(out, static_cast<float>(x));
-    for (int axis = 0; axis < 3 && !attributes.vertex_normals.empty(); ++axis) append(out, static_cast<float>(attributes.vertex_normals[i][axis]));
+    for (int axis = 0; axis < 3 && !attributes.vertex_normals.empty(); ++axis)
+      append(out, static_cast<float>(attributes.vertex_normals[i][axis]));
     if (!attributes.vertex_colours.empty()) append(out, attributes.vertex_colours[i]);
     if (!attributes.vertex_property.empty()) append(out, attributes.vertex_property[i]);
   });
@@ -187,9 +190,11 @@ MeshFile read_mesh(const std::filesystem::path& path) {
   // What the readers leave out themselves: OBJ faces with too few vertices, and STL triangles that welding closed.
   const std::size_t left_out = survey.faces - std::min(survey.faces, importer.n_faces());
   if (!ok || (!is_welded && (importer.n_vertices() != survey.vertices || left_out != survey.small_faces)))
-    throw IoError(fmt::format("{}: OpenMesh took {} of {} vertices and {} of {} faces from this file; save it in another format", where, importer.n_vertices(),
-                              survey.vertices, importer.n_faces(), survey.faces));
-  for (const MeshSurvey::OddCoordinate& odd : survey.odd_coordinates) importer.set_coordinate(odd.vertex, odd.axis, odd.value);
+    throw IoError(
+        fmt::format("{}: OpenMesh took {} of {} vertices and {} of {} faces from this file; save it in another format",
+                    where, importer.n_vertices(), survey.vertices, importer.n_faces(), survey.faces));
+  for (const MeshSurvey::OddCoordinate& odd : survey.odd_coordinates)
+    importer.set_coordinate(odd.vertex, odd.axis, odd.value);
   MeshFile result = importer.take(where);
   result.degenerate_faces += static_cast<int>(left_out);
   result.faces_in_file = static_cast<int>(survey.faces);
@@ -203,9 +208,12 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, con
   if (extension != ".ply" && extension != ".obj")
     throw IoError(fmt::format("{}: meshes are written as .ply or .obj, not as \"{}\"", path.string(), extension));
   const auto fits = [](std::size_t size, std::size_t count) { return size == 0 || size == count; };
-  if (!fits(attributes.vertex_colours.size(), mesh.positions.size()) || !fits(attributes.vertex_normals.size(), mesh.positions.size()) ||
-      !fits(attributes.vertex_property.size(), mesh.positions.size()) || !fits(attributes.face_colours.size(), mesh.triangles.size()))
-    throw IoError(fmt::format("{}: there must be as many colours, normals or values as the mesh has vertices or triangles", path.string()));
+  if (!fits(attributes.vertex_colours.size(), mesh.positions.size()) ||
+      !fits(attributes.vertex_normals.size(), mesh.positions.size()) ||
+      !fits(attributes.vertex_property.size(), mesh.positions.size()) ||
+      !fits(attributes.face_colours.size(), mesh.triangles.size()))
+    throw IoError(fmt::format(
+        "{}: there must be as many colours, normals or values as the mesh has vertices or triangles", path.string()));
   if (!attributes.vertex_property.empty() && attributes.vertex_property_name.empty())
     throw IoError(fmt::format("{}: the vertex property needs a name", path.string()));
   check_finite(mesh, attributes, path.string());

@@ -5,15 +5,16 @@
 #include <string>
 #include <vector>
 
-#include "skeletex/model/mesh.h"
+#include "skeletex/geometry/mesh.h"
 
 namespace skeletex {
 
 struct MeshFile {
   TriangleMesh mesh;
-  int faces_in_file = 0;     ///< polygons as the file counts them
-  int triangles = 0;         ///< after polygons were split into fans
-  int degenerate_faces = 0;  ///< faces with fewer than three different vertices (after welding): they have no area and are left out
+  int faces_in_file = 0;  ///< polygons as the file counts them
+  int triangles = 0;      ///< after polygons were split into fans
+  int degenerate_faces =
+      0;  ///< faces with fewer than three different vertices (after welding): they have no area and are left out
   int vertices_in_file = 0;  ///< for STL, three per triangle
   int merged_vertices = 0;   ///< equal positions welded (STL; other formats are not welded)
 };
@@ -39,7 +40,8 @@ struct PlyAttributes {
 
 /// Writes binary PLY (little endian, float positions) or OBJ by the ending, under a temporary name that is renamed when
 /// complete. Attributes go into PLY only.
-/// \throw IoError (unknown ending, folder not writable, disk full, attributes that do not fit the mesh, a number that is not finite in single precision): no file is left behind
+/// \throw IoError (unknown ending, folder not writable, disk full, attributes that do not fit the mesh, a number that
+/// is not finite in single precision): no file is left behind
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, const PlyAttributes& attributes = {});
 
 }  // namespace skeletex

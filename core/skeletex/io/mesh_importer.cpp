@@ -26,7 +26,8 @@ MeshFile MeshImporter::take(const std::string& where) {
     for (int i = 0; i < corner_counts_[face]; ++i) {
       const int corner = *next++;
       if (corner < 0 || corner >= result.vertices_in_file)
-        throw IoError(fmt::format("{}: face {} names vertex {}, but the file has vertices 0 to {} (counted from 0)", where, face, corner, result.vertices_in_file - 1));
+        throw IoError(fmt::format("{}: face {} names vertex {}, but the file has vertices 0 to {} (counted from 0)",
+                                  where, face, corner, result.vertices_in_file - 1));
       if (polygon.empty() || polygon.back() != corner) polygon.push_back(corner);
     }
     while (polygon.size() > 1 && polygon.front() == polygon.back()) polygon.pop_back();
@@ -39,9 +40,12 @@ MeshFile MeshImporter::take(const std::string& where) {
       std::sort(sorted.begin(), sorted.end());
       const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
       if (twice != sorted.end())
-        throw IoError(fmt::format("{}: face {} (counted from 0) runs through vertex {} twice; split it into simple polygons", where, face, *twice));
+        throw IoError(
+            fmt::format("{}: face {} (counted from 0) runs through vertex {} twice; split it into simple polygons",
+                        where, face, *twice));
     }
-    for (std::size_t i = 2; i < polygon.size(); ++i) mesh_.triangles.push_back({polygon[0], polygon[i - 1], polygon[i]});
+    for (std::size_t i = 2; i < polygon.size(); ++i)
+      mesh_.triangles.push_back({polygon[0], polygon[i - 1], polygon[i]});
   }
   result.triangles = static_cast<int>(mesh_.triangles.size());
   result.mesh = std::move(mesh_);

@@ -11,8 +11,12 @@ namespace skeletex {
 /// leave out every face that does not fit; here faces are kept, so that validation can say what is wrong with them.
 class MeshImporter : public OpenMesh::IO::BaseImporter {
  public:
-  OpenMesh::VertexHandle add_vertex(const OpenMesh::Vec3f& point) override { return add(Vec3(point[0], point[1], point[2])); }
-  OpenMesh::VertexHandle add_vertex(const OpenMesh::Vec3d& point) override { return add(Vec3(point[0], point[1], point[2])); }
+  OpenMesh::VertexHandle add_vertex(const OpenMesh::Vec3f& point) override {
+    return add(Vec3(point[0], point[1], point[2]));
+  }
+  OpenMesh::VertexHandle add_vertex(const OpenMesh::Vec3d& point) override {
+    return add(Vec3(point[0], point[1], point[2]));
+  }
   OpenMesh::VertexHandle add_vertex() override { return add(Vec3::Zero()); }
   void set_point(OpenMesh::VertexHandle vertex, const OpenMesh::Vec3f& point) override {
     mesh_.positions.at(static_cast<std::size_t>(vertex.idx())) = Vec3(point[0], point[1], point[2]);
@@ -28,7 +32,9 @@ class MeshImporter : public OpenMesh::IO::BaseImporter {
   std::size_t n_edges() const override { return 0; }
 
   // Everything below is data that the project does not read from meshes.
-  OpenMesh::HalfedgeHandle add_edge(OpenMesh::VertexHandle, OpenMesh::VertexHandle) override { return OpenMesh::HalfedgeHandle(); }
+  OpenMesh::HalfedgeHandle add_edge(OpenMesh::VertexHandle, OpenMesh::VertexHandle) override {
+    return OpenMesh::HalfedgeHandle();
+  }
   OpenMesh::FaceHandle add_face(OpenMesh::HalfedgeHandle) override { return OpenMesh::FaceHandle(); }
   void add_face_texcoords(OpenMesh::FaceHandle, OpenMesh::VertexHandle, const std::vector<OpenMesh::Vec2f>&) override {}
   void add_face_texcoords(OpenMesh::FaceHandle, OpenMesh::VertexHandle, const std::vector<OpenMesh::Vec3f>&) override {}

@@ -28,7 +28,9 @@ std::string quoted(std::string_view word) {
   return '"' + text + (word.size() > 30 ? "...\"" : "\"");
 }
 
-std::string_view without_plus(std::string_view word) { return word.size() > 1 && word[0] == '+' && word[1] != '-' ? word.substr(1) : word; }
+std::string_view without_plus(std::string_view word) {
+  return word.size() > 1 && word[0] == '+' && word[1] != '-' ? word.substr(1) : word;
+}
 
 std::optional<double> number_from(std::string_view word) {
   word = without_plus(word);
@@ -55,7 +57,9 @@ class Text {
  public:
   Text(std::string_view text, const std::string& where) : text_(text), where_(where) {}
 
-  [[noreturn]] void fail(const std::string& what) const { throw IoError(fmt::format("{}: line {}: {}", where_, line_, what)); }
+  [[noreturn]] void fail(const std::string& what) const {
+    throw IoError(fmt::format("{}: line {}: {}", where_, line_, what));
+  }
   bool at_end() const { return at_ >= text_.size(); }
   std::size_t position() const { return at_; }
   const std::string& where() const { return where_; }
@@ -85,7 +89,8 @@ class Text {
     line_ += pending_;
     pending_ = 0;
     while (at_ < text_.size() && is_space(text_[at_])) {
-      const bool is_end = text_[at_] == '\n' || (text_[at_] == '\r' && (at_ + 1 == text_.size() || text_[at_ + 1] != '\n'));
+      const bool is_end =
+          text_[at_] == '\n' || (text_[at_] == '\r' && (at_ + 1 == text_.size() || text_[at_ + 1] != '\n'));
       line_ += is_end ? 1 : 0;
       ++at_;
     }
@@ -128,7 +133,8 @@ void append_coordinate(MeshSurvey& survey, int axis, std::string_view word, cons
 std::size_t count_from(std::string_view word, const char* what, const Text& text) {
   const std::optional<std::int64_t> count = integer_from(word);
   if (!count || *count < 0) text.fail(fmt::format("the number of {} is expected, found {}", what, quoted(word)));
-  if (static_cast<std::size_t>(*count) > kMaxCount) text.fail(fmt::format("{} {} are more than can be read ({})", *count, what, kMaxCount));
+  if (static_cast<std::size_t>(*count) > kMaxCount)
+    text.fail(fmt::format("{} {} are more than can be read ({})", *count, what, kMaxCount));
   return static_cast<std::size_t>(*count);
 }
 
@@ -136,7 +142,8 @@ void check_index(std::string_view word, std::size_t vertices, const Text& text) 
   const std::optional<std::int64_t> index = integer_from(word);
   if (!index) text.fail(fmt::format("the index of a vertex is expected, found {}", quoted(word)));
   if (*index < 0 || static_cast<std::size_t>(*index) >= vertices)
-    text.fail(fmt::format("vertex {} does not exist; the file has vertices 0 to {}", *index, static_cast<std::int64_t>(vertices) - 1));
+    text.fail(fmt::format("vertex {} does not exist; the file has vertices 0 to {}", *index,
+                          static_cast<std::int64_t>(vertices) - 1));
 }
 
 MeshSurvey survey_obj(std::string_view bytes, const std::string& where) {
@@ -164,16 +171,19 @@ MeshSurvey survey_obj(std::string_view bytes, const std::string& where) {
     if (words[0] == "v") {
       if (words.size() < 4) text.fail("a vertex has three coordinates");
       survey.plain += "v ";
-      for (int axis = 0; axis < 3; ++axis) append_coordinate(survey, axis, words[static_cast<std::size_t>(axis) + 1], text);
+      for (int axis = 0; axis < 3; ++axis)
+        append_coordinate(survey, axis, words[static_cast<std::size_t>(axis) + 1], text);
       ++survey.vertices;
     } else if (words[0] == "f") {
       survey.plain += 'f';
       corners.clear();
       for (std::size_t i = 1; i < words.size(); ++i) {
         const std::optional<std::int64_t> given = integer_from(words[i].substr(0, words[i].find('/')));
-        if (!given || *given == 0) text.fail(fmt::format("a vertex index (1, 2, ... or -1, -2, ...) is expected, found {}", quoted(words[i])));
+        if (!given || *given == 0)
+          text.fail(fmt::format("a vertex index (1, 2, ... or -1, -2, ...) is expected, found {}", quoted(words[i])));
         const std::int64_t index = *given > 0 ? *given : static_cast<std::int64_t>(survey.vertices) + *given + 1;
-        if (index < 1) text.fail(fmt::format("vertex {} does not exist; {} come before this line", *given, survey.vertices));
+        if (index < 1)
+          text.fail(fmt::format("vertex {} does not exist; {} come before this line", *given, survey.vertices));
         if (static_cast<std::size_t>(index) > kMaxCount) text.fail(fmt::format("vertex {} does not exist", *given));
         if (static_cast<std::size_t>(index) > last_vertex) {
           last_vertex = static_cast<std::size_t>(index);
@@ -202,7 +212,8 @@ MeshSurvey survey_obj(std::string_view bytes, const std::string& where) {
         text.fail("the face runs through one of its vertices twice; split it into simple polygons");
     }
   }
-  if (last_vertex > survey.vertices) throw IoError(fmt::format("{}; the file has {}", last_vertex_message, survey.vertices));
+  if (last_vertex > survey.vertices)
+    throw IoError(fmt::format("{}; the file has {}", last_vertex_message, survey.vertices));
   return survey;
 }
 
@@ -234,7 +245,8 @@ MeshSurvey survey_off(std::string_view bytes, const std::string& where) {
     const auto& line = text.next_words('#');
     if (line.empty()) text.fail(fmt::format("the file ends after {} of {} faces", survey.faces, faces));
     const std::size_t corners = count_from(line[0], "corners", text);
-    if (line.size() < corners + 1) text.fail(fmt::format("a face of {} corners has only {} on its line", corners, line.size() - 1));
+    if (line.size() < corners + 1)
+      text.fail(fmt::format("a face of {} corners has only {} on its line", corners, line.size() - 1));
     survey.plain += fmt::format("{}", corners);
     for (std::size_t i = 1; i <= corners; ++i) {
       check_index(line[i], vertices, text);
@@ -251,9 +263,11 @@ struct PlyType {
   int size;
   bool is_float, is_signed;
 };
-constexpr PlyType kPlyTypes[] = {{"char", 1, false, true},  {"uchar", 1, false, false}, {"short", 2, false, true},  {"ushort", 2, false, false},
-                                 {"int", 4, false, true},   {"uint", 4, false, false},  {"float", 4, true, true},   {"double", 8, true, true}};
-constexpr std::string_view kPlyAliases[] = {"int8", "uint8", "int16", "uint16", "int32", "uint32", "float32", "float64"};
+constexpr PlyType kPlyTypes[] = {{"char", 1, false, true},    {"uchar", 1, false, false}, {"short", 2, false, true},
+                                 {"ushort", 2, false, false}, {"int", 4, false, true},    {"uint", 4, false, false},
+                                 {"float", 4, true, true},    {"double", 8, true, true}};
+constexpr std::string_view kPlyAliases[] = {"int8",  "uint8",  "int16",   "uint16",
+                                            "int32", "uint32", "float32", "float64"};
 
 const PlyType* ply_type(std::string_view name) {
   for (std::size_t i = 0; i < std::size(kPlyTypes); ++i)
@@ -275,16 +289,20 @@ struct PlyElement {
 /// Where in a PLY file something could not be read: a line of its text, or an element of its binary part.
 class PlyReader {
  public:
-  PlyReader(std::string_view bytes, const std::string& where) : bytes_(bytes), where_(where), text_(bytes, where) { survey_.format = MeshFormat::kPly; }
+  PlyReader(std::string_view bytes, const std::string& where) : bytes_(bytes), where_(where), text_(bytes, where) {
+    survey_.format = MeshFormat::kPly;
+  }
 
   MeshSurvey run() {
     read_header();
     survey_.plain = fmt::format("ply\nformat {} 1.0\n", format_);
     for (const PlyElement& element : elements_) {
       if (element.name == "vertex")
-        survey_.plain += fmt::format("element vertex {}\nproperty {} x\nproperty {} y\nproperty {} z\n", element.count, coordinates_[0]->name, coordinates_[1]->name, coordinates_[2]->name);
+        survey_.plain += fmt::format("element vertex {}\nproperty {} x\nproperty {} y\nproperty {} z\n", element.count,
+                                     coordinates_[0]->name, coordinates_[1]->name, coordinates_[2]->name);
       else if (element.name == "face")
-        survey_.plain += fmt::format("element face {}\nproperty list {} {} vertex_indices\n", element.count, list_count_name_, list_type_->name);
+        survey_.plain += fmt::format("element face {}\nproperty list {} {} vertex_indices\n", element.count,
+                                     list_count_name_, list_type_->name);
     }
     survey_.plain += "end_header\n";
     for (const PlyElement& element : elements_)
@@ -304,30 +322,38 @@ class PlyReader {
     if (is_text_) text_.fail(what);
     throw IoError(fmt::format("{}: {} {} (of {}): {}", where_, element.name, i, element.count, what));
   }
-  [[noreturn]] void fail_early(const PlyElement& element, std::size_t i) const { fail_at(element, i, fmt::format("the file ends after {} of {} elements \"{}\"", i, element.count, element.name)); }
+  [[noreturn]] void fail_early(const PlyElement& element, std::size_t i) const {
+    fail_at(element, i, fmt::format("the file ends after {} of {} elements \"{}\"", i, element.count, element.name));
+  }
 
   void read_header() {
-    if (text_.split(text_.next_line(), '\0') != std::vector<std::string_view>{"ply"} && !bytes_.starts_with("PLY")) throw IoError(where_ + ": not a PLY file: its first line is not \"ply\"");
+    if (text_.split(text_.next_line(), '\0') != std::vector<std::string_view>{"ply"} && !bytes_.starts_with("PLY"))
+      throw IoError(where_ + ": not a PLY file: its first line is not \"ply\"");
     for (;;) {
-      if (text_.at_end() || text_.position() > (1 << 20)) text_.fail("the header does not end (\"end_header\" is missing)");
+      if (text_.at_end() || text_.position() > (1 << 20))
+        text_.fail("the header does not end (\"end_header\" is missing)");
       const auto& words = text_.split(text_.next_line(), '\0');
       if (words.empty() || words[0] == "comment" || words[0] == "obj_info") continue;
       if (words[0] == "end_header") break;
       if (words[0] == "format" && words.size() >= 2) {
         format_ = words[1];
-        if (format_ != "ascii" && format_ != "binary_little_endian" && format_ != "binary_big_endian") text_.fail(fmt::format("the format {} is not known", quoted(words[1])));
+        if (format_ != "ascii" && format_ != "binary_little_endian" && format_ != "binary_big_endian")
+          text_.fail(fmt::format("the format {} is not known", quoted(words[1])));
       } else if (words[0] == "element" && words.size() >= 3) {
         elements_.push_back({std::string(words[1]), count_from(words[2], "elements", text_), {}});
-        if (std::count_if(elements_.begin(), elements_.end(), [&](const PlyElement& e) { return e.name == elements_.back().name; }) > 1)
+        if (std::count_if(elements_.begin(), elements_.end(),
+                          [&](const PlyElement& e) { return e.name == elements_.back().name; }) > 1)
           text_.fail(fmt::format("the element {} comes twice", quoted(words[1])));
       } else if (words[0] == "property" && !elements_.empty() && words.size() >= (words[1] == "list" ? 5u : 3u)) {
         const bool is_list = words[1] == "list";
-        PlyProperty property{std::string(words[is_list ? 4 : 2]), ply_type(words[is_list ? 3 : 1]), is_list ? ply_type(words[2]) : nullptr};
+        PlyProperty property{std::string(words[is_list ? 4 : 2]), ply_type(words[is_list ? 3 : 1]),
+                             is_list ? ply_type(words[2]) : nullptr};
         if (property.type == nullptr || (is_list && (property.count_type == nullptr || property.count_type->is_float)))
           text_.fail(fmt::format("the type of property {} is not known", quoted(property.name)));
         elements_.back().properties.push_back(std::move(property));
       } else {
-        text_.fail(fmt::format("\"format\", \"element\", \"property\" or \"end_header\" is expected, found {}", quoted(words[0])));
+        text_.fail(fmt::format("\"format\", \"element\", \"property\" or \"end_header\" is expected, found {}",
+                               quoted(words[0])));
       }
     }
     if (format_.empty()) text_.fail("the header does not say the format");
@@ -335,21 +361,26 @@ class PlyReader {
     is_swapped_ = (format_ == "binary_big_endian") != (std::endian::native == std::endian::big);
     at_ = text_.position();
 
-    const auto vertex = std::find_if(elements_.begin(), elements_.end(), [](const PlyElement& e) { return e.name == "vertex"; });
-    const auto face = std::find_if(elements_.begin(), elements_.end(), [](const PlyElement& e) { return e.name == "face"; });
-    if (vertex == elements_.end() || face == elements_.end()) text_.fail("the file has no element \"vertex\" or no element \"face\"");
+    const auto vertex =
+        std::find_if(elements_.begin(), elements_.end(), [](const PlyElement& e) { return e.name == "vertex"; });
+    const auto face =
+        std::find_if(elements_.begin(), elements_.end(), [](const PlyElement& e) { return e.name == "face"; });
+    if (vertex == elements_.end() || face == elements_.end())
+      text_.fail("the file has no element \"vertex\" or no element \"face\"");
     if (face < vertex) text_.fail("faces before vertices are not read");
     for (int axis = 0; axis < 3; ++axis)
       for (const PlyProperty& property : vertex->properties)
         if (property.name.size() == 1 && property.name[0] == "xyz"[axis]) {
-          if (property.count_type != nullptr || (!is_text_ && !property.type->is_float)) text_.fail("vertex coordinates must be float or double");
+          if (property.count_type != nullptr || (!is_text_ && !property.type->is_float))
+            text_.fail("vertex coordinates must be float or double");
           if (coordinates_[axis] != nullptr) text_.fail(fmt::format("the property \"{}\" comes twice", property.name));
           coordinates_[axis] = property.type;
         }
     if (std::count(coordinates_.begin(), coordinates_.end(), nullptr) > 0) text_.fail("vertices must have x, y and z");
     for (const PlyProperty& property : face->properties)
       if (property.name == "vertex_indices" || property.name == "vertex_index") {
-        if (property.count_type == nullptr || property.type->is_float || list_type_ != nullptr) text_.fail("\"vertex_indices\" must be one list of whole numbers");
+        if (property.count_type == nullptr || property.type->is_float || list_type_ != nullptr)
+          text_.fail("\"vertex_indices\" must be one list of whole numbers");
         list_type_ = property.type;
         // The names that OpenMesh takes; a count is not negative, so the sign does not matter.
         list_count_name_ = property.count_type->size == 1 ? "uchar" : property.count_type->size == 2 ? "uint16" : "int";
@@ -378,7 +409,9 @@ class PlyReader {
       return *number;
     }
     std::uint64_t bits = 0;
-    for (std::size_t k = 0; k < value.size(); ++k) bits |= static_cast<std::uint64_t>(static_cast<unsigned char>(value[is_swapped_ ? value.size() - 1 - k : k])) << (8 * k);
+    for (std::size_t k = 0; k < value.size(); ++k)
+      bits |= static_cast<std::uint64_t>(static_cast<unsigned char>(value[is_swapped_ ? value.size() - 1 - k : k]))
+              << (8 * k);
     if (type.is_signed && (bits >> (8 * value.size() - 1)) != 0) bits |= ~std::uint64_t{0} << (8 * value.size() - 1);
     return static_cast<std::int64_t>(bits);
   }
@@ -398,7 +431,8 @@ class PlyReader {
   void read_vertex(const PlyElement& element, std::size_t i) {
     std::array<std::string_view, 3> point;
     for (const PlyProperty& property : element.properties) {
-      const std::size_t axis = property.name.size() == 1 ? std::string_view("xyz").find(property.name[0]) : std::string_view::npos;
+      const std::size_t axis =
+          property.name.size() == 1 ? std::string_view("xyz").find(property.name[0]) : std::string_view::npos;
       if (axis < 3)
         point[axis] = next(*property.type, element, i);
       else
@@ -426,7 +460,9 @@ class PlyReader {
         const std::string_view value = next(*property.type, element, i);
         const std::int64_t index = integer(value, *property.type, element, i);
         if (index < 0 || static_cast<std::size_t>(index) >= vertices_)
-          fail_at(element, i, fmt::format("vertex {} does not exist; the file has vertices 0 to {}", index, static_cast<std::int64_t>(vertices_) - 1));
+          fail_at(element, i,
+                  fmt::format("vertex {} does not exist; the file has vertices 0 to {}", index,
+                              static_cast<std::int64_t>(vertices_) - 1));
         if (is_text_) survey_.plain += ' ';
         survey_.plain += is_text_ ? without_plus(value) : value;
       }
@@ -451,7 +487,8 @@ class PlyReader {
 
 std::string lower(std::string_view word) {
   std::string result(word.substr(0, 16));
-  std::transform(result.begin(), result.end(), result.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::transform(result.begin(), result.end(), result.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return result;
 }
 
@@ -463,16 +500,20 @@ MeshSurvey survey_stl_ascii(std::string_view bytes, const std::string& where) {
   const auto expect = [&](std::initializer_list<const char*> words) {
     for (const char* word : words) {
       const std::string_view found = text.next_word();
-      if (found.empty()) text.fail(fmt::format("the file ends in triangle {}, where \"{}\" is expected", survey.faces, word));
+      if (found.empty())
+        text.fail(fmt::format("the file ends in triangle {}, where \"{}\" is expected", survey.faces, word));
       if (lower(found) != word) text.fail(fmt::format("\"{}\" is expected, found {}", word, quoted(found)));
     }
   };
   const auto coordinate = [&](bool is_used) {
     const std::string_view word = text.next_word();
     const std::optional<double> value = number_from(word);
-    if (!value) text.fail(word.empty() ? fmt::format("the file ends in triangle {}", survey.faces) : fmt::format("a number is expected, found {}", quoted(word)));
+    if (!value)
+      text.fail(word.empty() ? fmt::format("the file ends in triangle {}", survey.faces)
+                             : fmt::format("a number is expected, found {}", quoted(word)));
     // Normals are not read; programs write NaN for those of slivers.
-    if (is_used && !std::isfinite(static_cast<float>(*value))) text.fail(fmt::format("the coordinate {} cannot be welded; repair the file", quoted(word)));
+    if (is_used && !std::isfinite(static_cast<float>(*value)))
+      text.fail(fmt::format("the coordinate {} cannot be welded; repair the file", quoted(word)));
     return word;
   };
   while (true) {
@@ -514,10 +555,14 @@ MeshSurvey survey_stl(std::string_view bytes, const std::string& where) {
   // Many binary files begin with "solid", too; what counts is whether the size fits, and then whether it is text.
   const std::string_view start = bytes.substr(0, 1024);
   const std::size_t first = start.find_first_not_of(" \t\r\n");
-  const bool is_text = bytes.size() != size && first != std::string_view::npos && lower(start.substr(first, 5)) == "solid" && start.find('\0') == std::string_view::npos;
+  const bool is_text = bytes.size() != size && first != std::string_view::npos &&
+                       lower(start.substr(first, 5)) == "solid" && start.find('\0') == std::string_view::npos;
   if (is_text) return survey_stl_ascii(bytes, where);
-  if (bytes.size() < kHeader) throw IoError(fmt::format("{}: not an STL file: {} bytes are fewer than its header has", where, bytes.size()));
-  if (bytes.size() < size) throw IoError(fmt::format("{}: the file ends after {} of {} triangles, or is no STL file", where, (bytes.size() - kHeader) / kTriangle, triangles));
+  if (bytes.size() < kHeader)
+    throw IoError(fmt::format("{}: not an STL file: {} bytes are fewer than its header has", where, bytes.size()));
+  if (bytes.size() < size)
+    throw IoError(fmt::format("{}: the file ends after {} of {} triangles, or is no STL file", where,
+                              (bytes.size() - kHeader) / kTriangle, triangles));
   MeshSurvey survey;
   survey.format = MeshFormat::kStlBinary;
   survey.faces = triangles;
@@ -527,7 +572,9 @@ MeshSurvey survey_stl(std::string_view bytes, const std::string& where) {
     float corners[9];
     std::memcpy(corners, bytes.data() + kHeader + kTriangle * i + 12, sizeof corners);
     if (!std::all_of(std::begin(corners), std::end(corners), [](float x) { return std::isfinite(x); }))
-      throw IoError(fmt::format("{}: triangle {} (of {}) has a coordinate that is no finite number, which cannot be welded; repair the file", where, i, triangles));
+      throw IoError(fmt::format(
+          "{}: triangle {} (of {}) has a coordinate that is no finite number, which cannot be welded; repair the file",
+          where, i, triangles));
   }
   return survey;
 }
@@ -546,8 +593,10 @@ MeshSurvey survey_mesh(std::string_view bytes, const std::string& extension, con
   else if (extension == ".stl")
     survey = survey_stl(bytes, where);
   else
-    throw IoError(fmt::format("{}: meshes are read from .obj, .off, .ply and .stl files, not from \"{}\"", where, extension));
-  if (survey.faces == 0) throw IoError(where + ": the file has no faces; it is not a mesh, or not what its ending says");
+    throw IoError(
+        fmt::format("{}: meshes are read from .obj, .off, .ply and .stl files, not from \"{}\"", where, extension));
+  if (survey.faces == 0)
+    throw IoError(where + ": the file has no faces; it is not a mesh, or not what its ending says");
   if (survey.vertices > kMaxCount || survey.faces > kMaxCount) throw IoError(where + ": the mesh is too large");
   return survey;
 }

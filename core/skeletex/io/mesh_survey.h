@@ -27,11 +27,11 @@ struct MeshSurvey {
 };
 
 /// Walks through a mesh file before OpenMesh reads it. OpenMesh 9's readers take a file at its word: they do not notice
-/// that it ends early, go on with zeros after the first word they cannot parse (which "nan" is), run for ever in a header
-/// without end, and lose their place at comments, colours or properties that they do not expect. The survey checks that
-/// everything announced is there, that every number is one and every index exists, and leaves out what is not read.
-/// \param extension  lower case with dot: ".obj", ".off", ".ply" or ".stl"
-/// \throw IoError with the line (text) or element (binary)
+/// that it ends early, go on with zeros after the first word they cannot parse (which "nan" is), run for ever in a
+/// header without end, and lose their place at comments, colours or properties that they do not expect. The survey
+/// checks that everything announced is there, that every number is one and every index exists, and leaves out what is
+/// not read. \param extension  lower case with dot: ".obj", ".off", ".ply" or ".stl" \throw IoError with the line
+/// (text) or element (binary)
 MeshSurvey survey_mesh(std::string_view bytes, const std::string& extension, const std::string& where);
 
 }  // namespace skeletex

@@ -61,43 +61,57 @@ class CountingStream : public Imf::OStream {
 void use_threads() {
   static std::once_flag once;
   std::call_once(once, [] {
-    if (Imf::globalThreadCount() == 0) Imf::setGlobalThreadCount(static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1u, 8u)));
+    if (Imf::globalThreadCount() == 0)
+      Imf::setGlobalThreadCount(static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1u, 8u)));
   });
 }
 
-const std::vector<float>& plane(const DisplacementTexture& texture, int i) { return i == 0 ? texture.along : i == 1 ? texture.around : texture.out; }
-std::vector<float>& plane(DisplacementTexture& texture, int i) { return i == 0 ? texture.along : i == 1 ? texture.around : texture.out; }
+const std::vector<float>& plane(const DisplacementTexture& texture, int i) {
+  return i == 0 ? texture.along : i == 1 ? texture.around : texture.out;
+}
+std::vector<float>& plane(DisplacementTexture& texture, int i) {
+  return i == 0 ? texture.along : i == 1 ? texture.around : texture.out;
+}
 
 /// \param is_good  what a value of the channel must be    \param what  why it is not
 template <class Good>
-void check_plane(const std::vector<float>& values, const std::string& channel, const DisplacementTexture& texture, const Good& is_good, const char* what,
-                 const std::string& where) {
+void check_plane(const std::vector<float>& values, const std::string& channel, const DisplacementTexture& texture,
+                 const Good& is_good, const char* what, const std::string& where) {
   const std::size_t count = static_cast<std::size_t>(texture.width) * static_cast<std::size_t>(texture.height);
   if (values.size() != count) throw IoError(fmt::format("{}: channel {} must have {} texels", where, channel, count));
   const auto bad = std::find_if_not(values.begin(), values.end(), is_good);
   if (bad == values.end()) return;
   const auto at = static_cast<int>(bad - values.begin());
-  throw IoError(fmt::format("{}: channel {} at column {}, row {} is {}", where, channel, at % texture.width, at / texture.width, what));
+  throw IoError(fmt::format("{}: channel {} at column {}, row {} is {}", where, channel, at % texture.width,
+                            at / texture.width, what));
 }
 
 void check_texels(const SkeletexModel& model, const std::string& where) {
   for (int i = 0; i < 3; ++i)
-    check_plane(plane(model.texture, i), kChannels[i], model.texture, [&](float x) { return std::abs(x) <= kMostDiagonals * model.diagonal; },
-                "not a finite number, or beyond 100 diagonals", where);
+    check_plane(
+        plane(model.texture, i), kChannels[i], model.texture,
+        [&](float x) { return std::abs(x) <= kMostDiagonals * model.diagonal; },
+        "not a finite number, or beyond 100 diagonals", where);
   if (model.bone_weights.empty()) return;
   if (model.bone_weights.size() != model.skeleton.bones.size())
-    throw IoError(fmt::format("{}: weights of {} bones are expected, not of {}", where, model.skeleton.bones.size(), model.bone_weights.size()));
+    throw IoError(fmt::format("{}: weights of {} bones are expected, not of {}", where, model.skeleton.bones.size(),
+                              model.bone_weights.size()));
   const std::vector<std::string> channels = weight_channels(model.skeleton);
   for (std::size_t bone = 0; bone < channels.size(); ++bone)
-    check_plane(model.bone_weights[bone], channels[bone], model.texture, [](float x) { return x >= 0 && std::isfinite(x); }, "no weight: at least 0, and finite", where);
+    check_plane(
+        model.bone_weights[bone], channels[bone], model.texture, [](float x) { return x >= 0 && std::isfinite(x); },
+        "no weight: at least 0, and finite", where);
 }
 
 nlohmann::json header_json(const ExrSurvey& survey, const std::string& where) {
   const auto found = survey.attributes.find(kAttribute);
   if (found == survey.attributes.end() || found->second.type != "string")
-    throw IoError(fmt::format("{}: an OpenEXR image, but not a model: its header has no text \"{}\" (some programs drop it when they save)", where, kAttribute));
+    throw IoError(fmt::format(
+        "{}: an OpenEXR image, but not a model: its header has no text \"{}\" (some programs drop it when they save)",
+        where, kAttribute));
   nlohmann::json json = parse_json(found->second.value, fmt::format("{}: header \"{}\"", where, kAttribute));
-  if (!json.is_object() || json.value("format", nlohmann::json()) != kAttribute) throw IoError(fmt::format("{}: an OpenEXR image, but its header is not that of a model", where));
+  if (!json.is_object() || json.value("format", nlohmann::json()) != kAttribute)
+    throw IoError(fmt::format("{}: an OpenEXR image, but its header is not that of a model", where));
   return json;
 }
 
@@ -137,8 +151,10 @@ bool pays_zip(const ExrPart& part, int width, int height) {
     std::vector<char>& plane = planes.emplace_back();
     for (int i = 0; i < kBlocks * kLines; ++i) {
       const int block = i / kLines;
-      const char* from = slice.slice().base + line * static_cast<std::size_t>(height * (block + 1) / (kBlocks + 1) - kLines / 2 + i % kLines) +
-                         texel * static_cast<std::size_t>((width - columns) * block / (kBlocks - 1));
+      const char* from =
+          slice.slice().base +
+          line * static_cast<std::size_t>(height * (block + 1) / (kBlocks + 1) - kLines / 2 + i % kLines) +
+          texel * static_cast<std::size_t>((width - columns) * block / (kBlocks - 1));
       plane.insert(plane.end(), from, from + texel * columns);
     }
     frame.insert(slice.name(), Imf::Slice(slice.slice().type, plane.data(), texel, texel * columns));
@@ -170,23 +186,30 @@ ExrPart make_part(const SkeletexModel& model, const ModelFileOptions& options, c
   const auto add_channel = [&](const std::string& name, const std::vector<float>& texels) {
     const void* data = texels.data();
     if (is_half) {
-      const auto largest = std::max_element(texels.begin(), texels.end(), [](float a, float b) { return std::abs(a) < std::abs(b); });
+      const auto largest =
+          std::max_element(texels.begin(), texels.end(), [](float a, float b) { return std::abs(a) < std::abs(b); });
       if (std::abs(*largest) > HALF_MAX)
-        throw IoError(fmt::format("{}: channel {} has {}, beyond half precision's range of +-65504; store float, or scale the mesh", where, name, *largest));
+        throw IoError(fmt::format(
+            "{}: channel {} has {}, beyond half precision's range of +-65504; store float, or scale the mesh", where,
+            name, *largest));
       data = part.halves.emplace_back(texels.begin(), texels.end()).data();
     }
     const Imf::PixelType type = is_half ? Imf::HALF : Imf::FLOAT;
     const std::size_t bytes = is_half ? sizeof(half) : sizeof(float);
     part.header.channels().insert(name, Imf::Channel(type));
-    part.frame.insert(name, Imf::Slice(type, static_cast<char*>(const_cast<void*>(data)), bytes, bytes * static_cast<std::size_t>(width)));
+    part.frame.insert(name, Imf::Slice(type, static_cast<char*>(const_cast<void*>(data)), bytes,
+                                       bytes * static_cast<std::size_t>(width)));
   };
   for (int i = 0; i < 3; ++i) add_channel(kChannels[i], plane(model.texture, i));
   if (!model.bone_weights.empty()) {
     const std::vector<std::string> channels = weight_channels(model.skeleton);
     for (std::size_t bone = 0; bone < channels.size(); ++bone) add_channel(channels[bone], model.bone_weights[bone]);
   }
-  const bool has_zip = options.compression == ExrCompression::kZip || (options.compression == ExrCompression::kAuto && pays_zip(part, width, height));
-  part.header.compression() = has_zip ? Imf::ZIP_COMPRESSION : options.compression == ExrCompression::kPiz ? Imf::PIZ_COMPRESSION : Imf::NO_COMPRESSION;
+  const bool has_zip = options.compression == ExrCompression::kZip ||
+                       (options.compression == ExrCompression::kAuto && pays_zip(part, width, height));
+  part.header.compression() = has_zip                                       ? Imf::ZIP_COMPRESSION
+                              : options.compression == ExrCompression::kPiz ? Imf::PIZ_COMPRESSION
+                                                                            : Imf::NO_COMPRESSION;
   return part;
 }
 
@@ -196,13 +219,16 @@ void write_model(const std::filesystem::path& path, const SkeletexModel& model, 
   write_model_levels(path, std::span(&model, 1), options);
 }
 
-void write_model_levels(const std::filesystem::path& path, std::span<const SkeletexModel> levels, const ModelFileOptions& options) {
+void write_model_levels(const std::filesystem::path& path, std::span<const SkeletexModel> levels,
+                        const ModelFileOptions& options) {
   const std::string where = path.string();
   if (levels.empty()) throw IoError(where + ": a model has at least one level");
   std::vector<ExrPart> parts;
   for (const SkeletexModel& level : levels) parts.push_back(make_part(level, options, where));
   // To be handed a plain line takes a thread longer than to write it.
-  if (std::any_of(parts.begin(), parts.end(), [](const ExrPart& part) { return part.header.compression() != Imf::NO_COMPRESSION; })) use_threads();
+  if (std::any_of(parts.begin(), parts.end(),
+                  [](const ExrPart& part) { return part.header.compression() != Imf::NO_COMPRESSION; }))
+    use_threads();
   write_atomically(path, [&](const std::filesystem::path& temporary) {
     OutputFile file(temporary, path);
     with_openexr(where, "cannot write", [&] {
@@ -236,7 +262,8 @@ namespace {
 
 const ExrSurvey& part_of(const std::vector<ExrSurvey>& parts, int level, const std::string& where) {
   if (level < 0 || level >= static_cast<int>(parts.size()))
-    throw IoError(fmt::format("{}: there is no level {}; the file has {}", where, level, parts.size() == 1 ? "level 0 alone" : fmt::format("levels 0 to {}", parts.size() - 1)));
+    throw IoError(fmt::format("{}: there is no level {}; the file has {}", where, level,
+                              parts.size() == 1 ? "level 0 alone" : fmt::format("levels 0 to {}", parts.size() - 1)));
   return parts[level];
 }
 
@@ -265,10 +292,12 @@ SkeletexModel read_model(const std::filesystem::path& path, int level) {
     weight_names = weight_channels(header, model.skeleton.bones.size(), where);
     model.bone_weights.resize(weight_names.size());
     if (model.texture.width != survey.width || model.texture.height != survey.height)
-      throw IoError(fmt::format("{}: the image has {} x {} texels, but the model in its header {} x {}; it was resized by another program", where, survey.width,
-                                survey.height, model.texture.width, model.texture.height));
+      throw IoError(fmt::format(
+          "{}: the image has {} x {} texels, but the model in its header {} x {}; it was resized by another program",
+          where, survey.width, survey.height, model.texture.width, model.texture.height));
   }
-  const auto width = static_cast<std::size_t>(model.texture.width), height = static_cast<std::size_t>(model.texture.height);
+  const auto width = static_cast<std::size_t>(model.texture.width),
+             height = static_cast<std::size_t>(model.texture.height);
   use_threads();
   with_openexr(where, "cannot read, the file is damaged", [&] {
     Imf::MultiPartInputFile file(path.c_str());
@@ -277,14 +306,20 @@ SkeletexModel read_model(const std::filesystem::path& path, int level) {
     const auto add_channel = [&](const std::string& name, std::vector<float>& values) {
       const Imf::Channel* channel = exr.header().channels().findChannel(name);
       if (channel == nullptr || channel->xSampling != 1 || channel->ySampling != 1 || channel->type == Imf::UINT)
-        throw IoError(fmt::format("{}: a model has the channels R, G, B and those of its weights in full resolution, float or half; {} is not like that", where, name));
+        throw IoError(
+            fmt::format("{}: a model has the channels R, G, B and those of its weights in full resolution, float or "
+                        "half; {} is not like that",
+                        where, name));
       values.resize(width * height);
-      frame.insert(name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()), sizeof(float), sizeof(float) * width));
+      frame.insert(
+          name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()), sizeof(float), sizeof(float) * width));
     };
     for (int i = 0; i < 3; ++i) add_channel(kChannels[i], plane(model.texture, i));
-    for (std::size_t bone = 0; bone < weight_names.size(); ++bone) add_channel(weight_names[bone], model.bone_weights[bone]);
+    for (std::size_t bone = 0; bone < weight_names.size(); ++bone)
+      add_channel(weight_names[bone], model.bone_weights[bone]);
     const Imath::Box2i window = exr.header().dataWindow();
-    if (window.min != Imath::V2i(0, 0) || window.max != Imath::V2i(model.texture.width - 1, model.texture.height - 1)) throw IoError(where + ": the file changed while it was read");
+    if (window.min != Imath::V2i(0, 0) || window.max != Imath::V2i(model.texture.width - 1, model.texture.height - 1))
+      throw IoError(where + ": the file changed while it was read");
     exr.setFrameBuffer(frame);
     exr.readPixels(0, model.texture.height - 1);
   });

@@ -2,18 +2,18 @@
 #pragma once
 #include <array>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <vector>
-
-#include <nlohmann/json.hpp>
 
 #include "skeletex/model/texture.h"
 
 namespace skeletex {
 
 enum class TexelFormat { kFloat, kHalf };
-/// kAuto: ZIP where it pays. Of float texels in small textures it may save a thirtieth, and takes a sixth of the time of encoding.
+/// kAuto: ZIP where it pays. Of float texels in small textures it may save a thirtieth, and takes a sixth of the time
+/// of encoding.
 enum class ExrCompression { kAuto, kNone, kZip, kPiz };
 
 struct ModelFileOptions {
@@ -26,14 +26,14 @@ struct ModelFileOptions {
 /// \throw IoError
 void write_model(const std::filesystem::path& path, const SkeletexModel& model, const ModelFileOptions& options = {});
 
-/// Writes a chain of levels of detail, the finest first, as one OpenEXR file with a part for each (docs/file-formats.md).
-/// One level is written as write_model does.
-/// \throw IoError
-void write_model_levels(const std::filesystem::path& path, std::span<const SkeletexModel> levels, const ModelFileOptions& options = {});
+/// Writes a chain of levels of detail, the finest first, as one OpenEXR file with a part for each
+/// (docs/file-formats.md). One level is written as write_model does. \throw IoError
+void write_model_levels(const std::filesystem::path& path, std::span<const SkeletexModel> levels,
+                        const ModelFileOptions& options = {});
 
 /// \param level  part of the file: 0, the finest, is what files of one part have
-/// \throw IoError: there is no such level; not an EXR, truncated, no skeletex attribute, a newer version, or contents that do not fit together
-/// (every index, size and number is checked before use)
+/// \throw IoError: there is no such level; not an EXR, truncated, no skeletex attribute, a newer version, or contents
+/// that do not fit together (every index, size and number is checked before use)
 SkeletexModel read_model(const std::filesystem::path& path, int level = 0);
 
 /// The header's JSON alone, without reading texels, for `skeletex inspect`.

@@ -24,7 +24,9 @@ int size_of(const auto& list) { return static_cast<int>(list.size()); }
 
 json sample_to_json(const SeamSample& sample) { return {sample.turn, sample.distance}; }
 
-std::string item(const std::string& where, const char* list, std::size_t i) { return fmt::format("{}: {}[{}]", where, list, i); }
+std::string item(const std::string& where, const char* list, std::size_t i) {
+  return fmt::format("{}: {}[{}]", where, list, i);
+}
 
 std::vector<double> numbers_from_json(const json& value, const std::string& where) {
   std::vector<double> numbers;
@@ -67,14 +69,26 @@ std::string layer_word(const std::string& name) {
 
 json conventions() {
   return {
-      {"texel", "R along, G around, B out: the vector from the bone's foot point W(u) towards the surface in the frame of (u, v), its length the surface "
-                "point's distance from the bone as a segment"},
-      {"frame", "out = f/|f| with f = s'(v) + k o; around = o x s'(v); along = out x around: left-handed in the order (along, around, out)"},
-      {"angle", "v in turns about the bone from s towards b = o x s, o from head to tail; column j of a patch is v = j/width and wraps round"},
+      {"texel",
+       "R along, G around, B out: the vector from the bone's foot point W(u) towards the surface in the frame of (u, "
+       "v), its length the surface "
+       "point's distance from the bone as a segment"},
+      {"frame",
+       "out = f/|f| with f = s'(v) + k o; around = o x s'(v); along = out x around: left-handed in the order (along, "
+       "around, out)"},
+      {"angle",
+       "v in turns about the bone from s towards b = o x s, o from head to tail; column j of a patch is v = j/width "
+       "and wraps round"},
       {"rows", "row r of a patch is read at u = row_u[r], 0 at the head and 1 at the tail"},
-      {"seams", "samples are turn, distance, turn, distance, ...: the angle about bones[0] and the distance to the half-line from the node along it"},
-      {"origin", "of the image: first row of the file is y = 0, first column x = 0; triangles of the surface run counter-clockwise seen from outside"},
-      {"weights", "where the header has \"weights\": per bone the channel of its weights in smooth poses, at least 0; their sum does not matter"},
+      {"seams",
+       "samples are turn, distance, turn, distance, ...: the angle about bones[0] and the distance to the half-line "
+       "from the node along it"},
+      {"origin",
+       "of the image: first row of the file is y = 0, first column x = 0; triangles of the surface run "
+       "counter-clockwise seen from outside"},
+      {"weights",
+       "where the header has \"weights\": per bone the channel of its weights in smooth poses, at least 0; their sum "
+       "does not matter"},
       {"units", "lengths in the units of the input mesh, angles in turns"},
   };
 }
@@ -94,12 +108,14 @@ std::vector<std::string> weight_channels(const Skeleton& skeleton) {
 std::vector<std::string> weight_channels(const json& header, std::size_t bones, const std::string& where) {
   const auto found = header.find("weights");
   if (found == header.end()) return {};
-  if (!found->is_array() || found->size() != bones) throw IoError(fmt::format("{}: \"weights\": the names of {} channels are expected, one per bone", where, bones));
+  if (!found->is_array() || found->size() != bones)
+    throw IoError(fmt::format("{}: \"weights\": the names of {} channels are expected, one per bone", where, bones));
   std::vector<std::string> names;
   for (const json& name : *found) {
     if (!name.is_string()) throw IoError(where + ": \"weights\": names of channels are expected");
     names.push_back(name.get<std::string>());
-    if (std::count(names.begin(), names.end(), names.back()) > 1) throw IoError(fmt::format("{}: \"weights\": \"{}\" is named twice", where, names.back()));
+    if (std::count(names.begin(), names.end(), names.back()) > 1)
+      throw IoError(fmt::format("{}: \"weights\": \"{}\" is named twice", where, names.back()));
   }
   return names;
 }
@@ -112,7 +128,8 @@ json model_to_json(const SkeletexModel& model, const std::string& where) {
     json ends;
     for (const std::size_t end : {0u, 1u}) {
       json uses = json::array();
-      for (const ArcUse& use : model.ends[i][end].arcs) uses.push_back({{"arc", use.arc}, {"reversed", use.is_reversed}});
+      for (const ArcUse& use : model.ends[i][end].arcs)
+        uses.push_back({{"arc", use.arc}, {"reversed", use.is_reversed}});
       ends[kEndNames[end]] = std::move(uses);
     }
     patches.push_back({{"rectangle", {r.x, r.y, r.width, r.height}},
@@ -153,11 +170,16 @@ json model_to_json(const SkeletexModel& model, const std::string& where) {
 }
 
 SkeletexModel model_from_json(const json& root, const std::string& where) {
-  const auto member = [&](const json& object, const char* key, const std::string& here) -> const json& { return json_member(object, key, here); };
-  if (!root.is_object() || root.value("format", json()) != "skeletex") throw IoError(where + ": the header is not that of a skeletex model");
+  const auto member = [&](const json& object, const char* key, const std::string& here) -> const json& {
+    return json_member(object, key, here);
+  };
+  if (!root.is_object() || root.value("format", json()) != "skeletex")
+    throw IoError(where + ": the header is not that of a skeletex model");
   const int version = json_int(member(root, "version", where), 1, kMaxInt, where + ": \"version\"");
   if (version > kModelFileVersion)
-    throw IoError(fmt::format("{}: written in version {} of the format, this program reads up to version {}; use a newer skeletex", where, version, kModelFileVersion));
+    throw IoError(fmt::format(
+        "{}: written in version {} of the format, this program reads up to version {}; use a newer skeletex", where,
+        version, kModelFileVersion));
 
   SkeletexModel model;
   model.skeleton = skeleton_from_json(member(root, "skeleton", where), where + ": skeleton");
@@ -169,12 +191,15 @@ SkeletexModel model_from_json(const json& root, const std::string& where) {
   model.genus = json_int(member(root, "genus", where), 0, kMaxInt, where + ": \"genus\"");
   if (root.contains("diagonals")) {
     const json& rule = root["diagonals"];
-    if (rule != "smooth" && rule != "nearest") throw IoError(where + ": \"diagonals\": \"smooth\" or \"nearest\" is expected");
+    if (rule != "smooth" && rule != "nearest")
+      throw IoError(where + ": \"diagonals\": \"smooth\" or \"nearest\" is expected");
     model.diagonals = rule == "smooth" ? DiagonalRule::kSmooth : DiagonalRule::kNearest;
   }
   const json& texture = member(root, "texture", where);
-  model.texture.width = json_int(member(texture, "width", where + ": texture"), 1, kMaxTextureSize, where + ": texture, \"width\"");
-  model.texture.height = json_int(member(texture, "height", where + ": texture"), 1, kMaxTextureSize, where + ": texture, \"height\"");
+  model.texture.width =
+      json_int(member(texture, "width", where + ": texture"), 1, kMaxTextureSize, where + ": texture, \"width\"");
+  model.texture.height =
+      json_int(member(texture, "height", where + ": texture"), 1, kMaxTextureSize, where + ": texture, \"height\"");
 
   const json& corners = json_array(member(root, "corners", where), where + ": \"corners\"");
   for (std::size_t i = 0; i < corners.size(); ++i) {
@@ -193,7 +218,8 @@ SkeletexModel model_from_json(const json& root, const std::string& where) {
     SeamArc arc;
     arc.node = json_int(member(arcs[i], "node", here), 0, nodes - 1, here + ", \"node\"");
     arc.bones = pair_from_json(member(arcs[i], "bones", here), bones, here + ", \"bones\"");
-    if (arcs[i].contains("corners")) arc.corners = pair_from_json(arcs[i]["corners"], size_of(model.corners), here + ", \"corners\"");
+    if (arcs[i].contains("corners"))
+      arc.corners = pair_from_json(arcs[i]["corners"], size_of(model.corners), here + ", \"corners\"");
     const std::vector<double> samples = numbers_from_json(member(arcs[i], "samples", here), here + ", \"samples\"");
     if (samples.size() % 2 != 0) throw IoError(here + ", \"samples\": pairs of turn and distance are expected");
     for (std::size_t s = 0; s < samples.size(); s += 2) arc.samples.push_back({samples[s], samples[s + 1]});
@@ -217,7 +243,8 @@ SkeletexModel model_from_json(const json& root, const std::string& where) {
       for (const json& use : json_array(member(member(patches[i], "ends", here), kEndNames[end], here), there)) {
         const json& is_reversed = member(use, "reversed", there);
         if (!is_reversed.is_boolean()) throw IoError(there + ", \"reversed\": true or false is expected");
-        ends[end].arcs.push_back({json_int(member(use, "arc", there), 0, size_of(model.arcs) - 1, there + ", \"arc\""), is_reversed.get<bool>()});
+        ends[end].arcs.push_back({json_int(member(use, "arc", there), 0, size_of(model.arcs) - 1, there + ", \"arc\""),
+                                  is_reversed.get<bool>()});
       }
     }
     model.ends.push_back(std::move(ends));
@@ -238,13 +265,17 @@ class ModelCheck {
 
   void run() {
     require(m_.diagonal >= kSmallestDiagonal && m_.diagonal <= kLargestDiagonal, "diagonal",
-            fmt::format("must be a length from {:g} to {:g}, as single precision holds no others", kSmallestDiagonal, kLargestDiagonal));
-    require(m_.origin.allFinite() && m_.origin.cwiseAbs().maxCoeff() <= 1e12 * m_.diagonal, "origin", "must be finite, and within 1e12 diagonals of zero");
+            fmt::format("must be a length from {:g} to {:g}, as single precision holds no others", kSmallestDiagonal,
+                        kLargestDiagonal));
+    require(m_.origin.allFinite() && m_.origin.cwiseAbs().maxCoeff() <= 1e12 * m_.diagonal, "origin",
+            "must be finite, and within 1e12 diagonals of zero");
     require(m_.genus >= 0, "genus", "must not be negative");
-    require(m_.texture.width > 0 && m_.texture.height > 0 && m_.texture.width <= kMaxTextureSize && m_.texture.height <= kMaxTextureSize, "texture",
-            fmt::format("its sides must be from 1 to {}", kMaxTextureSize));
+    require(m_.texture.width > 0 && m_.texture.height > 0 && m_.texture.width <= kMaxTextureSize &&
+                m_.texture.height <= kMaxTextureSize,
+            "texture", fmt::format("its sides must be from 1 to {}", kMaxTextureSize));
     check_skeleton();
-    require(m_.patches.size() == m_.skeleton.bones.size() && m_.ends.size() == m_.skeleton.bones.size(), "patches", "there must be one for each bone");
+    require(m_.patches.size() == m_.skeleton.bones.size() && m_.ends.size() == m_.skeleton.bones.size(), "patches",
+            "there must be one for each bone");
     check_patches();
     check_corners();
     check_arcs();
@@ -253,29 +284,40 @@ class ModelCheck {
 
  private:
   void require(bool condition, const std::string& entry, const std::string& rule) const {
-    if (!condition) throw IoError(fmt::format("{}: {}: {}; the file is damaged or was not written by skeletex", where_, entry, rule));
+    if (!condition)
+      throw IoError(fmt::format("{}: {}: {}; the file is damaged or was not written by skeletex", where_, entry, rule));
   }
   static std::string entry(const char* list, std::size_t i) { return fmt::format("{}[{}]", list, i); }
 
-  int node_of(std::size_t bone, std::size_t end) const { return end == 0 ? m_.skeleton.bones[bone].head : m_.skeleton.bones[bone].tail; }
-  bool is_at(int bone, int node) const { return m_.skeleton.bones[bone].head == node || m_.skeleton.bones[bone].tail == node; }
+  int node_of(std::size_t bone, std::size_t end) const {
+    return end == 0 ? m_.skeleton.bones[bone].head : m_.skeleton.bones[bone].tail;
+  }
+  bool is_at(int bone, int node) const {
+    return m_.skeleton.bones[bone].head == node || m_.skeleton.bones[bone].tail == node;
+  }
   bool is_index(int index, const auto& list) const { return index >= 0 && index < size_of(list); }
-  bool is_sample(const SeamSample& s) const { return s.turn >= 0 && s.turn < 1 && s.distance >= 0 && s.distance <= kMostDiagonals * m_.diagonal; }
+  bool is_sample(const SeamSample& s) const {
+    return s.turn >= 0 && s.turn < 1 && s.distance >= 0 && s.distance <= kMostDiagonals * m_.diagonal;
+  }
 
   void check_skeleton() {
     const auto& bones = m_.skeleton.bones;
     for (const Node& node : m_.skeleton.nodes)
-      require(node.position.allFinite() && (node.position - m_.origin).cwiseAbs().maxCoeff() <= kMostDiagonals * m_.diagonal, "skeleton",
+      require(node.position.allFinite() &&
+                  (node.position - m_.origin).cwiseAbs().maxCoeff() <= kMostDiagonals * m_.diagonal,
+              "skeleton",
               fmt::format("node \"{}\" must lie within {:g} diagonals of the origin", node.name, kMostDiagonals));
     bones_at_.assign(m_.skeleton.nodes.size(), 0);
     require(!bones.empty(), "skeleton", "must have a bone");
     for (const Bone& bone : bones) {
-      require(is_index(bone.head, m_.skeleton.nodes) && is_index(bone.tail, m_.skeleton.nodes) && bone.head != bone.tail, "skeleton",
-              fmt::format("bone \"{}\" must join two nodes", bone.name));
+      require(
+          is_index(bone.head, m_.skeleton.nodes) && is_index(bone.tail, m_.skeleton.nodes) && bone.head != bone.tail,
+          "skeleton", fmt::format("bone \"{}\" must join two nodes", bone.name));
       require(bone.s && bone.s->cwiseAbs().maxCoeff() >= 1e-6 && bone.s->cwiseAbs().maxCoeff() <= 1e6, "skeleton",
               fmt::format("bone \"{}\" must have its s, a direction of length about 1", bone.name));
       const double length = (m_.skeleton.nodes[bone.tail].position - m_.skeleton.nodes[bone.head].position).norm();
-      require(length >= 1e-6 * m_.diagonal, "skeleton", fmt::format("bone \"{}\" must be at least a millionth of the diagonal long", bone.name));
+      require(length >= 1e-6 * m_.diagonal, "skeleton",
+              fmt::format("bone \"{}\" must be at least a millionth of the diagonal long", bone.name));
       ++bones_at_[bone.head];
       ++bones_at_[bone.tail];
     }
@@ -288,13 +330,17 @@ class ModelCheck {
   }
 
   void check_patches() const {
-    std::vector<bool> is_taken(static_cast<std::size_t>(m_.texture.width) * static_cast<std::size_t>(m_.texture.height), false);
+    std::vector<bool> is_taken(static_cast<std::size_t>(m_.texture.width) * static_cast<std::size_t>(m_.texture.height),
+                               false);
     for (std::size_t i = 0; i < m_.patches.size(); ++i) {
       const Patch& patch = m_.patches[i];
       const Rectangle& r = patch.rectangle;
-      require(r.x >= 0 && r.y >= 0 && r.width >= 3 && r.height >= 2 && r.width <= m_.texture.width && r.height <= m_.texture.height &&
-                  r.x <= m_.texture.width - r.width && r.y <= m_.texture.height - r.height,
-              entry("patches", i), fmt::format("its rectangle must be at least 3 x 2 and lie in the texture of {} x {}", m_.texture.width, m_.texture.height));
+      require(r.x >= 0 && r.y >= 0 && r.width >= 3 && r.height >= 2 && r.width <= m_.texture.width &&
+                  r.height <= m_.texture.height && r.x <= m_.texture.width - r.width &&
+                  r.y <= m_.texture.height - r.height,
+              entry("patches", i),
+              fmt::format("its rectangle must be at least 3 x 2 and lie in the texture of {} x {}", m_.texture.width,
+                          m_.texture.height));
       bool is_apart = true;
       for (int y = r.y; y < r.y + r.height; ++y) {
         const auto first = is_taken.begin() + y * static_cast<std::ptrdiff_t>(m_.texture.width) + r.x;
@@ -304,11 +350,14 @@ class ModelCheck {
       require(is_apart, entry("patches", i), "its rectangle must not overlap others");
       require(size_of(patch.row_u) == r.height, entry("patches", i), "row_u must have an entry per row");
       bool is_increasing = patch.row_u.front() == 0 && patch.row_u.back() == 1;
-      for (std::size_t row = 1; row < patch.row_u.size(); ++row) is_increasing = is_increasing && patch.row_u[row - 1] < patch.row_u[row];
+      for (std::size_t row = 1; row < patch.row_u.size(); ++row)
+        is_increasing = is_increasing && patch.row_u[row - 1] < patch.row_u[row];
       require(is_increasing, entry("patches", i), "row_u must increase from 0 to 1");
       const int free_ends = (bones_at_[node_of(i, 0)] == 1) + (bones_at_[node_of(i, 1)] == 1);
       constexpr std::array kTopologies{SegmentTopology::kAnnulus, SegmentTopology::kDisk, SegmentTopology::kSphere};
-      require(patch.topology == kTopologies[free_ends], entry("patches", i), fmt::format("a bone with {} free ends has the topology {}", free_ends, to_string(kTopologies[free_ends])));
+      require(
+          patch.topology == kTopologies[free_ends], entry("patches", i),
+          fmt::format("a bone with {} free ends has the topology {}", free_ends, to_string(kTopologies[free_ends])));
     }
   }
 
@@ -318,10 +367,13 @@ class ModelCheck {
       require(is_index(corner.node, m_.skeleton.nodes), entry("corners", i), "its node must exist");
       std::vector<int> bones = corner.bones;
       std::sort(bones.begin(), bones.end());
-      require(bones.size() >= 3 && std::adjacent_find(bones.begin(), bones.end()) == bones.end(), entry("corners", i), "three or more bones meet at a corner");
+      require(bones.size() >= 3 && std::adjacent_find(bones.begin(), bones.end()) == bones.end(), entry("corners", i),
+              "three or more bones meet at a corner");
       for (const int bone : bones)
-        require(is_index(bone, m_.skeleton.bones) && is_at(bone, corner.node), entry("corners", i), "its bones must lie at its node");
-      require(is_sample(corner.sample), entry("corners", i), "turn must be in [0,1), distance not negative and at most 100 diagonals");
+        require(is_index(bone, m_.skeleton.bones) && is_at(bone, corner.node), entry("corners", i),
+                "its bones must lie at its node");
+      require(is_sample(corner.sample), entry("corners", i),
+              "turn must be in [0,1), distance not negative and at most 100 diagonals");
     }
   }
 
@@ -331,18 +383,23 @@ class ModelCheck {
       require(is_index(arc.node, m_.skeleton.nodes), entry("arcs", i), "its node must exist");
       require(arc.bones[0] != arc.bones[1], entry("arcs", i), "lies between two bones");
       for (const int bone : arc.bones)
-        require(is_index(bone, m_.skeleton.bones) && is_at(bone, arc.node), entry("arcs", i), "its bones must lie at its node");
+        require(is_index(bone, m_.skeleton.bones) && is_at(bone, arc.node), entry("arcs", i),
+                "its bones must lie at its node");
       require((arc.corners[0] < 0) == (arc.corners[1] < 0), entry("arcs", i), "has two corners or none");
       for (const int corner : arc.corners) {
         if (arc.is_closed()) continue;
-        require(is_index(corner, m_.corners) && m_.corners[corner].node == arc.node, entry("arcs", i), "its corners must exist and lie at its node");
+        require(is_index(corner, m_.corners) && m_.corners[corner].node == arc.node, entry("arcs", i),
+                "its corners must exist and lie at its node");
         for (const int bone : arc.bones) {
           const auto& bones = m_.corners[corner].bones;
-          require(std::find(bones.begin(), bones.end(), bone) != bones.end(), entry("arcs", i), "its bones must meet at its corners");
+          require(std::find(bones.begin(), bones.end(), bone) != bones.end(), entry("arcs", i),
+                  "its bones must meet at its corners");
         }
       }
-      require(arc.samples.size() >= (arc.is_closed() ? 3u : 1u), entry("arcs", i), "a closed arc has at least three samples, an open one at least one");
-      require(std::all_of(arc.samples.begin(), arc.samples.end(), [&](const SeamSample& s) { return is_sample(s); }), entry("arcs", i), "turns must be in [0,1), distances not negative and at most 100 diagonals");
+      require(arc.samples.size() >= (arc.is_closed() ? 3u : 1u), entry("arcs", i),
+              "a closed arc has at least three samples, an open one at least one");
+      require(std::all_of(arc.samples.begin(), arc.samples.end(), [&](const SeamSample& s) { return is_sample(s); }),
+              entry("arcs", i), "turns must be in [0,1), distances not negative and at most 100 diagonals");
     }
   }
 
@@ -353,23 +410,29 @@ class ModelCheck {
         const std::string here = fmt::format("patches[{}], ends.{}", bone, kEndNames[end]);
         const std::vector<ArcUse>& loop = m_.ends[bone][end].arcs;
         const int node = node_of(bone, end);
-        require(loop.empty() == (bones_at_[node] == 1), here, "arcs run along an end that has neighbours, and none along a free one");
+        require(loop.empty() == (bones_at_[node] == 1), here,
+                "arcs run along an end that has neighbours, and none along a free one");
         for (std::size_t k = 0; k < loop.size(); ++k) {
           require(is_index(loop[k].arc, m_.arcs), here, "its arcs must exist");
           const SeamArc& arc = m_.arcs[loop[k].arc];
-          require(arc.node == node && (arc.bones[0] == static_cast<int>(bone) || arc.bones[1] == static_cast<int>(bone)), here, "its arcs must be the bone's own");
+          require(
+              arc.node == node && (arc.bones[0] == static_cast<int>(bone) || arc.bones[1] == static_cast<int>(bone)),
+              here, "its arcs must be the bone's own");
           const std::size_t side = arc.bones[0] == static_cast<int>(bone) ? 0 : 1;
           ++uses[loop[k].arc][side];
           // Angles about two bones run against each other when both begin, or both end, at the node.
-          const std::size_t other = static_cast<std::size_t>(m_.skeleton.bones[arc.bones[1 - side]].head == node ? 0 : 1);
-          require(loop[k].is_reversed == (side == 1 && other == end), here, "an arc runs with the angle about its first bone");
+          const std::size_t other =
+              static_cast<std::size_t>(m_.skeleton.bones[arc.bones[1 - side]].head == node ? 0 : 1);
+          require(loop[k].is_reversed == (side == 1 && other == end), here,
+                  "an arc runs with the angle about its first bone");
           if (arc.is_closed()) {
             require(loop.size() == 1, here, "a closed arc is a loop of its own");
             continue;
           }
           const ArcUse& after = loop[(k + 1) % loop.size()];
           require(is_index(after.arc, m_.arcs), here, "its arcs must exist");
-          const int from = arc.corners[loop[k].is_reversed ? 0 : 1], to = m_.arcs[after.arc].corners[after.is_reversed ? 1 : 0];
+          const int from = arc.corners[loop[k].is_reversed ? 0 : 1],
+                    to = m_.arcs[after.arc].corners[after.is_reversed ? 1 : 0];
           require(from == to, here, "each arc must begin where the one before ends");
         }
       }

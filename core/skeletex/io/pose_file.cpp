@@ -26,8 +26,10 @@ void check_keys(const nlohmann::json& object, const std::vector<std::string>& kn
 
 /// Index of a bone or node by its name.
 template <class Named>
-std::size_t index_of(const std::vector<Named>& all, const std::string& name, const char* kind, const std::string& where) {
-  const auto found = std::find_if(all.begin(), all.end(), [&](const Named& candidate) { return candidate.name == name; });
+std::size_t index_of(const std::vector<Named>& all, const std::string& name, const char* kind,
+                     const std::string& where) {
+  const auto found =
+      std::find_if(all.begin(), all.end(), [&](const Named& candidate) { return candidate.name == name; });
   if (found != all.end()) return static_cast<std::size_t>(found - all.begin());
   std::vector<std::string> names;
   for (const Named& candidate : all) names.push_back(candidate.name);
@@ -38,7 +40,9 @@ std::size_t index_of(const std::vector<Named>& all, const std::string& name, con
 double pose_number(const nlohmann::json& json, const std::string& where) {
   constexpr double kMost = 1e15;
   const double value = json_number(json, where);
-  if (std::abs(value) > kMost) throw IoError(fmt::format("{}: {:g} is out of range; numbers of a pose go from {:g} to {:g}", where, value, -kMost, kMost));
+  if (std::abs(value) > kMost)
+    throw IoError(
+        fmt::format("{}: {:g} is out of range; numbers of a pose go from {:g} to {:g}", where, value, -kMost, kMost));
   return value;
 }
 
@@ -58,7 +62,8 @@ Eigen::Quaterniond rotation_from_json(const nlohmann::json& json, const std::str
     if (!(q.norm() > 1e-12)) throw IoError(where + ", \"quaternion\": it has no length; [0, 0, 0, 1] is no rotation");
     return Eigen::Quaterniond(q[3], q[0], q[1], q[2]).normalized();
   }
-  const Vec3 axis = numbers_from_json<3>(json_member(json, "axis", where), "three numbers [x, y, z]", where + ", \"axis\"");
+  const Vec3 axis =
+      numbers_from_json<3>(json_member(json, "axis", where), "three numbers [x, y, z]", where + ", \"axis\"");
   const double degrees = pose_number(json_member(json, "degrees", where), where + ", \"degrees\"");
   if (!(axis.norm() > 1e-12)) throw IoError(where + ", \"axis\": the zero vector is no axis");
   return Eigen::Quaterniond(Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis.normalized()));
@@ -106,7 +111,8 @@ PoseAnimation animation_from_json(const nlohmann::json& json, const Skeleton& sk
     check_keys(entry, {"time", "name", "pose"}, here);
     const double time = pose_number(json_member(entry, "time", here), here + ", \"time\"");
     if (!animation.frames.empty() && !(time > animation.frames.back().time))
-      throw IoError(fmt::format("{}, \"time\": {} is not after the frame before, {}; times must grow", here, time, animation.frames.back().time));
+      throw IoError(fmt::format("{}, \"time\": {} is not after the frame before, {}; times must grow", here, time,
+                                animation.frames.back().time));
     PoseFrame frame{time, pose_from_json(json_member(entry, "pose", here), skeleton, here + ", \"pose\"")};
     if (const auto name = entry.find("name"); name != entry.end()) {
       if (!name->is_string()) throw IoError(here + ", \"name\": text is expected");
@@ -126,10 +132,12 @@ nlohmann::json pose_to_json(const Pose& pose, const Skeleton& skeleton) {
   nlohmann::json json = nlohmann::json::object();
   for (std::size_t i = 0; i < pose.rotations.size(); ++i) {
     const Eigen::Quaterniond& q = pose.rotations[i];
-    if (q.vec() != Vec3::Zero()) json["rotations"][skeleton.bones[i].name] = {{"quaternion", {q.x(), q.y(), q.z(), q.w()}}};
+    if (q.vec() != Vec3::Zero())
+      json["rotations"][skeleton.bones[i].name] = {{"quaternion", {q.x(), q.y(), q.z(), q.w()}}};
   }
   for (std::size_t i = 0; i < pose.nodes.size(); ++i)
-    if (pose.nodes[i] != skeleton.nodes[i].position) json["nodes"][skeleton.nodes[i].name] = {pose.nodes[i][0], pose.nodes[i][1], pose.nodes[i][2]};
+    if (pose.nodes[i] != skeleton.nodes[i].position)
+      json["nodes"][skeleton.nodes[i].name] = {pose.nodes[i][0], pose.nodes[i][1], pose.nodes[i][2]};
   for (std::size_t i = 0; i < pose.rolls.size(); ++i)
     if (pose.rolls[i] != 0) json["roll"][skeleton.bones[i].name] = pose.rolls[i] * 180 / std::numbers::pi;
   return json;

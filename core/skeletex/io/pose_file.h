@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <filesystem>
-
 #include <nlohmann/json.hpp>
 
-#include "skeletex/model/pose.h"
+#include "skeletex/skeleton/pose.h"
 
 namespace skeletex {
 

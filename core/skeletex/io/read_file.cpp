@@ -14,13 +14,17 @@ namespace skeletex {
 
 std::string read_file(const std::filesystem::path& path, std::uintmax_t max_bytes) {
   std::error_code error;
-  if (std::filesystem::is_directory(path, error)) throw IoError(fmt::format("{} is a folder, not a file", path.string()));
+  if (std::filesystem::is_directory(path, error))
+    throw IoError(fmt::format("{} is a folder, not a file", path.string()));
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), std::fclose);
   if (!file) throw IoError(fmt::format("{}: cannot open: {}", path.string(), std::strerror(errno)));
   std::string bytes;
-  const std::uintmax_t size = std::filesystem::file_size(path, error);  // an error for pipes, which are read all the same
+  const std::uintmax_t size =
+      std::filesystem::file_size(path, error);  // an error for pipes, which are read all the same
   if (!error) {
-    if (size > max_bytes) throw IoError(fmt::format("{}: {} bytes are more than the {} that this kind of file may have", path.string(), size, max_bytes));
+    if (size > max_bytes)
+      throw IoError(fmt::format("{}: {} bytes are more than the {} that this kind of file may have", path.string(),
+                                size, max_bytes));
     bytes.reserve(size);
   }
   char block[1 << 16];

@@ -33,7 +33,8 @@ bool is_same_file(const fs::path& a, const fs::path& b) {
 void check_not_an_input(const fs::path& output, std::initializer_list<fs::path> inputs) {
   for (const fs::path& input : inputs)
     if (!output.empty() && !input.empty() && is_same_file(output, input))
-      throw InputError(fmt::format("{} is also the input {}, which would be lost; name another file", output.string(), input.string()));
+      throw InputError(fmt::format("{} is also the input {}, which would be lost; name another file", output.string(),
+                                   input.string()));
 }
 
 }  // namespace skeletex

@@ -15,7 +15,8 @@ namespace {
 constexpr std::uintmax_t kMaxBytes = std::uintmax_t{256} << 20;
 
 Vec3 vector_from_json(const nlohmann::json& json, const std::string& where) {
-  if (!json.is_array() || json.size() != 3) throw IoError(fmt::format("{}: three numbers [x, y, z] are expected", where));
+  if (!json.is_array() || json.size() != 3)
+    throw IoError(fmt::format("{}: three numbers [x, y, z] are expected", where));
   Vec3 v;
   for (int i = 0; i < 3; ++i) v[i] = json_number(json[static_cast<std::size_t>(i)], where);
   return v;
@@ -25,7 +26,8 @@ nlohmann::json vector_to_json(const Vec3& v) { return {v[0], v[1], v[2]}; }
 
 /// "FILE: nodes[3] ("elbow")"
 std::string entry(const std::string& where, const char* list, std::size_t i, const std::string& name = {}) {
-  return name.empty() ? fmt::format("{}: {}[{}]", where, list, i) : fmt::format("{}: {}[{}] (\"{}\")", where, list, i, name);
+  return name.empty() ? fmt::format("{}: {}[{}]", where, list, i)
+                      : fmt::format("{}: {}[{}] (\"{}\")", where, list, i, name);
 }
 
 std::string name_of(const nlohmann::json& object, const char* kind, std::size_t i, const std::string& where) {
@@ -35,9 +37,12 @@ std::string name_of(const nlohmann::json& object, const char* kind, std::size_t 
   return json_string(*found, where + ", \"name\"");
 }
 
-void claim_name(std::unordered_map<std::string, int>& names, const std::string& name, const char* list, std::size_t i, const std::string& where) {
+void claim_name(std::unordered_map<std::string, int>& names, const std::string& name, const char* list, std::size_t i,
+                const std::string& where) {
   const auto [other, is_new] = names.emplace(name, static_cast<int>(i));
-  if (!is_new) throw IoError(fmt::format("{}: the name is already that of {}[{}]; names must differ", entry(where, list, i, name), list, other->second));
+  if (!is_new)
+    throw IoError(fmt::format("{}: the name is already that of {}[{}]; names must differ", entry(where, list, i, name),
+                              list, other->second));
 }
 
 }  // namespace
@@ -67,15 +72,19 @@ Skeleton skeleton_from_json(const nlohmann::json& json, const std::string& where
         return json_int(value, 0, static_cast<int>(skeleton.nodes.size()) - 1, there);
       }
       const auto found = node_names.find(value.get<std::string>());
-      if (found == node_names.end()) throw IoError(fmt::format("{}: there is no node \"{}\"", there, value.get<std::string>()));
+      if (found == node_names.end())
+        throw IoError(fmt::format("{}: there is no node \"{}\"", there, value.get<std::string>()));
       return found->second;
     };
     bone.head = node_index("head");
     bone.tail = node_index("tail");
-    if (bone.head == bone.tail) throw IoError(fmt::format("{}: head and tail are the same node; a bone joins two", here));
+    if (bone.head == bone.tail)
+      throw IoError(fmt::format("{}: head and tail are the same node; a bone joins two", here));
     if (const auto s = bones[i].find("s"); s != bones[i].end() && !s->is_null()) {
       bone.s = vector_from_json(*s, here + ", \"s\"");
-      if (bone.s->isZero(0)) throw IoError(fmt::format("{}, \"s\": the zero vector is no direction; leave \"s\" out or give one across the bone", here));
+      if (bone.s->isZero(0))
+        throw IoError(fmt::format(
+            "{}, \"s\": the zero vector is no direction; leave \"s\" out or give one across the bone", here));
     }
     claim_name(bone_names, bone.name, "bones", i, where);
     skeleton.bones.push_back(std::move(bone));
@@ -90,7 +99,8 @@ Skeleton read_skeleton(const std::filesystem::path& path) {
 
 nlohmann::json skeleton_to_json(const Skeleton& skeleton) {
   nlohmann::json nodes = nlohmann::json::array(), bones = nlohmann::json::array();
-  for (const Node& node : skeleton.nodes) nodes.push_back({{"name", node.name}, {"position", vector_to_json(node.position)}});
+  for (const Node& node : skeleton.nodes)
+    nodes.push_back({{"name", node.name}, {"position", vector_to_json(node.position)}});
   for (const Bone& bone : skeleton.bones) {
     bones.push_back({{"name", bone.name}, {"head", bone.head}, {"tail", bone.tail}});
     if (bone.s) bones.back()["s"] = vector_to_json(*bone.s);

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <filesystem>
-
 #include <nlohmann/json.hpp>
 
-#include "skeletex/model/skeleton.h"
+#include "skeletex/skeleton/skeleton.h"
 
 namespace skeletex {
 

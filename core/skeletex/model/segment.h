@@ -3,15 +3,16 @@
 #include <array>
 #include <vector>
 
-#include "skeletex/model/mesh.h"
-#include "skeletex/model/skeleton.h"
+#include "skeletex/geometry/mesh.h"
+#include "skeletex/skeleton/skeleton.h"
 
 namespace skeletex {
 
 /// What a bone's segment is: a tube between two nodes, a cap at one free end, or the whole of a lone bone's surface.
 enum class SegmentTopology { kAnnulus, kDisk, kSphere };
 
-/// A piece of the wall between two bones at one node: a polyline on the surface, shared by exactly two segments.
+/// A piece of the separation plane between two bones at one node: a polyline on the surface, shared by exactly two
+/// segments.
 struct Arc {
   int node = -1;
   std::array<int, 2> bones{-1, -1};
@@ -38,14 +39,14 @@ struct BoundaryLoop {
 struct Segment {
   int bone = -1;
   SegmentTopology topology = SegmentTopology::kAnnulus;
-  TriangleMesh mesh;                 ///< local vertices and triangles, outward
-  std::vector<int> source_vertices;  ///< local vertex -> vertex of the cut mesh
+  TriangleMesh mesh;                  ///< local vertices and triangles, outward
+  std::vector<int> source_vertices;   ///< local vertex -> vertex of the cut mesh
   std::array<BoundaryLoop, 2> loops;  ///< at the head, at the tail
 };
 
-/// The mesh cut along the walls of a skeleton (paper 3.1).
+/// The mesh cut along the separation planes of a skeleton (paper 3.1).
 struct Segmentation {
-  TriangleMesh cut_mesh;            ///< the input's vertices first, then those on the walls
+  TriangleMesh cut_mesh;            ///< the input's vertices first, then those on the separation planes
   std::vector<int> triangle_bones;  ///< per triangle of the cut mesh, its bone
   std::vector<Arc> arcs;
   std::vector<Segment> segments;  ///< one per bone, in the skeleton's order

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "skeletex/model/segment.h"
-#include "skeletex/model/skeleton.h"
+#include "skeletex/skeleton/skeleton.h"
 
 namespace skeletex {
 
@@ -65,29 +65,31 @@ struct DisplacementTexture {
 
 /// Which diagonal the quads between texels take, see kernels/reconstruct.cl.
 enum class DiagonalRule {
-  kNearest,  ///< the one nearer to a cubic through the texels around: for even lattices
-  kSmooth,   ///< the one whose triangles turn least against those around: for texels on the mesh's own vertices and edges
+  kNearest,  ///< the one nearer to a cubic through the texels around: for regular grids
+  kSmooth,   ///< the one whose triangles turn least against those around: for texels on the mesh's own vertices and
+             ///< edges
 };
 
-/// Lengths, in the units of the mesh, whose squares single precision holds with room to spare: diagonals of models lie between them.
+/// Lengths, in the units of the mesh, whose squares single precision holds with room to spare: diagonals of models lie
+/// between them.
 inline constexpr double kSmallestDiagonal = 1e-15, kLargestDiagonal = 1e15;
 /// How many diagonals a model's nodes, seams and texels may lie away from its origin.
 inline constexpr double kMostDiagonals = 100;
 
 /// A model: one texture and what is needed to turn it back into a mesh.
 struct SkeletexModel {
-  Skeleton skeleton;  ///< bind pose, every bone with its s
+  Skeleton skeleton;           ///< bind pose, every bone with its s
   Vec3 origin = Vec3::Zero();  ///< world position that device coordinates are relative to (the input's box centre)
   double diagonal = 0;         ///< of the input mesh's bounding box
   int genus = 0;
   DiagonalRule diagonals = DiagonalRule::kNearest;
   DisplacementTexture texture;
-  std::vector<Patch> patches;  ///< one per bone
+  std::vector<Patch> patches;                 ///< one per bone
   std::vector<std::array<PatchEnd, 2>> ends;  ///< one pair per bone: head, tail
   std::vector<SeamArc> arcs;
   std::vector<SeamCorner> corners;
-  /// How much each bone moves each texel in a smooth pose, where that is painted or imported: per bone a plane as the texture's, values
-  /// of at least 0 whose sum does not matter. Empty: weights in closed form (weight_walk.h).
+  /// How much each bone moves each texel in a smooth pose, where that is painted or imported: per bone a plane as the
+  /// texture's, values of at least 0 whose sum does not matter. Empty: weights in closed form (weight_walk.h).
   std::vector<std::vector<float>> bone_weights;
   std::string encoder_settings;  ///< JSON object: the options and version of the encoder, for the record
 };

@@ -38,7 +38,8 @@ DeviceTables upload_tables(ClContext& context, const FrameTables& tables) {
     columns[2 * count + i] = tables.columns[i].slope_head;
     columns[3 * count + i] = tables.columns[i].slope_tail;
   }
-  return {context.upload(tables.patches), context.upload(tables.rows), context.upload(columns), static_cast<int>(count)};
+  return {context.upload(tables.patches), context.upload(tables.rows), context.upload(columns),
+          static_cast<int>(count)};
 }
 
 FrameTables in_bone_axes(FrameTables tables) {
@@ -52,27 +53,30 @@ FrameTables in_bone_axes(FrameTables tables) {
   return tables;
 }
 
-DeviceLattice upload_lattice(ClContext& context, const FrameTables& tables, const std::vector<Patch>& patches, const DisplacementTexture& texture,
-                             RowChoice choice) {
+DeviceLattice upload_lattice(ClContext& context, const FrameTables& tables, const std::vector<Patch>& patches,
+                             const DisplacementTexture& texture, RowChoice choice) {
   DeviceLattice lattice;
   lattice.texture_width = texture.width;
   lattice.texels = {context.upload(texture.along), context.upload(texture.around), context.upload(texture.out)};
   lattice.tables = upload_tables(context, tables);
   lattice.rows = context.upload(lattice_rows(patches, choice));
   for (const Patch& patch : patches)
-    lattice.vertex_count += static_cast<std::size_t>(patch.rectangle.width) * (patch.rectangle.height - (choice == RowChoice::kInner ? 2 : 0));
+    lattice.vertex_count += static_cast<std::size_t>(patch.rectangle.width) *
+                            (patch.rectangle.height - (choice == RowChoice::kInner ? 2 : 0));
   return lattice;
 }
 
 void displace(ClContext& context, const DeviceLattice& lattice, DevicePlanes& points) {
-  context.launch({"reconstruct.cl", "displace"}, row_range(context, lattice.rows.size), static_cast<int>(lattice.rows.size), lattice.texture_width,
-                 lattice.tables.column_count, lattice.rows, lattice.tables.patches, lattice.tables.rows, lattice.tables.columns, lattice.texels.x,
+  context.launch({"reconstruct.cl", "displace"}, row_range(context, lattice.rows.size),
+                 static_cast<int>(lattice.rows.size), lattice.texture_width, lattice.tables.column_count, lattice.rows,
+                 lattice.tables.patches, lattice.tables.rows, lattice.tables.columns, lattice.texels.x,
                  lattice.texels.y, lattice.texels.z, points.x, points.y, points.z);
 }
 
-DevicePlanes row_points(ClContext& context, const SkeletexModel& model, const Walls& walls) {
+DevicePlanes row_points(ClContext& context, const SkeletexModel& model, const SeparationPlanes& separation) {
   const DeviceLattice lattice =
-      upload_lattice(context, frame_tables(model.skeleton, walls, model.patches, model.origin), model.patches, model.texture, RowChoice::kAll);
+      upload_lattice(context, frame_tables(model.skeleton, separation, model.patches, model.origin), model.patches,
+                     model.texture, RowChoice::kAll);
   DevicePlanes points = allocate_planes(context, lattice.vertex_count);
   displace(context, lattice, points);
   return points;

@@ -3,9 +3,9 @@
 #include <array>
 #include <vector>
 
-#include "skeletex/cl/context.h"
-#include "skeletex/model/frame.h"
+#include "skeletex/device/context.h"
 #include "skeletex/model/texture.h"
+#include "skeletex/skeleton/frame.h"
 
 namespace skeletex {
 
@@ -47,13 +47,13 @@ struct DeviceLattice {
   DeviceTables tables;
   ClBuffer<LatticeRow> rows;
 };
-DeviceLattice upload_lattice(ClContext& context, const FrameTables& tables, const std::vector<Patch>& patches, const DisplacementTexture& texture,
-                             RowChoice choice);
+DeviceLattice upload_lattice(ClContext& context, const FrameTables& tables, const std::vector<Patch>& patches,
+                             const DisplacementTexture& texture, RowChoice choice);
 
 /// Queues the points of all rows (one launch), relative to the origin of the tables.
 void displace(ClContext& context, const DeviceLattice& lattice, DevicePlanes& points);
 
 /// The points of all rows of a model in its bind pose, relative to its origin.
-DevicePlanes row_points(ClContext& context, const SkeletexModel& model, const Walls& walls);
+DevicePlanes row_points(ClContext& context, const SkeletexModel& model, const SeparationPlanes& separation);
 
 }  // namespace skeletex

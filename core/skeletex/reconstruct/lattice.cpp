@@ -11,8 +11,8 @@ namespace skeletex {
 namespace {
 
 [[noreturn]] void refuse(const SkeletexModel& model, int bone, int end, const std::string& what) {
-  throw InputError(fmt::format("the model does not fit together at the {} of bone \"{}\": {}; encode it again", end == 0 ? "head" : "tail",
-                               model.skeleton.bones[bone].name, what));
+  throw InputError(fmt::format("the model does not fit together at the {} of bone \"{}\": {}; encode it again",
+                               end == 0 ? "head" : "tail", model.skeleton.bones[bone].name, what));
 }
 
 void check_end(const SkeletexModel& model, int bone, int end, const std::vector<int>& loop) {
@@ -20,10 +20,12 @@ void check_end(const SkeletexModel& model, int bone, int end, const std::vector<
   for (std::size_t i = 0; i < uses.size(); ++i) {
     const SeamArc& arc = model.arcs[uses[i].arc];
     if (arc.is_closed()) {
-      if (uses.size() > 1 || arc.samples.size() < 3) refuse(model, bone, end, "a closed arc needs three samples and no other arc beside it");
+      if (uses.size() > 1 || arc.samples.size() < 3)
+        refuse(model, bone, end, "a closed arc needs three samples and no other arc beside it");
       continue;
     }
-    if (arc.samples.empty()) refuse(model, bone, end, fmt::format("arc {} has no sample between its corners", uses[i].arc));
+    if (arc.samples.empty())
+      refuse(model, bone, end, fmt::format("arc {} has no sample between its corners", uses[i].arc));
     const ArcUse next = uses[(i + 1) % uses.size()];
     if (arc.corners[uses[i].is_reversed ? 0 : 1] != model.arcs[next.arc].corners[next.is_reversed ? 1 : 0])
       refuse(model, bone, end, fmt::format("arc {} does not end where arc {} starts", uses[i].arc, next.arc));
@@ -45,7 +47,8 @@ Lattice number_lattice(const SkeletexModel& model) {
   for (int bone = 0; bone < count; ++bone) {
     const auto [x, y, width, height] = model.patches[bone].rectangle;
     if (width < 4 || height < 4)
-      throw InputError(fmt::format("bone \"{}\" has a rectangle of {} x {} texels; 4 x 4 is the least", model.skeleton.bones[bone].name, width, height));
+      throw InputError(fmt::format("bone \"{}\" has a rectangle of {} x {} texels; 4 x 4 is the least",
+                                   model.skeleton.bones[bone].name, width, height));
     lattice.first_inner[bone] = lattice.inner_count;
     lattice.first_quad[bone] = lattice.quad_count;
     lattice.inner_count += width * (height - 2);
@@ -80,7 +83,8 @@ std::vector<int> end_loop(const SkeletexModel& model, const Lattice& lattice, in
     const SeamArc& arc = model.arcs[use.arc];
     const int samples = static_cast<int>(arc.samples.size());
     if (!arc.is_closed()) loop.push_back(lattice.first_corner + arc.corners[use.is_reversed ? 1 : 0]);
-    for (int i = 0; i < samples; ++i) loop.push_back(lattice.first_sample[use.arc] + (use.is_reversed ? samples - 1 - i : i));
+    for (int i = 0; i < samples; ++i)
+      loop.push_back(lattice.first_sample[use.arc] + (use.is_reversed ? samples - 1 - i : i));
   }
   return loop;
 }
@@ -103,7 +107,8 @@ void append_pole_fan(std::span<const int> row, int pole, BoneEnd end, std::vecto
   }
 }
 
-void append_pole_fan(const SkeletexModel& model, const Lattice& lattice, int bone, BoneEnd end, std::vector<Triangle>& triangles) {
+void append_pole_fan(const SkeletexModel& model, const Lattice& lattice, int bone, BoneEnd end,
+                     std::vector<Triangle>& triangles) {
   append_pole_fan(end_row(model, lattice, bone, end), lattice.poles[bone][static_cast<int>(end)], end, triangles);
 }
 

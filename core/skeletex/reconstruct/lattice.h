@@ -12,9 +12,9 @@ namespace skeletex {
 /// row by row; one pole per free end; the samples of every arc; the corners. Rows 0 and height-1 are no vertices of
 /// their own: they lie on seams, which both sides share, or on a pole.
 struct Lattice {
-  std::vector<int> first_inner;             ///< per patch: vertex of row 1, column 0
-  std::vector<std::array<int, 2>> poles;    ///< per patch, at the head and at the tail; -1 where a seam is
-  std::vector<int> first_sample;            ///< per arc
+  std::vector<int> first_inner;           ///< per patch: vertex of row 1, column 0
+  std::vector<std::array<int, 2>> poles;  ///< per patch, at the head and at the tail; -1 where a seam is
+  std::vector<int> first_sample;          ///< per arc
   int first_corner = 0;
   int inner_count = 0;
   int vertex_count = 0;
@@ -34,6 +34,7 @@ std::vector<int> end_row(const SkeletexModel& model, const Lattice& lattice, int
 /// The triangles between a pole and the inner row next to it, outward, of any numbering.
 void append_pole_fan(std::span<const int> row, int pole, BoneEnd end, std::vector<Triangle>& triangles);
 /// Those of a lattice.
-void append_pole_fan(const SkeletexModel& model, const Lattice& lattice, int bone, BoneEnd end, std::vector<Triangle>& triangles);
+void append_pole_fan(const SkeletexModel& model, const Lattice& lattice, int bone, BoneEnd end,
+                     std::vector<Triangle>& triangles);
 
 }  // namespace skeletex

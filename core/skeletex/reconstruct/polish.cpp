@@ -7,19 +7,20 @@
 #include <array>
 #include <set>
 
-#include "skeletex/measure/deformation.h"
-#include "skeletex/measure/self_intersection.h"
+#include "skeletex/analysis/deformation.h"
+#include "skeletex/geometry/self_intersection.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
 namespace {
 
 constexpr int kRounds = 20;
-constexpr float kStep = 0.5f;      // of the way to the neighbours' mean, at the triangles of a fold
+constexpr float kStep = 0.5f;       // of the way to the neighbours' mean, at the triangles of a fold
 constexpr float kRingStep = 0.25f;  // at their neighbours
 
 /// Per vertex how far it goes in this round.
-std::vector<float> steps_of_vertices(const TriangleMesh& mesh, const SurfaceEdges& edges, const std::vector<int>& folds) {
+std::vector<float> steps_of_vertices(const TriangleMesh& mesh, const SurfaceEdges& edges,
+                                     const std::vector<int>& folds) {
   std::vector<float> steps(mesh.positions.size(), 0.f);
   for (const int fold : folds)
     for (const int triangle : edges.triangles[fold])
@@ -32,7 +33,8 @@ std::vector<float> steps_of_vertices(const TriangleMesh& mesh, const SurfaceEdge
 }
 
 /// Sums over the edges at each vertex that moves: of weighted neighbours, and of the weights.
-void smooth(const SurfaceEdges& edges, const std::vector<double>& weights, const std::vector<float>& steps, std::vector<Vec3>& positions) {
+void smooth(const SurfaceEdges& edges, const std::vector<double>& weights, const std::vector<float>& steps,
+            std::vector<Vec3>& positions) {
   std::vector<Vec3> sums(positions.size(), Vec3::Zero());
   std::vector<double> totals(positions.size(), 0);
   for (std::size_t i = 0; i < weights.size(); ++i) {
@@ -48,7 +50,8 @@ void smooth(const SurfaceEdges& edges, const std::vector<double>& weights, const
 }
 
 /// Per vertex the connected part of the moved surface that it belongs to, -1 where it has not moved.
-std::vector<int> moved_parts(const SurfaceEdges& edges, const std::vector<Vec3>& posed, const std::vector<Vec3>& positions) {
+std::vector<int> moved_parts(const SurfaceEdges& edges, const std::vector<Vec3>& posed,
+                             const std::vector<Vec3>& positions) {
   std::vector<int> part(posed.size(), -1);
   for (std::size_t v = 0; v < posed.size(); ++v)
     if (positions[v] != posed[v]) part[v] = static_cast<int>(v);
@@ -63,10 +66,10 @@ std::vector<int> moved_parts(const SurfaceEdges& edges, const std::vector<Vec3>&
   return part;
 }
 
-/// Per part, by its number, the pairs of triangles that intersect, do not in the bind pose, and of which one is the part's.
-/// \param known  the pairs of the bind pose, sorted
-std::vector<int> new_intersections(const std::vector<Triangle>& triangles, const std::vector<std::array<int, 2>>& known, const std::vector<Vec3>& positions,
-                                   const std::vector<int>& part) {
+/// Per part, by its number, the pairs of triangles that intersect, do not in the bind pose, and of which one is the
+/// part's. \param known  the pairs of the bind pose, sorted
+std::vector<int> new_intersections(const std::vector<Triangle>& triangles, const std::vector<std::array<int, 2>>& known,
+                                   const std::vector<Vec3>& positions, const std::vector<int>& part) {
   std::vector<int> counts(positions.size(), 0);
   for (const auto& pair : find_self_intersections({positions, triangles})) {
     if (std::binary_search(known.begin(), known.end(), pair)) continue;
@@ -80,10 +83,12 @@ std::vector<int> new_intersections(const std::vector<Triangle>& triangles, const
 }
 
 /// Moves parts back that have got more intersections.
-void revert_intersecting(const TriangleMesh& bind, const SurfaceEdges& edges, const std::vector<Vec3>& posed, std::vector<Vec3>& positions) {
+void revert_intersecting(const TriangleMesh& bind, const SurfaceEdges& edges, const std::vector<Vec3>& posed,
+                         std::vector<Vec3>& positions) {
   const std::vector<int> part = moved_parts(edges, posed, positions);
   const auto known = find_self_intersections(bind);
-  const std::vector<int> before = new_intersections(bind.triangles, known, posed, part), after = new_intersections(bind.triangles, known, positions, part);
+  const std::vector<int> before = new_intersections(bind.triangles, known, posed, part),
+                         after = new_intersections(bind.triangles, known, positions, part);
   for (std::size_t v = 0; v < posed.size(); ++v)
     if (part[v] >= 0 && after[part[v]] > before[part[v]]) positions[v] = posed[v];
 }
@@ -92,11 +97,14 @@ void revert_intersecting(const TriangleMesh& bind, const SurfaceEdges& edges, co
 
 PolishReport polish_pose(const TriangleMesh& bind, std::vector<Vec3>& positions) {
   if (positions.size() != bind.positions.size())
-    throw InputError(fmt::format("the mesh in the pose has {} vertices, in the bind pose {}; they must be two poses of one model", positions.size(), bind.positions.size()));
+    throw InputError(
+        fmt::format("the mesh in the pose has {} vertices, in the bind pose {}; they must be two poses of one model",
+                    positions.size(), bind.positions.size()));
   const SurfaceEdges edges = surface_edges(bind);
   const double shortest = 1e-9 * bounding_box(bind).diagonal();
   std::vector<double> weights;
-  for (const auto& [a, b] : edges.vertices) weights.push_back(1 / std::max(shortest, (bind.positions[a] - bind.positions[b]).norm()));
+  for (const auto& [a, b] : edges.vertices)
+    weights.push_back(1 / std::max(shortest, (bind.positions[a] - bind.positions[b]).norm()));
 
   const std::vector<Vec3> posed = positions;
   std::vector<Vec3> current = positions;

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "skeletex/model/mesh.h"
+#include "skeletex/geometry/mesh.h"
 
 namespace skeletex {
 
@@ -15,12 +15,13 @@ struct PolishReport {
   double farthest = 0;  ///< that a vertex was moved, world units
 };
 
-/// A corrective step for poses that fold the surface: where an edge is folded anew, its triangles and their neighbours are smoothed by the
-/// scale-dependent Laplacian of the bind pose (Desbrun et al., Implicit Fairing of Irregular Meshes using Diffusion and Curvature Flow, 1999),
-/// up to 20 rounds. The round with the fewest new folds is kept, and connected parts that would get more new intersections of triangles are
-/// left as they were; so a pose gets more of neither. Vertices elsewhere keep their places.
-/// Cost: several searches for intersections (measure/self_intersection.h), below a second for 130 000 triangles.
-/// \param positions  of the bind mesh's vertices in the pose    \throw InputError when their number differs
+/// A corrective step for poses that fold the surface: where an edge is folded anew, its triangles and their neighbours
+/// are smoothed by the scale-dependent Laplacian of the bind pose (Desbrun et al., Implicit Fairing of Irregular Meshes
+/// using Diffusion and Curvature Flow, 1999), up to 20 rounds. The round with the fewest new folds is kept, and
+/// connected parts that would get more new intersections of triangles are left as they were; so a pose gets more of
+/// neither. Vertices elsewhere keep their places. Cost: several searches for intersections
+/// (measure/self_intersection.h), below a second for 130 000 triangles. \param positions  of the bind mesh's vertices
+/// in the pose    \throw InputError when their number differs
 PolishReport polish_pose(const TriangleMesh& bind, std::vector<Vec3>& positions);
 
 }  // namespace skeletex

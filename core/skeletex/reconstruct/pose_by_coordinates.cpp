@@ -15,7 +15,7 @@ namespace {
 constexpr double kTwoPi = 2 * std::numbers::pi;
 
 /// The arcs around a bone's end by growing bind angle in [0, 2 pi): the one that runs across angle 0 comes as two.
-std::vector<PosedArcRecord> arc_records(const PosedWalls& posed, int bone, BoneEnd end) {
+std::vector<PosedArcRecord> arc_records(const PosedPlanes& posed, int bone, BoneEnd end) {
   const std::vector<PosedBound> bounds = posed.bounds(bone, end);
   if (bounds.empty()) return {PosedArcRecord{}};
   std::vector<PosedArcRecord> records;
@@ -26,8 +26,9 @@ std::vector<PosedArcRecord> arc_records(const PosedWalls& posed, int bone, BoneE
       const double begin = bound.turn - lap, first = std::max(0.0, begin);
       if (length <= 0 || begin + length <= 0 || begin >= 1) continue;
       const double rate = (bound.end_roll - bound.roll) / length;
-      records.push_back({static_cast<float>(kTwoPi * first), static_cast<float>(kTwoPi * (bound.roll + rate * (first - begin))),
-                         static_cast<float>(rate), static_cast<float>(bound.slope_s), static_cast<float>(bound.slope_b)});
+      records.push_back({static_cast<float>(kTwoPi * first),
+                         static_cast<float>(kTwoPi * (bound.roll + rate * (first - begin))), static_cast<float>(rate),
+                         static_cast<float>(bound.slope_s), static_cast<float>(bound.slope_b)});
     }
   return records;
 }
@@ -37,7 +38,7 @@ struct EndTables {
   std::vector<PosedArcRecord> arcs;
 };
 
-EndTables end_tables(const SkeletexModel& model, const PosedWalls& posed) {
+EndTables end_tables(const SkeletexModel& model, const PosedPlanes& posed) {
   EndTables tables;
   for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
     PosedEndsRecord record{};
@@ -60,61 +61,68 @@ ClLocal loops_of_block() { return ClLocal{6 * SKIN_BLOCK * sizeof(float)}; }
 
 }  // namespace
 
-BoneCoordinates bone_coordinates(const Skeleton& skeleton, const Walls& walls, int bone, const Vec3& point) {
+BoneCoordinates bone_coordinates(const Skeleton& skeleton, const SeparationPlanes& separation, int bone,
+                                 const Vec3& point) {
   const Vec3 offset = point - end_position(skeleton, bone, BoneEnd::kHead);
-  const bool is_head_free = walls.is_free(bone, BoneEnd::kHead), is_tail_free = walls.is_free(bone, BoneEnd::kTail);
-  const double length = bone_length(skeleton, bone), turn = walls.turn_of(bone, offset);
-  const double along = offset.dot(walls.bases()[bone].o);
-  const double across = std::hypot(offset.dot(walls.bases()[bone].s), offset.dot(walls.bases()[bone].b));
-  const double from_head = along - across * walls.slope(bone, BoneEnd::kHead, turn);
-  const double to_tail = length + across * walls.slope(bone, BoneEnd::kTail, turn) - along;
+  const bool is_head_free = separation.is_free(bone, BoneEnd::kHead),
+             is_tail_free = separation.is_free(bone, BoneEnd::kTail);
+  const double length = bone_length(skeleton, bone), turn = separation.turn_of(bone, offset);
+  const double along = offset.dot(separation.bases()[bone].o);
+  const double across = std::hypot(offset.dot(separation.bases()[bone].s), offset.dot(separation.bases()[bone].b));
+  const double from_head = along - across * separation.slope(bone, BoneEnd::kHead, turn);
+  const double to_tail = length + across * separation.slope(bone, BoneEnd::kTail, turn) - along;
   // a and b where both are positive, -b and -a where both are negative; one of the two is 0 beyond one plane alone.
-  const double before = std::max(0.0, from_head) + std::max(0.0, -to_tail), after = std::max(0.0, to_tail) + std::max(0.0, -from_head);
-  Station at{before > 0 ? before / (before + after) : 0, 0};
-  if (is_head_free && at.station <= 0) at.latitude = std::min(0.0, std::atan2(along, across));
-  if (is_tail_free && at.station >= 1) at.latitude = std::max(0.0, std::atan2(along - length, across));
+  const double before = std::max(0.0, from_head) + std::max(0.0, -to_tail),
+               after = std::max(0.0, to_tail) + std::max(0.0, -from_head);
+  Axial at{before > 0 ? before / (before + after) : 0, 0};
+  if (is_head_free && at.axial <= 0) at.latitude = std::min(0.0, std::atan2(along, across));
+  if (is_tail_free && at.axial >= 1) at.latitude = std::max(0.0, std::atan2(along - length, across));
   return {u_of(at, is_head_free, is_tail_free), turn};
 }
 
-Vec3 posed_by_coordinates(const SkeletexModel& model, const Walls& bind, const PosedWalls& posed, int bone, const Vec3& point, DistanceRule rule) {
+Vec3 posed_by_coordinates(const SkeletexModel& model, const SeparationPlanes& bind, const PosedPlanes& posed, int bone,
+                          const Vec3& point, DistanceRule rule) {
   const auto [u, turn] = bone_coordinates(model.skeleton, bind, bone, point);
-  const Vec3 texel = encode_texel(tangent_frame(model.skeleton, bind, bone, u, turn), point, end_position(model.skeleton, bone, BoneEnd::kHead),
+  const Vec3 texel = encode_texel(tangent_frame(model.skeleton, bind, bone, u, turn), point,
+                                  end_position(model.skeleton, bone, BoneEnd::kHead),
                                   end_position(model.skeleton, bone, BoneEnd::kTail));
   return posed_point(model, bind, posed, bone, u, turn, texel, rule);
 }
 
 DeviceCoordinates make_coordinates(ClContext& context, const SkeletexModel& model, const DevicePlanes& points) {
-  const Walls walls(model.skeleton);
-  const EndTables tables = end_tables(model, PosedWalls(model, model.skeleton));
+  const SeparationPlanes separation(model.skeleton);
+  const EndTables tables = end_tables(model, PosedPlanes(model, model.skeleton));
   const std::size_t size = points.x.size;
   DeviceCoordinates made{context.upload(skin_blocks(model.patches)),
-                         context.upload(frame_tables(model.skeleton, walls, model.patches, model.origin).patches),
+                         context.upload(frame_tables(model.skeleton, separation, model.patches, model.origin).patches),
                          context.allocate<float>(size),
                          context.allocate<float>(size),
                          context.allocate<float>(size),
                          context.allocate<float>(size),
                          context.allocate<float>(size)};
   if (made.blocks.size > 0)
-    context.launch({"coordinates.cl", "bone_coordinates"}, block_range(context, made.blocks.size), static_cast<int>(made.blocks.size), made.blocks,
-                   made.patches, context.upload(tables.ends), context.upload(tables.arcs), points.x, points.y, points.z, made.angle, made.distance,
-                   made.height, made.slope_head, made.slope_tail, loops_of_block());
+    context.launch({"coordinates.cl", "bone_coordinates"}, block_range(context, made.blocks.size),
+                   static_cast<int>(made.blocks.size), made.blocks, made.patches, context.upload(tables.ends),
+                   context.upload(tables.arcs), points.x, points.y, points.z, made.angle, made.distance, made.height,
+                   made.slope_head, made.slope_tail, loops_of_block());
   return made;
 }
 
-void pose_by_coordinates(ClContext& context, const SkeletexModel& model, const DeviceCoordinates& coordinates, const PosedWalls& posed,
-                         DistanceRule rule, const Vec3& origin, DevicePlanes& points) {
+void pose_by_coordinates(ClContext& context, const SkeletexModel& model, const DeviceCoordinates& coordinates,
+                         const PosedPlanes& posed, DistanceRule rule, const Vec3& origin, DevicePlanes& points) {
   if (coordinates.blocks.size == 0) return;
   const EndTables tables = end_tables(model, posed);
-  context.launch({"coordinates.cl", "pose_by_coordinates"}, block_range(context, coordinates.blocks.size), static_cast<int>(coordinates.blocks.size),
-                 static_cast<int>(rule == DistanceRule::kFromBone), coordinates.blocks, coordinates.patches,
-                 context.upload(posed_patches(model, posed, origin)), context.upload(tables.ends), context.upload(tables.arcs), coordinates.angle,
-                 coordinates.distance, coordinates.height, coordinates.slope_head, coordinates.slope_tail, points.x, points.y, points.z,
+  context.launch({"coordinates.cl", "pose_by_coordinates"}, block_range(context, coordinates.blocks.size),
+                 static_cast<int>(coordinates.blocks.size), static_cast<int>(rule == DistanceRule::kFromBone),
+                 coordinates.blocks, coordinates.patches, context.upload(posed_patches(model, posed, origin)),
+                 context.upload(tables.ends), context.upload(tables.arcs), coordinates.angle, coordinates.distance,
+                 coordinates.height, coordinates.slope_head, coordinates.slope_tail, points.x, points.y, points.z,
                  loops_of_block());
 }
 
-void place_shared_by_coordinates(const SkeletexModel& model, const PosedWalls& posed, const Lattice& lattice, DistanceRule rule,
-                                 std::vector<Vec3>& positions) {
-  const Walls bind(model.skeleton);
+void place_shared_by_coordinates(const SkeletexModel& model, const PosedPlanes& posed, const Lattice& lattice,
+                                 DistanceRule rule, std::vector<Vec3>& positions) {
+  const SeparationPlanes bind(model.skeleton);
   place_shared_vertices(model, posed, lattice, rule, positions);
   std::vector<Vec3> bind_positions(positions.size());
   place_shared_vertices(model, bind, lattice, bind_positions);

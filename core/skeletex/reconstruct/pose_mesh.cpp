@@ -24,7 +24,8 @@ void download_points(ClContext& context, const DevicePlanes& points, const Vec3&
 
 }  // namespace
 
-DevicePose upload_pose(ClContext& context, const SkeletexModel& model, const PosedWalls& posed, RowChoice choice, DistanceRule rule) {
+DevicePose upload_pose(ClContext& context, const SkeletexModel& model, const PosedPlanes& posed, RowChoice choice,
+                       DistanceRule rule) {
   const PoseTables tables = pose_tables(model, posed);
   const std::size_t count = tables.columns.size();
   std::vector<float> columns(4 * count);
@@ -37,45 +38,63 @@ DevicePose upload_pose(ClContext& context, const SkeletexModel& model, const Pos
   std::vector<LatticeRow> plain = lattice_rows(model.patches, choice), other;
   const auto is_plain = [&](const LatticeRow& row) {
     const PosedRowRecord& record = tables.rows[tables.patches[row[0]].row_begin + row[1]];
-    return rule == DistanceRule::kFromBone && record.bind_reach_head == 0 && record.bind_reach_tail == 0 && record.reach_head == 0 && record.reach_tail == 0;
+    return rule == DistanceRule::kFromBone && record.bind_reach_head == 0 && record.bind_reach_tail == 0 &&
+           record.reach_head == 0 && record.reach_tail == 0;
   };
-  std::copy_if(plain.begin(), plain.end(), std::back_inserter(other), [&](const LatticeRow& row) { return !is_plain(row); });
+  std::copy_if(plain.begin(), plain.end(), std::back_inserter(other),
+               [&](const LatticeRow& row) { return !is_plain(row); });
   std::erase_if(plain, [&](const LatticeRow& row) { return !is_plain(row); });
-  return {context.upload(tables.patches), context.upload(tables.rows), context.upload(columns), context.upload(plain), context.upload(other),
-          plain.size(), other.size(), rule == DistanceRule::kFromBone, tables.origin};
+  return {context.upload(tables.patches),
+          context.upload(tables.rows),
+          context.upload(columns),
+          context.upload(plain),
+          context.upload(other),
+          plain.size(),
+          other.size(),
+          rule == DistanceRule::kFromBone,
+          tables.origin};
 }
 
 void displace_posed(ClContext& context, const DeviceLattice& lattice, const DevicePose& pose, DevicePlanes& points) {
   const DeviceTables& bind = lattice.tables;
   if (pose.plain_count > 0)
-    context.launch({"pose.cl", "displace_posed"}, row_range(context, pose.plain_count), static_cast<int>(pose.plain_count), lattice.texture_width,
-                   bind.column_count, pose.plain_rows, bind.rows, bind.columns, pose.patches, pose.columns, lattice.texels.x, lattice.texels.y,
+    context.launch({"pose.cl", "displace_posed"}, row_range(context, pose.plain_count),
+                   static_cast<int>(pose.plain_count), lattice.texture_width, bind.column_count, pose.plain_rows,
+                   bind.rows, bind.columns, pose.patches, pose.columns, lattice.texels.x, lattice.texels.y,
                    lattice.texels.z, points.x, points.y, points.z);
   if (pose.other_count > 0)
-    context.launch({"pose.cl", "displace_posed_from_bind"}, row_range(context, pose.other_count), static_cast<int>(pose.other_count),
-                   lattice.texture_width, bind.column_count, static_cast<int>(pose.is_distance_kept), pose.other_rows, bind.patches, bind.rows,
-                   bind.columns, pose.patches, pose.rows, pose.columns, lattice.texels.x, lattice.texels.y, lattice.texels.z, points.x, points.y, points.z);
+    context.launch({"pose.cl", "displace_posed_from_bind"}, row_range(context, pose.other_count),
+                   static_cast<int>(pose.other_count), lattice.texture_width, bind.column_count,
+                   static_cast<int>(pose.is_distance_kept), pose.other_rows, bind.patches, bind.rows, bind.columns,
+                   pose.patches, pose.rows, pose.columns, lattice.texels.x, lattice.texels.y, lattice.texels.z,
+                   points.x, points.y, points.z);
 }
 
-void place_shared_vertices(const SkeletexModel& model, const PosedWalls& walls, const Lattice& lattice, DistanceRule rule, std::vector<Vec3>& positions) {
-  const Walls bind(model.skeleton);
+void place_shared_vertices(const SkeletexModel& model, const PosedPlanes& separation, const Lattice& lattice,
+                           DistanceRule rule, std::vector<Vec3>& positions) {
+  const SeparationPlanes bind(model.skeleton);
   for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
     for (const int end : {0, 1}) {
       if (lattice.poles[bone][end] < 0) continue;
       const Rectangle& rectangle = model.patches[bone].rectangle;
-      const std::size_t at = static_cast<std::size_t>(rectangle.y + (end == 0 ? 0 : rectangle.height - 1)) * model.texture.width + rectangle.x;
+      const std::size_t at =
+          static_cast<std::size_t>(rectangle.y + (end == 0 ? 0 : rectangle.height - 1)) * model.texture.width +
+          rectangle.x;
       const Vec3 texel(model.texture.along[at], model.texture.around[at], model.texture.out[at]);
-      positions[lattice.poles[bone][end]] = posed_point(model, bind, walls, bone, end, 0, texel, rule);
+      positions[lattice.poles[bone][end]] = posed_point(model, bind, separation, bone, end, 0, texel, rule);
     }
   for (int a = 0; a < static_cast<int>(model.arcs.size()); ++a)
-    for (int i = 0; i < static_cast<int>(model.arcs[a].samples.size()); ++i) positions[lattice.first_sample[a] + i] = walls.sample_point(a, i, rule);
-  for (int c = 0; c < static_cast<int>(model.corners.size()); ++c) positions[lattice.first_corner + c] = walls.corner_point(c, rule);
+    for (int i = 0; i < static_cast<int>(model.arcs[a].samples.size()); ++i)
+      positions[lattice.first_sample[a] + i] = separation.sample_point(a, i, rule);
+  for (int c = 0; c < static_cast<int>(model.corners.size()); ++c)
+    positions[lattice.first_corner + c] = separation.corner_point(c, rule);
 }
 
 namespace {
 
-void pose_smoothly(ClContext& context, const SkeletexModel& model, const Skeleton& posed, const Lattice& lattice, std::vector<Vec3>& positions) {
-  DevicePlanes bind = displace_inner(context, model, Walls(model.skeleton), lattice);
+void pose_smoothly(ClContext& context, const SkeletexModel& model, const Skeleton& posed, const Lattice& lattice,
+                   std::vector<Vec3>& positions) {
+  DevicePlanes bind = displace_inner(context, model, SeparationPlanes(model.skeleton), lattice);
   const Skin skin = make_skin(context, model, bind);
   const DeviceSkin device = upload_skin(context, skin, std::move(bind));
   const std::vector<BoneMotion> motions = bone_motions(model.skeleton, posed);
@@ -86,27 +105,29 @@ void pose_smoothly(ClContext& context, const SkeletexModel& model, const Skeleto
   pose_shared_vertices(skin, motions, positions);
 }
 
-void pose_by_own_coordinates(ClContext& context, const SkeletexModel& model, const Skeleton& posed, const Lattice& lattice, DistanceRule rule,
-                             std::vector<Vec3>& positions) {
-  const PosedWalls walls(model, posed);
-  const DeviceCoordinates coordinates = make_coordinates(context, model, displace_inner(context, model, Walls(model.skeleton), lattice));
+void pose_by_own_coordinates(ClContext& context, const SkeletexModel& model, const Skeleton& posed,
+                             const Lattice& lattice, DistanceRule rule, std::vector<Vec3>& positions) {
+  const PosedPlanes separation(model, posed);
+  const DeviceCoordinates coordinates =
+      make_coordinates(context, model, displace_inner(context, model, SeparationPlanes(model.skeleton), lattice));
   const Vec3 origin = middle_of_nodes(posed);
   DevicePlanes points = allocate_planes(context, lattice.inner_count);
-  pose_by_coordinates(context, model, coordinates, walls, rule, origin, points);
+  pose_by_coordinates(context, model, coordinates, separation, rule, origin, points);
   download_points(context, points, origin, positions);
-  place_shared_by_coordinates(model, walls, lattice, rule, positions);
+  place_shared_by_coordinates(model, separation, lattice, rule, positions);
 }
 
-void pose_by_paper(ClContext& context, const SkeletexModel& model, const Skeleton& posed, const Lattice& lattice, DistanceRule rule, std::vector<Vec3>& positions) {
-  const Walls bind(model.skeleton);
-  const PosedWalls walls(model, posed);
-  const DeviceLattice device =
-      upload_lattice(context, frame_tables(model.skeleton, bind, model.patches, model.origin), model.patches, model.texture, RowChoice::kInner);
-  const DevicePose pose = upload_pose(context, model, walls, RowChoice::kInner, rule);
+void pose_by_paper(ClContext& context, const SkeletexModel& model, const Skeleton& posed, const Lattice& lattice,
+                   DistanceRule rule, std::vector<Vec3>& positions) {
+  const SeparationPlanes bind(model.skeleton);
+  const PosedPlanes separation(model, posed);
+  const DeviceLattice device = upload_lattice(context, frame_tables(model.skeleton, bind, model.patches, model.origin),
+                                              model.patches, model.texture, RowChoice::kInner);
+  const DevicePose pose = upload_pose(context, model, separation, RowChoice::kInner, rule);
   DevicePlanes points = allocate_planes(context, device.vertex_count);
   displace_posed(context, device, pose, points);
   download_points(context, points, pose.origin, positions);
-  place_shared_vertices(model, walls, lattice, rule, positions);
+  place_shared_vertices(model, separation, lattice, rule, positions);
 }
 
 }  // namespace
@@ -120,35 +141,42 @@ const char* to_string(Deformation deformation) {
   return "?";
 }
 
-TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model, const Skeleton& posed, const PoseRule& rule) {
+TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model, const Skeleton& posed,
+                              const PoseRule& rule) {
   TriangleMesh mesh = reconstruct_mesh(context, model);
   const Lattice lattice = number_lattice(model);
   switch (rule.deformation) {
     case Deformation::kSmooth: pose_smoothly(context, model, posed, lattice, mesh.positions); break;
-    case Deformation::kCoordinates: pose_by_own_coordinates(context, model, posed, lattice, rule.distance, mesh.positions); break;
+    case Deformation::kCoordinates:
+      pose_by_own_coordinates(context, model, posed, lattice, rule.distance, mesh.positions);
+      break;
     case Deformation::kPaper: pose_by_paper(context, model, posed, lattice, rule.distance, mesh.positions); break;
   }
   return mesh;
 }
 
-TriangleMesh constant_offset_mesh(ClContext& context, const SkeletexModel& model, const Skeleton& posed, std::span<const int> bones, double offset,
-                                  DistanceRule rule) {
-  if (!(offset > 0)) throw InputError(fmt::format("a plane in bone tangent space lies outside the bones: its offset, {}, must be above 0", offset));
-  const Walls bind(model.skeleton);
-  const PosedWalls walls(model, posed);
+TriangleMesh constant_offset_mesh(ClContext& context, const SkeletexModel& model, const Skeleton& posed,
+                                  std::span<const int> bones, double offset, DistanceRule rule) {
+  if (!(offset > 0))
+    throw InputError(
+        fmt::format("a plane in bone tangent space lies outside the bones: its offset, {}, must be above 0", offset));
+  const SeparationPlanes bind(model.skeleton);
+  const PosedPlanes separation(model, posed);
   DisplacementTexture plane = model.texture;
   std::fill(plane.along.begin(), plane.along.end(), 0.f);
   std::fill(plane.around.begin(), plane.around.end(), 0.f);
   std::fill(plane.out.begin(), plane.out.end(), static_cast<float>(offset));
-  const DeviceLattice device = upload_lattice(context, frame_tables(model.skeleton, bind, model.patches, model.origin), model.patches, plane, RowChoice::kAll);
-  const DevicePose pose = upload_pose(context, model, walls, RowChoice::kAll, rule);
+  const DeviceLattice device = upload_lattice(context, frame_tables(model.skeleton, bind, model.patches, model.origin),
+                                              model.patches, plane, RowChoice::kAll);
+  const DevicePose pose = upload_pose(context, model, separation, RowChoice::kAll, rule);
   DevicePlanes points = allocate_planes(context, device.vertex_count);
   displace_posed(context, device, pose, points);
   std::vector<Vec3> positions(device.vertex_count);
   download_points(context, points, pose.origin, positions);
 
   std::vector<int> firsts(model.patches.size() + 1, 0), all(model.patches.size());
-  for (std::size_t i = 0; i < model.patches.size(); ++i) firsts[i + 1] = firsts[i] + model.patches[i].rectangle.width * model.patches[i].rectangle.height;
+  for (std::size_t i = 0; i < model.patches.size(); ++i)
+    firsts[i + 1] = firsts[i] + model.patches[i].rectangle.width * model.patches[i].rectangle.height;
   std::iota(all.begin(), all.end(), 0);
   TriangleMesh mesh;
   for (const int bone : bones.empty() ? std::span<const int>(all) : bones) {
@@ -157,7 +185,8 @@ TriangleMesh constant_offset_mesh(ClContext& context, const SkeletexModel& model
     mesh.positions.insert(mesh.positions.end(), positions.begin() + firsts[bone], positions.begin() + firsts[bone + 1]);
     for (int row = 0; row + 1 < height; ++row)
       for (int j = 0; j < width; ++j) {
-        const int v00 = base + row * width + j, v01 = base + row * width + (j + 1) % width, v10 = v00 + width, v11 = v01 + width;
+        const int v00 = base + row * width + j, v01 = base + row * width + (j + 1) % width, v10 = v00 + width,
+                  v11 = v01 + width;
         mesh.triangles.push_back({v00, v01, v11});
         mesh.triangles.push_back({v00, v11, v10});
       }

@@ -5,17 +5,17 @@
 #include <cmath>
 #include <numbers>
 
+#include "skeletex/convert/layout/pack_atlas.h"
 #include "skeletex/model/encoder_settings.h"
-#include "skeletex/model/frame.h"
-#include "skeletex/pack/pack_atlas.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/skeleton/frame.h"
 
 namespace skeletex {
 namespace {
 
-/// The surface between old samples, along one axis: linear where the lattice gets coarser; where it gets finer, a cubic of
-/// Mitchell and Netravali's family on the Keys line, which passes through P + B / 6 * (second difference of P).
+/// The surface between old samples, along one axis: linear where the lattice gets coarser; where it gets finer, a cubic
+/// of Mitchell and Netravali's family on the Keys line, which passes through P + B / 6 * (second difference of P).
 struct Interpolant {
   bool is_cubic = false;
   double softness = 0;  // B / 6
@@ -27,7 +27,8 @@ struct Interpolant {
     const auto kernel = [b, c](double x) {
       x = std::abs(x);
       return x < 1 ? ((12 - 9 * b - 6 * c) * x * x * x + (-18 + 12 * b + 6 * c) * x * x + (6 - 2 * b)) / 6
-                   : ((-b - 6 * c) * x * x * x + (6 * b + 30 * c) * x * x + (-12 * b - 48 * c) * x + (8 * b + 24 * c)) / 6;
+                   : ((-b - 6 * c) * x * x * x + (6 * b + 30 * c) * x * x + (-12 * b - 48 * c) * x + (8 * b + 24 * c)) /
+                         6;
     };
     return {kernel(1 + fraction), kernel(fraction), kernel(1 - fraction), kernel(2 - fraction)};
   }
@@ -115,7 +116,8 @@ double inverse_mass(int k) { return std::numbers::sqrt3 * std::pow(std::numbers:
 
 FilterTaps filter_taps(int old_count, int new_count, bool is_periodic, ResampleFilter filter, double softness) {
   FilterTaps taps;
-  const double spacing = is_periodic ? static_cast<double>(old_count) / new_count : static_cast<double>(old_count - 1) / (new_count - 1);
+  const double spacing =
+      is_periodic ? static_cast<double>(old_count) / new_count : static_cast<double>(old_count - 1) / (new_count - 1);
   const Interpolant interpolant{spacing < 1, softness};
   for (int i = 0; i < new_count; ++i) {
     OpenWeights open;
@@ -127,7 +129,8 @@ FilterTaps filter_taps(int old_count, int new_count, bool is_periodic, ResampleF
     } else if (filter == ResampleFilter::kAverage) {
       open.add_tent(interpolant, x, spacing, 1);
     } else {
-      for (int k = -kProjectionReach; k <= kProjectionReach; ++k) open.add_tent(interpolant, x + k * spacing, spacing, inverse_mass(k));
+      for (int k = -kProjectionReach; k <= kProjectionReach; ++k)
+        open.add_tent(interpolant, x + k * spacing, spacing, inverse_mass(k));
     }
     append_folded(open, old_count, is_periodic, taps);
   }
@@ -186,8 +189,11 @@ std::vector<Vec3> resample_polyline(const std::vector<Vec3>& points, bool is_clo
   return result;
 }
 
-std::vector<Rectangle> scale_rectangles(const std::vector<Patch>& patches, int width, int height, int new_width, int new_height) {
-  const auto scale = [](int edge, int from, int to) { return static_cast<int>(std::lround(static_cast<double>(edge) * to / from)); };
+std::vector<Rectangle> scale_rectangles(const std::vector<Patch>& patches, int width, int height, int new_width,
+                                        int new_height) {
+  const auto scale = [](int edge, int from, int to) {
+    return static_cast<int>(std::lround(static_cast<double>(edge) * to / from));
+  };
   std::vector<Rectangle> scaled;
   for (const Patch& patch : patches) {
     const Rectangle& old = patch.rectangle;
@@ -224,7 +230,8 @@ std::vector<double> scale_row_u(const std::vector<double>& row_u, int height) {
 }
 
 std::vector<Patch> scale_patches(const SkeletexModel& model, int width, int height) {
-  std::vector<Rectangle> rectangles = scale_rectangles(model.patches, model.texture.width, model.texture.height, width, height);
+  std::vector<Rectangle> rectangles =
+      scale_rectangles(model.patches, model.texture.width, model.texture.height, width, height);
   if (rectangles.empty()) {
     std::vector<PatchDemand> demands;
     for (const Patch& patch : model.patches)
@@ -264,7 +271,8 @@ LatticeTaps lattice_taps(const SkeletexModel& model, const std::vector<Patch>& p
   return taps;
 }
 
-void resample_texels(ClContext& context, const SkeletexModel& model, const Walls& walls, SkeletexModel& result) {
+void resample_texels(ClContext& context, const SkeletexModel& model, const SeparationPlanes& separation,
+                     SkeletexModel& result) {
   const int count = static_cast<int>(model.patches.size());
   std::vector<int> widths, first_old, first_middle;  // of the old lattice, and of the one with new rows and old columns
   std::vector<Patch> middle = result.patches;
@@ -280,34 +288,37 @@ void resample_texels(ClContext& context, const SkeletexModel& model, const Walls
     new_size += to.width * to.height;
   }
 
-  const FrameTables tables = in_bone_axes(frame_tables(model.skeleton, walls, result.patches, model.origin));
+  const FrameTables tables = in_bone_axes(frame_tables(model.skeleton, separation, result.patches, model.origin));
   const DeviceTables device_tables = upload_tables(context, tables);
-  const auto old_widths = context.upload(widths), from_old = context.upload(first_old), from_middle = context.upload(first_middle);
-  const std::vector<LatticeRow> rows = lattice_rows(result.patches, RowChoice::kAll), middle_rows = lattice_rows(middle, RowChoice::kAll);
+  const auto old_widths = context.upload(widths), from_old = context.upload(first_old),
+             from_middle = context.upload(first_middle);
+  const std::vector<LatticeRow> rows = lattice_rows(result.patches, RowChoice::kAll),
+                                middle_rows = lattice_rows(middle, RowChoice::kAll);
   const auto device_rows = context.upload(rows), device_middle_rows = context.upload(middle_rows);
   const int row_count = static_cast<int>(rows.size());
   const ClRange range = row_range(context, rows.size());
 
   DevicePlanes old_points = allocate_planes(context, old_size);
   {
-    const FrameTables old_tables = in_bone_axes(frame_tables(model.skeleton, walls, model.patches, model.origin));
+    const FrameTables old_tables = in_bone_axes(frame_tables(model.skeleton, separation, model.patches, model.origin));
     displace(context, upload_lattice(context, old_tables, model.patches, model.texture, RowChoice::kAll), old_points);
   }
   const auto filtered = [&](ResampleFilter filter) {
     const LatticeTaps taps = lattice_taps(model, result.patches, filter);
     DevicePlanes between = allocate_planes(context, middle_size), points = allocate_planes(context, new_size);
-    context.launch({"reconstruct.cl", "filter_rows"}, range, row_count, device_middle_rows, device_tables.patches, old_widths, from_old,
-                   context.upload(taps.rows.taps), context.upload(taps.rows.weights), old_points.x, old_points.y, old_points.z, between.x, between.y,
-                   between.z);
-    context.launch({"reconstruct.cl", "filter_columns"}, range, row_count, device_rows, device_tables.patches, old_widths, from_middle,
-                   context.upload(taps.columns.taps), context.upload(taps.columns.weights), between.x, between.y, between.z, points.x, points.y, points.z);
+    context.launch({"reconstruct.cl", "filter_rows"}, range, row_count, device_middle_rows, device_tables.patches,
+                   old_widths, from_old, context.upload(taps.rows.taps), context.upload(taps.rows.weights),
+                   old_points.x, old_points.y, old_points.z, between.x, between.y, between.z);
+    context.launch({"reconstruct.cl", "filter_columns"}, range, row_count, device_rows, device_tables.patches,
+                   old_widths, from_middle, context.upload(taps.columns.taps), context.upload(taps.columns.weights),
+                   between.x, between.y, between.z, points.x, points.y, points.z);
     return points;
   };
   DevicePlanes points = filtered(ResampleFilter::kProject);
   {
     const DevicePlanes sampled = filtered(ResampleFilter::kSample);
-    context.launch({"reconstruct.cl", "limit_fit"}, range, row_count, kLargestFit, device_rows, device_tables.patches, sampled.x, sampled.y, sampled.z,
-                   points.x, points.y, points.z);
+    context.launch({"reconstruct.cl", "limit_fit"}, range, row_count, kLargestFit, device_rows, device_tables.patches,
+                   sampled.x, sampled.y, sampled.z, points.x, points.y, points.z);
     context.finish();
   }
 
@@ -315,26 +326,30 @@ void resample_texels(ClContext& context, const SkeletexModel& model, const Walls
   DevicePlanes texels = allocate_planes(context, area);
   for (ClBuffer<float>* plane : {&texels.x, &texels.y, &texels.z}) context.fill(*plane, 0);
   context.launch({"reconstruct.cl", "enter_tangent_space"}, range, row_count, result.texture.width,
-                 device_tables.column_count, device_rows, device_tables.patches, device_tables.rows, device_tables.columns, points.x, points.y,
-                 points.z, texels.x, texels.y, texels.z);
+                 device_tables.column_count, device_rows, device_tables.patches, device_tables.rows,
+                 device_tables.columns, points.x, points.y, points.z, texels.x, texels.y, texels.z);
   result.texture.along = context.download(texels.x);
   result.texture.around = context.download(texels.y);
   result.texture.out = context.download(texels.z);
 }
 
-BoneEnd end_at(const Skeleton& skeleton, int bone, int node) { return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail; }
+BoneEnd end_at(const Skeleton& skeleton, int bone, int node) {
+  return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
+}
 
-SeamArc resample_arc(const SkeletexModel& model, const Walls& walls, const SeamArc& arc, int cells) {
+SeamArc resample_arc(const SkeletexModel& model, const SeparationPlanes& separation, const SeamArc& arc, int cells) {
   const int bone = arc.bones[0];
   const BoneEnd end = end_at(model.skeleton, bone, arc.node);
   const Vec3& node = model.skeleton.nodes[arc.node].position;
   const auto corner_point = [&](int corner) {
     const SeamCorner& c = model.corners[corner];
-    return walls.seam_point(c.bones[0], end_at(model.skeleton, c.bones[0], c.node), c.sample.turn, c.sample.distance);
+    return separation.seam_point(c.bones[0], end_at(model.skeleton, c.bones[0], c.node), c.sample.turn,
+                                 c.sample.distance);
   };
   std::vector<Vec3> points;
   if (!arc.is_closed()) points.push_back(corner_point(arc.corners[0]));
-  for (const SeamSample& sample : arc.samples) points.push_back(walls.seam_point(bone, end, sample.turn, sample.distance));
+  for (const SeamSample& sample : arc.samples)
+    points.push_back(separation.seam_point(bone, end, sample.turn, sample.distance));
   if (!arc.is_closed()) points.push_back(corner_point(arc.corners[1]));
 
   const std::vector<Vec3> fitted = resample_polyline(points, arc.is_closed(), cells, ResampleFilter::kProject);
@@ -342,27 +357,32 @@ SeamArc resample_arc(const SkeletexModel& model, const Walls& walls, const SeamA
   SeamArc result = arc;
   result.samples.clear();
   for (int i = arc.is_closed() ? 0 : 1; i < cells; ++i) {
-    // A fitted point that leaves the wall's interval would be restored on another wall.
-    const bool is_inside = walls.neighbour(bone, end, walls.turn_of(bone, fitted[i] - node)) == arc.bones[1];
+    // A fitted point that leaves the separation plane's interval would be restored on another separation plane.
+    const bool is_inside = separation.neighbour(bone, end, separation.turn_of(bone, fitted[i] - node)) == arc.bones[1];
     const Vec3& point = is_inside ? fitted[i] : sampled[i];
-    result.samples.push_back({walls.turn_of(bone, point - node), walls.half_line_distance(bone, end, point)});
+    result.samples.push_back({separation.turn_of(bone, point - node), separation.half_line_distance(bone, end, point)});
   }
   return result;
 }
 
 /// A plane of one value per texel at another size, linear between texels of the same patch.
-std::vector<float> resample_plane(const std::vector<float>& values, const SkeletexModel& model, const SkeletexModel& result) {
+std::vector<float> resample_plane(const std::vector<float>& values, const SkeletexModel& model,
+                                  const SkeletexModel& result) {
   std::vector<float> resampled(static_cast<std::size_t>(result.texture.width) * result.texture.height, 0.f);
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
     const Rectangle &from = model.patches[bone].rectangle, &to = result.patches[bone].rectangle;
-    const auto value = [&](int row, int column) { return values[static_cast<std::size_t>(from.y + row) * model.texture.width + from.x + column % from.width]; };
+    const auto value = [&](int row, int column) {
+      return values[static_cast<std::size_t>(from.y + row) * model.texture.width + from.x + column % from.width];
+    };
     for (int row = 0; row < to.height; ++row)
       for (int column = 0; column < to.width; ++column) {
-        const double y = static_cast<double>(row) * (from.height - 1) / (to.height - 1), x = static_cast<double>(column) * from.width / to.width;
+        const double y = static_cast<double>(row) * (from.height - 1) / (to.height - 1),
+                     x = static_cast<double>(column) * from.width / to.width;
         const int r = std::min(static_cast<int>(y), from.height - 2), c = static_cast<int>(x);
         const double v = y - r, u = x - c;
-        resampled[static_cast<std::size_t>(to.y + row) * result.texture.width + to.x + column] = static_cast<float>(
-            (1 - v) * ((1 - u) * value(r, c) + u * value(r, c + 1)) + v * ((1 - u) * value(r + 1, c) + u * value(r + 1, c + 1)));
+        resampled[static_cast<std::size_t>(to.y + row) * result.texture.width + to.x + column] =
+            static_cast<float>((1 - v) * ((1 - u) * value(r, c) + u * value(r, c + 1)) +
+                               v * ((1 - u) * value(r + 1, c) + u * value(r + 1, c + 1)));
       }
   }
   return resampled;
@@ -376,21 +396,23 @@ SkeletexModel resample_model(ClContext& context, const SkeletexModel& model, int
   const int width = side(model.texture.width), height = side(model.texture.height);
   if (width == model.texture.width && height == model.texture.height) return model;
 
-  const Walls walls(model.skeleton);
+  const SeparationPlanes separation(model.skeleton);
   SkeletexModel result = model;
   result.texture = {};
   result.texture.width = width;
   result.texture.height = height;
   result.patches = scale_patches(model, width, height);
   result.diagonals = DiagonalRule::kNearest;  // new texels lie evenly
-  resample_texels(context, model, walls, result);
+  resample_texels(context, model, separation, result);
   for (std::vector<float>& weights : result.bone_weights) weights = resample_plane(weights, model, result);
   for (SeamArc& arc : result.arcs) {
     double ratio = 0;
     for (const int bone : arc.bones)
-      ratio = std::max(ratio, static_cast<double>(result.patches[bone].rectangle.width) / model.patches[bone].rectangle.width);
+      ratio = std::max(ratio,
+                       static_cast<double>(result.patches[bone].rectangle.width) / model.patches[bone].rectangle.width);
     const int old_cells = static_cast<int>(arc.samples.size()) + (arc.is_closed() ? 0 : 1);
-    arc = resample_arc(model, walls, arc, std::max(arc.is_closed() ? 3 : 2, static_cast<int>(std::lround(old_cells * ratio))));
+    arc = resample_arc(model, separation, arc,
+                       std::max(arc.is_closed() ? 3 : 2, static_cast<int>(std::lround(old_cells * ratio))));
   }
   // For the record, and because a fit straddles the surface as prefiltered texels do.
   nlohmann::json settings = parsed_encoder_settings(model);

@@ -3,7 +3,7 @@
 #include <array>
 #include <vector>
 
-#include "skeletex/model/mesh.h"
+#include "skeletex/geometry/mesh.h"
 #include "skeletex/model/texture.h"
 
 namespace skeletex {
@@ -21,7 +21,8 @@ struct FilterTaps {
   std::vector<float> weights;            ///< each new sample's sum to 1
 };
 /// \param softness  where the lattice gets finer, the surface between old samples is the cubic that passes through
-///                  p + softness * (second difference of p); 1/16 takes back the encoder's prefilter, 0 passes through p
+///                  p + softness * (second difference of p); 1/16 takes back the encoder's prefilter, 0 passes through
+///                  p
 /// \param is_periodic  sample i lies at i / count and old indices wrap round (they stay below old_count, so do counts);
 ///                     otherwise at i / (count - 1), and the two ends are kept as they are
 FilterTaps filter_taps(int old_count, int new_count, bool is_periodic, ResampleFilter filter, double softness);
@@ -31,9 +32,9 @@ FilterTaps filter_taps(int old_count, int new_count, bool is_periodic, ResampleF
 /// no point of theirs stays.
 std::vector<Vec3> resample_polyline(const std::vector<Vec3>& points, bool is_closed, int cells, ResampleFilter filter);
 
-/// The rectangles of a width x height texture scaled to another one: edges keep their places relative to it, to rounding,
-/// so that nothing overlaps and covered stays covered.
-/// \return empty when a rectangle would fall below 4 x 4
-std::vector<Rectangle> scale_rectangles(const std::vector<Patch>& patches, int width, int height, int new_width, int new_height);
+/// The rectangles of a width x height texture scaled to another one: edges keep their places relative to it, to
+/// rounding, so that nothing overlaps and covered stays covered. \return empty when a rectangle would fall below 4 x 4
+std::vector<Rectangle> scale_rectangles(const std::vector<Patch>& patches, int width, int height, int new_width,
+                                        int new_height);
 
 }  // namespace skeletex

@@ -7,7 +7,7 @@
 #include <limits>
 #include <optional>
 
-#include "skeletex/model/loop_turns.h"
+#include "skeletex/geometry/loop_turns.h"
 
 namespace skeletex {
 namespace {
@@ -18,10 +18,11 @@ constexpr double kCapCosine2 = 0.9924;  // 175 degrees
 constexpr double kCapCost = 1;          // times the square of its longest side
 constexpr int kAroundCap = 3;           // seam vertices where caps are charged, before and behind one
 
-/// What it costs that a triangle is a cap, one with hardly an area and a direction of its own: a texel or sample lies between two others that
-/// sit on the same edge of the mesh. By its sides, squared.
+/// What it costs that a triangle is a cap, one with hardly an area and a direction of its own: a texel or sample lies
+/// between two others that sit on the same edge of the mesh. By its sides, squared.
 double cap_cost(double a2, double b2, double c2) {
-  const double longest2 = std::max({a2, b2, c2}), along = 0.5 * (2 * longest2 - (a2 + b2 + c2));  // the others' inner product
+  const double longest2 = std::max({a2, b2, c2}),
+               along = 0.5 * (2 * longest2 - (a2 + b2 + c2));  // the others' inner product
   return along > 0 && along * along * longest2 > kCapCosine2 * a2 * b2 * c2 ? kCapCost * longest2 : 0;
 }
 
@@ -30,29 +31,34 @@ double cap_cost(double a2, double b2, double c2) {
 std::vector<double> seam_turns(const std::vector<Vec3>& points, const std::vector<double>& turns) {
   const int count = static_cast<int>(turns.size());
   std::vector<double> result(count);
-  if (std::optional<std::vector<double>> grown = loop_turns(points, turns)) result = std::move(*grown);
+  if (std::optional<std::vector<double>> grown = loop_turns(points, turns))
+    result = std::move(*grown);
   else
-    for (int i = 0; i < count; ++i) result[i] = (std::isfinite(turns[0]) ? turns[0] : 0) + static_cast<double>(i) / count;
+    for (int i = 0; i < count; ++i)
+      result[i] = (std::isfinite(turns[0]) ? turns[0] : 0) + static_cast<double>(i) / count;
 
   double largest = 0;
-  for (int i = 0; i < count; ++i) largest = std::max(largest, i + 1 < count ? result[i + 1] - result[i] : result[0] + 1 - result[i]);
+  for (int i = 0; i < count; ++i)
+    largest = std::max(largest, i + 1 < count ? result[i + 1] - result[i] : result[0] + 1 - result[i]);
   if (largest > kLargestStep) {
     const double share = (largest - kLargestStep) / (largest - 1.0 / count);
-    for (int i = 1; i < count; ++i) result[i] = (1 - share) * result[i] + share * (result[0] + static_cast<double>(i) / count);
+    for (int i = 1; i < count; ++i)
+      result[i] = (1 - share) * result[i] + share * (result[0] + static_cast<double>(i) / count);
   }
   const double whole = std::floor(result[0]);
   for (double& turn : result) turn -= whole;
   return result;
 }
 
-void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, const Ring& row, BoneEnd end, std::vector<Triangle>& triangles) {
+void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, const Ring& row, BoneEnd end,
+                       std::vector<Triangle>& triangles) {
   std::vector<Vec3> points;
   for (const int vertex : seam.vertices) points.push_back(positions[vertex]);
   append_seam_strip(positions, seam, seam_turns(points, seam.turns), row, end, triangles);
 }
 
-void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::span<const double> turns, const Ring& row, BoneEnd end,
-                       std::vector<Triangle>& triangles) {
+void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::span<const double> turns,
+                       const Ring& row, BoneEnd end, std::vector<Triangle>& triangles) {
   const int m = static_cast<int>(seam.vertices.size()), n = static_cast<int>(row.vertices.size());
   // Columns of seam vertices -1 to 2 m in unwrapped numbers: row angles are column / n.
   std::vector<double> columns;
@@ -90,19 +96,23 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::s
   // From here on both rings begin there, and end where they began.
   std::vector<int> seam_vertices, row_vertices;
   for (int k = 0; k <= m; ++k) seam_vertices.push_back(seam.vertices[start + k < m ? start + k : start + k - m]);
-  for (int j = 0, at = (start_column % n + n) % n; j <= n; ++j, at = at + 1 < n ? at + 1 : 0) row_vertices.push_back(row.vertices[at]);
+  for (int j = 0, at = (start_column % n + n) % n; j <= n; ++j, at = at + 1 < n ? at + 1 : 0)
+    row_vertices.push_back(row.vertices[at]);
   std::vector<Vec3> seam_points, row_points;
   for (const int vertex : seam_vertices) seam_points.push_back(positions[vertex]);
   for (const int vertex : row_vertices) row_points.push_back(positions[vertex]);
   std::vector<int> first(m + 1), last(m + 1), place(m + 2, 0);
   for (int k = 0; k <= m; ++k) {
-    first[k] = std::max(first_column(start + k) - start_column, 0), last[k] = std::min(last_column(start + k) - start_column, n);
+    first[k] = std::max(first_column(start + k) - start_column, 0),
+    last[k] = std::min(last_column(start + k) - start_column, n);
     place[k + 1] = place[k] + last[k] - first[k] + 1;
   }
-  // Squared lengths: of what joins seam vertex k to column j, at place[k] + j - first[k], and along the rings from k or j on.
+  // Squared lengths: of what joins seam vertex k to column j, at place[k] + j - first[k], and along the rings from k or
+  // j on.
   std::vector<double> joints2(place[m + 1]), seam_steps2(m), row_steps2(n);
   for (int k = 0; k <= m; ++k)
-    for (int j = first[k]; j <= last[k]; ++j) joints2[place[k] + j - first[k]] = (seam_points[k] - row_points[j]).squaredNorm();
+    for (int j = first[k]; j <= last[k]; ++j)
+      joints2[place[k] + j - first[k]] = (seam_points[k] - row_points[j]).squaredNorm();
   for (int k = 0; k < m; ++k) seam_steps2[k] = (seam_points[k + 1] - seam_points[k]).squaredNorm();
   for (int j = 0; j < n; ++j) row_steps2[j] = (row_points[j + 1] - row_points[j]).squaredNorm();
   const auto joint2 = [&](int k, int j) { return joints2[place[k] + j - first[k]]; };
@@ -115,7 +125,8 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::s
     for (int k = from; k <= m; ++k) {
       if (k > 0 && !charges_caps[k] && first[k] <= last[k - 1]) {
         // Without branches: which of the two is cheaper follows no pattern.
-        const int before = place[k - 1] - first[k - 1], own = place[k] - first[k], last_of_both = std::min(last[k], last[k - 1]);
+        const int before = place[k - 1] - first[k - 1], own = place[k] - first[k],
+                  last_of_both = std::min(last[k], last[k - 1]);
         const double* const lengths2 = joints2.data();
         double* const costs = best.data();
         char* const steps = along_row.data();
@@ -125,13 +136,15 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::s
           steps[own + j] = cheapest < costs[before + j];
           costs[own + j] = cheapest = std::min(costs[before + j], cheapest) + lengths2[own + j];
         }
-        for (const int last_of_own = last[k]; j <= last_of_own; ++j) steps[own + j] = 1, costs[own + j] = cheapest = cheapest + lengths2[own + j];
+        for (const int last_of_own = last[k]; j <= last_of_own; ++j)
+          steps[own + j] = 1, costs[own + j] = cheapest = cheapest + lengths2[own + j];
         continue;
       }
       for (int j = first[k]; j <= last[k]; ++j) {
         const int at = place[k] + j - first[k];
         const bool has_column = j > first[k], has_seam = k > 0 && j <= last[k - 1];
-        double from_column = has_column ? best[at - 1] : 0, from_seam = has_seam ? best[place[k - 1] + j - first[k - 1]] : 0;
+        double from_column = has_column ? best[at - 1] : 0,
+               from_seam = has_seam ? best[place[k - 1] + j - first[k - 1]] : 0;
         if (charges_caps[k] && has_column) from_column += column_cap_cost(k, j - 1);
         if (charges_caps[k] && has_seam) from_seam += seam_cap_cost(k - 1, j);
         along_row[at] = has_column && (!has_seam || from_column < from_seam);

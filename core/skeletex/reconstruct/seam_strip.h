@@ -3,15 +3,15 @@
 #include <span>
 #include <vector>
 
-#include "skeletex/model/mesh.h"
-#include "skeletex/model/skeleton.h"
+#include "skeletex/geometry/mesh.h"
+#include "skeletex/skeleton/skeleton.h"
 
 namespace skeletex {
 
 /// A closed polyline around a bone: at a seam, or a row of the lattice.
 struct Ring {
-  std::vector<int> vertices;   ///< in the direction of growing v
-  std::vector<double> turns;   ///< angle of each about the bone; seams: measured, rows: column / width
+  std::vector<int> vertices;  ///< in the direction of growing v
+  std::vector<double> turns;  ///< angle of each about the bone; seams: measured, rows: column / width
 };
 
 /// Fills the strip between a seam and the inner row next to it with triangles, outward. Every edge of both rings is an
@@ -19,10 +19,11 @@ struct Ring {
 /// whose cross edges stay within about a cell of v the one with the smallest sum of squared lengths is taken.
 /// \param turns  of the seam, in place of its own: see seam_turns
 /// \pre seam has at least 3 vertices, row at least 4
-void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::span<const double> turns, const Ring& row, BoneEnd end,
-                       std::vector<Triangle>& triangles);
+void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::span<const double> turns,
+                       const Ring& row, BoneEnd end, std::vector<Triangle>& triangles);
 /// The same with the turns that follow from the seam's measured ones.
-void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, const Ring& row, BoneEnd end, std::vector<Triangle>& triangles);
+void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, const Ring& row, BoneEnd end,
+                       std::vector<Triangle>& triangles);
 
 /// v of a seam's vertices: that of its loop (loop_turns), the first in [0,1), with no step above 0.45 of a turn; evenly
 /// spread when the points do not wind once around the bone.

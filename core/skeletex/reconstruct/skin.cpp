@@ -5,11 +5,11 @@
 #include <cmath>
 #include <numeric>
 
-#include "skeletex/model/parallel.h"
-#include "skeletex/model/walls.h"
-#include "skeletex/model/weight_walk.h"
+#include "skeletex/geometry/parallel.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/skeleton/separation_planes.h"
+#include "skeletex/skeleton/weight_walk.h"
 
 namespace skeletex {
 namespace {
@@ -39,13 +39,15 @@ void weigh_inner_vertices(ClContext& context, const WeightWalks& walks, const De
   auto device_weights = context.allocate<float>(std::min(kBlocksAtOnce, skin.blocks.size()) * slots * SKIN_BLOCK);
   for (std::size_t begin = 0; begin < skin.blocks.size(); begin += kBlocksAtOnce) {
     const std::size_t count = std::min(kBlocksAtOnce, skin.blocks.size() - begin);
-    context.launch({"skin.cl", "bone_weights"}, block_range(context, count), static_cast<int>(count), static_cast<int>(begin), static_cast<int>(slots),
-                   blocks, first_steps, steps, points.x, points.y, points.z, device_weights);
+    context.launch({"skin.cl", "bone_weights"}, block_range(context, count), static_cast<int>(count),
+                   static_cast<int>(begin), static_cast<int>(slots), blocks, first_steps, steps, points.x, points.y,
+                   points.z, device_weights);
     const ClMapping<float> weights = context.map(device_weights);
     for (std::size_t b = 0; b < count; ++b) {
       SkinBlock& block = skin.blocks[begin + b];
       std::vector<int> bones{block.bone};
-      for (int k = walks.first_steps[block.bone]; k < walks.first_steps[block.bone + 1]; ++k) bones.push_back(walks.steps[k].bone);
+      for (int k = walks.first_steps[block.bone]; k < walks.first_steps[block.bone + 1]; ++k)
+        bones.push_back(walks.steps[k].bone);
       append_block(block, bones, weights.data() + b * slots * SKIN_BLOCK, skin);
     }
   }
@@ -85,7 +87,8 @@ void take_inner_weights(const SkeletexModel& model, Skin& skin) {
     const int width = model.patches[bone].rectangle.width;
     for (int i = 0; i < block.vertex_count; ++i) {
       const int inner = block.first_vertex - first_vertex + i;
-      for (const auto& [moving, weight] : weights_at(model, bone, 1 + inner / width, static_cast<double>(inner % width) / width))
+      for (const auto& [moving, weight] :
+           weights_at(model, bone, 1 + inner / width, static_cast<double>(inner % width) / width))
         weights[moving * SKIN_BLOCK + i] = static_cast<float>(weight);
     }
     append_block(block, all, weights.data(), skin);
@@ -96,15 +99,19 @@ void take_inner_weights(const SkeletexModel& model, Skin& skin) {
 std::vector<std::vector<BoneWeight>> shared_weights_of(const SkeletexModel& model, const Lattice& lattice) {
   std::vector<std::vector<BoneWeight>> weights;
   const auto at = [&](int bone, BoneEnd end, double turn) {
-    weights.push_back(weights_at(model, bone, end == BoneEnd::kHead ? 0 : model.patches[bone].rectangle.height - 1, turn));
+    weights.push_back(
+        weights_at(model, bone, end == BoneEnd::kHead ? 0 : model.patches[bone].rectangle.height - 1, turn));
   };
-  const auto end_at = [&](int bone, int node) { return model.skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail; };
+  const auto end_at = [&](int bone, int node) {
+    return model.skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
+  };
   for (int bone = 0; bone < static_cast<int>(lattice.poles.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
       if (lattice.poles[bone][static_cast<int>(end)] >= 0) at(bone, end, 0);
   for (const SeamArc& arc : model.arcs)
     for (const SeamSample& sample : arc.samples) at(arc.bones[0], end_at(arc.bones[0], arc.node), sample.turn);
-  for (const SeamCorner& corner : model.corners) at(corner.bones[0], end_at(corner.bones[0], corner.node), corner.sample.turn);
+  for (const SeamCorner& corner : model.corners)
+    at(corner.bones[0], end_at(corner.bones[0], corner.node), corner.sample.turn);
   return weights;
 }
 
@@ -116,8 +123,10 @@ std::vector<int> bones_of_shared_vertices(const SkeletexModel& model, const Latt
     for (const int pole : lattice.poles[bone])
       if (pole >= 0) bones[pole - lattice.inner_count] = bone;
   for (std::size_t a = 0; a < model.arcs.size(); ++a)
-    std::fill_n(bones.begin() + (lattice.first_sample[a] - lattice.inner_count), model.arcs[a].samples.size(), model.arcs[a].bones[0]);
-  for (std::size_t c = 0; c < model.corners.size(); ++c) bones[lattice.first_corner - lattice.inner_count + static_cast<int>(c)] = model.corners[c].bones[0];
+    std::fill_n(bones.begin() + (lattice.first_sample[a] - lattice.inner_count), model.arcs[a].samples.size(),
+                model.arcs[a].bones[0]);
+  for (std::size_t c = 0; c < model.corners.size(); ++c)
+    bones[lattice.first_corner - lattice.inner_count + static_cast<int>(c)] = model.corners[c].bones[0];
   return bones;
 }
 
@@ -144,7 +153,7 @@ Skin make_skin(ClContext& context, const SkeletexModel& model, const DevicePlane
   skin.inner_count = lattice.inner_count;
   skin.origin = model.origin;
   std::vector<Vec3> positions(lattice.vertex_count);
-  place_shared_vertices(model, Walls(model.skeleton), lattice, positions);
+  place_shared_vertices(model, SeparationPlanes(model.skeleton), lattice, positions);
   skin.shared_points.assign(positions.begin() + lattice.inner_count, positions.end());
   if (!model.bone_weights.empty()) {
     take_inner_weights(model, skin);
@@ -154,7 +163,8 @@ Skin make_skin(ClContext& context, const SkeletexModel& model, const DevicePlane
   const WeightWalks walks = make_weight_walks(model);
   weigh_inner_vertices(context, walks, points, skin);
   const std::vector<int> bones = bones_of_shared_vertices(model, lattice);
-  for (std::size_t i = 0; i < bones.size(); ++i) skin.shared_weights.push_back(bone_weights(walks, bones[i], skin.shared_points[i] - model.origin));
+  for (std::size_t i = 0; i < bones.size(); ++i)
+    skin.shared_weights.push_back(bone_weights(walks, bones[i], skin.shared_points[i] - model.origin));
   return skin;
 }
 
@@ -163,7 +173,8 @@ std::vector<float> vertex_weights(const Skin& skin, int bone) {
   for (const SkinBlock& block : skin.blocks)
     for (int k = 0; k < block.bone_count; ++k)
       if (skin.block_bones[block.first_bone + k] == bone)
-        std::copy_n(skin.weights.begin() + block.first_weight + k * SKIN_BLOCK, block.vertex_count, weights.begin() + block.first_vertex);
+        std::copy_n(skin.weights.begin() + block.first_weight + k * SKIN_BLOCK, block.vertex_count,
+                    weights.begin() + block.first_vertex);
   for (std::size_t i = 0; i < skin.shared_weights.size(); ++i)
     for (const BoneWeight& weight : skin.shared_weights[i])
       if (weight.bone == bone) weights[skin.inner_count + i] = static_cast<float>(weight.weight);
@@ -172,8 +183,9 @@ std::vector<float> vertex_weights(const Skin& skin, int bone) {
 
 std::vector<std::vector<float>> weight_planes(ClContext& context, const SkeletexModel& model) {
   const WeightWalks walks = make_weight_walks(model);
-  const DevicePlanes device = row_points(context, model, Walls(model.skeleton));
-  const std::vector<float> x = context.download(device.x), y = context.download(device.y), z = context.download(device.z);
+  const DevicePlanes device = row_points(context, model, SeparationPlanes(model.skeleton));
+  const std::vector<float> x = context.download(device.x), y = context.download(device.y),
+                           z = context.download(device.z);
   const std::size_t texels = static_cast<std::size_t>(model.texture.width) * model.texture.height;
   std::vector<std::vector<float>> planes(model.skeleton.bones.size(), std::vector<float>(texels, 0.f));
   const std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kAll);
@@ -182,25 +194,30 @@ std::vector<std::vector<float>> weight_planes(ClContext& context, const Skeletex
       const auto [bone, row, vertex, quad] = rows[k];
       const Rectangle& r = model.patches[bone].rectangle;
       for (int j = 0; j < r.width; ++j)
-        for (const auto& [moving, weight] : bone_weights(walks, bone, Vec3(x[vertex + j], y[vertex + j], z[vertex + j])))
-          planes[moving][static_cast<std::size_t>(r.y + row) * model.texture.width + r.x + j] = static_cast<float>(weight);
+        for (const auto& [moving, weight] :
+             bone_weights(walks, bone, Vec3(x[vertex + j], y[vertex + j], z[vertex + j])))
+          planes[moving][static_cast<std::size_t>(r.y + row) * model.texture.width + r.x + j] =
+              static_cast<float>(weight);
     }
   });
   return planes;
 }
 
 DeviceSkin upload_skin(ClContext& context, const Skin& skin, DevicePlanes points) {
-  return {context.upload(skin.blocks), context.upload(skin.block_bones), context.upload(skin.weights), std::move(points)};
+  return {context.upload(skin.blocks), context.upload(skin.block_bones), context.upload(skin.weights),
+          std::move(points)};
 }
 
-std::vector<BoneMotionRecord> motion_records(std::span<const BoneMotion> motions, const Vec3& bind_origin, const Vec3& posed_origin) {
+std::vector<BoneMotionRecord> motion_records(std::span<const BoneMotion> motions, const Vec3& bind_origin,
+                                             const Vec3& posed_origin) {
   std::vector<BoneMotionRecord> records;
   for (const BoneMotion& motion : motions) {
     BoneMotionRecord record{};
     const Eigen::Vector4d real(motion.rotation.w(), motion.rotation.x(), motion.rotation.y(), motion.rotation.z());
     const Eigen::Vector4d dual = dual_part(motion, bind_origin, posed_origin);
     const Vec3 head = motion.bind_head - bind_origin;
-    for (int i = 0; i < 4; ++i) record.real[i] = static_cast<float>(real[i]), record.dual[i] = static_cast<float>(dual[i]);
+    for (int i = 0; i < 4; ++i)
+      record.real[i] = static_cast<float>(real[i]), record.dual[i] = static_cast<float>(dual[i]);
     for (int i = 0; i < 3; ++i) {
       record.head[i] = static_cast<float>(head[i]);
       record.stretch[i] = static_cast<float>(motion.stretch[i]);
@@ -212,14 +229,17 @@ std::vector<BoneMotionRecord> motion_records(std::span<const BoneMotion> motions
 }
 
 bool is_stretched(std::span<const BoneMotion> motions) {
-  return std::any_of(motions.begin(), motions.end(), [](const BoneMotion& motion) { return !motion.stretch.isZero(0); });
+  return std::any_of(motions.begin(), motions.end(),
+                     [](const BoneMotion& motion) { return !motion.stretch.isZero(0); });
 }
 
-void pose_skin(ClContext& context, const Skin& skin, const DeviceSkin& device, std::span<const BoneMotion> motions, const Vec3& posed_origin, DevicePlanes& points) {
+void pose_skin(ClContext& context, const Skin& skin, const DeviceSkin& device, std::span<const BoneMotion> motions,
+               const Vec3& posed_origin, DevicePlanes& points) {
   if (skin.blocks.empty()) return;
   const auto records = context.upload(motion_records(motions, skin.origin, posed_origin));
-  context.launch({"skin.cl", "skin"}, block_range(context, skin.blocks.size()), static_cast<int>(skin.blocks.size()), static_cast<int>(is_stretched(motions)),
-                 device.blocks, device.block_bones, device.weights, records, device.points.x, device.points.y, device.points.z, points.x, points.y, points.z);
+  context.launch({"skin.cl", "skin"}, block_range(context, skin.blocks.size()), static_cast<int>(skin.blocks.size()),
+                 static_cast<int>(is_stretched(motions)), device.blocks, device.block_bones, device.weights, records,
+                 device.points.x, device.points.y, device.points.z, points.x, points.y, points.z);
 }
 
 void pose_shared_vertices(const Skin& skin, std::span<const BoneMotion> motions, std::vector<Vec3>& positions) {

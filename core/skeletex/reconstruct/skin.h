@@ -3,23 +3,25 @@
 #include <span>
 #include <vector>
 
-#include "skeletex/cl/context.h"
-#include "skeletex/model/bone_motion.h"
+#include "skeletex/device/context.h"
 #include "skeletex/model/texture.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/lattice.h"
+#include "skeletex/skeleton/bone_motion.h"
 #include "skeletex_structs.h"
 
 namespace skeletex {
 
-/// What smooth posing needs of a model, made once: its points in the bind pose and their weights. Any pose of them is one pass.
+/// What smooth posing needs of a model, made once: its points in the bind pose and their weights. Any pose of them is
+/// one pass.
 struct Skin {
-  std::vector<SkinBlock> blocks;   ///< all inner vertices of the lattice (lattice.h), in order
-  std::vector<int> block_bones;    ///< block by block
-  std::vector<float> weights;      ///< SKIN_BLOCK per entry of block_bones
+  std::vector<SkinBlock> blocks;  ///< all inner vertices of the lattice (lattice.h), in order
+  std::vector<int> block_bones;   ///< block by block
+  std::vector<float> weights;     ///< SKIN_BLOCK per entry of block_bones
   int inner_count = 0;
-  Vec3 origin = Vec3::Zero();      ///< world position that the device's points are relative to
-  std::vector<Vec3> shared_points;                      ///< poles, seam samples and corners in the bind pose, world; behind the inner vertices
+  Vec3 origin = Vec3::Zero();  ///< world position that the device's points are relative to
+  std::vector<Vec3>
+      shared_points;  ///< poles, seam samples and corners in the bind pose, world; behind the inner vertices
   std::vector<std::vector<BoneWeight>> shared_weights;  ///< of each of them
 };
 
@@ -48,16 +50,19 @@ DeviceSkin upload_skin(ClContext& context, const Skin& skin, DevicePlanes points
 /// How much a bone moves each vertex of the model's mesh, 0 to 1.
 std::vector<float> vertex_weights(const Skin& skin, int bone);
 
-/// Weights in closed form of all texels, per bone a plane of the texture's size, as SkeletexModel::bone_weights has them; 0 outside patches.
+/// Weights in closed form of all texels, per bone a plane of the texture's size, as SkeletexModel::bone_weights has
+/// them; 0 outside patches.
 std::vector<std::vector<float>> weight_planes(ClContext& context, const SkeletexModel& model);
 
 /// The motions as the kernels read them: from the bind origin to the posed one.
-std::vector<BoneMotionRecord> motion_records(std::span<const BoneMotion> motions, const Vec3& bind_origin, const Vec3& posed_origin);
+std::vector<BoneMotionRecord> motion_records(std::span<const BoneMotion> motions, const Vec3& bind_origin,
+                                             const Vec3& posed_origin);
 /// Whether a bone changes its length.
 bool is_stretched(std::span<const BoneMotion> motions);
 
 /// Queues the points of the inner vertices in a pose (one launch), relative to `posed_origin`.
-void pose_skin(ClContext& context, const Skin& skin, const DeviceSkin& device, std::span<const BoneMotion> motions, const Vec3& posed_origin, DevicePlanes& points);
+void pose_skin(ClContext& context, const Skin& skin, const DeviceSkin& device, std::span<const BoneMotion> motions,
+               const Vec3& posed_origin, DevicePlanes& points);
 
 /// The other vertices: few, and shared by several patches, so they are moved on the host in double precision.
 /// \param positions  by lattice vertex, world; inner vertices are left as they are

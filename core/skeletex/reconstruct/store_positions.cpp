@@ -7,8 +7,8 @@
 #include <array>
 #include <cmath>
 
+#include "skeletex/geometry/loop_turns.h"
 #include "skeletex/model/error.h"
-#include "skeletex/model/loop_turns.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
@@ -17,11 +17,13 @@
 namespace skeletex {
 namespace {
 
-BoneEnd end_at(const Skeleton& skeleton, int bone, int node) { return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail; }
+BoneEnd end_at(const Skeleton& skeleton, int bone, int node) {
+  return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
+}
 
 /// The points of a patch's first or last row: the pole, or where the seam's polyline passes the columns.
-std::vector<Vec3> end_row_points(const SkeletexModel& model, const Walls& walls, const Lattice& lattice, int bone, BoneEnd end,
-                                 std::span<const Vec3> positions) {
+std::vector<Vec3> end_row_points(const SkeletexModel& model, const SeparationPlanes& separation, const Lattice& lattice,
+                                 int bone, BoneEnd end, std::span<const Vec3> positions) {
   const int columns = model.patches[bone].rectangle.width;
   const int pole = lattice.poles[bone][static_cast<int>(end)];
   if (pole >= 0) return std::vector<Vec3>(columns, positions[pole]);
@@ -29,28 +31,29 @@ std::vector<Vec3> end_row_points(const SkeletexModel& model, const Walls& walls,
   std::vector<double> turns;
   for (const int vertex : end_loop(model, lattice, bone, end)) {
     points.push_back(positions[vertex]);
-    turns.push_back(walls.turn_of(bone, points.back() - end_position(model.skeleton, bone, end)));
+    turns.push_back(separation.turn_of(bone, points.back() - end_position(model.skeleton, bone, end)));
   }
   return points_at_columns(points, seam_turns(points, turns), columns);
 }
 
 /// Whether any vertex at a patch's end has moved.
-bool has_end_moved(const SkeletexModel& model, const Lattice& lattice, int bone, BoneEnd end, std::span<const Vec3> before, std::span<const Vec3> after) {
+bool has_end_moved(const SkeletexModel& model, const Lattice& lattice, int bone, BoneEnd end,
+                   std::span<const Vec3> before, std::span<const Vec3> after) {
   const int pole = lattice.poles[bone][static_cast<int>(end)];
   if (pole >= 0) return before[pole] != after[pole];
   const std::vector<int> loop = end_loop(model, lattice, bone, end);
   return std::any_of(loop.begin(), loop.end(), [&](int vertex) { return before[vertex] != after[vertex]; });
 }
 
-void store_texels(ClContext& context, const Walls& walls, const Lattice& lattice, std::span<const Vec3> before, std::span<const Vec3> after,
-                  SkeletexModel& model) {
+void store_texels(ClContext& context, const SeparationPlanes& separation, const Lattice& lattice,
+                  std::span<const Vec3> before, std::span<const Vec3> after, SkeletexModel& model) {
   // All rows of all patches, in each bone's own axes: from H along s, b, o.
   const std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kAll);
   std::array<std::vector<float>, 3> planes;
   std::vector<char> is_stored;
   for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
     const Rectangle& rectangle = model.patches[bone].rectangle;
-    const BoneBasis& basis = walls.bases()[bone];
+    const BoneBasis& basis = separation.bases()[bone];
     const Vec3& head = end_position(model.skeleton, bone, BoneEnd::kHead);
     const auto add = [&](const Vec3& point, bool has_moved) {
       const Vec3 offset = point - head;
@@ -61,18 +64,21 @@ void store_texels(ClContext& context, const Walls& walls, const Lattice& lattice
     };
     const auto add_end = [&](BoneEnd end) {
       const bool has_moved = has_end_moved(model, lattice, bone, end, before, after);
-      for (const Vec3& point : end_row_points(model, walls, lattice, bone, end, after)) add(point, has_moved);
+      for (const Vec3& point : end_row_points(model, separation, lattice, bone, end, after)) add(point, has_moved);
     };
     add_end(BoneEnd::kHead);
     const int first = lattice.first_inner[bone], last = first + rectangle.width * (rectangle.height - 2);
     for (int vertex = first; vertex < last; ++vertex) add(after[vertex], before[vertex] != after[vertex]);
     add_end(BoneEnd::kTail);
   }
-  const DeviceTables tables = upload_tables(context, frame_tables(model.skeleton, walls, model.patches, model.origin));
-  DevicePlanes texels{context.upload(model.texture.along), context.upload(model.texture.around), context.upload(model.texture.out)};
-  context.launch({"reconstruct.cl", "enter_tangent_space"}, row_range(context, rows.size()), static_cast<int>(rows.size()), model.texture.width,
-                 tables.column_count, context.upload(rows), tables.patches, tables.rows, tables.columns, context.upload(planes[0]),
-                 context.upload(planes[1]), context.upload(planes[2]), texels.x, texels.y, texels.z);
+  const DeviceTables tables =
+      upload_tables(context, frame_tables(model.skeleton, separation, model.patches, model.origin));
+  DevicePlanes texels{context.upload(model.texture.along), context.upload(model.texture.around),
+                      context.upload(model.texture.out)};
+  context.launch({"reconstruct.cl", "enter_tangent_space"}, row_range(context, rows.size()),
+                 static_cast<int>(rows.size()), model.texture.width, tables.column_count, context.upload(rows),
+                 tables.patches, tables.rows, tables.columns, context.upload(planes[0]), context.upload(planes[1]),
+                 context.upload(planes[2]), texels.x, texels.y, texels.z);
   const auto keep_moved = [&](const ClBuffer<float>& stored, std::vector<float>& plane) {
     const std::vector<float> all = context.download(stored);
     std::size_t point = 0;
@@ -88,12 +94,14 @@ void store_texels(ClContext& context, const Walls& walls, const Lattice& lattice
   keep_moved(texels.z, model.texture.out);
 }
 
-/// The point in the wall through `node` with unit normal `wall` that p comes to by the shortest way in its tangent plane.
-/// The way is h / sin of the angle between the two planes; below some 18 degrees it turns towards the wall.
-Vec3 slide_to_wall(const Vec3& p, const Vec3& normal, const Vec3& node, const Vec3& wall) {
-  const double cosine = normal.dot(wall);
+/// The point in the separation plane through `node` with unit normal `separation plane` that p comes to by the shortest
+/// way in its tangent plane. The way is h / sin of the angle between the two planes; below some 18 degrees it turns
+/// towards the separation plane.
+Vec3 slide_to_separation_plane(const Vec3& p, const Vec3& normal, const Vec3& node, const Vec3& separation_plane) {
+  const double cosine = normal.dot(separation_plane);
   const double share = std::min(1.0, 0.9 / std::max(cosine * cosine, 1e-9));
-  return p - wall.dot(p - node) / (1 - share * cosine * cosine) * (wall - share * cosine * normal);
+  return p -
+         separation_plane.dot(p - node) / (1 - share * cosine * cosine) * (separation_plane - share * cosine * normal);
 }
 
 /// The point of the ray from `node` in a unit direction that lies in p's tangent plane, where they meet at more than
@@ -109,14 +117,16 @@ Vec3 slide_to_ray(const Vec3& p, const Vec3& normal, const Vec3& node, const Vec
 SkeletexModel store_positions(ClContext& context, const SkeletexModel& model, std::span<const Vec3> positions) {
   const Lattice lattice = number_lattice(model);
   if (static_cast<int>(positions.size()) != lattice.vertex_count)
-    throw InputError(fmt::format("{} positions are given for a model of {} vertices", positions.size(), lattice.vertex_count));
+    throw InputError(
+        fmt::format("{} positions are given for a model of {} vertices", positions.size(), lattice.vertex_count));
   const auto bad = std::find_if(positions.begin(), positions.end(), [](const Vec3& p) { return !p.allFinite(); });
-  if (bad != positions.end()) throw InputError(fmt::format("the position of vertex {} is not a finite number", bad - positions.begin()));
+  if (bad != positions.end())
+    throw InputError(fmt::format("the position of vertex {} is not a finite number", bad - positions.begin()));
 
   const std::vector<Vec3> before = lattice_positions(context, model);
-  const Walls walls(model.skeleton);
+  const SeparationPlanes separation(model.skeleton);
   SkeletexModel result = model;
-  store_texels(context, walls, lattice, before, positions, result);
+  store_texels(context, separation, lattice, before, positions, result);
   for (std::size_t a = 0; a < model.arcs.size(); ++a) {
     const SeamArc& arc = model.arcs[a];
     const int bone = arc.bones[0];
@@ -125,38 +135,45 @@ SkeletexModel store_positions(ClContext& context, const SkeletexModel& model, st
       const Vec3& point = positions[lattice.first_sample[a] + i];
       if (point == before[lattice.first_sample[a] + i]) continue;
       SeamSample& sample = result.arcs[a].samples[i];
-      sample.distance = walls.half_line_distance(bone, end, point);
-      // Beyond its arc it would be restored in another wall.
-      const double turn = walls.turn_of(bone, point - model.skeleton.nodes[arc.node].position);
-      if (walls.neighbour(bone, end, turn) == arc.bones[1]) sample.turn = turn;
+      sample.distance = separation.half_line_distance(bone, end, point);
+      // Beyond its arc it would be restored in another separation plane.
+      const double turn = separation.turn_of(bone, point - model.skeleton.nodes[arc.node].position);
+      if (separation.neighbour(bone, end, turn) == arc.bones[1]) sample.turn = turn;
     }
   }
   for (std::size_t i = 0; i < model.corners.size(); ++i) {
     const Vec3& point = positions[lattice.first_corner + i];
     const int bone = model.corners[i].bones[0];
     if (point != before[lattice.first_corner + i])
-      result.corners[i].sample.distance = walls.half_line_distance(bone, end_at(model.skeleton, bone, model.corners[i].node), point);
+      result.corners[i].sample.distance =
+          separation.half_line_distance(bone, end_at(model.skeleton, bone, model.corners[i].node), point);
   }
   return result;
 }
 
-void slide_to_walls(const SkeletexModel& model, std::span<const Vec3> normals, std::span<Vec3> positions) {
+void slide_to_separation(const SkeletexModel& model, std::span<const Vec3> normals, std::span<Vec3> positions) {
   const Lattice lattice = number_lattice(model);
-  const Walls walls(model.skeleton);
+  const SeparationPlanes separation(model.skeleton);
   for (std::size_t a = 0; a < model.arcs.size(); ++a) {
     const SeamArc& arc = model.arcs[a];
-    const auto away = [&](int bone) { return direction_from(model.skeleton, {bone, end_at(model.skeleton, bone, arc.node)}); };
-    const Vec3 wall = (away(arc.bones[0]) - away(arc.bones[1])).normalized();
+    const auto away = [&](int bone) {
+      return direction_from(model.skeleton, {bone, end_at(model.skeleton, bone, arc.node)});
+    };
+    const Vec3 separation_plane = (away(arc.bones[0]) - away(arc.bones[1])).normalized();
     for (std::size_t i = 0; i < arc.samples.size(); ++i) {
       const std::size_t vertex = lattice.first_sample[a] + i;
-      positions[vertex] = slide_to_wall(positions[vertex], normals[vertex], model.skeleton.nodes[arc.node].position, wall);
+      positions[vertex] = slide_to_separation_plane(positions[vertex], normals[vertex],
+                                                    model.skeleton.nodes[arc.node].position, separation_plane);
     }
   }
   for (std::size_t i = 0; i < model.corners.size(); ++i) {
     const SeamCorner& corner = model.corners[i];
     const std::size_t vertex = lattice.first_corner + i;
     const Vec3& node = model.skeleton.nodes[corner.node].position;
-    const Vec3 ray = (walls.seam_point(corner.bones[0], end_at(model.skeleton, corner.bones[0], corner.node), corner.sample.turn, 1) - node).normalized();
+    const Vec3 ray = (separation.seam_point(corner.bones[0], end_at(model.skeleton, corner.bones[0], corner.node),
+                                            corner.sample.turn, 1) -
+                      node)
+                         .normalized();
     positions[vertex] = slide_to_ray(positions[vertex], normals[vertex], node, ray);
   }
 }

@@ -17,7 +17,8 @@ constexpr double kMargin = 0.04;
 constexpr double kRadians = std::numbers::pi / 180;
 
 Vec3 vector_of(const nlohmann::json& json, const std::string& where) {
-  if (!json.is_array() || json.size() != 3 || !std::all_of(json.begin(), json.end(), [](const auto& x) { return x.is_number(); }))
+  if (!json.is_array() || json.size() != 3 ||
+      !std::all_of(json.begin(), json.end(), [](const auto& x) { return x.is_number(); }))
     throw IoError(fmt::format("{} must be three numbers", where));
   return {json[0].get<double>(), json[1].get<double>(), json[2].get<double>()};
 }
@@ -25,25 +26,37 @@ Vec3 vector_of(const nlohmann::json& json, const std::string& where) {
 }  // namespace
 
 View parse_view(const nlohmann::json& json, const std::string& source) {
-  if (!json.is_object()) throw IoError(fmt::format("{}: a view is an object like {{\"azimuth\": 30, \"elevation\": 15}}", source));
+  if (!json.is_object())
+    throw IoError(fmt::format("{}: a view is an object like {{\"azimuth\": 30, \"elevation\": 15}}", source));
   View view;
   for (const auto& [key, value] : json.items()) {
     const std::string where = fmt::format("{}: \"{}\"", source, key);
     const auto number = [&](double lowest, double highest) {
       if (!value.is_number()) throw IoError(where + " must be a number");
       const double x = value.get<double>();
-      if (!(x >= lowest && x <= highest)) throw IoError(fmt::format("{} is {}, not within {} to {}", where, x, lowest, highest));
+      if (!(x >= lowest && x <= highest))
+        throw IoError(fmt::format("{} is {}, not within {} to {}", where, x, lowest, highest));
       return x;
     };
-    if (key == "azimuth") view.azimuth_deg = number(-3600, 3600);
-    else if (key == "elevation") view.elevation_deg = number(-90, 90);
-    else if (key == "fov") view.fov_deg = number(0, 120);
-    else if (key == "zoom") view.zoom = number(0.01, 1000);
-    else if (key == "up") view.up = vector_of(value, where);
-    else if (key == "front") view.front = vector_of(value, where);
-    else if (key == "target") view.target = vector_of(value, where);
-    else if (key == "eye") view.eye = vector_of(value, where);
-    else throw IoError(fmt::format("{} is no part of a view; there are azimuth, elevation, fov, zoom, up, front, target and eye", where));
+    if (key == "azimuth")
+      view.azimuth_deg = number(-3600, 3600);
+    else if (key == "elevation")
+      view.elevation_deg = number(-90, 90);
+    else if (key == "fov")
+      view.fov_deg = number(0, 120);
+    else if (key == "zoom")
+      view.zoom = number(0.01, 1000);
+    else if (key == "up")
+      view.up = vector_of(value, where);
+    else if (key == "front")
+      view.front = vector_of(value, where);
+    else if (key == "target")
+      view.target = vector_of(value, where);
+    else if (key == "eye")
+      view.eye = vector_of(value, where);
+    else
+      throw IoError(fmt::format(
+          "{} is no part of a view; there are azimuth, elevation, fov, zoom, up, front, target and eye", where));
   }
   return view;
 }
@@ -52,7 +65,8 @@ Camera fit_camera(const View& view, std::span<const Vec3> points, int width, int
   if (!(view.up.norm() > 0)) throw InputError("the view's up direction has no length");
   const Vec3 up = view.up.normalized();
   Vec3 front = view.front - up * up.dot(view.front);
-  if (!(front.norm() > 1e-9 * view.front.norm())) throw InputError("the view's front direction must not be parallel to its up direction");
+  if (!(front.norm() > 1e-9 * view.front.norm()))
+    throw InputError("the view's front direction must not be parallel to its up direction");
   front.normalize();
   const Vec3 left = up.cross(front);
   Vec3 lower = Vec3::Constant(std::numeric_limits<double>::infinity()), upper = -lower;
@@ -84,13 +98,16 @@ Camera fit_camera(const View& view, std::span<const Vec3> points, int width, int
   camera.tan_y = aspect >= 1 ? half : half / aspect;
 
   // Extents as the camera sees them, about the target.
-  const auto seen = [&](const Vec3& p) { return Vec3(camera.right.dot(p - target), camera.up.dot(p - target), camera.back.dot(p - target)); };
+  const auto seen = [&](const Vec3& p) {
+    return Vec3(camera.right.dot(p - target), camera.up.dot(p - target), camera.back.dot(p - target));
+  };
   const double usable = 1 - 2 * kMargin;
   if (view.eye) {
     camera.eye = *view.eye;
     if (camera.is_orthographic) {
       double scale = 1e-12;
-      for (const Vec3& p : points) scale = std::max({scale, std::abs(seen(p).x()) / camera.tan_x, std::abs(seen(p).y()) / camera.tan_y});
+      for (const Vec3& p : points)
+        scale = std::max({scale, std::abs(seen(p).x()) / camera.tan_x, std::abs(seen(p).y()) / camera.tan_y});
       camera.tan_x *= scale / usable;
       camera.tan_y *= scale / usable;
     }
@@ -102,7 +119,9 @@ Camera fit_camera(const View& view, std::span<const Vec3> points, int width, int
     }
     if (points.empty()) low = high = Vec3::Zero();
     if (!view.target) target += 0.5 * (low.x() + high.x()) * camera.right + 0.5 * (low.y() + high.y()) * camera.up;
-    const double scale = std::max({0.5 * (high.x() - low.x()) / camera.tan_x, 0.5 * (high.y() - low.y()) / camera.tan_y, 1e-12}) / usable / view.zoom;
+    const double scale =
+        std::max({0.5 * (high.x() - low.x()) / camera.tan_x, 0.5 * (high.y() - low.y()) / camera.tan_y, 1e-12}) /
+        usable / view.zoom;
     camera.tan_x *= scale;
     camera.tan_y *= scale;
     camera.eye = target + 3 * radius * camera.back;

@@ -6,30 +6,31 @@
 #include <span>
 #include <string>
 
-#include "skeletex/model/mesh.h"
+#include "skeletex/geometry/mesh.h"
 
 namespace skeletex {
 
 /// From where to look: angles about the model, or a place of its own.
 struct View {
   Vec3 up = Vec3::UnitY(), front = Vec3::UnitZ();  ///< of the model, in its world axes; front is made orthogonal to up
-  double azimuth_deg = 30;   ///< 0: the front is seen; growing: the eye goes to the model's left
+  double azimuth_deg = 30;                         ///< 0: the front is seen; growing: the eye goes to the model's left
   double elevation_deg = 15;
-  double fov_deg = 25;       ///< of the picture's shorter side; 0: orthographic
-  double zoom = 1;           ///< 1: the model fills the picture but for a margin
+  double fov_deg = 25;                        ///< of the picture's shorter side; 0: orthographic
+  double zoom = 1;                            ///< 1: the model fills the picture but for a margin
   std::optional<Vec3> target = std::nullopt;  ///< world; without it the model is centred
   std::optional<Vec3> eye = std::nullopt;     ///< world; with it angles and zoom do not count
 };
 
-/// A view from JSON; keys as the members above: up, front, azimuth, elevation, fov, zoom, target, eye. All may be missing.
-/// \param where  name of the JSON in messages, e.g. its path
-/// \throw IoError naming the key that is unknown or has no such value
+/// A view from JSON; keys as the members above: up, front, azimuth, elevation, fov, zoom, target, eye. All may be
+/// missing. \param where  name of the JSON in messages, e.g. its path \throw IoError naming the key that is unknown or
+/// has no such value
 View parse_view(const nlohmann::json& json, const std::string& where);
 
 /// A camera in world space. The axes are orthonormal and right-handed: right, up, back.
 struct Camera {
   Vec3 eye = Vec3::Zero(), right = Vec3::UnitX(), up = Vec3::UnitY(), back = Vec3::UnitZ();
-  double tan_x = 0.2, tan_y = 0.2;  ///< half of the picture's extent at distance 1; orthographic: half extents, world units
+  double tan_x = 0.2,
+         tan_y = 0.2;  ///< half of the picture's extent at distance 1; orthographic: half extents, world units
   bool is_orthographic = false;
   double near = 0.1, far = 10;
 };

@@ -11,7 +11,9 @@
 namespace skeletex {
 namespace {
 
-unsigned char to_byte(double value) { return static_cast<unsigned char>(std::lround(255 * std::clamp(value, 0.0, 1.0))); }
+unsigned char to_byte(double value) {
+  return static_cast<unsigned char>(std::lround(255 * std::clamp(value, 0.0, 1.0)));
+}
 
 /// Oklab (Ottosson 2020) to sRGB.
 VertexColour from_oklch(double lightness, double chroma, double hue_rad) {
@@ -50,7 +52,8 @@ VertexColour viridis(double value) {
   const std::size_t i = std::min(static_cast<std::size_t>(at), kAnchors.size() - 2);
   const double t = at - static_cast<double>(i);
   const auto mix = [t](unsigned char a, unsigned char b) { return to_byte(((1 - t) * a + t * b) / 255); };
-  return {mix(kAnchors[i].r, kAnchors[i + 1].r), mix(kAnchors[i].g, kAnchors[i + 1].g), mix(kAnchors[i].b, kAnchors[i + 1].b)};
+  return {mix(kAnchors[i].r, kAnchors[i + 1].r), mix(kAnchors[i].g, kAnchors[i + 1].g),
+          mix(kAnchors[i].b, kAnchors[i + 1].b)};
 }
 
 std::string hex(VertexColour colour) { return fmt::format("#{:02x}{:02x}{:02x}", colour.r, colour.g, colour.b); }

@@ -3,7 +3,6 @@
 
 #define GL_GLEXT_PROTOTYPES
 #include <GL/glcorearb.h>
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -51,15 +50,16 @@ Light key_light(const Camera& camera) {
   return {(-0.55 * camera.right + 0.65 * camera.up + 0.75 * camera.back).normalized(), Vec3(0.90, 0.88, 0.83)};
 }
 
-/// Directions spread evenly (Fibonacci) over the half of the sphere that is up in the picture, so that pictures of models
-/// look alike whatever way their own up is, and weakly a little below: light that a floor would send back.
+/// Directions spread evenly (Fibonacci) over the half of the sphere that is up in the picture, so that pictures of
+/// models look alike whatever way their own up is, and weakly a little below: light that a floor would send back.
 std::vector<Light> sky_light(const Camera& camera, int count) {
   std::vector<Light> lights;
   double total = 0;
   for (int i = 0; i < count; ++i) {
     const double height = (i + 0.5) / count * 1.35 - 0.35;
     const double angle = 2 * std::numbers::pi * 0.6180339887498949 * i, radius = std::sqrt(1 - height * height);
-    const Vec3 direction = radius * std::cos(angle) * camera.right + height * camera.up + radius * std::sin(angle) * camera.back;
+    const Vec3 direction =
+        radius * std::cos(angle) * camera.right + height * camera.up + radius * std::sin(angle) * camera.back;
     const double weight = height > 0 ? 1 : 0.45;
     lights.push_back({direction, weight * Vec3(0.94, 0.98, 1.06)});
     total += weight * std::max(0.0, direction.dot(camera.up));
@@ -120,7 +120,8 @@ struct ShadowMaps {
   std::vector<GlFramebuffer> framebuffers;
 };
 
-void draw_geometry(GlContext& context, const GpuSurface& surface, const SurfacePaint& paint, const Camera& camera, const DrawOptions& options) {
+void draw_geometry(GlContext& context, const GpuSurface& surface, const SurfacePaint& paint, const Camera& camera,
+                   const DrawOptions& options) {
   glEnable(GL_DEPTH_TEST);
   glDisable(GL_BLEND);
   glDisable(GL_CULL_FACE);
@@ -152,16 +153,20 @@ GlBuffer upload_colours(std::span<const VertexColour> colours) {
   return gl_buffer(bytes);
 }
 
-Image draw(GlContext& context, const GpuSurface& surface, const SurfacePaint& paint, const Camera& camera, const DrawOptions& options) {
+Image draw(GlContext& context, const GpuSurface& surface, const SurfacePaint& paint, const Camera& camera,
+           const DrawOptions& options) {
   GLint largest = 0;
   glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);
   const int samples = std::max(1, options.samples), width = options.width * samples, height = options.height * samples;
   if (width > largest || height > largest)
-    throw InputError(fmt::format("a picture of {} x {} with {} samples is larger than this device can draw ({} pixels a side); ask for a smaller one",
-                                 options.width, options.height, samples, largest));
+    throw InputError(
+        fmt::format("a picture of {} x {} with {} samples is larger than this device can draw ({} pixels a side); ask "
+                    "for a smaller one",
+                    options.width, options.height, samples, largest));
   const VertexArray array;
   array.bind();
-  const GlTexture albedo(GL_RGBA16F, width, height), normals(GL_RGBA16F, width, height), depth(GL_DEPTH_COMPONENT32F, width, height);
+  const GlTexture albedo(GL_RGBA16F, width, height), normals(GL_RGBA16F, width, height),
+      depth(GL_DEPTH_COMPONENT32F, width, height);
   const GlTexture irradiance(GL_RGBA32F, width, height);
   const GlFramebuffer geometry(std::array{albedo.id(), normals.id()}, depth.id());
   const GlFramebuffer lighting(std::array{irradiance.id()}, 0);
@@ -205,7 +210,8 @@ Image draw(GlContext& context, const GpuSurface& surface, const SurfacePaint& pa
     shine(std::array{key_light(camera)}, ShadowMaps(kKeyShadowSize, 1), 2, 1.5f);
     const std::vector<Light> sky = sky_light(camera, options.sky_lights);
     const ShadowMaps maps(kShadowSize, kBatch);
-    for (std::size_t i = 0; i < sky.size(); i += kBatch) shine(std::span(sky).subspan(i, std::min<std::size_t>(kBatch, sky.size() - i)), maps, 0, 0);
+    for (std::size_t i = 0; i < sky.size(); i += kBatch)
+      shine(std::span(sky).subspan(i, std::min<std::size_t>(kBatch, sky.size() - i)), maps, 0, 0);
     glDisable(GL_BLEND);
   }
 
@@ -225,7 +231,8 @@ Image draw(GlContext& context, const GpuSurface& surface, const SurfacePaint& pa
   Image image = make_image(options.width, options.height), flipped = image;
   glReadPixels(0, 0, options.width, options.height, GL_RGBA, GL_FLOAT, flipped.rgba.data());
   check_gl("drawing");
-  for (int y = 0; y < image.height; ++y) std::copy_n(flipped.at(0, image.height - 1 - y), 4 * static_cast<std::size_t>(image.width), image.at(0, y));
+  for (int y = 0; y < image.height; ++y)
+    std::copy_n(flipped.at(0, image.height - 1 - y), 4 * static_cast<std::size_t>(image.width), image.at(0, y));
   return image;
 }
 

@@ -24,17 +24,17 @@ struct SurfacePaint {
 
 struct DrawOptions {
   int width = 1200, height = 900;
-  int samples = 2;           ///< per pixel and direction: samples^2 are averaged
-  bool is_flat = false;      ///< a normal per triangle instead of per vertex
-  double wire_pixels = 0;    ///< half the width of drawn edges, 0: none
-  double lighting = 1;       ///< 1: light and shadow in full, 0: colours as they are
-  int sky_lights = 40;       ///< directions that make up the soft light from above; each costs a depth map
+  int samples = 2;         ///< per pixel and direction: samples^2 are averaged
+  bool is_flat = false;    ///< a normal per triangle instead of per vertex
+  double wire_pixels = 0;  ///< half the width of drawn edges, 0: none
+  double lighting = 1;     ///< 1: light and shadow in full, 0: colours as they are
+  int sky_lights = 40;     ///< directions that make up the soft light from above; each costs a depth map
 };
 
-/// Draws a surface: smooth or flat, a key light from the upper left and a sky of many directions, each with its shadows, so
-/// that folds and contacts are dark as they are outdoors. The background stays clear.
-/// \throw DeviceError
-Image draw(GlContext& context, const GpuSurface& surface, const SurfacePaint& paint, const Camera& camera, const DrawOptions& options);
+/// Draws a surface: smooth or flat, a key light from the upper left and a sky of many directions, each with its
+/// shadows, so that folds and contacts are dark as they are outdoors. The background stays clear. \throw DeviceError
+Image draw(GlContext& context, const GpuSurface& surface, const SurfacePaint& paint, const Camera& camera,
+           const DrawOptions& options);
 
 /// Bytes r, g, b, 255 as SurfacePaint takes them.
 GlBuffer upload_colours(std::span<const VertexColour> colours);

@@ -13,7 +13,7 @@
 #include <cstring>
 #include <string_view>
 
-#include "skeletex/cl/kernel_source.h"
+#include "skeletex/device/kernel_source.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
@@ -44,7 +44,8 @@ GlDeviceInfo describe(int index, EGLDeviceEXT device) {
   const auto query = reinterpret_cast<PFNEGLQUERYDEVICESTRINGEXTPROC>(eglGetProcAddress("eglQueryDeviceStringEXT"));
   const char* extensions = query ? query(device, EGL_EXTENSIONS) : nullptr;
   GlDeviceInfo info{index, "", has_word(extensions, "EGL_MESA_device_software")};
-  const char* file = query && has_word(extensions, "EGL_EXT_device_drm") ? query(device, EGL_DRM_DEVICE_FILE_EXT) : nullptr;
+  const char* file =
+      query && has_word(extensions, "EGL_EXT_device_drm") ? query(device, EGL_DRM_DEVICE_FILE_EXT) : nullptr;
   info.name = info.is_software ? "software" : file ? file : "device";
   return info;
 }
@@ -56,7 +57,8 @@ EGLDisplay display_of(EGLDeviceEXT device) {
 
 EGLDisplay surfaceless_display() {
   const auto get = reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(eglGetProcAddress("eglGetPlatformDisplayEXT"));
-  if (!get || !has_word(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS), "EGL_MESA_platform_surfaceless")) return EGL_NO_DISPLAY;
+  if (!get || !has_word(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS), "EGL_MESA_platform_surfaceless"))
+    return EGL_NO_DISPLAY;
   return get(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr);
 }
 
@@ -94,8 +96,9 @@ struct GlContext::Display {
     EGLConfig config = nullptr;
     EGLint count = 0;
     if (!eglChooseConfig(display, wanted, &config, 1, &count) || count < 1) return "no configuration with OpenGL";
-    const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION, 4, EGL_CONTEXT_MINOR_VERSION, 5, EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                                 EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
+    const EGLint attributes[] = {
+        EGL_CONTEXT_MAJOR_VERSION,           4,       EGL_CONTEXT_MINOR_VERSION, 5, EGL_CONTEXT_OPENGL_PROFILE_MASK,
+        EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
     context = eglCreateContext(display, config, EGL_NO_CONTEXT, attributes);
     if (context == EGL_NO_CONTEXT) return "no OpenGL 4.5";
     if (!eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context)) return "no context without a surface";
@@ -114,13 +117,16 @@ GlContext::GlContext(const std::string& selector) : display_(std::make_unique<Di
   const std::vector<EGLDeviceEXT> devices = egl_devices();
   std::vector<GlDeviceInfo> chosen = list_gl_devices();
   std::string names;
-  for (const GlDeviceInfo& device : chosen) names += fmt::format("{}{}: {}", names.empty() ? "" : ", ", device.index, device.name);
+  for (const GlDeviceInfo& device : chosen)
+    names += fmt::format("{}{}: {}", names.empty() ? "" : ", ", device.index, device.name);
   if (!selector.empty()) {
-    const bool is_number = std::all_of(selector.begin(), selector.end(), [](unsigned char c) { return std::isdigit(c); });
+    const bool is_number =
+        std::all_of(selector.begin(), selector.end(), [](unsigned char c) { return std::isdigit(c); });
     std::erase_if(chosen, [&](const GlDeviceInfo& device) {
       return is_number ? std::to_string(device.index) != selector : device.name.find(selector) == std::string::npos;
     });
-    if (chosen.empty()) throw DeviceError(fmt::format("no EGL device \"{}\"; there are: {}", selector, names.empty() ? "none" : names));
+    if (chosen.empty())
+      throw DeviceError(fmt::format("no EGL device \"{}\"; there are: {}", selector, names.empty() ? "none" : names));
   }
   std::stable_partition(chosen.begin(), chosen.end(), [](const GlDeviceInfo& device) { return !device.is_software; });
   std::string reasons;
@@ -138,7 +144,10 @@ GlContext::GlContext(const std::string& selector) : display_(std::make_unique<Di
     if (!is_open) reasons += fmt::format("\n  surfaceless: {}", reason);
   }
   if (!is_open)
-    throw DeviceError(fmt::format("no EGL device gives an OpenGL 4.5 context:{}\nMesa's software device (Debian packages libegl1 and libgl1-mesa-dri) does.", reasons));
+    throw DeviceError(
+        fmt::format("no EGL device gives an OpenGL 4.5 context:{}\nMesa's software device (Debian packages libegl1 and "
+                    "libgl1-mesa-dri) does.",
+                    reasons));
   const auto text = [](GLenum name) { return std::string(reinterpret_cast<const char*>(glGetString(name))); };
   renderer_ = fmt::format("{}, OpenGL {}", text(GL_RENDERER), text(GL_VERSION));
 }

@@ -10,7 +10,7 @@ namespace skeletex {
 /// A device that EGL offers, in EGL's order.
 struct GlDeviceInfo {
   int index = 0;
-  std::string name;         ///< its DRM device file, or "software" for Mesa's rasterizer
+  std::string name;  ///< its DRM device file, or "software" for Mesa's rasterizer
   bool is_software = false;
 };
 /// Empty when EGL cannot list devices (then only the default surfaceless one is tried).
@@ -20,8 +20,8 @@ std::vector<GlDeviceInfo> list_gl_devices();
 /// thread. Owns the programs; buffers and textures are objects of their own (gl_objects.h) that must not outlive it.
 class GlContext {
  public:
-  /// \param selector  "" : the first hardware device that works, else software; or a device's number or a part of its name
-  /// \throw DeviceError when there is no such device or it has no OpenGL 4.5
+  /// \param selector  "" : the first hardware device that works, else software; or a device's number or a part of its
+  /// name \throw DeviceError when there is no such device or it has no OpenGL 4.5
   explicit GlContext(const std::string& selector = "");
   ~GlContext();
   GlContext(const GlContext&) = delete;

@@ -28,10 +28,13 @@ void GlBuffer::bind(unsigned binding) const { glBindBufferBase(GL_SHADER_STORAGE
 
 GlTexture::GlTexture(unsigned format, int width, int height, int layers) {
   glCreateTextures(layers > 0 ? GL_TEXTURE_2D_ARRAY : GL_TEXTURE_2D, 1, &id_);
-  if (layers > 0) glTextureStorage3D(id_, 1, format, width, height, layers);
-  else glTextureStorage2D(id_, 1, format, width, height);
+  if (layers > 0)
+    glTextureStorage3D(id_, 1, format, width, height, layers);
+  else
+    glTextureStorage2D(id_, 1, format, width, height);
   for (const GLenum axis : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T}) glTextureParameteri(id_, axis, GL_CLAMP_TO_EDGE);
-  for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER}) glTextureParameteri(id_, filter, GL_NEAREST);
+  for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
+    glTextureParameteri(id_, filter, GL_NEAREST);
   check_gl("a texture");
 }
 GlTexture::~GlTexture() {
@@ -45,8 +48,10 @@ GlFramebuffer::GlFramebuffer(std::span<const unsigned> colours, unsigned depth, 
     targets.push_back(GL_COLOR_ATTACHMENT0 + static_cast<GLenum>(targets.size()));
     glNamedFramebufferTexture(id_, targets.back(), colour, 0);
   }
-  if (layer >= 0) glNamedFramebufferTextureLayer(id_, GL_DEPTH_ATTACHMENT, depth, 0, layer);
-  else if (depth != 0) glNamedFramebufferTexture(id_, GL_DEPTH_ATTACHMENT, depth, 0);
+  if (layer >= 0)
+    glNamedFramebufferTextureLayer(id_, GL_DEPTH_ATTACHMENT, depth, 0, layer);
+  else if (depth != 0)
+    glNamedFramebufferTexture(id_, GL_DEPTH_ATTACHMENT, depth, 0);
   glNamedFramebufferDrawBuffers(id_, static_cast<GLsizei>(targets.size()), targets.data());
   if (glCheckNamedFramebufferStatus(id_, GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
     glDeleteFramebuffers(1, &id_);
@@ -61,7 +66,8 @@ void GlFramebuffer::bind() const { glBindFramebuffer(GL_FRAMEBUFFER, id_); }
 void check_gl(const char* what) {
   const GLenum code = glGetError();
   if (code == GL_NO_ERROR) return;
-  if (code == GL_OUT_OF_MEMORY) throw DeviceError(fmt::format("OpenGL has no memory for {}; ask for a smaller picture or model", what));
+  if (code == GL_OUT_OF_MEMORY)
+    throw DeviceError(fmt::format("OpenGL has no memory for {}; ask for a smaller picture or model", what));
   throw DeviceError(fmt::format("OpenGL error {:#x} with {}", code, what));
 }
 

@@ -6,10 +6,10 @@
 
 #include <algorithm>
 
-#include "skeletex/model/frame.h"
-#include "skeletex/model/posed_frame.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/skeleton/frame.h"
+#include "skeletex/skeleton/posed_frame.h"
 
 namespace skeletex {
 namespace {
@@ -53,8 +53,8 @@ GpuModel upload_model(const SkeletexModel& model) {
   device.texels = GlTexture(GL_RGB32F, texture.width, texture.height);
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
   glTextureSubImage2D(device.texels.id(), 0, 0, 0, texture.width, texture.height, GL_RGB, GL_FLOAT, texels.data());
-  const Walls walls(model.skeleton);
-  const FrameTables tables = frame_tables(model.skeleton, walls, model.patches, model.origin);
+  const SeparationPlanes separation(model.skeleton);
+  const FrameTables tables = frame_tables(model.skeleton, separation, model.patches, model.origin);
   const std::vector<LatticeRow> lattice_rows = skeletex::lattice_rows(model.patches, RowChoice::kInner);
   device.lattice_rows = gl_buffer(lattice_rows);
   device.row_count = static_cast<int>(lattice_rows.size());
@@ -67,10 +67,12 @@ GpuModel upload_model(const SkeletexModel& model) {
   return device;
 }
 
-void displace(GlContext& context, const GpuModel& device, const SkeletexModel& model, const Skeleton& posed, DistanceRule rule, GpuSurface& surface) {
-  const PosedWalls walls(model, posed);
-  const PoseTables tables = pose_tables(model, walls);
-  const GlBuffer patches = gl_buffer(tables.patches), rows = gl_buffer(tables.rows), columns = upload_planes(tables.columns);
+void displace(GlContext& context, const GpuModel& device, const SkeletexModel& model, const Skeleton& posed,
+              DistanceRule rule, GpuSurface& surface) {
+  const PosedPlanes separation(model, posed);
+  const PoseTables tables = pose_tables(model, separation);
+  const GlBuffer patches = gl_buffer(tables.patches), rows = gl_buffer(tables.rows),
+                 columns = upload_planes(tables.columns);
   surface.origin = tables.origin;
   glUseProgram(context.program({"displace.comp"}));
   glBindTextureUnit(0, device.texels.id());
@@ -88,7 +90,7 @@ void displace(GlContext& context, const GpuModel& device, const SkeletexModel& m
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
 
   std::vector<Vec3> points(device.lattice.vertex_count);
-  place_shared_vertices(model, walls, device.lattice, rule, points);
+  place_shared_vertices(model, separation, device.lattice, rule, points);
   write_shared_vertices(points, device.lattice.inner_count, surface);
   check_gl("displacing");
   update_normals(context, surface);
@@ -104,7 +106,8 @@ GpuSkin upload_skin(const Skin& skin, const TriangleMesh& bind) {
   return device;
 }
 
-void pose_skin(GlContext& context, const GpuSkin& device, const Skin& skin, std::span<const BoneMotion> motions, const Skeleton& posed, GpuSurface& surface) {
+void pose_skin(GlContext& context, const GpuSkin& device, const Skin& skin, std::span<const BoneMotion> motions,
+               const Skeleton& posed, GpuSurface& surface) {
   surface.origin = middle_of_nodes(posed);
   const GlBuffer records = gl_buffer(motion_records(motions, skin.origin, surface.origin));
   glUseProgram(context.program({"skin.comp"}));

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-#include "skeletex/model/posed_walls.h"
 #include "skeletex/model/texture.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/reconstruct/skin.h"
 #include "skeletex/render/gpu_surface.h"
+#include "skeletex/skeleton/posed_planes.h"
 
 namespace skeletex {
 
@@ -17,11 +17,12 @@ struct GpuModel {
 };
 GpuModel upload_model(const SkeletexModel& model);
 
-/// Moves a surface's vertices to the model's points in a pose by the paper's rules, in a compute shader that reads the texture; seams and poles,
-/// few and shared, are made on the host. Normals follow.
-/// \param surface  upload_surface of reconstruct_mesh(.., model), whose numbering it keeps
-/// \param posed    apply_pose(model.skeleton, ..), or the model's own skeleton for the bind pose
-void displace(GlContext& context, const GpuModel& device, const SkeletexModel& model, const Skeleton& posed, DistanceRule rule, GpuSurface& surface);
+/// Moves a surface's vertices to the model's points in a pose by the paper's rules, in a compute shader that reads the
+/// texture; seams and poles, few and shared, are made on the host. Normals follow. \param surface  upload_surface of
+/// reconstruct_mesh(.., model), whose numbering it keeps \param posed    apply_pose(model.skeleton, ..), or the model's
+/// own skeleton for the bind pose
+void displace(GlContext& context, const GpuModel& device, const SkeletexModel& model, const Skeleton& posed,
+              DistanceRule rule, GpuSurface& surface);
 
 /// A skin on the GL device.
 struct GpuSkin {
@@ -31,8 +32,9 @@ struct GpuSkin {
 /// \param bind  the model's mesh in its bind pose
 GpuSkin upload_skin(const Skin& skin, const TriangleMesh& bind);
 
-/// Moves a surface's vertices as pose_skin does, in a compute shader; the few shared vertices are moved on the host. Normals follow.
-/// \param posed  the skeleton that the motions lead to
-void pose_skin(GlContext& context, const GpuSkin& device, const Skin& skin, std::span<const BoneMotion> motions, const Skeleton& posed, GpuSurface& surface);
+/// Moves a surface's vertices as pose_skin does, in a compute shader; the few shared vertices are moved on the host.
+/// Normals follow. \param posed  the skeleton that the motions lead to
+void pose_skin(GlContext& context, const GpuSkin& device, const Skin& skin, std::span<const BoneMotion> motions,
+               const Skeleton& posed, GpuSurface& surface);
 
 }  // namespace skeletex

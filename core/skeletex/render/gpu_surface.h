@@ -2,7 +2,7 @@
 #pragma once
 #include <vector>
 
-#include "skeletex/model/mesh.h"
+#include "skeletex/geometry/mesh.h"
 #include "skeletex/render/gl_context.h"
 #include "skeletex/render/gl_objects.h"
 
@@ -11,10 +11,10 @@ namespace skeletex {
 /// A triangle mesh on the GL device. Positions are floats relative to `origin`.
 struct GpuSurface {
   int vertex_count = 0, triangle_count = 0;
-  Vec3 origin = Vec3::Zero();        ///< world
-  GlBuffer positions, normals;       ///< three floats per vertex
-  GlBuffer indices;                  ///< three ints per triangle
-  GlBuffer incident_begin, incident; ///< the triangles at each vertex
+  Vec3 origin = Vec3::Zero();         ///< world
+  GlBuffer positions, normals;        ///< three floats per vertex
+  GlBuffer indices;                   ///< three ints per triangle
+  GlBuffer incident_begin, incident;  ///< the triangles at each vertex
 };
 
 /// Positions relative to the bounding box's centre, normals made.

@@ -31,7 +31,8 @@ using Surface = std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy
 /// cairo's premultiplied ARGB in sRGB. Its blending is not linear, which only text edges would show.
 Surface to_cairo(const Image& image) {
   Surface surface(cairo_image_surface_create(CAIRO_FORMAT_ARGB32, image.width, image.height), cairo_surface_destroy);
-  if (cairo_surface_status(surface.get()) != CAIRO_STATUS_SUCCESS) throw InputError("there is no memory for a picture of this size");
+  if (cairo_surface_status(surface.get()) != CAIRO_STATUS_SUCCESS)
+    throw InputError("there is no memory for a picture of this size");
   unsigned char* data = cairo_image_surface_get_data(surface.get());
   const int stride = cairo_image_surface_get_stride(surface.get());
   for (int y = 0; y < image.height; ++y)
@@ -62,7 +63,9 @@ void draw_with_cairo(Image& image, const std::function<void(cairo_t*)>& draw) {
       const float alpha = static_cast<float>(packed >> 24) / 255;
       float* p = layer.at(x, y);
       for (int c = 0; c < 3; ++c)
-        p[c] = alpha > 0 ? alpha * from_srgb(std::min(1.0f, static_cast<float>(packed >> (16 - 8 * c) & 255) / (255 * alpha))) : 0;
+        p[c] = alpha > 0
+                   ? alpha * from_srgb(std::min(1.0f, static_cast<float>(packed >> (16 - 8 * c) & 255) / (255 * alpha)))
+                   : 0;
       p[3] = alpha;
     }
   blend_over(image, layer);
@@ -92,10 +95,13 @@ std::vector<double> ticks(double lowest, double highest, int n) {
 
 }  // namespace
 
-Image make_image(int width, int height) { return {width, height, std::vector<float>(4 * static_cast<std::size_t>(width) * height, 0.0f)}; }
+Image make_image(int width, int height) {
+  return {width, height, std::vector<float>(4 * static_cast<std::size_t>(width) * height, 0.0f)};
+}
 
 LinearRgb to_linear(const VertexColour& srgb) {
-  return {from_srgb(static_cast<float>(srgb.r) / 255), from_srgb(static_cast<float>(srgb.g) / 255), from_srgb(static_cast<float>(srgb.b) / 255)};
+  return {from_srgb(static_cast<float>(srgb.r) / 255), from_srgb(static_cast<float>(srgb.g) / 255),
+          from_srgb(static_cast<float>(srgb.b) / 255)};
 }
 
 void blend_over(Image& under, const Image& over, double opacity) {
@@ -124,7 +130,8 @@ Image tile(std::span<const Image> images, int columns) {
   columns = std::clamp(columns, 1, std::max(count, 1));
   Image result = make_image(columns * cell_width, (count + columns - 1) / columns * cell_height);
   for (int i = 0; i < count; ++i) {
-    const int left = i % columns * cell_width + (cell_width - images[i].width) / 2, top = i / columns * cell_height + (cell_height - images[i].height) / 2;
+    const int left = i % columns * cell_width + (cell_width - images[i].width) / 2,
+              top = i / columns * cell_height + (cell_height - images[i].height) / 2;
     for (int y = 0; y < images[i].height; ++y)
       std::copy_n(images[i].at(0, y), 4 * static_cast<std::size_t>(images[i].width), result.at(left, top + y));
   }
@@ -140,7 +147,8 @@ void write_png(const std::filesystem::path& path, const Image& image) {
       return CAIRO_STATUS_SUCCESS;
     };
     const cairo_status_t status = cairo_surface_write_to_png_stream(surface.get(), write, &file);
-    if (status != CAIRO_STATUS_SUCCESS) throw IoError(fmt::format("{}: {}", path.string(), cairo_status_to_string(status)));
+    if (status != CAIRO_STATUS_SUCCESS)
+      throw IoError(fmt::format("{}: {}", path.string(), cairo_status_to_string(status)));
     file.close();
   });
 }
@@ -154,8 +162,9 @@ void write_exr_image(const std::filesystem::path& path, const Image& image) {
       constexpr const char* kNames[] = {"R", "G", "B", "A"};
       for (int c = 0; c < 4; ++c) {
         header.channels().insert(kNames[c], Imf::Channel(Imf::FLOAT));
-        frame.insert(kNames[c], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(image.rgba.data() + c)), 4 * sizeof(float),
-                                           4 * sizeof(float) * static_cast<std::size_t>(image.width)));
+        frame.insert(kNames[c],
+                     Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(image.rgba.data() + c)),
+                                4 * sizeof(float), 4 * sizeof(float) * static_cast<std::size_t>(image.width)));
       }
       Imf::OutputFile file(temporary.c_str(), header);
       file.setFrameBuffer(frame);
@@ -170,8 +179,8 @@ void draw_text(Image& image, double x, double y, const std::string& text, const 
   draw_with_cairo(image, [&](cairo_t* cairo) { show_text(cairo, x, y, text, style); });
 }
 
-void draw_scale(Image& image, std::span<const VertexColour> colours, double lowest, double highest, const std::string& title,
-                const std::array<double, 3>& ink) {
+void draw_scale(Image& image, std::span<const VertexColour> colours, double lowest, double highest,
+                const std::string& title, const std::array<double, 3>& ink) {
   const double unit = std::min(image.width, image.height) / 40.0, width = 1.2 * unit, height = 0.5 * image.height;
   const double x = image.width - 7 * unit, top = 0.5 * (image.height - height);
   draw_with_cairo(image, [&](cairo_t* cairo) {
@@ -191,7 +200,8 @@ void draw_scale(Image& image, std::span<const VertexColour> colours, double lowe
       cairo_move_to(cairo, x + width, y);
       cairo_line_to(cairo, x + width + 0.4 * unit, y);
       cairo_stroke(cairo);
-      show_text(cairo, x + width + 0.6 * unit, y + 0.35 * unit, value == 0 ? "0" : fmt::format("{:.2g}", value), {.size = unit, .colour = ink});
+      show_text(cairo, x + width + 0.6 * unit, y + 0.35 * unit, value == 0 ? "0" : fmt::format("{:.2g}", value),
+                {.size = unit, .colour = ink});
     }
     show_text(cairo, x + 0.5 * width, top - 0.8 * unit, title, {.size = unit, .colour = ink, .is_centred = true});
   });

@@ -40,8 +40,9 @@ struct TextStyle {
   bool is_centred = false;
 };
 void draw_text(Image& image, double x, double y, const std::string& text, const TextStyle& style);
-/// A vertical bar of a colour map at the right margin, with numbers from 0 to `highest` (or lowest to highest) and a title.
-void draw_scale(Image& image, std::span<const VertexColour> colours, double lowest, double highest, const std::string& title,
-                const std::array<double, 3>& ink);
+/// A vertical bar of a colour map at the right margin, with numbers from 0 to `highest` (or lowest to highest) and a
+/// title.
+void draw_scale(Image& image, std::span<const VertexColour> colours, double lowest, double highest,
+                const std::string& title, const std::array<double, 3>& ink);
 
 }  // namespace skeletex

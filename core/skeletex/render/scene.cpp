@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "skeletex/model/walls.h"
+#include "skeletex/skeleton/separation_planes.h"
 
 namespace skeletex {
 namespace {
@@ -15,22 +15,27 @@ constexpr int kBallRows = 10, kBallColumns = 16, kSpindleColumns = 12;
 constexpr int kBallTriangles = 2 * kBallColumns * (kBallRows - 1), kSpindleTriangles = 4 * kSpindleColumns;
 
 /// Closes a surface of revolution about an axis; the first and last ring are points.
-void append_revolution(const Vec3& axis, const Vec3& base, const std::vector<std::array<double, 2>>& profile, int columns, TriangleMesh& mesh) {
+void append_revolution(const Vec3& axis, const Vec3& base, const std::vector<std::array<double, 2>>& profile,
+                       int columns, TriangleMesh& mesh) {
   const Vec3 any = std::abs(axis.x()) < 0.7 ? Vec3::UnitX() : Vec3::UnitY();
   const Vec3 a = any.cross(axis).normalized(), b = axis.cross(a);
   const int first = static_cast<int>(mesh.positions.size()), rings = static_cast<int>(profile.size());
   const auto vertex = [&](int ring, int j) {
-    return ring == 0 ? first : ring == rings - 1 ? first + 1 + (rings - 2) * columns : first + 1 + (ring - 1) * columns + (j + columns) % columns;
+    return ring == 0           ? first
+           : ring == rings - 1 ? first + 1 + (rings - 2) * columns
+                               : first + 1 + (ring - 1) * columns + (j + columns) % columns;
   };
   for (int ring = 0; ring < rings; ++ring)
     for (int j = 0; j < (ring == 0 || ring == rings - 1 ? 1 : columns); ++j) {
       const double angle = 2 * std::numbers::pi * j / columns;
-      mesh.positions.push_back(base + profile[ring][0] * axis + profile[ring][1] * (std::cos(angle) * a + std::sin(angle) * b));
+      mesh.positions.push_back(base + profile[ring][0] * axis +
+                               profile[ring][1] * (std::cos(angle) * a + std::sin(angle) * b));
     }
   for (int ring = 0; ring + 1 < rings; ++ring)
     for (int j = 0; j < columns; ++j) {
       if (ring > 0) mesh.triangles.push_back({vertex(ring, j), vertex(ring, j + 1), vertex(ring + 1, j)});
-      if (ring + 2 < rings) mesh.triangles.push_back({vertex(ring, j + 1), vertex(ring + 1, j + 1), vertex(ring + 1, j)});
+      if (ring + 2 < rings)
+        mesh.triangles.push_back({vertex(ring, j + 1), vertex(ring + 1, j + 1), vertex(ring + 1, j)});
     }
 }
 
@@ -42,13 +47,16 @@ std::vector<int> triangle_bones(const Lattice& lattice, const std::vector<Triang
   for (const Triangle& t : triangles) {
     // Inner vertices come first, and every triangle has one: seams and poles never join up without the row beside them.
     const int vertex = *std::min_element(t.begin(), t.end());
-    bones.push_back(static_cast<int>(std::upper_bound(lattice.first_inner.begin(), lattice.first_inner.end(), vertex) - lattice.first_inner.begin()) - 1);
+    bones.push_back(static_cast<int>(std::upper_bound(lattice.first_inner.begin(), lattice.first_inner.end(), vertex) -
+                                     lattice.first_inner.begin()) -
+                    1);
   }
   return bones;
 }
 
-std::vector<std::array<float, 2>> checker_coordinates(const SkeletexModel& model, const Lattice& lattice, const TriangleMesh& mesh, int cells) {
-  const Walls walls(model.skeleton);
+std::vector<std::array<float, 2>> checker_coordinates(const SkeletexModel& model, const Lattice& lattice,
+                                                      const TriangleMesh& mesh, int cells) {
+  const SeparationPlanes separation(model.skeleton);
   const std::vector<int> bones = triangle_bones(lattice, mesh.triangles);
   const int count = static_cast<int>(model.patches.size());
   std::vector<double> rows_in_cells(count);
@@ -78,7 +86,8 @@ std::vector<std::array<float, 2>> checker_coordinates(const SkeletexModel& model
         v[c] = static_cast<double>((vertex - lattice.first_inner[bone]) % width) / width;
       } else {
         u[c] = near_end == BoneEnd::kHead ? 0 : 1;
-        if (!is_pole[c]) v[c] = walls.turn_of(bone, mesh.positions[vertex] - end_position(model.skeleton, bone, near_end));
+        if (!is_pole[c])
+          v[c] = separation.turn_of(bone, mesh.positions[vertex] - end_position(model.skeleton, bone, near_end));
       }
     }
     const int anchor = is_pole[0] ? 1 : 0;
@@ -89,7 +98,8 @@ std::vector<std::array<float, 2>> checker_coordinates(const SkeletexModel& model
     }
     const double others = 3 - static_cast<double>(std::count(is_pole.begin(), is_pole.end(), true));
     for (int c = 0; c < 3; ++c)
-      coordinates.push_back({static_cast<float>(u[c] * rows_in_cells[bone]), static_cast<float>((is_pole[c] ? sum / others : v[c]) * cells)});
+      coordinates.push_back({static_cast<float>(u[c] * rows_in_cells[bone]),
+                             static_cast<float>((is_pole[c] ? sum / others : v[c]) * cells)});
   }
   return coordinates;
 }
@@ -108,14 +118,17 @@ TriangleMesh skeleton_mesh(const Skeleton& skeleton, double radius) {
     const Vec3 head = skeleton.nodes[bone.head].position, along = skeleton.nodes[bone.tail].position - head;
     const double length = along.norm();
     const double belly = std::min(1.5 * radius, 0.25 * length), thickness = std::min(0.85 * radius, 0.2 * length);
-    append_revolution(along / length, head, {{0, 0}, {belly, thickness}, {length - 0.1 * belly, 0.25 * thickness}, {length, 0}}, kSpindleColumns, mesh);
+    append_revolution(along / length, head,
+                      {{0, 0}, {belly, thickness}, {length - 0.1 * belly, 0.25 * thickness}, {length, 0}},
+                      kSpindleColumns, mesh);
   }
   return mesh;
 }
 
 std::vector<int> skeleton_mesh_bones(const Skeleton& skeleton) {
   std::vector<int> bones(skeleton.nodes.size() * kBallTriangles, -1);
-  for (int bone = 0; bone < static_cast<int>(skeleton.bones.size()); ++bone) bones.insert(bones.end(), kSpindleTriangles, bone);
+  for (int bone = 0; bone < static_cast<int>(skeleton.bones.size()); ++bone)
+    bones.insert(bones.end(), kSpindleTriangles, bone);
   return bones;
 }
 

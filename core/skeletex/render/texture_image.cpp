@@ -22,7 +22,8 @@ float robust_size(std::vector<float> values) {
 /// Pixels of the picture in a texture's shape, its longer side about `pixels`.
 Image canvas(const DisplacementTexture& texture, int pixels, double& scale) {
   scale = static_cast<double>(pixels) / std::max(texture.width, texture.height);
-  Image image = make_image(std::max(1, static_cast<int>(std::lround(texture.width * scale))), std::max(1, static_cast<int>(std::lround(texture.height * scale))));
+  Image image = make_image(std::max(1, static_cast<int>(std::lround(texture.width * scale))),
+                           std::max(1, static_cast<int>(std::lround(texture.height * scale))));
   return image;
 }
 
@@ -45,10 +46,12 @@ Image map_image(const SkeletexModel& model, int pixels) {
   const auto byte = [](float x) { return static_cast<unsigned char>(std::lround(255 * std::clamp(x, 0.0f, 1.0f))); };
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) {
-      const int column = std::min(texture.width - 1, static_cast<int>(x / scale)), row = std::min(texture.height - 1, static_cast<int>(y / scale));
+      const int column = std::min(texture.width - 1, static_cast<int>(x / scale)),
+                row = std::min(texture.height - 1, static_cast<int>(y / scale));
       const std::size_t at = static_cast<std::size_t>(row) * texture.width + column;
-      const LinearRgb colour = to_linear({byte(0.5f + 0.5f * texture.along[at] / along), byte(0.5f + 0.5f * texture.around[at] / around),
-                                          byte(texture.out[at] / out)});
+      const LinearRgb colour =
+          to_linear({byte(0.5f + 0.5f * texture.along[at] / along), byte(0.5f + 0.5f * texture.around[at] / around),
+                     byte(texture.out[at] / out)});
       std::copy(colour.begin(), colour.end(), image.at(x, y));
       image.at(x, y)[3] = 1;
     }
@@ -63,17 +66,22 @@ Image layout_image(const SkeletexModel& model, int pixels) {
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
     const Rectangle& rectangle = model.patches[bone].rectangle;
     const LinearRgb colour = to_linear(bone_colour(static_cast<int>(bone)));
-    for (int y = static_cast<int>(rectangle.y * scale); y < std::min(image.height, static_cast<int>((rectangle.y + rectangle.height) * scale)); ++y)
-      for (int x = static_cast<int>(rectangle.x * scale); x < std::min(image.width, static_cast<int>((rectangle.x + rectangle.width) * scale)); ++x)
+    for (int y = static_cast<int>(rectangle.y * scale);
+         y < std::min(image.height, static_cast<int>((rectangle.y + rectangle.height) * scale)); ++y)
+      for (int x = static_cast<int>(rectangle.x * scale);
+           x < std::min(image.width, static_cast<int>((rectangle.x + rectangle.width) * scale)); ++x)
         std::copy(colour.begin(), colour.end(), image.at(x, y));
     outline(image, rectangle, scale, {0.02f, 0.02f, 0.02f});
   }
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
     const Rectangle& rectangle = model.patches[bone].rectangle;
     const std::string& name = model.skeleton.bones[bone].name;
-    const double size = std::min({0.022 * pixels, 0.7 * rectangle.height * scale, 1.5 * rectangle.width * scale / std::max<double>(1, static_cast<double>(name.size()))});
+    const double size =
+        std::min({0.022 * pixels, 0.7 * rectangle.height * scale,
+                  1.5 * rectangle.width * scale / std::max<double>(1, static_cast<double>(name.size()))});
     if (size < 5) continue;
-    draw_text(image, (rectangle.x + 0.5 * rectangle.width) * scale, (rectangle.y + 0.5 * rectangle.height) * scale + 0.35 * size, name,
+    draw_text(image, (rectangle.x + 0.5 * rectangle.width) * scale,
+              (rectangle.y + 0.5 * rectangle.height) * scale + 0.35 * size, name,
               {.size = size, .colour = {0.05, 0.05, 0.05}, .is_centred = true});
   }
   return image;

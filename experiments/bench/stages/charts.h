@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "inputs.h"
-#include "skeletex/parameterize/chart.h"
+#include "skeletex/convert/parameterize/chart.h"
 
 namespace skeletex {
 

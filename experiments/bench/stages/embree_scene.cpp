@@ -26,10 +26,12 @@ struct EmbreeScene::Query {
 EmbreeScene::EmbreeScene(const std::vector<Vec3>& positions, const std::vector<Triangle>& triangles, Distance distance)
     : positions_(positions), triangles_(triangles), distance_(distance), scene_(rtcNewScene(embree_device())) {
   RTCGeometry geometry = rtcNewGeometry(embree_device(), RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, positions.size()));
+  auto* vertices = static_cast<float*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, positions.size()));
   for (const Vec3& p : positions)
     for (int d = 0; d < 3; ++d) *vertices++ = static_cast<float>(p[d]);
-  auto* indices = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, triangles.size()));
+  auto* indices = static_cast<unsigned*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, triangles.size()));
   for (const Triangle& t : triangles)
     for (const int v : t) *indices++ = static_cast<unsigned>(v);
   if (distance) rtcSetGeometryPointQueryFunction(geometry, visit);

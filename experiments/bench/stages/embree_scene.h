@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "skeletex/model/mesh.h"
+#include "skeletex/geometry/mesh.h"
 
 namespace skeletex {
 

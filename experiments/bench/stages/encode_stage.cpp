@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <OpenMesh/Core/IO/MeshIO.hh>
-#include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
-
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfOutputFile.h>
 #include <fmt/format.h>
+
+#include <OpenMesh/Core/IO/MeshIO.hh>
+#include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 
 #include "runner/process.h"
 #include "runner/work_folder.h"
@@ -33,14 +33,16 @@ struct Command {
     std::vector<std::string> all = arguments;
     all.insert(all.end(), more.begin(), more.end());
     const ProcessResult result = run_process(program, all, {}, folder.path() / "errors.txt");
-    if (result.exit_code != 0) throw Error(fmt::format("{} encode ended with {}: {}", program, result.exit_code, result.errors));
+    if (result.exit_code != 0)
+      throw Error(fmt::format("{} encode ended with {}: {}", program, result.exit_code, result.errors));
     peak_memory_mb = result.peak_memory_mb;
   }
   /// Of the last run.
   nlohmann::json read_report() const { return parse_json(read_file(report()), report().string()); }
 };
 
-std::shared_ptr<Command> make_command(const MeshInput& input, int size, const std::string& program, const std::string& device) {
+std::shared_ptr<Command> make_command(const MeshInput& input, int size, const std::string& program,
+                                      const std::string& device) {
   auto command = std::make_shared<Command>();
   command->program = program;
   command->mesh = input.mesh_path.string();
@@ -48,7 +50,15 @@ std::shared_ptr<Command> make_command(const MeshInput& input, int size, const st
     command->mesh = command->folder.path() / "mesh.ply";
     write_mesh(command->mesh, input.mesh);
   }
-  command->arguments = {"encode", command->mesh, input.skeleton_path.string(), "-o", command->model().string(), "--size", fmt::format("{}", size), "--json", command->report().string()};
+  command->arguments = {"encode",
+                        command->mesh,
+                        input.skeleton_path.string(),
+                        "-o",
+                        command->model().string(),
+                        "--size",
+                        fmt::format("{}", size),
+                        "--json",
+                        command->report().string()};
   if (!device.empty()) command->arguments.insert(command->arguments.end(), {"--device", device});
   return command;
 }
@@ -58,7 +68,8 @@ void write_exr(const std::string& path, const DisplacementTexture& texels) {
   Imf::FrameBuffer frame;
   for (const auto& [name, plane] : {std::pair{"R", &texels.along}, {"G", &texels.around}, {"B", &texels.out}}) {
     header.channels().insert(name, Imf::Channel(Imf::FLOAT));
-    frame.insert(name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(plane->data())), sizeof(float), sizeof(float) * texels.width));
+    frame.insert(name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(plane->data())), sizeof(float),
+                                  sizeof(float) * texels.width));
   }
   Imf::OutputFile file(path.c_str(), header);
   file.setFrameBuffer(frame);
@@ -118,7 +129,10 @@ Stage snap_stage(MeshInputPointer input, int size, const std::string& program, c
     times->snapped = command->read_report().at("times_ms").at("encoding").get<double>();
   };
   stage.counted_ms = [times] { return times->snapped - times->even; };
-  stage.details = [times] { return std::vector<std::pair<std::string, double>>{{"encoding_ms", times->snapped}, {"even_encoding_ms", times->even}}; };
+  stage.details = [times] {
+    return std::vector<std::pair<std::string, double>>{{"encoding_ms", times->snapped},
+                                                       {"even_encoding_ms", times->even}};
+  };
   return stage;
 }
 

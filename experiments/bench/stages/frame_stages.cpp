@@ -3,15 +3,15 @@
 #include <cmath>
 #include <numbers>
 
-#include "skeletex/edit/correspondence.h"
-#include "skeletex/edit/filter.h"
+#include "skeletex/edit/filter/filter.h"
 #include "skeletex/edit/live.h"
-#include "skeletex/edit/part.h"
-#include "skeletex/edit/transfer.h"
+#include "skeletex/edit/transfer/part.h"
+#include "skeletex/edit/transfer/transfer.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/skin.h"
+#include "skeletex/skeleton/correspondence.h"
 #include "stages.h"
 
 namespace skeletex {
@@ -24,8 +24,10 @@ constexpr const char* kCopy = "device copy of the same bytes";
 struct Frame {
   explicit Frame(ClContext& context, TextureInputPointer from)
       : input(std::move(from)),
-        lattice(upload_lattice(context, frame_tables(model().skeleton, Walls(model().skeleton), model().patches, model().origin), model().patches,
-                               model().texture, RowChoice::kInner)),
+        lattice(upload_lattice(
+            context,
+            frame_tables(model().skeleton, SeparationPlanes(model().skeleton), model().patches, model().origin),
+            model().patches, model().texture, RowChoice::kInner)),
         points(allocate_planes(context, lattice.vertex_count)) {}
   const SkeletexModel& model() const { return input->model; }
 
@@ -35,7 +37,9 @@ struct Frame {
 };
 
 int longer_side(const SkeletexModel& model) { return std::max(model.texture.width, model.texture.height); }
-std::size_t texels_of(const SkeletexModel& model) { return static_cast<std::size_t>(model.texture.width) * model.texture.height; }
+std::size_t texels_of(const SkeletexModel& model) {
+  return static_cast<std::size_t>(model.texture.width) * model.texture.height;
+}
 
 Stage stage_of(const char* name, const TextureInput& input) {
   Stage stage;
@@ -92,7 +96,7 @@ Stage smooth_pose_stage(ClContext& context, TextureInputPointer input, const std
   std::shared_ptr<const Skin> skin;
   std::shared_ptr<const DeviceSkin> device;
   const double prepare_ms = wall_ms([&] {
-    DevicePlanes bind = displace_inner(context, model, Walls(model.skeleton), number_lattice(model));
+    DevicePlanes bind = displace_inner(context, model, SeparationPlanes(model.skeleton), number_lattice(model));
     skin = std::make_shared<const Skin>(make_skin(context, model, bind));
     device = std::make_shared<const DeviceSkin>(upload_skin(context, *skin, std::move(bind)));
     context.finish();
@@ -103,8 +107,11 @@ Stage smooth_pose_stage(ClContext& context, TextureInputPointer input, const std
     pose_skin(context, *skin, *device, bone_motions(bind, posed), middle_of_nodes(posed), frame->points);
   };
   stage.run_reference = device_copy(context, 2 * kPlanes * frame->lattice.vertex_count);
-  const double bones = static_cast<double>(skin->block_bones.size()) / static_cast<double>(std::max<std::size_t>(1, skin->blocks.size()));
-  stage.details = [prepare_ms, bones] { return std::vector<std::pair<std::string, double>>{{"prepare_ms", prepare_ms}, {"bones_per_block", bones}}; };
+  const double bones = static_cast<double>(skin->block_bones.size()) /
+                       static_cast<double>(std::max<std::size_t>(1, skin->blocks.size()));
+  stage.details = [prepare_ms, bones] {
+    return std::vector<std::pair<std::string, double>>{{"prepare_ms", prepare_ms}, {"bones_per_block", bones}};
+  };
   return stage;
 }
 
@@ -115,7 +122,9 @@ Stage paper_pose_stage(ClContext& context, TextureInputPointer input, const std:
   stage.run = [&context, frame, pose] {
     const SkeletexModel& model = frame->model();
     const Skeleton posed = apply_pose(model.skeleton, pose);
-    displace_posed(context, frame->lattice, upload_pose(context, model, PosedWalls(model, posed), RowChoice::kInner, DistanceRule::kFromBone), frame->points);
+    displace_posed(context, frame->lattice,
+                   upload_pose(context, model, PosedPlanes(model, posed), RowChoice::kInner, DistanceRule::kFromBone),
+                   frame->points);
   };
   stage.run_reference = device_copy(context, 2 * kPlanes * frame->lattice.vertex_count);
   return stage;
@@ -123,7 +132,8 @@ Stage paper_pose_stage(ClContext& context, TextureInputPointer input, const std:
 
 }  // namespace
 
-Stage pose_stage(ClContext& context, TextureInputPointer input, const std::optional<Pose>& pose, Deformation deformation) {
+Stage pose_stage(ClContext& context, TextureInputPointer input, const std::optional<Pose>& pose,
+                 Deformation deformation) {
   switch (deformation) {
     case Deformation::kSmooth: return smooth_pose_stage(context, std::move(input), pose);
     case Deformation::kPaper: return paper_pose_stage(context, std::move(input), pose);
@@ -147,13 +157,14 @@ struct LiveFrame {
       lattice.rows = context.upload(rows);
       points = allocate_planes(context, lattice.vertex_count);
     }
-    lattice.tables = upload_tables(context, frame_tables(model.skeleton, Walls(model.skeleton), model.patches, model.origin));
+    lattice.tables = upload_tables(
+        context, frame_tables(model.skeleton, SeparationPlanes(model.skeleton), model.patches, model.origin));
     displace(context, lattice, points);
   }
 };
 
-/// Frames of a live edit, each at another place of its way, against a copy of two textures in and one lattice of points out.
-/// \param queue  (share, texels) -> model
+/// Frames of a live edit, each at another place of its way, against a copy of two textures in and one lattice of points
+/// out. \param queue  (share, texels) -> model
 template <class Queue>
 void set_live(Stage& stage, ClContext& context, const Queue& queue, std::size_t texels, double prepare_ms) {
   stage.run = [&context, queue, frame = std::make_shared<LiveFrame>(), t = 0.0]() mutable {
@@ -171,13 +182,16 @@ Stage morph_stage(ClContext& context, TextureInputPointer first, TextureInputPoi
   stage.model += " to " + second->name;
   MorphOptions options;
   options.layout = 0;
-  const auto morph = std::make_shared<const Morph>(context, std::vector{first->model, second->model}, std::vector{correspond(*first, *second)}, options);
+  const auto morph = std::make_shared<const Morph>(context, std::vector{first->model, second->model},
+                                                   std::vector{correspond(*first, *second)}, options);
   std::shared_ptr<const LiveMorph> live;
   const double prepare_ms = wall_ms([&] {
     live = std::make_shared<const LiveMorph>(context, *morph, std::vector<std::vector<double>>{{1, 0}, {0, 1}});
     context.finish();
   });
-  set_live(stage, context, [morph, live](double t, DevicePlanes& texels) { return live->queue(t, texels); }, texels_of(morph->models()[0]), prepare_ms);
+  set_live(
+      stage, context, [morph, live](double t, DevicePlanes& texels) { return live->queue(t, texels); },
+      texels_of(morph->models()[0]), prepare_ms);
   return stage;
 }
 
@@ -186,19 +200,25 @@ Stage transfer_stage(ClContext& context, TextureInputPointer source, TextureInpu
   stage.model = source->name + " to " + stage.model;
   const Correspondence to_source = correspond(*target, *source);
   int chosen = -1;
-  const auto texels = [&](int bone) { return target->model.patches[bone].rectangle.width * target->model.patches[bone].rectangle.height; };
+  const auto texels = [&](int bone) {
+    return target->model.patches[bone].rectangle.width * target->model.patches[bone].rectangle.height;
+  };
   for (int bone = 0; bone < static_cast<int>(target->model.patches.size()); ++bone)
-    if (is_free_end(target->model, bone, BoneEnd::kHead) != is_free_end(target->model, bone, BoneEnd::kTail) && (chosen < 0 || texels(bone) > texels(chosen)))
+    if (is_free_end(target->model, bone, BoneEnd::kHead) != is_free_end(target->model, bone, BoneEnd::kTail) &&
+        (chosen < 0 || texels(bone) > texels(chosen)))
       chosen = bone;
   if (chosen < 0) throw InputError(target->name + " has no bone with a free end to transfer");
   const std::vector<std::pair<std::string, std::string>> pairs{
       {source->model.skeleton.bones[to_source.bones[chosen]].name, target->model.skeleton.bones[chosen].name}};
   std::shared_ptr<const LiveBlend> live;
   const double prepare_ms = wall_ms([&] {
-    live = std::make_shared<const LiveBlend>(context, target->model, transfer(context, source->model, target->model, pairs));
+    live = std::make_shared<const LiveBlend>(context, target->model,
+                                             transfer(context, source->model, target->model, pairs));
     context.finish();
   });
-  set_live(stage, context, [live](double share, DevicePlanes& planes) { return live->queue(share, planes); }, texels_of(target->model), prepare_ms);
+  set_live(
+      stage, context, [live](double share, DevicePlanes& planes) { return live->queue(share, planes); },
+      texels_of(target->model), prepare_ms);
   return stage;
 }
 

@@ -2,10 +2,10 @@
 #include <random>
 
 #include "embree_scene.h"
-#include "skeletex/measure/hilbert_order.h"
-#include "skeletex/measure/metro.h"
-#include "skeletex/measure/point_triangle.h"
-#include "skeletex/model/parallel.h"
+#include "skeletex/analysis/metro.h"
+#include "skeletex/geometry/hilbert_order.h"
+#include "skeletex/geometry/parallel.h"
+#include "skeletex/geometry/point_triangle.h"
 #include "stages.h"
 
 namespace skeletex {
@@ -20,15 +20,17 @@ std::vector<Vec3> points_near(const TriangleMesh& mesh, double noise_rel_diag) {
   for (const auto& [a, b, c] : mesh.triangles)
     for (int k = 0; k < 16; ++k) {
       const double s = share(random), t = share(random) * (1 - s);
-      points.push_back(mesh.positions[a] + s * (mesh.positions[b] - mesh.positions[a]) + t * (mesh.positions[c] - mesh.positions[a]) +
-                       Vec3(noise(random), noise(random), noise(random)));
+      points.push_back(mesh.positions[a] + s * (mesh.positions[b] - mesh.positions[a]) +
+                       t * (mesh.positions[c] - mesh.positions[a]) + Vec3(noise(random), noise(random), noise(random)));
     }
   std::vector<Vec3> sorted;
   for (const int i : hilbert_order(points)) sorted.push_back(points[i]);
   return sorted;
 }
 
-double distance_from_triangle(const Vec3& point, const Vec3& a, const Vec3& b, const Vec3& c) { return offset_from_triangle(point, a, b, c).norm(); }
+double distance_from_triangle(const Vec3& point, const Vec3& a, const Vec3& b, const Vec3& c) {
+  return offset_from_triangle(point, a, b, c).norm();
+}
 
 }  // namespace
 
@@ -49,7 +51,9 @@ Stage metro_stage(ClContext& context, MeshInputPointer input, double noise_rel_d
       });
     });
   };
-  stage.details = [points] { return std::vector<std::pair<std::string, double>>{{"points", static_cast<double>(points->size())}}; };
+  stage.details = [points] {
+    return std::vector<std::pair<std::string, double>>{{"points", static_cast<double>(points->size())}};
+  };
   return stage;
 }
 

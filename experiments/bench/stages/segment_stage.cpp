@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/segment/half_edge.h"
-#include "skeletex/segment/segment_mesh.h"
+#include "skeletex/convert/segment/segment_mesh.h"
+#include "skeletex/geometry/half_edge.h"
 #include "stages.h"
 
 namespace skeletex {
@@ -16,7 +16,8 @@ Stage segment_stage(ClContext& context, MeshInputPointer input) {
     return wall_ms([&] {
       HalfEdgeMesh mesh;
       for (const Vec3& p : input->mesh.positions) mesh.add_vertex(OpenMesh::Vec3d(p.x(), p.y(), p.z()));
-      for (const auto& [a, b, c] : input->mesh.triangles) mesh.add_face(OpenMesh::VertexHandle(a), OpenMesh::VertexHandle(b), OpenMesh::VertexHandle(c));
+      for (const auto& [a, b, c] : input->mesh.triangles)
+        mesh.add_face(OpenMesh::VertexHandle(a), OpenMesh::VertexHandle(b), OpenMesh::VertexHandle(c));
     });
   };
   return stage;

@@ -5,9 +5,9 @@
 
 #include "charts.h"
 #include "embree_scene.h"
-#include "skeletex/model/parallel.h"
-#include "skeletex/pack/pack_atlas.h"
-#include "skeletex/parameterize/spd.h"
+#include "skeletex/convert/layout/pack_atlas.h"
+#include "skeletex/convert/parameterize/spd.h"
+#include "skeletex/geometry/parallel.h"
 #include "stages.h"
 
 namespace skeletex {
@@ -19,7 +19,8 @@ std::vector<Patch> patches_of(const std::vector<double>& areas, int size) {
   std::vector<Patch> patches;
   for (const Rectangle& rectangle : pack_atlas(demands, size, size).rectangles) {
     patches.push_back({rectangle, Method::kSpd, SegmentTopology::kAnnulus, {}});
-    for (int r = 0; r < rectangle.height; ++r) patches.back().row_u.push_back(static_cast<double>(r) / (rectangle.height - 1));
+    for (int r = 0; r < rectangle.height; ++r)
+      patches.back().row_u.push_back(static_cast<double>(r) / (rectangle.height - 1));
   }
   return patches;
 }
@@ -29,7 +30,7 @@ struct Ray {
 };
 
 struct Rays {
-  Rays(ClContext& context, const MeshInput& input, int size) : skeleton(input.skeleton), walls(skeleton) {
+  Rays(ClContext& context, const MeshInput& input, int size) : skeleton(input.skeleton), separation(skeleton) {
     const ChartSet set = charts_of(context, input);
     charts = set.charts;
     patches = patches_of(set.areas, size);
@@ -38,7 +39,8 @@ struct Rays {
       std::vector<Ray>& list = rays.emplace_back();
       for (const double u : patches[i].row_u)
         for (int j = 0; j < patches[i].rectangle.width; ++j) {
-          const TangentFrame frame = tangent_frame(skeleton, walls, charts[i].bone, u, static_cast<double>(j) / patches[i].rectangle.width);
+          const TangentFrame frame = tangent_frame(skeleton, separation, charts[i].bone, u,
+                                                   static_cast<double>(j) / patches[i].rectangle.width);
           list.push_back({frame.foot, frame.out});
         }
       distances[i].resize(list.size());
@@ -46,7 +48,7 @@ struct Rays {
   }
 
   Skeleton skeleton;
-  Walls walls;
+  SeparationPlanes separation;
   std::vector<Chart> charts;
   std::vector<Patch> patches;
   std::vector<std::vector<Ray>> rays;
@@ -55,7 +57,8 @@ struct Rays {
 };
 
 /// Rays [begin, end) in packets of eight.
-void cast_packets(RTCScene scene, const std::vector<Ray>& rays, std::size_t begin, std::size_t end, std::vector<float>& distances) {
+void cast_packets(RTCScene scene, const std::vector<Ray>& rays, std::size_t begin, std::size_t end,
+                  std::vector<float>& distances) {
   RTCIntersectContext intersect;
   rtcInitIntersectContext(&intersect);
   intersect.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
@@ -91,9 +94,11 @@ Stage spd_rays_stage(ClContext& context, MeshInputPointer input, int size) {
   stage.reference = "Embree's rtcIntersect8 of the same rays on all threads";
   const auto shared = std::make_shared<Rays>(context, *input, size);
   stage.run = [&context, shared] {
-    shared->hits = cast_spd_rays(context, shared->skeleton, shared->walls, shared->charts, shared->patches, SpdHit::kFirst);
+    shared->hits =
+        cast_spd_rays(context, shared->skeleton, shared->separation, shared->charts, shared->patches, SpdHit::kFirst);
   };
-  // Each time holds what a new model needs: lists of triangles here, trees there. Embree is given its rays, ours are made on the way.
+  // Each time holds what a new model needs: lists of triangles here, trees there. Embree is given its rays, ours are
+  // made on the way.
   stage.run_reference = [shared] {
     return wall_ms([&] {
       for (std::size_t i = 0; i < shared->charts.size(); ++i) {

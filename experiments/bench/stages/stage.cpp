@@ -37,7 +37,8 @@ StageSample run_once(ClContext& context, const Stage& stage) {
   return sample;
 }
 
-StageSamples measure(ClContext& context, const Stage& stage, const Repeats& repeats, const std::function<void(double)>& after_each) {
+StageSamples measure(ClContext& context, const Stage& stage, const Repeats& repeats,
+                     const std::function<void(double)>& after_each) {
   StageSamples measured;
   const int total = repeats.warm_ups + repeats.most;
   double spent = 0;
@@ -45,7 +46,8 @@ StageSamples measure(ClContext& context, const Stage& stage, const Repeats& repe
     const StageSample sample = run_once(context, stage);
     spent += sample.wall_ms + sample.reference_ms;
     if (i >= repeats.warm_ups) measured.samples.push_back(sample);
-    if (after_each) after_each(std::max(static_cast<double>(i + 1) / total, std::min(1.0, spent / (1000 * repeats.seconds))));
+    if (after_each)
+      after_each(std::max(static_cast<double>(i + 1) / total, std::min(1.0, spent / (1000 * repeats.seconds))));
   }
   return measured;
 }
@@ -63,7 +65,8 @@ std::function<double()> device_copy(ClContext& context, std::size_t floats) {
     ::cl::Event event;
     context.queue().enqueueCopyBuffer(from.memory, to.memory, 0, 0, size * sizeof(float), nullptr, &event);
     event.wait();
-    return 1e-6 * static_cast<double>(event.getProfilingInfo<CL_PROFILING_COMMAND_END>() - event.getProfilingInfo<CL_PROFILING_COMMAND_START>());
+    return 1e-6 * static_cast<double>(event.getProfilingInfo<CL_PROFILING_COMMAND_END>() -
+                                      event.getProfilingInfo<CL_PROFILING_COMMAND_START>());
   };
 }
 

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "skeletex/cl/context.h"
+#include "skeletex/device/context.h"
 
 namespace skeletex {
 
@@ -50,7 +50,8 @@ struct Repeats {
 };
 /// Stage and reference in alternation, after warm-ups that do not count.
 /// \param after_each  called after every run with the share that is done
-StageSamples measure(ClContext& context, const Stage& stage, const Repeats& repeats, const std::function<void(double)>& after_each = {});
+StageSamples measure(ClContext& context, const Stage& stage, const Repeats& repeats,
+                     const std::function<void(double)>& after_each = {});
 
 /// Milliseconds of the wall clock that the work takes.
 double wall_ms(const std::function<void()>& work);

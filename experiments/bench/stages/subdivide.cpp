@@ -13,7 +13,8 @@ TriangleMesh subdivided(const TriangleMesh& mesh) {
   std::unordered_map<std::uint64_t, int> middles;
   middles.reserve(3 * mesh.triangles.size() / 2);
   const auto middle = [&](int a, int b) {
-    const std::uint64_t edge = static_cast<std::uint64_t>(std::min(a, b)) << 32 | static_cast<std::uint64_t>(std::max(a, b));
+    const std::uint64_t edge =
+        static_cast<std::uint64_t>(std::min(a, b)) << 32 | static_cast<std::uint64_t>(std::max(a, b));
     const auto [it, is_new] = middles.try_emplace(edge, static_cast<int>(fine.positions.size()));
     if (is_new) fine.positions.push_back(0.5 * (mesh.positions[a] + mesh.positions[b]));
     return it->second;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-#include "skeletex/model/mesh.h"
+#include "skeletex/geometry/mesh.h"
 
 namespace skeletex {
 

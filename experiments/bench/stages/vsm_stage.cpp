@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "charts.h"
-#include "skeletex/model/parallel.h"
-#include "skeletex/parameterize/vsm.h"
+#include "skeletex/convert/parameterize/vsm.h"
+#include "skeletex/geometry/parallel.h"
 #include "stages.h"
 
 namespace skeletex {
@@ -73,7 +73,9 @@ Stage vsm_stage(ClContext& context, MeshInputPointer input, int threads) {
   stage.run_reference = [matrices, threads] {
     const int solves = VsmOptions().iterations + 1;
     std::vector<double> sums(matrices->size());
-    const auto solve = [&](std::size_t i, std::size_t, std::size_t) { sums[i] = solve_directly((*matrices)[i], solves); };
+    const auto solve = [&](std::size_t i, std::size_t, std::size_t) {
+      sums[i] = solve_directly((*matrices)[i], solves);
+    };
     return wall_ms([&] {
       if (threads == 1)
         for (std::size_t i = 0; i < matrices->size(); ++i) solve(i, i, i + 1);
@@ -89,7 +91,8 @@ Stage vsm_stage(ClContext& context, MeshInputPointer input, int threads) {
       steps += (*reports)[k].solver_steps * count;
       direct += (*reports)[k].used_direct_solver;
     }
-    return std::vector<std::pair<std::string, double>>{{"vertices", vertices}, {"steps", steps / vertices}, {"direct_solves", direct}};
+    return std::vector<std::pair<std::string, double>>{
+        {"vertices", vertices}, {"steps", steps / vertices}, {"direct_solves", direct}};
   };
   return stage;
 }

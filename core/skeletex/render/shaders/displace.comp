@@ -2,7 +2,7 @@
 #version 450
 // From texels to surface points in a pose (paper 3.4, 3.6): what kernels/pose.cl does, for any row, from a texture.
 // Rows of the lattice: four ints each (patch, row, number of its first vertex, unused); patches: 19 words (PatchRecord);
-// rows: u, station, cap_cos, cap_sin (RowRecord); posed_rows: four reaches (PosedRowRecord); columns as four planes, the
+// rows: u, axial parameter, cap_cos, cap_sin (RowRecord); posed_rows: four reaches (PosedRowRecord); columns as four planes, the
 // bind pose's cosine, sine, slope_head, slope_tail and the pose's roll_head, roll_tail, slope_head, slope_tail.
 // Dispatch: columns / 64 x rows. Out: three floats per vertex, relative to the origin of the posed patches.
 layout(local_size_x = 64) in;
@@ -30,15 +30,15 @@ void main() {
   const ivec2 corner = ivec2(floatBitsToInt(patches[patch_at + 13]), floatBitsToInt(patches[patch_at + 14]));
   const vec3 texel = texelFetch(texels, corner + ivec2(j, lattice_row.y), 0).xyz;
   const float a = texel.x, c = texel.y, w = texel.z;
-  const float station = rows[row].y, cap_cos = rows[row].z, cap_sin = rows[row].w;
+  const float axial = rows[row].y, cap_cos = rows[row].z, cap_sin = rows[row].w;
   const vec4 reach = posed_rows[row];
   const float bind_length = bind_patches[patch_at + 3], len = patches[patch_at + 3];
-  const float bind_foot = station * bind_length, foot = station * len;
+  const float bind_foot = axial * bind_length, foot = axial * len;
   const float e2 = dot(texel, texel);
   const float e2_inverse = e2 > 0.0 ? 1.0 / e2 : 0.0;
 
   // The bind point, bind_m times the texel from the foot: where the ray leaves the bone's capsule.
-  const float bind_slope = mix(bind_columns[2 * column_count + column], bind_columns[3 * column_count + column], station);
+  const float bind_slope = mix(bind_columns[2 * column_count + column], bind_columns[3 * column_count + column], axial);
   const float bind_f_o = cap_cos * bind_slope + cap_sin;
   const float bind_f_inverse = inversesqrt(cap_cos * cap_cos + bind_f_o * bind_f_o);
   const float bind_q_s = (w * cap_cos - a * bind_f_o) * bind_f_inverse;
@@ -55,9 +55,9 @@ void main() {
   const float past = max(0.0, max(-reach.x - bind_z, bind_z - bind_length - reach.y));
   const float g = (bind_m * bind_m * bind_across2 + past * past) * e2_inverse;
 
-  const float eased = station * station * (3.0 - 2.0 * station);  // see pose.cl
+  const float eased = axial * axial * (3.0 - 2.0 * axial);  // see pose.cl
   const float slope = mix(columns[2 * column_count + column], columns[3 * column_count + column], eased) +
-                      (station - eased) * (bind_columns[3 * column_count + column] - bind_columns[2 * column_count + column]);
+                      (axial - eased) * (bind_columns[3 * column_count + column] - bind_columns[2 * column_count + column]);
   const float f_o = cap_cos * slope + cap_sin;
   const float f_inverse = inversesqrt(cap_cos * cap_cos + f_o * f_o);
   const float q_s = (w * cap_cos - a * f_o) * f_inverse;

@@ -1,0 +1,365 @@
+// SPDX-License-Identifier: MIT
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <numeric>
+
+#include "skeletex/analysis/findings.h"
+
+namespace skeletex {
+namespace {
+
+/// Below these, in diagonals and as a distance of unit vectors, two things are in the same place or direction. The
+/// second is what segment_mesh refuses.
+constexpr double kSamePlace = 1e-9;
+constexpr double kSameDirection = 1e-3;
+constexpr double kSmallAngleDegrees = 5;
+
+std::string name_of_node(const Skeleton& skeleton, int n) {
+  const std::string& name = skeleton.nodes[n].name;
+  return name.empty() ? fmt::format("node {}", n) : fmt::format("node \"{}\"", name);
+}
+
+std::string name_of_bone(const Skeleton& skeleton, int b) {
+  const std::string& name = skeleton.bones[b].name;
+  return name.empty() ? fmt::format("bone {}", b) : fmt::format("bone \"{}\"", name);
+}
+
+/// The component of each node; nodes without bones are their own.
+std::vector<int> components_of(const Skeleton& skeleton) {
+  std::vector<int> component(skeleton.nodes.size());
+  std::iota(component.begin(), component.end(), 0);
+  bool is_changed = true;
+  while (is_changed) {
+    is_changed = false;
+    for (const Bone& bone : skeleton.bones) {
+      const int least = std::min(component[bone.head], component[bone.tail]);
+      for (const int n : {bone.head, bone.tail}) {
+        is_changed = is_changed || component[n] != least;
+        component[n] = least;
+      }
+    }
+  }
+  return component;
+}
+
+std::vector<bool> used_nodes(const Skeleton& skeleton) {
+  std::vector<bool> is_used(skeleton.nodes.size(), false);
+  for (const Bone& bone : skeleton.bones) is_used[bone.head] = is_used[bone.tail] = true;
+  return is_used;
+}
+
+void find_parts(const Skeleton& skeleton, std::vector<Finding>& findings) {
+  const std::vector<int> component = components_of(skeleton);
+  std::map<int, std::vector<int>> bones;
+  for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b)
+    bones[component[skeleton.bones[b].head]].push_back(b);
+  if (bones.size() <= 1) return;
+  std::string list;
+  for (const auto& [root, some] : bones)
+    list += fmt::format("{}{} bone{} with {}", list.empty() ? "" : ", ", some.size(), some.size() == 1 ? "" : "s",
+                        name_of_bone(skeleton, some.front()));
+  // The shortest way from the first part to another.
+  double least = std::numeric_limits<double>::infinity();
+  std::pair<int, int> nearest{0, 0};
+  const std::vector<bool> is_used = used_nodes(skeleton);
+  for (std::size_t i = 0; i < skeleton.nodes.size(); ++i)
+    for (std::size_t j = 0; j < skeleton.nodes.size(); ++j) {
+      if (!is_used[i] || !is_used[j] || component[i] != bones.begin()->first || component[j] == component[i]) continue;
+      const double d = (skeleton.nodes[i].position - skeleton.nodes[j].position).norm();
+      if (d < least) {
+        least = d;
+        nearest = {static_cast<int>(i), static_cast<int>(j)};
+      }
+    }
+  findings.push_back(
+      {Severity::kError, "connected", fmt::format("the skeleton falls into {} parts: {}", bones.size(), list),
+       fmt::format("join them with bones, for example from {} to {}, which are {:.4g} apart",
+                   name_of_node(skeleton, nearest.first), name_of_node(skeleton, nearest.second), least)});
+}
+
+void find_equal_places(const Skeleton& skeleton, double diagonal, std::vector<Finding>& findings) {
+  for (int i = 0; i < static_cast<int>(skeleton.nodes.size()); ++i)
+    for (int j = i + 1; j < static_cast<int>(skeleton.nodes.size()); ++j) {
+      if ((skeleton.nodes[i].position - skeleton.nodes[j].position).norm() > kSamePlace * diagonal) continue;
+      // Told as a bone of no length.
+      if (std::any_of(skeleton.bones.begin(), skeleton.bones.end(),
+                      [&](const Bone& b) { return (b.head == i && b.tail == j) || (b.head == j && b.tail == i); }))
+        continue;
+      findings.push_back({Severity::kError, "node-duplicate",
+                          fmt::format("{} and {} lie in the same place, {}", name_of_node(skeleton, i),
+                                      name_of_node(skeleton, j), text_of(skeleton.nodes[i].position)),
+                          fmt::format("let the bones of {} end at {} and remove it, or move them apart",
+                                      name_of_node(skeleton, j), name_of_node(skeleton, i))});
+    }
+}
+
+/// Where two segments are nearest to each other: shares of both, and the distance.
+struct Approach {
+  double first = 0, second = 0, distance = 0;
+};
+
+Approach nearest_of_segments(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  const Vec3 u = b - a, v = d - c, w = a - c;
+  const double uu = u.squaredNorm(), uv = u.dot(v), vv = v.squaredNorm(), uw = u.dot(w), vw = v.dot(w);
+  const double determinant = uu * vv - uv * uv;
+  double s = determinant > 1e-12 * uu * vv ? std::clamp((uv * vw - vv * uw) / determinant, 0.0, 1.0) : 0;
+  const double t = std::clamp((uv * s + vw) / vv, 0.0, 1.0);
+  s = std::clamp((uv * t - uw) / uu, 0.0, 1.0);
+  return {s, t, (w + s * u - t * v).norm()};
+}
+
+void find_between_bones(const Skeleton& skeleton, const std::vector<bool>& has_length, double diagonal,
+                        std::vector<Finding>& findings) {
+  const int count = static_cast<int>(skeleton.bones.size());
+  for (int i = 0; i < count; ++i)
+    for (int j = i + 1; j < count; ++j) {
+      if (!has_length[i] || !has_length[j]) continue;
+      const Bone &a = skeleton.bones[i], &b = skeleton.bones[j];
+      const bool is_same_pair = (a.head == b.head && a.tail == b.tail) || (a.head == b.tail && a.tail == b.head);
+      if (is_same_pair) {
+        findings.push_back(
+            {Severity::kError, "bone-duplicate",
+             fmt::format("{} and {} both run between {} and {}, on the same straight line", name_of_bone(skeleton, i),
+                         name_of_bone(skeleton, j), name_of_node(skeleton, a.head), name_of_node(skeleton, a.tail)),
+             "remove one of them; for a ring of bones give one a node on its way, around the hole"});
+        continue;
+      }
+      bool has_common_node = false;
+      for (const BoneEnd end_a : {BoneEnd::kHead, BoneEnd::kTail})
+        for (const BoneEnd end_b : {BoneEnd::kHead, BoneEnd::kTail}) {
+          if (end_node(skeleton, i, end_a) != end_node(skeleton, j, end_b)) continue;
+          has_common_node = true;
+          const int node = end_node(skeleton, i, end_a);
+          const Vec3 da = direction_from(skeleton, {i, end_a}), db = direction_from(skeleton, {j, end_b});
+          const double apart = (da - db).norm();
+          const double degrees = 2 * std::asin(std::min(1.0, apart / 2)) * 180 / std::numbers::pi;
+          if (degrees >= kSmallAngleDegrees) continue;
+          const bool is_error = apart < kSameDirection;
+          const double shift = 2 * std::sin(kSmallAngleDegrees * std::numbers::pi / 360) * bone_length(skeleton, j);
+          findings.push_back(
+              {is_error ? Severity::kError : Severity::kWarning, "bone-direction",
+               fmt::format("{} and {} leave {} at {} in {} direction ({:.3g} degrees apart){}",
+                           name_of_bone(skeleton, i), name_of_bone(skeleton, j), name_of_node(skeleton, node),
+                           text_of(skeleton.nodes[node].position), is_error ? "the same" : "nearly the same", degrees,
+                           is_error ? ", so that no separation plane separates them" : ""),
+               fmt::format("move the far end of {} sideways by {:.3g} or more, or let it branch off further along",
+                           name_of_bone(skeleton, j), shift)});
+        }
+      if (has_common_node) continue;
+      const Approach near =
+          nearest_of_segments(end_position(skeleton, i, BoneEnd::kHead), end_position(skeleton, i, BoneEnd::kTail),
+                              end_position(skeleton, j, BoneEnd::kHead), end_position(skeleton, j, BoneEnd::kTail));
+      const double lengths = bone_length(skeleton, i) + bone_length(skeleton, j);
+      const auto is_at_end = [&](double share, int bone) {
+        return std::min(share, 1 - share) * bone_length(skeleton, bone) <= kSamePlace * diagonal;
+      };
+      if (near.distance > 1e-6 * lengths || (is_at_end(near.first, i) && is_at_end(near.second, j))) continue;
+      const Vec3 place =
+          end_position(skeleton, i, BoneEnd::kHead) +
+          near.first * (end_position(skeleton, i, BoneEnd::kTail) - end_position(skeleton, i, BoneEnd::kHead));
+      findings.push_back({Severity::kError, "bone-contact",
+                          fmt::format("{} and {} meet at {} without a node there", name_of_bone(skeleton, i),
+                                      name_of_bone(skeleton, j), text_of(place)),
+                          "split the bones there, so that they share a node, or move them apart"});
+    }
+}
+
+}  // namespace
+
+std::string text_of(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x(), p.y(), p.z()); }
+
+std::string text_of_distance(double distance, double diagonal) {
+  return fmt::format("{:.4g} ({:.2g} % of the diagonal)", distance, diagonal > 0 ? 100 * distance / diagonal : 0);
+}
+
+int count_cycles(const Skeleton& skeleton) {
+  const std::vector<int> component = components_of(skeleton);
+  const std::vector<bool> is_used = used_nodes(skeleton);
+  int nodes = 0, parts = 0;
+  for (int n = 0; n < static_cast<int>(skeleton.nodes.size()); ++n) {
+    nodes += is_used[n];
+    parts += is_used[n] && component[n] == n;
+  }
+  return static_cast<int>(skeleton.bones.size()) - nodes + parts;
+}
+
+bool find_in_skeleton(const Skeleton& skeleton, double diagonal, std::vector<Finding>& findings) {
+  const int node_count = static_cast<int>(skeleton.nodes.size()), bone_count = static_cast<int>(skeleton.bones.size());
+  if (bone_count == 0) {
+    findings.push_back({Severity::kError, "empty", "the skeleton has no bones", "give it at least one"});
+    return false;
+  }
+  bool is_usable = true;
+  for (int b = 0; b < bone_count; ++b)
+    for (const int n : {skeleton.bones[b].head, skeleton.bones[b].tail})
+      if (n < 0 || n >= node_count) {
+        findings.push_back(
+            {Severity::kError, "bone-node",
+             fmt::format("{} ends at node {}, and there are {} nodes", name_of_bone(skeleton, b), n, node_count),
+             "let it end at a node that exists"});
+        is_usable = false;
+      }
+  for (int n = 0; n < node_count; ++n)
+    if (!skeleton.nodes[n].position.allFinite()) {
+      findings.push_back(
+          {Severity::kError, "finite",
+           fmt::format("{} has no finite position: {}", name_of_node(skeleton, n), text_of(skeleton.nodes[n].position)),
+           "give it three finite numbers"});
+      is_usable = false;
+    }
+  if (!is_usable) return false;
+
+  double unit = diagonal;
+  if (!(unit > 0))
+    for (const Node& node : skeleton.nodes)
+      unit = std::max(unit, (node.position - skeleton.nodes.front().position).norm());
+  std::vector<bool> has_length(bone_count);
+  for (int b = 0; b < bone_count; ++b) {
+    const Bone& bone = skeleton.bones[b];
+    has_length[b] = bone_length(skeleton, b) > kSamePlace * unit;
+    if (!has_length[b]) {
+      const std::string what =
+          bone.head == bone.tail
+              ? fmt::format("{} begins and ends at {}", name_of_bone(skeleton, b), name_of_node(skeleton, bone.head))
+              : fmt::format("{} has no length: {} and {} lie in the same place, {}", name_of_bone(skeleton, b),
+                            name_of_node(skeleton, bone.head), name_of_node(skeleton, bone.tail),
+                            text_of(skeleton.nodes[bone.head].position));
+      findings.push_back({Severity::kError, "bone-length", what,
+                          "move one of its ends, or remove the bone and let its neighbours share a node"});
+      continue;
+    }
+    if (!bone.s) continue;
+    const Vec3 o = direction_from(skeleton, {b, BoneEnd::kHead}), s = *bone.s;
+    if (!s.allFinite() || !((s - o.dot(s) * o).norm() > 1e-6 * s.norm()))
+      findings.push_back(
+          {Severity::kError, "bone-angle",
+           fmt::format("{}: its \"s\" {} gives no direction across the bone", name_of_bone(skeleton, b), text_of(s)),
+           "give a direction across the bone, or leave \"s\" out"});
+  }
+  const std::vector<bool> is_used = used_nodes(skeleton);
+  for (int n = 0; n < node_count; ++n)
+    if (!is_used[n])
+      findings.push_back({Severity::kWarning, "node-unused",
+                          fmt::format("{} at {} is the end of no bone", name_of_node(skeleton, n),
+                                      text_of(skeleton.nodes[n].position)),
+                          "remove it, or give it a bone; it is ignored"});
+  find_parts(skeleton, findings);
+  find_equal_places(skeleton, unit, findings);
+  find_between_bones(skeleton, has_length, unit, findings);
+  return true;
+}
+
+void find_between(const SurfaceProbe& surface, bool is_closed, const Skeleton& skeleton,
+                  std::vector<Finding>& findings) {
+  const double diagonal = surface.diagonal();
+  const std::vector<bool> is_used = used_nodes(skeleton);
+  std::vector<int> nodes;
+  std::vector<Vec3> points;
+  for (int n = 0; n < static_cast<int>(skeleton.nodes.size()); ++n) {
+    if (!is_used[n]) continue;
+    nodes.push_back(n);
+    points.push_back(skeleton.nodes[n].position);
+  }
+  const std::vector<double> windings = surface.winding_numbers(points, is_closed);
+  const char* doubt = is_closed ? "" : " (as far as a surface that is not closed has an inside)";
+
+  std::vector<bool> is_outside(skeleton.nodes.size(), false);
+  std::size_t outside = 0;
+  std::vector<Finding> node_findings;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const Vec3& position = points[i];
+    const NearestPoint nearest = surface.nearest(position);
+    const bool is_on_surface = nearest.distance <= 1e-6 * diagonal;
+    if (windings[i] > 0.5 && !is_on_surface) continue;
+    is_outside[nodes[i]] = true;
+    outside += !is_on_surface;
+    const Vec3 inward = is_on_surface ? Vec3(-nearest.normal) : Vec3((nearest.point - position).normalized());
+    const Vec3 target = surface.middle_of_body(nearest.point, inward);
+    const std::string where = fmt::format("{} at {} lies", name_of_node(skeleton, nodes[i]), text_of(position));
+    if (is_on_surface)
+      node_findings.push_back({Severity::kError, "node-inside", fmt::format("{} on the surface{}", where, doubt),
+                               fmt::format("move it into the body, for example to {}, by {}", text_of(target),
+                                           text_of_distance((target - position).norm(), diagonal))});
+    else
+      node_findings.push_back(
+          {Severity::kError, "node-inside",
+           fmt::format("{} outside the mesh, {} from its surface{}", where,
+                       text_of_distance(nearest.distance, diagonal), doubt),
+           fmt::format("move it by more than {:.4g} towards {}, for example on to {}, the middle of the body there",
+                       nearest.distance, text_of(nearest.point), text_of(target))});
+  }
+  if (outside == nodes.size() && nodes.size() > 1) {
+    Vec3 lower = points.front(), upper = points.front();
+    for (const Vec3& p : points) {
+      lower = lower.cwiseMin(p);
+      upper = upper.cwiseMax(p);
+    }
+    const Vec3 middle = 0.5 * (lower + upper);
+    const NearestPoint nearest = surface.nearest(middle);
+    findings.push_back(
+        {Severity::kError, "frame",
+         fmt::format("no node of the skeleton lies in the mesh: its nodes fill the box {} to {} (diagonal {:.4g}), the "
+                     "mesh has a diagonal of {:.4g}, "
+                     "and its surface comes nearest to that box's centre at {}",
+                     text_of(lower), text_of(upper), (upper - lower).norm(), diagonal, text_of(nearest.point)),
+         "check that mesh and skeleton share units, axes and origin"});
+  }
+  findings.insert(findings.end(), node_findings.begin(), node_findings.end());
+
+  for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b) {
+    const Bone& bone = skeleton.bones[b];
+    const Vec3 &head = skeleton.nodes[bone.head].position, &tail = skeleton.nodes[bone.tail].position;
+    if (!((tail - head).norm() > kSamePlace * diagonal)) continue;
+    const std::vector<Crossing> crossings = surface.crossings(head, tail);
+    if (crossings.empty()) continue;
+    std::string list;
+    for (std::size_t c = 0; c < crossings.size() && c < 8; ++c)
+      list += fmt::format("{}{} at {} ({:.0f} % of the way)", c ? ", " : "", crossings[c].is_leaving ? "out" : "in",
+                          text_of(crossings[c].point), 100 * crossings[c].share);
+    if (crossings.size() > 8) list += fmt::format(" and {} more", crossings.size() - 8);
+
+    // The stretch outside that strays furthest from the body.
+    double furthest = -1;
+    NearestPoint nearest;
+    Vec3 stray = head;
+    for (std::size_t c = 0; c + 1 < crossings.size(); ++c) {
+      if (!crossings[c].is_leaving || crossings[c + 1].is_leaving) continue;
+      constexpr int kSteps = 8;
+      for (int step = 1; step < kSteps; ++step) {
+        const Vec3 point =
+            crossings[c].point + static_cast<double>(step) / kSteps * (crossings[c + 1].point - crossings[c].point);
+        const NearestPoint there = surface.nearest(point);
+        if (there.distance <= furthest) continue;
+        furthest = there.distance;
+        nearest = there;
+        stray = point;
+      }
+    }
+    std::string remedy = "move its ends into the body, or bend it with a node in between";
+    if (furthest > 0) {
+      const Vec3 inward = (nearest.point - stray).normalized();
+      remedy = fmt::format(
+          "at {} shift it by more than {} towards {}: bend it with a node, for example at {}, the middle of the body "
+          "there, or move its ends",
+          text_of(stray), text_of_distance(furthest, diagonal), text_of(nearest.point),
+          text_of(surface.middle_of_body(nearest.point, inward)));
+    } else if (is_outside[bone.head] || is_outside[bone.tail]) {
+      remedy = fmt::format(
+          "move {} into the body",
+          is_outside[bone.head] && is_outside[bone.tail]
+              ? fmt::format("{} and {}", name_of_node(skeleton, bone.head), name_of_node(skeleton, bone.tail))
+              : name_of_node(skeleton, is_outside[bone.head] ? bone.head : bone.tail));
+    }
+    findings.push_back({Severity::kError, "bone-crossing",
+                        fmt::format("{} from {} to {} goes through the surface: {}", name_of_bone(skeleton, b),
+                                    name_of_node(skeleton, bone.head), name_of_node(skeleton, bone.tail), list),
+                        remedy});
+  }
+}
+
+}  // namespace skeletex

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/analysis/validate_input.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "skeletex/analysis/findings.h"
+#include "skeletex/convert/segment/segment_mesh.h"
+#include "skeletex/geometry/self_intersection.h"
+#include "skeletex/model/error.h"
+
+namespace skeletex {
+namespace {
+
+/// "what is wrong; what to do" as a finding.
+Finding finding_of(const Error& error) {
+  const std::string text = error.what();
+  const auto cut = text.rfind("; ");
+  if (cut == std::string::npos) return {Severity::kError, "segmentation", text, "move the nodes that it names"};
+  return {Severity::kError, "segmentation", text.substr(0, cut), text.substr(cut + 2)};
+}
+
+}  // namespace
+
+std::vector<Finding> validate_before_segmentation(TriangleMesh& mesh, const Skeleton& skeleton,
+                                                  std::optional<TriangleTree>* tree) {
+  std::vector<Finding> findings;
+  const ManifoldReport report = measure_manifold(mesh);
+  find_in_mesh(mesh, report, findings);
+  const bool is_closed = report.is_closed_manifold();
+  const bool is_good_mesh = is_closed && report.non_finite_vertices.empty();
+  const double diagonal = report.non_finite_vertices.empty() ? bounding_box(mesh).diagonal() : 0;
+  if (is_good_mesh) {
+    const double volume = signed_volume(mesh);
+    if (std::abs(volume) <= 1e-12 * std::pow(diagonal, 3)) {
+      findings.push_back({Severity::kError, "volume", fmt::format("the mesh encloses no volume ({:.3g})", volume),
+                          "give a body, not a sheet"});
+    } else if (volume < 0) {
+      for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
+      findings.push_back({Severity::kNote, "orientation",
+                          fmt::format("the mesh was inside out (volume {:.6g}); all its triangles were turned", volume),
+                          "nothing to do; a file with counter-clockwise triangles avoids this note"});
+    }
+    TriangleTree own = build_triangle_tree(mesh);
+    const auto pairs = find_self_intersections(mesh, own);
+    if (tree) *tree = std::move(own);
+    if (!pairs.empty()) {
+      const auto& [a, b] = pairs.front();
+      const Vec3 place = (mesh.positions[mesh.triangles[a][0]] + mesh.positions[mesh.triangles[a][1]] +
+                          mesh.positions[mesh.triangles[a][2]]) /
+                         3;
+      findings.push_back({Severity::kWarning, "self-intersection",
+                          fmt::format("{} pair{} of triangles intersect; the first are triangles {} and {} at {}",
+                                      pairs.size(), pairs.size() == 1 ? "" : "s", a, b, text_of(place)),
+                          "none needed: such a mesh is encoded as it is"});
+    }
+  }
+
+  const TriangleMesh surface = usable_surface(mesh, report);
+  const double unit = surface.triangles.empty() ? diagonal : bounding_box(surface).diagonal();
+  const bool is_usable_skeleton = find_in_skeleton(skeleton, unit, findings);
+  if (is_usable_skeleton && !surface.triangles.empty())
+    find_between(SurfaceProbe(surface), is_good_mesh, skeleton, findings);
+  if (is_usable_skeleton && is_closed && report.components == 1) {
+    const int cycles = count_cycles(skeleton);
+    if (cycles != report.genus)
+      findings.push_back(
+          {Severity::kError, "genus",
+           fmt::format("the mesh has {} handle{} (its genus), but the skeleton has {} independent cycle{} of bones",
+                       report.genus, report.genus == 1 ? "" : "s", cycles, cycles == 1 ? "" : "s"),
+           cycles < report.genus ? fmt::format("close {} more ring{} of bones, one around every hole of the body",
+                                               report.genus - cycles, report.genus - cycles == 1 ? "" : "s")
+                                 : fmt::format("open {} ring{} of bones: only a hole in the body has one around it",
+                                               cycles - report.genus, cycles - report.genus == 1 ? "" : "s")});
+  }
+  return findings;
+}
+
+std::vector<Finding> validate_input(ClContext& context, TriangleMesh& mesh, const Skeleton& skeleton) {
+  std::vector<Finding> findings = validate_before_segmentation(mesh, skeleton);
+  if (has_errors(findings)) return findings;
+  try {
+    segment_mesh(context, mesh, skeleton);
+  } catch (const TopologyError& error) {
+    findings.push_back(finding_of(error));
+  } catch (const InputError& error) {
+    findings.push_back(finding_of(error));
+  }
+  return findings;
+}
+
+bool has_errors(const std::vector<Finding>& findings) {
+  return std::any_of(findings.begin(), findings.end(), [](const Finding& f) { return f.severity == Severity::kError; });
+}
+
+}  // namespace skeletex

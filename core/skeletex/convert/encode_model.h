@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "skeletex/convert/layout/patch_demands.h"
+#include "skeletex/convert/parameterize/spd.h"
+#include "skeletex/convert/parameterize/vsm.h"
+#include "skeletex/convert/sample/read_texels.h"
+#include "skeletex/device/context.h"
+#include "skeletex/geometry/triangle_tree.h"
+#include "skeletex/model/texture.h"
+
+namespace skeletex {
+
+enum class EncodeMethod { kSpd, kVsm, kHybrid };
+/// How rows are spread along a bone: evenly in surface length (the default), or evenly in the map's u (the paper).
+enum class RowSpacing { kSurfaceLength, kUniform };
+/// Up to here the fit is the default: beyond it gains little, and takes longest.
+inline constexpr std::size_t kMostFittedTexels = 256 * 256;
+
+struct EncodeOptions {
+  int width = 512, height = 512;
+  EncodeMethod method = EncodeMethod::kVsm;
+  /// Hybrid: bones whose unseen share of area is above this take VSM, the others SPD (docs/spd.md).
+  double hybrid_unseen_threshold = 0.01;
+  /// Hybrid: bones by name whose method the user chose.
+  std::vector<std::pair<std::string, Method>> hybrid_overrides;
+  VsmOptions vsm;
+  SpdHit spd_hit = SpdHit::kLast;
+  RowSpacing row_spacing = RowSpacing::kSurfaceLength;
+  bool has_prefilter = true;
+  bool has_unfold = true;  ///< see unfold_lattice; snapping and fit start from the lattice that it leaves
+  /// Texels of VSM patches sit on the mesh's own vertices and edges where they can (docs/snap.md). Takes the
+  /// prefilter's place. Default: from 2 texels per vertex on, with the fit from 1.5 on.
+  std::optional<bool> has_snap;
+  /// Their points move so that the flat triangles between them are nearer to the mesh (docs/snap.md). Takes the
+  /// prefilter's place. Default: with the prefilter, up to 256 x 256 texels.
+  std::optional<bool> has_fit;
+  std::optional<DiagonalRule> diagonals;  ///< default: smooth with snapping or fit, else nearest
+  /// Texels come as half floats hold them (docs/encoding.md): write_model stores them as such without loss.
+  bool has_half_texels = false;
+  std::optional<TexelShare> texel_share;  ///< and of the side ratio; default: area for all-SPD models, error otherwise
+  /// Of the mesh, as validate_before_segmentation has built it; without, it is built where it is needed. Another mesh's
+  /// is an error.
+  const TriangleTree* tree = nullptr;
+  /// Called with a stage's name and the share of work done; returning false cancels by throwing Error.
+  std::function<bool(const std::string& stage, double done)> progress;
+};
+
+struct BoneReport {
+  std::string name;
+  Method method = Method::kVsm;
+  SegmentTopology topology = SegmentTopology::kAnnulus;
+  double area = 0;  ///< world units squared
+  int vertices = 0, triangles = 0;
+  Rectangle rectangle;
+  double unseen_area_fraction = 0;
+  int flipped_triangles = 0;             ///< of the map; VSM only
+  double sampled_triangle_fraction = 0;  ///< share of the segment's triangles that a texel reads
+  int missed_texels = 0;                 ///< SPD rays that hit nothing, filled from their neighbours
+  VsmReport vsm;
+};
+
+struct EncodeReport {
+  int vertices = 0, triangles = 0, genus = 0;
+  double diagonal = 0;
+  std::vector<BoneReport> bones;
+  double used_fraction = 0;
+  std::optional<UnfoldReport> unfold;                   ///< when it was on
+  std::optional<SnapReport> snap;                       ///< when it was on
+  std::optional<FitReport> fit;                         ///< when it was on
+  std::optional<RoundingReport> rounding;               ///< to half floats, when it was on
+  int turned_triangles = 0, even_turned_triangles = 0;  ///< with snapping or fit: see GuardReport
+  double half_edge_ms = 0, segmentation_ms = 0, parameterization_ms = 0, encoding_ms = 0;
+  std::string device;
+};
+
+struct EncodeResult {
+  SkeletexModel model;
+  EncodeReport report;
+};
+
+/// Turns a closed mesh and its skeleton into a model (paper 3.1-3.4): half edges, segments, maps, atlas, texels.
+/// \pre validate_before_segmentation reports no error      \throw TopologyError, InputError, DeviceError
+EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& skeleton,
+                          const EncodeOptions& options = {});
+
+}  // namespace skeletex

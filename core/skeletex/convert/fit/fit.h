@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <span>
+#include <vector>
+
+#include "skeletex/convert/snap/snap.h"
+
+namespace skeletex {
+
+struct FitOptions {
+  int steps = 4;            ///< of Gauss-Newton, at most
+  int sweeps = 4;           ///< of the solver, per step
+  float damping = 0.0005f;  ///< of a step, share of a texel's mean diagonal entry
+  float springs = 0.001f;   ///< between the steps of neighbouring texels, the same share
+  float floor = 1;          ///< added to |residual| in the weights, share of the mean one
+};
+
+/// What the fit did.
+struct FitReport {
+  std::vector<double> residuals;  ///< before each step and after the last: mean distance of the samples, world units
+  int texels_put_back = 0;        ///< by the guard
+};
+
+/// Moves the points of VSM patches in space so that the flat triangles between them are nearer to the mesh, in both
+/// directions: Gauss-Newton with weights 1 / |residual|, so the mean distance falls and not its square. Samples are
+/// four points of the mesh per quad of the lattice and the middle of each of its triangles. End rows stay; no point
+/// moves by more than a quarter of a cell in a step and a cell in all. See docs/snap.md. \param covering  per texel the
+/// triangle of the map that covers its place, as encode.cl's cover_texels leaves it
+FitReport fit_points(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps,
+                     const ClBuffer<int>& covering, const ReadingPositions& positions, TexelPoints& points,
+                     const FitOptions& options = {});
+
+}  // namespace skeletex

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/convert/sample/half_texels.h"
+
+#include <cmath>
+
+#include "skeletex/convert/snap/lattice_mesh.h"
+
+namespace skeletex {
+namespace {
+
+/// Over those that are not 0.
+double root_mean_square(const ClMapping<float>& squares) {
+  double sum = 0;
+  int count = 0;
+  for (std::size_t i = 0; i < squares.size(); ++i) sum += squares.data()[i], count += squares.data()[i] > 0;
+  return count > 0 ? std::sqrt(sum / count) : 0;
+}
+
+}  // namespace
+
+RoundingReport round_to_half(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches,
+                             const DeviceLayout& layout, const ClBuffer<RowRecord>& rows,
+                             const ClBuffer<ColumnRecord>& columns, const DevicePlanes& points, DevicePlanes& texels) {
+  auto diagonals = context.allocate<int>(layout.size());
+  context.fill(diagonals, 0);
+  choose_diagonals(context, rule, patches, layout.width, context.upload(quad_rows(patches)), layout.patches, points,
+                   diagonals);
+  auto nearest2 = context.allocate<float>(layout.size()), chosen2 = context.allocate<float>(layout.size());
+  context.fill(nearest2, 0.f), context.fill(chosen2, 0.f);
+  const auto inner_rows = context.upload(lattice_rows(patches, RowChoice::kInner));
+  context.launch({"half.cl", "round_texels"}, row_range(context, inner_rows.size), static_cast<int>(inner_rows.size),
+                 layout.width, inner_rows, layout.patches, rows, columns, points.x, points.y, points.z, diagonals,
+                 texels.x, texels.y, texels.z, nearest2, chosen2);
+  return {root_mean_square(context.map(nearest2)), root_mean_square(context.map(chosen2))};
+}
+
+RoundedModel round_to_half(ClContext& context, const SkeletexModel& model) {
+  const DisplacementTexture& texture = model.texture;
+  const FrameTables tables =
+      frame_tables(model.skeleton, SeparationPlanes(model.skeleton), model.patches, model.origin);
+  const DeviceLayout layout = upload_layout(context, model.patches, tables, texture.width, texture.height);
+  // Rows whose points come at the places of their texels.
+  DeviceLattice lattice = upload_lattice(context, tables, model.patches, texture, RowChoice::kAll);
+  std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kAll);
+  for (LatticeRow& row : rows)
+    row[2] = (model.patches[row[0]].rectangle.y + row[1]) * texture.width + model.patches[row[0]].rectangle.x;
+  lattice.rows = context.upload(rows);
+  DevicePlanes points = allocate_planes(context, layout.size());
+  context.fill(points.x, 0.f), context.fill(points.y, 0.f), context.fill(points.z, 0.f);
+  displace(context, lattice, points);
+  const RoundingReport report =
+      round_to_half(context, model.diagonals, model.patches, layout, context.upload(tables.rows),
+                    context.upload(tables.columns), points, lattice.texels);
+  RoundedModel rounded{model, report};
+  rounded.model.texture = {texture.width, texture.height, context.download(lattice.texels.x),
+                           context.download(lattice.texels.y), context.download(lattice.texels.z)};
+  return rounded;
+}
+
+}  // namespace skeletex

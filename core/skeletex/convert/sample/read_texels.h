@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <array>
+#include <future>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "skeletex/convert/fit/fit.h"
+#include "skeletex/convert/parameterize/chart.h"
+#include "skeletex/convert/parameterize/spd.h"
+#include "skeletex/convert/sample/half_texels.h"
+#include "skeletex/convert/sample/unfold.h"
+#include "skeletex/convert/snap/guard.h"
+#include "skeletex/convert/snap/snap.h"
+#include "skeletex/device/context.h"
+#include "skeletex/skeleton/frame.h"
+
+namespace skeletex {
+
+/// What the texels of a layout are read from, per bone.
+struct TexelSources {
+  std::span<const Chart> charts;      ///< maps; of SPD patches only the positions are used
+  std::span<const Patch> patches;     ///< rectangle, method, row_u
+  std::span<const SpdHits> spd_hits;  ///< per bone; of VSM patches empty
+  /// Per bone and end, the points of row 0 and of the last row: `width` points on a seam, or one point for a pole.
+  std::span<const std::array<std::vector<Vec3>, 2>> end_points;
+  /// With snapping or fit, what the finished lattice is compared with; without it there is no such guard.
+  const GuardSources* guard = nullptr;
+  /// With snapping, what texels of VSM patches move to; waited for when the regular grid is there.
+  std::shared_future<DeviceSnapTables> features = {};
+};
+
+struct TexelOptions {
+  bool has_prefilter = true;  ///< of patches that are neither snapped nor fitted
+  bool has_unfold = true;
+  bool has_fit = false;  ///< points of VSM patches are fitted to the mesh, instead of the prefilter
+  std::optional<DiagonalRule> half_rule =
+      {};  ///< inner rows come as half floats, see round_to_half; the rule of the lattice's diagonals
+};
+
+/// What snapping did; of VSM patches.
+struct SnapReport {
+  int vertices = 0, snapped_vertices = 0;  ///< inner vertices that are not flat; those that a texel sits on
+  int edges = 0, snapped_edges = 0;        ///< creased edges; those with a texel between their ends
+  int texels_on_edges = 0;
+  int texels_put_back = 0;  ///< by the guard
+};
+
+struct TexelReport {
+  std::vector<double> sampled_triangle_fractions;  ///< per bone: share of the chart's triangles that a texel reads
+  std::vector<int> missed_texels;                  ///< per bone: filled from neighbours along the column
+  std::optional<SnapReport> snap;
+  std::optional<UnfoldReport> unfold;
+  std::optional<FitReport> fit;
+  std::optional<RoundingReport> rounding;               ///< to half floats
+  int turned_triangles = 0, even_turned_triangles = 0;  ///< with snapping or fit: see GuardReport
+};
+
+struct TexelResult {
+  DisplacementTexture texture;
+  TexelReport report;
+};
+
+/// Reads the surface at every texel and stores it in bone tangent space (paper 3.4), on the device. Texels between
+/// rectangles are zero.
+/// \param origin  world position that device coordinates are relative to
+TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const SeparationPlanes& separation,
+                        const TexelSources& sources, int texture_width, int texture_height, const Vec3& origin,
+                        const TexelOptions& options = {});
+
+}  // namespace skeletex

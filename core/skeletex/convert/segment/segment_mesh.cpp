@@ -1,0 +1,445 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/convert/segment/segment_mesh.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "skeletex/convert/segment/cells.h"
+#include "skeletex/convert/segment/cut.h"
+#include "skeletex/model/error.h"
+#include "skeletex/model/texture.h"
+#include "skeletex/skeleton/check_skeleton.h"
+#include "skeletex/skeleton/separation_planes.h"
+
+namespace skeletex {
+namespace {
+
+std::string text_of(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x(), p.y(), p.z()); }
+
+/// Which bone's side of which node's separation planes a half-edge runs along.
+struct SeamSide {
+  int node;
+  BoneAtNode bone;
+};
+
+/// A boundary of a bone's surface, in the order of its half-edges (surface on the left).
+struct HalfEdgeLoop {
+  std::vector<int> half_edges;
+  int turning = 0;  ///< how often it runs around the bone's axis in the direction of growing v
+};
+
+class Segmenter {
+ public:
+  Segmenter(ClContext& context, CutMesh mesh, const Skeleton& skeleton, const SegmentOptions& options)
+      : context_(context),
+        skeleton_(skeleton),
+        options_(options),
+        separation_(skeleton),
+        mesh_(std::move(mesh)),
+        genus_(1 - (static_cast<int>(mesh_.positions.size()) - mesh_.triangle_count() / 2) / 2) {}
+
+  Segmentation run() {
+    check_skeleton_inside(mesh_, skeleton_);
+    cut();
+    flood();
+    find_loops();
+    build_arcs();
+    build_segments();
+    return std::move(result_);
+  }
+
+ private:
+  const std::string& bone_name(int bone) const { return skeleton_.bones[bone].name; }
+  const std::string& node_name(int node) const { return skeleton_.nodes[node].name; }
+  const SeamSide& side(int half_edge) const { return sides_[mesh_.seams[half_edge]]; }
+  const Vec3& position(int vertex) const { return mesh_.positions[vertex]; }
+
+  void cut();
+  void flood();
+  void find_loops();
+  void build_arcs();
+  void build_segments();
+  [[noreturn]] void throw_crossing(int node, const CutOutcome& outcome) const;
+  double turn(int bone, int node, int vertex) const {
+    return separation_.turn_of(bone, position(vertex) - skeleton_.nodes[node].position);
+  }
+
+  ClContext& context_;
+  const Skeleton& skeleton_;
+  const SegmentOptions& options_;
+  SeparationPlanes separation_;
+  CutMesh mesh_;
+  int genus_;  // Euler's formula for a closed triangle mesh: edges are 3/2 of the triangles
+  std::vector<SeamSide> sides_;
+  std::vector<std::uint8_t> seam_degree_;                        // seams that meet at a vertex
+  std::vector<std::array<std::vector<HalfEdgeLoop>, 2>> loops_;  // per bone and end
+  std::vector<int> arc_of_;                                      // half-edge -> arc, -1
+  std::vector<int> triangle_counts_;                             // per bone
+  Segmentation result_;
+};
+
+void Segmenter::throw_crossing(int node, const CutOutcome& outcome) const {
+  const int other = side(outcome.crossed_half_edge).node;
+  int between = -1;
+  for (int b = 0; b < static_cast<int>(skeleton_.bones.size()); ++b)
+    if ((skeleton_.bones[b].head == node && skeleton_.bones[b].tail == other) ||
+        (skeleton_.bones[b].head == other && skeleton_.bones[b].tail == node))
+      between = b;
+  const int bone = between >= 0 ? between : side(outcome.crossed_half_edge).bone.bone;
+  throw TopologyError(
+      fmt::format("bone \"{}\": the separation planes at node \"{}\" and at node \"{}\" cross inside the body, at {} "
+                  "on the surface; move the "
+                  "nodes apart, or turn the bones there so that their separation planes stand more nearly parallel",
+                  bone_name(bone), node_name(other), node_name(node), text_of(outcome.point)));
+}
+
+void Segmenter::cut() {
+  BoundingBox box;
+  if (!mesh_.positions.empty()) box = {mesh_.positions[0], mesh_.positions[0]};
+  for (const Vec3& p : mesh_.positions) {
+    box.lower = box.lower.cwiseMin(p);
+    box.upper = box.upper.cwiseMax(p);
+  }
+  const std::vector<NodeCells> nodes = node_cells(skeleton_, options_.perturbation_rel_diag * box.diagonal());
+  const std::vector<std::uint8_t> labels_at_nodes = classify_points(context_, mesh_.positions, nodes);
+  const std::size_t input_count = mesh_.positions.size();
+  std::vector<std::uint8_t> labels;
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    const auto row = labels_at_nodes.begin() + static_cast<std::ptrdiff_t>(n * input_count);
+    labels.assign(row, row + static_cast<std::ptrdiff_t>(input_count));
+    for (std::size_t v = input_count; v < mesh_.positions.size(); ++v)
+      labels.push_back(static_cast<std::uint8_t>(nodes[n].cell_of(mesh_.positions[v])));
+    const CutOutcome outcome = cut_along_separation(mesh_, nodes[n], labels, static_cast<int>(sides_.size()));
+    if (outcome.status == CutStatus::kCrossesSeam) throw_crossing(nodes[n].node, outcome);
+    if (outcome.status == CutStatus::kNoSurface)
+      throw TopologyError(fmt::format(
+          "bone \"{}\": no separation plane of node \"{}\" at {} meets the surface; move the node into the body",
+          bone_name(nodes[n].cells[0].bone.bone), node_name(nodes[n].node), text_of(nodes[n].position)));
+    for (const Cell& cell : nodes[n].cells) sides_.push_back({nodes[n].node, cell.bone});
+  }
+
+  seam_degree_.assign(mesh_.positions.size(), 0);
+  for (std::size_t h = 0; h < mesh_.origins.size(); ++h)
+    if (mesh_.seams[h] >= 0 && seam_degree_[mesh_.origins[h]] < 255) ++seam_degree_[mesh_.origins[h]];
+  // Every open arc gets an inner vertex. Splitting appends half-edges, which old ones may have become.
+  for (std::size_t h = 0; h < mesh_.origins.size(); ++h)
+    if (mesh_.seams[h] >= 0 && seam_degree_[mesh_.origins[h]] != 2 &&
+        seam_degree_[mesh_.target(static_cast<int>(h))] != 2) {
+      split_edge(mesh_, static_cast<int>(h));
+      seam_degree_.push_back(2);
+    }
+}
+
+void Segmenter::flood() {
+  const int triangle_count = mesh_.triangle_count();
+  const int bone_count = static_cast<int>(skeleton_.bones.size());
+  std::vector<int>& bones = result_.triangle_bones;
+  std::vector<int> component(triangle_count, -1);
+  struct Component {
+    int seam = -1;  ///< a half-edge that says whose it is
+    int first = -1;
+  };
+  std::vector<Component> components;
+  std::vector<int> stack;
+  for (int seed = 0; seed < triangle_count; ++seed) {
+    if (component[seed] >= 0) continue;
+    const int c = static_cast<int>(components.size());
+    components.push_back({-1, seed});
+    component[seed] = c;
+    stack.push_back(seed);
+    while (!stack.empty()) {
+      const int t = stack.back();
+      stack.pop_back();
+      for (int h = 3 * t; h < 3 * t + 3; ++h) {
+        if (mesh_.seams[h] >= 0) {
+          const int seam = components[c].seam;
+          if (seam < 0) {
+            components[c].seam = h;
+          } else if (side(h).bone.bone != side(seam).bone.bone) {
+            const SeamSide &a = side(seam), &b = side(h);
+            const auto count_cycles = [&] {
+              std::vector<bool> is_used(skeleton_.nodes.size(), false);
+              for (const Bone& bone : skeleton_.bones) is_used[bone.head] = is_used[bone.tail] = true;
+              return bone_count - static_cast<int>(std::count(is_used.begin(), is_used.end(), true)) + 1;
+            };
+            std::string remedy = a.node == b.node ? fmt::format(
+                                                        "the separation planes at node \"{}\" do not close around the "
+                                                        "body; move the node, or turn the bones there",
+                                                        node_name(a.node))
+                                                  : fmt::format(
+                                                        "the separation planes at node \"{}\" or at node \"{}\" reach "
+                                                        "another part of the body; move one of them, or "
+                                                        "put a node in between",
+                                                        node_name(a.node), node_name(b.node));
+            if (genus_ != count_cycles())
+              remedy = fmt::format(
+                  "the mesh has {} handle{} and the skeleton {} ring{} of bones; lay one ring through every handle",
+                  genus_, genus_ == 1 ? "" : "s", count_cycles(), count_cycles() == 1 ? "" : "s");
+            throw TopologyError(fmt::format(
+                "bone \"{}\": its surface runs over into that of bone \"{}\", from {} at node \"{}\" to {} at node "
+                "\"{}\" without a separation plane between; {}",
+                bone_name(a.bone.bone), bone_name(b.bone.bone), text_of(position(mesh_.origins[seam])),
+                node_name(a.node), text_of(position(mesh_.origins[h])), node_name(b.node), remedy));
+          }
+          continue;
+        }
+        const int neighbour = mesh_.opposites[h] / 3;
+        if (component[neighbour] < 0) {
+          component[neighbour] = c;
+          stack.push_back(neighbour);
+        }
+      }
+    }
+  }
+
+  std::vector<int> component_of_bone(bone_count, -1);
+  for (int c = 0; c < static_cast<int>(components.size()); ++c) {
+    const Vec3& there = position(mesh_.origins[3 * components[c].first]);
+    if (components[c].seam < 0 && components.size() > 1)
+      throw TopologyError(
+          fmt::format("a part of the mesh at {} belongs to no bone; join the mesh to one piece, or remove the part",
+                      text_of(there)));
+    const int bone = components[c].seam < 0 ? 0 : side(components[c].seam).bone.bone;
+    if (component_of_bone[bone] >= 0)
+      throw TopologyError(
+          fmt::format("bone \"{}\": its separation planes at node \"{}\" cut off a second piece of surface at {}; move "
+                      "the node so that they meet "
+                      "only the body around it",
+                      bone_name(bone), node_name(side(components[c].seam).node),
+                      text_of(position(mesh_.origins[components[c].seam]))));
+    component_of_bone[bone] = c;
+  }
+  for (int b = 0; b < bone_count; ++b)
+    if (component_of_bone[b] < 0)
+      throw TopologyError(fmt::format(
+          "bone \"{}\" gets no surface: the separation planes at its nodes \"{}\" {} and \"{}\" {} leave it none; move "
+          "its nodes apart",
+          bone_name(b), node_name(skeleton_.bones[b].head), text_of(end_position(skeleton_, b, BoneEnd::kHead)),
+          node_name(skeleton_.bones[b].tail), text_of(end_position(skeleton_, b, BoneEnd::kTail))));
+  std::vector<int> bone_of(components.size());
+  for (int b = 0; b < bone_count; ++b) bone_of[component_of_bone[b]] = b;
+  bones.resize(triangle_count);
+  triangle_counts_.assign(bone_count, 0);
+  for (int t = 0; t < triangle_count; ++t) ++triangle_counts_[bones[t] = bone_of[component[t]]];
+}
+
+/// All boundaries of all segments, checked: one at each end that has neighbours, once around the bone.
+void Segmenter::find_loops() {
+  loops_.resize(skeleton_.bones.size());
+  std::vector<char> is_seen(mesh_.origins.size(), 0);
+  for (int start = 0; start < static_cast<int>(mesh_.origins.size()); ++start) {
+    if (mesh_.seams[start] < 0 || is_seen[start]) continue;
+    HalfEdgeLoop loop;
+    const SeamSide& first = side(start);
+    const int bone = first.bone.bone;
+    for (int h = start; !is_seen[h];) {
+      if (side(h).node != first.node)
+        throw TopologyError(fmt::format(
+            "bone \"{}\": the separation planes at nodes \"{}\" and \"{}\" meet at {} on the surface; move the nodes "
+            "apart",
+            bone_name(bone), node_name(first.node), node_name(side(h).node), text_of(position(mesh_.origins[h]))));
+      is_seen[h] = 1;
+      loop.half_edges.push_back(h);
+      h = CutMesh::next(h);
+      while (mesh_.seams[h] < 0) h = CutMesh::next(mesh_.opposites[h]);
+    }
+    double turning = 0;
+    double before = turn(bone, first.node, mesh_.origins[start]);
+    for (const int h : loop.half_edges) {
+      const double now = turn(bone, first.node, mesh_.target(h));
+      turning += now - before - std::round(now - before);
+      before = now;
+    }
+    loop.turning = static_cast<int>(std::lround(turning));
+    loops_[bone][static_cast<int>(first.bone.end)].push_back(std::move(loop));
+  }
+
+  const auto at_nodes = bones_at_nodes(skeleton_);
+  for (int b = 0; b < static_cast<int>(loops_.size()); ++b) {
+    int loop_count = 0;
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
+      const auto& loops = loops_[b][static_cast<int>(end)];
+      const int node = end_node(skeleton_, b, end);
+      const int wanted = at_nodes[node].size() > 1 ? 1 : 0;
+      loop_count += wanted;
+      if (static_cast<int>(loops.size()) < wanted)
+        throw TopologyError(
+            fmt::format("bone \"{}\": its surface does not reach the separation planes of its node \"{}\" at {}; move "
+                        "the node, or lengthen the bone",
+                        bone_name(b), node_name(node), text_of(skeleton_.nodes[node].position)));
+      if (static_cast<int>(loops.size()) > wanted) {
+        // The one that winds around the bone is right; name another.
+        const auto wrong =
+            std::find_if(loops.begin(), loops.end(), [](const HalfEdgeLoop& l) { return l.turning == 0; });
+        const HalfEdgeLoop& loop = wrong == loops.end() ? loops.back() : *wrong;
+        throw TopologyError(fmt::format(
+            "bone \"{}\": its surface has {} boundaries at node \"{}\" instead of one, another at {}: the separation "
+            "planes there "
+            "reach a second part of the body; move the node or turn the bones so that they meet only the body around "
+            "it",
+            bone_name(b), loops.size(), node_name(node), text_of(position(mesh_.origins[loop.half_edges[0]]))));
+      }
+      // With the surface on the left, a boundary at the head runs with growing v, one at the tail against it.
+      if (wanted && loops[0].turning != (end == BoneEnd::kHead ? 1 : -1))
+        throw TopologyError(
+            fmt::format("bone \"{}\": its boundary at node \"{}\", through {}, does not run once around the bone; move "
+                        "the node to the "
+                        "middle of the body",
+                        bone_name(b), node_name(node), text_of(position(mesh_.origins[loops[0].half_edges[0]]))));
+    }
+    result_.segments.push_back({});
+    result_.segments.back().bone = b;
+    result_.segments.back().topology = loop_count == 2   ? SegmentTopology::kAnnulus
+                                       : loop_count == 1 ? SegmentTopology::kDisk
+                                                         : SegmentTopology::kSphere;
+  }
+}
+
+void Segmenter::build_arcs() {
+  arc_of_.assign(mesh_.origins.size(), -1);
+  for (int bone = 0; bone < static_cast<int>(loops_.size()); ++bone)
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
+      auto& loops = loops_[bone][static_cast<int>(end)];
+      if (loops.empty()) continue;
+      const int node = end_node(skeleton_, bone, end);
+      std::vector<int>& ring = loops[0].half_edges;
+      // The loop begins at the corner with the smallest angle; without corners at the vertex with the smallest angle.
+      const bool has_corners =
+          std::any_of(ring.begin(), ring.end(), [&](int h) { return seam_degree_[mesh_.origins[h]] != 2; });
+      const auto key = [&](int h) {
+        const int v = mesh_.origins[h];
+        return std::pair(has_corners && seam_degree_[v] == 2, turn(bone, node, v));
+      };
+      std::rotate(ring.begin(),
+                  std::min_element(ring.begin(), ring.end(), [&](int g, int h) { return key(g) < key(h); }),
+                  ring.end());
+
+      for (std::size_t begin = 0; begin < ring.size();) {
+        std::size_t stop = begin + 1;
+        while (stop < ring.size() && (!has_corners || seam_degree_[mesh_.origins[ring[stop]]] == 2)) ++stop;
+        const int other = side(mesh_.opposites[ring[begin]]).bone.bone;
+        for (std::size_t k = begin; k < stop; ++k)
+          if (side(mesh_.opposites[ring[k]]).bone.bone != other)
+            throw TopologyError(fmt::format(
+                "bone \"{}\": its neighbour at node \"{}\" changes from \"{}\" to \"{}\" at {} without a corner; move "
+                "the node",
+                bone_name(bone), node_name(node), bone_name(other), bone_name(side(mesh_.opposites[ring[k]]).bone.bone),
+                text_of(position(mesh_.origins[ring[k]]))));
+        if (bone < other) {
+          Arc arc;
+          arc.node = node;
+          arc.bones = {bone, other};
+          arc.is_closed = !has_corners;
+          for (std::size_t k = begin; k < stop; ++k) arc.vertices.push_back(mesh_.origins[ring[k]]);
+          if (has_corners) arc.vertices.push_back(mesh_.target(ring[stop - 1]));
+          if (end == BoneEnd::kTail)
+            std::reverse(has_corners ? arc.vertices.begin() : arc.vertices.begin() + 1, arc.vertices.end());
+          for (std::size_t k = begin; k < stop; ++k)
+            arc_of_[ring[k]] = arc_of_[mesh_.opposites[ring[k]]] = static_cast<int>(result_.arcs.size());
+          result_.arcs.push_back(std::move(arc));
+        }
+        begin = stop;
+      }
+    }
+}
+
+void Segmenter::build_segments() {
+  const int triangle_count = mesh_.triangle_count();
+  result_.cut_mesh.positions = mesh_.positions;
+  result_.cut_mesh.triangles.resize(triangle_count);
+  for (int t = 0; t < triangle_count; ++t)
+    result_.cut_mesh.triangles[t] = {mesh_.origins[3 * t], mesh_.origins[3 * t + 1], mesh_.origins[3 * t + 2]};
+
+  std::vector<std::vector<int>> triangles(result_.segments.size());
+  for (std::size_t b = 0; b < triangles.size(); ++b) triangles[b].reserve(triangle_counts_[b]);
+  for (int t = 0; t < triangle_count; ++t) triangles[result_.triangle_bones[t]].push_back(t);
+
+  std::vector<int> local(mesh_.positions.size(), -1);
+  for (Segment& segment : result_.segments) {
+    const int bone = segment.bone;
+    segment.source_vertices.reserve(triangles[bone].size() / 2 + 64);
+    segment.mesh.triangles.reserve(triangles[bone].size());
+    for (const int t : triangles[bone]) {
+      Triangle triangle;
+      for (int c = 0; c < 3; ++c) {
+        const int v = mesh_.origins[3 * t + c];
+        if (local[v] < 0) {
+          local[v] = static_cast<int>(segment.source_vertices.size());
+          segment.source_vertices.push_back(v);
+        }
+        triangle[c] = local[v];
+      }
+      segment.mesh.triangles.push_back(triangle);
+    }
+    segment.mesh.positions.reserve(segment.source_vertices.size());
+    for (const int v : segment.source_vertices) segment.mesh.positions.push_back(position(v));
+
+    int boundary_edges = 0;
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
+      auto& loops = loops_[bone][static_cast<int>(end)];
+      if (loops.empty()) continue;
+      const std::vector<int>& ring = loops[0].half_edges;
+      boundary_edges += static_cast<int>(ring.size());
+      BoundaryLoop& loop = segment.loops[static_cast<int>(end)];
+      for (const int h : ring) {
+        const int v = mesh_.origins[h];
+        loop.vertices.push_back(local[v]);
+        const int arc = arc_of_[h];
+        if (loop.arcs.empty() || loop.arcs.back().arc != arc) loop.arcs.push_back({arc, false});
+      }
+      // Half-edges run with growing v at a head, against it at a tail; arcs with growing v of their first bone.
+      if (end == BoneEnd::kTail) {
+        std::reverse(loop.vertices.begin() + 1, loop.vertices.end());
+        std::reverse(loop.arcs.begin(), loop.arcs.end());
+      }
+      for (ArcUse& use : loop.arcs) {
+        const Arc& arc = result_.arcs[use.arc];
+        if (arc.bones[0] == bone) continue;
+        const BoneEnd first_end =
+            end_node(skeleton_, arc.bones[0], BoneEnd::kHead) == arc.node ? BoneEnd::kHead : BoneEnd::kTail;
+        // The half-edges of the two sides run against each other, and once more where the ends differ.
+        use.is_reversed = first_end == end;
+      }
+      // A closed arc begins where its first bone has its smallest angle.
+      if (loop.arcs.size() == 1 && result_.arcs[loop.arcs[0].arc].is_closed) {
+        const int v = local[result_.arcs[loop.arcs[0].arc].vertices[0]];
+        std::rotate(loop.vertices.begin(), std::find(loop.vertices.begin(), loop.vertices.end(), v),
+                    loop.vertices.end());
+      }
+    }
+    const int vertex_count = static_cast<int>(segment.source_vertices.size());
+    const int face_count = static_cast<int>(segment.mesh.triangles.size());
+    const int euler = vertex_count - (3 * face_count + boundary_edges) / 2 + face_count;
+    const int wanted = segment.topology == SegmentTopology::kAnnulus ? 0
+                       : segment.topology == SegmentTopology::kDisk  ? 1
+                                                                     : 2;
+    if (euler != wanted) {
+      const Vec3 centre =
+          0.5 * (end_position(skeleton_, bone, BoneEnd::kHead) + end_position(skeleton_, bone, BoneEnd::kTail));
+      throw TopologyError(
+          fmt::format("bone \"{}\" around {}: its surface is no {} but has {} handle{} (Euler number {} instead of "
+                      "{}); lay a ring of "
+                      "bones through every handle of the body",
+                      bone_name(bone), text_of(centre), to_string(segment.topology), (wanted - euler) / 2,
+                      wanted - euler == 2 ? "" : "s", euler, wanted));
+    }
+    for (const int v : segment.source_vertices) local[v] = -1;
+  }
+}
+
+}  // namespace
+
+Segmentation segment_mesh(ClContext& context, CutMesh mesh, const Skeleton& skeleton, const SegmentOptions& options) {
+  if (skeleton.bones.empty()) throw InputError("the skeleton has no bones; give it at least one");
+  if (mesh.origins.empty()) throw InputError("the mesh has no triangles");
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+    if (!std::isfinite(mesh.positions[v].squaredNorm()))
+      throw InputError(fmt::format("vertex {} of the mesh has no finite position; remove it", v));
+  return Segmenter(context, std::move(mesh), skeleton, options).run();
+}
+
+}  // namespace skeletex

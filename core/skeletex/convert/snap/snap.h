@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <span>
+#include <vector>
+
+#include "skeletex/convert/sample/device_maps.h"
+#include "skeletex/reconstruct/displace.h"
+
+namespace skeletex {
+
+/// Vertices and edges of the maps that texels should sit on, whatever the layout.
+struct MapFeatures {
+  struct Vertex {
+    int vertex = -1;      ///< of the chart
+    double strength = 0;  ///< sum over its edges of dihedral angle (radians) x length
+    int rank = 0;         ///< by strength, from 1, among those of all patches
+  };
+  struct Edge {
+    std::array<int, 2> vertices{-1, -1};  ///< of the chart
+    std::array<int, 2> turns{0, 0};       ///< that its ends are from their v
+    double dihedral = 0;                  ///< radians
+  };
+  std::vector<std::vector<Vertex>> vertices;  ///< per patch: inner ones that are not flat
+  std::vector<std::vector<Edge>> edges;       ///< per patch: inner ones whose dihedral angle is above the least
+};
+
+/// The features of all VSM patches.
+/// \param methods         per chart
+/// \param least_dihedral  radians; flatter edges are left out
+MapFeatures find_features(std::span<const Chart> charts, std::span<const Method> methods, double least_dihedral);
+
+/// Features where they lie in the cells of their patch: x = v width, unwrapped; y the row, with fractions, by the
+/// patch's row table.
+struct SnapFeatures {
+  struct Vertex {
+    int patch = -1;
+    int point = -1;  ///< its number among the vertices of DeviceMaps
+    double x = 0, y = 0;
+    int rank = 0;  ///< the stronger, the higher
+  };
+  struct Edge {
+    int patch = -1;
+    std::array<int, 2> points{-1, -1};
+    std::array<double, 2> x{0, 0}, y{0, 0};
+    double dihedral = 0;  ///< radians
+  };
+  std::vector<Vertex> vertices;
+  std::vector<Edge> edges;  ///< patch after patch; both there by rows and along them
+};
+
+/// Columns of a patch wrap round: the one of [0, width) that is the same.
+inline int wrapped(int column, int width) {
+  while (column < 0) column += width;
+  while (column >= width) column -= width;
+  return column;
+}
+/// The rows of a patch, with fractions, that read at some u. \param row_u  per row, see Patch \param u  of [0, 1]
+/// \return per u
+std::vector<double> rows_of(const std::vector<double>& row_u, std::span<const double> u);
+
+/// Those near each other in the texture come one after the other.
+/// \param charts   as for find_features
+/// \param patches  per chart, with its size and row table
+SnapFeatures place_features(const MapFeatures& features, std::span<const Chart> charts, std::span<const Patch> patches);
+
+/// Features as the kernels take them (snap.cl).
+struct SnapTables {
+  /// An edge at one turn of v, as EdgeRecord of snap.cl.
+  struct Edge {
+    float x, y, ex, ey, over_x, over_y, flatness;
+    int number;
+  };
+  std::vector<int> vertex_patches, vertex_points, vertex_ranks;
+  std::vector<float> vertex_x, vertex_y;  ///< cells
+  std::vector<std::array<int, 2>> edge_points;
+  std::vector<Edge> edges;
+  std::array<std::vector<LatticeRow>, 2> rows;  ///< of VSM patches, inner ones, even and odd: patch, row, first bin, 0
+  std::vector<int> bin_begins, bin_edges;       ///< the edges near each bin of eight columns of two rows
+};
+/// \param patches  as for place_features
+SnapTables tables_of(const SnapFeatures& features, std::span<const Patch> patches);
+
+/// Where each texel reads, a thing of its own between the map and the texel: per texel an offset from its place in the
+/// regular grid, in cells, at most 1 along each axis, and what holds it there.
+struct ReadingPositions {
+  ClBuffer<float> x, y;            ///< around, along
+  ClBuffer<int> anchors;           ///< 0: nothing; 1 + i: vertex i of the features; -1 - i: edge i
+  ClBuffer<float> home_x, home_y;  ///< the offsets that texels go back to: 0, but where the regular grid is unfolded
+};
+/// The regular grid.
+ReadingPositions even_positions(ClContext& context, const DeviceLayout& layout);
+
+/// The same as they are while texels snap: inner rows of VSM patches have their even columns first, then their odd
+/// ones.
+struct SnappedPositions {
+  ClBuffer<float> x, y;        ///< see ReadingPositions; 0 in all other rows
+  ClBuffer<int> anchors;       ///< likewise
+  ClBuffer<float> parameters;  ///< place on the edge, 0 at its first point, 1 at its last; of texels on edges alone
+};
+
+/// SnapTables on the device; lists that are empty are buffers of size 0.
+struct DeviceSnapTables {
+  ClBuffer<int> vertex_patches, vertex_points, vertex_ranks;
+  ClBuffer<float> vertex_x, vertex_y;
+  ClBuffer<std::array<int, 2>> edge_points;
+  ClBuffer<SnapTables::Edge> edges;
+  std::array<ClBuffer<LatticeRow>, 2> rows;
+  ClBuffer<int> bin_begins, bin_edges;
+};
+/// \throw DeviceError when there is no room
+DeviceSnapTables upload_tables(ClContext& context, const SnapTables& tables);
+
+/// Moves reading positions from home to vertices, strongest first, and then to creased edges; the map does not fold.
+/// \param positions  0 but for what is at home; x, y and anchors are taken over
+SnappedPositions snap_positions(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables,
+                                ReadingPositions& positions);
+
+/// Planes of points, one per texel.
+using TexelPoints = DevicePlanes;
+
+/// Lists of put_back_listed, for all its calls on one lattice: 30 at most.
+struct TexelReturns {
+  TexelReturns(ClContext& context, const DeviceLayout& layout);
+  ClBuffer<int> marks, back, bad;  ///< see put_listed_back in snap.cl
+  int calls = 0;
+};
+
+/// What put_back_listed has done.
+struct TexelsBack {
+  std::vector<int> texels;                 ///< that went back, in any order
+  std::array<ClMapping<float>, 3> points;  ///< x, y, z per texel of the texture, where all are now
+};
+/// Texels of inner rows go back to the regular grid, those on vertices only `with_vertices`; and with them the texels
+/// of quads at them that then fold in the map, or in space where the regular grid does not. \param even    the regular
+/// grid's points, the measure of folds \param before  what texels go back to: these as they would be stored \param
+/// texels  each once \throw DeviceError
+TexelsBack put_back_listed(ClContext& context, const DeviceLayout& layout, const TexelPoints& even,
+                           const TexelPoints& before, const std::vector<int>& texels, bool with_vertices,
+                           TexelReturns& returns, ReadingPositions& positions, TexelPoints& points);
+
+}  // namespace skeletex

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/edit/filter/filter.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "skeletex/edit/filter/move_surface.h"
+#include "skeletex/edit/regular_grid.h"
+#include "skeletex/model/error.h"
+
+namespace skeletex {
+namespace {
+
+void check_length(double value, const char* what, double least, double most) {
+  if (!(value >= least && value <= most))
+    throw InputError(fmt::format("{} is {}; give {} to {} diagonals", what, value, least, most));
+}
+
+/// Everything a filter needs of the model it works on.
+struct FilterJob {
+  ClContext& context;
+  const SkeletexModel& given;
+  SkeletexModel model;  ///< the given one on an regular grid: the slivers of a snapped one take the solver several
+                        ///< times the steps
+  ModelSurface surface;
+  SurfaceOperator laplace;
+  std::vector<float> weights;  ///< of the region, per vertex
+  SolveReport solver;
+
+  FilterJob(ClContext& on, const SkeletexModel& of, const FilterRegion& region);
+  double unit() const { return model.diagonal; }
+};
+
+/// Vertices whose bones all belong to the region.
+std::vector<float> inside_region(const SkeletexModel& model, const Lattice& lattice, const FilterRegion& region) {
+  std::vector<bool> is_chosen(model.patches.size(), region.bones.empty());
+  for (const std::string& name : region.bones) {
+    const auto& bones = model.skeleton.bones;
+    const auto found = std::find_if(bones.begin(), bones.end(), [&](const Bone& bone) { return bone.name == name; });
+    if (found == bones.end()) throw InputError(fmt::format("the skeleton has no bone \"{}\" to filter", name));
+    is_chosen[found - bones.begin()] = true;
+  }
+  std::vector<float> inside(lattice.vertex_count, 0.f);
+  for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
+    if (!is_chosen[bone]) continue;
+    const Rectangle& rectangle = model.patches[bone].rectangle;
+    std::fill_n(inside.begin() + lattice.first_inner[bone], rectangle.width * (rectangle.height - 2), 1.f);
+    for (const int pole : lattice.poles[bone])
+      if (pole >= 0) inside[pole] = 1;
+  }
+  for (std::size_t a = 0; a < model.arcs.size(); ++a)
+    if (is_chosen[model.arcs[a].bones[0]] && is_chosen[model.arcs[a].bones[1]])
+      std::fill_n(inside.begin() + lattice.first_sample[a], model.arcs[a].samples.size(), 1.f);
+  for (std::size_t i = 0; i < model.corners.size(); ++i) {
+    const std::vector<int>& bones = model.corners[i].bones;
+    if (std::all_of(bones.begin(), bones.end(), [&](int bone) { return is_chosen[bone]; }))
+      inside[lattice.first_corner + i] = 1;
+  }
+  return inside;
+}
+
+/// 0 at the boundary and outside, towards 1 inside: the solution of (M + falloff^2 L) w = M, which nears 1 as
+/// exp(-distance / falloff) does, made smooth at its foot.
+std::vector<float> weigh_region(ClContext& context, const SurfaceOperator& laplace, std::vector<float> inside,
+                                double falloff, SolveReport& report) {
+  if (std::find(inside.begin(), inside.end(), 0.f) == inside.end() || falloff == 0) return inside;
+  const DeviceField masses{1, context.upload(context.download(laplace.mass))};
+  SolveResult solved =
+      solve_diffusion(context, laplace, static_cast<float>(falloff * falloff), context.upload(inside), masses);
+  add_solve(solved.report, report);
+  std::vector<float> weights = context.download(solved.x.values);
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    const float w = std::clamp(weights[i], 0.f, 1.f);
+    weights[i] = inside[i] * w * w * (3 - 2 * w);
+  }
+  return weights;
+}
+
+FilterJob::FilterJob(ClContext& on, const SkeletexModel& of, const FilterRegion& region)
+    : context(on),
+      given(of),
+      model(regular_grid(on, of)),
+      surface(upload_surface(on, model)),
+      laplace(make_surface_operator(on, surface.neighbours, surface.points)) {
+  check_length(region.falloff, "the fall-off at the region's boundary", 0, 1);
+  weights = weigh_region(context, laplace, inside_region(model, surface.lattice, region), region.falloff, solver);
+}
+
+/// How far a surface of some points moves when it diffuses, world units: (M + time L) d = -time L x.
+std::vector<Vec3> diffusion_moves(FilterJob& job, const DeviceField& points, const SurfaceOperator& laplace,
+                                  double scale) {
+  const auto time = static_cast<float>(scale * scale);
+  const auto everywhere = job.context.upload(std::vector<float>(job.weights.size(), 1.f));
+  const DeviceField b = apply_operator(job.context, laplace, 0, -time, everywhere, points);
+  const SolveResult solved = solve_diffusion(job.context, laplace, time, everywhere, b);
+  add_solve(solved.report, job.solver);
+  std::vector<Vec3> moves = download_vectors(job.context, solved.x);
+  for (Vec3& move : moves) move *= job.unit();
+  return moves;
+}
+
+/// Texels beyond the region become the given model's again.
+void keep_outside(const FilterJob& job, SkeletexModel& model) {
+  bool has_outside = false;
+  for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
+    const auto [x, y, width, height] = model.patches[bone].rectangle;
+    for (int row = 1; row + 1 < height; ++row)
+      for (int j = 0; j < width; ++j) {
+        if (job.weights[job.surface.lattice.first_inner[bone] + (row - 1) * width + j] != 0) continue;
+        has_outside = true;
+        const std::size_t texel = static_cast<std::size_t>(y + row) * model.texture.width + x + j;
+        model.texture.along[texel] = job.given.texture.along[texel];
+        model.texture.around[texel] = job.given.texture.around[texel];
+        model.texture.out[texel] = job.given.texture.out[texel];
+      }
+  }
+  if (!has_outside) return;
+  model.diagonals = job.given.diagonals;
+  model.encoder_settings = job.given.encoder_settings;
+}
+
+/// The model with its surface moved, where and as far as the region allows.
+FilterResult finish(FilterJob& job, std::vector<Vec3> moves, double volume_before) {
+  for (std::size_t i = 0; i < moves.size(); ++i) moves[i] *= static_cast<double>(job.weights[i]);
+  MovedModel moved = move_surface(job.context, job.model, job.surface, job.laplace, moves);
+  add_solve(job.solver, moved.report.solver);
+  keep_outside(job, moved.model);
+  return {std::move(moved.model), {moved.report, volume_before}};
+}
+
+/// Adds to the moves what brings the volume back, along the normals: Newton's method, whose slope is the area.
+void restore_volume(const FilterJob& job, double volume, std::vector<Vec3>& moves) {
+  for (int round = 0; round < 4; ++round) {
+    std::vector<Vec3> positions = job.surface.positions;
+    for (std::size_t i = 0; i < positions.size(); ++i) positions[i] += static_cast<double>(job.weights[i]) * moves[i];
+    const std::vector<Vec3> vectors = area_vectors_at(job.context, job.model, job.surface, positions);
+    double area = 0;
+    for (std::size_t i = 0; i < vectors.size(); ++i) area += static_cast<double>(job.weights[i]) * vectors[i].norm();
+    if (!(area > 0)) return;
+    const double offset = (volume - enclosed_volume(job.model, positions, vectors)) / area;
+    for (std::size_t i = 0; i < moves.size(); ++i) moves[i] += offset * vectors[i].normalized();
+  }
+}
+
+}  // namespace
+
+std::vector<float> region_weights(ClContext& context, const SkeletexModel& model, const FilterRegion& region) {
+  return FilterJob(context, model, region).weights;
+}
+
+FilterResult smooth_model(ClContext& context, const SkeletexModel& model, const SmoothOptions& options,
+                          const FilterRegion& region) {
+  check_length(options.scale, "the scale of smoothing", 0, 1);
+  if (options.iterations < 1 || options.iterations > 1000)
+    throw InputError(fmt::format("{} iterations of smoothing; give 1 to 1000", options.iterations));
+  FilterJob job(context, model, region);
+  const double volume = enclosed_volume(job.model, job.surface.positions,
+                                        area_vectors_at(job.context, job.model, job.surface, job.surface.positions));
+  const double scale = options.scale / std::sqrt(options.iterations);
+  std::vector<Vec3> moves = diffusion_moves(job, job.surface.points, job.laplace, scale);
+  for (int iteration = 1; iteration < options.iterations; ++iteration) {
+    std::vector<Vec3> positions = job.surface.positions;
+    for (std::size_t i = 0; i < positions.size(); ++i) positions[i] += moves[i];
+    const DeviceField points = upload_points(context, positions, job.model.origin, job.unit());
+    const std::vector<Vec3> more =
+        diffusion_moves(job, points, make_surface_operator(context, job.surface.neighbours, points), scale);
+    for (std::size_t i = 0; i < moves.size(); ++i) moves[i] += more[i];
+  }
+  if (options.keeps_volume) restore_volume(job, volume, moves);
+  return finish(job, moves, volume);
+}
+
+FilterResult enhance_model(ClContext& context, const SkeletexModel& model, const EnhanceOptions& options,
+                           const FilterRegion& region) {
+  check_length(options.scale, "the scale of detail", 0, 1);
+  if (!(options.gain >= -1 && options.gain <= 100))
+    throw InputError(fmt::format("a gain of {}; give -1 (no detail) to 100", options.gain));
+  FilterJob job(context, model, region);
+  const double volume = enclosed_volume(job.model, job.surface.positions,
+                                        area_vectors_at(job.context, job.model, job.surface, job.surface.positions));
+  std::vector<Vec3> moves = diffusion_moves(job, job.surface.points, job.laplace, options.scale);
+  for (Vec3& move : moves) move *= -options.gain;
+  return finish(job, moves, volume);
+}
+
+FilterResult add_noise(ClContext& context, const SkeletexModel& model, const NoiseOptions& options,
+                       const FilterRegion& region) {
+  check_length(options.amplitude, "the noise's amplitude", 0, 1);
+  check_length(options.wavelength, "the noise's wavelength", 1e-5, 100);
+  if (options.octaves < 1 || options.octaves > 16)
+    throw InputError(fmt::format("{} octaves of noise; give 1 to 16", options.octaves));
+  FilterJob job(context, model, region);
+  std::vector<Vec3> moves = area_vectors_at(job.context, job.model, job.surface, job.surface.positions);
+  const double volume = enclosed_volume(job.model, job.surface.positions, moves);
+  const auto heights = context.allocate<float>(moves.size());
+  context.launch({"filter.cl", "noise_at_points"}, ClRange(moves.size()), static_cast<int>(moves.size()),
+                 static_cast<float>(1 / options.wavelength), options.octaves, static_cast<unsigned>(options.seed),
+                 job.surface.points.values, heights);
+  const std::vector<float> noise = context.download(heights);
+  for (std::size_t i = 0; i < moves.size(); ++i)
+    moves[i] = options.amplitude * job.unit() * static_cast<double>(noise[i]) * moves[i].normalized();
+  return finish(job, moves, volume);
+}
+
+}  // namespace skeletex

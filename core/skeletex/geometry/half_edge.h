@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
+
+#include "skeletex/geometry/mesh.h"
+
+namespace skeletex {
+
+struct HalfEdgeTraits : OpenMesh::DefaultTraits {
+  using Point = OpenMesh::Vec3d;
+};
+using HalfEdgeMesh = OpenMesh::TriMesh_ArrayKernelT<HalfEdgeTraits>;
+
+/// The half-edge mesh (OpenMesh) of an indexed one, with the same vertex and face indices (paper, Table 1: t_OM).
+/// \pre closed, oriented and 2-manifold (see measure_manifold)
+/// \throw InputError when OpenMesh cannot link a face
+HalfEdgeMesh build_half_edges(const TriangleMesh& mesh);
+
+}  // namespace skeletex

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/geometry/nearest_search.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "skeletex/geometry/parallel.h"
+
+namespace skeletex {
+namespace {
+
+constexpr std::size_t kBlock = 1 << 13;
+constexpr float kMoreThanRounding = 1e-5f;  // of the mesh's extent, or of a distance
+constexpr float kBeyondAll = 1e30f;         // as in metro.cl
+constexpr ClKernelName kFindNearest{"metro.cl", "find_nearest_triangles"};
+
+}  // namespace
+
+NearestSearch::NearestSearch(ClContext& context, const TriangleTree& tree)
+    : context_(context),
+      origin_(tree.origin),
+      scale_(tree.scale),
+      top_level_(tree.top_level()),
+      order_(tree.order),
+      boxes_(context.upload(tree.boxes)),
+      blocks_(context.upload(tree.blocks)),
+      level_begin_(context.upload(tree.level_begin)) {}
+
+void NearestSearch::find(std::span<const Vec3> points, std::span<int> triangles, std::span<float> distances,
+                         float enough, std::span<const float> bounds) {
+  const std::size_t count = points.size();
+  if (count == 0) return;
+  for (std::vector<float>* plane : {&x_, &y_, &z_}) plane->resize(count);
+  for_each_block(count, kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vec3 p = (points[i] - origin_) / scale_;
+      x_[i] = static_cast<float>(p.x());
+      y_[i] = static_cast<float>(p.y());
+      z_[i] = static_cast<float>(p.z());
+    }
+  });
+  if (nearest_.size != count)
+    nearest_ = context_.allocate<int>(count), nearest_squared_ = context_.allocate<float>(count);
+  constexpr int kRun = 16;
+  const std::size_t items = block_count(count, kRun);
+  const float scaled_enough = enough / static_cast<float>(scale_);
+  std::vector<float> bounds_squared;
+  bounds_squared.reserve(bounds.size());
+  for (const float bound : bounds) {
+    const float scaled = kMoreThanRounding + (1 + kMoreThanRounding) * bound / static_cast<float>(scale_);
+    bounds_squared.push_back(std::min(kBeyondAll, scaled * scaled));
+  }
+  context_.launch(kFindNearest, ClRange({items, 1}, {context_.work_group_size(kFindNearest, 32), 1}),
+                  context_.upload(x_), context_.upload(y_), context_.upload(z_), static_cast<int>(count), kRun, boxes_,
+                  blocks_, level_begin_, top_level_, scaled_enough * scaled_enough, static_cast<int>(!bounds.empty()),
+                  context_.upload(bounds_squared), nearest_, nearest_squared_);
+  const auto [places, squared] = context_.download(nearest_, nearest_squared_);
+  for (std::size_t i = 0; i < count; ++i) triangles[i] = order_[places[i]];
+  if (distances.empty()) return;
+  for (std::size_t i = 0; i < count; ++i)
+    distances[i] = static_cast<float>(scale_) * std::sqrt(std::max(0.0f, squared[i]));
+}
+
+}  // namespace skeletex

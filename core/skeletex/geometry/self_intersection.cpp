@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/geometry/self_intersection.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "skeletex/geometry/parallel.h"
+#include "skeletex/geometry/predicates.h"
+
+namespace skeletex {
+namespace {
+
+using Corners = std::array<Vec3, 3>;
+
+Corners corners_of(const TriangleMesh& mesh, int triangle) {
+  const Triangle& t = mesh.triangles[triangle];
+  return {mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]};
+}
+
+/// The plane of two coordinates in which a triangle is largest; -1 when it has no area in any.
+int drawing_plane(const Corners& t) {
+  const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
+  Eigen::Index axis;
+  normal.cwiseAbs().maxCoeff(&axis);
+  const auto drawn = [axis](const Vec3& p) { return Vec2(p[(axis + 1) % 3], p[(axis + 2) % 3]); };
+  return orientation(drawn(t[0]), drawn(t[1]), drawn(t[2])) != 0 ? static_cast<int>(axis) : -1;
+}
+
+Vec2 drawn(const Vec3& p, int plane) { return {p[(plane + 1) % 3], p[(plane + 2) % 3]}; }
+
+bool do_intervals_meet(double a, double b, double c, double d) {
+  return std::max(std::min(a, b), std::min(c, d)) <= std::min(std::max(a, b), std::max(c, d));
+}
+
+bool do_segments_meet(const Vec2& a, const Vec2& b, const Vec2& c, const Vec2& d) {
+  const int abc = orientation(a, b, c), abd = orientation(a, b, d), cda = orientation(c, d, a),
+            cdb = orientation(c, d, b);
+  if (abc * abd > 0 || cda * cdb > 0) return false;
+  // All on one line, or touching: then the intervals decide.
+  return do_intervals_meet(a.x(), b.x(), c.x(), d.x()) && do_intervals_meet(a.y(), b.y(), c.y(), d.y());
+}
+
+/// Whether the segment from p to q meets a triangle with area (drawn in `plane`).
+bool does_segment_meet(const Vec3& p, const Vec3& q, const Corners& t, int plane) {
+  const int side_p = orientation(t[0], t[1], t[2], p), side_q = orientation(t[0], t[1], t[2], q);
+  if (side_p * side_q > 0) return false;
+  if (side_p == 0 && side_q == 0) {
+    const Vec2 a = drawn(t[0], plane), b = drawn(t[1], plane), c = drawn(t[2], plane), from = drawn(p, plane),
+               to = drawn(q, plane);
+    const int way = orientation(a, b, c);
+    if (orientation(a, b, from) * way >= 0 && orientation(b, c, from) * way >= 0 && orientation(c, a, from) * way >= 0)
+      return true;
+    return do_segments_meet(from, to, a, b) || do_segments_meet(from, to, b, c) || do_segments_meet(from, to, c, a);
+  }
+  const int ab = orientation(p, q, t[0], t[1]), bc = orientation(p, q, t[1], t[2]), ca = orientation(p, q, t[2], t[0]);
+  return (ab >= 0 && bc >= 0 && ca >= 0) || (ab <= 0 && bc <= 0 && ca <= 0);
+}
+
+enum class Answer { kNo, kYes, kUnsure };
+
+/// Where two triangles meet the line of both their planes (Moeller 1997), in plain double precision: unsure wherever
+/// rounding could decide, or they are nearly in one plane, or have no area. \param shared  whether their first vertex
+/// is one: then of meeting elsewhere
+Answer meet_on_line(const Corners& s, const Corners& t, bool shared) {
+  constexpr double kRounding = 1e-14;  // of products of differences: some ten times what their last digits add up to
+  constexpr double kLeastSine = 1e-6;
+  struct Cut {
+    double low = 0, high = 0, error = 0;
+  };
+  std::array<Vec3, 3> own, other;  // from the first vertex of s
+  double extent = 0;
+  for (int k = 0; k < 3; ++k) {
+    own[k] = s[k] - s[0], other[k] = t[k] - s[0];
+    extent = std::max({extent, own[k].lpNorm<Eigen::Infinity>(), other[k].lpNorm<Eigen::Infinity>()});
+  }
+  const Vec3 own_normal = own[1].cross(own[2]), other_normal = (other[1] - other[0]).cross(other[2] - other[0]);
+  const Vec3 line = own_normal.cross(other_normal);
+  Eigen::Index axis;
+  const double along = line.cwiseAbs().maxCoeff(&axis);
+  if (along <= kLeastSine * own_normal.lpNorm<1>() * other_normal.lpNorm<1>() || own_normal.isZero() ||
+      other_normal.isZero())
+    return Answer::kUnsure;
+  // A triangle from the other's plane, and the part of the line in it.
+  const auto cut = [&](const std::array<Vec3, 3>& points, const Vec3& normal, const Vec3& origin, Cut& found) {
+    const double error = kRounding * extent * (extent * extent + normal.lpNorm<1>());
+    std::array<double, 3> heights;
+    int above = 0, below = 0;
+    for (int k = shared ? 1 : 0; k < 3; ++k) {
+      heights[k] = normal.dot(points[k] - origin);
+      above += heights[k] > error, below += heights[k] < -error;
+    }
+    if (above + below < (shared ? 2 : 3)) return Answer::kUnsure;
+    if (above == 0 || below == 0) return Answer::kNo;
+    bool is_first = true;
+    for (int k = shared ? 1 : 0; k < (shared ? 2 : 3); ++k) {
+      const int next = (k + 1) % 3;
+      if ((heights[k] > 0) == (heights[next] > 0)) continue;
+      const double span = std::abs(heights[k] - heights[next]);
+      const double at = points[k][axis] + (points[next][axis] - points[k][axis]) * (std::abs(heights[k]) / span);
+      found.low = is_first ? at : std::min(found.low, at), found.high = is_first ? at : std::max(found.high, at);
+      found.error = std::max(found.error, extent * (8 * error / span + kRounding));
+      is_first = false;
+    }
+    return Answer::kYes;
+  };
+  Cut first, second;
+  if (const Answer answer = cut(own, other_normal, other[0], first); answer != Answer::kYes) return answer;
+  if (const Answer answer = cut(other, own_normal, Vec3::Zero(), second); answer != Answer::kYes) return answer;
+  const double error = first.error + second.error;
+  // Both parts begin at a shared vertex: whether they lie on one side of it.
+  const double common = shared
+                            ? (std::abs(first.low) > error && std::abs(second.low) > error ? first.low * second.low : 0)
+                            : std::min(first.high, second.high) - std::max(first.low, second.low);
+  if (shared) return common > 0 ? Answer::kYes : common < 0 ? Answer::kNo : Answer::kUnsure;
+  return common > error ? Answer::kYes : common < -error ? Answer::kNo : Answer::kUnsure;
+}
+
+bool do_disjoint_triangles_meet(const Corners& s, const Corners& t) {
+  if (const Answer answer = meet_on_line(s, t, false); answer != Answer::kUnsure) return answer == Answer::kYes;
+  const auto is_off = [](const Corners& plane, const Corners& points) {
+    const int side = orientation(plane[0], plane[1], plane[2], points[0]);
+    return side != 0 && side == orientation(plane[0], plane[1], plane[2], points[1]) &&
+           side == orientation(plane[0], plane[1], plane[2], points[2]);
+  };
+  if (is_off(s, t) || is_off(t, s)) return false;
+  const int plane_s = drawing_plane(s), plane_t = drawing_plane(t);
+  for (int k = 0; k < 3; ++k) {
+    if (plane_t >= 0 && does_segment_meet(s[k], s[(k + 1) % 3], t, plane_t)) return true;
+    if (plane_s >= 0 && does_segment_meet(t[k], t[(k + 1) % 3], s, plane_s)) return true;
+  }
+  return false;
+}
+
+/// Two triangles with their shared vertex first.
+bool do_triangles_at_vertex_meet(const Corners& s, const Corners& t) {
+  if (const Answer answer = meet_on_line(s, t, true); answer != Answer::kUnsure) return answer == Answer::kYes;
+  // The rest of one on one side of the other's plane: for most pairs all that needs to be known.
+  if (orientation(t[0], t[1], t[2], s[1]) * orientation(t[0], t[1], t[2], s[2]) > 0) return false;
+  if (orientation(s[0], s[1], s[2], t[1]) * orientation(s[0], s[1], s[2], t[2]) > 0) return false;
+  const int plane_s = drawing_plane(s), plane_t = drawing_plane(t);
+  return (plane_t >= 0 && does_segment_meet(s[1], s[2], t, plane_t)) ||
+         (plane_s >= 0 && does_segment_meet(t[1], t[2], s, plane_s));
+}
+
+/// Two triangles that share the edge from a to b.
+bool do_triangles_at_edge_meet(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  if (orientation(a, b, c, d) != 0) return false;
+  const int plane = drawing_plane({a, b, c});
+  if (plane < 0) return false;
+  return orientation(drawn(a, plane), drawn(b, plane), drawn(c, plane)) *
+             orientation(drawn(a, plane), drawn(b, plane), drawn(d, plane)) >
+         0;
+}
+
+/// Vertices whose triangles go once around them, all facing one way: seen from there their corners lie side by side, so
+/// no two of them meet but where they touch. Most are such, and most pairs of boxes that overlap are of triangles at
+/// such a vertex.
+std::vector<char> find_plain_vertices(const TriangleMesh& mesh) {
+  constexpr int kMostTriangles = 24;
+  constexpr double kLeastCosine = 0.1;
+  const std::size_t count = mesh.positions.size();
+  std::vector<int> begin(count + 1, 0);
+  for (const Triangle& t : mesh.triangles)
+    for (const int vertex : t) ++begin[vertex + 1];
+  for (std::size_t v = 0; v < count; ++v) begin[v + 1] += begin[v];
+  std::vector<int> corners(3 * mesh.triangles.size()), next(begin.begin(), begin.end() - 1);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (int k = 0; k < 3; ++k) corners[next[mesh.triangles[t][k]]++] = static_cast<int>(3 * t) + k;
+  std::vector<char> is_plain(count, 0);
+  for_each_block(count, 1 << 12, [&](std::size_t, std::size_t first, std::size_t last) {
+    std::array<std::array<int, 2>, kMostTriangles> sides;
+    std::array<Vec3, kMostTriangles> normals;
+    for (std::size_t v = first; v < last; ++v) {
+      const int n = begin[v + 1] - begin[v];
+      if (n < 3 || n > kMostTriangles) continue;
+      const Vec3& p = mesh.positions[v];
+      Vec3 mean = Vec3::Zero();
+      for (int i = 0; i < n; ++i) {
+        const int corner = corners[begin[v] + i];
+        const Triangle& t = mesh.triangles[corner / 3];
+        sides[i] = {t[(corner % 3 + 1) % 3], t[(corner % 3 + 2) % 3]};
+        normals[i] = (mesh.positions[sides[i][0]] - p).cross(mesh.positions[sides[i][1]] - p).normalized();
+        mean += normals[i];
+      }
+      const double least = kLeastCosine * mean.norm();
+      bool is_one_way = true;
+      for (int i = 0; i < n; ++i) {
+        is_one_way &= normals[i].dot(mean) > least;
+        int followers = 0;
+        for (int j = 0; j < n; ++j) followers += sides[j][0] == sides[i][1];
+        is_one_way &= followers == 1;
+      }
+      if (!is_one_way) continue;
+      // How often they go around: how often they pass one direction.
+      Eigen::Index axis;
+      mean.cwiseAbs().minCoeff(&axis);
+      const Vec3 across = mean.cross(Vec3::Unit(axis));
+      int turns = 0;
+      for (int i = 0; i < n; ++i)
+        turns +=
+            (mesh.positions[sides[i][0]] - p).dot(across) <= 0 && (mesh.positions[sides[i][1]] - p).dot(across) > 0;
+      is_plain[v] = turns == 1;
+    }
+  });
+  return is_plain;
+}
+
+}  // namespace
+
+bool do_triangles_intersect(const TriangleMesh& mesh, int first, int second) {
+  return do_triangles_intersect(mesh.triangles[first], corners_of(mesh, first), mesh.triangles[second],
+                                corners_of(mesh, second));
+}
+
+bool do_triangles_intersect(const Triangle& i, const std::array<Vec3, 3>& s, const Triangle& j,
+                            const std::array<Vec3, 3>& t) {
+  int shared = 0, at_i = 0, at_j = 0, free_i = 0, free_j = 0;
+  for (int k = 0; k < 3; ++k) {
+    const auto there = std::find(j.begin(), j.end(), i[k]);
+    if (there == j.end()) {
+      free_i = k;
+    } else {
+      ++shared;
+      at_i = k;
+      at_j = static_cast<int>(there - j.begin());
+    }
+    if (std::find(i.begin(), i.end(), j[k]) == i.end()) free_j = k;
+  }
+  switch (shared) {
+    case 0: return do_disjoint_triangles_meet(s, t);
+    case 1:
+      return do_triangles_at_vertex_meet({s[at_i], s[(at_i + 1) % 3], s[(at_i + 2) % 3]},
+                                         {t[at_j], t[(at_j + 1) % 3], t[(at_j + 2) % 3]});
+    case 2: return do_triangles_at_edge_meet(s[(free_i + 1) % 3], s[(free_i + 2) % 3], s[free_i], t[free_j]);
+    default: return drawing_plane(s) >= 0;
+  }
+}
+
+std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh) {
+  if (mesh.triangles.empty()) return {};
+  return find_self_intersections(mesh, build_triangle_tree(mesh));
+}
+
+std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh, const TriangleTree& tree) {
+  constexpr int kWidth = TriangleTree::kWidth;
+  const std::size_t count = tree.order.size();
+  // Boxes of the triangles as the tree has them for its blocks: by place, six planes of eight per block.
+  std::vector<float> triangle_boxes(block_count(count, kWidth) * 6 * kWidth);
+  constexpr float kMargin = 3e-7f;  // rounding of the corners and of the edges that lead to them
+  for_each_block(block_count(count, kWidth), 1 << 12, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t block = begin; block < end; ++block) {
+      const float* from = tree.blocks.data() + block * 9 * kWidth;
+      float* to = triangle_boxes.data() + block * 6 * kWidth;
+      for (int d = 0; d < 3; ++d)
+        for (int k = 0; k < kWidth; ++k) {
+          const float corner = from[d * kWidth + k], second = from[(3 + d) * kWidth + k],
+                      third = from[(6 + d) * kWidth + k];
+          to[d * kWidth + k] = corner + std::min(0.0f, std::min(second, third)) - kMargin;
+          to[(3 + d) * kWidth + k] = corner + std::max(0.0f, std::max(second, third)) + kMargin;
+        }
+    }
+  });
+
+  const std::vector<char> is_plain = find_plain_vertices(mesh);
+  const auto do_share_plain_vertex = [&](const Triangle& a, const Triangle& b) {
+    for (const int v : a)
+      if ((v == b[0] || v == b[1] || v == b[2]) && is_plain[v]) return true;
+    return false;
+  };
+  // Blocks of the tree are asked as wholes, then their triangles one by one.
+  constexpr std::size_t kAtOnce = 128;
+  const std::size_t blocks = block_count(count, kWidth);
+  std::vector<std::vector<std::array<int, 2>>> found(block_count(blocks, kAtOnce));
+  for_each_block(blocks, kAtOnce, [&](std::size_t part, std::size_t first_block, std::size_t end_block) {
+    struct Entry {
+      int level;
+      std::size_t index;
+    };
+    std::vector<Entry> stack;
+    // By how much each of eight boxes is apart from one: at most 0 where they overlap. (Without branches: the compiler
+    // takes lanes.)
+    const auto gaps_to = [](const float* planes, const std::array<float, 6>& box) {
+      std::array<float, kWidth> gaps;
+      for (int k = 0; k < kWidth; ++k) {
+        const float x = std::max(planes[k] - box[3], box[0] - planes[3 * kWidth + k]),
+                    y = std::max(planes[kWidth + k] - box[4], box[1] - planes[4 * kWidth + k]);
+        gaps[k] = std::max(std::max(x, y), std::max(planes[2 * kWidth + k] - box[5], box[2] - planes[5 * kWidth + k]));
+      }
+      return gaps;
+    };
+    for (std::size_t block = first_block; block < end_block; ++block) {
+      const std::size_t begin = block * kWidth, end = std::min(count, begin + kWidth);
+      const float* own = triangle_boxes.data() + block * 6 * kWidth;
+      std::array<std::array<float, 6>, kWidth> boxes;
+      std::array<float, 6> box;
+      for (std::size_t place = begin; place < end; ++place) {
+        std::array<float, 6>& mine = boxes[place - begin];
+        for (int d = 0; d < 6; ++d) mine[d] = own[d * kWidth + (place - begin)];
+        for (int d = 0; d < 3; ++d) {
+          box[d] = place == begin ? mine[d] : std::min(box[d], mine[d]);
+          box[3 + d] = place == begin ? mine[3 + d] : std::max(box[3 + d], mine[3 + d]);
+        }
+      }
+      stack.push_back({tree.top_level(), 0});
+      while (!stack.empty()) {
+        const auto [level, index] = stack.back();
+        stack.pop_back();
+        if (level > 0) {
+          const auto gaps = gaps_to(tree.boxes.data() + (tree.level_begin[level] + index) * 6 * kWidth, box);
+          for (int k = 0; k < kWidth; ++k) {
+            const std::size_t child = kWidth * index + k;
+            // Every pair once: with the blocks that come later. A child of this level covers 8^(level - 1) blocks.
+            if (gaps[k] <= 0 && (child + 1) << (3 * (level - 1)) > block) stack.push_back({level - 1, child});
+          }
+          continue;
+        }
+        const float* planes = triangle_boxes.data() + index * 6 * kWidth;
+        for (std::size_t place = begin; place < end; ++place) {
+          const auto gaps = gaps_to(planes, boxes[place - begin]);
+          for (int k = 0; k < kWidth; ++k) {
+            const std::size_t other = kWidth * index + k;
+            if (gaps[k] > 0 || other >= count || other <= place) continue;
+            const int first = std::min(tree.order[place], tree.order[other]),
+                      second = std::max(tree.order[place], tree.order[other]);
+            if (do_share_plain_vertex(mesh.triangles[first], mesh.triangles[second])) continue;
+            if (do_triangles_intersect(mesh, first, second)) found[part].push_back({first, second});
+          }
+        }
+      }
+    }
+  });
+  std::vector<std::array<int, 2>> pairs;
+  for (const auto& some : found) pairs.insert(pairs.end(), some.begin(), some.end());
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
+}
+
+long count_self_intersections(const TriangleMesh& mesh) {
+  return static_cast<long>(find_self_intersections(mesh).size());
+}
+
+}  // namespace skeletex

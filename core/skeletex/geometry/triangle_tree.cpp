@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/geometry/triangle_tree.h"
+
+#include <cstddef>
+
+#include "skeletex/geometry/hilbert_order.h"
+#include "skeletex/geometry/parallel.h"
+
+namespace skeletex {
+namespace {
+
+constexpr int kWidth = TriangleTree::kWidth;
+constexpr float kFarAway = 1e15f;  // its square and the products of squares stay finite
+/// Boxes grow by this much: more than what rounding to float32 moves a corner, in units of the scale.
+constexpr float kMargin = 1.5e-7f;
+
+using Box = std::array<float, 6>;
+constexpr Box kNoBox{kFarAway, kFarAway, kFarAway, -kFarAway, -kFarAway, -kFarAway};
+
+Box joined(const Box& a, const Box& b) {
+  Box box;
+  for (int d = 0; d < 3; ++d) {
+    box[d] = std::min(a[d], b[d]);
+    box[d + 3] = std::max(a[d + 3], b[d + 3]);
+  }
+  return box;
+}
+
+}  // namespace
+
+TriangleTree build_triangle_tree(const TriangleMesh& mesh) {
+  std::vector<Vec3> centres(mesh.triangles.size());
+  for_each_block(centres.size(), 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const auto [a, b, c] = mesh.triangles[t];
+      centres[t] = (mesh.positions[a] + mesh.positions[b] + mesh.positions[c]) / 3;
+    }
+  });
+  TriangleTree tree;
+  const std::size_t count = mesh.triangles.size();
+  tree.order = hilbert_order(centres);
+  const BoundingBox box = bounding_box(mesh);
+  tree.origin = box.centre();
+  tree.scale = box.diagonal() > 0 ? box.diagonal() : 1;
+
+  // Sizes of the levels: blocks, then an eighth each until one node is left. Level 0 has no boxes of its own.
+  std::vector<std::size_t> sizes{block_count(count, kWidth)};
+  tree.level_begin = {0};
+  std::size_t nodes = 0;
+  do {
+    tree.level_begin.push_back(static_cast<int>(nodes));
+    sizes.push_back(block_count(sizes.back(), kWidth));
+    nodes += sizes.back();
+  } while (sizes.back() > 1);
+
+  tree.blocks.resize(sizes[0] * 9 * kWidth);
+  std::vector<Box> children(sizes[0]);
+  for_each_block(sizes[0], 1 << 12, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t block = begin; block < end; ++block) {
+      float* planes = tree.blocks.data() + block * 9 * kWidth;
+      Box around = kNoBox;
+      for (std::size_t k = 0; k < kWidth; ++k) {
+        const std::size_t place = block * kWidth + k;
+        if (place >= count) {
+          for (std::size_t plane = 0; plane < 9; ++plane) planes[plane * kWidth + k] = plane < 3 ? kFarAway : 0.0f;
+          continue;
+        }
+        const Triangle& triangle = mesh.triangles[tree.order[place]];
+        std::array<Vec3, 3> p;
+        for (int v = 0; v < 3; ++v) {
+          p[v] = (mesh.positions[triangle[v]] - tree.origin) / tree.scale;
+          const Eigen::Vector3f rounded = p[v].cast<float>();
+          around = joined(around, {rounded[0] - kMargin, rounded[1] - kMargin, rounded[2] - kMargin,  //
+                                   rounded[0] + kMargin, rounded[1] + kMargin, rounded[2] + kMargin});
+        }
+        for (int d = 0; d < 3; ++d) {
+          planes[d * kWidth + k] = static_cast<float>(p[0][d]);
+          planes[(3 + d) * kWidth + k] = static_cast<float>(p[1][d] - p[0][d]);
+          planes[(6 + d) * kWidth + k] = static_cast<float>(p[2][d] - p[0][d]);
+        }
+      }
+      children[block] = around;
+    }
+  });
+
+  tree.boxes.resize(nodes * 6 * kWidth);
+  for (int level = 1; level <= tree.top_level(); ++level) {
+    std::vector<Box> parents(sizes[level], kNoBox);
+    for (std::size_t node = 0; node < parents.size(); ++node) {
+      float* planes = tree.boxes.data() + (tree.level_begin[level] + node) * 6 * kWidth;
+      for (std::size_t k = 0; k < kWidth; ++k) {
+        const std::size_t child = node * kWidth + k;
+        const Box& around = child < children.size() ? children[child] : kNoBox;
+        // A missing child is a point far away: an inverted box would look near from everywhere inside it.
+        for (int d = 0; d < 6; ++d) planes[d * kWidth + k] = child < children.size() ? around[d] : kFarAway;
+        parents[node] = joined(parents[node], around);
+      }
+    }
+    children = std::move(parents);
+  }
+  return tree;
+}
+
+}  // namespace skeletex

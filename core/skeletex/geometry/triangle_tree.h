@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <span>
+#include <vector>
+
+#include "skeletex/geometry/mesh.h"
+
+namespace skeletex {
+
+/// A tree of boxes over the triangles of a mesh, eight children to a node, complete and hence without pointers: child k
+/// of node j of level l is node 8 j + k of level l - 1; the nodes of level 0 are blocks of eight triangles in the order
+/// of a Hilbert curve; the highest level has one node. Coordinates are float32, relative to `origin` and in units of
+/// `scale`; boxes are rounded outwards.
+struct TriangleTree {
+  static constexpr int kWidth = 8;
+  Vec3 origin = Vec3::Zero();
+  double scale = 1;
+  std::vector<int> order;  ///< place in the tree -> triangle of the mesh
+  /// Per block nine planes of eight values: x, y, z of the first vertex, then of the edges to the second and third.
+  /// Places past the end hold a triangle far away.
+  std::vector<float> blocks;
+  /// Per node of levels 1 and up six planes of eight values, one per child: least x, y, z, greatest x, y, z. Places
+  /// past the end hold a box far away.
+  std::vector<float> boxes;
+  std::vector<int> level_begin;  ///< per level: its first node in `boxes`; [0] is unused
+  int top_level() const { return static_cast<int>(level_begin.size()) - 1; }  ///< at least 1
+};
+
+/// Cost: O(triangles), about 0.3 s per million.
+/// \pre at least one triangle; indices in range, coordinates finite
+TriangleTree build_triangle_tree(const TriangleMesh& mesh);
+
+}  // namespace skeletex

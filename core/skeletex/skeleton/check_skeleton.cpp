@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/skeleton/check_skeleton.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+
+#include "skeletex/geometry/parallel.h"
+#include "skeletex/model/error.h"
+
+namespace skeletex {
+
+/// Crossings of the ray from the point along +z, with sign. Sides of edges are found from the lower vertex, and
+/// vertices at the ray's y count as above it, so neighbouring triangles never both or neither claim the ray.
+int winding_number(std::span<const Vec3> positions, std::span<const int> corners, const Vec3& point) {
+  const auto is_above = [&](int v) { return positions[v].y() >= point.y(); };
+  int winding = 0;
+  for (std::size_t base = 0; base < corners.size(); base += 3) {
+    const int* v = &corners[base];
+    const bool a = is_above(v[0]), b = is_above(v[1]), c = is_above(v[2]);
+    if (a == b && b == c) continue;
+    int sign = 0;  // of the triangle around the ray, seen from +z
+    for (int e = 0; e < 3; ++e) {
+      int i = v[e], j = v[(e + 1) % 3];
+      const bool is_i_above = is_above(i);
+      if (is_i_above == is_above(j)) continue;
+      if (i > j) std::swap(i, j);
+      const Vec3 &p = positions[i], &q = positions[j];
+      // x at which the edge meets the ray's plane
+      const double x = p.x() + (point.y() - p.y()) / (q.y() - p.y()) * (q.x() - p.x());
+      if (x > point.x()) sign += is_i_above ? -1 : 1;
+    }
+    if (sign == 0) continue;
+    const Vec3 &p = positions[v[0]], &q = positions[v[1]], &r = positions[v[2]];
+    const Vec3 normal = (q - p).cross(r - p);
+    // Over or under the point: the plane's z at the point's x, y.
+    if ((point - p).dot(normal) * (normal.z() > 0 ? 1 : -1) < 0) winding += sign;
+  }
+  return winding;
+}
+
+namespace {
+
+std::string text_of(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x(), p.y(), p.z()); }
+
+/// Where a bone first meets the surface on its way from head to tail: its parameter, or infinity.
+double first_crossing(const CutMesh& mesh, const Vec3& head, const Vec3& tail) {
+  // Coordinates along the bone and across it; a triangle all on one side of a plane is out.
+  const Vec3 axis = tail - head, e = axis.unitOrthogonal(), f = axis.cross(e).normalized();
+  const double length_squared = axis.squaredNorm();
+  std::vector<std::uint8_t> codes(mesh.positions.size());
+  for (std::size_t v = 0; v < codes.size(); ++v) {
+    const Vec3 p = mesh.positions[v] - head;
+    const double x = p.dot(e), y = p.dot(f), z = p.dot(axis);
+    codes[v] = static_cast<std::uint8_t>((x > 0) | (x < 0) << 1 | (y > 0) << 2 | (y < 0) << 3 |
+                                         (z > length_squared) << 4 | (z < 0) << 5);
+  }
+  double first = std::numeric_limits<double>::infinity();
+  for (std::size_t base = 0; base < mesh.origins.size(); base += 3) {
+    const int* v = &mesh.origins[base];
+    if (codes[v[0]] & codes[v[1]] & codes[v[2]]) continue;
+    const Vec3 &p = mesh.positions[v[0]], &q = mesh.positions[v[1]], &r = mesh.positions[v[2]];
+    const Vec3 a = p - head, b = q - head, c = r - head;
+    const double ab = axis.dot(a.cross(b)), bc = axis.dot(b.cross(c)), ca = axis.dot(c.cross(a));
+    if (!((ab >= 0 && bc >= 0 && ca >= 0) || (ab <= 0 && bc <= 0 && ca <= 0))) continue;
+    const Vec3 normal = (q - p).cross(r - p);
+    const double along = axis.dot(normal);
+    if (along == 0) continue;
+    const double t = a.dot(normal) / along;
+    if (t >= 0 && t <= 1) first = std::min(first, t);
+  }
+  return first;
+}
+
+}  // namespace
+
+void check_skeleton_inside(const CutMesh& mesh, const Skeleton& skeleton) {
+  // Spread from the first bone over shared nodes.
+  std::vector<bool> is_reached(skeleton.nodes.size(), false);
+  is_reached[skeleton.bones[0].head] = true;
+  for (bool is_changed = true; is_changed;) {
+    is_changed = false;
+    for (const Bone& bone : skeleton.bones)
+      if (is_reached[bone.head] != is_reached[bone.tail])
+        is_reached[bone.head] = is_reached[bone.tail] = is_changed = true;
+  }
+  for (const Bone& bone : skeleton.bones)
+    if (!is_reached[bone.head])
+      throw TopologyError(fmt::format(
+          "bone \"{}\" at {} is not connected with bone \"{}\"; let them share a node, or join them by further bones",
+          bone.name, text_of(skeleton.nodes[bone.head].position), skeleton.bones[0].name));
+
+  std::vector<bool> is_used(skeleton.nodes.size(), false);
+  for (const Bone& bone : skeleton.bones) is_used[bone.head] = is_used[bone.tail] = true;
+  std::vector<int> windings(skeleton.nodes.size(), 1);
+  for_each_block(windings.size(), 1, [&](std::size_t n, std::size_t, std::size_t) {
+    if (is_used[n]) windings[n] = winding_number(mesh.positions, mesh.origins, skeleton.nodes[n].position);
+  });
+  for (std::size_t n = 0; n < skeleton.nodes.size(); ++n) {
+    const Node& node = skeleton.nodes[n];
+    const int winding = windings[n];
+    if (winding > 0) continue;
+    if (winding < 0)
+      throw TopologyError(fmt::format(
+          "the mesh is turned inside out around node \"{}\" at {}; reverse the order of every triangle's vertices",
+          node.name, text_of(node.position)));
+    std::string bones;
+    for (const Bone& bone : skeleton.bones)
+      if (bone.head == static_cast<int>(n) || bone.tail == static_cast<int>(n))
+        bones += fmt::format("{}\"{}\"", bones.empty() ? "" : ", ", bone.name);
+    double nearest = std::numeric_limits<double>::infinity();
+    Vec3 vertex = node.position;
+    for (const Vec3& p : mesh.positions)
+      if ((p - node.position).squaredNorm() < nearest) {
+        nearest = (p - node.position).squaredNorm();
+        vertex = p;
+      }
+    throw TopologyError(fmt::format(
+        "node \"{}\" (bone {}) lies outside the mesh at {}; move it into the body, whose nearest vertex is at {}",
+        node.name, bones, text_of(node.position), text_of(vertex)));
+  }
+  std::vector<double> crossings(skeleton.bones.size());
+  for_each_block(crossings.size(), 1, [&](std::size_t b, std::size_t, std::size_t) {
+    const int bone = static_cast<int>(b);
+    crossings[b] = first_crossing(mesh, end_position(skeleton, bone, BoneEnd::kHead),
+                                  end_position(skeleton, bone, BoneEnd::kTail));
+  });
+  for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b) {
+    const Vec3 &head = end_position(skeleton, b, BoneEnd::kHead), &tail = end_position(skeleton, b, BoneEnd::kTail);
+    const double t = crossings[b];
+    if (t > 1) continue;
+    const Bone& bone = skeleton.bones[b];
+    throw TopologyError(fmt::format(
+        "bone \"{}\" leaves the mesh at {}, {:.0f} % of the way from node \"{}\" to node \"{}\"; move one of them, or "
+        "bend the bone with a node in between",
+        bone.name, text_of(head + t * (tail - head)), 100 * t, skeleton.nodes[bone.head].name,
+        skeleton.nodes[bone.tail].name));
+  }
+}
+
+}  // namespace skeletex

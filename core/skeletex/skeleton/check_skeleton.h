@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <span>
+
+#include "skeletex/convert/segment/cut.h"
+#include "skeletex/skeleton/skeleton.h"
+
+namespace skeletex {
+
+/// That the skeleton is in one piece and lies inside the closed mesh.
+/// \throw TopologyError naming node or bone, the point, and what to move
+void check_skeleton_inside(const CutMesh& mesh, const Skeleton& skeleton);
+
+/// How often a closed mesh winds around a point off its surface: 1 inside, 0 outside, -1 inside a mesh that is inside
+/// out. \param corners  three vertices per triangle
+int winding_number(std::span<const Vec3> positions, std::span<const int> corners, const Vec3& point);
+
+}  // namespace skeletex

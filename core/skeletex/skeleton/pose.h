@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "skeletex/skeleton/skeleton.h"
+
+namespace skeletex {
+
+/// A pose of one skeleton (paper 3.4): turned bones or moved nodes, and a roll per bone. Empty vectors mean "as bound".
+struct Pose {
+  /// Per bone, about its node nearer to the root, in the bind pose's world axes; applied down the hierarchy, so a bone
+  /// carries everything below it along. Trees only.
+  std::vector<Eigen::Quaterniond> rotations;
+  /// Per node, its new position (world units). Not together with rotations.
+  std::vector<Vec3> nodes;
+  /// Per bone, radians about its posed direction from head to tail: turns s, moves no node and no other bone.
+  std::vector<double> rolls;
+};
+
+/// Poses over time.
+struct PoseFrame {
+  double time = 0;
+  Pose pose;
+  std::string name{};  ///< for tables and messages; may be empty
+};
+struct PoseAnimation {
+  std::vector<PoseFrame> frames;  ///< by growing time, at least one
+};
+/// The pose at a time: rotations by slerp, the shorter way, bone by bone; nodes and rolls linear; before the first
+/// frame the first, after the last the last. What only one of two neighbouring frames has counts as bound in the other.
+/// \throw InputError when one of the two frames turns bones and the other one moves nodes
+Pose pose_at(const Skeleton& bind, const PoseAnimation& animation, double time);
+
+/// Where the hierarchy of each component starts: the node that the most bones point away from (in a hierarchy all of
+/// them do), the first of several. One node per component, in the order of the nodes.
+std::vector<int> root_nodes(const Skeleton& skeleton);
+
+/// The bind skeleton in a pose: node positions, and every bone's s.
+///
+/// Rotations carry s along. Moved nodes: trees fit a rotation to the directions of all bones, where each step away
+/// from the tree's centre (the node with the shortest ways to all others) counts a tenth (Kabsch), and then turn bone
+/// by bone from there on with the smallest rotation relative to the bone before. In graphs with cycles there is no bone
+/// before: every bone takes the smallest rotation relative to one fit of the whole component, and then the rolls about
+/// the bones that spread the remaining twist evenly over all joints. Either way, a rigid motion of all nodes is that
+/// motion of all bases, and neither names nor order nor direction of the bones matter. \throw InputError when sizes do
+/// not match, rotations meet a cycle, or a bone has no length, naming the bone
+Skeleton apply_pose(const Skeleton& bind, const Pose& pose);
+
+/// Every bone that is not at a root turns about an axis that is uniform on the sphere, by an angle uniform in [0,
+/// largest]. The same seed gives the same pose on every machine. \param largest  radians    \throw InputError for
+/// skeletons with cycles, whose bones cannot be turned
+Pose make_random_pose(const Skeleton& skeleton, double largest, std::uint64_t seed);
+
+}  // namespace skeletex

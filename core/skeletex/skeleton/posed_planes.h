@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <array>
+#include <vector>
+
+#include "skeletex/model/texture.h"
+#include "skeletex/skeleton/separation_planes.h"
+
+namespace skeletex {
+
+/// What a pose keeps of a texel.
+enum class DistanceRule {
+  kFromBone,  ///< its distance to the bone segment (paper 3.6.1)
+  kFromFoot,  ///< its distance to its foot, as in the bind pose: nothing is restored (Figure 10, left)
+};
+
+/// How the separation planes of a model meet a bone in a pose, at one of its ends and one bind angle.
+struct PosedRadial {
+  double roll = 0;   ///< turns, to be added to the bind angle; 0 at a free end
+  double slope = 0;  ///< k' of the separation plane that separates the two bones there (see Separation planes::slope),
+                     ///< at the rolled angle
+};
+
+/// Where an arc around a bone's end begins, and what holds along it.
+struct PosedBound {
+  double turn = 0;      ///< angle in the bind pose, turns
+  double roll = 0;      ///< turns, to be added to it
+  double end_roll = 0;  ///< where the arc ends; rolls are linear in between
+  double slope_s =
+      0;  ///< slope of the arc's separation plane in the pose along s; at angle a about the posed bone it is
+  double slope_b = 0;  ///< slope_s cos a + slope_b sin a
+};
+
+/// The seams of a model in a pose (paper 3.3 and 3.4.1). Each node is a drawing on the sphere around it: corners are
+/// directions, arcs are curves between them, and every bone's end is the loop of arcs around it. In the bind pose this
+/// is the Voronoi diagram of the bones' directions. In a pose
+///   - a corner goes where it is equally far from the same three bones, on the side that continues the bind pose's,
+///   - an arc stays in the separation plane of its two bones and runs between its corners; angles move linearly along
+///   it, which both
+///     bones see alike,
+///   - around a node of two bones the separation plane is one closed curve, and both bones turn by half of the twist.
+/// Around a node of three bones every arc is half a turn in every pose. With more, directions can move so far that two
+/// corners pass each other: the arc between them then runs backwards, and the surface overlaps itself there. Distances
+/// hold and seams stay closed nevertheless.
+class PosedPlanes {
+ public:
+  /// \param model  its skeleton is the bind pose; texels are not looked at. Must outlive this
+  /// \param posed  the same skeleton in a pose, every bone with its s (see apply_pose). Must outlive this
+  PosedPlanes(const SkeletexModel& model, const Skeleton& posed);
+
+  const Skeleton& skeleton() const { return *posed_; }
+  const std::vector<BoneBasis>& bases() const { return bases_; }
+
+  /// \param turn  angle about the bone in the bind pose, turns
+  PosedRadial radial(int bone, BoneEnd end, double turn) const;
+  /// Where the arcs at an end begin, in the order of SkeletexModel::ends; angles grow by less than a turn in all, rolls
+  /// run on from arc to arc. A closed arc begins anywhere. Empty at a free end.
+  std::vector<PosedBound> bounds(int bone, BoneEnd end) const;
+
+  /// How long the bones at a node are taken to be where they meet, so that all of them restore distances alike: as long
+  /// as the longest of them. In the bind pose and in this one, world units.
+  double bind_reach(int node) const { return bind_reaches_[node]; }
+  double reach(int node) const { return reaches_[node]; }
+
+  /// Points of the seams, world. Every bone at a seam gives the same point; `side` chooses the one to compute it from.
+  Vec3 sample_point(int arc, int sample, DistanceRule rule, int side = 0) const;
+  Vec3 corner_point(int corner, DistanceRule rule) const;
+
+  /// The arc at a bone's end and a bind angle; -1 at a free end.
+  int arc_at(int bone, BoneEnd end, double turn) const;
+
+ private:
+  /// An arc as one of its bones sees it. Parameter t runs along the arc from its first corner (0) to its last (1).
+  struct Side {
+    int bone = -1;
+    BoneEnd end = BoneEnd::kHead;
+    double sign = 1;                    ///< +1: v grows with t, -1: it falls
+    double begin = 0;                   ///< bind angle at t = 0, turns
+    std::array<double, 2> rolls{0, 0};  ///< at t = 0 and 1, turns
+  };
+  struct Arc {
+    bool is_closed = false;
+    double bind_turns = 1, posed_turns = 1;  ///< length; negative: its corners have passed each other
+    std::array<Side, 2> sides;
+    Vec3 bind_normal = Vec3::Zero(),
+         normal = Vec3::Zero();  ///< of the separation plane, unit, from bones[1] to bones[0]
+  };
+  /// One bone's end: the loop of arcs around it.
+  struct Interval {
+    double start = 0;  ///< bind angle from the loop's base, growing
+    int arc = -1;
+    int side = 0;
+  };
+  struct Loop {
+    double base = 0;
+    std::vector<Interval> intervals;
+  };
+
+  void join_linear(Arc& arc);
+  void build_node(int node, const std::vector<int>& arcs);
+  void wind_loop(int bone, BoneEnd end);
+  const Interval* interval_at(int bone, BoneEnd end, double turn, double& t) const;
+  PosedRadial radial_on(const Arc& arc, int side, double t, double turn) const;
+  double radius_at(int node, int bone, double distance, const Vec3& bind_direction, const Vec3& direction,
+                   DistanceRule rule) const;
+  Vec3 bind_direction(int bone, int node) const;
+  Vec3 posed_direction(int bone, int node) const;
+
+  const SkeletexModel* model_;
+  const Skeleton* posed_;
+  std::vector<BoneBasis> bind_bases_, bases_;
+  std::vector<double> bind_reaches_, reaches_;  ///< per node
+  std::vector<Arc> arcs_;
+  std::vector<Vec3> bind_corners_, corners_;  ///< unit directions from their node
+  std::vector<std::array<Loop, 2>> loops_;    ///< per bone and end
+};
+
+}  // namespace skeletex

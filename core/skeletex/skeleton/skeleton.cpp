@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/skeleton/skeleton.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <deque>
+
+#include "skeletex/model/error.h"
+
+namespace skeletex {
+
+std::vector<std::vector<BoneAtNode>> bones_at_nodes(const Skeleton& skeleton) {
+  std::vector<std::vector<BoneAtNode>> at(skeleton.nodes.size());
+  for (int i = 0; i < static_cast<int>(skeleton.bones.size()); ++i) {
+    at[skeleton.bones[i].head].push_back({i, BoneEnd::kHead});
+    at[skeleton.bones[i].tail].push_back({i, BoneEnd::kTail});
+  }
+  return at;
+}
+
+int end_node(const Skeleton& skeleton, int bone, BoneEnd end) {
+  return end == BoneEnd::kHead ? skeleton.bones[bone].head : skeleton.bones[bone].tail;
+}
+
+const Vec3& end_position(const Skeleton& skeleton, int bone, BoneEnd end) {
+  return skeleton.nodes[end_node(skeleton, bone, end)].position;
+}
+
+double bone_length(const Skeleton& skeleton, int bone) {
+  return (end_position(skeleton, bone, BoneEnd::kTail) - end_position(skeleton, bone, BoneEnd::kHead)).norm();
+}
+
+Vec3 direction_from(const Skeleton& skeleton, BoneAtNode at) {
+  const Vec3 o =
+      (end_position(skeleton, at.bone, BoneEnd::kTail) - end_position(skeleton, at.bone, BoneEnd::kHead)).normalized();
+  return at.end == BoneEnd::kHead ? o : Vec3(-o);
+}
+
+void check_directions(const Skeleton& skeleton) {
+  constexpr double kLeast = 1e-3;  // between the ends of two unit vectors
+  const auto at_nodes = bones_at_nodes(skeleton);
+  for (std::size_t n = 0; n < at_nodes.size(); ++n)
+    for (std::size_t i = 0; i < at_nodes[n].size(); ++i)
+      for (std::size_t j = i + 1; j < at_nodes[n].size(); ++j) {
+        const BoneAtNode &a = at_nodes[n][i], &b = at_nodes[n][j];
+        if ((direction_from(skeleton, a) - direction_from(skeleton, b)).norm() >= kLeast) continue;
+        const Vec3& p = skeleton.nodes[n].position;
+        throw TopologyError(fmt::format(
+            "bones \"{}\" and \"{}\" leave node \"{}\" at ({:.6g}, {:.6g}, {:.6g}) in the same direction, so no plane "
+            "separates them; "
+            "move the far end of one of them",
+            skeleton.bones[a.bone].name, skeleton.bones[b.bone].name, skeleton.nodes[n].name, p.x(), p.y(), p.z()));
+      }
+}
+
+Vec3 middle_of_nodes(const Skeleton& skeleton) {
+  BoundingBox box{skeleton.nodes[0].position, skeleton.nodes[0].position};
+  for (const Node& node : skeleton.nodes) {
+    box.lower = box.lower.cwiseMin(node.position);
+    box.upper = box.upper.cwiseMax(node.position);
+  }
+  return box.centre();
+}
+
+double distance_to_bone(const Vec3& point, const Vec3& head, const Vec3& tail) {
+  const Vec3 axis = tail - head;
+  const double t = std::clamp((point - head).dot(axis) / axis.squaredNorm(), 0.0, 1.0);
+  return (point - head - t * axis).norm();
+}
+
+namespace {
+
+Vec3 least_aligned_axis(const Vec3& o) {
+  Vec3::Index smallest;
+  o.cwiseAbs().minCoeff(&smallest);
+  return Vec3::Unit(smallest);
+}
+
+Vec3 orthonormalized(const Vec3& s, const Vec3& o) { return (s - o.dot(s) * o).normalized(); }
+
+}  // namespace
+
+std::vector<BoneBasis> bone_bases(const Skeleton& skeleton) {
+  const int count = static_cast<int>(skeleton.bones.size());
+  std::vector<BoneBasis> bases(count);
+  std::vector<bool> known(count, false);
+  for (int i = 0; i < count; ++i) {
+    const Vec3 axis = end_position(skeleton, i, BoneEnd::kTail) - end_position(skeleton, i, BoneEnd::kHead);
+    if (!(axis.norm() > 0))
+      throw InputError(fmt::format("bone \"{}\" has no length; move its head or its tail", skeleton.bones[i].name));
+    bases[i].o = axis.normalized();
+    if (!skeleton.bones[i].s) continue;
+    const Vec3 s = *skeleton.bones[i].s;
+    const Vec3 across = s - bases[i].o.dot(s) * bases[i].o;
+    if (!(across.norm() > 1e-6 * s.norm()))
+      throw InputError(fmt::format("bone \"{}\": its \"s\" is parallel to the bone; give a direction across it",
+                                   skeleton.bones[i].name));
+    bases[i].s = across.normalized();
+    known[i] = true;
+  }
+  const auto at = bones_at_nodes(skeleton);
+  std::deque<int> queue;
+  for (int i = 0; i < count; ++i)
+    if (known[i]) queue.push_back(i);
+  for (int seed = 0; seed <= count; ++seed) {
+    while (!queue.empty()) {
+      const int from = queue.front();
+      queue.pop_front();
+      for (const BoneEnd end : {BoneEnd::kTail, BoneEnd::kHead}) {
+        for (const BoneAtNode to : at[end_node(skeleton, from, end)]) {
+          if (known[to.bone]) continue;
+          // The reflection in the separation plane between the two takes one direction away from the node to the other
+          // and leaves what both see in their separation plane where it is. Where a tail meets a head it is the
+          // smallest rotation as well.
+          const Vec3 n = direction_from(skeleton, {from, end}) - direction_from(skeleton, to);
+          Vec3 s = bases[from].s;
+          if (n.squaredNorm() > 1e-24) s -= 2 * s.dot(n) / n.squaredNorm() * n;
+          bases[to.bone].s = orthonormalized(s, bases[to.bone].o);
+          known[to.bone] = true;
+          queue.push_back(to.bone);
+        }
+      }
+    }
+    if (seed < count && !known[seed]) {
+      bases[seed].s = orthonormalized(least_aligned_axis(bases[seed].o), bases[seed].o);
+      known[seed] = true;
+      queue.push_back(seed);
+    }
+  }
+  for (BoneBasis& basis : bases) basis.b = basis.o.cross(basis.s);
+  return bases;
+}
+
+}  // namespace skeletex
