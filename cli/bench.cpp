@@ -121,7 +121,7 @@ std::vector<std::string> stages_of(const Arguments& arguments) {
 }
 
 Json row_json(const Stage& stage, const StageSamples& samples, const std::string& device) {
-  const double separation_plane = samples.median(&StageSample::wall_ms);
+  const double wall = samples.median(&StageSample::wall_ms);
   Json row{{"stage", stage.name},
            {"model", stage.model},
            {"size", stage.size},
@@ -129,7 +129,7 @@ Json row_json(const Stage& stage, const StageSamples& samples, const std::string
            {"reference", stage.reference},
            {"reference_ms", samples.median(&StageSample::reference_ms)},
            {"ratio", samples.ratio()},
-           {"wall_ms", separation_plane},
+           {"wall_ms", wall},
            {"frames_per_second", 1000 / separation_plane},
            {"ms_min", samples.least(&StageSample::ms)},
            {"ms_max", samples.most(&StageSample::ms)},

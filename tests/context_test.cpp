@@ -194,6 +194,32 @@ TEST(Context, BuildsFilesOfOneProgramTogetherAndEachHeaderOnce) {
   EXPECT_EQ(text.find(header), text.rfind(header));
 }
 
+TEST_F(Kernels, TakesAStructOfParameters) {
+  write("scale.cl",
+        "typedef struct Scale { int count; float factor; } Scale;\n"
+        "__kernel void scale(const Scale p, __global float* restrict values) {\n"
+        "  const int i = (int)get_global_id(0);\n"
+        "  if (i < p.count) values[i] *= p.factor;\n"
+        "}\n");
+  struct Scale {
+    int count;
+    float factor;
+  };
+  ClContext context;
+  auto values = context.upload(std::vector<float>{1, 2, 3});
+  context.launch({"scale.cl", "scale"}, ClRange(3), Scale{2, 10}, values);
+  EXPECT_EQ(context.download(values), (std::vector<float>{10, 20, 3}));
+  // A struct of another size, or a number in its place, is named.
+  struct Larger {
+    int count;
+    float factor, offset;
+  };
+  expect_contains(device_error([&] {
+                    context.launch({"scale.cl", "scale"}, ClRange(3), Larger{2, 10, 0}, values);
+                  }),
+                  "argument 0");
+}
+
 TEST_F(Kernels, ComeFromTheFolderThatTheVariableNames) {
   ClContext context;
   EXPECT_EQ(scaled(context), twice_);

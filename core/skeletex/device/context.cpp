@@ -55,6 +55,7 @@ const char* to_words(ClArgument kind) {
     case ClArgument::kInt: return "an int";
     case ClArgument::kUnsigned: return "an unsigned";
     case ClArgument::kFloat: return "a float";
+    case ClArgument::kStruct: return "a struct";
     default: return "another kind of value";
   }
 }

@@ -101,7 +101,7 @@ struct ClProfileEntry {
 };
 
 /// What kind of value a kernel takes as an argument, or is given.
-enum class ClArgument { kUnknown, kBuffer, kLocal, kInt, kUnsigned, kFloat };
+enum class ClArgument { kUnknown, kBuffer, kLocal, kInt, kUnsigned, kFloat, kStruct };
 
 /// The one owner of OpenCL state: device, context, an in-order queue, programs and profiling events.
 /// Not safe for use by several threads at once.
@@ -186,9 +186,10 @@ class ClContext {
     fill_bytes(buffer.memory, &value, sizeof(T), buffer.size * sizeof(T));
   }
 
-  /// Queues a kernel. Arguments: ClBuffer, ClLocal, or trivially copyable scalars of the kernel's own types (int,
-  /// unsigned, float). Programs are built on first use and kept, see programs_with.
-  /// \throw DeviceError naming the kernel, the failing call and its code in words; the argument whose number or kind is
+  /// Queues a kernel. Arguments: ClBuffer, ClLocal, scalars of the kernel's own types (int, unsigned, float), or a
+  /// struct of such, which a header in kernels/ shares with the kernel. Programs are built on first use and kept, see
+  /// programs_with. \throw DeviceError naming the kernel, the failing call and its code in words; the argument whose
+  /// number or kind is
   ///        not the kernel's own (kinds where the driver tells them); for a build the log with the kernel file's lines
   template <class... Args>
   void launch(const ClKernelName& name, const ClRange& range, const Args&... args) {
@@ -261,6 +262,9 @@ class ClContext {
   }
   static constexpr ClArgument kind_of(const ClLocal*) { return ClArgument::kLocal; }
   template <class T>
+  requires std::is_class_v<T>
+  static constexpr ClArgument kind_of(const T*) { return ClArgument::kStruct; }
+  template <class T>
   requires std::is_arithmetic_v<T>
   static constexpr ClArgument kind_of(const T*) {
     return std::is_floating_point_v<T> ? ClArgument::kFloat
@@ -279,6 +283,12 @@ class ClContext {
   requires std::is_arithmetic_v<T>
   static void set_argument(const ::cl::Kernel& kernel, const ClKernelName& name, unsigned index, const T& value) {
     static_assert(sizeof(T) == 4, "pass int, unsigned or float: the kernel's own type");
+    check_argument(::clSetKernelArg(kernel(), index, sizeof(T), &value), name, index);
+  }
+  template <class T>
+  requires std::is_class_v<T>
+  static void set_argument(const ::cl::Kernel& kernel, const ClKernelName& name, unsigned index, const T& value) {
+    static_assert(std::is_trivially_copyable_v<T>, "a kernel takes a struct of scalars by value");
     check_argument(::clSetKernelArg(kernel(), index, sizeof(T), &value), name, index);
   }
 
