@@ -317,12 +317,11 @@ TEST(Coordinates, TheKernelAgreesWithItsTwinFarFromTheSurfaceToo) {
         planes[axis].push_back(
             static_cast<float>(middle[axis] + 0.7 * bone_length(model.skeleton, bone) * normal(random)));
     });
-    DevicePlanes points{device().upload(planes[0]), device().upload(planes[1]), device().upload(planes[2])};
+    DevicePlanes points = upload_planes(device(), planes[0], planes[1], planes[2]);
     const DeviceCoordinates coordinates = make_coordinates(device(), model, points);
     for (const DistanceRule rule : kRules) {
       pose_by_coordinates(device(), model, coordinates, separation, rule, Vec3::Zero(), points);
-      const std::vector<float> x = device().download(points.x), y = device().download(points.y),
-                               z = device().download(points.z);
+      const auto [x, y, z] = download_planes(device(), points);
       int compared = 0;
       for (std::size_t i = 0; i < bones.size(); ++i) {
         const Vec3 point = model.origin + Vec3(planes[0][i], planes[1][i], planes[2][i]);

@@ -2,6 +2,9 @@
 #include "skeletex/reconstruct/displace.h"
 
 #include <algorithm>
+#include <utility>
+
+#include "reconstruct_structs.h"
 
 namespace skeletex {
 
@@ -25,8 +28,41 @@ ClRange row_range(const ClContext& context, std::size_t rows) {
   return {{rows * group, 1}, {group, 1}};
 }
 
-DevicePlanes allocate_planes(ClContext& context, std::size_t size) {
-  return {context.allocate<float>(size), context.allocate<float>(size), context.allocate<float>(size)};
+DevicePlanes allocate_planes(ClContext& context, std::size_t count) {
+  return {context.allocate<float>(3 * count), count};
+}
+
+DevicePlanes upload_planes(ClContext& context, std::span<const float> x, std::span<const float> y,
+                           std::span<const float> z) {
+  std::vector<float> values;
+  values.reserve(3 * x.size());
+  for (const std::span<const float>& plane : {x, y, z}) values.insert(values.end(), plane.begin(), plane.end());
+  return {context.upload(values), x.size()};
+}
+
+DevicePlanes upload_texels(ClContext& context, const DisplacementTexture& texture) {
+  return upload_planes(context, texture.along, texture.around, texture.out);
+}
+
+std::array<std::vector<float>, 3> download_planes(ClContext& context, const DevicePlanes& planes) {
+  const ClMapping<float> values = context.map(planes.values);
+  std::array<std::vector<float>, 3> copies;
+  for (std::size_t i = 0; i < 3; ++i)
+    copies[i].assign(values.data() + i * planes.count, values.data() + (i + 1) * planes.count);
+  return copies;
+}
+
+void download_points(ClContext& context, const DevicePlanes& points, const Vec3& origin, std::span<Vec3> positions) {
+  const ClMapping<float> values = context.map(points.values);
+  for (int axis = 0; axis < 3; ++axis) {
+    const float* const plane = values.data() + static_cast<std::size_t>(axis) * points.count;
+    for (std::size_t i = 0; i < points.count; ++i) positions[i][axis] = origin[axis] + static_cast<double>(plane[i]);
+  }
+}
+
+void download_texels(ClContext& context, const DevicePlanes& texels, DisplacementTexture& texture) {
+  auto [along, around, out] = download_planes(context, texels);
+  texture.along = std::move(along), texture.around = std::move(around), texture.out = std::move(out);
 }
 
 DeviceTables upload_tables(ClContext& context, const FrameTables& tables) {
@@ -57,7 +93,7 @@ DeviceLattice upload_lattice(ClContext& context, const FrameTables& tables, cons
                              const DisplacementTexture& texture, RowChoice choice) {
   DeviceLattice lattice;
   lattice.texture_width = texture.width;
-  lattice.texels = {context.upload(texture.along), context.upload(texture.around), context.upload(texture.out)};
+  lattice.texels = upload_texels(context, texture);
   lattice.tables = upload_tables(context, tables);
   lattice.rows = context.upload(lattice_rows(patches, choice));
   for (const Patch& patch : patches)
@@ -66,11 +102,28 @@ DeviceLattice upload_lattice(ClContext& context, const FrameTables& tables, cons
   return lattice;
 }
 
+DisplaceParameters displace_parameters(std::size_t row_count, int texture_width, const DeviceTables& tables,
+                                       const DevicePlanes& texels, const DevicePlanes& points) {
+  return {static_cast<int>(row_count),
+          texture_width,
+          tables.column_count,
+          static_cast<int>(texels.count),
+          static_cast<int>(points.count),
+          1};
+}
+
 void displace(ClContext& context, const DeviceLattice& lattice, DevicePlanes& points) {
   context.launch({"reconstruct.cl", "displace"}, row_range(context, lattice.rows.size),
-                 static_cast<int>(lattice.rows.size), lattice.texture_width, lattice.tables.column_count, lattice.rows,
-                 lattice.tables.patches, lattice.tables.rows, lattice.tables.columns, lattice.texels.x,
-                 lattice.texels.y, lattice.texels.z, points.x, points.y, points.z);
+                 displace_parameters(lattice.rows.size, lattice.texture_width, lattice.tables, lattice.texels, points),
+                 lattice.rows, lattice.tables.patches, lattice.tables.rows, lattice.tables.columns,
+                 lattice.texels.values, points.values);
+}
+
+void enter_tangent_space(ClContext& context, const DeviceTables& tables, const ClBuffer<LatticeRow>& rows,
+                         int texture_width, const DevicePlanes& points, DevicePlanes& texels) {
+  context.launch({"reconstruct.cl", "enter_tangent_space"}, row_range(context, rows.size),
+                 displace_parameters(rows.size, texture_width, tables, texels, points), rows, tables.patches,
+                 tables.rows, tables.columns, points.values, texels.values);
 }
 
 DevicePlanes row_points(ClContext& context, const SkeletexModel& model, const SeparationPlanes& separation) {

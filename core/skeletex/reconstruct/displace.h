@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <array>
+#include <span>
 #include <vector>
 
 #include "skeletex/device/context.h"
@@ -20,11 +21,25 @@ std::vector<LatticeRow> lattice_rows(const std::vector<Patch>& patches, RowChoic
 /// One work-group per row: see kernels/reconstruct.cl.
 ClRange row_range(const ClContext& context, std::size_t rows);
 
-/// Three planes of floats on the device.
+/// Three planes of floats on the device, behind each other in one buffer: x, y, z of points, or along, around, out of
+/// texels.
 struct DevicePlanes {
-  ClBuffer<float> x, y, z;
+  ClBuffer<float> values;
+  std::size_t count = 0;  ///< values per plane
 };
-DevicePlanes allocate_planes(ClContext& context, std::size_t size);
+/// Not initialised.
+DevicePlanes allocate_planes(ClContext& context, std::size_t count);
+/// \pre the planes have the same size
+DevicePlanes upload_planes(ClContext& context, std::span<const float> x, std::span<const float> y,
+                           std::span<const float> z);
+DevicePlanes upload_texels(ClContext& context, const DisplacementTexture& texture);
+/// Waits for the queue and copies the planes to the host.
+std::array<std::vector<float>, 3> download_planes(ClContext& context, const DevicePlanes& planes);
+/// The same as positions. \param origin  world position that the points are relative to
+/// \param positions  the first ones are set
+void download_points(ClContext& context, const DevicePlanes& points, const Vec3& origin, std::span<Vec3> positions);
+/// Waits for the queue and copies the planes to a texture, whose size is left as it is.
+void download_texels(ClContext& context, const DevicePlanes& texels, DisplacementTexture& texture);
 
 /// The frame tables on the device; columns as four planes behind each other: cosine, sine, slope_head, slope_tail.
 struct DeviceTables {
@@ -49,6 +64,16 @@ struct DeviceLattice {
 };
 DeviceLattice upload_lattice(ClContext& context, const FrameTables& tables, const std::vector<Patch>& patches,
                              const DisplacementTexture& texture, RowChoice choice);
+
+/// Queues the texels of points at the places of some rows (one launch): the inverse of displace.
+/// \param points  of the rows, in each bone's own axes (in_bone_axes)   \param texels  of texture_width columns
+void enter_tangent_space(ClContext& context, const DeviceTables& tables, const ClBuffer<LatticeRow>& rows,
+                         int texture_width, const DevicePlanes& points, DevicePlanes& texels);
+
+/// What the kernels between texels and points take as parameters (kernels/reconstruct_structs.h).
+struct DisplaceParameters;
+DisplaceParameters displace_parameters(std::size_t row_count, int texture_width, const DeviceTables& tables,
+                                       const DevicePlanes& texels, const DevicePlanes& points);
 
 /// Queues the points of all rows (one launch), relative to the origin of the tables.
 void displace(ClContext& context, const DeviceLattice& lattice, DevicePlanes& points);

@@ -36,9 +36,9 @@ Vec3 posed_by_coordinates(const SkeletexModel& model, const SeparationPlanes& bi
 struct DeviceCoordinates {
   ClBuffer<SkinBlock> blocks;
   ClBuffer<PatchRecord> patches;  ///< of the bind pose
-  ClBuffer<float> angle, distance,
-      height;                              ///< cylinder coordinates about the vertex's bone: see kernels/coordinates.cl
-  ClBuffer<float> slope_head, slope_tail;  ///< of the bind pose's separation planes at that angle
+  /// Five planes: angle, distance and height about the vertex's bone, and the slopes of the bind pose's separation
+  /// planes at the head and tail at that angle (kernels/coordinates.cl).
+  ClBuffer<float> values;
 };
 /// \param points  of the inner vertices in the bind pose, relative to the model's origin
 /// \throw DeviceError

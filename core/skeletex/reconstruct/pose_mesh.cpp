@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "reconstruct_structs.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/reconstruct/pose_by_coordinates.h"
@@ -13,17 +14,6 @@
 #include "skeletex/reconstruct/skin.h"
 
 namespace skeletex {
-namespace {
-
-void download_points(ClContext& context, const DevicePlanes& points, const Vec3& origin, std::vector<Vec3>& positions) {
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::vector<float> plane = context.download(axis == 0 ? points.x : axis == 1 ? points.y : points.z);
-    for (std::size_t i = 0; i < plane.size(); ++i) positions[i][axis] = origin[axis] + static_cast<double>(plane[i]);
-  }
-}
-
-}  // namespace
-
 DevicePose upload_pose(ClContext& context, const SkeletexModel& model, const PosedPlanes& posed, RowChoice choice,
                        DistanceRule rule) {
   const PoseTables tables = pose_tables(model, posed);
@@ -38,8 +28,8 @@ DevicePose upload_pose(ClContext& context, const SkeletexModel& model, const Pos
   std::vector<LatticeRow> plain = lattice_rows(model.patches, choice), other;
   const auto is_plain = [&](const LatticeRow& row) {
     const PosedRowRecord& record = tables.rows[tables.patches[row[0]].row_begin + row[1]];
-    return rule == DistanceRule::kFromBone && record.bind_reach_head == 0 && record.bind_reach_tail == 0 &&
-           record.reach_head == 0 && record.reach_tail == 0;
+    return rule == DistanceRule::kFromBone && record.bind_extension_head == 0 && record.bind_extension_tail == 0 &&
+           record.extension_head == 0 && record.extension_tail == 0;
   };
   std::copy_if(plain.begin(), plain.end(), std::back_inserter(other),
                [&](const LatticeRow& row) { return !is_plain(row); });
@@ -57,17 +47,19 @@ DevicePose upload_pose(ClContext& context, const SkeletexModel& model, const Pos
 
 void displace_posed(ClContext& context, const DeviceLattice& lattice, const DevicePose& pose, DevicePlanes& points) {
   const DeviceTables& bind = lattice.tables;
+  const auto parameters = [&](std::size_t row_count) {
+    DisplaceParameters made = displace_parameters(row_count, lattice.texture_width, bind, lattice.texels, points);
+    made.is_distance_kept = static_cast<int>(pose.is_distance_kept);
+    return made;
+  };
   if (pose.plain_count > 0)
-    context.launch({"pose.cl", "displace_posed"}, row_range(context, pose.plain_count),
-                   static_cast<int>(pose.plain_count), lattice.texture_width, bind.column_count, pose.plain_rows,
-                   bind.rows, bind.columns, pose.patches, pose.columns, lattice.texels.x, lattice.texels.y,
-                   lattice.texels.z, points.x, points.y, points.z);
+    context.launch({"pose.cl", "displace_posed"}, row_range(context, pose.plain_count), parameters(pose.plain_count),
+                   pose.plain_rows, bind.rows, bind.columns, pose.patches, pose.columns, lattice.texels.values,
+                   points.values);
   if (pose.other_count > 0)
     context.launch({"pose.cl", "displace_posed_from_bind"}, row_range(context, pose.other_count),
-                   static_cast<int>(pose.other_count), lattice.texture_width, bind.column_count,
-                   static_cast<int>(pose.is_distance_kept), pose.other_rows, bind.patches, bind.rows, bind.columns,
-                   pose.patches, pose.rows, pose.columns, lattice.texels.x, lattice.texels.y, lattice.texels.z,
-                   points.x, points.y, points.z);
+                   parameters(pose.other_count), pose.other_rows, bind.rows, bind.columns, pose.patches, pose.rows,
+                   pose.columns, lattice.texels.values, points.values);
 }
 
 void place_shared_vertices(const SkeletexModel& model, const PosedPlanes& separation, const Lattice& lattice,

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "reconstruct_structs.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/reconstruct/seam_strip.h"
@@ -73,11 +74,7 @@ std::vector<Vec3> place_vertices(ClContext& context, const SkeletexModel& model,
                                  const Lattice& lattice, const DevicePlanes& inner) {
   std::vector<Vec3> positions(lattice.vertex_count);
   place_shared_vertices(model, separation, lattice, positions);
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::vector<float> plane = context.download(axis == 0 ? inner.x : axis == 1 ? inner.y : inner.z);
-    for (int i = 0; i < lattice.inner_count; ++i)
-      positions[i][axis] = model.origin[axis] + static_cast<double>(plane[i]);
-  }
+  download_points(context, inner, model.origin, positions);
   return positions;
 }
 
@@ -137,9 +134,10 @@ ClBuffer<Triangle> triangulate(ClContext& context, DiagonalRule rule, const Devi
                                const DevicePlanes& inner) {
   // Room for the strips and fans at the end, so that the host's copy need not grow.
   auto triangles = context.allocate<Triangle>(lattice.triangle_count);
-  context.launch({"reconstruct.cl", rule == DiagonalRule::kSmooth ? "triangulate_smoothly" : "triangulate_quads"},
-                 row_range(context, quads.rows.size), static_cast<int>(quads.rows.size), quads.rows, quads.patches,
-                 inner.x, inner.y, inner.z, triangles);
+  context.launch({"reconstruct.cl", "triangulate"}, row_range(context, quads.rows.size),
+                 TriangulateParameters{static_cast<int>(quads.rows.size), static_cast<int>(inner.count),
+                                       static_cast<int>(rule == DiagonalRule::kSmooth)},
+                 quads.rows, quads.patches, inner.values, triangles);
   return triangles;
 }
 

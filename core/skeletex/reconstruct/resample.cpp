@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "reconstruct_structs.h"
 #include "skeletex/convert/layout/pack_atlas.h"
 #include "skeletex/model/encoder_settings.h"
 #include "skeletex/reconstruct/displace.h"
@@ -295,7 +296,10 @@ void resample_texels(ClContext& context, const SkeletexModel& model, const Separ
   const std::vector<LatticeRow> rows = lattice_rows(result.patches, RowChoice::kAll),
                                 middle_rows = lattice_rows(middle, RowChoice::kAll);
   const auto device_rows = context.upload(rows), device_middle_rows = context.upload(middle_rows);
-  const int row_count = static_cast<int>(rows.size());
+  const auto parameters = [&](const DevicePlanes& in, const DevicePlanes& out) {
+    return ResampleParameters{static_cast<int>(rows.size()), static_cast<int>(in.count), static_cast<int>(out.count),
+                              kLargestFit};
+  };
   const ClRange range = row_range(context, rows.size());
 
   DevicePlanes old_points = allocate_planes(context, old_size);
@@ -306,31 +310,27 @@ void resample_texels(ClContext& context, const SkeletexModel& model, const Separ
   const auto filtered = [&](ResampleFilter filter) {
     const LatticeTaps taps = lattice_taps(model, result.patches, filter);
     DevicePlanes between = allocate_planes(context, middle_size), points = allocate_planes(context, new_size);
-    context.launch({"reconstruct.cl", "filter_rows"}, range, row_count, device_middle_rows, device_tables.patches,
-                   old_widths, from_old, context.upload(taps.rows.taps), context.upload(taps.rows.weights),
-                   old_points.x, old_points.y, old_points.z, between.x, between.y, between.z);
-    context.launch({"reconstruct.cl", "filter_columns"}, range, row_count, device_rows, device_tables.patches,
-                   old_widths, from_middle, context.upload(taps.columns.taps), context.upload(taps.columns.weights),
-                   between.x, between.y, between.z, points.x, points.y, points.z);
+    context.launch({"reconstruct.cl", "filter_rows"}, range, parameters(old_points, between), device_middle_rows,
+                   device_tables.patches, old_widths, from_old, context.upload(taps.rows.taps),
+                   context.upload(taps.rows.weights), old_points.values, between.values);
+    context.launch({"reconstruct.cl", "filter_columns"}, range, parameters(between, points), device_rows,
+                   device_tables.patches, old_widths, from_middle, context.upload(taps.columns.taps),
+                   context.upload(taps.columns.weights), between.values, points.values);
     return points;
   };
   DevicePlanes points = filtered(ResampleFilter::kProject);
   {
     const DevicePlanes sampled = filtered(ResampleFilter::kSample);
-    context.launch({"reconstruct.cl", "limit_fit"}, range, row_count, kLargestFit, device_rows, device_tables.patches,
-                   sampled.x, sampled.y, sampled.z, points.x, points.y, points.z);
+    context.launch({"reconstruct.cl", "limit_fit"}, range, parameters(sampled, points), device_rows,
+                   device_tables.patches, sampled.values, points.values);
     context.finish();
   }
 
   const std::size_t area = static_cast<std::size_t>(result.texture.width) * result.texture.height;
   DevicePlanes texels = allocate_planes(context, area);
-  for (ClBuffer<float>* plane : {&texels.x, &texels.y, &texels.z}) context.fill(*plane, 0);
-  context.launch({"reconstruct.cl", "enter_tangent_space"}, range, row_count, result.texture.width,
-                 device_tables.column_count, device_rows, device_tables.patches, device_tables.rows,
-                 device_tables.columns, points.x, points.y, points.z, texels.x, texels.y, texels.z);
-  result.texture.along = context.download(texels.x);
-  result.texture.around = context.download(texels.y);
-  result.texture.out = context.download(texels.z);
+  context.fill(texels.values, 0);
+  enter_tangent_space(context, device_tables, device_rows, result.texture.width, points, texels);
+  download_texels(context, texels, result.texture);
 }
 
 BoneEnd end_at(const Skeleton& skeleton, int bone, int node) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "reconstruct_structs.h"
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
@@ -39,9 +40,12 @@ void weigh_inner_vertices(ClContext& context, const WeightWalks& walks, const De
   auto device_weights = context.allocate<float>(std::min(kBlocksAtOnce, skin.blocks.size()) * slots * SKIN_BLOCK);
   for (std::size_t begin = 0; begin < skin.blocks.size(); begin += kBlocksAtOnce) {
     const std::size_t count = std::min(kBlocksAtOnce, skin.blocks.size() - begin);
-    context.launch({"skin.cl", "bone_weights"}, block_range(context, count), static_cast<int>(count),
-                   static_cast<int>(begin), static_cast<int>(slots), blocks, first_steps, steps, points.x, points.y,
-                   points.z, device_weights);
+    context.launch({"skin.cl", "bone_weights"}, block_range(context, count),
+                   BlockParameters{.block_count = static_cast<int>(count),
+                                   .first_block = static_cast<int>(begin),
+                                   .slots = static_cast<int>(slots),
+                                   .point_count = static_cast<int>(points.count)},
+                   blocks, first_steps, steps, points.values, device_weights);
     const ClMapping<float> weights = context.map(device_weights);
     for (std::size_t b = 0; b < count; ++b) {
       SkinBlock& block = skin.blocks[begin + b];
@@ -184,8 +188,7 @@ std::vector<float> vertex_weights(const Skin& skin, int bone) {
 std::vector<std::vector<float>> weight_planes(ClContext& context, const SkeletexModel& model) {
   const WeightWalks walks = make_weight_walks(model);
   const DevicePlanes device = row_points(context, model, SeparationPlanes(model.skeleton));
-  const std::vector<float> x = context.download(device.x), y = context.download(device.y),
-                           z = context.download(device.z);
+  const std::array<std::vector<float>, 3> points = download_planes(context, device);
   const std::size_t texels = static_cast<std::size_t>(model.texture.width) * model.texture.height;
   std::vector<std::vector<float>> planes(model.skeleton.bones.size(), std::vector<float>(texels, 0.f));
   const std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kAll);
@@ -195,7 +198,7 @@ std::vector<std::vector<float>> weight_planes(ClContext& context, const Skeletex
       const Rectangle& r = model.patches[bone].rectangle;
       for (int j = 0; j < r.width; ++j)
         for (const auto& [moving, weight] :
-             bone_weights(walks, bone, Vec3(x[vertex + j], y[vertex + j], z[vertex + j])))
+             bone_weights(walks, bone, Vec3(points[0][vertex + j], points[1][vertex + j], points[2][vertex + j])))
           planes[moving][static_cast<std::size_t>(r.y + row) * model.texture.width + r.x + j] =
               static_cast<float>(weight);
     }
@@ -237,9 +240,11 @@ void pose_skin(ClContext& context, const Skin& skin, const DeviceSkin& device, s
                const Vec3& posed_origin, DevicePlanes& points) {
   if (skin.blocks.empty()) return;
   const auto records = context.upload(motion_records(motions, skin.origin, posed_origin));
-  context.launch({"skin.cl", "skin"}, block_range(context, skin.blocks.size()), static_cast<int>(skin.blocks.size()),
-                 static_cast<int>(is_stretched(motions)), device.blocks, device.block_bones, device.weights, records,
-                 device.points.x, device.points.y, device.points.z, points.x, points.y, points.z);
+  context.launch({"skin.cl", "skin"}, block_range(context, skin.blocks.size()),
+                 BlockParameters{.block_count = static_cast<int>(skin.blocks.size()),
+                                 .point_count = static_cast<int>(points.count),
+                                 .is_stretched = static_cast<int>(is_stretched(motions))},
+                 device.blocks, device.block_bones, device.weights, records, device.points.values, points.values);
 }
 
 void pose_shared_vertices(const Skin& skin, std::span<const BoneMotion> motions, std::vector<Vec3>& positions) {

@@ -73,14 +73,11 @@ void store_texels(ClContext& context, const SeparationPlanes& separation, const 
   }
   const DeviceTables tables =
       upload_tables(context, frame_tables(model.skeleton, separation, model.patches, model.origin));
-  DevicePlanes texels{context.upload(model.texture.along), context.upload(model.texture.around),
-                      context.upload(model.texture.out)};
-  context.launch({"reconstruct.cl", "enter_tangent_space"}, row_range(context, rows.size()),
-                 static_cast<int>(rows.size()), model.texture.width, tables.column_count, context.upload(rows),
-                 tables.patches, tables.rows, tables.columns, context.upload(planes[0]), context.upload(planes[1]),
-                 context.upload(planes[2]), texels.x, texels.y, texels.z);
-  const auto keep_moved = [&](const ClBuffer<float>& stored, std::vector<float>& plane) {
-    const std::vector<float> all = context.download(stored);
+  DevicePlanes texels = upload_texels(context, model.texture);
+  enter_tangent_space(context, tables, context.upload(rows), model.texture.width,
+                      upload_planes(context, planes[0], planes[1], planes[2]), texels);
+  const std::array<std::vector<float>, 3> stored = download_planes(context, texels);
+  const auto keep_moved = [&](const std::vector<float>& all, std::vector<float>& plane) {
     std::size_t point = 0;
     for (const LatticeRow& row : rows) {
       const Rectangle& rectangle = model.patches[row[0]].rectangle;
@@ -89,9 +86,9 @@ void store_texels(ClContext& context, const SeparationPlanes& separation, const 
         if (is_stored[point]) plane[texel] = all[texel];
     }
   };
-  keep_moved(texels.x, model.texture.along);
-  keep_moved(texels.y, model.texture.around);
-  keep_moved(texels.z, model.texture.out);
+  keep_moved(stored[0], model.texture.along);
+  keep_moved(stored[1], model.texture.around);
+  keep_moved(stored[2], model.texture.out);
 }
 
 /// The point in the separation plane through `node` with unit normal `separation plane` that p comes to by the shortest

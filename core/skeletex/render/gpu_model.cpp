@@ -58,7 +58,6 @@ GpuModel upload_model(const SkeletexModel& model) {
   const std::vector<LatticeRow> lattice_rows = skeletex::lattice_rows(model.patches, RowChoice::kInner);
   device.lattice_rows = gl_buffer(lattice_rows);
   device.row_count = static_cast<int>(lattice_rows.size());
-  device.patches = gl_buffer(tables.patches);
   device.rows = gl_buffer(tables.rows);
   device.columns = upload_planes(tables.columns);
   device.column_count = static_cast<int>(tables.columns.size());
@@ -78,12 +77,11 @@ void displace(GlContext& context, const GpuModel& device, const SkeletexModel& m
   glBindTextureUnit(0, device.texels.id());
   surface.positions.bind(0);
   device.lattice_rows.bind(1);
-  device.patches.bind(2);
-  patches.bind(3);
-  device.rows.bind(4);
-  rows.bind(5);
-  device.columns.bind(6);
-  columns.bind(7);
+  patches.bind(2);
+  device.rows.bind(3);
+  rows.bind(4);
+  device.columns.bind(5);
+  columns.bind(6);
   glUniform1i(0, device.column_count);
   glUniform1i(1, rule == DistanceRule::kFromBone ? 1 : 0);
   glDispatchCompute((device.widest + 63) / 64, device.row_count, 1);

@@ -12,7 +12,7 @@ namespace skeletex {
 struct GpuModel {
   Lattice lattice;
   GlTexture texels;  ///< along, around, out
-  GlBuffer lattice_rows, patches, rows, columns;
+  GlBuffer lattice_rows, rows, columns;
   int row_count = 0, widest = 0, column_count = 0;
 };
 GpuModel upload_model(const SkeletexModel& model);

@@ -70,16 +70,16 @@ PosedPlanes::PosedPlanes(const SkeletexModel& model, const Skeleton& posed)
       posed_(&posed),
       bind_bases_(bone_bases(model.skeleton)),
       bases_(bone_bases(posed)),
-      bind_reaches_(model.skeleton.nodes.size(), 0),
-      reaches_(model.skeleton.nodes.size(), 0),
+      bind_longest_(model.skeleton.nodes.size(), 0),
+      longest_(model.skeleton.nodes.size(), 0),
       arcs_(model.arcs.size()),
       bind_corners_(model.corners.size(), Vec3::Zero()),
       corners_(model.corners.size(), Vec3::Zero()),
       loops_(model.skeleton.bones.size()) {
   for (int bone = 0; bone < static_cast<int>(model.skeleton.bones.size()); ++bone)
     for (const int node : {model.skeleton.bones[bone].head, model.skeleton.bones[bone].tail}) {
-      bind_reaches_[node] = std::max(bind_reaches_[node], bone_length(model.skeleton, bone));
-      reaches_[node] = std::max(reaches_[node], bone_length(posed, bone));
+      bind_longest_[node] = std::max(bind_longest_[node], bone_length(model.skeleton, bone));
+      longest_[node] = std::max(longest_[node], bone_length(posed, bone));
     }
   std::vector<std::vector<int>> arcs_at(model.skeleton.nodes.size());
   for (int a = 0; a < static_cast<int>(arcs_.size()); ++a) {
@@ -324,14 +324,14 @@ Vec3 PosedPlanes::corner_point(int c, DistanceRule rule) const {
 
 double PosedPlanes::radius_at(int node, int bone, double distance, const Vec3& bound, const Vec3& direction,
                               DistanceRule rule) const {
-  // The bind point from the half-line's distance, its distance to the bone's reach, and out of the posed capsule.
+  // The bind point from the half-line's distance, its distance to the bone as extended, and out of the posed capsule.
   const double cosine = bound.dot(bind_direction(bone, node));
   const double bind_radius = cosine > 0 ? distance / std::sqrt(std::max(1e-12, 1 - cosine * cosine)) : distance;
   if (rule == DistanceRule::kFromFoot) return bind_radius;
-  const double past = bind_radius * cosine - bind_reaches_[node];
+  const double past = bind_radius * cosine - bind_longest_[node];
   const double along = direction.dot(posed_direction(bone, node));
   return leave_capsule(0, along, std::sqrt(std::max(0.0, 1 - along * along)),
-                       past > 0 ? std::hypot(distance, past) : distance, 0, reaches_[node]);
+                       past > 0 ? std::hypot(distance, past) : distance, 0, longest_[node]);
 }
 
 }  // namespace skeletex

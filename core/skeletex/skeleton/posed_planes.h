@@ -57,10 +57,10 @@ class PosedPlanes {
   /// run on from arc to arc. A closed arc begins anywhere. Empty at a free end.
   std::vector<PosedBound> bounds(int bone, BoneEnd end) const;
 
-  /// How long the bones at a node are taken to be where they meet, so that all of them restore distances alike: as long
-  /// as the longest of them. In the bind pose and in this one, world units.
-  double bind_reach(int node) const { return bind_reaches_[node]; }
-  double reach(int node) const { return reaches_[node]; }
+  /// Length of the longest bone at a node, in the bind pose and in this one; world units. All bones there count as this
+  /// long where they meet, so that they restore distances alike.
+  double bind_longest_at(int node) const { return bind_longest_[node]; }
+  double longest_at(int node) const { return longest_[node]; }
 
   /// Points of the seams, world. Every bone at a seam gives the same point; `side` chooses the one to compute it from.
   Vec3 sample_point(int arc, int sample, DistanceRule rule, int side = 0) const;
@@ -109,7 +109,7 @@ class PosedPlanes {
   const SkeletexModel* model_;
   const Skeleton* posed_;
   std::vector<BoneBasis> bind_bases_, bases_;
-  std::vector<double> bind_reaches_, reaches_;  ///< per node
+  std::vector<double> bind_longest_, longest_;  ///< length of a bone, per node
   std::vector<Arc> arcs_;
   std::vector<Vec3> bind_corners_, corners_;  ///< unit directions from their node
   std::vector<std::array<Loop, 2>> loops_;    ///< per bone and end

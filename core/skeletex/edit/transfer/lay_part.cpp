@@ -31,7 +31,8 @@ DevicePlanes lay_part(ClContext& context, const LaidTables& tables, const FrameT
                  static_cast<int>(tables.rows.size()), static_cast<int>(tables.columns.size()),
                  context.upload(tables.rows), context.upload(result.patches), context.upload(tables.patches),
                  context.upload(tables.laid_rows), context.upload(tables.columns), context.upload(tables.corrections),
-                 source.x, source.y, source.z, target.x, target.y, target.z, points.x, points.y, points.z);
+                 static_cast<int>(source.count), source.values, static_cast<int>(target.count), target.values,
+                 static_cast<int>(points.count), points.values);
   return points;
 }
 
@@ -41,7 +42,7 @@ DevicePlanes read_part(ClContext& context, const LaidTables& tables, const Frame
   context.launch({"transfer.cl", "read_part"}, row_range(context, tables.rows.size()),
                  static_cast<int>(tables.rows.size()), context.upload(tables.rows), context.upload(result.patches),
                  context.upload(tables.patches), context.upload(tables.laid_rows), context.upload(tables.columns),
-                 points.x, points.y, points.z, read.x, read.y, read.z);
+                 static_cast<int>(points.count), points.values, static_cast<int>(read.count), read.values);
   return read;
 }
 
@@ -50,7 +51,7 @@ void keep_target(ClContext& context, const LaidTables& tables, const FrameTables
   context.launch({"transfer.cl", "keep_target"}, row_range(context, tables.rows.size()),
                  static_cast<int>(tables.rows.size()), texture_width, context.upload(tables.rows),
                  context.upload(result.patches), context.upload(tables.patches), context.upload(tables.columns),
-                 target.x, target.y, target.z, texels.x, texels.y, texels.z);
+                 static_cast<int>(texels.count), target.values, texels.values);
 }
 
 std::array<std::vector<double>, SKELETEX_TRANSFER_BANDS> wave_bands(const std::vector<double>& values) {
