@@ -8,21 +8,6 @@
 
 namespace skeletex {
 
-std::vector<LatticeRow> lattice_rows(const std::vector<Patch>& patches, RowChoice choice) {
-  const int margin = choice == RowChoice::kInner ? 1 : 0;
-  std::vector<LatticeRow> rows;
-  int vertex = 0, quad = 0;
-  for (int bone = 0; bone < static_cast<int>(patches.size()); ++bone) {
-    const Rectangle& rectangle = patches[bone].rectangle;
-    for (int row = margin; row < rectangle.height - margin; ++row) {
-      rows.push_back({bone, row, vertex, quad});
-      vertex += rectangle.width;
-      if (row + 1 < rectangle.height - margin) quad += rectangle.width;
-    }
-  }
-  return rows;
-}
-
 ClRange row_range(const ClContext& context, std::size_t rows) {
   const std::size_t group = context.row_items();
   return {{rows * group, 1}, {group, 1}};
@@ -126,13 +111,27 @@ void enter_tangent_space(ClContext& context, const DeviceTables& tables, const C
                  tables.rows, tables.columns, points.values, texels.values);
 }
 
-DevicePlanes row_points(ClContext& context, const SkeletexModel& model, const SeparationPlanes& separation) {
-  const DeviceLattice lattice =
-      upload_lattice(context, frame_tables(model.skeleton, separation, model.patches, model.origin), model.patches,
-                     model.texture, RowChoice::kAll);
+DeviceLattice upload_lattice(ClContext& context, const PreparedModel& model, RowChoice choice) {
+  return upload_lattice(context, model.tables, model.model.patches, model.model.texture, choice);
+}
+
+namespace {
+
+DevicePlanes points_of(ClContext& context, const DeviceLattice& lattice) {
   DevicePlanes points = allocate_planes(context, lattice.vertex_count);
   displace(context, lattice, points);
   return points;
+}
+
+}  // namespace
+
+DevicePlanes row_points(ClContext& context, const PreparedModel& model, RowChoice choice) {
+  return points_of(context, upload_lattice(context, model, choice));
+}
+
+DevicePlanes points_in_bone_axes(ClContext& context, const PreparedModel& model) {
+  return points_of(context, upload_lattice(context, in_bone_axes(model.tables), model.model.patches,
+                                           model.model.texture, RowChoice::kAll));
 }
 
 }  // namespace skeletex

@@ -85,8 +85,10 @@ BoneCoordinates bone_coordinates(const Skeleton& skeleton, const SeparationPlane
   return {u_of(at, is_head_free, is_tail_free), turn};
 }
 
-Vec3 posed_by_coordinates(const SkeletexModel& model, const SeparationPlanes& bind, const PosedPlanes& posed, int bone,
-                          const Vec3& point, DistanceRule rule) {
+Vec3 posed_by_coordinates(const PreparedModel& prepared, const PosedPlanes& posed, int bone, const Vec3& point,
+                          DistanceRule rule) {
+  const SkeletexModel& model = prepared.model;
+  const SeparationPlanes& bind = prepared.separation;
   const auto [u, turn] = bone_coordinates(model.skeleton, bind, bone, point);
   const Vec3 texel = encode_texel(tangent_frame(model.skeleton, bind, bone, u, turn), point,
                                   end_position(model.skeleton, bone, BoneEnd::kHead),
@@ -94,11 +96,10 @@ Vec3 posed_by_coordinates(const SkeletexModel& model, const SeparationPlanes& bi
   return posed_point(model, bind, posed, bone, u, turn, texel, rule);
 }
 
-DeviceCoordinates make_coordinates(ClContext& context, const SkeletexModel& model, const DevicePlanes& points) {
-  const SeparationPlanes separation(model.skeleton);
+DeviceCoordinates make_coordinates(ClContext& context, const PreparedModel& prepared, const DevicePlanes& points) {
+  const SkeletexModel& model = prepared.model;
   const EndTables tables = end_tables(model, PosedPlanes(model, model.skeleton));
-  DeviceCoordinates made{context.upload(skin_blocks(model.patches)),
-                         context.upload(frame_tables(model.skeleton, separation, model.patches, model.origin).patches),
+  DeviceCoordinates made{context.upload(skin_blocks(model.patches)), context.upload(prepared.tables.patches),
                          context.allocate<float>(5 * points.count)};
   if (made.blocks.size > 0)
     context.launch({"coordinates.cl", "bone_coordinates"}, block_range(context, made.blocks.size),
@@ -119,14 +120,13 @@ void pose_by_coordinates(ClContext& context, const SkeletexModel& model, const D
                  loops_of_block());
 }
 
-void place_shared_by_coordinates(const SkeletexModel& model, const PosedPlanes& posed, const Lattice& lattice,
-                                 DistanceRule rule, std::vector<Vec3>& positions) {
-  const SeparationPlanes bind(model.skeleton);
-  place_shared_vertices(model, posed, lattice, rule, positions);
+void place_shared_by_coordinates(const PreparedModel& model, const PosedPlanes& posed, DistanceRule rule,
+                                 std::vector<Vec3>& positions) {
+  place_shared_vertices(model, posed, rule, positions);
   std::vector<Vec3> bind_positions(positions.size());
-  place_shared_vertices(model, bind, lattice, bind_positions);
-  for_each_pole(model, lattice, [&](int vertex, int bone, int, std::size_t) {
-    positions[vertex] = posed_by_coordinates(model, bind, posed, bone, bind_positions[vertex], rule);
+  place_shared_vertices(model, bind_positions);
+  for_each_pole(model.model, model.lattice, [&](int vertex, int bone, int, std::size_t) {
+    positions[vertex] = posed_by_coordinates(model, posed, bone, bind_positions[vertex], rule);
   });
 }
 

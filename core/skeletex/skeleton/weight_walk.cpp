@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "skeletex/skeleton/separation_planes.h"
 #include "skin_weight.h"
 
 namespace skeletex {
@@ -20,15 +19,13 @@ struct JointSizes {
   std::vector<double> girths, radii;
 };
 
-JointSizes joint_sizes(const SkeletexModel& model) {
+JointSizes joint_sizes(const SkeletexModel& model, const SeparationPlanes& separation) {
   const Skeleton& skeleton = model.skeleton;
-  const SeparationPlanes separation(skeleton);
   std::vector<std::vector<double>> distances(skeleton.nodes.size());
   JointSizes sizes;
   sizes.radii.assign(skeleton.nodes.size(), 0);
   const auto add = [&](int node, int bone, const SeamSample& sample) {
-    const BoneEnd end = skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
-    const Vec3 point = separation.seam_point(bone, end, sample.turn, sample.distance);
+    const Vec3 point = separation.seam_point(bone, end_at(skeleton, bone, node), sample.turn, sample.distance);
     distances[node].push_back(sample.distance);
     sizes.radii[node] = std::max(sizes.radii[node], (point - skeleton.nodes[node].position).norm());
   };
@@ -103,8 +100,8 @@ std::vector<WeightStep> walk_from(const SkeletexModel& model, const JointSizes& 
 
 }  // namespace
 
-WeightWalks make_weight_walks(const SkeletexModel& model) {
-  const JointSizes sizes = joint_sizes(model);
+WeightWalks make_weight_walks(const SkeletexModel& model, const SeparationPlanes& separation) {
+  const JointSizes sizes = joint_sizes(model, separation);
   const auto at = bones_at_nodes(model.skeleton);
   WeightWalks walks;
   walks.first_steps.push_back(0);

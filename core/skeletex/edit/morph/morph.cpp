@@ -141,9 +141,7 @@ class SeamMean {
   }
 
  private:
-  BoneEnd end_at(int bone, int node) const {
-    return skeleton_.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
-  }
+  BoneEnd end_at(int bone, int node) const { return skeletex::end_at(skeleton_, bone, node); }
 
   Overlay::SeamPoint mean_at(int bone, BoneEnd end, double turn) const {
     Overlay::SeamPoint mean;

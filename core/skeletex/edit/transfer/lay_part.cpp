@@ -4,25 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "skeletex/skeleton/separation_planes.h"
-
 namespace skeletex {
-
-DevicePlanes points_in_bone_axes(ClContext& context, const SkeletexModel& model) {
-  const SeparationPlanes separation(model.skeleton);
-  FrameTables tables = frame_tables(model.skeleton, separation, model.patches, model.origin);
-  for (PatchRecord& patch : tables.patches)
-    for (int i = 0; i < 3; ++i) {
-      patch.head[i] = 0;
-      patch.s[i] = i == 0 ? 1.0f : 0.0f;
-      patch.b[i] = i == 1 ? 1.0f : 0.0f;
-      patch.axis[i] = i == 2 ? 1.0f : 0.0f;
-    }
-  const DeviceLattice lattice = upload_lattice(context, tables, model.patches, model.texture, RowChoice::kAll);
-  DevicePlanes points = allocate_planes(context, lattice.vertex_count);
-  displace(context, lattice, points);
-  return points;
-}
 
 DevicePlanes lay_part(ClContext& context, const LaidTables& tables, const FrameTables& result,
                       const DevicePlanes& source, const DevicePlanes& target, std::size_t point_count) {

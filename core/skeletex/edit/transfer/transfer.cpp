@@ -372,7 +372,7 @@ class Laying {
     if (options_.blend != TransferBlend::kCosine || !options_.is_smooth) return result;
     if (std::none_of(parts.begin(), parts.end(), [&](const auto& part) { return needs_join(*part); })) return result;
     const HostPoints read(context_, read_part(context_, tables_, frames_,
-                                              row_points(context_, even_source_, source_separation_), point_count_));
+                                              row_points(context_, even_source_, RowChoice::kAll), point_count_));
     for (const auto& part : parts) {
       if (!needs_join(*part)) continue;
       SkeletexModel joined = join_surface(context_, even_target_, result, placed_patches(*part, laid, read),
