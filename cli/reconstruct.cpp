@@ -82,18 +82,19 @@ void run(const Arguments& arguments) {
     }
     resample_ms = watch.lap_ms();
     bar.show("reconstructing", 0.3);
+    const PreparedModel prepared(model);
     const DistanceRule rule = arguments.is_distance_dropped ? DistanceRule::kFromFoot : DistanceRule::kFromBone;
     if (arguments.constant_offset) {
       const Skeleton& skeleton = posed ? *posed : model.skeleton;
-      mesh = constant_offset_mesh(context, model, skeleton, bones_by_name(model.skeleton, arguments.bones),
+      mesh = constant_offset_mesh(context, prepared, skeleton, bones_by_name(model.skeleton, arguments.bones),
                                   *arguments.constant_offset * model.diagonal, rule);
     } else {
-      mesh = posed ? reconstruct_mesh(context, model, *posed, {deformation_of(arguments.deform), rule})
-                   : reconstruct_mesh(context, model);
+      mesh = posed ? reconstruct_mesh(context, prepared, *posed, {deformation_of(arguments.deform), rule})
+                   : reconstruct_mesh(context, prepared);
     }
     if (arguments.is_polished) {
       bar.show("polishing", 0.5);
-      polish_report = polish_pose(reconstruct_mesh(context, model), mesh.positions);
+      polish_report = polish_pose(reconstruct_mesh(context, prepared), mesh.positions);
     }
     reconstruct_ms = watch.lap_ms();
     bar.show("writing", 0.7);
@@ -101,7 +102,7 @@ void run(const Arguments& arguments) {
     write_ms = watch.lap_ms();
     if (posed && !arguments.constant_offset && !arguments.has_no_report) {
       bar.show("measuring the pose", 0.8);
-      pose_report = report_pose(reconstruct_mesh(context, model), mesh);
+      pose_report = report_pose(reconstruct_mesh(context, prepared), mesh);
     }
   }
   const double total_ms = total.lap_ms();

@@ -153,9 +153,8 @@ struct ErrorScale {
   double highest = 0;                 ///< of the diagonal
 };
 
-Skin skin_of(ClContext& context, const SkeletexModel& model) {
-  return make_skin(context, model,
-                   displace_inner(context, model, SeparationPlanes(model.skeleton), number_lattice(model)));
+Skin skin_of(ClContext& context, const PreparedModel& model) {
+  return make_skin(context, model, row_points(context, model, RowChoice::kInner));
 }
 
 SurfacePaint paint_of(const Arguments& arguments, const Subject& subject, ClContext& context, ErrorScale& scale) {
@@ -169,8 +168,7 @@ SurfacePaint paint_of(const Arguments& arguments, const Subject& subject, ClCont
     paint.paint = Paint::kNormal;
   } else if (arguments.mode == "checker") {
     paint.paint = Paint::kChecker;
-    paint.corner_uv =
-        gl_buffer(checker_coordinates(*subject.model, number_lattice(*subject.model), subject.mesh, kCheckerCells));
+    paint.corner_uv = gl_buffer(checker_coordinates(*subject.model, subject.mesh, kCheckerCells));
   } else if (arguments.mode == "weights") {
     const int bone = bone_by_name(subject.model->skeleton, arguments.bone);
     std::vector<VertexColour> colours;
@@ -231,7 +229,7 @@ void check_arguments(const Arguments& arguments) {
 /// Moves the surface of a model to its pose on the GL device.
 void pose_surface(GlContext& gl, ClContext& context, const Arguments& arguments, const Subject& subject,
                   GpuSurface& surface) {
-  const SkeletexModel& model = *subject.model;
+  const PreparedModel model(*subject.model);
   const Deformation deformation = deformation_of(arguments.deform);
   const DistanceRule distance = arguments.is_distance_dropped ? DistanceRule::kFromFoot : DistanceRule::kFromBone;
   if (arguments.is_polished) {
@@ -249,7 +247,7 @@ void pose_surface(GlContext& gl, ClContext& context, const Arguments& arguments,
     return;
   }
   const Skin skin = skin_of(context, model);
-  pose_skin(gl, upload_skin(skin, subject.mesh), skin, bone_motions(model.skeleton, *subject.skeleton),
+  pose_skin(gl, upload_skin(skin, subject.mesh), skin, bone_motions(model.model.skeleton, *subject.skeleton),
             *subject.skeleton, surface);
 }
 

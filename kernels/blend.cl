@@ -11,7 +11,8 @@
 //      source_slopes: pairs per column of a source: the separation planes' slopes at head and tail, as the result's
 //      bone runs. A texel is turned from the slope that its frame has in the source, with the rise, to that of the
 //      result's frame. result_columns: of the result (ColumnRecord)
-// out  along, around, out: the result's texture, texture_width columns
+//      texels: planes along, around, out of in_count floats, of all sources
+// out  blended: the same of the result's texture, texture_width columns
 // NDRange: one work-group per row, of any size; work-items take columns in turn (see reconstruct.cl). A column of the
 // result is done by one work-item for all sources, so sums need no barrier and have a fixed order.
 // Reads are linear between the four texels around. Where a place is a texel's own, the result is weight * texel
@@ -27,12 +28,17 @@ __kernel void blend_texels(const int row_count, const int source_count, const in
                            __global const RowRecord* restrict rows, __global const BlendSource* restrict sources,
                            __global const BlendRow* restrict source_rows, __global const BlendColumn* restrict columns,
                            __global const float* restrict source_slopes,
-                           __global const ColumnRecord* restrict result_columns,
-                           __global const float* restrict in_along, __global const float* restrict in_around,
-                           __global const float* restrict in_out, __global float* restrict along,
-                           __global float* restrict around, __global float* restrict out) {
+                           __global const ColumnRecord* restrict result_columns, const int in_count,
+                           __global const float* restrict texels, const int out_count,
+                           __global float* restrict blended) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
+  __global const float* restrict in_along = texels;
+  __global const float* restrict in_around = in_along + in_count;
+  __global const float* restrict in_out = in_around + in_count;
+  __global float* restrict along = blended;
+  __global float* restrict around = along + out_count;
+  __global float* restrict out = around + out_count;
   const int patch_index = lattice_rows[4 * k], row = lattice_rows[4 * k + 1];
   __global const PatchRecord* restrict patch = patches + patch_index;
   const int width = patch->width;
@@ -108,9 +114,12 @@ __kernel void blend_texels(const int row_count, const int source_count, const in
 __kernel void move_ends(const int row_count, const int texture_width, const int column_count,
                         __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
                         __global const RowRecord* restrict rows, __global const float* restrict moves,
-                        __global float* restrict along, __global float* restrict around, __global float* restrict out) {
+                        const int texel_count, __global float* restrict texels) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
+  __global float* restrict along = texels;
+  __global float* restrict around = along + texel_count;
+  __global float* restrict out = around + texel_count;
   __global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
   const int row = lattice_rows[4 * k + 1], texel = (patch->y + row) * texture_width + patch->x;
   const float u = rows[patch->row_begin + row].u;
@@ -133,14 +142,20 @@ static float mixed(const float first, const float second, const float share) {
   return share == 0.0f ? first : share == 1.0f ? second : between;
 }
 
-__kernel void mix_texels(const int height, const int width, const float share,
-                         __global const float* restrict first_along, __global const float* restrict first_around,
-                         __global const float* restrict first_out, __global const float* restrict second_along,
-                         __global const float* restrict second_around, __global const float* restrict second_out,
-                         __global float* restrict along, __global float* restrict around,
-                         __global float* restrict out) {
+__kernel void mix_texels(const int height, const int width, const float share, __global const float* restrict first,
+                         __global const float* restrict second, __global float* restrict texels) {
   const int row = get_group_id(0);
   if (row >= height) return;
+  const int count = height * width;
+  __global const float* restrict first_along = first;
+  __global const float* restrict first_around = first_along + count;
+  __global const float* restrict first_out = first_around + count;
+  __global const float* restrict second_along = second;
+  __global const float* restrict second_around = second_along + count;
+  __global const float* restrict second_out = second_around + count;
+  __global float* restrict along = texels;
+  __global float* restrict around = along + count;
+  __global float* restrict out = around + count;
   const int begin = row * width, end = begin + width, step = get_local_size(0);
   for (int i = begin + (int)get_local_id(0); i < end; i += step) {
     along[i] = mixed(first_along[i], second_along[i], share);

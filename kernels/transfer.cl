@@ -55,19 +55,26 @@ static float read_at(const Place* restrict p, __global const float* restrict pla
 //      patches: the result's. laid: per patch of the result. laid_rows: per row to do. columns: see LaidColumn
 //      corrections: planes of column_count floats, [((end * bands + band) * 2 + is_slope) * 3 + axis]: offset where the
 //      part begins (LaidColumn's first_row and last_row) and its change per row from there
-//      in_s, in_b, in_o: points of the source's lattice, all rows, in the axes of their own bones from their heads
-//      target_s, target_b, target_o: the same of the target's
-// out  s, b, o: points in the axes of the result's bones from their heads
+//      source: planes s, b, o of source_count floats: points of the source's lattice, all rows, in the axes of their
+//      own bones from their heads. target: the same of the target's
+// out  points: planes s, b, o, in the axes of the result's bones from their heads
 __kernel void lay_part(const int row_count, const int column_count, __global const int* restrict lattice_rows,
                        __global const PatchRecord* restrict patches, __global const LaidPatch* restrict laid,
                        __global const LaidRow* restrict laid_rows, __global const LaidColumn* restrict columns,
-                       __global const float* restrict corrections, __global const float* restrict in_s,
-                       __global const float* restrict in_b, __global const float* restrict in_o,
-                       __global const float* restrict target_s, __global const float* restrict target_b,
-                       __global const float* restrict target_o, __global float* restrict s, __global float* restrict b,
-                       __global float* restrict o) {
+                       __global const float* restrict corrections, const int source_count,
+                       __global const float* restrict source, const int target_count,
+                       __global const float* restrict target, const int point_count, __global float* restrict points) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
+  __global const float* restrict in_s = source;
+  __global const float* restrict in_b = in_s + source_count;
+  __global const float* restrict in_o = in_b + source_count;
+  __global const float* restrict target_s = target;
+  __global const float* restrict target_b = target_s + target_count;
+  __global const float* restrict target_o = target_b + target_count;
+  __global float* restrict s = points;
+  __global float* restrict b = s + point_count;
+  __global float* restrict o = b + point_count;
   const int patch = lattice_rows[4 * k], row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
   const int width = patches[patch].width;
   __global const LaidPatch* restrict from = laid + patch;
@@ -123,15 +130,20 @@ __kernel void lay_part(const int row_count, const int column_count, __global con
 }
 
 // Where the points of lay_part come from: any points of the source's lattice, read at the same places.
-// in   as above; in_x, in_y, in_z: the points     out  x, y, z
+// in   as above; source: planes x, y, z of the points     out  points: planes x, y, z
 __kernel void read_part(const int row_count, __global const int* restrict lattice_rows,
                         __global const PatchRecord* restrict patches, __global const LaidPatch* restrict laid,
                         __global const LaidRow* restrict laid_rows, __global const LaidColumn* restrict columns,
-                        __global const float* restrict in_x, __global const float* restrict in_y,
-                        __global const float* restrict in_z, __global float* restrict x, __global float* restrict y,
-                        __global float* restrict z) {
+                        const int source_count, __global const float* restrict source, const int point_count,
+                        __global float* restrict points) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
+  __global const float* restrict in_x = source;
+  __global const float* restrict in_y = in_x + source_count;
+  __global const float* restrict in_z = in_y + source_count;
+  __global float* restrict x = points;
+  __global float* restrict y = x + point_count;
+  __global float* restrict z = y + point_count;
   const int patch = lattice_rows[4 * k], row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
   const float axial = laid_rows[k].axial;
   for (int j = get_local_id(0); j < patches[patch].width; j += get_local_size(0)) {
@@ -144,16 +156,20 @@ __kernel void read_part(const int row_count, __global const int* restrict lattic
 }
 
 // Where the target keeps its surface: its texels, bit by bit.
-// in   as above; in_along, in_around, in_out: the target's texels
-// out  along, around, out: the result's
+// in   as above; target: planes along, around, out of the target's texels
+// out  texels: the result's
 __kernel void keep_target(const int row_count, const int texture_width, __global const int* restrict lattice_rows,
                           __global const PatchRecord* restrict patches, __global const LaidPatch* restrict laid,
-                          __global const LaidColumn* restrict columns, __global const float* restrict in_along,
-                          __global const float* restrict in_around, __global const float* restrict in_out,
-                          __global float* restrict along, __global float* restrict around,
-                          __global float* restrict out) {
+                          __global const LaidColumn* restrict columns, const int texel_count,
+                          __global const float* restrict target, __global float* restrict texels) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
+  __global const float* restrict in_along = target;
+  __global const float* restrict in_around = in_along + texel_count;
+  __global const float* restrict in_out = in_around + texel_count;
+  __global float* restrict along = texels;
+  __global float* restrict around = along + texel_count;
+  __global float* restrict out = around + texel_count;
   const int patch = lattice_rows[4 * k], row = lattice_rows[4 * k + 1];
   const int width = patches[patch].width;
   const int texel = (patches[patch].y + row) * texture_width + patches[patch].x;

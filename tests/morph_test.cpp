@@ -423,11 +423,10 @@ TEST(Blend, KernelAndTwinAgreeOnRandomPlacesAndUglyWidths) {
   FrameTables frames = frame_tables(skeleton, SeparationPlanes(skeleton), patches, Vec3::Zero());
   for (ColumnRecord& column : frames.columns)
     column.slope_head = 2 * unit(random), column.slope_tail = 2 * unit(random);
-  const DevicePlanes texels{device().upload(in[0]), device().upload(in[1]), device().upload(in[2])};
+  const DevicePlanes texels = upload_planes(device(), in[0], in[1], in[2]);
   DevicePlanes blended = allocate_planes(device(), static_cast<std::size_t>(texture_width) * y);
   blend_texels(device(), tables, rows, frames, texture_width, texels, blended);
-  const std::vector<float> out[3] = {device().download(blended.x), device().download(blended.y),
-                                     device().download(blended.z)};
+  const auto out = download_planes(device(), blended);
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const auto [bone, row, vertex, quad] = rows[k];
     const Rectangle& rectangle = patches[bone].rectangle;

@@ -136,7 +136,7 @@ TEST_P(PoseModels, StayWhatTheyAre) {
             posed_row(model, separation, bone,
                       axial_of(patch.row_u[r], bind.is_free(bone, BoneEnd::kHead), bind.is_free(bone, BoneEnd::kTail)));
         all += static_cast<std::size_t>(width);
-        if (row.reaches[0] > 0 || row.reaches[1] > 0) continue;  // the seam's rule is mixed in
+        if (row.extensions[0] > 0 || row.extensions[1] > 0) continue;  // the seam's rule is mixed in
         for (int j = 0; j < width; ++j, ++kept) {
           const std::size_t at = static_cast<std::size_t>(y + r) * model.texture.width + x + j;
           const Vec3 texel(model.texture.along[at], model.texture.around[at], model.texture.out[at]);

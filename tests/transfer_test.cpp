@@ -384,13 +384,12 @@ TEST(LayPart, KernelAndTwinAgreeOnRandomTables) {
     }
   }
   for (std::size_t i = 0; i < tables.correction_size(); ++i) tables.corrections.push_back(0.1f * unit(random));
-  const DevicePlanes source_planes{device().upload(in[0]), device().upload(in[1]), device().upload(in[2])};
-  const DevicePlanes target_planes{device().upload(target[0]), device().upload(target[1]), device().upload(target[2])};
+  const DevicePlanes source_planes = upload_planes(device(), in[0], in[1], in[2]);
+  const DevicePlanes target_planes = upload_planes(device(), target[0], target[1], target[2]);
   const DevicePlanes laid = lay_part(device(), tables, frames, source_planes, target_planes, points);
-  const std::vector<float> out[3] = {device().download(laid.x), device().download(laid.y), device().download(laid.z)};
+  const auto out = download_planes(device(), laid);
   const DevicePlanes read = read_part(device(), tables, frames, source_planes, points);
-  const std::vector<float> read_out[3] = {device().download(read.x), device().download(read.y),
-                                          device().download(read.z)};
+  const auto read_out = download_planes(device(), read);
   for (std::size_t k = 0; k < tables.rows.size(); ++k) {
     const auto [p, row, vertex, quad] = tables.rows[k];
     for (int j = 0; j < sizes[p].first; ++j) {

@@ -13,8 +13,7 @@ namespace skeletex {
 namespace {
 
 DevicePlanes take_texels(ClContext& context, SkeletexModel& model) {
-  DevicePlanes planes{context.upload(model.texture.along), context.upload(model.texture.around),
-                      context.upload(model.texture.out)};
+  DevicePlanes planes = upload_texels(context, model.texture);
   model.texture = {model.texture.width, model.texture.height, {}, {}, {}};
   return planes;
 }

@@ -30,7 +30,7 @@ SkeletexModel regular_grid(ClContext& context, const SkeletexModel& model) {
   result.encoder_settings = settings.dump();
   const SeparationPlanes separation(model.skeleton);
   const FrameTables tables = in_bone_axes(frame_tables(model.skeleton, separation, model.patches, model.origin));
-  const DeviceLattice lattice = upload_lattice(context, tables, model.patches, model.texture, RowChoice::kAll);
+  DeviceLattice lattice = upload_lattice(context, tables, model.patches, model.texture, RowChoice::kAll);
   const std::size_t count = lattice.vertex_count;
   DevicePlanes own = allocate_planes(context, count);
   displace(context, lattice, own);
@@ -45,9 +45,9 @@ SkeletexModel regular_grid(ClContext& context, const SkeletexModel& model) {
   const ClRange range = row_range(context, lattice.rows.size);
   const int rows = static_cast<int>(lattice.rows.size);
   for (int step = 0; step < kSteps; ++step) {
-    context.launch({"regular_grid.cl", "slide_evenly"}, range, rows, lattice.rows, lattice.tables.patches, kept, own.x,
-                   own.y, own.z, now.offset_x, now.offset_y, now.points.x, now.points.y, now.points.z, next.offset_x,
-                   next.offset_y, next.points.x, next.points.y, next.points.z);
+    context.launch({"regular_grid.cl", "slide_evenly"}, range, rows, lattice.rows, lattice.tables.patches, kept,
+                   static_cast<int>(count), own.values, now.offset_x, now.offset_y, now.points.values, next.offset_x,
+                   next.offset_y, next.points.values);
     now = next;
     std::swap(next, spare);
   }
@@ -61,17 +61,11 @@ SkeletexModel regular_grid(ClContext& context, const SkeletexModel& model) {
   const int slid_count = static_cast<int>(slid.size());
   if (settings["prefilter"] == true) {
     context.launch({"regular_grid.cl", "prefilter_rows"}, row_range(context, slid.size()), slid_count, slid_rows,
-                   lattice.tables.patches, now.points.x, now.points.y, now.points.z, next.points.x, next.points.y,
-                   next.points.z);
+                   lattice.tables.patches, static_cast<int>(count), now.points.values, next.points.values);
     now = next;
   }
-  context.launch({"reconstruct.cl", "enter_tangent_space"}, row_range(context, slid.size()), slid_count,
-                 model.texture.width, lattice.tables.column_count, slid_rows, lattice.tables.patches,
-                 lattice.tables.rows, lattice.tables.columns, now.points.x, now.points.y, now.points.z,
-                 lattice.texels.x, lattice.texels.y, lattice.texels.z);
-  result.texture.along = context.download(lattice.texels.x);
-  result.texture.around = context.download(lattice.texels.y);
-  result.texture.out = context.download(lattice.texels.z);
+  enter_tangent_space(context, lattice.tables, slid_rows, model.texture.width, now.points, lattice.texels);
+  download_texels(context, lattice.texels, result.texture);
   return result;
 }
 

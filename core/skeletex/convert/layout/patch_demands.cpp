@@ -13,8 +13,6 @@ namespace {
 constexpr double kMostOff =
     2;  // of a side ratio, from that of girth to length: where a patch bends in one direction alone
 
-bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind == ChartVertex::kTailPole; }
-
 /// A triangle on the surface and in the map, whose area is in columns x rows; both areas doubled.
 struct MappedTriangle {
   Vec3 normal;  ///< unit

@@ -20,11 +20,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// A pole's hit this close to a vertex or an edge (in barycentric units) is moved onto it: no needle triangles.
 constexpr double kPoleSnap = 1e-3;
 
-double wrapped(double turns) { return turns - std::round(turns); }
-
 bool is_row(ChartVertex kind) { return kind == ChartVertex::kHeadRow || kind == ChartVertex::kTailRow; }
-bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind == ChartVertex::kTailPole; }
-
 /// One boundary row: lifted angles, first as measured, then made strictly increasing.
 struct Row {
   std::vector<int> vertices;
@@ -47,7 +43,7 @@ Row make_row(const BoundaryLoop& loop, const Segment& segment, const Skeleton& s
   double lift = turns.empty() ? 0 : turns[0];
   for (int i = 0; i < count; ++i) {
     row.measured.push_back(lift);
-    lift += wrapped(turns[(i + 1) % count] - turns[i]);
+    lift += shortest_turn(turns[(i + 1) % count] - turns[i]);
   }
   std::optional<std::vector<double>> lifted = loop_turns(points, turns);
   if (!lifted)
@@ -223,7 +219,7 @@ class Unroller {
     }
     if (cut_position[0] >= 0 && cut_position[1] >= 0) {
       double turn = rows[0].measured[cut_position[0]] - rows[1].measured[cut_position[1]];
-      for (std::size_t i = 0; i + 1 < path.size(); ++i) turn += wrapped(angles_[path[i + 1]] - angles_[path[i]]);
+      for (std::size_t i = 0; i + 1 < path.size(); ++i) turn += shortest_turn(angles_[path[i + 1]] - angles_[path[i]]);
       twist = static_cast<int>(std::lround(turn));
     }
     std::vector<int> row_turns(chart_.positions.size(), 0);
@@ -371,7 +367,7 @@ class Unroller {
         for (const int c : {HalfEdgeTable::next(h) % 3, HalfEdgeTable::previous(h) % 3}) {
           const int w = chart_.triangles[h / 3][c];
           if (is_known[w]) continue;
-          chart_.v[w] = chart_.v[v] + turns[h % 3] - turns[c] + wrapped(angles_[w] - angles_[v]);
+          chart_.v[w] = chart_.v[v] + turns[h % 3] - turns[c] + shortest_turn(angles_[w] - angles_[v]);
           reach(w);
         }
       });

@@ -31,8 +31,6 @@ constexpr int kSubtrees = 32, kSmallestSubtree = 256, kLargestSubtree = 1024;
 /// More groups than tasks do no harm, and drivers that hand groups to threads in blocks then use every thread.
 constexpr int kLeastGroups = 64;
 
-bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind == ChartVertex::kTailPole; }
-
 /// Surface areas, kept away from zero, in units of the chart's mean.
 std::vector<double> relative_surface_areas(const Chart& chart) {
   std::vector<double> areas;

@@ -6,8 +6,6 @@
 namespace skeletex {
 namespace {
 
-bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind == ChartVertex::kTailPole; }
-
 /// A number as two floats whose sum is exact to 2^-48.
 struct SplitValues {
   std::vector<float> high, low;

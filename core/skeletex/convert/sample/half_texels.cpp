@@ -16,11 +16,23 @@ double root_mean_square(const ClMapping<float>& squares) {
   return count > 0 ? std::sqrt(sum / count) : 0;
 }
 
+/// Planes of one buffer as buffers of their own.
+TexelPoints separate_planes(ClContext& context, const DevicePlanes& planes) {
+  TexelPoints points{context.allocate<float>(planes.count), context.allocate<float>(planes.count),
+                     context.allocate<float>(planes.count)};
+  std::size_t begin = 0;
+  for (ClBuffer<float>* const plane : {&points.x, &points.y, &points.z}) {
+    context.queue().enqueueCopyBuffer(planes.values.memory, plane->memory, begin, 0, planes.count * sizeof(float));
+    begin += planes.count * sizeof(float);
+  }
+  return points;
+}
+
 }  // namespace
 
 RoundingReport round_to_half(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches,
                              const DeviceLayout& layout, const ClBuffer<RowRecord>& rows,
-                             const ClBuffer<ColumnRecord>& columns, const DevicePlanes& points, DevicePlanes& texels) {
+                             const ClBuffer<ColumnRecord>& columns, const TexelPoints& points, TexelPoints& texels) {
   auto diagonals = context.allocate<int>(layout.size());
   context.fill(diagonals, 0);
   choose_diagonals(context, rule, patches, layout.width, context.upload(quad_rows(patches)), layout.patches, points,
@@ -46,14 +58,15 @@ RoundedModel round_to_half(ClContext& context, const SkeletexModel& model) {
     row[2] = (model.patches[row[0]].rectangle.y + row[1]) * texture.width + model.patches[row[0]].rectangle.x;
   lattice.rows = context.upload(rows);
   DevicePlanes points = allocate_planes(context, layout.size());
-  context.fill(points.x, 0.f), context.fill(points.y, 0.f), context.fill(points.z, 0.f);
+  context.fill(points.values, 0.f);
   displace(context, lattice, points);
+  TexelPoints texels = separate_planes(context, lattice.texels);
   const RoundingReport report =
       round_to_half(context, model.diagonals, model.patches, layout, context.upload(tables.rows),
-                    context.upload(tables.columns), points, lattice.texels);
+                    context.upload(tables.columns), separate_planes(context, points), texels);
   RoundedModel rounded{model, report};
-  rounded.model.texture = {texture.width, texture.height, context.download(lattice.texels.x),
-                           context.download(lattice.texels.y), context.download(lattice.texels.z)};
+  rounded.model.texture = {texture.width, texture.height, context.download(texels.x), context.download(texels.y),
+                           context.download(texels.z)};
   return rounded;
 }
 

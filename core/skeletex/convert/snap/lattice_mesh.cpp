@@ -34,8 +34,8 @@ std::vector<LatticeRow> quad_rows(const std::vector<Patch>& patches) {
 }
 
 void choose_diagonals(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches, int texture_width,
-                      const ClBuffer<LatticeRow>& rows, const ClBuffer<PatchRecord>& records,
-                      const DevicePlanes& points, ClBuffer<int>& diagonals) {
+                      const ClBuffer<LatticeRow>& rows, const ClBuffer<PatchRecord>& records, const TexelPoints& points,
+                      ClBuffer<int>& diagonals) {
   const int count = static_cast<int>(rows.size);
   int widest = 0;
   for (const Patch& patch : patches) widest = std::max(widest, patch.rectangle.width);
@@ -70,11 +70,11 @@ std::shared_ptr<const LatticeFrame> frame_lattice(const SkeletexModel& model) {
   return std::make_shared<const LatticeFrame>(std::move(frame));
 }
 
-LatticeMesh::LatticeMesh(ClContext& context, const LatticeMesh& other, DiagonalRule rule, DevicePlanes points)
+LatticeMesh::LatticeMesh(ClContext& context, const LatticeMesh& other, DiagonalRule rule, TexelPoints points)
     : LatticeMesh(context, other.model_, rule, other.frame_, other.patches_, std::move(points), Parts::kAll) {}
 
 LatticeMesh::LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule,
-                         std::shared_ptr<const LatticeFrame> frame, ClBuffer<PatchRecord> patches, DevicePlanes points,
+                         std::shared_ptr<const LatticeFrame> frame, ClBuffer<PatchRecord> patches, TexelPoints points,
                          Parts parts)
     : context_(context),
       model_(model),

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "skeletex/convert/sample/device_maps.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 
 namespace skeletex {
@@ -16,8 +17,8 @@ std::vector<LatticeRow> quad_rows(const std::vector<Patch>& patches);
 /// of the texture; those of rows 0 and height-1 do not count \param diagonals  out, per texel; of others than those of
 /// quads nothing is written
 void choose_diagonals(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches, int texture_width,
-                      const ClBuffer<LatticeRow>& rows, const ClBuffer<PatchRecord>& records,
-                      const DevicePlanes& points, ClBuffer<int>& diagonals);
+                      const ClBuffer<LatticeRow>& rows, const ClBuffer<PatchRecord>& records, const TexelPoints& points,
+                      ClBuffer<int>& diagonals);
 
 /// What of a LatticeMesh does not depend on points.
 struct LatticeFrame {
@@ -50,11 +51,11 @@ class LatticeMesh {
   /// poles count.
   ///                 These planes are kept, not copied, and read by the host: see `release` for what changes in them
   LatticeMesh(ClContext& context, const SkeletexModel& model, DiagonalRule rule,
-              std::shared_ptr<const LatticeFrame> frame, ClBuffer<PatchRecord> patches, DevicePlanes points,
+              std::shared_ptr<const LatticeFrame> frame, ClBuffer<PatchRecord> patches, TexelPoints points,
               Parts parts = Parts::kAll);
   /// Other points of the same model, with which it has in common what does not depend on them. All its triangles are
   /// there. \param context  another queue than that of the other lattice can go on beside it
-  LatticeMesh(ClContext& context, const LatticeMesh& other, DiagonalRule rule, DevicePlanes points);
+  LatticeMesh(ClContext& context, const LatticeMesh& other, DiagonalRule rule, TexelPoints points);
 
   const SkeletexModel& model() const { return model_; }
   int texel_count() const { return static_cast<int>(frame_->texel_patches.size()); }
@@ -96,9 +97,9 @@ class LatticeMesh {
   /// Whether that is a fan around a pole.
   bool is_pole(int bone, BoneEnd end) const { return frame_->ends.poles[bone][static_cast<int>(end)] >= 0; }
 
-  const DevicePlanes& device_points() const { return points_; }
+  const TexelPoints& device_points() const { return points_; }
   /// Those of vertices behind the texels, from the model's origin.
-  const DevicePlanes& device_end_points() const { return device_end_points_; }
+  const TexelPoints& device_end_points() const { return device_end_points_; }
   /// Per texel whether its quad takes the second diagonal.
   const ClBuffer<int>& device_diagonals() const { return device_diagonals_; }
   const ClBuffer<LatticeRow>& device_rows() const { return rows_; }
@@ -131,7 +132,7 @@ class LatticeMesh {
   std::vector<Vec3> end_positions_;         // the same in double precision, not from the model's origin
   std::vector<Triangle> end_triangles_;
   ClMapping<int> diagonals_;
-  DevicePlanes points_, device_end_points_;
+  TexelPoints points_, device_end_points_;
   ClBuffer<int> device_diagonals_;
 };
 

@@ -27,8 +27,6 @@ constexpr int kWideRounds = 2;         // of claims with a work-item per vertex;
 /// One work-item per vertex or edge, in groups of one size: PoCL compiles a kernel for every size that it meets.
 ClRange over(int count) { return {{static_cast<std::size_t>(count), 1}, {64, 1}}; }
 
-bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind == ChartVertex::kTailPole; }
-
 /// Angle between unit normals, precise for small ones too.
 double angle_between(const Vec3& a, const Vec3& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
 

@@ -115,9 +115,6 @@ DeviceSnapTables upload_tables(ClContext& context, const SnapTables& tables);
 SnappedPositions snap_positions(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables,
                                 ReadingPositions& positions);
 
-/// Planes of points, one per texel.
-using TexelPoints = DevicePlanes;
-
 /// Lists of put_back_listed, for all its calls on one lattice: 30 at most.
 struct TexelReturns {
   TexelReturns(ClContext& context, const DeviceLayout& layout);

@@ -48,7 +48,7 @@ ClRange over(std::size_t count) { return {{count, 1}, {64, 1}}; }
 /// \param arguments  of the kernel, between layout and points
 template <class... Arguments>
 ClBuffer<float> suspect(ClContext& context, const char* kernel, const DeviceLayout& layout,
-                        const ClBuffer<LatticeRow>& rows, const DevicePlanes& points, const Arguments&... arguments) {
+                        const ClBuffer<LatticeRow>& rows, const TexelPoints& points, const Arguments&... arguments) {
   auto suspicions2 = context.allocate<float>(layout.size());
   context.fill(suspicions2, 0.f);
   context.launch({"guard.cl", kernel}, row_range(context, rows.size), static_cast<int>(rows.size), layout.width,
@@ -136,7 +136,7 @@ ClBuffer<float> find_texel_normals(ClContext& context, const DeviceLayout& layou
 }
 
 ClBuffer<float> suspect_any_quads(ClContext& context, const DeviceLayout& layout, const ClBuffer<LatticeRow>& rows,
-                                  const DevicePlanes& points, const ClBuffer<int>& texel_triangles,
+                                  const TexelPoints& points, const ClBuffer<int>& texel_triangles,
                                   const ClBuffer<float>& texel_normals) {
   return suspect(context, "suspect_any_quads", layout, rows, points, texel_triangles, texel_normals);
 }
@@ -303,7 +303,7 @@ std::vector<Measured> TriangleDistances::measure_near(const LatticeMesh& lattice
       corners.push_back(lattice.triangle(i));
     }
   }
-  const DevicePlanes &points = lattice.device_points(), &ends = lattice.device_end_points();
+  const TexelPoints &points = lattice.device_points(), &ends = lattice.device_end_points();
   auto device_distances = context_.allocate<float>(asked.size());
   auto device_turned = context_.allocate<int>(asked.size());
   context_.launch({"guard.cl", "measure_triangles"}, over(asked.size()), static_cast<int>(asked.size()),

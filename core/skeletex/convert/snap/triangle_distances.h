@@ -18,7 +18,7 @@ ClBuffer<float> find_texel_normals(ClContext& context, const DeviceLayout& layou
 /// looks against that at a corner. \param rows           quad_rows \param points         of a lattice whose diagonals
 /// are not chosen \param texel_normals  see find_texel_normals
 ClBuffer<float> suspect_any_quads(ClContext& context, const DeviceLayout& layout, const ClBuffer<LatticeRow>& rows,
-                                  const DevicePlanes& points, const ClBuffer<int>& texel_triangles,
+                                  const TexelPoints& points, const ClBuffer<int>& texel_triangles,
                                   const ClBuffer<float>& texel_normals);
 
 /// How far the triangles of a lattice are from the mesh that it was read from, and which of them look against it,

@@ -141,9 +141,7 @@ class SeamMean {
   }
 
  private:
-  BoneEnd end_at(int bone, int node) const {
-    return skeleton_.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
-  }
+  BoneEnd end_at(int bone, int node) const { return skeletex::end_at(skeleton_, bone, node); }
 
   Overlay::SeamPoint mean_at(int bone, BoneEnd end, double turn) const {
     Overlay::SeamPoint mean;
@@ -303,7 +301,7 @@ Morph::Morph(ClContext& context, std::vector<SkeletexModel> models, std::span<co
     all.around.insert(all.around.end(), model.texture.around.begin(), model.texture.around.end());
     all.out.insert(all.out.end(), model.texture.out.begin(), model.texture.out.end());
   }
-  texels_ = {context.upload(all.along), context.upload(all.around), context.upload(all.out)};
+  texels_ = upload_texels(context, all);
 }
 
 Correspondence Morph::correspondence(int from, int to) const {
@@ -406,9 +404,9 @@ SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) 
     }
   }
   const std::size_t area = static_cast<std::size_t>(result.texture.width) * result.texture.height;
-  if (texels.x.size != area) {
+  if (texels.count != area) {
     texels = allocate_planes(*context_, area);
-    for (ClBuffer<float>* plane : {&texels.x, &texels.y, &texels.z}) context_->fill(*plane, 0);
+    context_->fill(texels.values, 0);
   }
   const FrameTables frames = frame_tables(result.skeleton, separation, result.patches, result.origin);
   blend_texels(*context_, tables, rows, frames, result.texture.width, texels_, texels);

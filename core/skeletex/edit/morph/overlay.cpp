@@ -15,10 +15,6 @@ namespace {
 
 constexpr double kNoWidth = 1e-9;  // turns
 
-BoneEnd end_at(const Skeleton& skeleton, int bone, int node) {
-  return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
-}
-
 /// y at x of a map that grows by a turn per turn, linear between its bounds.
 template <class Bound>
 double along_bounds(const std::vector<Bound>& bounds, double Bound::*x_of, double Bound::*y_of, double x) {

@@ -13,14 +13,6 @@
 
 namespace skeletex {
 
-namespace {
-
-BoneEnd end_at(const Skeleton& skeleton, int bone, int node) {
-  return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
-}
-
-}  // namespace
-
 std::vector<Vec3> map_surface(ClContext& context, const SkeletexModel& from, const SkeletexModel& to,
                               const Correspondence& correspondence) {
   const Lattice lattice = number_lattice(from);
@@ -54,9 +46,8 @@ std::vector<Vec3> map_surface(ClContext& context, const SkeletexModel& from, con
   const std::size_t area = static_cast<std::size_t>(from.texture.width) * from.texture.height;
   DevicePlanes read = allocate_planes(context, area);
   blend_texels(context, tables, rows, frame_tables(from.skeleton, separation, from.patches, from.origin),
-               from.texture.width, row_points(context, to, to_separation), read);
-  const std::array<std::vector<float>, 3> planes{context.download(read.x), context.download(read.y),
-                                                 context.download(read.z)};
+               from.texture.width, row_points(context, to, RowChoice::kAll), read);
+  const std::array<std::vector<float>, 3> planes = download_planes(context, read);
   const auto point_at = [&](int bone, int row, int column) {
     const Rectangle& rectangle = from.patches[bone].rectangle;
     const std::size_t at = static_cast<std::size_t>(rectangle.y + row) * from.texture.width + rectangle.x + column;

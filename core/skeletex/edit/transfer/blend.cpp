@@ -129,22 +129,16 @@ void blend_texels(ClContext& context, const BlendTables& tables, const std::vect
                  tables.source_count, static_cast<int>(result.patches.size()), texture_width, context.upload(rows),
                  context.upload(result.patches), context.upload(result.rows), context.upload(tables.sources),
                  context.upload(tables.rows), context.upload(tables.columns), context.upload(slopes),
-                 context.upload(result.columns), texels.x, texels.y, texels.z, blended.x, blended.y, blended.z);
+                 context.upload(result.columns), static_cast<int>(texels.count), texels.values,
+                 static_cast<int>(blended.count), blended.values);
 }
 
 void mix_texels(ClContext& context, const DevicePlanes& first, const DevicePlanes& second, double share,
                 int texture_width, DevicePlanes& mixed) {
-  if (mixed.x.size != first.x.size) mixed = allocate_planes(context, first.x.size);
-  const int height = static_cast<int>(first.x.size / texture_width);
+  if (mixed.count != first.count) mixed = allocate_planes(context, first.count);
+  const int height = static_cast<int>(first.count / texture_width);
   context.launch({"blend.cl", "mix_texels"}, row_range(context, height), height, texture_width,
-                 static_cast<float>(share), first.x, first.y, first.z, second.x, second.y, second.z, mixed.x, mixed.y,
-                 mixed.z);
-}
-
-void download_texels(ClContext& context, const DevicePlanes& texels, DisplacementTexture& texture) {
-  texture.along = context.download(texels.x);
-  texture.around = context.download(texels.y);
-  texture.out = context.download(texels.z);
+                 static_cast<float>(share), first.values, second.values, mixed.values);
 }
 
 void EndMoves::add(BoneEnd end, const Vec3& move) {
@@ -160,8 +154,8 @@ void move_ends(ClContext& context, const EndMoves& moves, const std::vector<Latt
     for (const std::vector<float>& plane : end) all.insert(all.end(), plane.begin(), plane.end());
   context.launch({"blend.cl", "move_ends"}, row_range(context, rows.size()), static_cast<int>(rows.size()),
                  texture_width, static_cast<int>(moves.planes[0][0].size()), context.upload(rows),
-                 context.upload(result.patches), context.upload(result.rows), context.upload(all), texels.x, texels.y,
-                 texels.z);
+                 context.upload(result.patches), context.upload(result.rows), context.upload(all),
+                 static_cast<int>(texels.count), texels.values);
 }
 
 }  // namespace skeletex

@@ -42,9 +42,6 @@ void blend_texels(ClContext& context, const BlendTables& tables, const std::vect
 void mix_texels(ClContext& context, const DevicePlanes& first, const DevicePlanes& second, double share,
                 int texture_width, DevicePlanes& mixed);
 
-/// Waits for texels on the device and copies them to a texture of their size.
-void download_texels(ClContext& context, const DevicePlanes& texels, DisplacementTexture& texture);
-
 /// What is added to the texels of the rows at the ends, and to those inside less and less.
 struct EndMoves {
   std::array<std::array<std::vector<float>, 3>, 2>

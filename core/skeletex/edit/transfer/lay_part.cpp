@@ -4,25 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "skeletex/skeleton/separation_planes.h"
-
 namespace skeletex {
-
-DevicePlanes points_in_bone_axes(ClContext& context, const SkeletexModel& model) {
-  const SeparationPlanes separation(model.skeleton);
-  FrameTables tables = frame_tables(model.skeleton, separation, model.patches, model.origin);
-  for (PatchRecord& patch : tables.patches)
-    for (int i = 0; i < 3; ++i) {
-      patch.head[i] = 0;
-      patch.s[i] = i == 0 ? 1.0f : 0.0f;
-      patch.b[i] = i == 1 ? 1.0f : 0.0f;
-      patch.axis[i] = i == 2 ? 1.0f : 0.0f;
-    }
-  const DeviceLattice lattice = upload_lattice(context, tables, model.patches, model.texture, RowChoice::kAll);
-  DevicePlanes points = allocate_planes(context, lattice.vertex_count);
-  displace(context, lattice, points);
-  return points;
-}
 
 DevicePlanes lay_part(ClContext& context, const LaidTables& tables, const FrameTables& result,
                       const DevicePlanes& source, const DevicePlanes& target, std::size_t point_count) {
@@ -31,7 +13,8 @@ DevicePlanes lay_part(ClContext& context, const LaidTables& tables, const FrameT
                  static_cast<int>(tables.rows.size()), static_cast<int>(tables.columns.size()),
                  context.upload(tables.rows), context.upload(result.patches), context.upload(tables.patches),
                  context.upload(tables.laid_rows), context.upload(tables.columns), context.upload(tables.corrections),
-                 source.x, source.y, source.z, target.x, target.y, target.z, points.x, points.y, points.z);
+                 static_cast<int>(source.count), source.values, static_cast<int>(target.count), target.values,
+                 static_cast<int>(points.count), points.values);
   return points;
 }
 
@@ -41,7 +24,7 @@ DevicePlanes read_part(ClContext& context, const LaidTables& tables, const Frame
   context.launch({"transfer.cl", "read_part"}, row_range(context, tables.rows.size()),
                  static_cast<int>(tables.rows.size()), context.upload(tables.rows), context.upload(result.patches),
                  context.upload(tables.patches), context.upload(tables.laid_rows), context.upload(tables.columns),
-                 points.x, points.y, points.z, read.x, read.y, read.z);
+                 static_cast<int>(points.count), points.values, static_cast<int>(read.count), read.values);
   return read;
 }
 
@@ -50,7 +33,7 @@ void keep_target(ClContext& context, const LaidTables& tables, const FrameTables
   context.launch({"transfer.cl", "keep_target"}, row_range(context, tables.rows.size()),
                  static_cast<int>(tables.rows.size()), texture_width, context.upload(tables.rows),
                  context.upload(result.patches), context.upload(tables.patches), context.upload(tables.columns),
-                 target.x, target.y, target.z, texels.x, texels.y, texels.z);
+                 static_cast<int>(texels.count), target.values, texels.values);
 }
 
 std::array<std::vector<double>, SKELETEX_TRANSFER_BANDS> wave_bands(const std::vector<double>& values) {

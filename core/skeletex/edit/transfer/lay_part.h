@@ -23,9 +23,6 @@ struct LaidTables {
   }
 };
 
-/// The points of all rows of a model's lattice, each in the axes (s, b, o) of its bone from the bone's head.
-DevicePlanes points_in_bone_axes(ClContext& context, const SkeletexModel& model);
-
 /// Queues the kernel. \param source, target  points in bone axes   \return points in the axes of the result's bones
 DevicePlanes lay_part(ClContext& context, const LaidTables& tables, const FrameTables& result,
                       const DevicePlanes& source, const DevicePlanes& target, std::size_t point_count);

@@ -36,10 +36,6 @@ std::vector<int> steps_from(const Skeleton& skeleton, int start, int without = -
 
 }  // namespace
 
-BoneEnd opposite(BoneEnd end) { return end == BoneEnd::kHead ? BoneEnd::kTail : BoneEnd::kHead; }
-BoneEnd end_at(const Skeleton& skeleton, int bone, int node) {
-  return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
-}
 bool is_free_end(const SkeletexModel& model, int bone, BoneEnd end) {
   return model.ends[bone][static_cast<int>(end)].arcs.empty();
 }

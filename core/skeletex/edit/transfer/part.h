@@ -20,8 +20,6 @@ struct Part {
 /// Name of the bone that stands for the rest of the body: no file's bone has it.
 extern const char* const kRestOfBody;
 
-BoneEnd opposite(BoneEnd end);
-BoneEnd end_at(const Skeleton& skeleton, int bone, int node);
 bool is_free_end(const SkeletexModel& model, int bone, BoneEnd end);
 
 /// The end that the rest of the body lies at: the one that is not free, else the one nearer to a root.

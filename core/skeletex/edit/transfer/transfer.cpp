@@ -62,8 +62,7 @@ void smooth_around(std::vector<double>& values) {
 /// Points of a lattice's rows in the axes of their bones, on the host.
 struct HostPoints {
   std::array<std::vector<float>, 3> planes;
-  HostPoints(ClContext& context, const DevicePlanes& points)
-      : planes{context.download(points.x), context.download(points.y), context.download(points.z)} {}
+  HostPoints(ClContext& context, const DevicePlanes& points) : planes(download_planes(context, points)) {}
   Vec3 at(std::size_t i) const { return {planes[0][i], planes[1][i], planes[2][i]}; }
 };
 
@@ -364,21 +363,16 @@ class Laying {
     const DevicePlanes points = lay_part(context_, tables_, frames_, source_points_, target_points_, point_count_);
 
     const DisplacementTexture& t = target_.texture;
-    const DevicePlanes target{context_.upload(t.along), context_.upload(t.around), context_.upload(t.out)};
-    DevicePlanes texels{context_.upload(t.along), context_.upload(t.around), context_.upload(t.out)};
-    const DeviceTables device = upload_tables(context_, frames_);
-    context_.launch({"reconstruct.cl", "enter_tangent_space"}, row_range(context_, tables_.rows.size()),
-                    static_cast<int>(tables_.rows.size()), t.width, device.column_count, context_.upload(tables_.rows),
-                    device.patches, device.rows, device.columns, points.x, points.y, points.z, texels.x, texels.y,
-                    texels.z);
+    const DevicePlanes target = upload_texels(context_, t);
+    DevicePlanes texels = upload_texels(context_, t);
+    enter_tangent_space(context_, upload_tables(context_, frames_), context_.upload(tables_.rows), t.width, points,
+                        texels);
     keep_target(context_, tables_, frames_, t.width, target, texels);
-    result.texture.along = context_.download(texels.x);
-    result.texture.around = context_.download(texels.y);
-    result.texture.out = context_.download(texels.z);
+    download_texels(context_, texels, result.texture);
     if (options_.blend != TransferBlend::kCosine || !options_.is_smooth) return result;
     if (std::none_of(parts.begin(), parts.end(), [&](const auto& part) { return needs_join(*part); })) return result;
     const HostPoints read(context_, read_part(context_, tables_, frames_,
-                                              row_points(context_, even_source_, source_separation_), point_count_));
+                                              row_points(context_, even_source_, RowChoice::kAll), point_count_));
     for (const auto& part : parts) {
       if (!needs_join(*part)) continue;
       SkeletexModel joined = join_surface(context_, even_target_, result, placed_patches(*part, laid, read),
