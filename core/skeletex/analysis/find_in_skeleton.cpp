@@ -171,8 +171,6 @@ void find_between_bones(const Skeleton& skeleton, const std::vector<bool>& has_l
 
 }  // namespace
 
-std::string text_of(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x(), p.y(), p.z()); }
-
 std::string text_of_distance(double distance, double diagonal) {
   return fmt::format("{:.4g} ({:.2g} % of the diagonal)", distance, diagonal > 0 ? 100 * distance / diagonal : 0);
 }

@@ -10,8 +10,6 @@
 
 namespace skeletex {
 
-/// "(0.12, 0.4, 0.03)"
-std::string text_of(const Vec3& p);
 /// "0.0123 (0.8 % of the diagonal)"
 std::string text_of_distance(double distance, double diagonal);
 

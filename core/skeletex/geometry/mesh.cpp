@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/geometry/mesh.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 
 namespace skeletex {
@@ -31,6 +33,10 @@ double signed_volume(const TriangleMesh& mesh) {
   double volume = 0;
   for (const Triangle& t : mesh.triangles) volume += (mesh.positions[t[0]] - origin).dot(area_vector(mesh, t)) / 3;
   return volume;
+}
+
+std::string text_of(const Vec3& point) {
+  return fmt::format("({:.6g}, {:.6g}, {:.6g})", point.x(), point.y(), point.z());
 }
 
 }  // namespace skeletex

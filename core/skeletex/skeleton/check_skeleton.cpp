@@ -44,8 +44,6 @@ int winding_number(std::span<const Vec3> positions, std::span<const int> corners
 
 namespace {
 
-std::string text_of(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x(), p.y(), p.z()); }
-
 /// Where a bone first meets the surface on its way from head to tail: its parameter, or infinity.
 double first_crossing(const CutMesh& mesh, const Vec3& head, const Vec3& tail) {
   // Coordinates along the bone and across it; a triangle all on one side of a plane is out.

@@ -18,8 +18,6 @@
 namespace skeletex {
 namespace {
 
-std::string text_of(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x(), p.y(), p.z()); }
-
 /// Which bone's side of which node's separation planes a half-edge runs along.
 struct SeamSide {
   int node;
