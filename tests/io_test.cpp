@@ -363,7 +363,7 @@ TEST(MeshFiles, WrittenMeshesComeBackAsTheyWere) {
     EXPECT_EQ(file.mesh.triangles, mesh.triangles);
     ASSERT_EQ(file.mesh.positions.size(), mesh.positions.size());
     for (std::size_t i = 0; i < mesh.positions.size(); ++i)
-      EXPECT_EQ(file.mesh.positions[i], mesh.positions[i]) << name << " " << i;
+      EXPECT_EQ(file.mesh.positions[i].cast<float>(), mesh.positions[i].cast<float>()) << name << " " << i;
   }
   EXPECT_EQ(folder.file_count(), 3);
   EXPECT_TRUE(contains(error_of([&] { write_mesh(folder / "a.stl", mesh); }), ".ply or .obj"));

@@ -18,18 +18,19 @@
 namespace skeletex::cli {
 namespace {
 
-/// A column with waves along it, and three bones in its axis.
+/// A column with waves about and along it, and three bones in its axis.
 struct Column {
   TriangleMesh mesh;
   Skeleton skeleton;
 };
 
-Column make_column() {
+Column make_column(int waves) {
   constexpr int kSides = 12, kRings = 31;
   Column column;
   for (int ring = 0; ring < kRings; ++ring)
     for (int side = 0; side < kSides; ++side) {
-      const double angle = 2 * std::numbers::pi * side / kSides, radius = 0.4 + 0.1 * std::sin(1.3 * ring + angle);
+      const double angle = 2 * std::numbers::pi * side / kSides,
+                   radius = 0.4 + 0.1 * std::sin(1.3 * ring + waves * angle);
       column.mesh.positions.push_back({radius * std::cos(angle), radius * std::sin(angle), 0.1 * ring});
     }
   const int bottom = kRings * kSides, top = bottom + 1;
@@ -78,7 +79,7 @@ Skeleton bent(Skeleton skeleton) {
 }  // namespace
 
 void compile_kernels(ClContext& context, ProgressBar& bar) {
-  const Column column = make_column();
+  const Column column = make_column(1);
   bar.show("encode", 0);
   const SkeletexModel model = encode_all_ways(context, column);
   bar.show("reconstruct", 0.5);
@@ -90,10 +91,14 @@ void compile_kernels(ClContext& context, ProgressBar& bar) {
   bar.show("metro", 0.6);
   measure_metro(context, column.mesh, surface);
   bar.show("morph", 0.7);
+  const Column other = make_column(2);
+  EncodeOptions options;
+  options.width = options.height = model.texture.width;
+  const SkeletexModel other_model = encode_model(context, other.mesh, other.skeleton, options).model;
   const Correspondence same = find_correspondence(model.skeleton, model.skeleton);
-  Morph(context, {model, model}, std::vector{same}).at(std::vector{0.5, 0.5});
+  Morph(context, {model, other_model}, std::vector{same}).at(std::vector{0.5, 0.5});
   bar.show("transfer", 0.8);
-  const SkeletexModel changed = transfer(context, model, model, {{"c", "c"}});
+  const SkeletexModel changed = transfer(context, other_model, model, {{"c", "c"}}, {.keep = 0});
   LiveBlend(context, model, changed).at(0.5);
   bar.show("filter", 0.9);
   smooth_model(context, model, {.keeps_volume = true}, {.bones = {"b"}});

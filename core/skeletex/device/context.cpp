@@ -76,6 +76,9 @@ ClKind argument_kind(const ::cl::Kernel& kernel, cl_uint index) {
   if (type == "float") return ClKind::kFloat;
   if (type == "int") return ClKind::kInt;
   if (type == "uint" || type == "unsigned int" || type == "unsigned") return ClKind::kUnsigned;
+  // The language's own types have small letters.
+  if (type.starts_with("struct ") || (!type.empty() && std::isupper(static_cast<unsigned char>(type[0]))))
+    return ClKind::kStruct;
   return ClKind::kUnknown;
 }
 
