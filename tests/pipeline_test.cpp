@@ -5,12 +5,10 @@
 #include <algorithm>
 #include <filesystem>
 #include <numeric>
-#include <set>
 
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/analysis/metro.h"
 #include "skeletex/convert/encode_model.h"
-#include "skeletex/convert/sample/encoding_kernels.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "support/load_model.h"
@@ -109,36 +107,6 @@ TEST(Hybrid, StaysWithinHalfAsMuchAgainOfVsmWhereSpdLosesMost) {
     RecordProperty(name, std::to_string(ratio));
     EXPECT_LE(ratio, 1.5) << name;
   }
-}
-
-TEST(Pipeline, LaunchesNoKernelThatIsNotListedForIt) {
-  const TestModel model = load_standard_model("bear");
-  for (const EncodeMethod method : {EncodeMethod::kVsm, EncodeMethod::kSpd, EncodeMethod::kHybrid})
-    for (const bool is_snapped : {false, true}) {
-      EncodeOptions options;
-      options.method = method;
-      options.width = options.height = 96;
-      options.has_snap = options.has_fit = is_snapped;
-      options.has_half_texels = true;
-      ClContext context;
-      std::set<std::string> listed;
-      for (const KernelVariant& kernel : encoding_kernels(context, options))
-        listed.insert(std::string(kernel.name.file) + ":" + std::string(kernel.name.kernel));
-      encode_model(context, model.mesh, model.skeleton, options);
-      for (const ClProfileEntry& launched : context.profile())
-        EXPECT_TRUE(listed.contains(launched.kernel))
-            << launched.kernel << " by method " << static_cast<int>(method) << ", snapped " << is_snapped;
-    }
-}
-
-TEST(Pipeline, KernelsCompiledAheadDoNothing) {
-  ClContext context;
-  EncodeOptions options;
-  options.method = EncodeMethod::kHybrid;
-  options.has_snap = options.has_fit = options.has_half_texels = true;
-  for (const KernelVariant& kernel : encoding_kernels(context, options))
-    EXPECT_NO_THROW(context.compile(kernel.name, kernel.range)) << kernel.name.kernel;
-  EXPECT_TRUE(context.profile().empty());
 }
 
 TEST(Pipeline, ASecondEncodeGivesTheSameBytes) {

@@ -204,7 +204,7 @@ TEST(RegularGrid, StaysOnTheSurfaceAndMakesMorphsAsSmoothAsOfEvenModels) {
     EXPECT_LT(from_snapped, 1.02 * from_even);
     // Means of the texels themselves are rougher by half.
     SkeletexModel untold[2] = {snapped[0], snapped[1]};
-    for (SkeletexModel& model : untold) model.encoder_settings = "{}";
+    for (SkeletexModel& model : untold) model.sampling = {};
     const double mixed = mean_angle(half_way({untold[0], untold[1]}));
     EXPECT_GT(mixed, 1.2 * from_snapped);
     RecordProperty(

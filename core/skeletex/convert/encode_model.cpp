@@ -15,6 +15,7 @@
 #include "skeletex/convert/layout/row_profile.h"
 #include "skeletex/convert/sample/sample_seams.h"
 #include "skeletex/convert/segment/segment_mesh.h"
+#include "skeletex/device/stopwatch.h"
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/model/error.h"
 
@@ -24,20 +25,6 @@ namespace {
 // With fewer, vertices pull texels about without making edges between them; the fit makes up for some of that.
 constexpr double kSnapTexelsPerVertex = 2, kFittedSnapTexelsPerVertex = 1.5;
 constexpr double kLeastDihedral = 0.004;  // radians: flatter edges are no creases to snap to
-
-class Stopwatch {
- public:
-  /// Milliseconds since construction or the last call.
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const double ms = std::chrono::duration<double, std::milli>(now - start_).count();
-    start_ = now;
-    return ms;
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 void check_options(const EncodeOptions& options, const Skeleton& skeleton) {
   if (options.vsm.iterations < 0 || options.vsm.iterations > 100)
@@ -197,10 +184,10 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   Stopwatch watch;
   progress("half edges", 0);
   CutMesh half_edges = cut_mesh_of(mesh);
-  report.half_edge_ms = watch.lap();
+  report.half_edge_ms = watch.lap_ms();
   progress("segmentation", 0.05);
   const Segmentation segmentation = segment_mesh(context, std::move(half_edges), skeleton);
-  report.segmentation_ms = watch.lap();
+  report.segmentation_ms = watch.lap_ms();
 
   progress("parameterization", 0.2);
   std::vector<Chart> charts(bones);
@@ -222,7 +209,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
         vsm_reports[bone] = solved[i++];
       }
   }
-  report.parameterization_ms = watch.lap();
+  report.parameterization_ms = watch.lap_ms();
 
   progress("encoding", 0.6);
   // Texels are shared out by detail; rectangles have the sides' ratio of girth to length.
@@ -322,12 +309,13 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
       read_texels(context, skeleton, separation, {charts, model.patches, hits, end_points, &guard, listing_features},
                   options.width, options.height, model.origin, texel_options);
   model.texture = std::move(texels.texture);
+  model.sampling = {options.has_prefilter, placing.has_snap, placing.has_fit};
   {
     nlohmann::json settings = settings_json(options, placing, unseen);
     add_results(texels.report, model.diagonal, settings);
     model.encoder_settings = settings.dump();
   }
-  report.encoding_ms = watch.lap();
+  report.encoding_ms = watch.lap_ms();
 
   report.vertices = static_cast<int>(mesh.positions.size());
   report.triangles = static_cast<int>(mesh.triangles.size());

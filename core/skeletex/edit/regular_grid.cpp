@@ -3,7 +3,6 @@
 
 #include <utility>
 
-#include "skeletex/model/encoder_settings.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/skeleton/separation_planes.h"
@@ -22,12 +21,10 @@ struct SlidingPoints {
 }  // namespace
 
 SkeletexModel regular_grid(ClContext& context, const SkeletexModel& model) {
-  nlohmann::json settings = parsed_encoder_settings(model);
-  if (settings["snap"] != true) return model;
+  if (!model.sampling.is_snapped) return model;
   SkeletexModel result = model;
   result.diagonals = DiagonalRule::kNearest;
-  settings["snap"] = settings["fit"] = false;
-  result.encoder_settings = settings.dump();
+  result.sampling.is_snapped = result.sampling.is_fitted = false;
   const SeparationPlanes separation(model.skeleton);
   const FrameTables tables = in_bone_axes(frame_tables(model.skeleton, separation, model.patches, model.origin));
   DeviceLattice lattice = upload_lattice(context, tables, model.patches, model.texture, RowChoice::kAll);
@@ -59,7 +56,7 @@ SkeletexModel regular_grid(ClContext& context, const SkeletexModel& model) {
   if (slid.empty()) return result;
   const auto slid_rows = context.upload(slid);
   const int slid_count = static_cast<int>(slid.size());
-  if (settings["prefilter"] == true) {
+  if (model.sampling.is_prefiltered) {
     context.launch({"regular_grid.cl", "prefilter_rows"}, row_range(context, slid.size()), slid_count, slid_rows,
                    lattice.tables.patches, static_cast<int>(count), now.points.values, next.points.values);
     now = next;

@@ -294,7 +294,7 @@ struct LatticeTaps {
   FilterTaps rows, columns;
 };
 LatticeTaps lattice_taps(const SkeletexModel& model, const std::vector<Patch>& patches, ResampleFilter filter) {
-  const double softness = parsed_encoder_settings(model)["prefilter"] == true ? kPrefilter : 0;
+  const double softness = model.sampling.is_prefiltered ? kPrefilter : 0;
   LatticeTaps taps;
   for (std::size_t bone = 0; bone < patches.size(); ++bone) {
     const Rectangle &from = model.patches[bone].rectangle, &to = patches[bone].rectangle;
@@ -452,12 +452,9 @@ SkeletexModel resample_model(ClContext& context, const PreparedModel& prepared, 
     arc = resample_arc(model, prepared.separation, arc,
                        std::max(arc.is_closed() ? 3 : 2, static_cast<int>(std::lround(old_cells * ratio))));
   }
-  // For the record, and because a fit straddles the surface as prefiltered texels do.
-  nlohmann::json settings = parsed_encoder_settings(model);
-  settings["prefilter"] = true;
-  settings["snap"] = settings["fit"] = false;
-  settings["resampled_from"] = {model.texture.width, model.texture.height};
-  result.encoder_settings = settings.dump();
+  // The filter fits the surface between texels, which leaves them off it as the prefilter does.
+  result.sampling = {.is_prefiltered = true, .is_snapped = false, .is_fitted = false};
+  record_setting(result, "resampled_from", {model.texture.width, model.texture.height});
   return result;
 }
 

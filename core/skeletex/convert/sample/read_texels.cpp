@@ -88,7 +88,7 @@ TexelPoints allocate_points(ClContext& context, std::size_t size) {
 
 template <class T>
 void copy_plane(ClContext& context, const ClBuffer<T>& from, ClBuffer<T>& to) {
-  context.queue().enqueueCopyBuffer(from.memory, to.memory, 0, 0, from.size * sizeof(T));
+  context.copy(from, to);
 }
 
 TexelPoints copy_points(ClContext& context, const TexelPoints& points) {

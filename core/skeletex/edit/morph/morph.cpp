@@ -326,6 +326,7 @@ std::unique_ptr<Morph::Between> Morph::between(std::span<const double> given, bo
   result.skeleton = layout.skeleton;
   result.genus = layout.genus;
   result.diagonals = layout.diagonals;
+  result.sampling = layout.sampling;
   result.encoder_settings = layout.encoder_settings;
   std::vector<const Skeleton*> skeletons;
   std::vector<Correspondence> from_layout;
@@ -363,9 +364,7 @@ std::unique_ptr<Morph::Between> Morph::between(std::span<const double> given, bo
 
   result.texture.width = layout.texture.width;
   result.texture.height = layout.texture.height;
-  nlohmann::json settings = parsed_encoder_settings(result);
-  settings["morphed"] = weights;
-  result.encoder_settings = settings.dump();
+  record_setting(result, "morphed", weights);
   return between;
 }
 

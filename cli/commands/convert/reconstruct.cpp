@@ -55,6 +55,19 @@ std::vector<int> bones_by_name(const Skeleton& skeleton, const std::vector<std::
   return bones;
 }
 
+/// The surface in its pose, or at a constant distance from the bones.
+TriangleMesh surface_of(ClContext& context, const PreparedModel& prepared, const std::optional<Skeleton>& posed,
+                        const Arguments& arguments) {
+  const SkeletexModel& model = prepared.model();
+  const DistanceRule rule = arguments.is_distance_dropped ? DistanceRule::kFromFoot : DistanceRule::kFromBone;
+  if (arguments.constant_offset)
+    return constant_offset_mesh(context, prepared, posed ? *posed : model.skeleton,
+                                bones_by_name(model.skeleton, arguments.bones),
+                                *arguments.constant_offset * model.diagonal, rule);
+  if (posed) return reconstruct_mesh(context, prepared, *posed, {deformation_of(arguments.deform), rule});
+  return reconstruct_mesh(context, prepared);
+}
+
 void run(const Arguments& arguments) {
   if (arguments.constant_offset && arguments.is_polished)
     throw CLI::ValidationError("--polish", "--constant-offset writes no surface that could be polished");
@@ -68,14 +81,14 @@ void run(const Arguments& arguments) {
                        pose_at(model.skeleton, animation, arguments.time.value_or(animation.frames.front().time)));
   }
   const double read_ms = watch.lap_ms();
-  ClContext& context = open_device(arguments.device);
+  ClContext context(arguments.device);
   const double start_ms = watch.lap_ms();
   double resample_ms = 0, reconstruct_ms = 0, write_ms = 0;
   TriangleMesh mesh;
   std::optional<PoseReport> pose_report;
   std::optional<PolishReport> polish_report;
   {
-    ProgressBar bar;
+    ProgressBar bar(context);
     if (arguments.size > 0 && arguments.size != std::max(model.texture.width, model.texture.height)) {
       bar.show("resampling", 0.1);
       model = resample_model(context, model, arguments.size);
@@ -83,15 +96,7 @@ void run(const Arguments& arguments) {
     resample_ms = watch.lap_ms();
     bar.show("reconstructing", 0.3);
     const PreparedModel prepared(model);
-    const DistanceRule rule = arguments.is_distance_dropped ? DistanceRule::kFromFoot : DistanceRule::kFromBone;
-    if (arguments.constant_offset) {
-      const Skeleton& skeleton = posed ? *posed : model.skeleton;
-      mesh = constant_offset_mesh(context, prepared, skeleton, bones_by_name(model.skeleton, arguments.bones),
-                                  *arguments.constant_offset * model.diagonal, rule);
-    } else {
-      mesh = posed ? reconstruct_mesh(context, prepared, *posed, {deformation_of(arguments.deform), rule})
-                   : reconstruct_mesh(context, prepared);
-    }
+    mesh = surface_of(context, prepared, posed, arguments);
     if (arguments.is_polished) {
       bar.show("polishing", 0.5);
       polish_report = polish_pose(reconstruct_mesh(context, prepared), mesh.positions);

@@ -24,9 +24,10 @@ void run(const Arguments& arguments) {
   if (arguments.is_removed) {
     model.bone_weights.clear();
   } else {
-    ProgressBar bar;
+    ClContext context(arguments.device);
+    ProgressBar bar(context);
     bar.show("weights", 0.2);
-    model.bone_weights = weight_planes(open_device(arguments.device), model);
+    model.bone_weights = weight_planes(context, model);
   }
   write_model(arguments.output, model);
   Json channels = Json::array();

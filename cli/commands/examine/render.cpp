@@ -251,35 +251,57 @@ void pose_surface(GlContext& gl, ClContext& context, const Arguments& arguments,
             *subject.skeleton, surface);
 }
 
+void draw_skeleton(GlContext& gl, const Subject& subject, const Camera& camera, const DrawOptions& options,
+                   Image& image) {
+  const TriangleMesh bones = skeleton_mesh(*subject.skeleton, 0.009 * bounding_box(subject.mesh).diagonal());
+  SurfacePaint paint;
+  paint.paint = Paint::kFace;
+  std::vector<VertexColour> colours;
+  for (const int bone : skeleton_mesh_bones(*subject.skeleton))
+    colours.push_back(bone < 0 ? VertexColour{38, 40, 46} : VertexColour{214, 92, 38});
+  paint.colours = upload_colours(colours);
+  DrawOptions plain = options;
+  plain.wire_pixels = 0;
+  plain.lighting = 0.8;
+  blend_over(image, draw(gl, upload_surface(gl, bones), paint, camera, plain), 0.85);
+}
+
+/// Takes mesh, skeleton and view from a file of configs/models. \return the view, null where there is none
+nlohmann::json resolve_config(Arguments& arguments, const CLI::App& command) {
+  if (!has_ending(arguments.input, ".json")) return {};
+  const ModelConfig config = read_model_config(arguments.input);
+  check_named_input(command, config.mesh.string(), "the mesh of " + arguments.input);
+  if (!config.skeleton.empty())
+    check_named_input(command, config.skeleton.string(), "the skeleton of " + arguments.input);
+  arguments.input = config.mesh.string();
+  if (arguments.skeleton.empty() && (arguments.shows_skeleton || arguments.mode == "segments"))
+    arguments.skeleton = config.skeleton.string();
+  return config.view;
+}
+
+/// The texture, or where its patches lie.
+void run_texture(const Arguments& arguments, int size) {
+  const SkeletexModel model = read_model(arguments.input);
+  write_picture(arguments.output, arguments.mode == "map" ? map_image(model, size) : layout_image(model, size));
+  print(arguments.json, arguments.output + '\n');
+  write_json(
+      arguments.json,
+      {{"picture", arguments.output}, {"mode", arguments.mode}, {"size", {model.texture.width, model.texture.height}}});
+}
+
 void run(Arguments arguments, const CLI::App& command) {
-  nlohmann::json own_view;
-  if (has_ending(arguments.input, ".json")) {
-    const ModelConfig config = read_model_config(arguments.input);
-    own_view = config.view;
-    check_named_input(command, config.mesh.string(), "the mesh of " + arguments.input);
-    if (!config.skeleton.empty())
-      check_named_input(command, config.skeleton.string(), "the skeleton of " + arguments.input);
-    arguments.input = config.mesh.string();
-    if (arguments.skeleton.empty() && (arguments.shows_skeleton || arguments.mode == "segments"))
-      arguments.skeleton = config.skeleton.string();
-  }
+  const nlohmann::json own_view = resolve_config(arguments, command);
   check_arguments(arguments);
   const auto [width, height] = parse_picture_size(arguments.size);
   const std::optional<LinearRgb> background = parse_background(arguments.background);
   const View view = view_of(arguments, own_view);
   Stopwatch watch;
   if (arguments.mode == "map" || arguments.mode == "layout") {
-    const SkeletexModel model = read_model(arguments.input);
-    write_picture(arguments.output, arguments.mode == "map" ? map_image(model, std::max(width, height))
-                                                            : layout_image(model, std::max(width, height)));
-    print(arguments.json, arguments.output + '\n');
-    write_json(arguments.json, {{"picture", arguments.output},
-                                {"mode", arguments.mode},
-                                {"size", {model.texture.width, model.texture.height}}});
+    run_texture(arguments, std::max(width, height));
     return;
   }
-  ClContext& context = open_device(arguments.device);
-  ProgressBar bar;
+  ClContext context(arguments.device);
+  ProgressBar bar(context);
   bar.show("reading", 0.05);
   Subject subject = load_subject(arguments, context);
   ErrorScale scale;
@@ -308,19 +330,7 @@ void run(Arguments arguments, const CLI::App& command) {
     turned.azimuth_deg += 360.0 * i / arguments.views;
     const Camera camera = fit_camera(turned, points, width, height);
     Image image = draw(gl, surface, paint, camera, options);
-    if (shows_skeleton) {
-      const TriangleMesh bones = skeleton_mesh(*subject.skeleton, 0.009 * bounding_box(subject.mesh).diagonal());
-      SurfacePaint bone_paint;
-      bone_paint.paint = Paint::kFace;
-      std::vector<VertexColour> colours;
-      for (const int bone : skeleton_mesh_bones(*subject.skeleton))
-        colours.push_back(bone < 0 ? VertexColour{38, 40, 46} : VertexColour{214, 92, 38});
-      bone_paint.colours = upload_colours(colours);
-      DrawOptions plain = options;
-      plain.wire_pixels = 0;
-      plain.lighting = 0.8;
-      blend_over(image, draw(gl, upload_surface(gl, bones), bone_paint, camera, plain), 0.85);
-    }
+    if (shows_skeleton) draw_skeleton(gl, subject, camera, options, image);
     images.push_back(std::move(image));
   }
   Image picture = tile(images, arguments.views);
@@ -346,6 +356,42 @@ void run(Arguments arguments, const CLI::App& command) {
             {"renderer", gl.renderer()}};
   if (!scale.colours.empty()) json["error_max"] = scale.highest;
   write_json(arguments.json, json);
+}
+
+void add_pose_options(CLI::App& command, Arguments& arguments) {
+  CLI::Option* pose =
+      declare_input(command, command.add_option("--pose", arguments.pose, "pose or animation of a model: .json"))
+          ->type_name("FILE");
+  command.add_option("--time", arguments.time, "time in the animation (default: its first frame)")
+      ->check(any_number())
+      ->type_name("T")
+      ->needs(pose);
+  add_deform_option(command, arguments.deform)->needs(pose);
+  command
+      .add_flag("--no-distance", arguments.is_distance_dropped,
+                "with --deform paper or coordinates: do not restore the distances to the bones")
+      ->needs(pose);
+  add_polish_option(command, arguments.is_polished, pose);
+}
+
+void add_camera_options(CLI::App& command, Arguments& arguments) {
+  declare_input(command, command.add_option("--camera", arguments.camera,
+                                            "view: .json with azimuth, elevation, fov, zoom, up, front, target, eye"))
+      ->type_name("FILE");
+  command.add_option("--azimuth", arguments.azimuth, "degrees about the up axis, 0 from the front (default: 30)")
+      ->check(any_number())
+      ->type_name("DEG");
+  command.add_option("--elevation", arguments.elevation, "degrees above the horizon (default: 15)")
+      ->check(number_in(-90.0, 90.0))
+      ->type_name("DEG");
+  command.add_option("--fov", arguments.fov, "degrees of the shorter side, 0: orthographic (default: 25)")
+      ->check(number_in(0.0, 120.0))
+      ->type_name("DEG");
+  command.add_option("--zoom", arguments.zoom, "1: the model fills the picture")
+      ->check(number_in(0.01, 1000.0))
+      ->type_name("X");
+  command.add_option("--up", arguments.up, "the model's up direction (default: 0,1,0)")->type_name("X,Y,Z");
+  command.add_option("--front", arguments.front, "where the model looks (default: 0,0,1)")->type_name("X,Y,Z");
 }
 
 }  // namespace
@@ -381,39 +427,11 @@ void add_render_command(CLI::App& program) {
                   "upper end of the colours, share of the diagonal (default: 99 % lie below)")
       ->check(number_above(0))
       ->type_name("X");
-  CLI::Option* pose =
-      declare_input(command, command.add_option("--pose", arguments->pose, "pose or animation of a model: .json"))
-          ->type_name("FILE");
-  command.add_option("--time", arguments->time, "time in the animation (default: its first frame)")
-      ->check(any_number())
-      ->type_name("T")
-      ->needs(pose);
-  add_deform_option(command, arguments->deform)->needs(pose);
-  command
-      .add_flag("--no-distance", arguments->is_distance_dropped,
-                "with --deform paper or coordinates: do not restore the distances to the bones")
-      ->needs(pose);
-  add_polish_option(command, arguments->is_polished, pose);
+  add_pose_options(command, *arguments);
   command.add_option("--lattice", arguments->lattice, "draw a model at another texture size, 4 to 16384 texels")
       ->check(number_in(4, 16384))
       ->type_name("N");
-  declare_input(command, command.add_option("--camera", arguments->camera,
-                                            "view: .json with azimuth, elevation, fov, zoom, up, front, target, eye"))
-      ->type_name("FILE");
-  command.add_option("--azimuth", arguments->azimuth, "degrees about the up axis, 0 from the front (default: 30)")
-      ->check(any_number())
-      ->type_name("DEG");
-  command.add_option("--elevation", arguments->elevation, "degrees above the horizon (default: 15)")
-      ->check(number_in(-90.0, 90.0))
-      ->type_name("DEG");
-  command.add_option("--fov", arguments->fov, "degrees of the shorter side, 0: orthographic (default: 25)")
-      ->check(number_in(0.0, 120.0))
-      ->type_name("DEG");
-  command.add_option("--zoom", arguments->zoom, "1: the model fills the picture")
-      ->check(number_in(0.01, 1000.0))
-      ->type_name("X");
-  command.add_option("--up", arguments->up, "the model's up direction (default: 0,1,0)")->type_name("X,Y,Z");
-  command.add_option("--front", arguments->front, "where the model looks (default: 0,0,1)")->type_name("X,Y,Z");
+  add_camera_options(command, *arguments);
   command.add_option("--views", arguments->views, "pictures side by side, all the way round")
       ->check(number_in(1, 24))
       ->type_name("N");

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "command.h"
+#include "compile_kernels.h"
 #include "skeletex/model/error.h"
 #include "table.h"
 
@@ -15,7 +16,25 @@ std::string short_version(const std::string& version) {
   return version.substr(0, version.find(' ', version.find(' ') + 1));
 }
 
-void run(const std::string& json_target) {
+struct Arguments {
+  std::string device, json;
+  bool is_compiling = false;
+};
+
+void run_compile(const Arguments& arguments) {
+  ClContext context(arguments.device);
+  Stopwatch watch;
+  {
+    ProgressBar bar(context);
+    compile_kernels(context, bar);
+  }
+  const double seconds = watch.lap_ms() / 1000;
+  print(arguments.json, fmt::format("kernels compiled for {} in {:.1f} s\n", context.device().name, seconds));
+  write_json(arguments.json,
+             {{"device", context.device().name}, {"seconds", seconds}, {"kernels", profile_json(context)}});
+}
+
+void run_list(const std::string& json_target) {
   const std::vector<ClDeviceInfo> devices = list_devices();
   const double gib = 1024.0 * 1024.0 * 1024.0;
   Table table({"device", "type", "platform", "version", "driver", "units", "memory GiB", "buffer GiB", "double"});
@@ -51,14 +70,25 @@ void run(const std::string& json_target) {
 }  // namespace
 
 void add_devices_command(CLI::App& program) {
-  auto json = std::make_shared<std::string>();
-  CLI::App& command = *program.add_subcommand("devices", "List the OpenCL devices");
-  add_json_option(command, *json);
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("devices", "List the OpenCL devices, or compile all kernels ahead");
+  CLI::Option* compile = command.add_flag("--compile", arguments->is_compiling,
+                                          "compile all kernels for a device now; else commands do so when they first "
+                                          "need them");
+  add_device_option(command, arguments->device);
+  command.get_option("--device")->needs(compile);
+  add_json_option(command, arguments->json);
   command.footer(
       "Example:\n"
       "  skeletex devices\n"
+      "  skeletex devices --compile\n"
       "Choose one with --device of the other commands, or with the variable SKELETEX_DEVICE.");
-  command.callback([json] { run(*json); });
+  command.callback([arguments] {
+    if (arguments->is_compiling)
+      run_compile(*arguments);
+    else
+      run_list(arguments->json);
+  });
 }
 
 }  // namespace skeletex::cli

@@ -27,11 +27,11 @@ void run(const Arguments& arguments) {
                                "\"" + arguments.output + "\" does not end in .ply, which carries the colours");
   TriangleMesh mesh = load_mesh(arguments.mesh);
   const Skeleton skeleton = read_skeleton(arguments.skeleton);
-  ClContext& context = open_device(arguments.device);
+  ClContext context(arguments.device);
   Segmentation segmentation;
   double half_edge_ms = 0, segmentation_ms = 0;
   {
-    ProgressBar bar;
+    ProgressBar bar(context);
     bar.show("checking the input", 0);
     require_valid(mesh, skeleton);
     context.reset_profile();

@@ -27,10 +27,10 @@ const char* to_word(Severity severity) {
 void run(const Arguments& arguments) {
   TriangleMesh mesh = load_mesh(arguments.mesh);
   const Skeleton skeleton = read_skeleton(arguments.skeleton);
-  ClContext& context = open_device(arguments.device);
+  ClContext context(arguments.device);
   std::vector<Finding> findings;
   {
-    ProgressBar bar;
+    ProgressBar bar(context);
     bar.show("checking", 0);
     findings = validate_input(context, mesh, skeleton);
   }

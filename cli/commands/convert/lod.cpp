@@ -31,7 +31,7 @@ void run(const Arguments& arguments) {
     throw CLI::ValidationError(
         "--output", fmt::format("\"{}\" must end in .skx.exr: half floats are those of a model", arguments.output));
   const SkeletexModel model = read_model(arguments.model);
-  ClContext& context = open_device(arguments.device);
+  ClContext context(arguments.device);
   Stopwatch watch;
   Json json;
   std::string text;

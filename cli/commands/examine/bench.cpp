@@ -145,7 +145,7 @@ Json row_json(const Stage& stage, const StageSamples& samples, const std::string
 void run(const Arguments& arguments) {
   if (arguments.models.size() > 2) throw CLI::ValidationError("one model, or two that correspond");
   const std::vector<std::string> names = stages_of(arguments);
-  ClContext& context = open_device(arguments.device);
+  ClContext context(arguments.device);
   Inputs inputs(context, arguments);
   Repeats repeats;
   if (arguments.repeats > 0) repeats = {.most = arguments.repeats, .least = arguments.repeats};
@@ -153,7 +153,7 @@ void run(const Arguments& arguments) {
   Table table({"stage", "model", "size", "ms", "min", "max", "wall ms", "reference ms", "ratio", "against"});
   Json json = Json::array();
   {
-    ProgressBar bar;
+    ProgressBar bar(context);
     for (std::size_t i = 0; i < names.size(); ++i) {
       const auto show = [&](double done) {
         bar.show(names[i], (static_cast<double>(i) + done) / static_cast<double>(names.size()));

@@ -48,7 +48,7 @@ Json distortion_json(const Distortion& d) {
           {"collapsed", d.collapsed}};
 }
 
-void run(const Arguments& arguments, const CLI::App& command) {
+void check_arguments(const Arguments& arguments) {
   if (arguments.models.size() < 2) throw CLI::ValidationError("a morph needs two models or more");
   if (!arguments.times.empty() + !arguments.weights.empty() + (arguments.frames > 0) != 1)
     throw CLI::ValidationError("give one of --t, --weights and --frames");
@@ -60,11 +60,13 @@ void run(const Arguments& arguments, const CLI::App& command) {
         fmt::format("{} weights for {} models; give one per model", arguments.weights.size(), arguments.models.size()));
   if (!arguments.bones.empty() && arguments.models.size() != 2)
     throw CLI::ValidationError("--bones", "pairs the bones of two models");
-  const BonePairs given = parse_bone_pairs(arguments.bones);
   if (arguments.layout > static_cast<int>(arguments.models.size()))
     throw CLI::ValidationError(
         fmt::format("--layout {}: there are {} models", arguments.layout, arguments.models.size()));
+}
 
+/// Weights of the models, one list for each result.
+std::vector<std::vector<double>> weights_of(const Arguments& arguments) {
   std::vector<std::vector<double>> all_weights;
   if (!arguments.weights.empty()) all_weights.push_back(arguments.weights);
   for (const double t : arguments.times) all_weights.push_back({1 - t, t});
@@ -72,14 +74,46 @@ void run(const Arguments& arguments, const CLI::App& command) {
     const double t = static_cast<double>(i) / (arguments.frames - 1);
     all_weights.push_back({1 - t, t});
   }
+  return all_weights;
+}
+
+/// A file for each result.
+std::vector<std::string> outputs_of(const Arguments& arguments, const CLI::App& command, std::size_t count) {
   std::vector<std::string> outputs;
-  for (std::size_t i = 0; i < all_weights.size(); ++i)
-    outputs.push_back(all_weights.size() == 1 && arguments.frames == 0 ? arguments.output
-                                                                       : numbered(arguments.output, i));
+  for (std::size_t i = 0; i < count; ++i)
+    outputs.push_back(count == 1 && arguments.frames == 0 ? arguments.output : numbered(arguments.output, i));
   for (const std::string& output : outputs) {
     if (output != arguments.output) check_made_output(command, output);
     check_output(output);
   }
+  return outputs;
+}
+
+/// Distortion of the map from the first model to each other one. \param text  a table of them
+Json measure_maps(ClContext& context, const Arguments& arguments, const Morph& morph,
+                  const std::vector<Correspondence>& from_first, std::string& text) {
+  Json maps = Json::array();
+  Table table({"distortion from " + arguments.models[0] + " to", "area", "angle", "symmetric Dirichlet", "collapsed"});
+  const TriangleMesh first = reconstruct_mesh(context, morph.models()[0]);
+  for (std::size_t m = 1; m < morph.models().size(); ++m) {
+    const Distortion d =
+        measure_distortion(first, map_surface(context, morph.models()[0], morph.models()[m], from_first[m - 1]));
+    table.add({arguments.models[m], fmt::format("{:.3f}", d.area), fmt::format("{:.3f}", d.angle),
+               fmt::format("{:.3f}", d.dirichlet), fmt::format("{:.2f} %", 100 * d.collapsed)});
+    maps.push_back({{"from", arguments.models[0]},
+                    {"to", arguments.models[m]},
+                    {"cost", from_first[m - 1].cost},
+                    {"distortion", distortion_json(d)}});
+  }
+  text = table.text() + '\n';
+  return maps;
+}
+
+void run(const Arguments& arguments, const CLI::App& command) {
+  check_arguments(arguments);
+  const BonePairs given = parse_bone_pairs(arguments.bones);
+  const std::vector<std::vector<double>> all_weights = weights_of(arguments);
+  const std::vector<std::string> outputs = outputs_of(arguments, command, all_weights.size());
 
   Stopwatch total;
   std::vector<SkeletexModel> models;
@@ -89,7 +123,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
     if (models.size() > 1)
       from_first.push_back(correspond(arguments.models[0], models[0].skeleton, path, models.back().skeleton, given));
   }
-  ClContext& context = open_device(arguments.device);
+  ClContext context(arguments.device);
   MorphOptions options;
   if (arguments.layout > 0) options.layout = arguments.layout - 1;
   options.size = arguments.size;
@@ -99,22 +133,9 @@ void run(const Arguments& arguments, const CLI::App& command) {
   Json json{{"maps", Json::array()}, {"results", Json::array()}};
   std::string text;
   {
-    ProgressBar bar;
-    Table table(
-        {"distortion from " + arguments.models[0] + " to", "area", "angle", "symmetric Dirichlet", "collapsed"});
-    const TriangleMesh first = reconstruct_mesh(context, morph.models()[0]);
-    for (std::size_t m = 1; m < morph.models().size(); ++m) {
-      bar.show("measuring", 0.05);
-      const Distortion d =
-          measure_distortion(first, map_surface(context, morph.models()[0], morph.models()[m], from_first[m - 1]));
-      table.add({arguments.models[m], fmt::format("{:.3f}", d.area), fmt::format("{:.3f}", d.angle),
-                 fmt::format("{:.3f}", d.dirichlet), fmt::format("{:.2f} %", 100 * d.collapsed)});
-      json["maps"].push_back({{"from", arguments.models[0]},
-                              {"to", arguments.models[m]},
-                              {"cost", from_first[m - 1].cost},
-                              {"distortion", distortion_json(d)}});
-    }
-    text = table.text() + '\n';
+    ProgressBar bar(context);
+    bar.show("measuring", 0.05);
+    json["maps"] = measure_maps(context, arguments, morph, from_first, text);
     for (std::size_t i = 0; i < all_weights.size(); ++i) {
       bar.show("morphing", 0.1 + 0.9 * static_cast<double>(i) / static_cast<double>(all_weights.size()));
       Json written = write_result(context, morph.at(all_weights[i]), outputs[i]);

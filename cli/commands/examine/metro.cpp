@@ -67,10 +67,10 @@ void run(const Arguments& arguments) {
   if (!arguments.ply.empty() && !has_ending(arguments.ply, ".ply"))
     throw CLI::ValidationError("--ply", "\"" + arguments.ply + "\" does not end in .ply");
   const TriangleMesh a = load_surface(arguments.a), b = load_surface(arguments.b);
-  ClContext& context = open_device(arguments.device);
+  ClContext context(arguments.device);
   MetroReport report;
   {
-    ProgressBar bar;
+    ProgressBar bar(context);
     bar.show("measuring", 0.2);
     report = measure_metro(context, a, b, {.samples = arguments.samples});
   }

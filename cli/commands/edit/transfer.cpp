@@ -99,11 +99,11 @@ void run(const Arguments& arguments) {
     check_bone(arguments.target, target.skeleton, to);
   }
   if (arguments.is_mirrored) source = mirrored(source);
-  ClContext& context = open_device(arguments.device);
+  ClContext context(arguments.device);
   Json json;
   std::vector<TransferredPart> parts;
   {
-    ProgressBar bar;
+    ProgressBar bar(context);
     bar.show("transferring", 0.3);
     SkeletexModel result = transfer(context, source, target, pairs, options, &parts);
     if (arguments.share != 1) result = LiveBlend(context, target, result).at(arguments.share);

@@ -68,7 +68,7 @@ void run_curvature(const Arguments& arguments) {
     throw CLI::ValidationError(
         "--output", fmt::format("\"{}\" must end in .ply: curvature is a mesh with values", arguments.output));
   const SkeletexModel stored = read_model(arguments.model);
-  ClContext& context = open_device(arguments.device);
+  ClContext context(arguments.device);
   Stopwatch watch;
   const SkeletexModel model = regular_grid(context, stored);  // as for filters: slivers slow the solver down
   const ModelSurface surface = upload_surface(context, model);
@@ -115,7 +115,7 @@ void run(const Arguments& arguments) {
     return;
   }
   const SkeletexModel model = read_model(arguments.model);
-  ClContext& context = open_device(arguments.device);
+  ClContext context(arguments.device);
   Stopwatch watch;
   const FilterResult result = apply_filter(context, model, arguments);
   const double filter_ms = watch.lap_ms();
