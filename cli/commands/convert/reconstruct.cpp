@@ -58,7 +58,7 @@ std::vector<int> bones_by_name(const Skeleton& skeleton, const std::vector<std::
 /// The surface in its pose, or at a constant distance from the bones.
 TriangleMesh surface_of(ClContext& context, const PreparedModel& prepared, const std::optional<Skeleton>& posed,
                         const Arguments& arguments) {
-  const SkeletexModel& model = prepared.model();
+  const SkeletexModel& model = prepared.model;
   const DistanceRule rule = arguments.is_distance_dropped ? DistanceRule::kFromFoot : DistanceRule::kFromBone;
   if (arguments.constant_offset)
     return constant_offset_mesh(context, prepared, posed ? *posed : model.skeleton,

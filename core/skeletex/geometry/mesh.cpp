@@ -37,8 +37,4 @@ double signed_volume(const TriangleMesh& mesh) {
   return volume;
 }
 
-std::string text_of(const Vec3& point) {
-  return fmt::format("({:.6g}, {:.6g}, {:.6g})", point.x(), point.y(), point.z());
-}
-
 }  // namespace skeletex

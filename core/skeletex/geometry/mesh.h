@@ -33,7 +33,5 @@ Vec3 area_vector(const TriangleMesh& mesh, const Triangle& triangle);
 double surface_area(const TriangleMesh& mesh);
 /// Enclosed volume by the divergence theorem; negative when the mesh is inside out. \pre closed
 double signed_volume(const TriangleMesh& mesh);
-/// "(0.12, 0.4, 0.03)", for messages.
-std::string text_of(const Vec3& point);
 
 }  // namespace skeletex
