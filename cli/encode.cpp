@@ -165,17 +165,18 @@ Json report_json(const EncodeReport& report, const EncodeOptions& options, doubl
                     {"edges", report.snap->edges},
                     {"snapped_edges", report.snap->snapped_edges},
                     {"texels_on_edges", report.snap->texels_on_edges},
-                    {"texels_put_back", report.snap->texels_put_back}};
+                    {"reverted_texels", report.snap->reverted_texels}};
   if (report.fit) {
     Json residuals = Json::array();
     for (const double residual : report.fit->residuals) residuals.push_back(residual / report.diagonal);
-    json["fit"] = {{"residuals", std::move(residuals)}, {"texels_put_back", report.fit->texels_put_back}};
+    json["fit"] = {{"residuals", std::move(residuals)}, {"reverted_texels", report.fit->reverted_texels}};
   }
   if (report.rounding)
     json["rounding"] = {{"nearest", report.rounding->nearest / report.diagonal},
                         {"chosen", report.rounding->chosen / report.diagonal}};
-  if (report.snap || report.fit)
-    json["turned_triangles"] = {{"lattice", report.turned_triangles}, {"even", report.even_turned_triangles}};
+  if (report.revert)
+    json["inverted_triangles"] = {{"lattice", report.revert->inverted_triangles},
+                                  {"regular_grid", report.revert->regular_inverted_triangles}};
   return json;
 }
 
@@ -191,25 +192,25 @@ std::string report_text(const EncodeReport& report, const EncodeOptions& options
   const auto percent = [](int part, int whole) { return whole > 0 ? 100.0 * part / whole : 100.0; };
   const std::string snap =
       !report.snap ? ""
-                   : fmt::format("snapped to {:.1f} % of {} vertices and {:.1f} % of {} edges; {} texels put back\n",
+                   : fmt::format("snapped to {:.1f} % of {} vertices and {:.1f} % of {} edges; {} texels reverted\n",
                                  percent(report.snap->snapped_vertices, report.snap->vertices), report.snap->vertices,
                                  percent(report.snap->snapped_edges, report.snap->edges), report.snap->edges,
-                                 report.snap->texels_put_back);
+                                 report.snap->reverted_texels);
   std::string fit;
   if (report.fit) {
     fit = "fitted: mean distance / diagonal";
     for (std::size_t i = 0; i < report.fit->residuals.size(); ++i)
       fit += fmt::format("{} {:.3e}", i == 0 ? "" : " ->", report.fit->residuals[i] / report.diagonal);
-    fit += fmt::format("; {} texels put back\n", report.fit->texels_put_back);
+    fit += fmt::format("; {} texels reverted\n", report.fit->reverted_texels);
   }
   if (report.rounding)
     fit += fmt::format(
         "rounded to half floats: points leave the lattice's planes by {:.1e} of the diagonal, with the nearest ones by "
         "{:.1e} (root mean squares)\n",
         report.rounding->chosen / report.diagonal, report.rounding->nearest / report.diagonal);
-  if (report.snap || report.fit)
-    fit += fmt::format("{} triangles look against the mesh, {} of the regular grid\n", report.turned_triangles,
-                       report.even_turned_triangles);
+  if (report.revert)
+    fit += fmt::format("{} inverted triangles, {} of the regular grid\n", report.revert->inverted_triangles,
+                       report.revert->regular_inverted_triangles);
   std::error_code ignored;
   return fmt::format(
       "{}\n{} vertices, {} triangles, genus {}; {} x {} texels, {:.1f} % used, on {}\n"

@@ -141,17 +141,18 @@ void add_results(const TexelReport& report, double diagonal, nlohmann::json& jso
   if (report.snap)
     json["snapped"] = {{"vertices", share(report.snap->snapped_vertices, report.snap->vertices)},
                        {"edges", share(report.snap->snapped_edges, report.snap->edges)},
-                       {"texels_put_back", report.snap->texels_put_back}};
+                       {"texels_put_back", report.snap->reverted_texels}};
   if (report.fit) {
     nlohmann::json residuals = nlohmann::json::array();
     for (const double residual : report.fit->residuals) residuals.push_back(residual / diagonal);
-    json["fitted"] = {{"residuals", std::move(residuals)}, {"texels_put_back", report.fit->texels_put_back}};
+    json["fitted"] = {{"residuals", std::move(residuals)}, {"texels_put_back", report.fit->reverted_texels}};
   }
   if (report.rounding)
     json["rounded"] = {{"nearest", report.rounding->nearest / diagonal},
                        {"chosen", report.rounding->chosen / diagonal}};
-  if (report.snap || report.fit)
-    json["turned_triangles"] = {{"lattice", report.turned_triangles}, {"even", report.even_turned_triangles}};
+  if (report.revert)
+    json["turned_triangles"] = {{"lattice", report.revert->inverted_triangles},
+                                {"even", report.revert->regular_inverted_triangles}};
 }
 
 /// Vertices where the pole of a chart's free end lies.
@@ -279,14 +280,6 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   model.corners = std::move(seams.corners);
   model.ends = std::move(seams.ends);
   model.texture.width = options.width, model.texture.height = options.height;
-  std::shared_future<GuardFrame> framing_guard;
-  if (placing.has_snap || placing.has_fit)
-    framing_guard =
-        run_beside([&, listing = context.can_run_beside() ? listing_features : std::shared_future<DeviceSnapTables>()] {
-          if (listing.valid()) listing.wait();  // two at once would take turns with what all wait for
-          return frame_guard(model, charts);
-        }).share();
-
   std::vector<SpdHits> hits(bones);
   {
     std::vector<Chart> cast_charts;
@@ -314,12 +307,17 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
             points_on_loop(segmentation.segments[bone], skeleton, separation, end, model.patches[bone].rectangle.width);
     }
   progress("encoding", 0.8);
-  const GuardSources guard{model, mesh, options.tree, charts, std::move(framing_guard)};
+  std::optional<TriangleTree> own_tree;
+  if ((placing.has_snap || placing.has_fit) && !options.tree) own_tree = build_triangle_tree(mesh);
+  std::optional<RevertSources> revert;
+  if (placing.has_snap || placing.has_fit)
+    revert.emplace(RevertSources{model, mesh, options.tree ? *options.tree : *own_tree, charts});
   TexelOptions texel_options{
       .has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_fit = placing.has_fit};
   if (options.has_half_texels) texel_options.half_rule = model.diagonals;
   TexelResult texels =
-      read_texels(context, skeleton, separation, {charts, model.patches, hits, end_points, &guard, listing_features},
+      read_texels(context, skeleton, separation,
+                  {charts, model.patches, hits, end_points, revert ? &*revert : nullptr, listing_features},
                   options.width, options.height, model.origin, texel_options);
   model.texture = std::move(texels.texture);
   {
@@ -337,8 +335,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   report.snap = texels.report.snap;
   report.fit = texels.report.fit;
   report.rounding = texels.report.rounding;
-  report.turned_triangles = texels.report.turned_triangles;
-  report.even_turned_triangles = texels.report.even_turned_triangles;
+  report.revert = texels.report.revert;
   report.device = context.device().name;
   for (int bone = 0; bone < bones; ++bone) {
     const Segment& segment = segmentation.segments[bone];

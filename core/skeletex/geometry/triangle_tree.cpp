@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/geometry/triangle_tree.h"
 
+#include <algorithm>
 #include <cstddef>
+#include <utility>
 
 #include "skeletex/geometry/hilbert_order.h"
 #include "skeletex/geometry/parallel.h"
+#include "skeletex/geometry/point_triangle.h"
 
 namespace skeletex {
 namespace {
@@ -36,9 +39,13 @@ TriangleTree build_triangle_tree(const TriangleMesh& mesh) {
       centres[t] = (mesh.positions[a] + mesh.positions[b] + mesh.positions[c]) / 3;
     }
   });
+  return build_triangle_tree(mesh, hilbert_order(centres));
+}
+
+TriangleTree build_triangle_tree(const TriangleMesh& mesh, std::vector<int> order) {
   TriangleTree tree;
-  const std::size_t count = mesh.triangles.size();
-  tree.order = hilbert_order(centres);
+  tree.order = std::move(order);
+  const std::size_t count = tree.order.size();
   const BoundingBox box = bounding_box(mesh);
   tree.origin = box.centre();
   tree.scale = box.diagonal() > 0 ? box.diagonal() : 1;
@@ -99,6 +106,64 @@ TriangleTree build_triangle_tree(const TriangleMesh& mesh) {
     children = std::move(parents);
   }
   return tree;
+}
+
+namespace {
+
+/// A node or block of a tree that is still to be looked at, and how far it is at least, in the tree's units.
+struct OpenNode {
+  int level;
+  std::size_t index;
+  float squared;
+};
+
+/// Adds the children of a node that are nearer than a distance, the nearest last.
+void open_children(const TriangleTree& tree, const OpenNode& node, const Eigen::Vector3f& point, float least_squared,
+                   std::vector<OpenNode>& open) {
+  const float* planes = tree.boxes.data() + (tree.level_begin[node.level] + node.index) * 6 * kWidth;
+  std::array<float, kWidth> squared{};
+  for (int d = 0; d < 3; ++d)
+    for (int k = 0; k < kWidth; ++k) {
+      const float gap =
+          std::max(0.0f, std::max(planes[d * kWidth + k] - point[d], point[d] - planes[(3 + d) * kWidth + k]));
+      squared[k] += gap * gap;
+    }
+  const std::size_t begin = open.size();
+  for (int k = 0; k < kWidth; ++k)
+    if (squared[k] < least_squared) open.push_back({node.level - 1, kWidth * node.index + k, squared[k]});
+  std::sort(open.begin() + static_cast<std::ptrdiff_t>(begin), open.end(),
+            [](const OpenNode& a, const OpenNode& b) { return a.squared > b.squared; });
+}
+
+}  // namespace
+
+NearestTriangle find_nearest_triangle(const TriangleMesh& mesh, const TriangleTree& tree, const Vec3& point,
+                                      double bound) {
+  constexpr double kRounding = 1e-6;  // of the tree's units: more than what rounding to float32 moves a point or box
+  const Eigen::Vector3f place = ((point - tree.origin) / tree.scale).cast<float>();
+  NearestTriangle nearest{-1, bound};
+  const auto least_squared = [&] {
+    const double scaled = std::min(1e9, nearest.distance / tree.scale) + kRounding;
+    return static_cast<float>(scaled * scaled);
+  };
+  std::vector<OpenNode> open{{tree.top_level(), 0, 0}};
+  while (!open.empty()) {
+    const OpenNode node = open.back();
+    open.pop_back();
+    if (node.squared >= least_squared()) continue;
+    if (node.level > 0) {
+      open_children(tree, node, place, least_squared(), open);
+      continue;
+    }
+    const std::size_t begin = node.index * kWidth, end = std::min(begin + kWidth, tree.order.size());
+    for (std::size_t at = begin; at < end; ++at) {
+      const Triangle& t = mesh.triangles[tree.order[at]];
+      const double distance =
+          offset_from_triangle(point, mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]).norm();
+      if (distance < nearest.distance) nearest = {tree.order[at], distance};
+    }
+  }
+  return nearest;
 }
 
 }  // namespace skeletex

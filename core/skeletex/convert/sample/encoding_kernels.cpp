@@ -49,19 +49,10 @@ std::vector<KernelVariant> encoding_kernels(const ClContext& context, const Enco
          "move_points"},
         items);
   if (options.has_prefilter) add("encode.cl", {"prefilter_positions"}, rows);
-  if (can_snap || can_fit) {
-    add("lattice.cl", {"choose_diagonals"}, rows);
-    add("guard.cl", {"find_normals", "normals_of_texels"}, items);
-    add("guard.cl", {"suspect_any_quads", "suspect_quads"}, rows);
-    add("guard.cl", {"suspect_listed_quads", "measure_triangles"}, items);
-    add("metro.cl", {"find_nearest_triangles"}, kSearch);
-    add("guard.cl", {"measure_vertices"}, items);
-    add("snap.cl", {"put_listed_back"}, rows);
-    add("lattice.cl", {"choose_listed_diagonals"}, items);
-  }
+  if (can_snap || can_fit) add("reconstruct.cl", {"triangulate_quads", "triangulate_smoothly"}, rows);
   add("encode.cl", {"encode_texels"}, rows);
   if (options.has_half_texels) {
-    if (!can_snap && !can_fit) add("lattice.cl", {"choose_diagonals"}, rows);
+    add("lattice.cl", {"choose_diagonals"}, rows);
     add("half.cl", {"round_texels"}, rows);
   }
   return kernels;

@@ -131,11 +131,23 @@ std::vector<int> vsm_texels(std::span<const Patch> patches, int texture_width, i
   return is_vsm;
 }
 
-SnapReport report_snap(int vertices, int edges, int put_back, const std::vector<int>& anchors) {
+PlacedTexels download_texels(ClContext& context, const TexelPoints& points, const ClBuffer<float>& offset_x,
+                             const ClBuffer<float>& offset_y, const ClBuffer<int>& anchors,
+                             const ClBuffer<int>& map_triangles) {
+  auto [x, y, z, own_x, own_y, own_anchors, triangles] =
+      context.download(points.x, points.y, points.z, offset_x, offset_y, anchors, map_triangles);
+  return {{std::move(x), std::move(y), std::move(z)},
+          std::move(own_x),
+          std::move(own_y),
+          std::move(own_anchors),
+          std::move(triangles)};
+}
+
+SnapReport report_snap(int vertices, int edges, int reverted, const std::vector<int>& anchors) {
   SnapReport report;
   report.vertices = vertices;
   report.edges = edges;
-  report.texels_put_back = put_back;
+  report.reverted_texels = reverted;
   // Signs, as 0 and -1.
   const Eigen::Map<const Eigen::ArrayXi> numbers(anchors.data(), static_cast<Eigen::Index>(anchors.size()));
   report.snapped_vertices = -(-numbers).shiftRight<31>().sum(),
@@ -237,25 +249,14 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Sepa
   const TexelPoints even = points;
   const ClBuffer<int> even_covering = covering;
   const auto all_rows = context.upload(lattice_rows({sources.patches.begin(), sources.patches.end()}, RowChoice::kAll));
-  const auto prefilter = [&](ClContext& on, const TexelPoints& from, const ClBuffer<int>& are_kept, int kept) {
-    TexelPoints filtered = allocate_points(on, texels);
-    on.launch({"encode.cl", "prefilter_positions"}, row_range(on, all_rows.size), static_cast<int>(all_rows.size),
-              texture_width, kept, all_rows, layout.patches, are_kept, from.x, from.y, from.z, filtered.x, filtered.y,
-              filtered.z);
+  const auto prefilter = [&](const TexelPoints& from, const ClBuffer<int>& are_kept, int kept) {
+    TexelPoints filtered = allocate_points(context, texels);
+    context.launch({"encode.cl", "prefilter_positions"}, row_range(context, all_rows.size),
+                   static_cast<int>(all_rows.size), texture_width, kept, all_rows, layout.patches, are_kept, from.x,
+                   from.y, from.z, filtered.x, filtered.y, filtered.z);
     return filtered;
   };
-  // The regular grid is measured beside the snapping, on a queue of its own.
-  std::unique_ptr<ClContext> beside;
-  std::future<std::unique_ptr<Guard>> measuring_even;
-  if ((is_snapped || is_fitted) && sources.guard) {
-    context.finish();
-    beside = context.beside();
-    measuring_even = std::async(context.can_run_beside() ? std::launch::async : std::launch::deferred, [&] {
-      const TexelPoints filtered = options.has_prefilter ? prefilter(*beside, even, even_covering, kNoneIsKept) : even;
-      return std::make_unique<Guard>(*beside, *sources.guard, layout, maps, even_covering, even, filtered);
-    });
-  }
-  int put_back = 0, edges = 0;
+  int edges = 0;
   std::vector<int> vertex_points;
   if (is_snapped) {
     const DeviceSnapTables& features = sources.features.get();
@@ -279,20 +280,19 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Sepa
   if (is_fitted) result.report.fit = fit_points(context, layout, maps, covering, positions, points);
   // What is snapped or fitted is not filtered as well: with SPD patches beside it, only these are.
   const bool is_placed = is_snapped || is_fitted;
-  if (options.has_prefilter && !is_placed) points = prefilter(context, points, positions.anchors, kNoneIsKept);
+  if (options.has_prefilter && !is_placed) points = prefilter(points, positions.anchors, kNoneIsKept);
   if (options.has_prefilter && is_placed && has_spd)
-    points =
-        prefilter(context, points, context.upload(vsm_texels(sources.patches, texture_width, texture_height)), kIsKept);
+    points = prefilter(points, context.upload(vsm_texels(sources.patches, texture_width, texture_height)), kIsKept);
   std::vector<int> anchors;
-  if (measuring_even.valid()) {
-    context.finish();
-    const std::unique_ptr<Guard> even_guard = measuring_even.get();
-    GuardReport guard = even_guard->put_back_faults(context, vertex_points, covering, positions, points);
-    context.take_profile(*beside);
-    result.report.turned_triangles = guard.turned_triangles,
-    result.report.even_turned_triangles = guard.even_turned_triangles;
-    (is_fitted ? result.report.fit->texels_put_back : put_back) += guard.texels_put_back;
-    anchors = std::move(guard.anchors);
+  if (is_placed && sources.revert) {
+    const TexelPoints filtered = options.has_prefilter ? prefilter(even, even_covering, kNoneIsKept) : even;
+    const PlacedTexels regular =
+        download_texels(context, filtered, positions.home_x, positions.home_y, positions.anchors, even_covering);
+    PlacedTexels placed = download_texels(context, points, positions.x, positions.y, positions.anchors, covering);
+    result.report.revert = revert_faults(context, *sources.revert, vertex_points, regular, placed);
+    points = {context.upload(placed.points[0]), context.upload(placed.points[1]), context.upload(placed.points[2])};
+    anchors = std::move(placed.anchors);
+    if (is_fitted) result.report.fit->reverted_texels = result.report.revert->reverted_texels;
   }
   if (is_snapped && anchors.empty()) anchors = context.download(positions.anchors);
   TexelPoints stored = allocate_points(context, texels);  // along, around, out
@@ -307,7 +307,8 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Sepa
                       columns, points, stored);
   if (is_snapped)
     result.report.snap =
-        report_snap(static_cast<int>(vertex_points.size()), edges, put_back, anchors);  // beside the device's work
+        report_snap(static_cast<int>(vertex_points.size()), edges,
+                    result.report.revert && !is_fitted ? result.report.revert->reverted_texels : 0, anchors);
   auto [along, around, out, marks] = context.download(stored.x, stored.y, stored.z, is_read);
   for (int bone = 0; bone < bones; ++bone) {
     const int begin = maps.first_triangle[bone], end = maps.first_triangle[bone + 1];
