@@ -165,18 +165,18 @@ Json report_json(const EncodeReport& report, const EncodeOptions& options, doubl
                     {"edges", report.snap->edges},
                     {"snapped_edges", report.snap->snapped_edges},
                     {"texels_on_edges", report.snap->texels_on_edges},
-                    {"reverted_texels", report.snap->reverted_texels}};
+                    {"texels_reverted", report.snap->reverted_texels}};
   if (report.fit) {
     Json residuals = Json::array();
     for (const double residual : report.fit->residuals) residuals.push_back(residual / report.diagonal);
-    json["fit"] = {{"residuals", std::move(residuals)}, {"reverted_texels", report.fit->reverted_texels}};
+    json["fit"] = {{"residuals", std::move(residuals)}, {"texels_reverted", report.fit->reverted_texels}};
   }
   if (report.rounding)
     json["rounding"] = {{"nearest", report.rounding->nearest / report.diagonal},
                         {"chosen", report.rounding->chosen / report.diagonal}};
   if (report.revert)
     json["inverted_triangles"] = {{"lattice", report.revert->inverted_triangles},
-                                  {"regular_grid", report.revert->regular_inverted_triangles}};
+                                  {"regular", report.revert->regular_inverted_triangles}};
   return json;
 }
 

@@ -585,7 +585,7 @@ TEST_F(Program, SnapsTexelsAndSaysHowMany) {
   const nlohmann::json fitted =
       json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64", "--fit"});
   EXPECT_GE(fitted["fit"]["residuals"].size(), 2u);
-  EXPECT_LE(fitted["turned_triangles"]["lattice"], 64 * 64);
+  EXPECT_LE(fitted["inverted_triangles"]["lattice"], 64 * 64);
   const nlohmann::json header = json_of({"inspect", "a.skx.exr"});
   EXPECT_EQ(header["diagonals"], "smooth");
   EXPECT_EQ(header["encoder"]["fitted"]["residuals"], fitted["fit"]["residuals"]);

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <future>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -248,10 +247,6 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
       patch_demands(sources, has_even_rows ? std::span<const RowProfile>() : profiles,
                     options.texel_share.value_or(is_all_spd ? TexelShare::kArea : TexelShare::kError));
   const TexelPlacing placing = choose_placing(options, mesh, is_all_spd);
-  // Packing is one processor's work, and so is most of what comes before the device reads texels: features are found
-  // and listed beside.
-  std::future<MapFeatures> finding_features;
-  if (placing.has_snap) finding_features = run_beside([&] { return find_features(charts, methods, kLeastDihedral); });
   const AtlasLayout layout = pack_atlas(demands, options.width, options.height);
   report.used_fraction = layout.used_fraction;
 
@@ -262,16 +257,11 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
                       : spread_rows_uniformly(patch.rectangle.height);
     model.patches.push_back(std::move(patch));
   }
-  std::shared_future<DeviceSnapTables> listing_features;
-  if (placing.has_snap) {
-    auto list = [&, on = context.beside()] {
-      return upload_tables(*on,
-                           tables_of(place_features(finding_features.get(), charts, model.patches), model.patches));
-    };
-    listing_features =
-        (context.can_run_beside() ? run_beside(std::move(list)) : std::async(std::launch::deferred, std::move(list)))
-            .share();
-  }
+  std::optional<DeviceSnapTables> features;
+  if (placing.has_snap)
+    features = upload_tables(
+        context, tables_of(place_features(find_features(charts, methods, kLeastDihedral), charts, model.patches),
+                           model.patches));
   model.diagonals =
       options.diagonals.value_or(placing.has_snap || placing.has_fit ? DiagonalRule::kSmooth : DiagonalRule::kNearest);
   Seams seams = sample_seams(segmentation, skeleton, separation, layout.rectangles,
@@ -315,10 +305,10 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   TexelOptions texel_options{
       .has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_fit = placing.has_fit};
   if (options.has_half_texels) texel_options.half_rule = model.diagonals;
-  TexelResult texels =
-      read_texels(context, skeleton, separation,
-                  {charts, model.patches, hits, end_points, revert ? &*revert : nullptr, listing_features},
-                  options.width, options.height, model.origin, texel_options);
+  TexelResult texels = read_texels(
+      context, skeleton, separation,
+      {charts, model.patches, hits, end_points, revert ? &*revert : nullptr, features ? &*features : nullptr},
+      options.width, options.height, model.origin, texel_options);
   model.texture = std::move(texels.texture);
   {
     nlohmann::json settings = settings_json(options, placing, unseen);

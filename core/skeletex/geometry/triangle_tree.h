@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "skeletex/geometry/mesh.h"
@@ -32,6 +33,10 @@ TriangleTree build_triangle_tree(const TriangleMesh& mesh);
 /// The same over the triangles in a given order, in which those that follow each other lie near each other.
 /// \param order  each triangle once
 TriangleTree build_triangle_tree(const TriangleMesh& mesh, std::vector<int> order);
+
+/// Makes a tree fit again after triangles have moved, by no more than their mesh's extent.
+/// \param places  theirs in the order of the tree
+void update_triangle_tree(const TriangleMesh& mesh, std::span<const int> places, TriangleTree& tree);
 
 struct NearestTriangle {
   int triangle = -1;  ///< none where nothing is nearer than the bound

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <array>
-#include <future>
 #include <optional>
 #include <span>
 #include <vector>
@@ -27,8 +26,8 @@ struct TexelSources {
   std::span<const std::array<std::vector<Vec3>, 2>> end_points;
   /// With snapping or fit, what the finished lattice is compared with, see revert_faults; without, no texel reverts.
   const RevertSources* revert = nullptr;
-  /// With snapping, what texels of VSM patches move to; waited for when the regular grid is there.
-  std::shared_future<DeviceSnapTables> features = {};
+  /// With snapping, what texels of VSM patches move to.
+  const DeviceSnapTables* features = nullptr;
 };
 
 struct TexelOptions {

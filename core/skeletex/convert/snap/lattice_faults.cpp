@@ -65,18 +65,21 @@ Estimate estimate(const LatticeSurface& surface, const OriginalSurface& original
   const std::array<int, 3> read = surface.read_by(triangle, original);
   const Vec3 own = area_vector(corners);
   Estimate result;
+  double corner_distance = 0;
   for (int k = 0; k < 3; ++k) {
     const int next = (k + 1) % 3;
     if (read[k] < 0) {
       result.distance = kInfinity;
       continue;
     }
-    result.may_be_inverted = result.may_be_inverted || own.dot(original.map_normals[read[k]]) < 0;
+    const Vec3& normal = original.map_normals[read[k]];
+    result.may_be_inverted = result.may_be_inverted || own.dot(normal) < 0;
+    corner_distance = std::max(corner_distance, std::abs(normal.dot(corners[k] - original.map_triangles[read[k]][0])));
     if (read[next] >= 0)
-      result.distance = std::max(
-          result.distance,
-          bend_of_side(corners[next] - corners[k], original.map_normals[read[k]], original.map_normals[read[next]]));
+      result.distance =
+          std::max(result.distance, bend_of_side(corners[next] - corners[k], normal, original.map_normals[read[next]]));
   }
+  result.distance += corner_distance;
   return result;
 }
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kPasses = 7;                 // it takes some four
 constexpr int kAroundFar = 1;              // columns and rows around a triangle that is too far that revert with it
-constexpr double kShareOfFurthest = 0.9;   // what is measured is not all that there is
+constexpr double kShareOfFurthest = 0.85;  // what is measured is not all that there is
 constexpr double kShareOfSuspects = 0.75;  // of the limit: triangles that are nearer intersect as the original does
 constexpr std::size_t kManyPairs = 500;    // from here on the regular grid is asked whether it intersects as much
 constexpr int kTolerance = 2;              // columns and rows around a fault of the regular grid
@@ -75,7 +75,7 @@ struct RegularGrid {
 
 RegularGrid prepare_regular_grid(ClContext& context, const LatticeFrame& frame, const OriginalSurface& original,
                                  const PlacedTexels& texels) {
-  RegularGrid grid{build_lattice_mesh(context, frame, DiagonalRule::kNearest, texels.points), {}, TexelSet(frame)};
+  RegularGrid grid{build_lattice_mesh(context, frame, DiagonalRule::kNearest, texels.points).mesh, {}, TexelSet(frame)};
   grid.faults = measure_regular_grid({frame, grid.mesh, texels.map_triangles}, original);
   for (const int triangle : grid.faults.inverted) grid.near_faults.add(grid.mesh.triangles[triangle], kTolerance);
   return grid;
@@ -83,25 +83,14 @@ RegularGrid prepare_regular_grid(ClContext& context, const LatticeFrame& frame, 
 
 /// The lattice as it is in a pass.
 struct Pass {
-  TriangleMesh mesh;
-  TriangleTree tree;
-  std::vector<MeasuredTriangle> suspects;  // triangles that are nearly too far, or inverted
-  Pairs intersections;
-  std::vector<int> near_far_vertices;  // triangles
-};
+  LatticeMesh lattice;
+  TriangleTree tree;                         // of its mesh
+  std::vector<MeasuredTriangle> suspects;    // triangles that are nearly too far, or inverted
+  Pairs intersections;                       // of suspects
+  std::vector<int> nearest_to_far_vertices;  // triangles
 
-/// The triangles that are not what they were, or not where.
-std::vector<int> changed_triangles(const TriangleMesh& before, const TriangleMesh& now) {
-  std::vector<char> has_moved(now.positions.size());
-  for (std::size_t i = 0; i < has_moved.size(); ++i) has_moved[i] = before.positions[i] != now.positions[i];
-  std::vector<int> changed;
-  for (std::size_t i = 0; i < now.triangles.size(); ++i) {
-    const Triangle& t = now.triangles[i];
-    if (t != before.triangles[i] || has_moved[t[0]] || has_moved[t[1]] || has_moved[t[2]])
-      changed.push_back(static_cast<int>(i));
-  }
-  return changed;
-}
+  const Triangle& triangle(int number) const { return lattice.mesh.triangles[number]; }
+};
 
 std::vector<char> held_vertices(const PlacedTexels& texels, std::span<const int> vertex_points,
                                 const OriginalSurface& original) {
@@ -111,36 +100,51 @@ std::vector<char> held_vertices(const PlacedTexels& texels, std::span<const int>
   return is_held;
 }
 
-/// Measures the lattice: the first time all of it, then what has changed since the pass before.
-Pass measure_pass(ClContext& context, const LatticeFrame& frame, const OriginalSurface& original,
-                  std::span<const int> vertex_points, const PlacedTexels& texels, double limit, const Pass* before) {
-  Pass pass{build_lattice_mesh(context, frame, frame.model.diagonals, texels.points), {}, {}, {}, {}};
-  pass.tree = build_triangle_tree(pass.mesh, frame.triangle_order);
-  const LatticeSurface surface{frame, pass.mesh, texels.map_triangles};
-  std::vector<int> changed;
-  if (before) {
-    changed = changed_triangles(before->mesh, pass.mesh);
-    std::copy_if(
-        before->suspects.begin(), before->suspects.end(), std::back_inserter(pass.suspects),
-        [&](const MeasuredTriangle& t) { return !std::binary_search(changed.begin(), changed.end(), t.triangle); });
-  } else {
-    changed.resize(pass.mesh.triangles.size());
-    std::iota(changed.begin(), changed.end(), 0);
-  }
+/// Measures triangles of a lattice that are new, or have changed.
+/// \param changed  in order
+void measure(const LatticeFrame& frame, const OriginalSurface& original, std::span<const int> vertex_points,
+             const PlacedTexels& texels, double limit, std::span<const int> changed, Pass& pass) {
+  const TriangleMesh& mesh = pass.lattice.mesh;
+  const LatticeSurface surface{frame, mesh, texels.map_triangles};
+  std::erase_if(pass.suspects, [&](const MeasuredTriangle& suspect) {
+    return std::binary_search(changed.begin(), changed.end(), suspect.triangle);
+  });
   const std::vector<MeasuredTriangle> measured = measure_triangles(surface, original, changed, limit, kShareOfSuspects);
   pass.suspects.insert(pass.suspects.end(), measured.begin(), measured.end());
   std::vector<int> query;
-  for (const MeasuredTriangle& suspect : pass.suspects) query.push_back(suspect.triangle);
-  pass.intersections = find_self_intersections(pass.mesh, pass.tree, query);
-  pass.near_far_vertices =
+  for (const MeasuredTriangle& suspect : measured) query.push_back(suspect.triangle);
+  pass.intersections = find_self_intersections(mesh, pass.tree, query);
+  pass.nearest_to_far_vertices =
       nearest_to_far_vertices(surface, original, pass.tree, held_vertices(texels, vertex_points, original), limit);
+}
+
+/// The first pass measures all.
+Pass start_passes(ClContext& context, const LatticeFrame& frame, const OriginalSurface& original,
+                  std::span<const int> vertex_points, const PlacedTexels& texels, double limit) {
+  Pass pass{build_lattice_mesh(context, frame, frame.model.diagonals, texels.points), {}, {}, {}, {}};
+  pass.tree = build_triangle_tree(pass.lattice.mesh, frame.triangle_order);
+  std::vector<int> all(pass.lattice.mesh.triangles.size());
+  std::iota(all.begin(), all.end(), 0);
+  measure(frame, original, vertex_points, texels, limit, all, pass);
   return pass;
+}
+
+/// Further ones measure what has changed.
+void next_pass(ClContext& context, const LatticeFrame& frame, const OriginalSurface& original,
+               std::span<const int> vertex_points, const PlacedTexels& texels, double limit,
+               std::span<const int> reverted, Pass& pass) {
+  const std::vector<int> changed =
+      move_texels(context, frame, frame.model.diagonals, reverted, texels.points, pass.lattice);
+  std::vector<int> places;
+  for (const int triangle : changed) places.push_back(frame.triangle_places[triangle]);
+  update_triangle_tree(pass.lattice.mesh, places, pass.tree);
+  measure(frame, original, vertex_points, texels, limit, changed, pass);
 }
 
 /// Decides by the first pass which faults near those of the regular grid are left.
 void choose_tolerances(const LatticeFrame& frame, const Pass& pass, RegularGrid& grid) {
   const auto inverted = std::count_if(pass.suspects.begin(), pass.suspects.end(), [&](const MeasuredTriangle& t) {
-    return t.is_inverted && grid.is_near_fault(pass.mesh.triangles[t.triangle]);
+    return t.is_inverted && grid.is_near_fault(pass.triangle(t.triangle));
   });
   grid.tolerates_inversion =
       static_cast<double>(inverted) <= kMuchWorse * static_cast<double>(grid.faults.inverted.size());
@@ -149,7 +153,7 @@ void choose_tolerances(const LatticeFrame& frame, const Pass& pass, RegularGrid&
                                               triangles_in(pass.intersections));
   for (const int triangle : triangles_in(pairs)) grid.near_faults.add(grid.mesh.triangles[triangle], kTolerance);
   const auto near = std::count_if(pass.intersections.begin(), pass.intersections.end(), [&](const auto& pair) {
-    return grid.is_near_fault(pass.mesh.triangles[pair[0]]) && grid.is_near_fault(pass.mesh.triangles[pair[1]]);
+    return grid.is_near_fault(pass.triangle(pair[0])) && grid.is_near_fault(pass.triangle(pair[1]));
   });
   grid.tolerates_intersection =
       pairs.size() > kManyPairs && static_cast<double>(near) <= kMuchWorse * static_cast<double>(pairs.size());
@@ -158,19 +162,19 @@ void choose_tolerances(const LatticeFrame& frame, const Pass& pass, RegularGrid&
 /// Texels at the faults of a pass that are not the regular grid's.
 TexelSet texels_at_faults(const LatticeFrame& frame, const Pass& pass, const RegularGrid& grid, double limit) {
   TexelSet texels(frame);
-  const auto is_near_fault = [&](int triangle) { return grid.is_near_fault(pass.mesh.triangles[triangle]); };
+  const auto is_near_fault = [&](int triangle) { return grid.is_near_fault(pass.triangle(triangle)); };
   for (const auto& [first, second] : pass.intersections) {
     if (grid.tolerates_intersection && is_near_fault(first) && is_near_fault(second)) continue;
-    texels.add(pass.mesh.triangles[first], 0), texels.add(pass.mesh.triangles[second], 0);
+    texels.add(pass.triangle(first), 0), texels.add(pass.triangle(second), 0);
   }
   for (const MeasuredTriangle& suspect : pass.suspects) {
-    const Triangle& triangle = pass.mesh.triangles[suspect.triangle];
+    const Triangle& triangle = pass.triangle(suspect.triangle);
     if (suspect.distance > limit)
       texels.add(triangle, kAroundFar);
     else if (suspect.is_inverted && !(grid.tolerates_inversion && is_near_fault(suspect.triangle)))
       texels.add(triangle, 0);
   }
-  for (const int triangle : pass.near_far_vertices) texels.add(pass.mesh.triangles[triangle], kAroundFar);
+  for (const int triangle : pass.nearest_to_far_vertices) texels.add(pass.triangle(triangle), kAroundFar);
   return texels;
 }
 
@@ -184,21 +188,21 @@ RevertReport revert_faults(ClContext& context, const RevertSources& sources, std
   const double limit = kShareOfFurthest * grid.faults.furthest;
   RevertReport report;
   report.regular_inverted_triangles = static_cast<int>(grid.faults.inverted.size());
-  Pass pass;
-  for (int number = 0; number < kPasses; ++number) {
-    pass = measure_pass(context, frame, original, vertex_points, texels, limit, number > 0 ? &pass : nullptr);
+  Pass pass = start_passes(context, frame, original, vertex_points, texels, limit);
+  choose_tolerances(frame, pass, grid);
+  for (int number = 0;; ++number) {
     report.inverted_triangles =
         static_cast<int>(std::count_if(pass.suspects.begin(), pass.suspects.end(),
                                        [](const MeasuredTriangle& suspect) { return suspect.is_inverted; }));
-    if (number == 0) choose_tolerances(frame, pass, grid);
     std::vector<int> listed = texels_at_faults(frame, pass, grid, limit).texels();
     std::erase_if(listed, [&](int texel) { return texels.has_same_point(texel, regular); });
-    if (listed.empty()) break;
+    if (listed.empty() || number == kPasses) break;
     // Vertices are given up only when the texels between them have been.
     const bool with_vertices = number > 0;
-    const std::size_t count = revert_texels(frame, listed, with_vertices, regular, texels).size();
-    report.reverted_texels += static_cast<int>(count);
-    if (count == 0 && with_vertices) break;
+    const std::vector<int> reverted = revert_texels(frame, listed, with_vertices, regular, texels);
+    report.reverted_texels += static_cast<int>(reverted.size());
+    if (reverted.empty() && with_vertices) break;
+    next_pass(context, frame, original, vertex_points, texels, limit, reverted, pass);
   }
   return report;
 }
