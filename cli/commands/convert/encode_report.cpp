@@ -70,17 +70,18 @@ Json encode_report_json(const EncodeReport& report, const EncodedFile& file) {
                     {"edges", report.snap->edges},
                     {"snapped_edges", report.snap->snapped_edges},
                     {"texels_on_edges", report.snap->texels_on_edges},
-                    {"texels_reverted", report.snap->texels_put_back}};
+                    {"texels_reverted", report.snap->reverted_texels}};
   if (report.fit) {
     Json residuals = Json::array();
     for (const double residual : report.fit->residuals) residuals.push_back(residual / report.diagonal);
-    json["fit"] = {{"residuals", std::move(residuals)}, {"texels_reverted", report.fit->texels_put_back}};
+    json["fit"] = {{"residuals", std::move(residuals)}, {"texels_reverted", report.fit->reverted_texels}};
   }
   if (report.rounding)
     json["rounding"] = {{"nearest", report.rounding->nearest / report.diagonal},
                         {"chosen", report.rounding->chosen / report.diagonal}};
-  if (report.snap || report.fit)
-    json["inverted_triangles"] = {{"lattice", report.turned_triangles}, {"regular", report.even_turned_triangles}};
+  if (report.revert)
+    json["inverted_triangles"] = {{"lattice", report.revert->inverted_triangles},
+                                  {"regular", report.revert->regular_inverted_triangles}};
   return json;
 }
 
@@ -100,7 +101,8 @@ std::string encode_report_text(const EncodeReport& report, const EncodedFile& fi
         fmt::format("mean distance to the mesh: {:.1e} diagonals\n", report.fit->residuals.back() / report.diagonal);
   if (report.rounding)
     text += fmt::format("error of the half floats: {:.1e} diagonals\n", report.rounding->chosen / report.diagonal);
-  if (report.turned_triangles > 0) text += fmt::format("inverted triangles: {}\n", report.turned_triangles);
+  if (report.revert && report.revert->inverted_triangles > 0)
+    text += fmt::format("inverted triangles: {}\n", report.revert->inverted_triangles);
   return text;
 }
 
@@ -118,12 +120,12 @@ std::string encode_details_text(const EncodeReport& report) {
     text += fmt::format("snapped to {:.1f} % of {} vertices and {:.1f} % of {} edges; {} texels reverted\n",
                         percent(report.snap->snapped_vertices, report.snap->vertices), report.snap->vertices,
                         percent(report.snap->snapped_edges, report.snap->edges), report.snap->edges,
-                        report.snap->texels_put_back);
+                        report.snap->reverted_texels);
   if (report.fit) {
     text += "fitted: mean distance / diagonal";
     for (std::size_t i = 0; i < report.fit->residuals.size(); ++i)
       text += fmt::format("{} {:.3e}", i == 0 ? "" : " ->", report.fit->residuals[i] / report.diagonal);
-    text += fmt::format("; {} texels reverted\n", report.fit->texels_put_back);
+    text += fmt::format("; {} texels reverted\n", report.fit->reverted_texels);
   }
   if (report.rounding)
     text += fmt::format(

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <future>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -128,17 +127,18 @@ void add_results(const TexelReport& report, double diagonal, nlohmann::json& jso
   if (report.snap)
     json["snapped"] = {{"vertices", share(report.snap->snapped_vertices, report.snap->vertices)},
                        {"edges", share(report.snap->snapped_edges, report.snap->edges)},
-                       {"texels_put_back", report.snap->texels_put_back}};
+                       {"texels_put_back", report.snap->reverted_texels}};
   if (report.fit) {
     nlohmann::json residuals = nlohmann::json::array();
     for (const double residual : report.fit->residuals) residuals.push_back(residual / diagonal);
-    json["fitted"] = {{"residuals", std::move(residuals)}, {"texels_put_back", report.fit->texels_put_back}};
+    json["fitted"] = {{"residuals", std::move(residuals)}, {"texels_put_back", report.fit->reverted_texels}};
   }
   if (report.rounding)
     json["rounded"] = {{"nearest", report.rounding->nearest / diagonal},
                        {"chosen", report.rounding->chosen / diagonal}};
-  if (report.snap || report.fit)
-    json["turned_triangles"] = {{"lattice", report.turned_triangles}, {"even", report.even_turned_triangles}};
+  if (report.revert)
+    json["turned_triangles"] = {{"lattice", report.revert->inverted_triangles},
+                                {"even", report.revert->regular_inverted_triangles}};
 }
 
 /// Vertices where the pole of a chart's free end lies.
@@ -234,10 +234,6 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
       patch_demands(sources, has_even_rows ? std::span<const RowProfile>() : profiles,
                     options.texel_share.value_or(is_all_spd ? TexelShare::kArea : TexelShare::kError));
   const TexelPlacing placing = choose_placing(options, mesh, is_all_spd);
-  // Packing is one processor's work, and so is most of what comes before the device reads texels: features are found
-  // and listed beside.
-  std::future<MapFeatures> finding_features;
-  if (placing.has_snap) finding_features = run_beside([&] { return find_features(charts, methods, kLeastDihedral); });
   const AtlasLayout layout = pack_atlas(demands, options.width, options.height);
   report.used_fraction = layout.used_fraction;
 
@@ -248,16 +244,11 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
                       : spread_rows_uniformly(patch.rectangle.height);
     model.patches.push_back(std::move(patch));
   }
-  std::shared_future<DeviceSnapTables> listing_features;
-  if (placing.has_snap) {
-    auto list = [&, on = context.beside()] {
-      return upload_tables(*on,
-                           tables_of(place_features(finding_features.get(), charts, model.patches), model.patches));
-    };
-    listing_features =
-        (context.can_run_beside() ? run_beside(std::move(list)) : std::async(std::launch::deferred, std::move(list)))
-            .share();
-  }
+  std::optional<DeviceSnapTables> features;
+  if (placing.has_snap)
+    features = upload_tables(
+        context, tables_of(place_features(find_features(charts, methods, kLeastDihedral), charts, model.patches),
+                           model.patches));
   model.diagonals =
       options.diagonals.value_or(placing.has_snap || placing.has_fit ? DiagonalRule::kSmooth : DiagonalRule::kNearest);
   Seams seams = sample_seams(segmentation, skeleton, separation, layout.rectangles,
@@ -266,14 +257,6 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   model.corners = std::move(seams.corners);
   model.ends = std::move(seams.ends);
   model.texture.width = options.width, model.texture.height = options.height;
-  std::shared_future<GuardFrame> framing_guard;
-  if (placing.has_snap || placing.has_fit)
-    framing_guard =
-        run_beside([&, listing = context.can_run_beside() ? listing_features : std::shared_future<DeviceSnapTables>()] {
-          if (listing.valid()) listing.wait();  // two at once would take turns with what all wait for
-          return frame_guard(model, charts);
-        }).share();
-
   std::vector<SpdHits> hits(bones);
   {
     std::vector<Chart> cast_charts;
@@ -301,13 +284,18 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
             points_on_loop(segmentation.segments[bone], skeleton, separation, end, model.patches[bone].rectangle.width);
     }
   progress("encoding", 0.8);
-  const GuardSources guard{model, mesh, options.tree, charts, std::move(framing_guard)};
+  std::optional<TriangleTree> own_tree;
+  if ((placing.has_snap || placing.has_fit) && !options.tree) own_tree = build_triangle_tree(mesh);
+  std::optional<RevertSources> revert;
+  if (placing.has_snap || placing.has_fit)
+    revert.emplace(RevertSources{model, mesh, options.tree ? *options.tree : *own_tree, charts});
   TexelOptions texel_options{
       .has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_fit = placing.has_fit};
   if (options.has_half_texels) texel_options.half_rule = model.diagonals;
-  TexelResult texels =
-      read_texels(context, skeleton, separation, {charts, model.patches, hits, end_points, &guard, listing_features},
-                  options.width, options.height, model.origin, texel_options);
+  TexelResult texels = read_texels(
+      context, skeleton, separation,
+      {charts, model.patches, hits, end_points, revert ? &*revert : nullptr, features ? &*features : nullptr},
+      options.width, options.height, model.origin, texel_options);
   model.texture = std::move(texels.texture);
   model.sampling = {options.has_prefilter, placing.has_snap, placing.has_fit};
   {
@@ -325,8 +313,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   report.snap = texels.report.snap;
   report.fit = texels.report.fit;
   report.rounding = texels.report.rounding;
-  report.turned_triangles = texels.report.turned_triangles;
-  report.even_turned_triangles = texels.report.even_turned_triangles;
+  report.revert = texels.report.revert;
   report.device = context.device().name;
   for (int bone = 0; bone < bones; ++bone) {
     const Segment& segment = segmentation.segments[bone];

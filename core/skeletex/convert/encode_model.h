@@ -69,11 +69,11 @@ struct EncodeReport {
   double diagonal = 0;
   std::vector<BoneReport> bones;
   double used_fraction = 0;
-  std::optional<UnfoldReport> unfold;                   ///< when it was on
-  std::optional<SnapReport> snap;                       ///< when it was on
-  std::optional<FitReport> fit;                         ///< when it was on
-  std::optional<RoundingReport> rounding;               ///< to half floats, when it was on
-  int turned_triangles = 0, even_turned_triangles = 0;  ///< with snapping or fit: see GuardReport
+  std::optional<UnfoldReport> unfold;      ///< when it was on
+  std::optional<SnapReport> snap;          ///< when it was on
+  std::optional<FitReport> fit;            ///< when it was on
+  std::optional<RoundingReport> rounding;  ///< to half floats, when it was on
+  std::optional<RevertReport> revert;      ///< with snapping or fit
   double half_edge_ms = 0, segmentation_ms = 0, parameterization_ms = 0, encoding_ms = 0;
   std::string device;
 };

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/convert/sample/half_texels.h"
 
+#include <algorithm>
 #include <cmath>
-
-#include "skeletex/convert/snap/lattice_mesh.h"
 
 namespace skeletex {
 namespace {
@@ -18,14 +17,27 @@ double root_mean_square(const ClMapping<float>& squares) {
 
 /// Planes of one buffer as buffers of their own.
 TexelPoints separate_planes(ClContext& context, const DevicePlanes& planes) {
-  TexelPoints points{context.allocate<float>(planes.count), context.allocate<float>(planes.count),
-                     context.allocate<float>(planes.count)};
-  std::size_t begin = 0;
-  for (ClBuffer<float>* const plane : {&points.x, &points.y, &points.z}) {
-    context.queue().enqueueCopyBuffer(planes.values.memory, plane->memory, begin, 0, planes.count * sizeof(float));
-    begin += planes.count * sizeof(float);
-  }
-  return points;
+  const auto [x, y, z] = download_planes(context, planes);
+  return {context.upload(x), context.upload(y), context.upload(z)};
+}
+
+/// Which diagonals the decoder takes: per texel whether the quad to the right of and above it takes the second one.
+ClBuffer<int> choose_diagonals(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches,
+                               const DeviceLayout& layout, const TexelPoints& points) {
+  constexpr int kBandRows = 16, kBandColumns = 64;  // of a group; columns as in lattice.cl
+  std::vector<LatticeRow> rows = lattice_rows(patches, RowChoice::kInner);
+  std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == patches[row[0]].rectangle.height - 2; });
+  const int count = static_cast<int>(rows.size());
+  int widest = 0;
+  for (const Patch& patch : patches) widest = std::max(widest, patch.rectangle.width);
+  ClRange groups = row_range(context, (count + kBandRows - 1) / kBandRows);
+  groups.global[1] = (widest + kBandColumns - 1) / kBandColumns;
+  auto diagonals = context.allocate<int>(layout.size());
+  context.fill(diagonals, 0);
+  context.launch({"lattice.cl", "choose_diagonals"}, groups, count, kBandRows, layout.width,
+                 static_cast<int>(rule == DiagonalRule::kSmooth), context.upload(rows), layout.patches, points.x,
+                 points.y, points.z, diagonals);
+  return diagonals;
 }
 
 }  // namespace
@@ -33,10 +45,7 @@ TexelPoints separate_planes(ClContext& context, const DevicePlanes& planes) {
 RoundingReport round_to_half(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches,
                              const DeviceLayout& layout, const ClBuffer<RowRecord>& rows,
                              const ClBuffer<ColumnRecord>& columns, const TexelPoints& points, TexelPoints& texels) {
-  auto diagonals = context.allocate<int>(layout.size());
-  context.fill(diagonals, 0);
-  choose_diagonals(context, rule, patches, layout.width, context.upload(quad_rows(patches)), layout.patches, points,
-                   diagonals);
+  const auto diagonals = choose_diagonals(context, rule, patches, layout, points);
   auto nearest2 = context.allocate<float>(layout.size()), chosen2 = context.allocate<float>(layout.size());
   context.fill(nearest2, 0.f), context.fill(chosen2, 0.f);
   const auto inner_rows = context.upload(lattice_rows(patches, RowChoice::kInner));

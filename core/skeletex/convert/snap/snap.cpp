@@ -355,25 +355,4 @@ SnappedPositions snap_positions(ClContext& context, const DeviceLayout& layout, 
   return snapped;
 }
 
-TexelReturns::TexelReturns(ClContext& context, const DeviceLayout& layout)
-    : marks(context.allocate<int>(layout.size())),
-      back(context.allocate<int>(layout.size())),
-      bad(context.allocate<int>(layout.size())) {
-  context.fill(marks, 0);
-}
-
-TexelsBack put_back_listed(ClContext& context, const DeviceLayout& layout, const TexelPoints& even,
-                           const TexelPoints& before, const std::vector<int>& texels, bool with_vertices,
-                           TexelReturns& returns, ReadingPositions& positions, TexelPoints& points) {
-  const auto device_counts = context.upload(std::vector{0, 0});
-  // One work-group: on a CPU one work-item.
-  context.launch({"snap.cl", "put_listed_back"}, row_range(context, 1), static_cast<int>(texels.size()),
-                 static_cast<int>(with_vertices), 1 << ++returns.calls, layout.width, context.upload(texels),
-                 layout.texel_patches, layout.patches, even.x, even.y, even.z, before.x, before.y, before.z,
-                 positions.home_x, positions.home_y, returns.marks, positions.anchors, positions.x, positions.y,
-                 points.x, points.y, points.z, returns.back, returns.bad, device_counts);
-  auto [counts, back, x, y, z] = context.map(device_counts, returns.back, points.x, points.y, points.z);
-  return {{back.data(), back.data() + counts[0]}, {std::move(x), std::move(y), std::move(z)}};
-}
-
 }  // namespace skeletex
