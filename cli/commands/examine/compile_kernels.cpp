@@ -52,17 +52,19 @@ Column make_column(int waves) {
   return column;
 }
 
-/// The kernels of `encode`. Some drivers compile a kernel again for a large number of work-items.
+/// The kernels of `encode`. PoCL compiles a kernel for few work-items and again for many; what it has for many it takes
+/// for few as well, within a process.
 SkeletexModel encode_all_ways(ClContext& context, const Column& column) {
   constexpr int kSmall = 64, kLarge = 512;
   EncodeOptions options;
   SkeletexModel model;
-  for (const int size : {kLarge, kSmall})
+  for (const int size : {kSmall, kLarge})
     for (const EncodeMethod method : {EncodeMethod::kSpd, EncodeMethod::kVsm}) {
       options.width = options.height = size;
       options.method = method;
       options.has_half_texels = false;
-      model = encode_model(context, column.mesh, column.skeleton, options).model;
+      SkeletexModel made = encode_model(context, column.mesh, column.skeleton, options).model;
+      if (size == kSmall) model = std::move(made);
       options.has_half_texels = true;
       encode_model(context, column.mesh, column.skeleton, options);
     }
@@ -78,18 +80,18 @@ Skeleton bent(Skeleton skeleton) {
 
 }  // namespace
 
-void compile_kernels(ClContext& context, ProgressBar& bar) {
+void compile_kernels(ClContext& context, ClContext& metro_context, ProgressBar& bar) {
   const Column column = make_column(1);
   bar.show("encode", 0);
   const SkeletexModel model = encode_all_ways(context, column);
   bar.show("reconstruct", 0.5);
-  const TriangleMesh surface = reconstruct_mesh(context, resample_model(context, model, 48));
+  reconstruct_mesh(context, resample_model(context, model, 48));
   for (const Deformation deformation : {Deformation::kSmooth, Deformation::kCoordinates, Deformation::kPaper})
     for (const DistanceRule distance : {DistanceRule::kFromBone, DistanceRule::kFromFoot})
       reconstruct_mesh(context, model, bent(model.skeleton), {deformation, distance});
   weight_planes(context, model);
   bar.show("metro", 0.6);
-  measure_metro(context, column.mesh, surface);
+  measure_metro(metro_context, column.mesh, column.mesh);
   bar.show("morph", 0.7);
   const Column other = make_column(2);
   EncodeOptions options;

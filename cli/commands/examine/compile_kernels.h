@@ -7,6 +7,8 @@ namespace skeletex::cli {
 
 /// Has the driver compile the kernels of all commands, by running each stage once on a small mesh: some drivers (PoCL)
 /// compile a kernel at its first launch.
-void compile_kernels(ClContext& context, ProgressBar& bar);
+/// \param metro_context  another one for the same device: `metro` has a program of its own where no other has come
+/// first
+void compile_kernels(ClContext& context, ClContext& metro_context, ProgressBar& bar);
 
 }  // namespace skeletex::cli

@@ -22,12 +22,13 @@ struct Arguments {
 };
 
 void run_compile(const Arguments& arguments) {
-  ClContext context(arguments.device);
+  ClContext context(arguments.device), metro_context(arguments.device);
   Stopwatch watch;
   {
     ProgressBar bar(context);
-    compile_kernels(context, bar);
+    compile_kernels(context, metro_context, bar);
   }
+  context.take_profile(metro_context);
   const double seconds = watch.lap_ms() / 1000;
   print(arguments.json, fmt::format("kernels compiled for {} in {:.1f} s\n", context.device().name, seconds));
   write_json(arguments.json,
