@@ -131,9 +131,9 @@ std::string encode_details_text(const EncodeReport& report) {
     text += fmt::format(
         "half floats: {:.1e} of the diagonal off the triangles, the nearest ones {:.1e} (root mean squares)\n",
         report.rounding->chosen / report.diagonal, report.rounding->nearest / report.diagonal);
-  if (report.snap || report.fit)
-    text += fmt::format("{} inverted triangles, {} on the regular grid\n", report.turned_triangles,
-                        report.even_turned_triangles);
+  if (report.revert)
+    text += fmt::format("{} inverted triangles, {} on the regular grid\n", report.revert->inverted_triangles,
+                        report.revert->regular_inverted_triangles);
   return text +
          fmt::format("half edges {:.0f} ms, segmentation {:.0f} ms, parameterization {:.0f} ms, encoding {:.0f} ms\n",
                      report.half_edge_ms, report.segmentation_ms, report.parameterization_ms, report.encoding_ms);

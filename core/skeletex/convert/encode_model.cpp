@@ -127,18 +127,18 @@ void add_results(const TexelReport& report, double diagonal, nlohmann::json& jso
   if (report.snap)
     json["snapped"] = {{"vertices", share(report.snap->snapped_vertices, report.snap->vertices)},
                        {"edges", share(report.snap->snapped_edges, report.snap->edges)},
-                       {"texels_put_back", report.snap->reverted_texels}};
+                       {"texels_reverted", report.snap->reverted_texels}};
   if (report.fit) {
     nlohmann::json residuals = nlohmann::json::array();
     for (const double residual : report.fit->residuals) residuals.push_back(residual / diagonal);
-    json["fitted"] = {{"residuals", std::move(residuals)}, {"texels_put_back", report.fit->reverted_texels}};
+    json["fitted"] = {{"residuals", std::move(residuals)}, {"texels_reverted", report.fit->reverted_texels}};
   }
   if (report.rounding)
     json["rounded"] = {{"nearest", report.rounding->nearest / diagonal},
                        {"chosen", report.rounding->chosen / diagonal}};
   if (report.revert)
-    json["turned_triangles"] = {{"lattice", report.revert->inverted_triangles},
-                                {"even", report.revert->regular_inverted_triangles}};
+    json["inverted_triangles"] = {{"lattice", report.revert->inverted_triangles},
+                                {"regular", report.revert->regular_inverted_triangles}};
 }
 
 /// Vertices where the pole of a chart's free end lies.

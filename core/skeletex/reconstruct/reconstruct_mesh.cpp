@@ -76,36 +76,35 @@ std::vector<Vec3> place_vertices(ClContext& context, const PreparedModel& prepar
   return positions;
 }
 
-/// The triangles of the quads between inner rows, with room for those at the ends behind them.
-std::vector<Triangle> quad_triangles(ClContext& context, const PreparedModel& prepared, const DevicePlanes& inner) {
+}  // namespace
+
+DeviceQuads upload_quads(ClContext& context, const PreparedModel& prepared) {
   std::vector<LatticeRow> rows = prepared.inner_rows;
   std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == prepared.tables.patches[row[0]].height - 2; });
-  auto triangles = context.allocate<Triangle>(prepared.lattice.triangle_count);
-  context.launch({"reconstruct.cl", "triangulate"}, row_range(context, rows.size()),
-                 TriangulateParameters{static_cast<int>(rows.size()), static_cast<int>(inner.count),
-                                       static_cast<int>(prepared.model.diagonals == DiagonalRule::kSmooth)},
-                 context.upload(rows), context.upload(prepared.tables.patches), inner.values, triangles);
-  std::vector<Triangle> quads = context.download(triangles);
-  quads.resize(2 * static_cast<std::size_t>(prepared.lattice.quad_count));
-  return quads;
+  return {context.upload(rows), context.upload(prepared.tables.patches)};
 }
 
-/// Appends the triangles between an end and the inner row next to it.
-void append_end_triangles(const PreparedModel& prepared, std::span<const Vec3> positions, int bone, BoneEnd end,
-                          std::vector<Triangle>& triangles) {
-  const SkeletexModel& model = prepared.model;
-  const EndSeam seam = end_seam(model, prepared.separation, prepared.lattice, positions, bone, end);
+ClBuffer<Triangle> triangulate(ClContext& context, DiagonalRule rule, const DeviceQuads& quads, const Lattice& lattice,
+                               const DevicePlanes& inner) {
+  auto triangles = context.allocate<Triangle>(lattice.triangle_count);
+  context.launch({"reconstruct.cl", "triangulate"}, row_range(context, quads.rows.size),
+                 TriangulateParameters{static_cast<int>(quads.rows.size), static_cast<int>(inner.count),
+                                       static_cast<int>(rule == DiagonalRule::kSmooth)},
+                 quads.rows, quads.patches, inner.values, triangles);
+  return triangles;
+}
+
+void append_end_triangles(const SkeletexModel& model, const Lattice& lattice, std::span<const Vec3> positions,
+                          const EndSeam& seam, int bone, BoneEnd end, std::vector<Triangle>& triangles) {
   if (seam.ring.vertices.empty()) {
-    append_pole_fan(model, prepared.lattice, bone, end, triangles);
+    append_pole_fan(model, lattice, bone, end, triangles);
     return;
   }
-  Ring row{end_row(model, prepared.lattice, bone, end), {}};
+  Ring row{end_row(model, lattice, bone, end), {}};
   for (std::size_t j = 0; j < row.vertices.size(); ++j)
     row.turns.push_back(static_cast<double>(j) / static_cast<double>(row.vertices.size()));
   append_seam_strip(positions, seam.ring, seam.turns, row, end, triangles);
 }
-
-}  // namespace
 
 std::vector<Vec3> lattice_positions(ClContext& context, const PreparedModel& model) {
   return place_vertices(context, model, row_points(context, model, RowChoice::kInner));
@@ -115,7 +114,9 @@ std::vector<Triangle> end_triangles(const PreparedModel& model, const std::vecto
   std::vector<Triangle> triangles;
   for (int bone = 0; bone < static_cast<int>(model.model.patches.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
-      append_end_triangles(model, positions, bone, end, triangles);
+      append_end_triangles(model.model, model.lattice, positions,
+                           end_seam(model.model, model.separation, model.lattice, positions, bone, end), bone, end,
+                           triangles);
   return triangles;
 }
 
@@ -123,7 +124,9 @@ BindMesh reconstruct_bind_mesh(ClContext& context, const PreparedModel& model) {
   BindMesh bind;
   bind.inner = row_points(context, model, RowChoice::kInner);
   bind.mesh.positions = place_vertices(context, model, bind.inner);
-  bind.mesh.triangles = quad_triangles(context, model, bind.inner);
+  bind.mesh.triangles = context.download(
+      triangulate(context, model.model.diagonals, upload_quads(context, model), model.lattice, bind.inner));
+  bind.mesh.triangles.resize(2 * static_cast<std::size_t>(model.lattice.quad_count));
   const std::vector<Triangle> ends = end_triangles(model, bind.mesh.positions);
   bind.mesh.triangles.insert(bind.mesh.triangles.end(), ends.begin(), ends.end());
   return bind;

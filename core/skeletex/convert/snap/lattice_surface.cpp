@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "skeletex/geometry/parallel.h"
+#include "skeletex/reconstruct/prepared_model.h"
 
 namespace skeletex {
 namespace {
@@ -48,9 +49,10 @@ void for_each_inner_row(const SkeletexModel& model, const Lattice& lattice, cons
 }  // namespace
 
 LatticeFrame frame_lattice(ClContext& context, const SkeletexModel& model) {
-  const SeparationPlanes separation(model.skeleton);
-  const Lattice lattice = number_lattice(model);
-  LatticeFrame frame{model, lattice, upload_quads(context, model, separation), {}, {}, {}, {}, {}, {}, {}};
+  const PreparedModel prepared(model);
+  const SeparationPlanes& separation = prepared.separation;
+  const Lattice& lattice = prepared.lattice;
+  LatticeFrame frame{model, lattice, upload_quads(context, prepared), {}, {}, {}, {}, {}, {}, {}};
   frame.rows = lattice_rows(model.patches, RowChoice::kInner);
   std::erase_if(frame.rows,
                 [&](const LatticeRow& row) { return row[1] == model.patches[row[0]].rectangle.height - 2; });
@@ -133,7 +135,8 @@ LatticeMesh build_lattice_mesh(ClContext& context, const LatticeFrame& frame, Di
       result.inner[axis].insert(result.inner[axis].end(), first, first + columns);
     });
   }
-  const auto device_triangles = triangulate(context, rule, frame.quads, lattice, upload_planes(context, result.inner[0], result.inner[1], result.inner[2]));
+  const auto device_triangles = triangulate(context, rule, frame.quads, lattice,
+                                            upload_planes(context, result.inner[0], result.inner[1], result.inner[2]));
   for (int vertex = 0; vertex < lattice.vertex_count; ++vertex)
     if (frame.texels[vertex] >= 0) mesh.positions[vertex] = position_of(frame.model, points, frame.texels[vertex]);
   std::vector<int> ends(frame.ends.size());
