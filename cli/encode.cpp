@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <charconv>
 #include <exception>
@@ -26,6 +27,8 @@
 
 namespace skeletex::cli {
 namespace {
+
+constexpr const char* kHybrid = "hybrid";  // each bone has a method of its own
 
 struct Arguments {
   std::string mesh, skeleton, output, device, json, size = "512", method = "vsm";
@@ -60,9 +63,11 @@ std::vector<std::pair<std::string, Method>> parse_bone_methods(const std::vector
   for (const std::string& text : texts) {
     const auto equals = text.rfind('=');
     const std::string method = equals == std::string::npos ? "" : text.substr(equals + 1);
-    if (method != "vsm" && method != "spd")
-      throw CLI::ValidationError("--bone-method", "\"" + text + "\" is not BONE=vsm or BONE=spd");
-    methods.emplace_back(text.substr(0, equals), method == "vsm" ? Method::kVsm : Method::kSpd);
+    const std::vector<std::string> names = method_names();
+    if (std::find(names.begin(), names.end(), method) == names.end())
+      throw CLI::ValidationError("--bone-method",
+                                 fmt::format("\"{}\" is not BONE={}", text, fmt::join(names, " or BONE=")));
+    methods.emplace_back(text.substr(0, equals), method_named(method));
   }
   return methods;
 }
@@ -76,13 +81,10 @@ EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command
   const auto size = parse_size(arguments.size);
   options.width = size[0];
   options.height = size[1];
-  options.method = arguments.method == "spd"   ? EncodeMethod::kSpd
-                   : arguments.method == "vsm" ? EncodeMethod::kVsm
-                                               : EncodeMethod::kHybrid;
+  options.method = arguments.method == kHybrid ? std::nullopt : std::optional(method_named(arguments.method));
   options.hybrid_unseen_threshold = arguments.hybrid_threshold;
   options.hybrid_overrides = parse_bone_methods(arguments.bone_methods);
-  if (options.method != EncodeMethod::kHybrid &&
-      (!arguments.bone_methods.empty() || command.count("--hybrid-threshold") > 0))
+  if (options.method && (!arguments.bone_methods.empty() || command.count("--hybrid-threshold") > 0))
     throw CLI::ValidationError("--bone-method and --hybrid-threshold", "need --method hybrid");
   if (arguments.is_paper_recipe) {
     options.vsm = {.iterations = 1, .alpha = 0};
@@ -91,7 +93,7 @@ EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command
     options.has_unfold = false;
     options.has_snap = false;
     options.has_fit = false;
-    if (options.method != EncodeMethod::kSpd) options.texel_share = TexelShare::kTriangles;
+    if (!options.method || !is_height_field(*options.method)) options.texel_share = TexelShare::kTriangles;
   }
   const auto is_given = [&](const char* name) { return command.count(name) > 0; };
   if (is_given("--iterations")) options.vsm.iterations = arguments.iterations;
@@ -136,12 +138,12 @@ Json report_json(const EncodeReport& report, const EncodeOptions& options, doubl
               {"flipped_triangles", bone.flipped_triangles},
               {"sampled_triangle_fraction", bone.sampled_triangle_fraction},
               {"missed_texels", bone.missed_texels}};
-    if (bone.method == Method::kVsm)
-      json["vsm"] = {{"iterations", bone.vsm.iterations},
-                     {"spread", bone.vsm.spread},
-                     {"solver_steps", bone.vsm.solver_steps},
-                     {"residual", bone.vsm.residual},
-                     {"used_direct_solver", bone.vsm.used_direct_solver}};
+    if (!is_height_field(bone.method))
+      json[to_string(bone.method)] = {{"iterations", bone.map.iterations},
+                                      {"spread", bone.map.spread},
+                                      {"solver_steps", bone.map.solver_steps},
+                                      {"residual", bone.map.residual},
+                                      {"used_direct_solver", bone.map.used_direct_solver}};
     bones.push_back(std::move(json));
   }
   Json json{{"mesh",
@@ -311,8 +313,8 @@ void run(const Arguments& arguments, const CLI::App& command) {
   for (const BoneReport& bone : result.report.bones) {
     if (bone.flipped_triangles > 0)
       warn(fmt::format("bone \"{}\": {} triangles are flipped in its map", bone.name, bone.flipped_triangles));
-    if (bone.method == Method::kSpd && bone.unseen_area_fraction > EncodeOptions{}.hybrid_unseen_threshold)
-      warn(fmt::format("bone \"{}\": SPD does not see {:.1f} % of its surface; --method hybrid or vsm does", bone.name,
+    if (is_height_field(bone.method) && bone.unseen_area_fraction > EncodeOptions{}.hybrid_unseen_threshold)
+      warn(fmt::format("bone \"{}\": rays do not see {:.1f} % of its surface; --method hybrid or vsm does", bone.name,
                        100 * bone.unseen_area_fraction));
   }
   Json json = report_json(result.report, options, watch.lap_ms() / 1000);
@@ -341,11 +343,13 @@ void add_encode_command(CLI::App& program) {
       ->required()
       ->type_name("FILE");
   add("Options", "--size", a.size, "texels: N for N x N, or WIDTHxHEIGHT").type_name("N|WxH");
+  std::vector<std::string> methods = method_names();
+  methods.push_back(kHybrid);
   take_one_of(add("Options", "--method", a.method,
                   "how bones are mapped: spd casts rays from the bone (a height field), vsm spreads the triangles over "
                   "the texels, hybrid takes spd "
                   "where it sees the surface and vsm elsewhere"),
-              {"spd", "vsm", "hybrid"});
+              methods);
   add("VSM", "--iterations", a.iterations,
       "reweightings after the first solve, 0 to 100; 0 is the plain barycentric map")
       .type_name("N")
@@ -366,7 +370,7 @@ void add_encode_command(CLI::App& program) {
       .type_name("X")
       ->check(number_in(0.0, 1.0));
   add("Hybrid", "--bone-method", a.bone_methods, "method of a bone by its name; repeat for more bones")
-      .type_name("BONE=vsm|spd")
+      .type_name(fmt::format("BONE={}", fmt::join(method_names(), "|")))
       ->expected(1)
       ->take_all();
   take_one_of(add("Texels", "--rows", a.rows,

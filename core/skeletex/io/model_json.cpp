@@ -2,6 +2,7 @@
 #include "skeletex/io/model_json.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cctype>
@@ -48,9 +49,9 @@ std::array<int, 2> pair_from_json(const json& value, int count, const std::strin
 }
 
 Method method_from_json(const json& value, const std::string& where) {
-  for (const Method method : {Method::kSpd, Method::kVsm})
+  for (const Method method : all_methods())
     if (value == to_string(method)) return method;
-  throw IoError(where + ": \"spd\" or \"vsm\" is expected");
+  throw IoError(fmt::format("{}: one of the methods {} is expected", where, fmt::join(method_names(), ", ")));
 }
 
 SegmentTopology topology_from_json(const json& value, const std::string& where) {

@@ -22,9 +22,6 @@ constexpr double kPoleSnap = 1e-3;
 
 double wrapped(double turns) { return turns - std::round(turns); }
 
-bool is_row(ChartVertex kind) { return kind == ChartVertex::kHeadRow || kind == ChartVertex::kTailRow; }
-bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind == ChartVertex::kTailPole; }
-
 /// One boundary row: lifted angles, first as measured, then made strictly increasing.
 struct Row {
   std::vector<int> vertices;

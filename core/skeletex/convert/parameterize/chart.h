@@ -18,6 +18,9 @@ enum class ChartVertex : std::uint8_t {
   kTailPole,  ///< u = 1, no v
 };
 
+inline bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind == ChartVertex::kTailPole; }
+inline bool is_row(ChartVertex kind) { return kind == ChartVertex::kHeadRow || kind == ChartVertex::kTailRow; }
+
 /// A segment made ready to be mapped to its rectangle, and then its map: u from head (0) to tail (1), v periodic with
 /// period 1. The v of a triangle's corner is v[vertex] + turns[triangle][corner]; over a triangle these lifted values
 /// are continuous (corners at a pole have no v: the pole's triangle covers the trapezoid over its opposite edge).

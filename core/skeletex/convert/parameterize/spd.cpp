@@ -335,4 +335,17 @@ SpdCoordinates spd_coordinates(const Skeleton& skeleton, const SeparationPlanes&
   return {u_of({axial, 0}, is_head_free, is_tail_free), turn};
 }
 
+namespace {
+
+class SpdMethod : public ParameterizationMethod {
+ public:
+  std::vector<MapReport> map(ClContext&, std::span<Chart> charts, const MapOptions&) const override {
+    return std::vector<MapReport>(charts.size());
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<ParameterizationMethod> make_spd_method() { return std::make_unique<SpdMethod>(); }
+
 }  // namespace skeletex

@@ -65,7 +65,7 @@ int fill_missed(const SpdHits& hits, const Rectangle& r, std::vector<float>& dis
 std::vector<int> fill_uncovered(std::span<const Patch> patches, int texture_width, std::vector<int>& texel_triangles) {
   std::vector<int> counts(patches.size(), 0);
   for (std::size_t bone = 0; bone < patches.size(); ++bone) {
-    if (patches[bone].method != Method::kVsm) continue;
+    if (is_height_field(patches[bone].method)) continue;
     const Rectangle& r = patches[bone].rectangle;
     for (int row = 1; row + 1 < r.height; ++row) {
       int* line = texel_triangles.data() + (r.y + row) * static_cast<std::size_t>(texture_width) + r.x;
@@ -126,7 +126,7 @@ std::vector<int> vsm_texels(std::span<const Patch> patches, int texture_width, i
     const Rectangle& r = patch.rectangle;
     for (int row = 0; row < r.height; ++row)
       std::fill_n(is_vsm.begin() + (r.y + row) * static_cast<std::size_t>(texture_width) + r.x, r.width,
-                  static_cast<int>(patch.method == Method::kVsm));
+                  static_cast<int>(!is_height_field(patch.method)));
   }
   return is_vsm;
 }
@@ -201,7 +201,7 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Sepa
   std::vector<float> distances;
   bool has_spd = false;
   for (int bone = 0; bone < bones; ++bone) {
-    if (sources.patches[bone].method != Method::kSpd) continue;
+    if (!is_height_field(sources.patches[bone].method)) continue;
     if (!has_spd) distances.assign(texels, -1);
     has_spd = true;
     const Rectangle& r = sources.patches[bone].rectangle;
