@@ -339,7 +339,12 @@ void ClContext::compile(const ClKernelName& name, const ClRange& range) {
       fill_bytes(buffers.back(), &zero, sizeof zero, kBytes);
       check_argument(kernel.setArg(i, buffers.back()), name, i);
     } else {
-      check_argument(kernel.setArg(i, sizeof zero, &zero), name, i);
+      // A scalar, or a struct of a size that only the driver knows.
+      const std::vector<std::byte> zeros(kBytes);
+      cl_int code = CL_INVALID_ARG_SIZE;
+      for (std::size_t bytes = sizeof zero; code == CL_INVALID_ARG_SIZE && bytes <= kBytes; bytes += sizeof zero)
+        code = ::clSetKernelArg(kernel(), i, bytes, zeros.data());
+      check_argument(code, name, i);
     }
   }
   enqueue(kernel, name, range);

@@ -8,13 +8,14 @@ namespace {
 
 /// Groups of the kernels that walk through lists or trees (spd.cpp, nearest_search.cpp).
 const ClRange kSearch{{32, 1}, {32, 1}};
-/// VSM on a CPU: a work-item takes a whole chart.
+/// Groups of VSM on a CPU (work_group.h).
 const ClRange kSingle{{1, 1}, {1, 1}};
 
 }  // namespace
 
 std::vector<KernelVariant> encoding_kernels(const ClContext& context, const EncodeOptions& options) {
-  const bool has_vsm = options.method != EncodeMethod::kSpd, has_spd = options.method != EncodeMethod::kVsm;
+  const bool has_vsm = !options.method || !is_height_field(*options.method),
+             has_spd = !options.method || is_height_field(*options.method);
   const std::size_t texels = static_cast<std::size_t>(options.width) * options.height;
   const ClRange items(1), all_texels(texels), rows = row_range(context, 1);
   std::vector<KernelVariant> kernels;
@@ -22,7 +23,11 @@ std::vector<KernelVariant> encoding_kernels(const ClContext& context, const Enco
     for (const char* name : names) kernels.push_back({{file, name}, range});
   };
   add("segment.cl", {"classify_points"}, items);
-  if (has_vsm && context.row_items() == 1) add("vsm.cl", {"map_charts"}, kSingle);  // elsewhere there is none
+  if (has_vsm) {
+    add("vsm.cl", {"weigh_rows", "form_residual"}, kSingle);
+    add("vsm.cl", {"scale_rows", "measure_areas"}, items);
+    add("elimination.cl", {"eliminate_fronts", "substitute_back"}, kSingle);
+  }
   add("spd.cl", {"find_hidden"}, kSearch);
   if (has_spd) add("spd.cl", {"cast_rays"}, kSearch);
   if (has_vsm) {
