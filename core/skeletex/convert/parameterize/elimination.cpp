@@ -2,10 +2,7 @@
 #include "skeletex/convert/parameterize/elimination.h"
 
 #include <algorithm>
-#include <array>
 #include <utility>
-
-#include "skeletex/geometry/parallel.h"
 
 namespace skeletex {
 namespace {
@@ -17,53 +14,39 @@ constexpr int kLeastGroups = 64;
 
 int padded(int count) { return (count + ELIMINATION_TILE - 1) / ELIMINATION_TILE * ELIMINATION_TILE; }
 
-template <class T>
-void append(std::vector<T>& to, const std::vector<T>& more) {
-  to.insert(to.end(), more.begin(), more.end());
-}
-
 /// A run of fronts that one work-group takes, and when it can.
 struct Task {
   int begin = 0, end = 0, stage = 0;
   double work = 0;
 };
 
-/// The fronts of one system, and the tasks that they make.
-struct SystemFronts {
-  std::vector<FrontRecord> fronts;
-  std::vector<int> children, boundary_rows, parent_columns, columns;
-  std::vector<int> value_counts;  ///< per row
-  std::vector<Task> tasks;
-  int matrix_rows = 0, vector_rows = 0;
-};
-
+/// Adds the fronts of one system to the tables, and the tasks that they make.
 class FrontBuilder {
  public:
-  FrontBuilder(const OrderedGraph& system, int id, int subtree_size)
+  FrontBuilder(const OrderedGraph& system, int id, int subtree_size, EliminationTables& tables,
+               std::vector<Task>& tasks)
       : system_(system),
         d_(system.dissection),
         id_(id),
         subtree_size_(subtree_size),
+        s_(tables),
+        tasks_(tasks),
         column_(d_.order.size(), -1),
         list_(d_.fronts.size()),
         records_(d_.fronts.size() + 1),
         stage_(d_.fronts.size(), 0),
-        depth_(d_.fronts.size(), 0),
-        rest_size_(d_.fronts.size(), 0),
         work_(d_.fronts.size(), 0) {}
 
-  SystemFronts build() {
-    const int count = static_cast<int>(d_.fronts.size());
-    for (int f = count - 1; f >= 0; --f)
-      if (d_.fronts[f].parent >= 0) depth_[f] = depth_[d_.fronts[f].parent] + 1;
-    for (int f = 0; f < count; ++f) {
+  void run() {
+    // Rows of padding before this system have no values.
+    s_.row_begin.resize(system_.first_row + 1, static_cast<int>(s_.columns.size()));
+    for (int f = 0; f < static_cast<int>(d_.fronts.size()); ++f) {
       number_columns(f);
       list_values(f);
       join_children(f);
       add_records(f);
-      add_task(f);
+      add_tasks(f);
     }
-    return std::move(s_);
   }
 
  private:
@@ -83,12 +66,9 @@ class FrontBuilder {
   void list_values(int f) {
     const Front& front = d_.fronts[f];
     for (int number = front.first; number < front.first + front.pivots; ++number) {
-      int& count = s_.value_counts.emplace_back(0);
       for (const int v : system_.graph.neighbours(d_.order[number]))
-        if (d_.number[v] > number) {
-          s_.columns.push_back(column_[d_.number[v]]);
-          ++count;
-        }
+        if (d_.number[v] > number) s_.columns.push_back(column_[d_.number[v]]);
+      s_.row_begin.push_back(static_cast<int>(s_.columns.size()));
     }
   }
 
@@ -126,12 +106,8 @@ class FrontBuilder {
       record.child_end = static_cast<int>(s_.children.size());
       record.rows = s_.matrix_rows;
       s_.matrix_rows += pivots(f) * width(f) / ELIMINATION_TILE;
-      // A task's boundary rows lie on two stacks, by depth, so that little memory is touched: a front's go on one, its
-      // children's leave the other.
-      int& rest_end = is_in_subtree(f) ? stack_[depth_[f] % 2] : s_.matrix_rows;
-      record.rest = rest_end;
-      rest_end += boundary * (boundary + ELIMINATION_TILE) / 2 / ELIMINATION_TILE;
-      rest_size_[f] += rest_end - record.rest;
+      record.rest = s_.matrix_rows;
+      s_.matrix_rows += boundary * (boundary + ELIMINATION_TILE) / 2 / ELIMINATION_TILE;
       record.vectors = s_.vector_rows;
       s_.vector_rows += 4 * width(f) / ELIMINATION_TILE;
       s_.fronts.push_back(record);
@@ -140,7 +116,7 @@ class FrontBuilder {
   }
 
   /// Fronts above subtrees are tasks of their own; a subtree is one when its last front is there.
-  void add_task(int f) {
+  void add_tasks(int f) {
     const Front& front = d_.fronts[f];
     const int begin = records_[f], end = records_[f + 1];
     const double own_work = static_cast<double>(pivots(f)) * width(f) * width(f);
@@ -148,75 +124,32 @@ class FrontBuilder {
     if (front.parent >= 0) work_[front.parent] += work_[f];
     if (!is_in_subtree(f)) {
       for (const int child : front.children) stage_[f] = std::max(stage_[f], stage_[child] + 1);
-      for (int k = begin; k < end; ++k) s_.tasks.push_back({k, k + 1, stage_[f], own_work});
+      for (int k = begin; k < end; ++k) tasks_.push_back({k, k + 1, stage_[f], own_work});
       return;
     }
-    const int side = depth_[f] % 2;
-    stack_size_[side] = std::max(stack_size_[side], stack_[side]);
-    for (const int child : front.children) stack_[1 - side] -= rest_size_[child];
-    if (front.parent >= 0 && is_in_subtree(front.parent)) return;
-    s_.tasks.push_back({records_[front.subtree], end, 0, work_[f]});
-    for (int g = front.subtree; g <= f; ++g)
-      for (int k = records_[g]; k < records_[g + 1]; ++k)
-        s_.fronts[k].rest += s_.matrix_rows + depth_[g] % 2 * stack_size_[0];
-    s_.matrix_rows += stack_size_[0] + stack_size_[1];
-    stack_ = stack_size_ = {};
+    if (front.parent < 0 || !is_in_subtree(front.parent)) tasks_.push_back({records_[front.subtree], end, 0, work_[f]});
   }
 
   const OrderedGraph& system_;
   const Dissection& d_;
   int id_, subtree_size_;
+  EliminationTables& s_;
+  std::vector<Task>& tasks_;
   std::vector<int> column_;   ///< per number, in the front at hand
   std::vector<int> list_;     ///< per front, its boundary's first entry in `boundary_rows`
   std::vector<int> records_;  ///< per front, its first record
-  std::vector<int> stage_, depth_, rest_size_;
+  std::vector<int> stage_;
   std::vector<double> work_;
-  std::array<int, 2> stack_{}, stack_size_{};
-  SystemFronts s_;
 };
-
-/// Appends the fronts of a system behind those of the systems before it.
-void append_fronts(EliminationTables& to, std::vector<Task>& tasks, SystemFronts&& more, int first_row) {
-  const int fronts = static_cast<int>(to.fronts.size()), children = static_cast<int>(to.children.size()),
-            list = static_cast<int>(to.boundary_rows.size());
-  for (FrontRecord& front : more.fronts) {
-    front.list += list;
-    front.child_begin += children;
-    front.child_end += children;
-    front.rows += to.matrix_rows;
-    front.rest += to.matrix_rows;
-    front.vectors += to.vector_rows;
-  }
-  for (int& child : more.children) child += fronts;
-  for (Task& task : more.tasks) {
-    task.begin += fronts;
-    task.end += fronts;
-  }
-  // Rows of padding have no values.
-  to.row_begin.resize(first_row + 1, static_cast<int>(to.columns.size()));
-  for (const int count : more.value_counts) to.row_begin.push_back(to.row_begin.back() + count);
-  append(to.fronts, more.fronts);
-  append(to.children, more.children);
-  append(to.boundary_rows, more.boundary_rows);
-  append(to.parent_columns, more.parent_columns);
-  append(to.columns, more.columns);
-  append(tasks, more.tasks);
-  to.matrix_rows += more.matrix_rows;
-  to.vector_rows += more.vector_rows;
-}
 
 }  // namespace
 
 EliminationTables make_elimination_tables(std::span<const OrderedGraph> systems, int rows) {
   const int subtree_size = std::clamp(rows / kSubtrees, kSmallestSubtree, kLargestSubtree);
-  std::vector<SystemFronts> fronts(systems.size());
-  for_each_block(systems.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-    fronts[i] = FrontBuilder(systems[i], static_cast<int>(i), subtree_size).build();
-  });
   EliminationTables tables;
   std::vector<Task> tasks;
   for (std::size_t i = 0; i < systems.size(); ++i)
-    append_fronts(tables, tasks, std::exchange(fronts[i], {}), systems[i].first_row);
+    FrontBuilder(systems[i], static_cast<int>(i), subtree_size, tables, tasks).run();
   tables.row_begin.resize(rows + 1, static_cast<int>(tables.columns.size()));
   std::stable_sort(tasks.begin(), tasks.end(), [](const Task& a, const Task& b) {
     return a.stage != b.stage ? a.stage < b.stage : a.work > b.work;
@@ -239,7 +172,7 @@ Elimination::Elimination(ClContext& context, EliminationTables tables, int rows,
   std::vector<int> joined = std::move(tables.tasks);
   const auto place = [&](const std::vector<int>& table) {
     const int begin = static_cast<int>(joined.size());
-    append(joined, table);
+    joined.insert(joined.end(), table.begin(), table.end());
     return begin;
   };
   layout_.children = place(tables.children);
