@@ -507,7 +507,7 @@ TEST(Filters, KeepARealModelClosedWithItsGenus) {
   const TestModel bear = load_standard_model("bear");
   EncodeOptions options;
   options.width = options.height = 128;
-  options.method = EncodeMethod::kSpd;
+  options.method = Method::kSpd;
   const SkeletexModel model = encode_model(device(), bear.mesh, bear.skeleton, options).model;
   SmoothOptions smooth;
   smooth.scale = 0.02;

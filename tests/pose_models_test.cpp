@@ -57,7 +57,7 @@ double largest_difference(const std::vector<Vec3>& a, const std::vector<Vec3>& b
 
 struct Case {
   const char* name;
-  EncodeMethod method;
+  std::optional<Method> method;
 };
 
 class PoseModels : public ::testing::TestWithParam<Case> {
@@ -155,11 +155,10 @@ TEST_P(PoseModels, StayWhatTheyAre) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Standard, PoseModels,
-                         ::testing::Values(Case{"armadillo", EncodeMethod::kVsm}, Case{"bear", EncodeMethod::kSpd},
-                                           Case{"eight", EncodeMethod::kVsm}, Case{"knot1", EncodeMethod::kSpd}),
+                         ::testing::Values(Case{"armadillo", Method::kVsm}, Case{"bear", Method::kSpd},
+                                           Case{"eight", Method::kVsm}, Case{"knot1", Method::kSpd}),
                          [](const auto& test) {
-                           return std::string(test.param.name) +
-                                  (test.param.method == EncodeMethod::kSpd ? "_spd" : "_vsm");
+                           return std::string(test.param.name) + (test.param.method == Method::kSpd ? "_spd" : "_vsm");
                          });
 
 }  // namespace

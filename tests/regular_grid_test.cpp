@@ -27,7 +27,7 @@ ClContext& device() {
   return context;
 }
 
-SkeletexModel encoded(const std::string& name, int size, bool is_snapped, EncodeMethod method = EncodeMethod::kVsm) {
+SkeletexModel encoded(const std::string& name, int size, bool is_snapped, std::optional<Method> method = Method::kVsm) {
   const TestModel model = load_standard_model(name);
   EncodeOptions options;
   options.width = options.height = size;

@@ -33,7 +33,7 @@ ClContext& cl() {
 SkeletexModel model_of(const Shape& shape, Method method) {
   EncodeOptions options;
   options.width = options.height = 64;
-  options.method = method == Method::kSpd ? EncodeMethod::kSpd : EncodeMethod::kVsm;
+  options.method = method;
   return encode_model(cl(), shape.mesh, shape.skeleton, options).model;
 }
 

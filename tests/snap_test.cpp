@@ -471,7 +471,7 @@ TEST(Snap, AndFitAreOnWhereTheyPayUnlessToldOtherwise) {
   EXPECT_EQ(reported(128, few, [](EncodeOptions& o) { o.has_snap = true, o.has_fit = false; }), std::pair(true, false));
   EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.has_prefilter = false; }),
             std::pair(true, false));  // texels on the mesh were asked for
-  EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.method = EncodeMethod::kSpd; }), std::pair(false, false));
+  EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.method = Method::kSpd; }), std::pair(false, false));
 }
 
 TEST(Snap, LeavesNoWideGapsBetweenSeamSamples) {

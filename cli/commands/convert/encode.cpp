@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <charconv>
 #include <filesystem>
@@ -18,6 +19,8 @@
 
 namespace skeletex::cli {
 namespace {
+
+constexpr const char* kHybrid = "hybrid";  // each bone has a method of its own
 
 struct Arguments {
   std::string mesh, skeleton, output, device, json, size = "512", method = "vsm";
@@ -52,9 +55,11 @@ std::vector<std::pair<std::string, Method>> parse_bone_methods(const std::vector
   for (const std::string& text : texts) {
     const auto equals = text.rfind('=');
     const std::string method = equals == std::string::npos ? "" : text.substr(equals + 1);
-    if (method != "vsm" && method != "spd")
-      throw CLI::ValidationError("--bone-method", "\"" + text + "\" is not BONE=vsm or BONE=spd");
-    methods.emplace_back(text.substr(0, equals), method == "vsm" ? Method::kVsm : Method::kSpd);
+    const std::vector<std::string> names = method_names();
+    if (std::find(names.begin(), names.end(), method) == names.end())
+      throw CLI::ValidationError("--bone-method",
+                                 fmt::format("\"{}\" is not BONE={}", text, fmt::join(names, " or BONE=")));
+    methods.emplace_back(text.substr(0, equals), method_named(method));
   }
   return methods;
 }
@@ -70,7 +75,7 @@ void take_paper_recipe(EncodeOptions& options) {
   options.has_unfold = false;
   options.has_snap = false;
   options.has_fit = false;
-  if (options.method != EncodeMethod::kSpd) options.texel_share = TexelShare::kTriangles;
+  if (!options.method || !is_height_field(*options.method)) options.texel_share = TexelShare::kTriangles;
 }
 
 /// What is given beats the paper's recipe.
@@ -98,13 +103,10 @@ EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command
   const auto size = parse_size(arguments.size);
   options.width = size[0];
   options.height = size[1];
-  options.method = arguments.method == "spd"   ? EncodeMethod::kSpd
-                   : arguments.method == "vsm" ? EncodeMethod::kVsm
-                                               : EncodeMethod::kHybrid;
+  options.method = arguments.method == kHybrid ? std::nullopt : std::optional(method_named(arguments.method));
   options.hybrid_unseen_threshold = arguments.hybrid_threshold;
   options.hybrid_overrides = parse_bone_methods(arguments.bone_methods);
-  if (options.method != EncodeMethod::kHybrid &&
-      (!arguments.bone_methods.empty() || command.count("--hybrid-threshold") > 0))
+  if (options.method && (!arguments.bone_methods.empty() || command.count("--hybrid-threshold") > 0))
     throw CLI::ValidationError("--bone-method and --hybrid-threshold", "need --method hybrid");
   if (arguments.is_paper_recipe) take_paper_recipe(options);
   set_texel_options(arguments, command, options);
@@ -144,8 +146,8 @@ void warn_of_bones(const EncodeReport& report) {
   for (const BoneReport& bone : report.bones) {
     if (bone.flipped_triangles > 0)
       warn(fmt::format("bone \"{}\": {} triangles are flipped in its map", bone.name, bone.flipped_triangles));
-    if (bone.method == Method::kSpd && bone.unseen_area_fraction > EncodeOptions{}.hybrid_unseen_threshold)
-      warn(fmt::format("bone \"{}\": SPD does not see {:.1f} % of its surface; --method hybrid or vsm does", bone.name,
+    if (is_height_field(bone.method) && bone.unseen_area_fraction > EncodeOptions{}.hybrid_unseen_threshold)
+      warn(fmt::format("bone \"{}\": rays do not see {:.1f} % of its surface; --method hybrid or vsm does", bone.name,
                        100 * bone.unseen_area_fraction));
   }
 }
@@ -202,7 +204,7 @@ void add_map_options(CLI::App& command, Arguments& a) {
       .type_name("X")
       ->check(number_in(0.0, 1.0));
   add(command, "Hybrid", "--bone-method", a.bone_methods, "method of a bone by its name; repeat for more bones")
-      .type_name("BONE=vsm|spd")
+      .type_name(fmt::format("BONE={}", fmt::join(method_names(), "|")))
       ->expected(1)
       ->take_all();
 }
@@ -273,11 +275,13 @@ void add_encode_command(CLI::App& program) {
       ->required()
       ->type_name("FILE");
   add(command, "Options", "--size", a.size, "texels: N for N x N, or WIDTHxHEIGHT").type_name("N|WxH");
+  std::vector<std::string> methods = method_names();
+  methods.push_back(kHybrid);
   take_one_of(add(command, "Options", "--method", a.method,
                   "how bones are mapped: spd casts rays from the bone (a height field), vsm spreads the triangles over "
                   "the texels, hybrid takes spd "
                   "where it sees the surface and vsm elsewhere"),
-              {"spd", "vsm", "hybrid"});
+              methods);
   add_map_options(command, a);
   add_texel_options(command, a);
   add_file_options(command, a);

@@ -23,12 +23,12 @@ Json bone_json(const BoneReport& bone) {
             {"flipped_triangles", bone.flipped_triangles},
             {"sampled_triangle_fraction", bone.sampled_triangle_fraction},
             {"missed_texels", bone.missed_texels}};
-  if (bone.method == Method::kVsm)
-    json["vsm"] = {{"iterations", bone.vsm.iterations},
-                   {"spread", bone.vsm.spread},
-                   {"solver_steps", bone.vsm.solver_steps},
-                   {"residual", bone.vsm.residual},
-                   {"used_direct_solver", bone.vsm.used_direct_solver}};
+  if (!is_height_field(bone.method))
+    json[to_string(bone.method)] = {{"iterations", bone.map.iterations},
+                   {"spread", bone.map.spread},
+                   {"solver_steps", bone.map.solver_steps},
+                   {"residual", bone.map.residual},
+                   {"used_direct_solver", bone.map.used_direct_solver}};
   return json;
 }
 

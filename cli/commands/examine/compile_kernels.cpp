@@ -59,7 +59,7 @@ SkeletexModel encode_all_ways(ClContext& context, const Column& column) {
   EncodeOptions options;
   SkeletexModel model;
   for (const int size : {kSmall, kLarge})
-    for (const EncodeMethod method : {EncodeMethod::kSpd, EncodeMethod::kVsm}) {
+    for (const Method method : {Method::kSpd, Method::kVsm}) {
       options.width = options.height = size;
       options.method = method;
       options.has_half_texels = false;

@@ -39,9 +39,8 @@ void check_options(const EncodeOptions& options, const Skeleton& skeleton) {
 
 std::vector<Method> choose_methods(const EncodeOptions& options, const Skeleton& skeleton,
                                    std::span<const double> unseen) {
-  std::vector<Method> methods(skeleton.bones.size(),
-                              options.method == EncodeMethod::kSpd ? Method::kSpd : Method::kVsm);
-  if (options.method != EncodeMethod::kHybrid) return methods;
+  std::vector<Method> methods(skeleton.bones.size(), options.method.value_or(Method::kVsm));
+  if (options.method) return methods;
   for (std::size_t bone = 0; bone < methods.size(); ++bone)
     methods[bone] = unseen[bone] > options.hybrid_unseen_threshold ? Method::kVsm : Method::kSpd;
   for (const auto& [name, method] : options.hybrid_overrides)
@@ -101,10 +100,7 @@ std::vector<RowProfile> spd_profiles(ClContext& context, const Skeleton& skeleto
 
 nlohmann::json settings_json(const EncodeOptions& options, const TexelPlacing& placing,
                              const std::vector<double>& unseen) {
-  const char* method = options.method == EncodeMethod::kSpd   ? "spd"
-                       : options.method == EncodeMethod::kVsm ? "vsm"
-                                                              : "hybrid";
-  nlohmann::json json{{"method", method},
+  nlohmann::json json{{"method", options.method ? to_string(*options.method) : "hybrid"},
                       {"size", {options.width, options.height}},
                       {"vsm",
                        {{"iterations", options.vsm.iterations},
@@ -116,7 +112,7 @@ nlohmann::json settings_json(const EncodeOptions& options, const TexelPlacing& p
                       {"snap", placing.has_snap},
                       {"fit", placing.has_fit},
                       {"spd_hit", options.spd_hit == SpdHit::kFirst ? "first" : "last"}};
-  if (options.method == EncodeMethod::kHybrid) json["hybrid_unseen_threshold"] = options.hybrid_unseen_threshold;
+  if (!options.method) json["hybrid_unseen_threshold"] = options.hybrid_unseen_threshold;
   if (!unseen.empty()) json["unseen_area_fractions"] = unseen;
   return json;
 }
@@ -196,45 +192,34 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   });
   const std::vector<double> unseen = unseen_area_fractions(context, skeleton, separation, charts);
   const std::vector<Method> methods = choose_methods(options, skeleton, unseen);
-  std::vector<VsmReport> vsm_reports(bones);
-  {
-    std::vector<Chart> mapped;
-    for (int bone = 0; bone < bones; ++bone)
-      if (methods[bone] == Method::kVsm) mapped.push_back(std::move(charts[bone]));
-    const std::vector<VsmReport> solved =
-        mapped.empty() ? std::vector<VsmReport>{} : solve_vsm(context, mapped, options.vsm);
-    for (int bone = 0, i = 0; bone < bones; ++bone)
-      if (methods[bone] == Method::kVsm) {
-        charts[bone] = std::move(mapped[i]);
-        vsm_reports[bone] = solved[i++];
-      }
-  }
+  const std::vector<MapReport> map_reports = map_charts(context, methods, charts, {options.vsm});
   report.parameterization_ms = watch.lap_ms();
 
   progress("encoding", 0.6);
   // Texels are shared out by detail; rectangles have the sides' ratio of girth to length.
-  const std::vector<RowProfile> rays = std::find(methods.begin(), methods.end(), Method::kSpd) == methods.end()
-                                           ? std::vector<RowProfile>(bones)
-                                           : spd_profiles(context, skeleton, separation, charts, options.spd_hit);
-  const bool is_all_spd = std::find(methods.begin(), methods.end(), Method::kVsm) == methods.end();
+  const std::vector<RowProfile> rays = std::any_of(methods.begin(), methods.end(), is_height_field)
+                                           ? spd_profiles(context, skeleton, separation, charts, options.spd_hit)
+                                           : std::vector<RowProfile>(bones);
+  const bool is_all_spd = std::all_of(methods.begin(), methods.end(), is_height_field);
   std::vector<RowProfile> profiles(bones);
   for_each_block(profiles.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-    profiles[i] = methods[i] == Method::kVsm ? row_profile(charts[i]) : rays[i];
+    profiles[i] = is_height_field(methods[i]) ? rays[i] : row_profile(charts[i]);
   });
   std::vector<PatchSource> sources;
   std::vector<double> areas;
   for (int bone = 0; bone < bones; ++bone) {
     const TriangleMesh& part = segmentation.segments[bone].mesh;
     areas.push_back(surface_area(part));
-    sources.push_back({methods[bone], &charts[bone], static_cast<double>(part.triangles.size()), areas[bone],
+    sources.push_back({is_height_field(methods[bone]) ? nullptr : &charts[bone],
+                       static_cast<double>(part.triangles.size()), areas[bone],
                        std::max(profiles[bone].length, 1e-9 * model.diagonal)});
   }
   const bool has_even_rows = options.row_spacing == RowSpacing::kUniform;
-  const std::vector<PatchDemand> demands =
-      patch_demands(sources, has_even_rows ? std::span<const RowProfile>() : profiles,
-                    options.texel_share.value_or(is_all_spd ? TexelShare::kArea : TexelShare::kError));
+  const std::vector<PatchRequest> requests =
+      patch_requests(sources, has_even_rows ? std::span<const RowProfile>() : profiles,
+                     options.texel_share.value_or(is_all_spd ? TexelShare::kArea : TexelShare::kError));
   const TexelPlacing placing = choose_placing(options, mesh, is_all_spd);
-  const AtlasLayout layout = pack_atlas(demands, options.width, options.height);
+  const AtlasLayout layout = pack_atlas(requests, options.width, options.height);
   report.used_fraction = layout.used_fraction;
 
   for (int bone = 0; bone < bones; ++bone) {
@@ -262,7 +247,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
     std::vector<Chart> cast_charts;
     std::vector<Patch> cast_patches;
     for (int bone = 0; bone < bones; ++bone)
-      if (methods[bone] == Method::kSpd) {
+      if (is_height_field(methods[bone])) {
         cast_charts.push_back(charts[bone]);
         cast_patches.push_back(model.patches[bone]);
       }
@@ -270,7 +255,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
         cast_charts.empty() ? std::vector<SpdHits>{}
                             : cast_spd_rays(context, skeleton, separation, cast_charts, cast_patches, options.spd_hit);
     for (int bone = 0, i = 0; bone < bones; ++bone)
-      if (methods[bone] == Method::kSpd) hits[bone] = std::move(cast[i++]);
+      if (is_height_field(methods[bone])) hits[bone] = std::move(cast[i++]);
   }
   std::vector<std::array<std::vector<Vec3>, 2>> end_points(bones);
   for (int bone = 0; bone < bones; ++bone)
@@ -326,10 +311,10 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
     entry.triangles = static_cast<int>(segment.mesh.triangles.size());
     entry.rectangle = layout.rectangles[bone];
     entry.unseen_area_fraction = unseen[bone];
-    entry.flipped_triangles = vsm_reports[bone].flipped_triangles;
+    entry.flipped_triangles = map_reports[bone].flipped_triangles;
     entry.sampled_triangle_fraction = texels.report.sampled_triangle_fractions[bone];
     entry.missed_texels = texels.report.missed_texels[bone];
-    entry.vsm = vsm_reports[bone];
+    entry.map = map_reports[bone];
     report.bones.push_back(std::move(entry));
   }
   progress("done", 1);

@@ -33,7 +33,7 @@ SkeletexModel regular_grid(ClContext& context, const SkeletexModel& model) {
   displace(context, lattice, own);
 
   std::vector<int> is_kept;
-  for (const Patch& patch : model.patches) is_kept.push_back(patch.method == Method::kSpd);
+  for (const Patch& patch : model.patches) is_kept.push_back(is_height_field(patch.method));
   const auto kept = context.upload(is_kept);
   SlidingPoints now{context.allocate<float>(count), context.allocate<float>(count), own};
   context.fill(now.offset_x, 0.0f), context.fill(now.offset_y, 0.0f);

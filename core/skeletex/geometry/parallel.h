@@ -12,7 +12,7 @@
 
 namespace skeletex {
 
-/// As many as there are when it is first asked for: the system library opens a file for every answer.
+/// Processors of the machine. Counted once, as the system library opens a file for every answer.
 inline std::size_t processor_count() {
   static const std::size_t count = std::max(1u, std::thread::hardware_concurrency());
   return count;

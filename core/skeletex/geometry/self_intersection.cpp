@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
+#include <span>
 #include <utility>
 
 #include "skeletex/geometry/parallel.h"
@@ -61,16 +63,51 @@ bool does_segment_meet(const Vec3& p, const Vec3& q, const Corners& t, int plane
 
 enum class Answer { kNo, kYes, kUnsure };
 
+constexpr double kRounding = 1e-14;  // of products of differences: some ten times what their last digits add up to
+
+/// The part of a line that lies in a triangle, by one coordinate.
+struct LinePart {
+  double low = 0, high = 0, error = 0;
+
+  void add(double at) {
+    low = is_empty ? at : std::min(low, at);
+    high = is_empty ? at : std::max(high, at);
+    is_empty = false;
+  }
+  bool is_empty = true;
+};
+
+/// Where a triangle meets the line of its plane and another one.
+/// \param normal, origin  of the other plane \param axis    the coordinate by which the line is measured
+/// \param first           1 when the first vertex lies in the other plane, else 0
+Answer cut_by_plane(const Corners& points, const Vec3& normal, const Vec3& origin, double extent, Eigen::Index axis,
+                    int first, LinePart& part) {
+  const double error = kRounding * extent * (extent * extent + normal.lpNorm<1>());
+  std::array<double, 3> heights;
+  int above = 0, below = 0;
+  for (int k = first; k < 3; ++k) {
+    heights[k] = normal.dot(points[k] - origin);
+    above += heights[k] > error;
+    below += heights[k] < -error;
+  }
+  if (above + below < 3 - first) return Answer::kUnsure;
+  if (above == 0 || below == 0) return Answer::kNo;
+  for (int k = first; k < 3 - first; ++k) {
+    const int next = (k + 1) % 3;
+    if ((heights[k] > 0) == (heights[next] > 0)) continue;
+    const double span = std::abs(heights[k] - heights[next]);
+    part.add(points[k][axis] + (points[next][axis] - points[k][axis]) * (std::abs(heights[k]) / span));
+    part.error = std::max(part.error, extent * (8 * error / span + kRounding));
+  }
+  return Answer::kYes;
+}
+
 /// Where two triangles meet the line of both their planes (Moeller 1997), in plain double precision: unsure wherever
-/// rounding could decide, or they are nearly in one plane, or have no area. \param shared  whether their first vertex
-/// is one: then of meeting elsewhere
+/// rounding could decide, or they are nearly in one plane, or have no area.
+/// \param shared  whether their first vertex is one: then whether they meet elsewhere
 Answer meet_on_line(const Corners& s, const Corners& t, bool shared) {
-  constexpr double kRounding = 1e-14;  // of products of differences: some ten times what their last digits add up to
   constexpr double kLeastSine = 1e-6;
-  struct Cut {
-    double low = 0, high = 0, error = 0;
-  };
-  std::array<Vec3, 3> own, other;  // from the first vertex of s
+  Corners own, other;  // from the first vertex of s
   double extent = 0;
   for (int k = 0; k < 3; ++k) {
     own[k] = s[k] - s[0], other[k] = t[k] - s[0];
@@ -83,38 +120,22 @@ Answer meet_on_line(const Corners& s, const Corners& t, bool shared) {
   if (along <= kLeastSine * own_normal.lpNorm<1>() * other_normal.lpNorm<1>() || own_normal.isZero() ||
       other_normal.isZero())
     return Answer::kUnsure;
-  // A triangle from the other's plane, and the part of the line in it.
-  const auto cut = [&](const std::array<Vec3, 3>& points, const Vec3& normal, const Vec3& origin, Cut& found) {
-    const double error = kRounding * extent * (extent * extent + normal.lpNorm<1>());
-    std::array<double, 3> heights;
-    int above = 0, below = 0;
-    for (int k = shared ? 1 : 0; k < 3; ++k) {
-      heights[k] = normal.dot(points[k] - origin);
-      above += heights[k] > error, below += heights[k] < -error;
-    }
-    if (above + below < (shared ? 2 : 3)) return Answer::kUnsure;
-    if (above == 0 || below == 0) return Answer::kNo;
-    bool is_first = true;
-    for (int k = shared ? 1 : 0; k < (shared ? 2 : 3); ++k) {
-      const int next = (k + 1) % 3;
-      if ((heights[k] > 0) == (heights[next] > 0)) continue;
-      const double span = std::abs(heights[k] - heights[next]);
-      const double at = points[k][axis] + (points[next][axis] - points[k][axis]) * (std::abs(heights[k]) / span);
-      found.low = is_first ? at : std::min(found.low, at), found.high = is_first ? at : std::max(found.high, at);
-      found.error = std::max(found.error, extent * (8 * error / span + kRounding));
-      is_first = false;
-    }
-    return Answer::kYes;
-  };
-  Cut first, second;
-  if (const Answer answer = cut(own, other_normal, other[0], first); answer != Answer::kYes) return answer;
-  if (const Answer answer = cut(other, own_normal, Vec3::Zero(), second); answer != Answer::kYes) return answer;
+  LinePart first, second;
+  const int begin = shared ? 1 : 0;
+  if (const Answer answer = cut_by_plane(own, other_normal, other[0], extent, axis, begin, first);
+      answer != Answer::kYes)
+    return answer;
+  if (const Answer answer = cut_by_plane(other, own_normal, Vec3::Zero(), extent, axis, begin, second);
+      answer != Answer::kYes)
+    return answer;
   const double error = first.error + second.error;
-  // Both parts begin at a shared vertex: whether they lie on one side of it.
-  const double common = shared
-                            ? (std::abs(first.low) > error && std::abs(second.low) > error ? first.low * second.low : 0)
-                            : std::min(first.high, second.high) - std::max(first.low, second.low);
-  if (shared) return common > 0 ? Answer::kYes : common < 0 ? Answer::kNo : Answer::kUnsure;
+  if (shared) {
+    // Both parts begin at the shared vertex: whether they lie on one side of it.
+    if (std::abs(first.low) <= error || std::abs(second.low) <= error) return Answer::kUnsure;
+    const double common = first.low * second.low;
+    return common > 0 ? Answer::kYes : common < 0 ? Answer::kNo : Answer::kUnsure;
+  }
+  const double common = std::min(first.high, second.high) - std::max(first.low, second.low);
   return common > error ? Answer::kYes : common < -error ? Answer::kNo : Answer::kUnsure;
 }
 
@@ -155,55 +176,67 @@ bool do_triangles_at_edge_meet(const Vec3& a, const Vec3& b, const Vec3& c, cons
          0;
 }
 
+/// The corners of a mesh's triangles by vertex: those of vertex v, as 3 triangle + corner, are corners[begin[v]] to
+/// corners[begin[v + 1] - 1].
+struct VertexCorners {
+  std::vector<int> begin, corners;
+};
+
+VertexCorners list_vertex_corners(const TriangleMesh& mesh) {
+  VertexCorners list{std::vector<int>(mesh.positions.size() + 1, 0), std::vector<int>(3 * mesh.triangles.size())};
+  for (const Triangle& t : mesh.triangles)
+    for (const int vertex : t) ++list.begin[vertex + 1];
+  std::partial_sum(list.begin.begin(), list.begin.end(), list.begin.begin());
+  std::vector<int> next(list.begin.begin(), list.begin.end() - 1);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (int k = 0; k < 3; ++k) list.corners[next[mesh.triangles[t][k]]++] = static_cast<int>(3 * t) + k;
+  return list;
+}
+
+constexpr int kMostCorners = 24;  // of a vertex that is looked at
+
+/// Whether the triangles at a vertex go once around it, all facing one way.
+bool is_plain_vertex(const TriangleMesh& mesh, int vertex, std::span<const int> corners) {
+  constexpr double kLeastCosine = 0.1;
+  const int n = static_cast<int>(corners.size());
+  if (n < 3 || n > kMostCorners) return false;
+  std::array<std::array<int, 2>, kMostCorners> sides;
+  std::array<Vec3, kMostCorners> normals;
+  const Vec3& p = mesh.positions[vertex];
+  Vec3 mean = Vec3::Zero();
+  for (int i = 0; i < n; ++i) {
+    const Triangle& t = mesh.triangles[corners[i] / 3];
+    const int k = corners[i] % 3;
+    sides[i] = {t[(k + 1) % 3], t[(k + 2) % 3]};
+    normals[i] = (mesh.positions[sides[i][0]] - p).cross(mesh.positions[sides[i][1]] - p).normalized();
+    mean += normals[i];
+  }
+  const double least = kLeastCosine * mean.norm();
+  for (int i = 0; i < n; ++i) {
+    int followers = 0;
+    for (int j = 0; j < n; ++j) followers += sides[j][0] == sides[i][1];
+    if (followers != 1 || !(normals[i].dot(mean) > least)) return false;
+  }
+  // How often they go around: how often they pass one direction.
+  Eigen::Index axis;
+  mean.cwiseAbs().minCoeff(&axis);
+  const Vec3 across = mean.cross(Vec3::Unit(axis));
+  int turns = 0;
+  for (int i = 0; i < n; ++i)
+    turns += (mesh.positions[sides[i][0]] - p).dot(across) <= 0 && (mesh.positions[sides[i][1]] - p).dot(across) > 0;
+  return turns == 1;
+}
+
 /// Vertices whose triangles go once around them, all facing one way: seen from there their corners lie side by side, so
 /// no two of them meet but where they touch. Most are such, and most pairs of boxes that overlap are of triangles at
 /// such a vertex.
 std::vector<char> find_plain_vertices(const TriangleMesh& mesh) {
-  constexpr int kMostTriangles = 24;
-  constexpr double kLeastCosine = 0.1;
-  const std::size_t count = mesh.positions.size();
-  std::vector<int> begin(count + 1, 0);
-  for (const Triangle& t : mesh.triangles)
-    for (const int vertex : t) ++begin[vertex + 1];
-  for (std::size_t v = 0; v < count; ++v) begin[v + 1] += begin[v];
-  std::vector<int> corners(3 * mesh.triangles.size()), next(begin.begin(), begin.end() - 1);
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-    for (int k = 0; k < 3; ++k) corners[next[mesh.triangles[t][k]]++] = static_cast<int>(3 * t) + k;
-  std::vector<char> is_plain(count, 0);
-  for_each_block(count, 1 << 12, [&](std::size_t, std::size_t first, std::size_t last) {
-    std::array<std::array<int, 2>, kMostTriangles> sides;
-    std::array<Vec3, kMostTriangles> normals;
-    for (std::size_t v = first; v < last; ++v) {
-      const int n = begin[v + 1] - begin[v];
-      if (n < 3 || n > kMostTriangles) continue;
-      const Vec3& p = mesh.positions[v];
-      Vec3 mean = Vec3::Zero();
-      for (int i = 0; i < n; ++i) {
-        const int corner = corners[begin[v] + i];
-        const Triangle& t = mesh.triangles[corner / 3];
-        sides[i] = {t[(corner % 3 + 1) % 3], t[(corner % 3 + 2) % 3]};
-        normals[i] = (mesh.positions[sides[i][0]] - p).cross(mesh.positions[sides[i][1]] - p).normalized();
-        mean += normals[i];
-      }
-      const double least = kLeastCosine * mean.norm();
-      bool is_one_way = true;
-      for (int i = 0; i < n; ++i) {
-        is_one_way &= normals[i].dot(mean) > least;
-        int followers = 0;
-        for (int j = 0; j < n; ++j) followers += sides[j][0] == sides[i][1];
-        is_one_way &= followers == 1;
-      }
-      if (!is_one_way) continue;
-      // How often they go around: how often they pass one direction.
-      Eigen::Index axis;
-      mean.cwiseAbs().minCoeff(&axis);
-      const Vec3 across = mean.cross(Vec3::Unit(axis));
-      int turns = 0;
-      for (int i = 0; i < n; ++i)
-        turns +=
-            (mesh.positions[sides[i][0]] - p).dot(across) <= 0 && (mesh.positions[sides[i][1]] - p).dot(across) > 0;
-      is_plain[v] = turns == 1;
-    }
+  const VertexCorners list = list_vertex_corners(mesh);
+  std::vector<char> is_plain(mesh.positions.size(), 0);
+  for_each_block(is_plain.size(), 1 << 12, [&](std::size_t, std::size_t first, std::size_t last) {
+    for (std::size_t v = first; v < last; ++v)
+      is_plain[v] = is_plain_vertex(mesh, static_cast<int>(v),
+                                    std::span(list.corners).subspan(list.begin[v], list.begin[v + 1] - list.begin[v]));
   });
   return is_plain;
 }

@@ -94,8 +94,8 @@ TriangleTree build_triangle_tree(const TriangleMesh& mesh, std::vector<int> orde
   tree.scale = box.diagonal() > 0 ? box.diagonal() : 1;
 
   // Sizes of the levels: blocks, then an eighth each until one node is left. Level 0 has no boxes of its own.
-  std::vector<std::size_t> sizes{block_count(count, kWidth)};
   tree.level_begin = {0};
+  std::vector<std::size_t> sizes{block_count(count, kWidth)};
   std::size_t nodes = 0;
   do {
     tree.level_begin.push_back(static_cast<int>(nodes));

@@ -2,6 +2,7 @@
 #include "skeletex/io/model_json.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cctype>
@@ -74,9 +75,9 @@ class Entry {
 };
 
 Method method_from(const Entry& entry) {
-  for (const Method method : {Method::kSpd, Method::kVsm})
+  for (const Method method : all_methods())
     if (entry.value() == to_string(method)) return method;
-  entry.fail("\"spd\" or \"vsm\" is expected");
+  entry.fail(fmt::format("one of the methods {} is expected", fmt::join(method_names(), ", ")).c_str());
 }
 
 SegmentTopology topology_from(const Entry& entry) {

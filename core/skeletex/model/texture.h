@@ -4,13 +4,12 @@
 #include <string>
 #include <vector>
 
+#include "skeletex/model/method.h"
 #include "skeletex/model/segment.h"
 #include "skeletex/skeleton/skeleton.h"
 
 namespace skeletex {
 
-enum class Method { kSpd, kVsm };
-const char* to_string(Method method);
 const char* to_string(SegmentTopology topology);
 
 /// A rectangle of texels: columns [x, x + width), rows [y, y + height).

@@ -266,11 +266,11 @@ std::vector<Patch> scale_patches(const SkeletexModel& model, int width, int heig
   std::vector<Rectangle> rectangles =
       scale_rectangles(model.patches, model.texture.width, model.texture.height, width, height);
   if (rectangles.empty()) {
-    std::vector<PatchDemand> demands;
+    std::vector<PatchRequest> requests;
     for (const Patch& patch : model.patches)
-      demands.push_back({static_cast<double>(patch.rectangle.width) * patch.rectangle.height,
+      requests.push_back({static_cast<double>(patch.rectangle.width) * patch.rectangle.height,
                          static_cast<double>(patch.rectangle.width) / patch.rectangle.height});
-    rectangles = pack_atlas(demands, width, height).rectangles;
+    rectangles = pack_atlas(requests, width, height).rectangles;
   }
   std::vector<Patch> patches = model.patches;
   for (std::size_t i = 0; i < patches.size(); ++i) {

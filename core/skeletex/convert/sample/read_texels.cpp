@@ -63,7 +63,7 @@ int fill_missed(const SpdHits& hits, const Rectangle& r, std::vector<float>& dis
 std::vector<int> fill_uncovered(std::span<const Patch> patches, int texture_width, std::vector<int>& texel_triangles) {
   std::vector<int> counts(patches.size(), 0);
   for (std::size_t bone = 0; bone < patches.size(); ++bone) {
-    if (patches[bone].method != Method::kVsm) continue;
+    if (is_height_field(patches[bone].method)) continue;
     const Rectangle& r = patches[bone].rectangle;
     for (int row = 1; row + 1 < r.height; ++row) {
       int* line = texel_triangles.data() + (r.y + row) * static_cast<std::size_t>(texture_width) + r.x;
@@ -124,13 +124,13 @@ std::vector<int> vsm_texels(std::span<const Patch> patches, int texture_width, i
     const Rectangle& r = patch.rectangle;
     for (int row = 0; row < r.height; ++row)
       std::fill_n(is_vsm.begin() + (r.y + row) * static_cast<std::size_t>(texture_width) + r.x, r.width,
-                  static_cast<int>(patch.method == Method::kVsm));
+                  static_cast<int>(!is_height_field(patch.method)));
   }
   return is_vsm;
 }
 
 bool has_spd(std::span<const Patch> patches) {
-  return std::any_of(patches.begin(), patches.end(), [](const Patch& patch) { return patch.method == Method::kSpd; });
+  return std::any_of(patches.begin(), patches.end(), [](const Patch& patch) { return is_height_field(patch.method); });
 }
 
 PlacedTexels download_texels(ClContext& context, const TexelPoints& points, const ClBuffer<float>& offset_x,
@@ -246,7 +246,7 @@ void place_spd_patches(const TexelStage& stage, TexelPoints& points, TexelReport
   const DeviceLayout& layout = stage.layout;
   std::vector<float> distances(layout.size(), -1);
   for (std::size_t bone = 0; bone < stage.sources.patches.size(); ++bone) {
-    if (stage.sources.patches[bone].method != Method::kSpd) continue;
+    if (!is_height_field(stage.sources.patches[bone].method)) continue;
     const Rectangle& r = stage.sources.patches[bone].rectangle;
     const SpdHits& hits = stage.sources.spd_hits[bone];
     std::vector<float> filled;

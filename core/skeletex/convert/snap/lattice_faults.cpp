@@ -159,7 +159,7 @@ OriginalSurface prepare_original(const TriangleMesh& mesh, const TriangleTree& t
   int first_point = 0;
   for (std::size_t bone = 0; bone < charts.size(); ++bone) {
     const Patch& patch = frame.model.patches[bone];
-    if (patch.method != Method::kVsm) continue;
+    if (is_height_field(patch.method)) continue;
     const Chart& chart = charts[bone];
     for (const auto& [a, b, c] : chart.triangles) {
       original.map_triangles.push_back({chart.positions[a], chart.positions[b], chart.positions[c]});

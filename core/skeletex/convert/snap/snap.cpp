@@ -111,7 +111,7 @@ MapFeatures find_features(std::span<const Chart> charts, std::span<const Method>
   };
   std::vector<Strength> strengths;
   for (int bone = 0; bone < static_cast<int>(charts.size()); ++bone) {
-    if (methods[bone] != Method::kVsm) continue;
+    if (is_height_field(methods[bone])) continue;
     add_features(charts[bone], least_dihedral, features.vertices[bone], features.edges[bone]);
     for (const MapFeatures::Vertex& vertex : features.vertices[bone])
       strengths.push_back({vertex.strength, bone, static_cast<int>(&vertex - features.vertices[bone].data())});
@@ -131,7 +131,7 @@ SnapFeatures place_features(const MapFeatures& features, std::span<const Chart> 
   placed.vertices.reserve(vertex_count), placed.edges.reserve(edge_count);
   int first_point = 0;
   for (int bone = 0; bone < static_cast<int>(charts.size()); ++bone) {
-    if (patches[bone].method != Method::kVsm) continue;
+    if (is_height_field(patches[bone].method)) continue;
     const Chart& chart = charts[bone];
     const Rectangle& r = patches[bone].rectangle;
     const std::vector<double> rows = rows_of(patches[bone].row_u, chart.u);
@@ -188,7 +188,7 @@ int band_of(int row) { return (row - 1) / kBinHeight; }
 int list_rows(std::span<const Patch> patches, std::array<std::vector<LatticeRow>, 2>& rows) {
   int bins = 0;
   for (std::size_t bone = 0; bone < patches.size(); ++bone) {
-    if (patches[bone].method != Method::kVsm) continue;
+    if (is_height_field(patches[bone].method)) continue;
     const Rectangle& r = patches[bone].rectangle;
     const BinCounts counts = bins_of(r);
     for (int row = 1; row < r.height - 1; ++row)
@@ -255,7 +255,7 @@ void fill_bins(const std::vector<SnapFeatures::Edge>& edges, std::span<const Pat
   int first_bin = 0;
   auto edge = edges.begin();
   for (std::size_t bone = 0; bone < patches.size(); ++bone) {
-    if (patches[bone].method != Method::kVsm) continue;
+    if (is_height_field(patches[bone].method)) continue;
     const Rectangle& r = patches[bone].rectangle;
     const int bins = bins_of(r).bands * bins_of(r).across;
     int* const counts = begins.data() + first_bin;

@@ -60,7 +60,7 @@ std::vector<Patch> mean_patches(const std::deque<Overlay>& overlays, std::span<c
       if (weights[m] == 0) continue;
       const Patch& from = overlays[m].model().patches[overlays[m].model_bone(bone)];
       const bool is_reversed = overlays[m].is_reversed(bone);
-      if (from.method == Method::kVsm) patch.method = Method::kVsm;
+      if (!is_height_field(from.method)) patch.method = from.method;
       for (int r = 0; r < height; ++r) {
         const double u = u_at_row(from, row_at_same_share(r, height, from.rectangle.height, is_reversed));
         patch.row_u[r] += weights[m] * (is_reversed ? 1 - u : u);

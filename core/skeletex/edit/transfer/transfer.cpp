@@ -177,7 +177,7 @@ class PartTransfer {
 
   /// Rows of the result's patch: the source's, unless the target keeps some of its own.
   void set_rows(int i, Patch& patch) const {
-    patch.method = Method::kVsm;
+    if (is_height_field(patch.method)) patch.method = Method::kVsm;  // texels of two models lie on no common rays
     for (const BoneEnd end : kEnds)
       for (const double kept : cut(end).kept_rows)
         if (i == 0 && kept > 0) return;

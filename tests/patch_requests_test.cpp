@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/convert/layout/patch_demands.h"
+#include "skeletex/convert/layout/patch_requests.h"
 
 #include <gtest/gtest.h>
 
@@ -89,37 +89,37 @@ TEST(ExpectedError, GoesWithTheCubeOfSizeAndTurnsWithTheMap) {
               1e-9 * error.around);
 }
 
-TEST(PatchDemands, GiveAnotherModelTheSameWhateverItsSize) {
+TEST(PatchRequests, GiveAnotherModelTheSameWhateverItsSize) {
   const Chart thin = tube(20, 30, 4, [](double u) { return 0.2 + 0.05 * std::sin(9 * u); }),
               wide = tube(20, 30, 1, [](double u) { return 0.8 - 0.1 * u; });
-  const auto demands_at = [&](double scale, Method method) {
+  const auto requests_at = [&](double scale, bool has_map) {
     static Chart charts[2];
     charts[0] = thin, charts[1] = wide;
     for (Chart& chart : charts)
       for (Vec3& p : chart.positions) p *= scale;
-    const std::vector<PatchSource> sources{{Method::kVsm, charts, 1140, 5.0 * scale * scale, 4 * scale},
-                                           {method, charts + 1, 1140, 4.7 * scale * scale, scale}};
-    return patch_demands(sources, {}, TexelShare::kError);
+    const std::vector<PatchSource> sources{{charts, 1140, 5.0 * scale * scale, 4 * scale},
+                                           {has_map ? charts + 1 : nullptr, 1140, 4.7 * scale * scale, scale}};
+    return patch_requests(sources, {}, TexelShare::kError);
   };
-  for (const Method method : {Method::kVsm, Method::kSpd}) {
-    const std::vector<PatchDemand> one = demands_at(1, method), other = demands_at(20, method);
+  for (const bool has_map : {true, false}) {
+    const std::vector<PatchRequest> one = requests_at(1, has_map), other = requests_at(20, has_map);
     for (int i = 0; i < 2; ++i) EXPECT_NEAR(one[i].columns_per_row, other[i].columns_per_row, 1e-9);
     EXPECT_NEAR(one[0].share / one[1].share, other[0].share / other[1].share, 1e-9);
-    if (method == Method::kSpd) {
+    if (!has_map) {
       EXPECT_DOUBLE_EQ(one[1].columns_per_row, 4.7);
     }
   }
 }
 
-TEST(PatchDemands, OfWhatBendsAroundTheBoneAloneStayNearGirthToLength) {
+TEST(PatchRequests, OfWhatBendsAroundTheBoneAloneStayNearGirthToLength) {
   const Chart cylinder = tube(20, 64, 4, [](double) { return 0.2; });
-  const std::vector<PatchDemand> demands =
-      patch_demands(std::vector<PatchSource>{{Method::kVsm, &cylinder, 2432, 5, 4}}, {}, TexelShare::kError);
-  EXPECT_DOUBLE_EQ(demands[0].columns_per_row, 2 * 5.0 / 16);
-  EXPECT_TRUE(std::isfinite(demands[0].share) && demands[0].share > 0);
+  const std::vector<PatchRequest> requests =
+      patch_requests(std::vector<PatchSource>{{&cylinder, 2432, 5, 4}}, {}, TexelShare::kError);
+  EXPECT_DOUBLE_EQ(requests[0].columns_per_row, 2 * 5.0 / 16);
+  EXPECT_TRUE(std::isfinite(requests[0].share) && requests[0].share > 0);
 }
 
-TEST(PatchDemands, ByErrorHaveLessOfItThanByTriangles) {
+TEST(PatchRequests, ByErrorHaveLessOfItThanByTriangles) {
   ClContext context;
   double product = 1;
   for (const char* const name : {"bunny00", "camel", "man", "bear"}) {

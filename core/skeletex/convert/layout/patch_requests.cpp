@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/convert/layout/patch_demands.h"
+#include "skeletex/convert/layout/patch_requests.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -10,8 +10,8 @@
 namespace skeletex {
 namespace {
 
-constexpr double kMostOff =
-    2;  // of a side ratio, from that of girth to length: where a patch bends in one direction alone
+/// How far a side ratio may leave that of girth to length, as a factor: where a patch bends in one direction alone.
+constexpr double kMostOff = 2;
 
 /// A triangle on the surface and in the map, whose area is in columns x rows; both areas doubled.
 struct MappedTriangle {
@@ -63,31 +63,31 @@ ExpectedError expected_error(const Chart& chart, const RowProfile* profile) {
   return error;
 }
 
-std::vector<PatchDemand> patch_demands(std::span<const PatchSource> sources, std::span<const RowProfile> profiles,
-                                       TexelShare share) {
-  std::vector<PatchDemand> demands(sources.size());
+std::vector<PatchRequest> patch_requests(std::span<const PatchSource> sources, std::span<const RowProfile> profiles,
+                                         TexelShare share) {
+  std::vector<PatchRequest> requests(sources.size());
   for (std::size_t i = 0; i < sources.size(); ++i)
-    demands[i] = {share == TexelShare::kArea ? sources[i].area : sources[i].triangles,
-                  sources[i].area / (sources[i].length * sources[i].length)};
-  if (share != TexelShare::kError) return demands;
+    requests[i] = {share == TexelShare::kArea ? sources[i].area : sources[i].triangles,
+                   sources[i].area / (sources[i].length * sources[i].length)};
+  if (share != TexelShare::kError) return requests;
 
   std::vector<double> roots(sources.size(), 0);  // of errors
   for_each_block(sources.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-    if (sources[i].method != Method::kVsm) return;
+    if (!sources[i].chart) return;
     const ExpectedError error = expected_error(*sources[i].chart, profiles.empty() ? nullptr : &profiles[i]);
-    const double usual = demands[i].columns_per_row;
+    const double usual = requests[i].columns_per_row;
     if (error.around > 0 || error.along > 0)
-      demands[i].columns_per_row = std::clamp(error.best_ratio(), usual / kMostOff, usual * kMostOff);
-    roots[i] = std::sqrt(error.with_ratio(demands[i].columns_per_row));
+      requests[i].columns_per_row = std::clamp(error.best_ratio(), usual / kMostOff, usual * kMostOff);
+    roots[i] = std::sqrt(error.with_ratio(requests[i].columns_per_row));
   });
   double triangles = 0, root = 0;  // of patches that have both
   for (std::size_t i = 0; i < sources.size(); ++i)
     if (roots[i] > 0) triangles += sources[i].triangles, root += roots[i];
   for (std::size_t i = 0; i < sources.size(); ++i)
-    demands[i].share = std::sqrt(sources[i].triangles * (roots[i] > 0    ? roots[i] / root
-                                                         : triangles > 0 ? sources[i].triangles / triangles
-                                                                         : 1));
-  return demands;
+    requests[i].share = std::sqrt(sources[i].triangles * (roots[i] > 0    ? roots[i] / root
+                                                          : triangles > 0 ? sources[i].triangles / triangles
+                                                                          : 1));
+  return requests;
 }
 
 }  // namespace skeletex
