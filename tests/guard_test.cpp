@@ -36,7 +36,7 @@ SkeletexModel encoded(const char* name, int size) {
 struct Points {
   ClBuffer<PatchRecord> patches;
   std::array<std::vector<float>, 3> planes;
-  DevicePlanes on_device;
+  TexelPoints on_device;
   Points(const SkeletexModel& model, double noise, std::mt19937& random)
       : patches(device().upload(
             frame_tables(model.skeleton, SeparationPlanes(model.skeleton), model.patches, model.origin).patches)) {
