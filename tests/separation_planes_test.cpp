@@ -29,8 +29,6 @@ int nearest_bone(const Skeleton& skeleton, const Vec3& direction) {
 BoneEnd end_at_centre(const Skeleton& skeleton, int bone) {
   return skeleton.bones[bone].head == 0 ? BoneEnd::kHead : BoneEnd::kTail;
 }
-BoneEnd opposite(BoneEnd end) { return end == BoneEnd::kHead ? BoneEnd::kTail : BoneEnd::kHead; }
-
 /// Direction of the seam at an angle.
 Vec3 seam_direction(const SeparationPlanes& separation, int bone, BoneEnd end, double turn) {
   return (separation.radial(bone, turn) + separation.slope(bone, end, turn) * separation.bases()[bone].o).normalized();

@@ -120,11 +120,13 @@ struct EdgeUse {
   bool is_forward;
 };
 
-/// Per triangle, whether it must be turned so that all agree with the majority of their component; and whether that is
-/// possible at all.
-std::pair<std::vector<bool>, bool> triangles_to_turn(const TriangleMesh& mesh, const ManifoldReport& report) {
-  std::vector<bool> is_bad(mesh.triangles.size(), false);
-  for (const int t : report.degenerate_triangles) is_bad[t] = true;
+struct NeighbourTriangle {
+  int triangle;
+  bool is_opposed;  ///< it runs through the common edge in the same direction
+};
+
+/// Per triangle those that share an edge with it alone.
+std::vector<std::vector<NeighbourTriangle>> neighbours_of(const TriangleMesh& mesh, const std::vector<bool>& is_bad) {
   std::vector<EdgeUse> uses;
   for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t)
     for (int k = 0; k < 3 && !is_bad[t]; ++k) {
@@ -134,11 +136,7 @@ std::pair<std::vector<bool>, bool> triangles_to_turn(const TriangleMesh& mesh, c
   std::sort(uses.begin(), uses.end(), [](const EdgeUse& a, const EdgeUse& b) {
     return std::tie(a.smaller, a.larger, a.triangle) < std::tie(b.smaller, b.larger, b.triangle);
   });
-  struct Neighbour {
-    int triangle;
-    bool is_opposed;
-  };
-  std::vector<std::vector<Neighbour>> neighbours(mesh.triangles.size());
+  std::vector<std::vector<NeighbourTriangle>> neighbours(mesh.triangles.size());
   for (std::size_t i = 0; i < uses.size();) {
     std::size_t j = i + 1;
     while (j < uses.size() && uses[j].smaller == uses[i].smaller && uses[j].larger == uses[i].larger) ++j;
@@ -149,6 +147,15 @@ std::pair<std::vector<bool>, bool> triangles_to_turn(const TriangleMesh& mesh, c
     }
     i = j;
   }
+  return neighbours;
+}
+
+/// Per triangle, whether it must be turned so that all agree with the majority of their component; and whether that is
+/// possible at all.
+std::pair<std::vector<bool>, bool> triangles_to_turn(const TriangleMesh& mesh, const ManifoldReport& report) {
+  std::vector<bool> is_bad(mesh.triangles.size(), false);
+  for (const int t : report.degenerate_triangles) is_bad[t] = true;
+  const std::vector<std::vector<NeighbourTriangle>> neighbours = neighbours_of(mesh, is_bad);
   std::vector<bool> turn(mesh.triangles.size(), false), is_seen = is_bad;
   bool is_orientable = true;
   for (int seed = 0; seed < static_cast<int>(mesh.triangles.size()); ++seed) {
@@ -161,7 +168,7 @@ std::pair<std::vector<bool>, bool> triangles_to_turn(const TriangleMesh& mesh, c
       for (const auto& [other, is_opposed] : neighbours[part[i]]) {
         const bool wanted = turn[part[i]] != is_opposed;
         if (is_seen[other]) {
-          if (turn[other] != wanted) is_orientable = false;
+          is_orientable = is_orientable && turn[other] == wanted;
           continue;
         }
         turn[other] = wanted;
@@ -198,6 +205,49 @@ void find_turned_triangles(const TriangleMesh& mesh, const ManifoldReport& repor
        "turn these triangles, so that all run counter-clockwise seen from outside"});
 }
 
+/// Edges and vertices where more sheets of surface meet than one.
+void find_sheets(const TriangleMesh& mesh, const ManifoldReport& report, std::vector<Finding>& findings) {
+  if (!report.non_manifold_edges.empty()) {
+    const auto& [a, b] = report.non_manifold_edges.front();
+    findings.push_back(
+        {Severity::kError, "manifold",
+         fmt::format("{} edge{} more than two triangles; the first runs between vertices {} and {} at {}",
+                     report.non_manifold_edges.size(), report.non_manifold_edges.size() == 1 ? " has" : "s have", a, b,
+                     text_of(0.5 * (mesh.positions[a] + mesh.positions[b]))),
+         "remove inner faces and doubled triangles, so that two are left at every edge"});
+  }
+  if (!report.non_manifold_vertices.empty()) {
+    const int v = report.non_manifold_vertices.front();
+    findings.push_back(
+        {Severity::kError, "manifold",
+         fmt::format("at {} vert{} several sheets of surface touch in a point; the first is vertex {} at {}",
+                     report.non_manifold_vertices.size(), report.non_manifold_vertices.size() == 1 ? "ex" : "ices", v,
+                     text_of(mesh.positions[v])),
+         "give every sheet a vertex of its own and move them apart, or join the sheets"});
+  }
+}
+
+void find_flat_triangles(const TriangleMesh& mesh, const ManifoldReport& report, std::vector<Finding>& findings) {
+  std::vector<int> flat;
+  std::size_t next_bad = 0;
+  for (int t = 0; t < report.triangles; ++t) {
+    if (next_bad < report.degenerate_triangles.size() && report.degenerate_triangles[next_bad] == t) {
+      ++next_bad;
+      continue;
+    }
+    const auto [a, b, c] = mesh.triangles[t];
+    const Vec3 &p = mesh.positions[a], &q = mesh.positions[b], &r = mesh.positions[c];
+    const double longest = std::max({(q - p).squaredNorm(), (r - q).squaredNorm(), (p - r).squaredNorm()});
+    if (2 * area_vector(mesh, mesh.triangles[t]).norm() <= 1e-12 * longest) flat.push_back(t);
+  }
+  if (!flat.empty())
+    findings.push_back(
+        {Severity::kWarning, "area",
+         fmt::format("{} triangle{} no area; the first is triangle {} at {}", flat.size(),
+                     flat.size() == 1 ? " has" : "s have", flat.front(), text_of(centre_of(mesh, flat.front()))),
+         "collapse their shortest edges, or turn their longest ones"});
+}
+
 }  // namespace
 
 void find_in_mesh(const TriangleMesh& mesh, const ManifoldReport& report, std::vector<Finding>& findings) {
@@ -227,45 +277,11 @@ void find_in_mesh(const TriangleMesh& mesh, const ManifoldReport& report, std::v
          "remove these triangles"});
   }
   find_holes(mesh, report, findings);
-  if (!report.non_manifold_edges.empty()) {
-    const auto& [a, b] = report.non_manifold_edges.front();
-    findings.push_back(
-        {Severity::kError, "manifold",
-         fmt::format("{} edge{} more than two triangles; the first runs between vertices {} and {} at {}",
-                     report.non_manifold_edges.size(), report.non_manifold_edges.size() == 1 ? " has" : "s have", a, b,
-                     text_of(0.5 * (mesh.positions[a] + mesh.positions[b]))),
-         "remove inner faces and doubled triangles, so that two are left at every edge"});
-  }
-  if (!report.non_manifold_vertices.empty()) {
-    const int v = report.non_manifold_vertices.front();
-    findings.push_back(
-        {Severity::kError, "manifold",
-         fmt::format("at {} vert{} several sheets of surface touch in a point; the first is vertex {} at {}",
-                     report.non_manifold_vertices.size(), report.non_manifold_vertices.size() == 1 ? "ex" : "ices", v,
-                     text_of(mesh.positions[v])),
-         "give every sheet a vertex of its own and move them apart, or join the sheets"});
-  }
+  find_sheets(mesh, report, findings);
   find_components(mesh, report, findings);
   find_turned_triangles(mesh, report, findings);
 
-  std::vector<int> flat;
-  std::size_t next_bad = 0;
-  for (int t = 0; t < report.triangles; ++t) {
-    if (next_bad < report.degenerate_triangles.size() && report.degenerate_triangles[next_bad] == t) {
-      ++next_bad;
-      continue;
-    }
-    const auto [a, b, c] = mesh.triangles[t];
-    const Vec3 &p = mesh.positions[a], &q = mesh.positions[b], &r = mesh.positions[c];
-    const double longest = std::max({(q - p).squaredNorm(), (r - q).squaredNorm(), (p - r).squaredNorm()});
-    if (2 * area_vector(mesh, mesh.triangles[t]).norm() <= 1e-12 * longest) flat.push_back(t);
-  }
-  if (!flat.empty())
-    findings.push_back(
-        {Severity::kWarning, "area",
-         fmt::format("{} triangle{} no area; the first is triangle {} at {}", flat.size(),
-                     flat.size() == 1 ? " has" : "s have", flat.front(), text_of(centre_of(mesh, flat.front()))),
-         "collapse their shortest edges, or turn their longest ones"});
+  find_flat_triangles(mesh, report, findings);
   if (!report.unreferenced_vertices.empty()) {
     const int v = report.unreferenced_vertices.front();
     findings.push_back(

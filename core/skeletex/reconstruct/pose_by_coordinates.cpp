@@ -59,7 +59,7 @@ EndTables end_tables(const SkeletexModel& model, const PosedPlanes& posed) {
 }
 
 BlockParameters block_parameters(const ClBuffer<SkinBlock>& blocks, const DevicePlanes& points) {
-  return {.block_count = static_cast<int>(blocks.size), .point_count = static_cast<int>(points.count)};
+  return {static_cast<int>(blocks.size), 0, 0, static_cast<int>(points.count), 0, 0};
 }
 
 ClLocal loops_of_block() { return ClLocal{6 * SKIN_BLOCK * sizeof(float)}; }

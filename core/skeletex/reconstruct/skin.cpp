@@ -41,10 +41,8 @@ void weigh_inner_vertices(ClContext& context, const WeightWalks& walks, const De
   for (std::size_t begin = 0; begin < skin.blocks.size(); begin += kBlocksAtOnce) {
     const std::size_t count = std::min(kBlocksAtOnce, skin.blocks.size() - begin);
     context.launch({"skin.cl", "bone_weights"}, block_range(context, count),
-                   BlockParameters{.block_count = static_cast<int>(count),
-                                   .first_block = static_cast<int>(begin),
-                                   .slots = static_cast<int>(slots),
-                                   .point_count = static_cast<int>(points.count)},
+                   BlockParameters{static_cast<int>(count), static_cast<int>(begin), static_cast<int>(slots),
+                                   static_cast<int>(points.count), 0, 0},
                    blocks, first_steps, steps, points.values, device_weights);
     const ClMapping<float> weights = context.map(device_weights);
     for (std::size_t b = 0; b < count; ++b) {
@@ -243,9 +241,8 @@ void pose_skin(ClContext& context, const Skin& skin, const DeviceSkin& device, s
   if (skin.blocks.empty()) return;
   const auto records = context.upload(motion_records(motions, skin.origin, posed_origin));
   context.launch({"skin.cl", "skin"}, block_range(context, skin.blocks.size()),
-                 BlockParameters{.block_count = static_cast<int>(skin.blocks.size()),
-                                 .point_count = static_cast<int>(points.count),
-                                 .is_stretched = static_cast<int>(is_stretched(motions))},
+                 BlockParameters{static_cast<int>(skin.blocks.size()), 0, 0, static_cast<int>(points.count),
+                                 static_cast<int>(is_stretched(motions)), 0},
                  device.blocks, device.block_bones, device.weights, records, device.points.values, points.values);
 }
 

@@ -73,9 +73,7 @@ double first_crossing(const CutMesh& mesh, const Vec3& head, const Vec3& tail) {
   return first;
 }
 
-}  // namespace
-
-void check_skeleton_inside(const CutMesh& mesh, const Skeleton& skeleton) {
+void check_connected(const Skeleton& skeleton) {
   // Spread from the first bone over shared nodes.
   std::vector<bool> is_reached(skeleton.nodes.size(), false);
   is_reached[skeleton.bones[0].head] = true;
@@ -90,7 +88,26 @@ void check_skeleton_inside(const CutMesh& mesh, const Skeleton& skeleton) {
       throw TopologyError(fmt::format(
           "bone \"{}\" at {} is not connected with bone \"{}\"; let them share a node, or join them by further bones",
           bone.name, text_of(skeleton.nodes[bone.head].position), skeleton.bones[0].name));
+}
 
+[[noreturn]] void refuse_outside_node(const CutMesh& mesh, const Skeleton& skeleton, int n) {
+  const Node& node = skeleton.nodes[n];
+  std::string bones;
+  for (const Bone& bone : skeleton.bones)
+    if (bone.head == n || bone.tail == n) bones += fmt::format("{}\"{}\"", bones.empty() ? "" : ", ", bone.name);
+  double nearest = std::numeric_limits<double>::infinity();
+  Vec3 vertex = node.position;
+  for (const Vec3& p : mesh.positions)
+    if ((p - node.position).squaredNorm() < nearest) {
+      nearest = (p - node.position).squaredNorm();
+      vertex = p;
+    }
+  throw TopologyError(fmt::format(
+      "node \"{}\" (bone {}) lies outside the mesh at {}; move it into the body, whose nearest vertex is at {}",
+      node.name, bones, text_of(node.position), text_of(vertex)));
+}
+
+void check_nodes(const CutMesh& mesh, const Skeleton& skeleton) {
   std::vector<bool> is_used(skeleton.nodes.size(), false);
   for (const Bone& bone : skeleton.bones) is_used[bone.head] = is_used[bone.tail] = true;
   std::vector<int> windings(skeleton.nodes.size(), 1);
@@ -105,21 +122,11 @@ void check_skeleton_inside(const CutMesh& mesh, const Skeleton& skeleton) {
       throw TopologyError(fmt::format(
           "the mesh is turned inside out around node \"{}\" at {}; reverse the order of every triangle's vertices",
           node.name, text_of(node.position)));
-    std::string bones;
-    for (const Bone& bone : skeleton.bones)
-      if (bone.head == static_cast<int>(n) || bone.tail == static_cast<int>(n))
-        bones += fmt::format("{}\"{}\"", bones.empty() ? "" : ", ", bone.name);
-    double nearest = std::numeric_limits<double>::infinity();
-    Vec3 vertex = node.position;
-    for (const Vec3& p : mesh.positions)
-      if ((p - node.position).squaredNorm() < nearest) {
-        nearest = (p - node.position).squaredNorm();
-        vertex = p;
-      }
-    throw TopologyError(fmt::format(
-        "node \"{}\" (bone {}) lies outside the mesh at {}; move it into the body, whose nearest vertex is at {}",
-        node.name, bones, text_of(node.position), text_of(vertex)));
+    refuse_outside_node(mesh, skeleton, static_cast<int>(n));
   }
+}
+
+void check_bones(const CutMesh& mesh, const Skeleton& skeleton) {
   std::vector<double> crossings(skeleton.bones.size());
   for_each_block(crossings.size(), 1, [&](std::size_t b, std::size_t, std::size_t) {
     const int bone = static_cast<int>(b);
@@ -137,6 +144,14 @@ void check_skeleton_inside(const CutMesh& mesh, const Skeleton& skeleton) {
         bone.name, text_of(head + t * (tail - head)), 100 * t, skeleton.nodes[bone.head].name,
         skeleton.nodes[bone.tail].name));
   }
+}
+
+}  // namespace
+
+void check_skeleton_inside(const CutMesh& mesh, const Skeleton& skeleton) {
+  check_connected(skeleton);
+  check_nodes(mesh, skeleton);
+  check_bones(mesh, skeleton);
 }
 
 }  // namespace skeletex
