@@ -25,6 +25,7 @@ struct OrderedGraph {
   int first_row = 0;
 };
 
+/// The tables of some systems, whose rows lie behind each other.
 /// \param rows  of all systems; those that no unknown has are padding
 EliminationTables make_elimination_tables(std::span<const OrderedGraph> systems, int rows);
 
@@ -32,7 +33,8 @@ EliminationTables make_elimination_tables(std::span<const OrderedGraph> systems,
 /// caller's kernels write matrix, scale and residuals to `system`; solve() adds the solution to the unknowns.
 class Elimination {
  public:
-  /// \param group_size  work-items of a group \param options  of the kernels, see work_group.h
+  /// \param group_size  work-items of a group
+  /// \param options     of the kernels, see work_group.h
   Elimination(ClContext& context, EliminationTables tables, int rows, std::size_t group_size, const char* options);
 
   /// Values of the matrix, and from `layout` on what joins rows to fixed vertices, roots and residuals.
@@ -40,7 +42,8 @@ class Elimination {
   const EliminationLayout& layout() const { return layout_; }
 
   /// \param is_new     the matrix has changed since the last call
-  /// \param ratios     per system, a float as bits: those above `tolerance` are solved
+  /// \param tolerance  systems whose ratio is above this are solved
+  /// \param ratios     per system, a float as bits
   /// \param unknowns   four floats per row: two values, and what they are more than their floats
   void solve(bool is_new, float tolerance, const ClBuffer<int>& ratios, ClBuffer<float>& unknowns);
 

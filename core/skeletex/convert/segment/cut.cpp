@@ -32,6 +32,7 @@ std::vector<int> components_at_corner_rays(SeparationNetwork& network, const Nod
     if (!is_new && distance < it->second.first) it->second = {distance, static_cast<int>(p)};
   }
   std::vector<int> components;
+  components.reserve(first.size());
   for (const auto& [ray, hit] : first) components.push_back(network.component(hit.second));
   return components;
 }
@@ -314,6 +315,7 @@ void TriangleDivider::link_diagonal(int half_edge, int from, int to) {
 /// Triangulates a region.
 void TriangleDivider::add_pieces(const MixedTriangle& mixed, const std::vector<int>& polygon) {
   std::vector<PieceCorner> outline;
+  outline.reserve(polygon.size());
   for (const int s : polygon)
     outline.push_back(*std::find_if(corners_.begin(), corners_.end(),
                                     [&](const PieceCorner& c) { return c.vertex == sides_[s].from; }));
