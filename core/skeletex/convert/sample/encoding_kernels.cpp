@@ -39,7 +39,7 @@ std::vector<KernelVariant> encoding_kernels(const ClContext& context, const Enco
   const bool can_snap = has_vsm && options.has_snap.value_or(true);
   const bool can_fit = has_vsm && options.has_fit.value_or(options.has_prefilter && texels <= kMostFittedTexels);
   if (can_snap) {
-    add("snap.cl", {"claim_texels", "decide_claims"}, items);
+    add("snap.cl", {"reserve_texels", "decide_reservations"}, items);
     add("snap.cl", {"part_colours", "decide_the_rest", "place_on_edges"}, rows);
     add("encode.cl", {"read_snapped"}, rows);
   }
