@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The corners of a texel's quad, 0 (the texel) to 3, counter-clockwise, and of its two triangles, and the places of its samples; see fit.cl.
+// The corners of a texel's quad, 0 (the texel) to 3, counter-clockwise, and of its two triangles, and the places of its
+// samples; see fit.cl.
 #include "patch_texels.h"
 #include "skeletex_structs.h"
 

@@ -130,16 +130,18 @@ LatticeMesh build_lattice_mesh(ClContext& context, const LatticeFrame& frame, Di
   const Lattice& lattice = frame.numbers;
   LatticeMesh result{{frame.positions, {}}, {}};
   TriangleMesh& mesh = result.mesh;
-  for (int axis = 0; axis < 3; ++axis) {
+  for_each_block(3, 1, [&](std::size_t axis, std::size_t, std::size_t) {
     result.inner[axis].reserve(lattice.inner_count);
     for_each_inner_row(frame.model, lattice, [&](int, int texel, int columns) {
       const auto first = points[axis].begin() + texel;
       result.inner[axis].insert(result.inner[axis].end(), first, first + columns);
     });
-  }
+  });
   const auto device_triangles = triangulate(context, rule, frame.quads, lattice, upload_planes(context, result.inner));
-  for (int vertex = 0; vertex < lattice.vertex_count; ++vertex)
-    if (frame.texels[vertex] >= 0) mesh.positions[vertex] = position_of(frame.model, points, frame.texels[vertex]);
+  for_each_block(lattice.vertex_count, 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t vertex = begin; vertex < end; ++vertex)
+      if (frame.texels[vertex] >= 0) mesh.positions[vertex] = position_of(frame.model, points, frame.texels[vertex]);
+  });
   std::vector<int> ends(frame.ends.size());
   std::iota(ends.begin(), ends.end(), 0);
   const std::vector<std::vector<Triangle>> of_ends = make_ends(frame, ends, mesh.positions);
