@@ -17,35 +17,17 @@
 #include "map_triangle.h"
 #include "mesh_walk.h"
 #include "patch_texels.h"
+#include "quad_corners.h"
 #include "quad_diagonal.h"
 #include "skeletex_structs.h"
 
-#define FIT_SAMPLES 4
 #define SAMPLE_PLANES 7   // x, y, z, normal x, y, z, share of the area; the normal is 0 where there is nothing to fit
 #define LATTICE_PLANES 5  // of a triangle's middle: weight (area), residual, normal x, y, z
-#define SYSTEM_STRIDE \
-  36  // floats of a texel's row: 6 own block (xx, xy, xz, yy, yz, zz), 3 right-hand side, 4 x 6 blocks with the texels
-      // ahead
+// Floats of a texel's row: 6 own block (xx, xy, xz, yy, yz, zz), 3 right-hand side, 4 x 6 blocks with the texels ahead.
+#define SYSTEM_STRIDE 36
 #define LARGEST_STEP 0.25f  // cells
 #define LARGEST_MOVE 1.0f   // cells, of all steps together, off the lattice
 #define LARGEST_SLIDE 0.5f  // distances to the nearer neighbours, of all steps together, along the lattice
-
-float sample_s(int i) { return i & 1 ? 0.75f : 0.25f; }
-float sample_t(int i) { return i & 2 ? 0.75f : 0.25f; }
-
-// Corner k, 0 to 2, of triangle t of a quad.
-int corner_of(int is_second, int t, int k) {
-  return is_second ? (t == 0 ? (k == 2 ? 3 : k) : k + 1) : (t == 0 ? k : (k == 0 ? 0 : k + 1));
-}
-int corner_right(int c) { return c == 1 || c == 2; }
-int corner_up(int c) { return c >= 2; }
-
-void corners_of_quad(global const PatchRecord* restrict p, int texture_width, int column, int row, int at[4]) {
-  at[0] = texel_at(p, texture_width, column, row);
-  at[1] = texel_at(p, texture_width, column + 1, row);
-  at[2] = at[1] + texture_width;
-  at[3] = at[0] + texture_width;
-}
 
 // NDRange (texture width, texture height). A sample has a fixed place in its quad; where that is in the map follows
 // from the reading positions of the quad's corners, and from there a walk leads to the triangle that covers it. out

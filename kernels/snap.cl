@@ -1,85 +1,31 @@
 // SPDX-License-Identifier: MIT
 // Where texels read: from the regular grid to the mesh's own vertices and creased edges.
-//   claim_texels, decide_claims, decide_the_rest
+//   reserve_texels, decide_reservations, decide_the_rest
 //                               vertices, strongest first, take the nearest texel that is free
 //   place_on_edges              free texels follow their neighbours half way, then go to the nearest point of a creased
-//   edge part_colours                rows by colour, see below; read_snapped in encode.cl has them the other way again
+//                               edge
+//   part_colours                rows by colour, see below; read_snapped in encode.cl has them the other way again
 // A reading position is an offset from the texel's own place in the lattice, in cells: two planes over the texture, x
 // around, y along. Rows 0 and height-1 stay. `anchors` says what holds a texel: 0 nothing, 1 + i vertex i of the list
 // of vertices, -1 - i edge i. Vertices and edges come with their patch and their place (x, y) in its cells, x
 // unwrapped. While texels snap, each row of a patch has its even columns first, then its odd ones: those of a colour
-// and their neighbours lie side by side. Texels never look at each other's offsets where these may change: claims wait
-// for stronger ones next to them, the other kernels take even and odd rows apart, and in each of them one colour after
-// the other (see row_colour). So nothing depends on the order of work-items.
+// and their neighbours lie side by side. Texels never look at each other's offsets where these may change: reservations
+// wait for stronger ones next to them, the other kernels take even and odd rows apart, and in each of them one colour
+// after the other (see row_colour). So nothing depends on the order of work-items.
 #include "extremes.h"
 #include "patch_texels.h"
 #include "row_group.h"
 #include "skeletex_structs.h"
+#include "snap_map.h"
 
 #define REACH 0.7f         // cells from where a texel is to where it goes
 #define FURTHEST 1.0f      // cells from a texel's own place, along each axis
 #define LOOSE 0.5f         // the same of texels that nothing holds: where edges look for them
 #define LEAST_CROSS 0.05f  // cells squared: twice the area that the triangles around a texel keep in the map
-#define LEAST_COSINE 0.2f  // between a triangle and the regular grid's quad in space
-#define MARGIN 0.6f        // cells that the rows next to a seam or pole keep from it
 #define LEAST_MOVE 0.01f   // cells: shorter steps of free texels are not worth their test
-#define PLACED 5           // states of a vertex: 0 to 3 the candidate it claims, 4 none is left
-#define LOOKED_AT 1        // a mark of a texel's quad
+#define PLACED 5           // states of a vertex: 0 to 3 the candidate that it reserves, 4 none is left
 #define NONE -1            // of a bin's edges
 #define FLATTEST 5.0f      // of edges that texels look for again, see EdgeRecord: dihedral angles of 0.1 rad
-
-// A texel among its row's by colour; columns one beyond either end wrap round.
-int coloured_at(global const PatchRecord* restrict p, int texture_width, int column, int row) {
-  const int wrapped = column < 0 ? column + p->width : column < p->width ? column : column - p->width;
-  return (p->y + row) * texture_width + p->x + (wrapped >> 1) + ((wrapped & 1) ? (p->width + 1) >> 1 : 0);
-}
-
-// A texel and its eight neighbours.
-typedef struct Neighbours {
-  int own, left, right;  // those below and above them are a line of the texture away
-} Neighbours;
-
-Neighbours neighbours_of(global const PatchRecord* restrict p, int texture_width, int column, int row) {
-  const Neighbours n = {coloured_at(p, texture_width, column, row), coloured_at(p, texture_width, column - 1, row),
-                        coloured_at(p, texture_width, column + 1, row)};
-  return n;
-}
-
-// The three corners of the quad (0, 0), a, b, c, counter-clockwise, whose cross product depends on (0, 0).
-__attribute__((always_inline)) float least_cross(float ax, float ay, float bx, float by, float cx, float cy) {
-  const float own = ax * cy - ay * cx, at_a = (ax - bx) * ay - (ay - by) * ax, at_c = cx * (cy - by) - cy * (cx - bx);
-  return lesser(own, lesser(at_a, at_c));
-}
-
-// The smallest cross product at the corners of the four quads around a texel that depend on its offset, if that were
-// (dx, dy); at most 0 when it would come too near to a seam, whose own samples are not at the columns.
-__attribute__((always_inline)) float cross_around(Neighbours n, int height, int texture_width, int row, float dx,
-                                                  float dy, global const float* offset_x,
-                                                  global const float* offset_y) {
-  const float rx = 1.0f + offset_x[n.right] - dx, ry = offset_y[n.right] - dy, lx = -1.0f + offset_x[n.left] - dx,
-              ly = offset_y[n.left] - dy;
-  const int above = texture_width, below = -texture_width;
-  const float ax = offset_x[n.own + above] - dx, ay = 1.0f + offset_y[n.own + above] - dy;
-  const float bx = offset_x[n.own + below] - dx, by = -1.0f + offset_y[n.own + below] - dy;
-  const float right_above =
-      least_cross(rx, ry, 1.0f + offset_x[n.right + above] - dx, 1.0f + offset_y[n.right + above] - dy, ax, ay);
-  const float left_above =
-      least_cross(ax, ay, -1.0f + offset_x[n.left + above] - dx, 1.0f + offset_y[n.left + above] - dy, lx, ly);
-  const float left_below =
-      least_cross(lx, ly, -1.0f + offset_x[n.left + below] - dx, -1.0f + offset_y[n.left + below] - dy, bx, by);
-  const float right_below =
-      least_cross(bx, by, 1.0f + offset_x[n.right + below] - dx, -1.0f + offset_y[n.right + below] - dy, rx, ry);
-  const int is_near_end = ((float)row + dy < MARGIN) | ((float)row + dy > (float)(height - 1) - MARGIN);
-  // No choice between the two: the compiler would put loads of neighbours behind it, each a gather under a mask.
-  return lesser(is_near_end ? 0.0f : INFINITY,
-                lesser(lesser(right_above, left_above), lesser(left_below, right_below)));
-}
-
-// The same, compiled once.
-__attribute__((noinline)) float cross_around_one(Neighbours n, int height, int texture_width, int row, float dx,
-                                                 float dy, global const float* offset_x, global const float* offset_y) {
-  return cross_around(n, height, texture_width, row, dx, dy, offset_x, offset_y);
-}
 
 // The candidate of a vertex: the k-th nearest corner of its cell, and the vertex' offset from it.
 void candidate_of(float x, float y, int k, int* column, int* row, float* dx, float* dy) {
@@ -94,11 +40,11 @@ void candidate_of(float x, float y, int k, int* column, int* row, float* dx, flo
   *dx = fx - (float)right, *dy = fy - (float)up;
 }
 
-// A vertex that is not placed claims the first of its candidates that it can still have.
-// in   least: more than all claims of rounds before; rank: its own by strength, from 1
-__attribute__((always_inline)) void claim_texel(int v, int least, int rank, global const PatchRecord* restrict p,
-                                                int texture_width, float x, float y, global const int* anchors,
-                                                global int* states, volatile global int* claims) {
+// A vertex that is not placed reserves the first of its candidates that it can still have.
+// in   least: more than all reservations of rounds before; rank: its own by strength, from 1
+__attribute__((always_inline)) void reserve_texel(int v, int least, int rank, global const PatchRecord* restrict p,
+                                                  int texture_width, float x, float y, global const int* anchors,
+                                                  global int* states, volatile global int* reservations) {
   int state = states[v];
   for (; state < 4; ++state) {
     int column, row;
@@ -107,18 +53,19 @@ __attribute__((always_inline)) void claim_texel(int v, int least, int rank, glob
     if (row < 1 || row > p->height - 2 || dx * dx + dy * dy > REACH * REACH) continue;
     const int texel = coloured_at(p, texture_width, (column % p->width + p->width) % p->width, row);
     if (anchors[texel] != 0) continue;
-    atomic_max(claims + texel, least + rank);
+    atomic_max(reservations + texel, least + rank);
     break;
   }
   states[v] = state;
 }
 
-// A claim that is the strongest on its texel and the eight around is decided: it stands when the map does not fold,
-// else the next candidate's turn has come.
-__attribute__((always_inline)) void decide_claim(int v, int least, int rank, global const PatchRecord* restrict p,
-                                                 int texture_width, float x, float y, volatile global const int* claims,
-                                                 global int* states, global int* anchors, global float* offset_x,
-                                                 global float* offset_y) {
+// A reservation that is the strongest on its texel and the eight around is decided: it stands when the map does not
+// fold, else the next candidate's turn has come.
+__attribute__((always_inline)) void decide_reservation(int v, int least, int rank, global const PatchRecord* restrict p,
+                                                       int texture_width, float x, float y,
+                                                       volatile global const int* reservations, global int* states,
+                                                       global int* anchors, global float* offset_x,
+                                                       global float* offset_y) {
   int column, row;
   float dx, dy;
   candidate_of(x, y, states[v], &column, &row, &dx, &dy);
@@ -126,7 +73,7 @@ __attribute__((always_inline)) void decide_claim(int v, int least, int rank, glo
   int is_strongest = 1;
   for (int i = -1; i <= 1; ++i)
     for (int j = -1; j <= 1; ++j)
-      is_strongest &= claims[coloured_at(p, texture_width, column + j, row + i)] <= least + rank;
+      is_strongest &= reservations[coloured_at(p, texture_width, column + j, row + i)] <= least + rank;
   if (!is_strongest) return;
   const Neighbours n = neighbours_of(p, texture_width, column, row);
   if (cross_around_one(n, p->height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) {
@@ -139,39 +86,39 @@ __attribute__((always_inline)) void decide_claim(int v, int least, int rank, glo
   states[v] = PLACED;
 }
 
-// NDRange (vertices). One round: claims.
-kernel void claim_texels(const int vertex_count, const int texture_width, const int least,
-                         global const int* restrict vertex_patches, global const float* restrict vertex_x,
-                         global const float* restrict vertex_y, global const int* restrict ranks,
-                         global const PatchRecord* restrict patches, global const int* restrict anchors,
-                         global int* restrict states, global int* restrict claims) {
+// NDRange (vertices). One round: reservations.
+kernel void reserve_texels(const int vertex_count, const int texture_width, const int least,
+                           global const int* restrict vertex_patches, global const float* restrict vertex_x,
+                           global const float* restrict vertex_y, global const int* restrict ranks,
+                           global const PatchRecord* restrict patches, global const int* restrict anchors,
+                           global int* restrict states, global int* restrict reservations) {
   const int v = (int)get_global_id(0);
   if (v < vertex_count)
-    claim_texel(v, least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v], anchors,
-                states, claims);
+    reserve_texel(v, least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v], anchors,
+                  states, reservations);
 }
 
 // NDRange (vertices). One round: decisions.
-kernel void decide_claims(const int vertex_count, const int texture_width, const int least,
-                          global const int* restrict vertex_patches, global const float* restrict vertex_x,
-                          global const float* restrict vertex_y, global const int* restrict ranks,
-                          global const PatchRecord* restrict patches, global const int* restrict claims,
-                          global int* restrict states, global int* restrict anchors, global float* restrict offset_x,
-                          global float* restrict offset_y) {
+kernel void decide_reservations(const int vertex_count, const int texture_width, const int least,
+                                global const int* restrict vertex_patches, global const float* restrict vertex_x,
+                                global const float* restrict vertex_y, global const int* restrict ranks,
+                                global const PatchRecord* restrict patches, global const int* restrict reservations,
+                                global int* restrict states, global int* restrict anchors,
+                                global float* restrict offset_x, global float* restrict offset_y) {
   const int v = (int)get_global_id(0);
   if (v < vertex_count && states[v] < 4)
-    decide_claim(v, least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v], claims,
-                 states, anchors, offset_x, offset_y);
+    decide_reservation(v, least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v],
+                       reservations, states, anchors, offset_x, offset_y);
 }
 
 // NDRange: one work-group of ROW_ITEMS. All further rounds, which are of few vertices. Every round decides at least the
-// strongest claim that is open. in   least: of the first of them; step: from one round's to the next out  open: what
-// else the kernel needs, two numbers per vertex
+// strongest reservation that is open. in   least: of the first of them; step: from one round's to the next out  open:
+// what else the kernel needs, two numbers per vertex
 kernel void decide_the_rest(const int vertex_count, const int texture_width, const int texel_count, const int least,
                             const int step, global const int* restrict vertex_patches,
                             global const float* restrict vertex_x, global const float* restrict vertex_y,
                             global const int* restrict ranks, global const PatchRecord* restrict patches,
-                            volatile global int* claims, global int* states, global int* anchors,
+                            volatile global int* reservations, global int* states, global int* anchors,
                             global float* offset_x, global float* offset_y, global int* open) {
   local int counts[2];
   const int own = (int)get_local_id(0);
@@ -187,22 +134,22 @@ kernel void decide_the_rest(const int vertex_count, const int texture_width, con
     global const int* from = open + list * vertex_count;
     global int* to = open + !list * vertex_count;
     if (round_least > 0x7fffffff - 2 * step) {
-      for (int i = own; i < texel_count; i += ROW_ITEMS) claims[i] = 0;
+      for (int i = own; i < texel_count; i += ROW_ITEMS) reservations[i] = 0;
       round_least = 0;
       WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
     }
     for (int i = own; i < count; i += ROW_ITEMS) {
       const int v = from[i];
-      claim_texel(v, round_least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v],
-                  anchors, states, claims);
+      reserve_texel(v, round_least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v],
+                    anchors, states, reservations);
     }
     WAIT_FOR_GROUP(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
     if (own == 0) counts[list] = 0;
     for (int i = own; i < count; i += ROW_ITEMS) {
       const int v = from[i];
       if (states[v] < 4)
-        decide_claim(v, round_least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v],
-                     claims, states, anchors, offset_x, offset_y);
+        decide_reservation(v, round_least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v],
+                           vertex_y[v], reservations, states, anchors, offset_x, offset_y);
       if (states[v] < 4) to[atomic_inc(counts + !list)] = v;
     }
     round_least += step;
@@ -337,9 +284,9 @@ int8 nearest_edges(const float8 x, const float8 y, const int begin, const int en
     const float8 to_x = edge->x - x, to_y = edge->y - y;
     const float8 t = clamp(to_x * edge->over_x + to_y * edge->over_y, (float8)(0.0f), (float8)(1.0f));
     const float8 dx = to_x + t * edge->ex, dy = to_y + t * edge->ey, distance2 = dx * dx + dy * dy,
-                 offer = distance2 * edge->flatness;
-    const int8 is_nearer = (offer < least) & (distance2 <= REACH * REACH);
-    least = is_nearer ? offer : least;
+                 cost = distance2 * edge->flatness;
+    const int8 is_nearer = (cost < least) & (distance2 <= REACH * REACH);
+    least = is_nearer ? cost : least;
     nearest = is_nearer ? (int8)(e) : nearest;
   }
   return nearest;
@@ -360,62 +307,62 @@ EdgeRecords gathered_edges(const int8 at, global const EdgeRecord* restrict edge
   return all;
 }
 
-// What an edge offers a texel: its number, and whether it is so sharp that another try is worth it. NONE: nothing.
-int8 offers_of(const EdgeRecords edges) { return 2 * edges.number + ((edges.flatness <= FLATTEST) & 1); }
-int number_of_offer(int offer) { return offer >> 1; }
-int is_sharp_offer(int offer) { return offer & 1; }
+// The edge that a texel can go to: its number, and whether it is so sharp that another try is worth it. NONE: nothing.
+int8 candidates_of(const EdgeRecords edges) { return 2 * edges.number + ((edges.flatness <= FLATTEST) & 1); }
+int number_of_candidate(int candidate) { return candidate >> 1; }
+int is_sharp_candidate(int candidate) { return candidate & 1; }
 
-// A free texel of any column goes where its offer is; if it cannot, and the edge is flat, it has none any more.
+// A free texel of any column goes where its candidate is; if it cannot, and the edge is flat, it has none any more.
 // Compiled once.
 __attribute__((noinline)) void place_one(global const PatchRecord* restrict p, const int texture_width,
                                          const int column, const int row, global const float* restrict target_x,
-                                         global const float* restrict target_y, global int* offers,
+                                         global const float* restrict target_y, global int* candidates,
                                          global int* restrict anchors, global float* offset_x, global float* offset_y) {
   const Neighbours n = neighbours_of(p, texture_width, column, row);
-  const int texel = n.own, offer = offers[texel];
-  if (offer == NONE) return;
+  const int texel = n.own, candidate = candidates[texel];
+  if (candidate == NONE) return;
   const float dx = target_x[texel], dy = target_y[texel];
   if (fmax(fabs(dx), fabs(dy)) > FURTHEST ||
       cross_around(n, p->height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) {
-    if (!is_sharp_offer(offer)) offers[texel] = NONE;
+    if (!is_sharp_candidate(candidate)) candidates[texel] = NONE;
     return;
   }
   offset_x[texel] = dx, offset_y[texel] = dy;
-  anchors[texel] = -1 - number_of_offer(offer), offers[texel] = NONE;
+  anchors[texel] = -1 - number_of_candidate(candidate), candidates[texel] = NONE;
 }
 
 // Texels of one colour, as for relax_colour, go to the edge that is nearest.
-// out  offers: of those that could not, and are worth another try
+// out  candidates: of those that could not, and are worth another try
 __attribute__((always_inline)) void place_colour(const RowColour colour, const int height, const int texture_width,
                                                  const int row, global const float* restrict target_x,
-                                                 global const float* restrict target_y, global int* restrict offers,
+                                                 global const float* restrict target_y, global int* restrict candidates,
                                                  global int* restrict anchors, global const float* restrict offset_x,
                                                  global const float* restrict offset_y, global float* restrict own_x,
                                                  global float* restrict own_y) {
   for (int i = get_local_id(0); i < colour.end - colour.first; i += ROW_ITEMS) {
-    const int texel = colour.first + i, offer = offers[texel], has_offer = offer != NONE;
+    const int texel = colour.first + i, candidate = candidates[texel], has_candidate = candidate != NONE;
     const float from_x = own_x[texel], from_y = own_y[texel], dx = target_x[texel], dy = target_y[texel];
     const Neighbours n = {texel, colour.left + i, colour.left + i + 1};
     const int stands = cross_around(n, height, texture_width, row, dx, dy, offset_x, offset_y) >= LEAST_CROSS;
-    const int moves = has_offer & (fabs(dx) <= FURTHEST) & (fabs(dy) <= FURTHEST) & stands;
+    const int moves = has_candidate & (fabs(dx) <= FURTHEST) & (fabs(dy) <= FURTHEST) & stands;
     const float to_x = moves ? dx : from_x, to_y = moves ? dy : from_y;
-    const int anchor = moves ? -1 - number_of_offer(offer) : anchors[texel];
+    const int anchor = moves ? -1 - number_of_candidate(candidate) : anchors[texel];
     own_x[texel] = to_x, own_y[texel] = to_y, anchors[texel] = anchor;
-    const int is_open = has_offer & !moves & is_sharp_offer(offer);
-    offers[texel] = is_open ? offer : NONE;
+    const int is_open = has_candidate & !moves & is_sharp_candidate(candidate);
+    candidates[texel] = is_open ? candidate : NONE;
   }
 }
 
-// The same where hardly any texel has an offer.
+// The same where hardly any texel has a candidate.
 __attribute__((always_inline)) void place_few(global const PatchRecord* restrict p, const RowColour colour,
                                               const int odd, const int texture_width, const int row,
                                               global const float* restrict target_x,
-                                              global const float* restrict target_y, global int* restrict offers,
+                                              global const float* restrict target_y, global int* restrict candidates,
                                               global int* restrict anchors, global float* offset_x,
                                               global float* offset_y) {
   for (int i = get_local_id(0); i < colour.end - colour.first; i += ROW_ITEMS)
-    if (offers[colour.first + i] != NONE)
-      place_one(p, texture_width, odd ? 2 * i + 1 : 2 * i + 2, row, target_x, target_y, offers, anchors, offset_x,
+    if (candidates[colour.first + i] != NONE)
+      place_one(p, texture_width, odd ? 2 * i + 1 : 2 * i + 2, row, target_x, target_y, candidates, anchors, offset_x,
                 offset_y);
 }
 
@@ -425,14 +372,14 @@ __attribute__((always_inline)) void place_few(global const PatchRecord* restrict
 // row, number of the first bin, 0: inner ones, even or odd; bin_begins: into bin_edges, numbers of edges
 //      is_again: to edges only in bins where a texel could not go to one the time before that is sharp enough
 //      (FLATTEST)
-// out  parameters: where on its edge a texel is, 0 to 1; offers, target_x, target_y: what else the kernel needs per
+// out  parameters: where on its edge a texel is, 0 to 1; candidates, target_x, target_y: what else the kernel needs per
 // texel
 kernel void place_on_edges(const int row_count, const int texture_width, const int is_again,
                            global const int* restrict rows, global const PatchRecord* restrict patches,
                            global const int* restrict bin_begins, global const int* restrict bin_edges,
                            global const EdgeRecord* restrict edges, global int* restrict anchors,
                            global float* restrict parameters, global float* offset_x, global float* offset_y,
-                           global int* restrict offers, global float* restrict target_x,
+                           global int* restrict candidates, global float* restrict target_x,
                            global float* restrict target_y) {
   const int k = get_group_id(0);
   if (k >= row_count) return;
@@ -447,32 +394,32 @@ kernel void place_on_edges(const int row_count, const int texture_width, const i
     const int8 columns = min(column + (int8)(0, 2, 4, 6, 1, 3, 5, 7), (int8)(width - 1));
     const int8 texels = (columns >> 1) + ((columns & 1) == 0 ? (int8)(first) : (int8)(odd));
     const int is_whole = column + 8 <= width, at_even = first + column / 2, at_odd = odd + column / 2;
-    if (is_again && is_whole && !any(loaded_ints(offers, at_even, at_odd) != NONE)) continue;
+    if (is_again && is_whole && !any(loaded_ints(candidates, at_even, at_odd) != NONE)) continue;
     const float8 x = is_whole ? loaded(offset_x, at_even, at_odd) : gathered(texels, offset_x);
     const float8 y = is_whole ? loaded(offset_y, at_even, at_odd) : gathered(texels, offset_y);
     const int8 nearest = nearest_edges(convert_float8(columns) + x, (float)row + y, bin_begins[bin],
                                        bin_begins[bin + 1], bin_edges, edges);
     const int8 are_held = (is_whole ? loaded_ints(anchors, at_even, at_odd) : gathered_ints(texels, anchors)) != 0;
-    const int8 have_offers = (nearest != NONE) & !are_held;
-    const EdgeRecords found = gathered_edges(have_offers ? nearest : (int8)(0), edges);
+    const int8 have_candidates = (nearest != NONE) & !are_held;
+    const EdgeRecords found = gathered_edges(have_candidates ? nearest : (int8)(0), edges);
     const float8 to_x = found.x - (convert_float8(columns) + x), to_y = found.y - ((float)row + y);
     const float8 t = clamp(to_x * found.over_x + to_y * found.over_y, (float8)(0.0f), (float8)(1.0f));
     const float8 to_offset_x = to_x + t * found.ex + x, to_offset_y = to_y + t * found.ey + y;
-    const int8 new_offers = have_offers ? offers_of(found) : (int8)(NONE);
+    const int8 new_candidates = have_candidates ? candidates_of(found) : (int8)(NONE);
     if (is_whole) {
-      store_ints(new_offers, offers, at_even, at_odd);
+      store_ints(new_candidates, candidates, at_even, at_odd);
       store(to_offset_x, target_x, at_even, at_odd), store(to_offset_y, target_y, at_even, at_odd);
       // The first time those of others are nothing yet.
       const float8 before = is_again ? loaded(parameters, at_even, at_odd) : t;
-      store(have_offers ? t : before, parameters, at_even, at_odd);
+      store(have_candidates ? t : before, parameters, at_even, at_odd);
     } else {
       int at[8], of_lanes[8];
       float x_of_lanes[8], y_of_lanes[8], t_of_lanes[8];
-      vstore8(texels, 0, at), vstore8(new_offers, 0, of_lanes);
+      vstore8(texels, 0, at), vstore8(new_candidates, 0, of_lanes);
       vstore8(to_offset_x, 0, x_of_lanes), vstore8(to_offset_y, 0, y_of_lanes), vstore8(t, 0, t_of_lanes);
       // What several lanes look at is the same.
       for (int i = 0; i < 8; ++i) {
-        offers[at[i]] = of_lanes[i], target_x[at[i]] = x_of_lanes[i], target_y[at[i]] = y_of_lanes[i];
+        candidates[at[i]] = of_lanes[i], target_x[at[i]] = x_of_lanes[i], target_y[at[i]] = y_of_lanes[i];
         if (of_lanes[i] != NONE) parameters[at[i]] = t_of_lanes[i];
       }
     }
@@ -481,13 +428,13 @@ kernel void place_on_edges(const int row_count, const int texture_width, const i
   for (int colour = 0; colour < 2 + (width & 1); ++colour) {
     const int at_end = end_of_colour(colour, width);
     if (colour < 2 && is_again)
-      place_few(p, row_colour(colour, first, width), colour, texture_width, row, target_x, target_y, offers, anchors,
-                offset_x, offset_y);
+      place_few(p, row_colour(colour, first, width), colour, texture_width, row, target_x, target_y, candidates,
+                anchors, offset_x, offset_y);
     else if (colour < 2)
-      place_colour(row_colour(colour, first, width), height, texture_width, row, target_x, target_y, offers, anchors,
-                   offset_x, offset_y, offset_x, offset_y);
+      place_colour(row_colour(colour, first, width), height, texture_width, row, target_x, target_y, candidates,
+                   anchors, offset_x, offset_y, offset_x, offset_y);
     if (get_local_id(0) == 0 && at_end >= 0)
-      place_one(p, texture_width, at_end, row, target_x, target_y, offers, anchors, offset_x, offset_y);
+      place_one(p, texture_width, at_end, row, target_x, target_y, candidates, anchors, offset_x, offset_y);
     WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
   }
 }

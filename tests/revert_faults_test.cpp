@@ -101,8 +101,8 @@ TEST(RevertFaults, LeavesWhatHasNone) {
   PlacedTexels texels = egg.regular;
   EXPECT_EQ(egg.revert(texels).reverted_texels, 0);
   EXPECT_EQ(texels.points, egg.regular.points);
-  // A fifth of a cell along the surface.
-  egg.place(Egg::texel(10, 5), Egg::point(10.2 / (Egg::kHeight - 1), 5.1 / Egg::kWidth), texels);
+  // A tenth of a cell along the surface, where cells are small.
+  egg.place(Egg::texel(17, 5), Egg::point(17.1 / (Egg::kHeight - 1), 5.1 / Egg::kWidth), texels);
   const PlacedTexels moved = texels;
   const RevertReport report = egg.revert(texels);
   EXPECT_EQ(report.reverted_texels, 0);
@@ -126,8 +126,8 @@ TEST(RevertFaults, FindsAPlantedFaultAndLeavesTheRest) {
        }) {
     PlacedTexels texels = egg.regular;
     // One that is in order elsewhere.
-    const int elsewhere = Egg::texel(14, 17);
-    egg.place(elsewhere, Egg::point(14.2 / rows, 17.1 / columns), texels);
+    const int elsewhere = Egg::texel(17, 17);
+    egg.place(elsewhere, Egg::point(17.1 / rows, 17.1 / columns), texels);
     for (const auto& [texel, p] : each.moves) egg.place(texel, p, texels);
     PlacedTexels again = texels;
     const RevertReport report = egg.revert(texels);

@@ -69,12 +69,12 @@ struct SnapLattice {
     };
     for (bool is_open = true; is_open;) {
       is_open = false;
-      std::map<int, int> claims;
+      std::map<int, int> reservations;
       for (int v = 0; v < count; ++v)
         for (; state[v] < 4; ++state[v]) {
           const Candidate c = candidates(v)[state[v]];
           if (c.row < 1 || c.row > height - 2 || c.distance > 0.7 || anchors[at(c.column, c.row)] != 0) continue;
-          claims[at(c.column, c.row)] = std::max(claims[at(c.column, c.row)], rank[v]);
+          reservations[at(c.column, c.row)] = std::max(reservations[at(c.column, c.row)], rank[v]);
           break;
         }
       for (int v = 0; v < count; ++v) {
@@ -83,8 +83,8 @@ struct SnapLattice {
         bool is_strongest = true;
         for (int i = -1; i <= 1; ++i)
           for (int j = -1; j <= 1; ++j) {
-            const auto claim = claims.find(at(c.column + j, c.row + i));
-            is_strongest = is_strongest && (claim == claims.end() || claim->second <= rank[v]);
+            const auto reservation = reservations.find(at(c.column + j, c.row + i));
+            is_strongest = is_strongest && (reservation == reservations.end() || reservation->second <= rank[v]);
           }
         if (is_strongest && move(c.column, c.row, vertices[v].x - c.column, vertices[v].y - c.row)) {
           anchors[at(c.column, c.row)] = 1 + v;
@@ -146,8 +146,8 @@ struct SnapLattice {
         for (int e = 0; e < static_cast<int>(edges.size()); ++e) {
           double dx = 0, dy = 0;
           const double distance = nearest(edges[e], j, row, dx, dy);
-          const long offer = std::lround(65536 * distance / std::sqrt(std::min(1.0, edges[e].dihedral / 0.5)));
-          if (distance <= 0.7 && offer < best) best = offer, chosen[at(j, row)] = e;
+          const long cost = std::lround(65536 * distance / std::sqrt(std::min(1.0, edges[e].dihedral / 0.5)));
+          if (distance <= 0.7 && cost < best) best = cost, chosen[at(j, row)] = e;
         }
       }
     for (int c = 0; c < 6; ++c)

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/convert/sample/half_texels.h"
 
-#include <algorithm>
 #include <cmath>
+
+#include "skeletex/convert/snap/lattice_surface.h"
 
 namespace skeletex {
 namespace {
@@ -21,31 +22,12 @@ TexelPoints separate_planes(ClContext& context, const DevicePlanes& planes) {
   return {context.upload(x), context.upload(y), context.upload(z)};
 }
 
-/// Which diagonals the decoder takes: per texel whether the quad to the right of and above it takes the second one.
-ClBuffer<int> choose_diagonals(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches,
-                               const DeviceLayout& layout, const TexelPoints& points) {
-  constexpr int kBandRows = 16, kBandColumns = 64;  // of a group; columns as in lattice.cl
-  std::vector<LatticeRow> rows = lattice_rows(patches, RowChoice::kInner);
-  std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == patches[row[0]].rectangle.height - 2; });
-  const int count = static_cast<int>(rows.size());
-  int widest = 0;
-  for (const Patch& patch : patches) widest = std::max(widest, patch.rectangle.width);
-  ClRange groups = row_range(context, (count + kBandRows - 1) / kBandRows);
-  groups.global[1] = (widest + kBandColumns - 1) / kBandColumns;
-  auto diagonals = context.allocate<int>(layout.size());
-  context.fill(diagonals, 0);
-  context.launch({"lattice.cl", "choose_diagonals"}, groups, count, kBandRows, layout.width,
-                 static_cast<int>(rule == DiagonalRule::kSmooth), context.upload(rows), layout.patches, points.x,
-                 points.y, points.z, diagonals);
-  return diagonals;
-}
-
 }  // namespace
 
 RoundingReport round_to_half(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches,
                              const DeviceLayout& layout, const ClBuffer<RowRecord>& rows,
                              const ClBuffer<ColumnRecord>& columns, const TexelPoints& points, TexelPoints& texels) {
-  const auto diagonals = choose_diagonals(context, rule, patches, layout, points);
+  const auto diagonals = choose_diagonals(context, rule, patches, layout.patches, layout.width, layout.size(), points);
   auto nearest2 = context.allocate<float>(layout.size()), chosen2 = context.allocate<float>(layout.size());
   context.fill(nearest2, 0.f), context.fill(chosen2, 0.f);
   const auto inner_rows = context.upload(lattice_rows(patches, RowChoice::kInner));

@@ -13,48 +13,50 @@ namespace {
 constexpr int kNoTriangle = std::numeric_limits<int>::max();  // as in encode.cl
 constexpr int kIsKept = 1, kNoneIsKept = 0;                   // what keeps a texel from being filtered
 
+/// Fills what is below 0 of a line of values: by the mean of the nearest known ones, weighted by nearness.
+/// \param known  places of the known ones, in order
+void fill_line(const std::vector<int>& known, int line_begin, int stride, int count, std::vector<float>& values) {
+  if (known.empty()) return;
+  const auto at = [&](int i) -> float& { return values[line_begin + i * stride]; };
+  for (int i = 0; i < count; ++i) {
+    if (at(i) >= 0) continue;
+    const auto after = std::lower_bound(known.begin(), known.end(), i);
+    if (after == known.begin()) {
+      at(i) = at(*after);
+    } else if (after == known.end()) {
+      at(i) = at(known.back());
+    } else {
+      const int a = *(after - 1), b = *after;
+      const float t = static_cast<float>(i - a) / static_cast<float>(b - a);
+      at(i) = (1 - t) * at(a) + t * at(b);
+    }
+  }
+}
+
+/// The places of a line whose values are at least 0.
+std::vector<int> known_places(const std::vector<float>& values, int line_begin, int stride, int count) {
+  std::vector<int> known;
+  for (int i = 0; i < count; ++i)
+    if (values[line_begin + i * stride] >= 0) known.push_back(i);
+  return known;
+}
+
 /// Distances along the rays of one SPD patch; a missed texel takes the mean of the nearest hits of its column, weighted
 /// by nearness, or of its row where the whole column missed. \return texels filled
 int fill_missed(const SpdHits& hits, const Rectangle& r, std::vector<float>& distances) {
   distances = hits.distances;
   int missed = 0;
-  const auto fill_line = [&](const std::vector<int>& known, int line_begin, int stride, int count) {
-    if (known.empty()) return;
-    for (int i = 0; i < count; ++i) {
-      float& value = distances[line_begin + i * stride];
-      if (value >= 0) continue;
-      const auto after = std::lower_bound(known.begin(), known.end(), i);
-      if (after == known.begin())
-        value = distances[line_begin + *after * stride];
-      else if (after == known.end())
-        value = distances[line_begin + known.back() * stride];
-      else {
-        const int a = *(after - 1), b = *after;
-        const float t = static_cast<float>(i - a) / static_cast<float>(b - a);
-        value = (1 - t) * distances[line_begin + a * stride] + t * distances[line_begin + b * stride];
-      }
+  for (int texel = r.width; texel < (r.height - 1) * r.width; ++texel)
+    if (hits.triangles[texel] < 0) {
+      distances[texel] = -1;
+      ++missed;
     }
-  };
-  for (int row = 1; row + 1 < r.height; ++row)
-    for (int j = 0; j < r.width; ++j)
-      if (hits.triangles[row * r.width + j] < 0) {
-        distances[row * r.width + j] = -1;
-        ++missed;
-      }
   if (missed == 0) return 0;
-  std::vector<int> known;
-  for (int j = 0; j < r.width; ++j) {
-    known.clear();
-    for (int row = 1; row + 1 < r.height; ++row)
-      if (distances[row * r.width + j] >= 0) known.push_back(row - 1);
-    fill_line(known, r.width + j, r.width, r.height - 2);
-  }
-  for (int row = 1; row + 1 < r.height; ++row) {
-    known.clear();
-    for (int j = 0; j < r.width; ++j)
-      if (distances[row * r.width + j] >= 0) known.push_back(j);
-    fill_line(known, row * r.width, 1, r.width);
-  }
+  for (int j = 0; j < r.width; ++j)
+    fill_line(known_places(distances, r.width + j, r.width, r.height - 2), r.width + j, r.width, r.height - 2,
+              distances);
+  for (int row = 1; row + 1 < r.height; ++row)
+    fill_line(known_places(distances, row * r.width, 1, r.width), row * r.width, 1, r.width, distances);
   return missed;
 }
 

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "skeletex/convert/snap/snap.h"
@@ -140,14 +141,21 @@ void for_each_index(std::size_t count, const Act& act) {
 
 /// The triangles with the highest estimates, of those that are finite.
 std::vector<int> highest(const std::vector<Estimate>& estimates) {
+  std::vector<double> distances;
+  distances.reserve(estimates.size());
+  for (const Estimate& each : estimates)
+    if (std::isfinite(each.distance)) distances.push_back(each.distance);
+  const auto share = static_cast<std::size_t>(kShareOfGrid * static_cast<double>(distances.size()));
+  const std::size_t count = std::max(kLeastOfGrid, share);
+  double least = 0;
+  if (count < distances.size()) {
+    const auto last = distances.begin() + static_cast<std::ptrdiff_t>(count);
+    std::nth_element(distances.begin(), last, distances.end(), std::greater<>());
+    least = *last;
+  }
   std::vector<int> triangles;
   for (std::size_t i = 0; i < estimates.size(); ++i)
-    if (std::isfinite(estimates[i].distance)) triangles.push_back(static_cast<int>(i));
-  const auto share = static_cast<std::size_t>(kShareOfGrid * static_cast<double>(triangles.size()));
-  const std::size_t count = std::min(triangles.size(), std::max(kLeastOfGrid, share));
-  std::nth_element(triangles.begin(), triangles.begin() + static_cast<std::ptrdiff_t>(count), triangles.end(),
-                   [&](int a, int b) { return estimates[a].distance > estimates[b].distance; });
-  triangles.resize(count);
+    if (std::isfinite(estimates[i].distance) && estimates[i].distance > least) triangles.push_back(static_cast<int>(i));
   return triangles;
 }
 

@@ -48,6 +48,25 @@ void for_each_inner_row(const SkeletexModel& model, const Lattice& lattice, cons
 
 }  // namespace
 
+ClBuffer<int> choose_diagonals(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches,
+                               const ClBuffer<PatchRecord>& records, int texture_width, std::size_t texels,
+                               const TexelPoints& points) {
+  constexpr int kBandRows = 16, kBandColumns = 64;  // of a group; columns as in lattice.cl
+  std::vector<LatticeRow> rows = lattice_rows(patches, RowChoice::kInner);
+  std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == patches[row[0]].rectangle.height - 2; });
+  const int count = static_cast<int>(rows.size());
+  int widest = 0;
+  for (const Patch& patch : patches) widest = std::max(widest, patch.rectangle.width);
+  ClRange groups = row_range(context, (count + kBandRows - 1) / kBandRows);
+  groups.global[1] = (widest + kBandColumns - 1) / kBandColumns;
+  auto diagonals = context.allocate<int>(texels);
+  context.fill(diagonals, 0);
+  context.launch({"lattice.cl", "choose_diagonals"}, groups, count, kBandRows, texture_width,
+                 static_cast<int>(rule == DiagonalRule::kSmooth), context.upload(rows), records, points.x, points.y,
+                 points.z, diagonals);
+  return diagonals;
+}
+
 LatticeFrame frame_lattice(ClContext& context, const SkeletexModel& model) {
   const PreparedModel prepared(model);
   const SeparationPlanes& separation = prepared.separation;
@@ -123,26 +142,51 @@ void replace_triangles(std::span<const Triangle> triangles, int first, std::span
 
 }  // namespace
 
+namespace {
+
+/// The triangles between inner rows, as reconstruct.cl writes them.
+void write_quads(const LatticeFrame& frame, const std::vector<int>& diagonals, std::vector<Triangle>& triangles) {
+  for_each_block(frame.rows.size(), 16, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto [patch, row, unused, first_quad] = frame.rows[i];
+      const int width = frame.model.patches[patch].rectangle.width;
+      const int first = frame.numbers.first_inner[patch] + (row - 1) * width;
+      for (int j = 0; j < width; ++j) {
+        const int own = first + j, right = j + 1 < width ? own + 1 : first, above = own + width, beyond = right + width;
+        const bool is_second = diagonals[frame.texels[own]] != 0;
+        triangles[2 * (first_quad + j)] = {own, right, is_second ? above : beyond};
+        triangles[2 * (first_quad + j) + 1] = is_second ? Triangle{above, right, beyond} : Triangle{own, beyond, above};
+      }
+    }
+  });
+}
+
+}  // namespace
+
 LatticeMesh build_lattice_mesh(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
                                const TexelPlanes& points) {
   const Lattice& lattice = frame.numbers;
   LatticeMesh result{{frame.positions, {}}, {}};
   TriangleMesh& mesh = result.mesh;
-  for (int axis = 0; axis < 3; ++axis) {
+  for_each_block(3, 1, [&](std::size_t axis, std::size_t, std::size_t) {
     result.inner[axis].reserve(lattice.inner_count);
     for_each_inner_row(frame.model, lattice, [&](int, int texel, int columns) {
       const auto first = points[axis].begin() + texel;
       result.inner[axis].insert(result.inner[axis].end(), first, first + columns);
     });
-  }
-  const auto device_triangles = triangulate(context, rule, frame.quads, lattice,
-                                            upload_planes(context, result.inner[0], result.inner[1], result.inner[2]));
-  for (int vertex = 0; vertex < lattice.vertex_count; ++vertex)
-    if (frame.texels[vertex] >= 0) mesh.positions[vertex] = position_of(frame.model, points, frame.texels[vertex]);
+  });
+  const auto device_diagonals = choose_diagonals(
+      context, rule, frame.model.patches, frame.quads.patches, frame.model.texture.width, points[0].size(),
+      TexelPoints{context.upload(points[0]), context.upload(points[1]), context.upload(points[2])});
+  for_each_block(lattice.vertex_count, 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t vertex = begin; vertex < end; ++vertex)
+      if (frame.texels[vertex] >= 0) mesh.positions[vertex] = position_of(frame.model, points, frame.texels[vertex]);
+  });
   std::vector<int> ends(frame.ends.size());
   std::iota(ends.begin(), ends.end(), 0);
   const std::vector<std::vector<Triangle>> of_ends = make_ends(frame, ends, mesh.positions);
-  mesh.triangles = context.download(device_triangles);
+  mesh.triangles.resize(lattice.triangle_count);
+  write_quads(frame, context.download(device_diagonals), mesh.triangles);
   auto next = mesh.triangles.begin() + 2 * static_cast<std::ptrdiff_t>(lattice.quad_count);
   for (const std::vector<Triangle>& triangles : of_ends) next = std::copy(triangles.begin(), triangles.end(), next);
   return result;

@@ -4,12 +4,20 @@
 #include <span>
 #include <vector>
 
+#include "skeletex/convert/sample/device_maps.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 
 namespace skeletex {
 
 /// Points of a texture's texels, from the model's origin: x, y and z per texel.
 using TexelPlanes = std::array<std::vector<float>, 3>;
+
+/// Which diagonals the decoder takes: per texel whether the quad to the right of and above it takes the second one.
+/// \param records  see frame_tables
+/// \param points   x, y, z per texel; those of rows 0 and height-1 do not count
+ClBuffer<int> choose_diagonals(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches,
+                               const ClBuffer<PatchRecord>& records, int texture_width, std::size_t texels,
+                               const TexelPoints& points);
 
 /// What the meshes of all points of one layout have in common: numbers of vertices and triangles (lattice.h), seams.
 struct LatticeFrame {

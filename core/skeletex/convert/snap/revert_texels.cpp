@@ -32,6 +32,15 @@ Quad quad_at(const LatticeFrame& frame, int patch, int row, int column) {
   return {{left, right, right + width, left + width}, {is_lower_inner, is_lower_inner, is_upper_inner, is_upper_inner}};
 }
 
+/// The four around an inner texel.
+std::array<Quad, 4> quads_at(const LatticeFrame& frame, int texel) {
+  const int width = frame.model.texture.width, patch = frame.texel_patches[texel];
+  const Rectangle& r = frame.model.patches[patch].rectangle;
+  const int row = texel / width - r.y, column = texel % width - r.x;
+  return {quad_at(frame, patch, row, column), quad_at(frame, patch, row, column - 1),
+          quad_at(frame, patch, row - 1, column), quad_at(frame, patch, row - 1, column - 1)};
+}
+
 QuadPoints points_of(const Quad& quad, const TexelPlanes& points) {
   QuadPoints found;
   for (int i = 0; i < 4; ++i)
@@ -94,19 +103,12 @@ std::vector<int> revert_texels(const LatticeFrame& frame, std::span<const int> l
   };
   for (const int texel : listed)
     if (texels.anchors[texel] <= 0 || with_vertices) revert(texel);
-  const int width = frame.model.texture.width;
-  for (std::size_t next = 0; next < reverted.size(); ++next) {
-    const int texel = reverted[next], patch = frame.texel_patches[texel];
-    const Rectangle& r = frame.model.patches[patch].rectangle;
-    const int row = texel / width - r.y, column = texel % width - r.x;
-    for (const int i : {row, row - 1})
-      for (const int j : {column, column - 1}) {
-        const Quad quad = quad_at(frame, patch, i, j);
-        if (!is_bad(quad, regular, texels)) continue;
-        for (int k = 0; k < 4; ++k)
-          if (quad.are_inner[k]) revert(quad.texels[k]);
-      }
-  }
+  for (std::size_t next = 0; next < reverted.size(); ++next)
+    for (const Quad& quad : quads_at(frame, reverted[next])) {
+      if (!is_bad(quad, regular, texels)) continue;
+      for (int k = 0; k < 4; ++k)
+        if (quad.are_inner[k]) revert(quad.texels[k]);
+    }
   return reverted;
 }
 

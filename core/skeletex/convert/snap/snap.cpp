@@ -22,7 +22,7 @@ constexpr int kBinHeight =
 constexpr int kEdgeRounds = 2;         // what one round has moved lets texels through that the fold test had stopped
 constexpr double kFlat = 1e-6;         // radians: what rounding may make of a flat edge
 constexpr double kFullDihedral = 0.5;  // radians: edges this sharp attract texels fully
-constexpr int kWideRounds = 2;         // of claims with a work-item per vertex; hardly any are open after them
+constexpr int kWideRounds = 2;         // of reservations with a work-item per vertex; hardly any are open after them
 
 /// One work-item per vertex or edge, in groups of one size: PoCL compiles a kernel for every size that it meets.
 ClRange over(int count) { return {{static_cast<std::size_t>(count), 1}, {64, 1}}; }
@@ -284,27 +284,27 @@ void fill_bins(const std::vector<SnapFeatures::Edge>& edges, std::span<const Pat
   begins[0] = 0;
 }
 
-/// \param claims  0
+/// \param reservations  0
 void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables,
-                      ClBuffer<int>& claims, SnappedPositions& positions) {
+                      ClBuffer<int>& reservations, SnappedPositions& positions) {
   if (tables.vertex_x.size == 0) return;
   const int count = static_cast<int>(tables.vertex_x.size);
   const auto &patch = tables.vertex_patches, &rank = tables.vertex_ranks;
   const auto &x = tables.vertex_x, &y = tables.vertex_y;
   auto states = context.allocate<int>(count), open = context.allocate<int>(2 * static_cast<std::size_t>(count));
   context.fill(states, 0);
-  // A claim is more than all of the rounds before, so these need not be taken off.
+  // A reservation is more than all of the rounds before, so these need not be taken off.
   const int step = 1 << std::bit_width(static_cast<unsigned>(count));
   for (int round = 0; round < kWideRounds; ++round) {
-    context.launch({"snap.cl", "claim_texels"}, over(count), count, layout.width, round * step, patch, x, y, rank,
-                   layout.patches, positions.anchors, states, claims);
-    context.launch({"snap.cl", "decide_claims"}, over(count), count, layout.width, round * step, patch, x, y, rank,
-                   layout.patches, claims, states, positions.anchors, positions.x, positions.y);
+    context.launch({"snap.cl", "reserve_texels"}, over(count), count, layout.width, round * step, patch, x, y, rank,
+                   layout.patches, positions.anchors, states, reservations);
+    context.launch({"snap.cl", "decide_reservations"}, over(count), count, layout.width, round * step, patch, x, y,
+                   rank, layout.patches, reservations, states, positions.anchors, positions.x, positions.y);
   }
   // One work-group: on a CPU one work-item.
   context.launch({"snap.cl", "decide_the_rest"}, row_range(context, 1), count, layout.width,
-                 static_cast<int>(layout.size()), kWideRounds * step, step, patch, x, y, rank, layout.patches, claims,
-                 states, positions.anchors, positions.x, positions.y, open);
+                 static_cast<int>(layout.size()), kWideRounds * step, step, patch, x, y, rank, layout.patches,
+                 reservations, states, positions.anchors, positions.x, positions.y, open);
 }
 
 }  // namespace
