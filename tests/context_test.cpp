@@ -10,7 +10,6 @@
 #include <fstream>
 #include <memory>
 #include <numeric>
-#include <thread>
 #include <vector>
 
 #include "skeletex/device/kernel_source.h"
@@ -343,31 +342,6 @@ TEST_F(Kernels, AreTimedByName) {
   EXPECT_GT(profile[0].milliseconds, 0);
   context.reset_profile();
   EXPECT_TRUE(context.profile().empty());
-}
-
-TEST_F(Kernels, RunOnAnotherThreadsQueue) {
-  ClContext context;
-  const std::unique_ptr<ClContext> beside = context.beside();
-  constexpr int kRounds = 20;
-  int right_beside = 0, right = 0;
-  std::thread thread([&] {
-    for (int i = 0; i < kRounds; ++i) right_beside += scaled(*beside) == twice_;
-  });
-  for (int i = 0; i < kRounds; ++i) right += scaled(context) == twice_;
-  thread.join();
-  EXPECT_EQ(right_beside, kRounds);
-  EXPECT_EQ(right, kRounds);
-  const std::vector<int> values{3, 1, 4, 1, 5, 9};
-  auto buffer = beside->upload(values);
-  EXPECT_EQ(context.download(buffer), values);
-  context.fill(buffer, 7);
-  context.finish();
-  EXPECT_EQ(beside->download(buffer), std::vector<int>(values.size(), 7));
-  context.take_profile(*beside);
-  EXPECT_TRUE(beside->profile().empty());
-  const auto profile = context.profile();
-  ASSERT_EQ(profile.size(), 1u);
-  EXPECT_EQ(profile[0].launches, 2 * kRounds);
 }
 
 // Also those that OpenCL has no buffers for, and when the host's memory is gone before the device needs it.

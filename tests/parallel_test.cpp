@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
-#include <future>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -34,29 +33,6 @@ TEST(ForEachBlock, ThrowsWhatABlockThrows) {
     FAIL() << "nothing thrown";
   } catch (const std::runtime_error& error) {
     EXPECT_EQ(error.what(), std::string("block 40"));
-  }
-}
-
-TEST(RunBeside, IsAThreadOfItsOwnThatHandsOverItsResult) {
-  std::promise<std::thread::id> begun;
-  std::future<std::thread::id> own = begun.get_future();
-  std::future<int> result = run_beside([&] {
-    begun.set_value(std::this_thread::get_id());
-    return 42;
-  });
-  ASSERT_EQ(own.wait_for(std::chrono::seconds(10)), std::future_status::ready) << "not before its result is asked for";
-  EXPECT_NE(own.get(), std::this_thread::get_id());
-  EXPECT_EQ(result.get(), 42);
-}
-
-TEST(RunBeside, ThrowsWhatItsThreadThrowsWhereTheResultIsTaken) {
-  std::future<void> failing = run_beside([] { throw std::runtime_error("beside"); });
-  failing.wait();
-  try {
-    failing.get();
-    FAIL() << "nothing thrown";
-  } catch (const std::runtime_error& error) {
-    EXPECT_EQ(error.what(), std::string("beside"));
   }
 }
 

@@ -291,30 +291,9 @@ ClContext::ClContext(const std::string& selector) {
   driver_ = std::make_unique<Driver>(info, device, ::cl::Context());
 }
 
-ClContext::ClContext(std::unique_ptr<Driver> driver) : info_(driver->info), driver_(std::move(driver)) {}
-
 ClContext::~ClContext() = default;
 
-std::unique_ptr<ClContext> ClContext::beside() const {
-  auto driver = std::make_unique<Driver>(info_, driver_->device, driver_->context);
-  driver->programs = driver_->programs;
-  return std::unique_ptr<ClContext>(new ClContext(std::move(driver)));
-}
-
-bool ClContext::can_run_beside() const { return workarounds::can_run_concurrently(info_); }
-
 std::size_t ClContext::row_items() const { return workarounds::row_items(info_); }
-
-void ClContext::take_profile(ClContext& beside) {
-  beside.driver_->collect_events();
-  for (const auto& [kernel, entry] : beside.driver_->profile) {
-    ClProfileEntry& own = driver_->profile[kernel];
-    own.kernel = kernel;
-    own.launches += entry.launches;
-    own.milliseconds += entry.milliseconds;
-  }
-  beside.driver_->profile.clear();
-}
 
 std::shared_ptr<ClMemory> ClContext::allocate_bytes(std::size_t bytes, const void* values) {
   if (bytes > info_.max_allocation_bytes)

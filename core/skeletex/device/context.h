@@ -130,14 +130,6 @@ class ClContext {
   ClContext(const ClContext&) = delete;
   ClContext& operator=(const ClContext&) = delete;
 
-  /// A queue of another thread's own, with the same device, buffers and programs. Neither queue waits for the other:
-  /// `finish` before the other one uses what this one makes.
-  std::unique_ptr<ClContext> beside() const;
-  /// Whether another thread may use that queue while this one is used.
-  bool can_run_beside() const;
-  /// Adds what was launched on such a queue to the profile. Waits for it.
-  void take_profile(ClContext& beside);
-
   const ClDeviceInfo& device() const { return info_; }
 
   /// Memory for `size` values, not initialised.
@@ -239,7 +231,6 @@ class ClContext {
     void* to;
     std::size_t bytes;
   };
-  explicit ClContext(std::unique_ptr<Driver> driver);
 
   static void check_fits(std::size_t values, std::size_t room);
   std::shared_ptr<ClMemory> allocate_bytes(std::size_t bytes, const void* values = nullptr);

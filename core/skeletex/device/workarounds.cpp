@@ -13,8 +13,6 @@ std::size_t row_items(const ClDeviceInfo& device) {
   return device.type == "cpu" ? 1 : std::min<std::size_t>(128, device.max_work_group_size);
 }
 
-bool can_run_concurrently(const ClDeviceInfo& device) { return device.platform != "Oclgrind"; }
-
 std::string marked_source(const std::string& options, const std::string& source) {
   return fmt::format("// {:016x}\n{}", std::hash<std::string>{}(options + source), source);
 }

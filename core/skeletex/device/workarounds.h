@@ -17,9 +17,6 @@ inline constexpr std::size_t kGroupSize = 64;
 /// columns: PoCL makes vector instructions of a loop whose step the compiler knows.
 std::size_t row_items(const ClDeviceInfo& device);
 
-/// False for Oclgrind, which runs one kernel at a time, whatever queues there are.
-bool can_run_concurrently(const ClDeviceInfo& device);
-
 /// The source below a line that changes with source and options: the caches of some drivers overlook the options.
 std::string marked_source(const std::string& options, const std::string& source);
 

@@ -4,7 +4,6 @@
 #include <atomic>
 #include <cstddef>
 #include <exception>
-#include <future>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -16,12 +15,6 @@ namespace skeletex {
 inline std::size_t processor_count() {
   static const std::size_t count = std::max(1u, std::thread::hardware_concurrency());
   return count;
-}
-
-/// Calls act() on a thread of its own. The future's destructor waits for it.
-template <class Act>
-auto run_beside(Act act) {
-  return std::async(std::launch::async, std::move(act));
 }
 
 /// Calls act(block, begin, end) for consecutive blocks of [0, size) on all processors. Blocks depend on the sizes
