@@ -3,14 +3,15 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <chrono>
-#include <cmath>
-#include <map>
+#include <array>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
+#include <utility>
 
 #include "skeletex/convert/layout/pack_atlas.h"
+#include "skeletex/convert/layout/ray_profile.h"
 #include "skeletex/convert/layout/row_profile.h"
 #include "skeletex/convert/sample/sample_seams.h"
 #include "skeletex/convert/segment/segment_mesh.h"
@@ -63,41 +64,6 @@ TexelPlacing choose_placing(const EncodeOptions& options, const TriangleMesh& me
   return {options.has_snap.value_or(static_cast<double>(texels) >= least_texels), has_fit};
 }
 
-/// The rays' own points on an regular grid in u: how surface length grows along an SPD patch.
-std::vector<RowProfile> spd_profiles(ClContext& context, const Skeleton& skeleton, const SeparationPlanes& separation,
-                                     std::span<const Chart> charts, SpdHit hit) {
-  constexpr int kRows = 257, kColumns = 64;
-  std::vector<Patch> probes(charts.size());
-  for (std::size_t i = 0; i < charts.size(); ++i) {
-    probes[i].rectangle = {0, 0, kColumns, kRows};
-    probes[i].row_u = spread_rows_uniformly(kRows);
-  }
-  const std::vector<SpdHits> hits = cast_spd_rays(context, skeleton, separation, charts, probes, hit);
-  std::vector<RowProfile> profiles;
-  for (std::size_t i = 0; i < charts.size(); ++i) {
-    std::vector<Vec3> points(static_cast<std::size_t>(kRows) * kColumns);
-    for (int j = 0; j < kColumns; ++j) {
-      // A ray that misses repeats the point before it, and adds no length.
-      int last_hit = -1;
-      for (int r = 0; r < kRows; ++r) {
-        const std::size_t at = static_cast<std::size_t>(r) * kColumns + j;
-        if (hits[i].triangles[at] >= 0) {
-          const TangentFrame frame = tangent_frame(skeleton, separation, charts[i].bone, probes[i].row_u[r],
-                                                   static_cast<double>(j) / kColumns);
-          points[at] = frame.foot + static_cast<double>(hits[i].distances[at]) * frame.out;
-          for (int q = last_hit < 0 ? 0 : r; q < r; ++q)
-            points[static_cast<std::size_t>(q) * kColumns + j] = points[at];
-          last_hit = r;
-        } else if (last_hit >= 0) {
-          points[at] = points[static_cast<std::size_t>(last_hit) * kColumns + j];
-        }
-      }
-    }
-    profiles.push_back(row_profile(points, kRows, kColumns));
-  }
-  return profiles;
-}
-
 nlohmann::json settings_json(const EncodeOptions& options, const TexelPlacing& placing,
                              const std::vector<double>& unseen) {
   nlohmann::json json{{"method", options.method ? to_string(*options.method) : "hybrid"},
@@ -134,7 +100,7 @@ void add_results(const TexelReport& report, double diagonal, nlohmann::json& jso
                        {"chosen", report.rounding->chosen / diagonal}};
   if (report.revert)
     json["inverted_triangles"] = {{"lattice", report.revert->inverted_triangles},
-                                {"regular", report.revert->regular_inverted_triangles}};
+                                  {"regular", report.revert->regular_inverted_triangles}};
 }
 
 /// Vertices where the pole of a chart's free end lies.
@@ -142,30 +108,12 @@ int pole_of(const Chart& chart, ChartVertex kind) {
   return static_cast<int>(std::find(chart.kinds.begin(), chart.kinds.end(), kind) - chart.kinds.begin());
 }
 
-}  // namespace
-
-EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& input_skeleton,
-                          const EncodeOptions& options) {
-  check_options(options, input_skeleton);
-  if (options.tree && options.tree->order.size() != mesh.triangles.size())
-    throw InputError(fmt::format("the tree is of {} triangles, the mesh has {}; give the mesh's own, or none",
-                                 options.tree->order.size(), mesh.triangles.size()));
-  const auto progress = [&](const char* stage, double done) {
-    if (options.progress && !options.progress(stage, done)) throw Error("cancelled");
-  };
-  EncodeResult result;
-  EncodeReport& report = result.report;
-  SkeletexModel& model = result.model;
-  const int bones = static_cast<int>(input_skeleton.bones.size());
-
-  // The model's skeleton carries its angles of 0 with it.
-  model.skeleton = input_skeleton;
-  {
-    const std::vector<BoneBasis> bases = bone_bases(model.skeleton);
-    for (int bone = 0; bone < bones; ++bone) model.skeleton.bones[bone].s = bases[bone].s;
-  }
-  const Skeleton& skeleton = model.skeleton;
-  const SeparationPlanes separation(skeleton);
+/// The model as it is before its surface is mapped: frame, genus, and the skeleton with its angles of 0.
+SkeletexModel start_model(const TriangleMesh& mesh, const Skeleton& skeleton) {
+  SkeletexModel model;
+  model.skeleton = skeleton;
+  const std::vector<BoneBasis> bases = bone_bases(model.skeleton);
+  for (std::size_t bone = 0; bone < bases.size(); ++bone) model.skeleton.bones[bone].s = bases[bone].s;
   const BoundingBox box = bounding_box(mesh);
   model.origin = box.centre();
   model.diagonal = box.diagonal();
@@ -176,147 +124,219 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
                     model.diagonal, kSmallestDiagonal, kLargestDiagonal));
   // Euler's formula for a closed triangle mesh: edges are 3/2 of the triangles.
   model.genus = (2 - (static_cast<int>(mesh.positions.size()) - static_cast<int>(mesh.triangles.size()) / 2)) / 2;
+  return model;
+}
 
-  Stopwatch watch;
-  progress("half edges", 0);
-  CutMesh half_edges = cut_mesh_of(mesh);
-  report.half_edge_ms = watch.lap_ms();
-  progress("segmentation", 0.05);
-  const Segmentation segmentation = segment_mesh(context, std::move(half_edges), skeleton);
-  report.segmentation_ms = watch.lap_ms();
+/// The surface by bones, and its maps.
+struct MappedSurface {
+  Segmentation segmentation;
+  std::vector<Chart> charts;
+  std::vector<double> unseen;  ///< share of each bone's area that its rays do not see
+  std::vector<Method> methods;
+  std::vector<MapReport> reports;
+};
 
-  progress("parameterization", 0.2);
-  std::vector<Chart> charts(bones);
-  for_each_block(charts.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-    charts[i] = make_chart(segmentation.segments[i], skeleton, separation);
+MappedSurface map_surface(ClContext& context, Segmentation segmentation, const Skeleton& skeleton,
+                          const SeparationPlanes& separation, const EncodeOptions& options) {
+  MappedSurface surface{std::move(segmentation), {}, {}, {}, {}};
+  surface.charts.resize(skeleton.bones.size());
+  for_each_block(surface.charts.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+    surface.charts[i] = make_chart(surface.segmentation.segments[i], skeleton, separation);
   });
-  const std::vector<double> unseen = unseen_area_fractions(context, skeleton, separation, charts);
-  const std::vector<Method> methods = choose_methods(options, skeleton, unseen);
-  const std::vector<MapReport> map_reports = map_charts(context, methods, charts, {options.vsm});
-  report.parameterization_ms = watch.lap_ms();
+  surface.unseen = unseen_area_fractions(context, skeleton, separation, surface.charts);
+  surface.methods = choose_methods(options, skeleton, surface.unseen);
+  surface.reports = map_charts(context, surface.methods, surface.charts, {options.vsm});
+  return surface;
+}
 
-  progress("encoding", 0.6);
-  // Texels are shared out by detail; rectangles have the sides' ratio of girth to length.
-  const std::vector<RowProfile> rays = std::any_of(methods.begin(), methods.end(), is_height_field)
-                                           ? spd_profiles(context, skeleton, separation, charts, options.spd_hit)
-                                           : std::vector<RowProfile>(bones);
-  const bool is_all_spd = std::all_of(methods.begin(), methods.end(), is_height_field);
-  std::vector<RowProfile> profiles(bones);
+std::vector<RowProfile> row_profiles(ClContext& context, const Skeleton& skeleton, const SeparationPlanes& separation,
+                                     const MappedSurface& surface, SpdHit hit) {
+  std::vector<RowProfile> profiles(surface.charts.size());
+  if (std::any_of(surface.methods.begin(), surface.methods.end(), is_height_field))
+    profiles = ray_profiles(context, skeleton, separation, surface.charts, hit);
   for_each_block(profiles.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-    profiles[i] = is_height_field(methods[i]) ? rays[i] : row_profile(charts[i]);
+    if (!is_height_field(surface.methods[i])) profiles[i] = row_profile(surface.charts[i]);
   });
-  std::vector<PatchSource> sources;
-  std::vector<double> areas;
-  for (int bone = 0; bone < bones; ++bone) {
-    const TriangleMesh& part = segmentation.segments[bone].mesh;
-    areas.push_back(surface_area(part));
-    sources.push_back({is_height_field(methods[bone]) ? nullptr : &charts[bone],
-                       static_cast<double>(part.triangles.size()), areas[bone],
-                       std::max(profiles[bone].length, 1e-9 * model.diagonal)});
-  }
-  const bool has_even_rows = options.row_spacing == RowSpacing::kUniform;
-  const std::vector<PatchRequest> requests =
-      patch_requests(sources, has_even_rows ? std::span<const RowProfile>() : profiles,
-                     options.texel_share.value_or(is_all_spd ? TexelShare::kArea : TexelShare::kError));
-  const TexelPlacing placing = choose_placing(options, mesh, is_all_spd);
-  const AtlasLayout layout = pack_atlas(requests, options.width, options.height);
-  report.used_fraction = layout.used_fraction;
+  return profiles;
+}
 
-  for (int bone = 0; bone < bones; ++bone) {
-    Patch patch{layout.rectangles[bone], methods[bone], segmentation.segments[bone].topology, {}};
-    patch.row_u = options.row_spacing == RowSpacing::kSurfaceLength
-                      ? spread_rows_by_length(profiles[bone], patch.rectangle.height)
-                      : spread_rows_uniformly(patch.rectangle.height);
+/// Shares texels out by detail, to rectangles with sides in the ratio of girth to length, and spreads their rows.
+/// \return the used share of the texture
+double lay_out_patches(const MappedSurface& surface, std::span<const RowProfile> profiles, const EncodeOptions& options,
+                       SkeletexModel& model) {
+  const std::vector<Segment>& segments = surface.segmentation.segments;
+  std::vector<PatchSource> sources;
+  for (std::size_t bone = 0; bone < segments.size(); ++bone)
+    sources.push_back({is_height_field(surface.methods[bone]) ? nullptr : &surface.charts[bone],
+                       static_cast<double>(segments[bone].mesh.triangles.size()), surface_area(segments[bone].mesh),
+                       std::max(profiles[bone].length, 1e-9 * model.diagonal)});
+  const bool has_uniform_rows = options.row_spacing == RowSpacing::kUniform;
+  const bool has_maps = !std::all_of(surface.methods.begin(), surface.methods.end(), is_height_field);
+  const AtlasLayout layout =
+      pack_atlas(patch_requests(sources, has_uniform_rows ? std::span<const RowProfile>() : profiles,
+                                options.texel_share.value_or(has_maps ? TexelShare::kError : TexelShare::kArea)),
+                 options.width, options.height);
+  for (std::size_t bone = 0; bone < segments.size(); ++bone) {
+    Patch patch{layout.rectangles[bone], surface.methods[bone], segments[bone].topology, {}};
+    patch.row_u = has_uniform_rows ? spread_rows_uniformly(patch.rectangle.height)
+                                   : spread_rows_by_length(profiles[bone], patch.rectangle.height);
     model.patches.push_back(std::move(patch));
   }
-  std::optional<DeviceSnapTables> features;
-  if (placing.has_snap)
-    features = upload_tables(
-        context, tables_of(place_features(find_features(charts, methods, kLeastDihedral), charts, model.patches),
-                           model.patches));
-  model.diagonals =
-      options.diagonals.value_or(placing.has_snap || placing.has_fit ? DiagonalRule::kSmooth : DiagonalRule::kNearest);
-  Seams seams = sample_seams(segmentation, skeleton, separation, layout.rectangles,
-                             placing.has_snap ? SeamSampling::kSnapped : SeamSampling::kEven);
+  model.texture.width = options.width, model.texture.height = options.height;
+  return layout.used_fraction;
+}
+
+void add_seams(const Segmentation& segmentation, const SeparationPlanes& separation, SeamSampling sampling,
+               SkeletexModel& model) {
+  std::vector<Rectangle> rectangles;
+  for (const Patch& patch : model.patches) rectangles.push_back(patch.rectangle);
+  Seams seams = sample_seams(segmentation, model.skeleton, separation, rectangles, sampling);
   model.arcs = std::move(seams.arcs);
   model.corners = std::move(seams.corners);
   model.ends = std::move(seams.ends);
-  model.texture.width = options.width, model.texture.height = options.height;
-  std::vector<SpdHits> hits(bones);
-  {
-    std::vector<Chart> cast_charts;
-    std::vector<Patch> cast_patches;
-    for (int bone = 0; bone < bones; ++bone)
-      if (is_height_field(methods[bone])) {
-        cast_charts.push_back(charts[bone]);
-        cast_patches.push_back(model.patches[bone]);
-      }
-    std::vector<SpdHits> cast =
-        cast_charts.empty() ? std::vector<SpdHits>{}
-                            : cast_spd_rays(context, skeleton, separation, cast_charts, cast_patches, options.spd_hit);
-    for (int bone = 0, i = 0; bone < bones; ++bone)
-      if (is_height_field(methods[bone])) hits[bone] = std::move(cast[i++]);
-  }
-  std::vector<std::array<std::vector<Vec3>, 2>> end_points(bones);
-  for (int bone = 0; bone < bones; ++bone)
+}
+
+/// Per bone what the rays of its texels hit; nothing for a bone with a map.
+std::vector<SpdHits> cast_rays(ClContext& context, const SkeletexModel& model, const SeparationPlanes& separation,
+                               std::span<const Chart> charts, SpdHit hit) {
+  std::vector<SpdHits> hits(charts.size());
+  std::vector<Chart> cast_charts;
+  std::vector<Patch> cast_patches;
+  for (std::size_t bone = 0; bone < charts.size(); ++bone)
+    if (is_height_field(model.patches[bone].method)) {
+      cast_charts.push_back(charts[bone]);
+      cast_patches.push_back(model.patches[bone]);
+    }
+  if (cast_charts.empty()) return hits;
+  std::vector<SpdHits> cast = cast_spd_rays(context, model.skeleton, separation, cast_charts, cast_patches, hit);
+  for (std::size_t bone = 0, i = 0; bone < charts.size(); ++bone)
+    if (is_height_field(model.patches[bone].method)) hits[bone] = std::move(cast[i++]);
+  return hits;
+}
+
+/// Per bone and end the points of its row: on the seam, or the pole.
+std::vector<std::array<std::vector<Vec3>, 2>> find_end_points(const SkeletexModel& model,
+                                                              const SeparationPlanes& separation,
+                                                              const MappedSurface& surface) {
+  std::vector<std::array<std::vector<Vec3>, 2>> end_points(model.patches.size());
+  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
+      const Chart& chart = surface.charts[bone];
       auto& points = end_points[bone][static_cast<int>(end)];
       if (separation.is_free(bone, end))
-        points = {charts[bone].positions[pole_of(
-            charts[bone], end == BoneEnd::kHead ? ChartVertex::kHeadPole : ChartVertex::kTailPole)]};
+        points = {
+            chart.positions[pole_of(chart, end == BoneEnd::kHead ? ChartVertex::kHeadPole : ChartVertex::kTailPole)]};
       else
-        points =
-            points_on_loop(segmentation.segments[bone], skeleton, separation, end, model.patches[bone].rectangle.width);
+        points = points_on_loop(surface.segmentation.segments[bone], model.skeleton, separation, end,
+                                model.patches[bone].rectangle.width);
     }
-  progress("encoding", 0.8);
+  return end_points;
+}
+
+/// Reads the texels of a model that is laid out.
+TexelResult read_model_texels(ClContext& context, const SkeletexModel& model, const SeparationPlanes& separation,
+                              const TriangleMesh& mesh, const MappedSurface& surface, const TexelPlacing& placing,
+                              const EncodeOptions& options) {
+  std::optional<DeviceSnapTables> features;
+  if (placing.has_snap)
+    features =
+        upload_tables(context, tables_of(place_features(find_features(surface.charts, surface.methods, kLeastDihedral),
+                                                        surface.charts, model.patches),
+                                         model.patches));
+  const std::vector<SpdHits> hits = cast_rays(context, model, separation, surface.charts, options.spd_hit);
+  const auto end_points = find_end_points(model, separation, surface);
   std::optional<TriangleTree> own_tree;
-  if ((placing.has_snap || placing.has_fit) && !options.tree) own_tree = build_triangle_tree(mesh);
   std::optional<RevertSources> revert;
-  if (placing.has_snap || placing.has_fit)
-    revert.emplace(RevertSources{model, mesh, options.tree ? *options.tree : *own_tree, charts});
+  if (placing.has_snap || placing.has_fit) {
+    if (!options.tree) own_tree = build_triangle_tree(mesh);
+    revert.emplace(RevertSources{model, mesh, own_tree ? *own_tree : *options.tree, surface.charts});
+  }
   TexelOptions texel_options{
       .has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_fit = placing.has_fit};
   if (options.has_half_texels) texel_options.half_rule = model.diagonals;
-  TexelResult texels = read_texels(
-      context, skeleton, separation,
-      {charts, model.patches, hits, end_points, revert ? &*revert : nullptr, features ? &*features : nullptr},
+  return read_texels(
+      context, model.skeleton, separation,
+      {surface.charts, model.patches, hits, end_points, revert ? &*revert : nullptr, features ? &*features : nullptr},
       options.width, options.height, model.origin, texel_options);
-  model.texture = std::move(texels.texture);
-  model.sampling = {options.has_prefilter, placing.has_snap, placing.has_fit};
-  {
-    nlohmann::json settings = settings_json(options, placing, unseen);
-    add_results(texels.report, model.diagonal, settings);
-    model.encoder_settings = settings.dump();
-  }
-  report.encoding_ms = watch.lap_ms();
+}
 
+void report_result(const SkeletexModel& model, const TriangleMesh& mesh, const MappedSurface& surface,
+                   const TexelReport& texels, EncodeReport& report) {
   report.vertices = static_cast<int>(mesh.positions.size());
   report.triangles = static_cast<int>(mesh.triangles.size());
   report.genus = model.genus;
   report.diagonal = model.diagonal;
-  report.unfold = texels.report.unfold;
-  report.snap = texels.report.snap;
-  report.fit = texels.report.fit;
-  report.rounding = texels.report.rounding;
-  report.revert = texels.report.revert;
-  report.device = context.device().name;
-  for (int bone = 0; bone < bones; ++bone) {
-    const Segment& segment = segmentation.segments[bone];
+  report.unfold = texels.unfold;
+  report.snap = texels.snap;
+  report.fit = texels.fit;
+  report.rounding = texels.rounding;
+  report.revert = texels.revert;
+  for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
+    const Segment& segment = surface.segmentation.segments[bone];
     BoneReport entry;
-    entry.name = skeleton.bones[bone].name;
-    entry.method = methods[bone];
+    entry.name = model.skeleton.bones[bone].name;
+    entry.method = surface.methods[bone];
     entry.topology = segment.topology;
-    entry.area = areas[bone];
+    entry.area = surface_area(segment.mesh);
     entry.vertices = static_cast<int>(segment.mesh.positions.size());
     entry.triangles = static_cast<int>(segment.mesh.triangles.size());
-    entry.rectangle = layout.rectangles[bone];
-    entry.unseen_area_fraction = unseen[bone];
-    entry.flipped_triangles = map_reports[bone].flipped_triangles;
-    entry.sampled_triangle_fraction = texels.report.sampled_triangle_fractions[bone];
-    entry.missed_texels = texels.report.missed_texels[bone];
-    entry.map = map_reports[bone];
+    entry.rectangle = model.patches[bone].rectangle;
+    entry.unseen_area_fraction = surface.unseen[bone];
+    entry.flipped_triangles = surface.reports[bone].flipped_triangles;
+    entry.sampled_triangle_fraction = texels.sampled_triangle_fractions[bone];
+    entry.missed_texels = texels.missed_texels[bone];
+    entry.map = surface.reports[bone];
     report.bones.push_back(std::move(entry));
   }
+}
+
+}  // namespace
+
+EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& skeleton,
+                          const EncodeOptions& options) {
+  check_options(options, skeleton);
+  if (options.tree && options.tree->order.size() != mesh.triangles.size())
+    throw InputError(fmt::format("the tree is of {} triangles, the mesh has {}; give the mesh's own, or none",
+                                 options.tree->order.size(), mesh.triangles.size()));
+  const auto progress = [&](const char* stage, double done) {
+    if (options.progress && !options.progress(stage, done)) throw Error("cancelled");
+  };
+  EncodeResult result{start_model(mesh, skeleton), {}};
+  EncodeReport& report = result.report;
+  SkeletexModel& model = result.model;
+  const SeparationPlanes separation(model.skeleton);
+  Stopwatch watch;
+
+  progress("half edges", 0);
+  CutMesh half_edges = cut_mesh_of(mesh);
+  report.half_edge_ms = watch.lap_ms();
+  progress("segmentation", 0.05);
+  Segmentation segmentation = segment_mesh(context, std::move(half_edges), model.skeleton);
+  report.segmentation_ms = watch.lap_ms();
+  progress("parameterization", 0.2);
+  const MappedSurface surface = map_surface(context, std::move(segmentation), model.skeleton, separation, options);
+  report.parameterization_ms = watch.lap_ms();
+
+  progress("layout", 0.6);
+  const TexelPlacing placing =
+      choose_placing(options, mesh, std::all_of(surface.methods.begin(), surface.methods.end(), is_height_field));
+  const bool is_placed = placing.has_snap || placing.has_fit;
+  report.used_fraction = lay_out_patches(
+      surface, row_profiles(context, model.skeleton, separation, surface, options.spd_hit), options, model);
+  model.diagonals = options.diagonals.value_or(is_placed ? DiagonalRule::kSmooth : DiagonalRule::kNearest);
+  add_seams(surface.segmentation, separation, placing.has_snap ? SeamSampling::kSnapped : SeamSampling::kEven, model);
+
+  progress("encoding", 0.7);
+  TexelResult texels = read_model_texels(context, model, separation, mesh, surface, placing, options);
+  model.texture = std::move(texels.texture);
+  model.sampling = {options.has_prefilter, placing.has_snap, placing.has_fit};
+  nlohmann::json settings = settings_json(options, placing, surface.unseen);
+  add_results(texels.report, model.diagonal, settings);
+  model.encoder_settings = settings.dump();
+  report.encoding_ms = watch.lap_ms();
+
+  report.device = context.device().name;
+  report_result(model, mesh, surface, texels.report, report);
   progress("done", 1);
   return result;
 }
