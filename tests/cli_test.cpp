@@ -573,8 +573,8 @@ TEST_F(Program, CompilesEachKernelOnceAndNothingInASecondProcess) {
     else
       EXPECT_TRUE(kernels.insert(path.parent_path().parent_path()).second) << path;
   }
-  EXPECT_EQ(programs.size(), 1u);
-  EXPECT_GT(kernels.size(), 30u);
+  EXPECT_LE(programs.size(), 2u);  // encoding, and the decoder's triangles
+  EXPECT_GT(kernels.size(), 20u);
 }
 
 TEST_F(Program, CompilesAllKernelsAhead) {
