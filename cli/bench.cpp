@@ -130,7 +130,7 @@ Json row_json(const Stage& stage, const StageSamples& samples, const std::string
            {"reference_ms", samples.median(&StageSample::reference_ms)},
            {"ratio", samples.ratio()},
            {"wall_ms", wall},
-           {"frames_per_second", 1000 / separation_plane},
+           {"frames_per_second", 1000 / wall},
            {"ms_min", samples.least(&StageSample::ms)},
            {"ms_max", samples.most(&StageSample::ms)},
            {"device_ms", samples.median(&StageSample::device_ms)},

@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include "regular_grid_structs.h"
+#include "skeletex/edit/morph/blend.h"
 #include "skeletex/model/encoder_settings.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
@@ -13,11 +15,32 @@ namespace {
 
 constexpr int kSteps = 6;
 
-/// Points of all rows, and where they are in the lattice: cells from each texel's own place.
+/// Points of all rows, and their places in the lattice: offsets from each texel's own place, in cells.
 struct SlidingPoints {
-  ClBuffer<float> offset_x, offset_y;
+  ClBuffer<float> offsets;  ///< along the columns of all points, then along the rows
   DevicePlanes points;
 };
+
+/// Points after some steps towards the means of their neighbours.
+SlidingPoints slide(ClContext& context, const DeviceLattice& lattice, const std::vector<int>& is_kept) {
+  const std::size_t count = lattice.vertex_count;
+  DevicePlanes own = allocate_planes(context, count);
+  displace(context, lattice, own);
+  const auto kept = context.upload(is_kept);
+  SlidingPoints now{context.allocate<float>(2 * count), own};
+  context.fill(now.offsets, 0.0f);
+  SlidingPoints next{context.allocate<float>(2 * count), allocate_planes(context, count)};
+  SlidingPoints spare{context.allocate<float>(2 * count), allocate_planes(context, count)};
+  const SlideParameters parameters{static_cast<int>(lattice.rows.size), static_cast<int>(count)};
+  for (int step = 0; step < kSteps; ++step) {
+    context.launch({"regular_grid.cl", "slide_points"}, row_range(context, lattice.rows.size), parameters, lattice.rows,
+                   lattice.tables.patches, kept, own.x, own.y, own.z, now.offsets, now.points.x, now.points.y,
+                   now.points.z, next.offsets, next.points.x, next.points.y, next.points.z);
+    now = next;
+    std::swap(next, spare);
+  }
+  return now;
+}
 
 }  // namespace
 
@@ -31,27 +54,10 @@ SkeletexModel regular_grid(ClContext& context, const SkeletexModel& model) {
   const SeparationPlanes separation(model.skeleton);
   const FrameTables tables = in_bone_axes(frame_tables(model.skeleton, separation, model.patches, model.origin));
   const DeviceLattice lattice = upload_lattice(context, tables, model.patches, model.texture, RowChoice::kAll);
-  const std::size_t count = lattice.vertex_count;
-  DevicePlanes own = allocate_planes(context, count);
-  displace(context, lattice, own);
-
   std::vector<int> is_kept;
   for (const Patch& patch : model.patches) is_kept.push_back(patch.method == Method::kSpd);
-  const auto kept = context.upload(is_kept);
-  SlidingPoints now{context.allocate<float>(count), context.allocate<float>(count), own};
-  context.fill(now.offset_x, 0.0f), context.fill(now.offset_y, 0.0f);
-  SlidingPoints next{context.allocate<float>(count), context.allocate<float>(count), allocate_planes(context, count)};
-  SlidingPoints spare{context.allocate<float>(count), context.allocate<float>(count), allocate_planes(context, count)};
-  const ClRange range = row_range(context, lattice.rows.size);
-  const int rows = static_cast<int>(lattice.rows.size);
-  for (int step = 0; step < kSteps; ++step) {
-    context.launch({"regular_grid.cl", "slide_evenly"}, range, rows, lattice.rows, lattice.tables.patches, kept, own.x,
-                   own.y, own.z, now.offset_x, now.offset_y, now.points.x, now.points.y, now.points.z, next.offset_x,
-                   next.offset_y, next.points.x, next.points.y, next.points.z);
-    now = next;
-    std::swap(next, spare);
-  }
-  // Texels that stay are not stored anew: they keep their bits.
+  DevicePlanes points = slide(context, lattice, is_kept).points;
+  // Only texels that move are stored, so that the others keep their bits.
   std::vector<LatticeRow> slid = lattice_rows(model.patches, RowChoice::kAll);
   std::erase_if(slid, [&](const LatticeRow& row) {
     return is_kept[row[0]] || row[1] == 0 || row[1] == model.patches[row[0]].rectangle.height - 1;
@@ -60,18 +66,17 @@ SkeletexModel regular_grid(ClContext& context, const SkeletexModel& model) {
   const auto slid_rows = context.upload(slid);
   const int slid_count = static_cast<int>(slid.size());
   if (settings["prefilter"] == true) {
-    context.launch({"regular_grid.cl", "prefilter_rows"}, row_range(context, slid.size()), slid_count, slid_rows,
-                   lattice.tables.patches, now.points.x, now.points.y, now.points.z, next.points.x, next.points.y,
-                   next.points.z);
-    now = next;
+    DevicePlanes filtered = allocate_planes(context, lattice.vertex_count);
+    context.launch({"regular_grid.cl", "prefilter_rows"}, row_range(context, slid.size()),
+                   SlideParameters{slid_count, static_cast<int>(lattice.vertex_count)}, slid_rows,
+                   lattice.tables.patches, points.x, points.y, points.z, filtered.x, filtered.y, filtered.z);
+    points = filtered;
   }
   context.launch({"reconstruct.cl", "enter_tangent_space"}, row_range(context, slid.size()), slid_count,
                  model.texture.width, lattice.tables.column_count, slid_rows, lattice.tables.patches,
-                 lattice.tables.rows, lattice.tables.columns, now.points.x, now.points.y, now.points.z,
-                 lattice.texels.x, lattice.texels.y, lattice.texels.z);
-  result.texture.along = context.download(lattice.texels.x);
-  result.texture.around = context.download(lattice.texels.y);
-  result.texture.out = context.download(lattice.texels.z);
+                 lattice.tables.rows, lattice.tables.columns, points.x, points.y, points.z, lattice.texels.x,
+                 lattice.texels.y, lattice.texels.z);
+  download_texels(context, lattice.texels, result.texture);
   return result;
 }
 

@@ -18,12 +18,11 @@ void check_length(double value, const char* what, double least, double most) {
     throw InputError(fmt::format("{} is {}; give {} to {} diagonals", what, value, least, most));
 }
 
-/// Everything a filter needs of the model it works on.
+/// What a filter needs of the model that it works on.
 struct FilterJob {
   ClContext& context;
   const SkeletexModel& given;
-  SkeletexModel model;  ///< the given one on an regular grid: the slivers of a snapped one take the solver several
-                        ///< times the steps
+  SkeletexModel model;  ///< the given one on a regular grid, where the solver takes far fewer steps
   ModelSurface surface;
   SurfaceOperator laplace;
   std::vector<float> weights;  ///< of the region, per vertex
@@ -47,22 +46,13 @@ std::vector<float> inside_region(const SkeletexModel& model, const Lattice& latt
     if (!is_chosen[bone]) continue;
     const Rectangle& rectangle = model.patches[bone].rectangle;
     std::fill_n(inside.begin() + lattice.first_inner[bone], rectangle.width * (rectangle.height - 2), 1.f);
-    for (const int pole : lattice.poles[bone])
-      if (pole >= 0) inside[pole] = 1;
   }
-  for (std::size_t a = 0; a < model.arcs.size(); ++a)
-    if (is_chosen[model.arcs[a].bones[0]] && is_chosen[model.arcs[a].bones[1]])
-      std::fill_n(inside.begin() + lattice.first_sample[a], model.arcs[a].samples.size(), 1.f);
-  for (std::size_t i = 0; i < model.corners.size(); ++i) {
-    const std::vector<int>& bones = model.corners[i].bones;
-    if (std::all_of(bones.begin(), bones.end(), [&](int bone) { return is_chosen[bone]; }))
-      inside[lattice.first_corner + i] = 1;
-  }
+  mark_ends(model, lattice, is_chosen, inside);
   return inside;
 }
 
-/// 0 at the boundary and outside, towards 1 inside: the solution of (M + falloff^2 L) w = M, which nears 1 as
-/// exp(-distance / falloff) does, made smooth at its foot.
+/// 0 at the boundary and outside, towards 1 inside: the solution of (M + falloff^2 L) w = M, which approaches 1 as
+/// exp(-distance / falloff) falls, made smooth at 0.
 std::vector<float> weigh_region(ClContext& context, const SurfaceOperator& laplace, std::vector<float> inside,
                                 double falloff, SolveReport& report) {
   if (std::find(inside.begin(), inside.end(), 0.f) == inside.end() || falloff == 0) return inside;
@@ -88,7 +78,7 @@ FilterJob::FilterJob(ClContext& on, const SkeletexModel& of, const FilterRegion&
   weights = weigh_region(context, laplace, inside_region(model, surface.lattice, region), region.falloff, solver);
 }
 
-/// How far a surface of some points moves when it diffuses, world units: (M + time L) d = -time L x.
+/// The moves of a surface that diffuses, world units: the solution of (M + time L) d = -time L x.
 std::vector<Vec3> diffusion_moves(FilterJob& job, const DeviceField& points, const SurfaceOperator& laplace,
                                   double scale) {
   const auto time = static_cast<float>(scale * scale);
@@ -101,7 +91,7 @@ std::vector<Vec3> diffusion_moves(FilterJob& job, const DeviceField& points, con
   return moves;
 }
 
-/// Texels beyond the region become the given model's again.
+/// Sets the texels outside of the region to those of the given model.
 void keep_outside(const FilterJob& job, SkeletexModel& model) {
   bool has_outside = false;
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
@@ -121,7 +111,7 @@ void keep_outside(const FilterJob& job, SkeletexModel& model) {
   model.encoder_settings = job.given.encoder_settings;
 }
 
-/// The model with its surface moved, where and as far as the region allows.
+/// The model with its surface moved, by the region's weights.
 FilterResult finish(FilterJob& job, std::vector<Vec3> moves, double volume_before) {
   for (std::size_t i = 0; i < moves.size(); ++i) moves[i] *= static_cast<double>(job.weights[i]);
   MovedModel moved = move_surface(job.context, job.model, job.surface, job.laplace, moves);
@@ -130,7 +120,7 @@ FilterResult finish(FilterJob& job, std::vector<Vec3> moves, double volume_befor
   return {std::move(moved.model), {moved.report, volume_before}};
 }
 
-/// Adds to the moves what brings the volume back, along the normals: Newton's method, whose slope is the area.
+/// Adds moves along the normals that restore the volume, by Newton's method.
 void restore_volume(const FilterJob& job, double volume, std::vector<Vec3>& moves) {
   for (int round = 0; round < 4; ++round) {
     std::vector<Vec3> positions = job.surface.positions;
