@@ -185,8 +185,9 @@ FilterResult add_noise(ClContext& context, const SkeletexModel& model, const Noi
   std::vector<Vec3> moves = area_vectors_at(job.context, job.model, job.surface, job.surface.positions);
   const double volume = enclosed_volume(job.model, job.surface.positions, moves);
   const auto heights = context.allocate<float>(moves.size());
-  context.launch({"filter.cl", "noise_at_points"}, ClRange(moves.size()), static_cast<int>(moves.size()),
-                 static_cast<float>(1 / options.wavelength), options.octaves, static_cast<unsigned>(options.seed),
+  context.launch({"filter.cl", "noise_at_points"}, ClRange(moves.size()),
+                 NoiseParameters{static_cast<int>(moves.size()), options.octaves, options.seed,
+                                 static_cast<float>(1 / options.wavelength)},
                  job.surface.points.values, heights);
   const std::vector<float> noise = context.download(heights);
   for (std::size_t i = 0; i < moves.size(); ++i)

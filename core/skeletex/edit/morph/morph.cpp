@@ -69,21 +69,18 @@ std::vector<Patch> mean_patches(const std::deque<SeamMap>& maps, std::span<const
 /// The moves of the end rows onto the seams: texels are averaged as vectors, seams by angle and distance.
 EndMoves end_moves(const SkeletexModel& result, const SeparationPlanes& separation, const std::deque<SeamMap>& maps,
                    std::span<const double> weights) {
+  const auto move_at = [&](int bone, BoneEnd end, double v) {
+    if (result.ends[bone][static_cast<int>(end)].arcs.empty()) return Vec3(Vec3::Zero());
+    Vec3 move = maps[0].target_end_texel(result.skeleton, separation, bone, end, v);
+    for (std::size_t m = 0; m < maps.size(); ++m)
+      if (weights[m] > 0) move -= weights[m] * maps[m].model_end_texel(bone, end, v);
+    return move.norm() < kNoMove * result.diagonal ? Vec3(Vec3::Zero()) : move;
+  };
   EndMoves moves;
   for (int bone = 0; bone < static_cast<int>(result.patches.size()); ++bone) {
     const int width = result.patches[bone].rectangle.width;
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
-      for (int j = 0; j < width; ++j) {
-        Vec3 move = Vec3::Zero();
-        if (!result.ends[bone][static_cast<int>(end)].arcs.empty()) {
-          const double v = static_cast<double>(j) / width;
-          move = maps[0].target_end_texel(result.skeleton, separation, bone, end, v);
-          for (std::size_t m = 0; m < maps.size(); ++m)
-            if (weights[m] > 0) move -= weights[m] * maps[m].model_end_texel(bone, end, v);
-          if (move.norm() < kNoMove * result.diagonal) move.setZero();
-        }
-        moves.add(end, move);
-      }
+      for (int j = 0; j < width; ++j) moves.add(end, move_at(bone, end, static_cast<double>(j) / width));
   }
   return moves;
 }

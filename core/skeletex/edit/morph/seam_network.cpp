@@ -34,18 +34,20 @@ std::vector<CellCorner> cell_corners(const std::vector<Vec3>& directions) {
   const auto axis = [](const std::vector<Vec3>& d, int i, int j, int k) {
     return Vec3((d[i] - d[j]).cross(d[i] - d[k]).normalized());
   };
+  // Whether no other cell is nearer to x than cells i, j and k.
+  const auto is_nearest = [&](const Vec3& x, int i, int j, int k) {
+    for (int other = 0; other < static_cast<int>(perturbed.size()); ++other)
+      if (other != i && other != j && other != k && !(x.dot(perturbed[other]) <= x.dot(perturbed[i]))) return false;
+    return true;
+  };
   std::vector<CellCorner> corners;
   const int count = static_cast<int>(directions.size());
   for (int i = 0; i < count; ++i)
     for (int j = i + 1; j < count; ++j)
       for (int k = j + 1; k < count; ++k)
-        for (const double sign : {1.0, -1.0}) {
-          const Vec3 x = sign * axis(perturbed, i, j, k);
-          bool is_nearest = true;
-          for (int other = 0; other < count && is_nearest; ++other)
-            if (other != i && other != j && other != k) is_nearest = x.dot(perturbed[other]) <= x.dot(perturbed[i]);
-          if (is_nearest) corners.push_back({{i, j, k}, sign * axis(directions, i, j, k)});
-        }
+        for (const double sign : {1.0, -1.0})
+          if (is_nearest(sign * axis(perturbed, i, j, k), i, j, k))
+            corners.push_back({{i, j, k}, sign * axis(directions, i, j, k)});
   return corners;
 }
 

@@ -115,6 +115,14 @@ class Joining {
     }
   }
 
+  /// Sets the part's poles to the first and the last of its patches' points.
+  void set_poles(std::vector<Vec3> PlacedPatch::*points, std::vector<Vec3>& positions) const {
+    for (const PlacedPatch& patch : patches_)
+      for (const int end : {0, 1})
+        if (const int pole = surface_.lattice.poles[patch.bone][end]; pole >= 0)
+          positions[pole] = end == 0 ? (patch.*points).front() : (patch.*points).back();
+  }
+
   /// The value at an angle in the first or the last row of a patch. \param values  row by row, or of one row
   Vec3 end_value(const std::vector<Vec3>& values, int bone, BoneEnd end, double turn) const {
     const std::size_t width = model_.patches[bone].rectangle.width,
@@ -170,6 +178,7 @@ class Joining {
     const SeparationPlanes separation(model_.skeleton);
     const EndGaps inner = place_inner_seams(separation);
     VertexGaps result{std::vector<Vec3>(positions_.size(), Vec3::Zero()), is_free_};
+    set_poles(&PlacedPatch::placed, positions_);
     for_each_texel([&](const PlacedPatch& patch, int vertex, int row, int j) {
       const int width = model_.patches[patch.bone].rectangle.width;
       if (is_free_[vertex] != 0) positions_[vertex] = patch.placed[static_cast<std::size_t>(row) * width + j];
@@ -183,13 +192,11 @@ class Joining {
     for (const PlacedPatch& patch : patches_)
       for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
         const std::vector<Vec3>& given = patch.gaps[static_cast<int>(end)];
-        if (!given.empty())
-          for (const int vertex : end_loop(model_, surface_.lattice, patch.bone, end))
-            result.gaps[vertex] = end_value(
-                given, patch.bone, BoneEnd::kHead,
-                separation.turn_of(patch.bone, positions_[vertex] - end_position(model_.skeleton, patch.bone, end)));
-        if (const int pole = surface_.lattice.poles[patch.bone][static_cast<int>(end)]; pole >= 0)
-          positions_[pole] = end == BoneEnd::kHead ? patch.placed.front() : patch.placed.back();
+        if (given.empty()) continue;
+        for (const int vertex : end_loop(model_, surface_.lattice, patch.bone, end))
+          result.gaps[vertex] = end_value(
+              given, patch.bone, BoneEnd::kHead,
+              separation.turn_of(patch.bone, positions_[vertex] - end_position(model_.skeleton, patch.bone, end)));
       }
     return result;
   }
@@ -256,10 +263,7 @@ class Joining {
     for_each_texel([&](const PlacedPatch& patch, int vertex, int row, int j) {
       points[vertex] = patch.source[static_cast<std::size_t>(row) * model_.patches[patch.bone].rectangle.width + j];
     });
-    for (const PlacedPatch& patch : patches_)
-      for (const int end : {0, 1})
-        if (const int pole = lattice.poles[patch.bone][end]; pole >= 0)
-          points[pole] = end == 0 ? patch.source.front() : patch.source.back();
+    set_poles(&PlacedPatch::source, points);
     const auto seam_point = [&](int bone, int node, double turn) {
       return end_value(patch_of_[bone]->source, bone, end_at(model_.skeleton, bone, node), turn);
     };
