@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The tangent frame's foot W and its axis `out`, from the tables (model/frame.h).
+#include "skeletex_structs.h"
+
 void frame_of(global const PatchRecord* restrict p, RowRecord row, ColumnRecord column, float foot[3], float out[3]) {
   const float slope = (1.0f - row.axial) * column.slope_head + row.axial * column.slope_tail;
   const float o = row.cap_cos * slope + row.cap_sin;
