@@ -41,10 +41,13 @@ void weigh_corner(const float* restrict b, const float* restrict c, const float*
   add_triangle(b[0], b[1], b[2], d[0], d[1], d[2], weights, weights + 2, area);
 }
 
-// The edges from vertex j of a row to the eight around it, counter-clockwise from its right.
-void edges_around(__global const float* restrict points, const int count, const int before, const int here,
-                  const int after, const int left, const int j, const int right, float e[8][3]) {
-  const int v = here + j;
+// The edges from the vertex in column j of a row to the eight around it, counter-clockwise from its right. Edges to
+// rows that are no inner rows are those to the row itself.
+void edges_around(__global const float* restrict points, const int count, const SurfaceRow row, const int j,
+                  float e[8][3]) {
+  const int here = row.first, v = here + j;
+  const int before = row.has_before ? here - row.width : here, after = row.has_after ? here + row.width : here;
+  const int left = j > 0 ? j - 1 : row.width - 1, right = j + 1 < row.width ? j + 1 : 0;
   edge_between(points, count, v, here + right, e[0]);
   edge_between(points, count, v, after + right, e[1]);
   edge_between(points, count, v, after + j, e[2]);
@@ -57,52 +60,37 @@ void edges_around(__global const float* restrict points, const int count, const 
 
 // Weights of four edges of a vertex in a row, one plane of `count` each: to its right, (0, +1), and to the next row, at
 // (+1, -1), (+1, 0) and (+1, +1). Its other four edges are edges of its neighbours.
-// mass: the vertex's share of the area; stiffness: the sum of its eight weights
-void weigh_vertex(const int count, __global const float* restrict points, const int before, const int here,
-                  const int after, const int left, const int j, const int right, const float has_before,
-                  const float has_after, __global float* restrict weights, __global float* restrict mass,
-                  __global float* restrict stiffness) {
-  const int v = here + j;
-  float e[8][3];
-  edges_around(points, count, before, here, after, left, j, right, e);
-  float w[4][3] = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
-  float area_after = 0.0f, area_before = 0.0f;
-  weigh_corner(e[0], e[1], e[2], w[0], &area_after);
-  weigh_corner(e[2], e[3], e[4], w[1], &area_after);
-  weigh_corner(e[4], e[5], e[6], w[2], &area_before);
-  weigh_corner(e[6], e[7], e[0], w[3], &area_before);
-  const float to_right = has_after * w[0][0] + has_before * w[3][2];
-  const float to_left = has_after * w[1][2] + has_before * w[2][0];
-  const float ahead = has_after * (w[0][2] + w[1][0]), ahead_right = has_after * w[0][1],
-              ahead_left = has_after * w[1][1];
-  const float behind = has_before * (w[2][2] + w[3][0] + w[2][1] + w[3][1]);
-  weights[v] = to_right;
-  weights[count + v] = ahead_left;
-  weights[2 * count + v] = ahead;
-  weights[3 * count + v] = ahead_right;
-  mass[v] = (has_after * area_after + has_before * area_before) / 6.0f;
-  stiffness[v] = to_right + to_left + ahead + ahead_right + ahead_left + behind;
-}
-
 // NDRange: rows.
 // in   points
-// out  weights: four planes; mass, stiffness: one plane each
+// out  weights: four planes; mass: the vertex's share of the area; stiffness: the sum of its eight weights
 __kernel void weigh_rows(const SurfaceParameters surface, __global const SurfaceRow* restrict rows,
                          __global const float* restrict points, __global float* restrict weights,
                          __global float* restrict mass, __global float* restrict stiffness) {
-  const int k = get_group_id(0);
+  const int k = get_group_id(0), count = surface.count;
   if (k >= surface.row_count) return;
-  const int here = rows[k].first, width = rows[k].width, has_before = rows[k].has_before, has_after = rows[k].has_after;
-  const int before = has_before ? here - width : here, after = has_after ? here + width : here;
-  const int begin = get_local_id(0), step = get_local_size(0);
-  for (int j = 1 + begin; j < width - 1; j += step)
-    weigh_vertex(surface.count, points, before, here, after, j - 1, j, j + 1, has_before, has_after, weights, mass,
-                 stiffness);
-  if (begin == 0) {
-    weigh_vertex(surface.count, points, before, here, after, width - 1, 0, 1, has_before, has_after, weights, mass,
-                 stiffness);
-    weigh_vertex(surface.count, points, before, here, after, width - 2, width - 1, 0, has_before, has_after, weights,
-                 mass, stiffness);
+  const SurfaceRow row = rows[k];
+  const float has_before = row.has_before, has_after = row.has_after;
+  for (int j = get_local_id(0); j < row.width; j += get_local_size(0)) {
+    const int v = row.first + j;
+    float e[8][3];
+    edges_around(points, count, row, j, e);
+    float w[4][3] = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
+    float area_after = 0.0f, area_before = 0.0f;
+    weigh_corner(e[0], e[1], e[2], w[0], &area_after);
+    weigh_corner(e[2], e[3], e[4], w[1], &area_after);
+    weigh_corner(e[4], e[5], e[6], w[2], &area_before);
+    weigh_corner(e[6], e[7], e[0], w[3], &area_before);
+    const float to_right = has_after * w[0][0] + has_before * w[3][2];
+    const float to_left = has_after * w[1][2] + has_before * w[2][0];
+    const float ahead = has_after * (w[0][2] + w[1][0]), ahead_right = has_after * w[0][1],
+                ahead_left = has_after * w[1][1];
+    const float behind = has_before * (w[2][2] + w[3][0] + w[2][1] + w[3][1]);
+    weights[v] = to_right;
+    weights[count + v] = ahead_left;
+    weights[2 * count + v] = ahead;
+    weights[3 * count + v] = ahead_right;
+    mass[v] = (has_after * area_after + has_before * area_before) / 6.0f;
+    stiffness[v] = to_right + to_left + ahead + ahead_right + ahead_left + behind;
   }
 }
 
@@ -163,37 +151,23 @@ void add_corner_vector(const float* restrict b, const float* restrict c, const f
   add_cross(b, d, share, sum);
 }
 
-void area_vector_at(const int count, __global const float* restrict points, const int before, const int here,
-                    const int after, const int left, const int j, const int right, const float has_before,
-                    const float has_after, __global float* restrict vectors) {
-  const int v = here + j;
-  float e[8][3];
-  edges_around(points, count, before, here, after, left, j, right, e);
-  float sum[3] = {0.0f, 0.0f, 0.0f};
-  add_corner_vector(e[0], e[1], e[2], has_after / 12.0f, sum);
-  add_corner_vector(e[2], e[3], e[4], has_after / 12.0f, sum);
-  add_corner_vector(e[4], e[5], e[6], has_before / 12.0f, sum);
-  add_corner_vector(e[6], e[7], e[0], has_before / 12.0f, sum);
-  vectors[v] = sum[0];
-  vectors[count + v] = sum[1];
-  vectors[2 * count + v] = sum[2];
-}
-
 // Each vertex's third of the area vectors around it, outward.
 // NDRange: rows.
 // in   points     out  vectors: field of three
 __kernel void sum_row_vectors(const SurfaceParameters surface, __global const SurfaceRow* restrict rows,
                               __global const float* restrict points, __global float* restrict vectors) {
-  const int k = get_group_id(0);
+  const int k = get_group_id(0), count = surface.count;
   if (k >= surface.row_count) return;
-  const int here = rows[k].first, width = rows[k].width, has_before = rows[k].has_before, has_after = rows[k].has_after;
-  const int before = has_before ? here - width : here, after = has_after ? here + width : here;
-  const int begin = get_local_id(0), step = get_local_size(0);
-  for (int j = 1 + begin; j < width - 1; j += step)
-    area_vector_at(surface.count, points, before, here, after, j - 1, j, j + 1, has_before, has_after, vectors);
-  if (begin == 0) {
-    area_vector_at(surface.count, points, before, here, after, width - 1, 0, 1, has_before, has_after, vectors);
-    area_vector_at(surface.count, points, before, here, after, width - 2, width - 1, 0, has_before, has_after, vectors);
+  const SurfaceRow row = rows[k];
+  const float after_share = row.has_after / 12.0f, before_share = row.has_before / 12.0f;
+  for (int j = get_local_id(0); j < row.width; j += get_local_size(0)) {
+    float e[8][3], sum[3] = {0.0f, 0.0f, 0.0f};
+    edges_around(points, count, row, j, e);
+    add_corner_vector(e[0], e[1], e[2], after_share, sum);
+    add_corner_vector(e[2], e[3], e[4], after_share, sum);
+    add_corner_vector(e[4], e[5], e[6], before_share, sum);
+    add_corner_vector(e[6], e[7], e[0], before_share, sum);
+    for (int c = 0; c < 3; ++c) vectors[c * count + row.first + j] = sum[c];
   }
 }
 

@@ -16,8 +16,8 @@ struct Profiles {
 };
 
 Profiles find_profiles(const TransferInput& input, const PartPair& pair, BoneEnd end) {
-  const PatchPoints target = input.target_points_of(pair.target_bone(0)),
-                    source = input.source_points_of(pair.source_bone(0));
+  const PatchPoints &target = input.target_patches[pair.target_bone(0)],
+                    &source = input.source_patches[pair.source_bone(0)];
   const BoneEnd source_end = pair.map().model_end(0, end);
   Profiles profiles;
   for (int j = 0; j < target.width; ++j) {

@@ -17,15 +17,14 @@ constexpr std::array<BoneEnd, 2> kEnds{BoneEnd::kHead, BoneEnd::kTail};
 constexpr double kMostLean = 0.5;     // a part leans by at most half of its length
 constexpr double kMostRunBack = 0.5;  // share of the rows behind its cut that a column may leave out, too
 
-/// The number of the first point of every patch, where all rows follow each other.
-std::vector<std::size_t> first_points(const std::vector<Patch>& patches) {
-  std::vector<std::size_t> first;
+std::vector<PatchPoints> patch_points(const std::vector<Patch>& patches, const BonePoints& points) {
+  std::vector<PatchPoints> result;
   std::size_t count = 0;
   for (const Patch& patch : patches) {
-    first.push_back(count);
+    result.push_back({&points, count, patch.rectangle.width, patch.rectangle.height});
     count += static_cast<std::size_t>(patch.rectangle.width) * patch.rectangle.height;
   }
-  return first;
+  return result;
 }
 
 /// Makes a placement, step by step.
@@ -83,7 +82,8 @@ class Placing {
         download_points(context_, place_part(context_, tables_, input_.source_points, input_.target_points));
   }
   PatchPoints placed_points_of(int bone) const {
-    return TransferInput::points_of(input_.target.patches[bone], place_.points, place_.first[bone]);
+    const Rectangle& rectangle = input_.target.patches[bone].rectangle;
+    return {&place_.points, place_.first[bone], rectangle.width, rectangle.height};
   }
   TransferColumn& column(int bone, int j) { return tables_.columns[tables_.patches[bone].column_begin + j]; }
 
@@ -99,7 +99,7 @@ class Placing {
     const auto [x, y, width, height] = input_.target.patches[bone].rectangle;
     TransferPatch& patch = tables_.patches[bone];
     patch = {};
-    patch.begin = static_cast<int>(input_.source_first[pair.source_bone(i)]);
+    patch.begin = static_cast<int>(input_.source_patches[pair.source_bone(i)].first);
     patch.width = source.width;
     patch.height = source.height;
     patch.column_begin = static_cast<int>(tables_.columns.size());
@@ -111,7 +111,7 @@ class Placing {
     patch.tail_width = static_cast<float>(fade_width(pair, i, BoneEnd::kTail));
     patch.is_linear = options_.blend == TransferBlend::kLinear;
     const bool is_mixed = pair.is_between() && options_.blend != TransferBlend::kNone;
-    patch.target_begin = is_mixed ? static_cast<int>(input_.target_first[bone]) : -1;
+    patch.target_begin = is_mixed ? static_cast<int>(input_.target_patches[bone].first) : -1;
 
     const auto columns = model_columns(pair.map(), i, width);
     const auto shear = [&](BoneEnd end, int j) {
@@ -157,7 +157,7 @@ class Placing {
   /// along the bone. There the part begins later.
   void skip_reversed_rows(int bone, PartPair& pair, int i) {
     const double length = pair.target_length(i);
-    const PatchPoints placed = placed_points_of(bone), target = input_.target_points_of(bone);
+    const PatchPoints placed = placed_points_of(bone), target = input_.target_patches[bone];
     for (const BoneEnd end : kEnds) {
       if (!pair.is_boundary(i, end) || pair.is_between()) continue;
       PartCut& cut = pair.cut(end);
@@ -181,7 +181,7 @@ class Placing {
   void find_lean(int bone, const PartPair& pair, int i) {
     if (pair.is_boundary(i, BoneEnd::kHead) == pair.is_boundary(i, BoneEnd::kTail)) return;
     const BoneEnd end = pair.is_boundary(i, BoneEnd::kHead) ? BoneEnd::kHead : BoneEnd::kTail;
-    const PatchPoints placed = placed_points_of(bone), target = input_.target_points_of(bone);
+    const PatchPoints placed = placed_points_of(bone), target = input_.target_patches[bone];
     Vec3 edge = Vec3::Zero(), target_edge = Vec3::Zero(), far = Vec3::Zero();
     for (int j = 0; j < placed.width; ++j) {
       const double row = pair.cut(end).kept_rows[j];
@@ -208,7 +208,7 @@ class Placing {
   };
   /// From the placed part to the target, where the part begins.
   Correction boundary_correction(int bone, const PartPair& pair, int i, BoneEnd end, int j) const {
-    const BoneProfile to = bone_profile(input_.target_points_of(bone), j, end, 0),
+    const BoneProfile to = bone_profile(input_.target_patches[bone], j, end, 0),
                       from = bone_profile(placed_points_of(bone), j, end, 0);
     const double kept = pair.cut(end).kept_rows[j], range = std::max(1.0, pair.width_in_rows(i) / 6),
                  back = std::min(kept, range / 2);
@@ -276,8 +276,8 @@ TransferInput::TransferInput(ClContext& context, const SkeletexModel& source_mod
       target_points(points_in_bone_axes(context, regular_target)),
       source_host(download_points(context, source_points)),
       target_host(download_points(context, target_points)),
-      source_first(first_points(source.patches)),
-      target_first(first_points(target.patches)) {}
+      source_patches(patch_points(source.patches, source_host)),
+      target_patches(patch_points(target.patches, target_host)) {}
 
 Placement place_parts(ClContext& context, const TransferInput& input, const SkeletexModel& result,
                       std::span<const std::unique_ptr<PartPair>> pairs) {

@@ -15,24 +15,15 @@ namespace skeletex {
 struct TransferInput {
   TransferInput(ClContext& context, const SkeletexModel& source, const SkeletexModel& target,
                 const TransferOptions& options);
-
-  PatchPoints source_points_of(int bone) const {
-    return points_of(source.patches[bone], source_host, source_first[bone]);
-  }
-  PatchPoints target_points_of(int bone) const {
-    return points_of(target.patches[bone], target_host, target_first[bone]);
-  }
-  static PatchPoints points_of(const Patch& patch, const BonePoints& points, std::size_t first) {
-    return {&points, first, patch.rectangle.width, patch.rectangle.height};
-  }
+  TransferInput(const TransferInput&) = delete;  // the patches refer to the points
 
   const SkeletexModel &source, &target;
   TransferOptions options;
-  SeparationPlanes source_separation, separation;       ///< of the source, of the target
-  SkeletexModel regular_source, regular_target;         ///< on regular grids; their points are mixed
-  DevicePlanes source_points, target_points;            ///< in bone axes
-  BonePoints source_host, target_host;                  ///< the same points
-  std::vector<std::size_t> source_first, target_first;  ///< per bone, the point of row 0, column 0
+  SeparationPlanes source_separation, separation;           ///< of the source, of the target
+  SkeletexModel regular_source, regular_target;             ///< on regular grids; their points are mixed
+  DevicePlanes source_points, target_points;                ///< in bone axes
+  BonePoints source_host, target_host;                      ///< the same points
+  std::vector<PatchPoints> source_patches, target_patches;  ///< the same points, per bone
 };
 
 /// Sets where the part leaves the body at the boundaries of its first bone, and what it is scaled by.
