@@ -12,14 +12,14 @@ float laplacian_at(const int count, __global const float* restrict weights, __gl
                    const float has_before) {
   const int v = here + j;
   const float centre = p[v];
-  const float beside = weights[v] * (centre - p[here + right]) + weights[here + left] * (centre - p[here + left]);
+  const float in_row = weights[v] * (centre - p[here + right]) + weights[here + left] * (centre - p[here + left]);
   const float ahead = weights[count + v] * (centre - p[after + left]) +
                       weights[2 * count + v] * (centre - p[after + j]) +
                       weights[3 * count + v] * (centre - p[after + right]);
   const float behind = weights[count + before + right] * (centre - p[before + right]) +
                        weights[2 * count + before + j] * (centre - p[before + j]) +
                        weights[3 * count + before + left] * (centre - p[before + left]);
-  return beside + ahead + has_before * behind;
+  return in_row + ahead + has_before * behind;
 }
 
 // q = is_free (mass_share M + time L) p, and partial sums of p q.

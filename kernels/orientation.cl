@@ -36,6 +36,15 @@ void rotate_vector(const float* restrict q, const float* restrict v, float* rest
   rotated[2] = v[2] + q[0] * tz + q[1] * ty - q[2] * tx;
 }
 
+// The directions of a surface along and around its bone, at the vertex in column j of a row.
+void directions_at(__global const float* restrict points, const int count, const SurfaceRow row, const int j,
+                   float* restrict along, float* restrict around) {
+  const int v = row.first + j;
+  edge_between(points, count, row.has_before ? v - row.width : v, row.has_after ? v + row.width : v, along);
+  edge_between(points, count, row.first + (j > 0 ? j - 1 : row.width - 1), row.first + (j + 1 < row.width ? j + 1 : 0),
+               around);
+}
+
 // Unit normal of the directions along and around. Returns 0 where they have none.
 int unit_normal(const float* restrict along, const float* restrict around, float* restrict n) {
   cross_product(along, around, n);
@@ -96,18 +105,14 @@ __kernel void add_rotations(const SurfaceParameters surface, __global const Surf
   const int k = get_group_id(0);
   if (k >= surface.row_count) return;
   const int here = rows[k].first, width = rows[k].width;
-  const int before = rows[k].has_before ? here - width : here, after = rows[k].has_after ? here + width : here;
   float first[4];
   for (int i = 0; i < 4; ++i) first[i] = facing[4 * k + i];
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
     const float weight = weights[here + j];
     if (weight == 0.0f) continue;
-    const int left = here + (j > 0 ? j - 1 : width - 1), right = here + (j + 1 < width ? j + 1 : 0);
     float along[3], around[3], source_along[3], source_around[3], to_along[3], to_around[3], q[4];
-    edge_between(points, surface.count, before + j, after + j, along);
-    edge_between(points, surface.count, left, right, around);
-    edge_between(source, surface.count, before + j, after + j, source_along);
-    edge_between(source, surface.count, left, right, source_around);
+    directions_at(points, surface.count, rows[k], j, along, around);
+    directions_at(source, surface.count, rows[k], j, source_along, source_around);
     rotate_vector(first, source_along, to_along);
     rotate_vector(first, source_around, to_around);
     rotation_between(along, around, to_along, to_around, q);
@@ -124,11 +129,9 @@ __kernel void row_normals(const SurfaceParameters surface, __global const Surfac
   const int k = get_group_id(0);
   if (k >= surface.row_count) return;
   const int here = rows[k].first, width = rows[k].width;
-  const int before = rows[k].has_before ? here - width : here, after = rows[k].has_after ? here + width : here;
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
     float along[3], around[3], n[3];
-    edge_between(points, surface.count, before + j, after + j, along);
-    edge_between(points, surface.count, here + (j > 0 ? j - 1 : width - 1), here + (j + 1 < width ? j + 1 : 0), around);
+    directions_at(points, surface.count, rows[k], j, along, around);
     const int has_normal = unit_normal(along, around, n);
     for (int i = 0; i < 3; ++i) normals[i * surface.count + here + j] = has_normal ? n[i] : 0.0f;
   }

@@ -47,7 +47,7 @@ const SkeletexModel& standard(const std::string& name, EncodeMethod method = Enc
   return it->second;
 }
 
-/// The same surface elsewhere: texels know nothing of it.
+/// The same surface elsewhere: its texels stay as they are.
 SkeletexModel moved(SkeletexModel model, const Eigen::Quaterniond& rotation, const Vec3& shift) {
   const std::vector<BoneBasis> bases = bone_bases(model.skeleton);
   for (std::size_t i = 0; i < bases.size(); ++i) model.skeleton.bones[i].s = rotation * bases[i].s;

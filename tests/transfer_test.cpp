@@ -189,10 +189,10 @@ TEST(Transfer, MeetsTheSeamWithCosineAndJumpsThereWithNone) {
       edge = 0;
       for (int j = 0; j < width; ++j) {
         const int v = lattice.first_inner[bone] + row * width + j, next = row == 0 ? v + width : v - width;
-        const int beside = lattice.first_inner[bone] + row * width + (j + 1) % width;
+        const int neighbour = lattice.first_inner[bone] + row * width + (j + 1) % width;
         sum += (after[v] - before[v]).norm() / width;
         worst = std::max(worst, (after[v] - before[v]).norm());
-        edge += ((before[next] - before[v]).norm() + (before[beside] - before[v]).norm()) / (2 * width);
+        edge += ((before[next] - before[v]).norm() + (before[neighbour] - before[v]).norm()) / (2 * width);
       }
       return std::array{sum, worst};
     };

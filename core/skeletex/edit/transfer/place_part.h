@@ -8,7 +8,7 @@
 
 namespace skeletex {
 
-/// What the kernels of transfer.cl read beside points.
+/// What the kernels of transfer.cl read besides points.
 struct TransferTables {
   std::vector<TransferRow> rows;        ///< to do
   std::vector<TransferPatch> patches;   ///< per patch of the result

@@ -49,10 +49,10 @@ struct TransferredPart {
 ///
 /// The part keeps its shape up to an affine map: it takes the target's length along the bone, is scaled across it, and
 /// is turned about it so that the rest of the body stays on the same side. Near the seams that the target keeps, an
-/// offset moves the part's edge onto the seam and its slope to the target's. The offset fades with the distance from
-/// the seam (see docs/transfers.md). \param bones  names: source, target   \param parts  if given, receives one entry
-/// per pair of bones \throw InputError when a bone is unknown, one of a pair ends freely and the other does not, the
-/// bones behind them
+/// offset moves the part's edge onto the seam and its slope to the target's. It fades with the distance from the seam.
+/// \param bones  names: source, target
+/// \param parts  if given, receives one entry per pair of bones
+/// \throw InputError when a bone is unknown, one of a pair ends freely and the other does not, the bones behind them
 ///        branch differently, or a limb is part of a cycle, naming the bone; DeviceError
 SkeletexModel transfer(ClContext& context, const SkeletexModel& source, const SkeletexModel& target,
                        const std::vector<std::pair<std::string, std::string>>& bones,
