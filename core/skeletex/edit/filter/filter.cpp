@@ -26,6 +26,7 @@ struct FilterJob {
   ModelSurface surface;
   SurfaceOperator laplace;
   std::vector<float> weights;  ///< of the region, per vertex
+  double volume = 0;           ///< world units cubed
   SolveReport solver;
 
   FilterJob(ClContext& on, const SkeletexModel& of, const FilterRegion& region);
@@ -75,6 +76,7 @@ FilterJob::FilterJob(ClContext& on, const SkeletexModel& of, const FilterRegion&
       surface(upload_surface(on, model)),
       laplace(make_surface_operator(on, surface.neighbours, surface.points)) {
   check_length(region.falloff, "the fall-off at the region's boundary", 0, 1);
+  volume = enclosed_volume(model, surface.positions, area_vectors_at(on, model, surface, surface.positions));
   weights = weigh_region(context, laplace, inside_region(model, surface.lattice, region), region.falloff, solver);
 }
 
@@ -112,16 +114,16 @@ void keep_outside(const FilterJob& job, SkeletexModel& model) {
 }
 
 /// The model with its surface moved, by the region's weights.
-FilterResult finish(FilterJob& job, std::vector<Vec3> moves, double volume_before) {
+FilterResult finish(FilterJob& job, std::vector<Vec3> moves) {
   for (std::size_t i = 0; i < moves.size(); ++i) moves[i] *= static_cast<double>(job.weights[i]);
   MovedModel moved = move_surface(job.context, job.model, job.surface, job.laplace, moves);
   add_solve(job.solver, moved.report.solver);
   keep_outside(job, moved.model);
-  return {std::move(moved.model), {moved.report, volume_before}};
+  return {std::move(moved.model), {moved.report, job.volume}};
 }
 
 /// Adds moves along the normals that restore the volume, by Newton's method.
-void restore_volume(const FilterJob& job, double volume, std::vector<Vec3>& moves) {
+void restore_volume(const FilterJob& job, std::vector<Vec3>& moves) {
   for (int round = 0; round < 4; ++round) {
     std::vector<Vec3> positions = job.surface.positions;
     for (std::size_t i = 0; i < positions.size(); ++i) positions[i] += static_cast<double>(job.weights[i]) * moves[i];
@@ -129,7 +131,7 @@ void restore_volume(const FilterJob& job, double volume, std::vector<Vec3>& move
     double area = 0;
     for (std::size_t i = 0; i < vectors.size(); ++i) area += static_cast<double>(job.weights[i]) * vectors[i].norm();
     if (!(area > 0)) return;
-    const double offset = (volume - enclosed_volume(job.model, positions, vectors)) / area;
+    const double offset = (job.volume - enclosed_volume(job.model, positions, vectors)) / area;
     for (std::size_t i = 0; i < moves.size(); ++i) moves[i] += offset * vectors[i].normalized();
   }
 }
@@ -146,8 +148,6 @@ FilterResult smooth_model(ClContext& context, const SkeletexModel& model, const 
   if (options.iterations < 1 || options.iterations > 1000)
     throw InputError(fmt::format("{} iterations of smoothing; give 1 to 1000", options.iterations));
   FilterJob job(context, model, region);
-  const double volume = enclosed_volume(job.model, job.surface.positions,
-                                        area_vectors_at(job.context, job.model, job.surface, job.surface.positions));
   const double scale = options.scale / std::sqrt(options.iterations);
   std::vector<Vec3> moves = diffusion_moves(job, job.surface.points, job.laplace, scale);
   for (int iteration = 1; iteration < options.iterations; ++iteration) {
@@ -158,8 +158,8 @@ FilterResult smooth_model(ClContext& context, const SkeletexModel& model, const 
         diffusion_moves(job, points, make_surface_operator(context, job.surface.neighbours, points), scale);
     for (std::size_t i = 0; i < moves.size(); ++i) moves[i] += more[i];
   }
-  if (options.keeps_volume) restore_volume(job, volume, moves);
-  return finish(job, moves, volume);
+  if (options.keeps_volume) restore_volume(job, moves);
+  return finish(job, moves);
 }
 
 FilterResult enhance_model(ClContext& context, const SkeletexModel& model, const EnhanceOptions& options,
@@ -168,11 +168,9 @@ FilterResult enhance_model(ClContext& context, const SkeletexModel& model, const
   if (!(options.gain >= -1 && options.gain <= 100))
     throw InputError(fmt::format("a gain of {}; give -1 (no detail) to 100", options.gain));
   FilterJob job(context, model, region);
-  const double volume = enclosed_volume(job.model, job.surface.positions,
-                                        area_vectors_at(job.context, job.model, job.surface, job.surface.positions));
   std::vector<Vec3> moves = diffusion_moves(job, job.surface.points, job.laplace, options.scale);
   for (Vec3& move : moves) move *= -options.gain;
-  return finish(job, moves, volume);
+  return finish(job, moves);
 }
 
 FilterResult add_noise(ClContext& context, const SkeletexModel& model, const NoiseOptions& options,
@@ -183,7 +181,6 @@ FilterResult add_noise(ClContext& context, const SkeletexModel& model, const Noi
     throw InputError(fmt::format("{} octaves of noise; give 1 to 16", options.octaves));
   FilterJob job(context, model, region);
   std::vector<Vec3> moves = area_vectors_at(job.context, job.model, job.surface, job.surface.positions);
-  const double volume = enclosed_volume(job.model, job.surface.positions, moves);
   const auto heights = context.allocate<float>(moves.size());
   context.launch({"filter.cl", "noise_at_points"}, ClRange(moves.size()),
                  NoiseParameters{static_cast<int>(moves.size()), options.octaves, options.seed,
@@ -192,7 +189,7 @@ FilterResult add_noise(ClContext& context, const SkeletexModel& model, const Noi
   const std::vector<float> noise = context.download(heights);
   for (std::size_t i = 0; i < moves.size(); ++i)
     moves[i] = options.amplitude * job.unit() * static_cast<double>(noise[i]) * moves[i].normalized();
-  return finish(job, moves, volume);
+  return finish(job, moves);
 }
 
 }  // namespace skeletex

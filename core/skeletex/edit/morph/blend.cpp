@@ -55,6 +55,18 @@ double row_at_same_share(int row, int height, int model_height, bool is_reversed
 
 int source_columns(const SeamMap& map, int bone) { return map.model().patches[map.model_bone(bone)].rectangle.width; }
 
+/// The rows to do as the kernels take them.
+std::vector<BlendRow> blend_rows(const std::vector<LatticeRow>& rows, const FrameTables& result, int texture_width) {
+  std::vector<BlendRow> blend;
+  for (const auto& [bone, row, vertex, quad] : rows) {
+    const PatchRecord& patch = result.patches[bone];
+    const RowRecord& record = result.rows[patch.row_begin + row];
+    blend.push_back(
+        {bone, (patch.y + row) * texture_width + patch.x, patch.width, patch.column_begin, record.u, record.axial});
+  }
+  return blend;
+}
+
 }  // namespace
 
 std::array<std::vector<float>, 2> model_columns(const SeamMap& map, int bone, int width) {
@@ -128,17 +140,6 @@ double u_at_same_share(const Patch& model, int row, int height, bool is_reversed
   const int below = std::clamp(static_cast<int>(at), 0, static_cast<int>(model.row_u.size()) - 2);
   const double u = model.row_u[below] + (at - below) * (model.row_u[below + 1] - model.row_u[below]);
   return is_reversed ? 1 - u : u;
-}
-
-std::vector<BlendRow> blend_rows(const std::vector<LatticeRow>& rows, const FrameTables& result, int texture_width) {
-  std::vector<BlendRow> blend;
-  for (const auto& [bone, row, vertex, quad] : rows) {
-    const PatchRecord& patch = result.patches[bone];
-    const RowRecord& record = result.rows[patch.row_begin + row];
-    blend.push_back(
-        {bone, (patch.y + row) * texture_width + patch.x, patch.width, patch.column_begin, record.u, record.axial});
-  }
-  return blend;
 }
 
 void blend_texels(ClContext& context, const BlendTables& tables, const std::vector<LatticeRow>& rows,
