@@ -28,9 +28,9 @@ std::vector<double> smoothed_around(const std::vector<double>& values) {
   around.insert(around.end(), values.begin(), values.end());
   around.insert(around.end(), values.begin(), values.begin() + radius);
   const Eigen::Map<const Eigen::VectorXd> share(shares.data(), 2 * radius + 1);
-  std::vector<double> result;
+  std::vector<double> result(count);
   for (int j = 0; j < count; ++j)
-    result.push_back(share.dot(Eigen::Map<const Eigen::VectorXd>(around.data() + j, 2 * radius + 1)) / total);
+    result[j] = share.dot(Eigen::Map<const Eigen::VectorXd>(around.data() + j, 2 * radius + 1)) / total;
   return result;
 }
 
@@ -83,8 +83,8 @@ void append_columns(const SeamMap& map, int bone, int width, BlendTables& tables
   const double sign = map.sign(bone);
   std::array<std::vector<double>, 2> even;
   for (const int end : {0, 1}) {
-    std::vector<double> offsets;
-    for (int j = 0; j < width; ++j) offsets.push_back(places[end][j] - sign * j / width);
+    std::vector<double> offsets(width);
+    for (int j = 0; j < width; ++j) offsets[j] = places[end][j] - sign * j / width;
     even[end] = smoothed_around(offsets);
   }
   const auto column = [&](double v) { return static_cast<float>(rounded_column(source_columns(map, bone) * v)); };
