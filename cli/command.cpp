@@ -7,9 +7,7 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <memory>
 
-#include "device_threads.h"
 #include "files.h"
 #include "skeletex/analysis/validate_input.h"
 #include "skeletex/io/atomic_file.h"
@@ -94,19 +92,6 @@ void require_valid(TriangleMesh& mesh, const Skeleton& skeleton, std::optional<T
     }
   }
   if (errors > 0) throw CLI::RuntimeError(kExitBad);
-}
-
-double Stopwatch::lap_ms() {
-  const auto now = std::chrono::steady_clock::now();
-  const double ms = std::chrono::duration<double, std::milli>(now - begin_).count();
-  begin_ = now;
-  return ms;
-}
-
-ClContext& open_device(const std::string& selector) {
-  static std::vector<std::unique_ptr<ClContext>> open;
-  const LoadingDevice loading;
-  return *open.emplace_back(std::make_unique<ClContext>(selector));
 }
 
 Json profile_json(ClContext& context) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <CLI/CLI.hpp>
-#include <chrono>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "skeletex/device/context.h"
+#include "skeletex/device/stopwatch.h"
 #include "skeletex/geometry/mesh.h"
 #include "skeletex/geometry/triangle_tree.h"
 #include "skeletex/skeleton/skeleton.h"
@@ -66,19 +66,6 @@ TriangleMesh load_mesh(const std::filesystem::path& path);
 /// Checks that mesh and skeleton fit (validate_before_segmentation, which turns a mesh that is inside out) and prints
 /// every finding to standard error. \throw CLI::RuntimeError(kExitBad) when one is an error
 void require_valid(TriangleMesh& mesh, const Skeleton& skeleton, std::optional<TriangleTree>* tree = nullptr);
-
-/// Milliseconds since it was made or last read.
-class Stopwatch {
- public:
-  double lap_ms();
-
- private:
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-};
-
-/// A device until the process ends, which does not take its driver apart (main.cpp).
-/// \param selector  as of ClContext    \throw DeviceError
-ClContext& open_device(const std::string& selector);
 
 /// Time on the device by kernel, for the JSON.
 Json profile_json(ClContext& context);

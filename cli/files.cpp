@@ -62,6 +62,20 @@ void check_ending(const NamedFile& file) {
 
 bool is_stream(const NamedFile& file) { return file.path == "-" && file.declaration->is_output; }
 
+void check_apart(const NamedFile& output, const NamedFile& other) {
+  if (is_stream(output) || is_stream(other) || !is_same_file(output.path, other.path)) return;
+  throw CLI::ValidationError(
+      output.name, fmt::format("\"{}\" is also {}, which would be lost; name another file", output.path,
+                               other.declaration == output.declaration ? "named a second time"
+                                                                       : other.name + " \"" + other.path + '"'));
+}
+
+void check_folder(const NamedFile& output) {
+  std::error_code error;
+  if (fs::exists(output.path, error) && !fs::is_directory(output.path, error))
+    throw CLI::ValidationError(output.name, fmt::format("\"{}\" is a file, not a folder", output.path));
+}
+
 CLI::Validator number(const std::string& words, double lower, double upper, bool is_lower_in) {
   return CLI::Validator(
       [=](const std::string& text) -> std::string {
@@ -118,25 +132,16 @@ void check_files(const CLI::App& command) {
     if (!output.declaration->is_output) continue;
     if (output.path == "-" && !output.declaration->can_be_stream)
       throw CLI::ValidationError(output.name, "\"-\" is not a file; standard output is for --json alone");
-    for (const NamedFile& other : files) {
-      if (&other == &output || is_stream(output) || is_stream(other)) continue;
-      if (is_same_file(output.path, other.path))
-        throw CLI::ValidationError(
-            output.name, fmt::format("\"{}\" is also {}, which would be lost; name another file", output.path,
-                                     other.declaration == output.declaration ? "named a second time"
-                                                                             : other.name + " \"" + other.path + '"'));
-    }
+    for (const NamedFile& other : files)
+      if (&other != &output) check_apart(output, other);
   }
   for (const NamedFile& output : files) {
     if (!output.declaration->is_output || is_stream(output)) continue;
     check_ending(output);
-    if (output.declaration->is_folder) {
-      std::error_code error;
-      if (fs::exists(output.path, error) && !fs::is_directory(output.path, error))
-        throw CLI::ValidationError(output.name, fmt::format("\"{}\" is a file, not a folder", output.path));
-    } else {
+    if (output.declaration->is_folder)
+      check_folder(output);
+    else
       check_output(output.path);
-    }
   }
 }
 

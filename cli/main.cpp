@@ -1,21 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include <fmt/format.h>
-#include <malloc.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <climits>
-#include <cstdint>
 #include <cstdio>
-#include <cstdlib>
 #include <memory>
 #include <new>
 
 #include "command.h"
-#include "device_threads.h"
 #include "help_formatter.h"
 #include "skeletex/io/suggestion.h"
 #include "skeletex/model/error.h"
@@ -50,26 +43,6 @@ void check_names(const CLI::App& program, int argc, char** argv, std::string& ch
       chosen = argument + ' ';
     }
   }
-}
-
-/// Stages pass large arrays on and free them. Kept for the next one, they need not be cleared by the system again: a
-/// tenth of the time of `encode`. And where the system gives huge pages to those who ask, they are asked for: two in
-/// three page faults less.
-void keep_freed_memory() {
-#ifdef __GLIBC__
-  mallopt(M_MMAP_THRESHOLD, 32 << 20);  // the most it takes
-  mallopt(M_TRIM_THRESHOLD, INT_MAX);
-  mallopt(M_TOP_PAD, 256 << 20);
-  mallopt(M_ARENA_MAX, 1);  // other threads' arrays as well
-#ifdef MADV_HUGEPAGE
-  constexpr std::uintptr_t kHugePage = 2 << 20;
-  const auto end_of_heap = [] { return reinterpret_cast<std::uintptr_t>(sbrk(0)); };
-  const std::uintptr_t begin = (end_of_heap() + kHugePage - 1) / kHugePage * kHugePage;
-  void* volatile large = std::malloc(kHugePage);  // more than the heap has: it grows by what it is padded with
-  std::free(large);
-  if (end_of_heap() > begin) madvise(reinterpret_cast<void*>(begin), end_of_heap() - begin, MADV_HUGEPAGE);
-#endif
-#endif
 }
 
 int run(int argc, char** argv) {
@@ -115,13 +88,8 @@ int run(int argc, char** argv) {
 }  // namespace skeletex::cli
 
 int main(int argc, char** argv) {
-  skeletex::cli::keep_freed_memory();
-  skeletex::cli::prepare_device_threads();
   auto log = spdlog::stderr_color_mt("skeletex");
   log->set_pattern("%^%l:%$ %v");
   spdlog::set_default_logger(log);
-  const int code = skeletex::cli::run(argc, argv);
-  // Without destructors of what lives as long as the process: a driver with a compiler in it takes 10 ms to take apart.
-  std::fflush(nullptr);
-  std::_Exit(code);
+  return skeletex::cli::run(argc, argv);
 }

@@ -11,8 +11,8 @@
 //      direction of the result's bone. A texel is turned from the slope of its frame in the source, plus the rise, to
 //      the slope of the result's frame.
 //      result_columns: of the result
-//      in_along, in_around, in_out: texels of all sources
-// out  along, around, out: the result's texture
+//      texels: planes along, around, out of all sources
+// out  blended: planes along, around, out of the result's texture
 // NDRange: one work-group of any size per row, whose work-items take columns in turn. One work-item does a column of
 // the result for all sources, so sums need no barrier and have a fixed order. Reads are linear between the four texels
 // around. At a texel's own place the result is exactly weight * texel.
@@ -27,12 +27,16 @@ __kernel void blend_texels(const BlendParameters blend, __global const BlendRow*
                            __global const BlendSource* restrict sources,
                            __global const BlendSourceRow* restrict source_rows,
                            __global const BlendColumn* restrict columns, __global const float* restrict source_slopes,
-                           __global const ColumnRecord* restrict result_columns,
-                           __global const float* restrict in_along, __global const float* restrict in_around,
-                           __global const float* restrict in_out, __global float* restrict along,
-                           __global float* restrict around, __global float* restrict out) {
+                           __global const ColumnRecord* restrict result_columns, __global const float* restrict texels,
+                           __global float* restrict blended) {
   const int k = get_group_id(0);
   if (k >= blend.row_count) return;
+  __global const float* restrict in_along = texels;
+  __global const float* restrict in_around = in_along + blend.texel_count;
+  __global const float* restrict in_out = in_around + blend.texel_count;
+  __global float* restrict along = blended;
+  __global float* restrict around = along + blend.blended_count;
+  __global float* restrict out = around + blend.blended_count;
   const int width = rows[k].width, texel = rows[k].texel;
   const float axial = rows[k].axial, eased = EASED(axial);
   const float near_head = fmax(0.0f, 1.0f - axial / END_RANGE),
@@ -103,10 +107,12 @@ __kernel void blend_texels(const BlendParameters blend, __global const BlendRow*
 // moves: six planes over the columns of all patches: along, around, out at the head, then at the tail
 // NDRange: as above.
 __kernel void move_ends(const MoveEndsParameters ends, __global const BlendRow* restrict rows,
-                        __global const float* restrict moves, __global float* restrict along,
-                        __global float* restrict around, __global float* restrict out) {
+                        __global const float* restrict moves, __global float* restrict texels) {
   const int k = get_group_id(0), column_count = ends.column_count;
   if (k >= ends.row_count) return;
+  __global float* restrict along = texels;
+  __global float* restrict around = along + ends.texel_count;
+  __global float* restrict out = around + ends.texel_count;
   const int texel = rows[k].texel, width = rows[k].width;
   const float u = rows[k].u;
   const float to_head = fmax(0.0f, 1.0f - u / END_RANGE), to_tail = fmax(0.0f, 1.0f - (1.0f - u) / END_RANGE);
@@ -128,13 +134,19 @@ static float mixed(const float first, const float second, const float share) {
 
 // Linear interpolation between the texels of two textures of one layout.
 // NDRange: one work-group of any size per row of the texture.
-__kernel void mix_texels(const MixParameters mix, __global const float* restrict first_along,
-                         __global const float* restrict first_around, __global const float* restrict first_out,
-                         __global const float* restrict second_along, __global const float* restrict second_around,
-                         __global const float* restrict second_out, __global float* restrict along,
-                         __global float* restrict around, __global float* restrict out) {
-  const int row = get_group_id(0);
+__kernel void mix_texels(const MixParameters mix, __global const float* restrict first,
+                         __global const float* restrict second, __global float* restrict texels) {
+  const int row = get_group_id(0), count = mix.height * mix.width;
   if (row >= mix.height) return;
+  __global const float* restrict first_along = first;
+  __global const float* restrict first_around = first_along + count;
+  __global const float* restrict first_out = first_around + count;
+  __global const float* restrict second_along = second;
+  __global const float* restrict second_around = second_along + count;
+  __global const float* restrict second_out = second_around + count;
+  __global float* restrict along = texels;
+  __global float* restrict around = along + count;
+  __global float* restrict out = around + count;
   const int begin = row * mix.width, end = begin + mix.width, step = get_local_size(0);
   for (int i = begin + (int)get_local_id(0); i < end; i += step) {
     along[i] = mixed(first_along[i], second_along[i], mix.share);

@@ -47,12 +47,15 @@ typedef struct BlendParameters {
   int row_count;
   int source_count;
   int patch_count;
+  int texel_count;    ///< values per plane of texels
+  int blended_count;  ///< the same of the result
 } BlendParameters;
 
 /// What move_ends takes.
 typedef struct MoveEndsParameters {
   int row_count;
   int column_count;  ///< of all patches
+  int texel_count;   ///< values per plane of texels
 } MoveEndsParameters;
 
 /// What mix_texels takes.
@@ -67,8 +70,8 @@ static_assert(sizeof(BlendRow) == 24);
 static_assert(sizeof(BlendSource) == 28);
 static_assert(sizeof(BlendSourceRow) == 8);
 static_assert(sizeof(BlendColumn) == 32);
-static_assert(sizeof(BlendParameters) == 12);
-static_assert(sizeof(MoveEndsParameters) == 8);
+static_assert(sizeof(BlendParameters) == 20);
+static_assert(sizeof(MoveEndsParameters) == 12);
 static_assert(sizeof(MixParameters) == 12);
 }  // namespace skeletex
 #endif

@@ -3,13 +3,15 @@
 //
 // Blocks, work-groups and work-items as in skin.cl: no work-item reads what another one writes, so no barriers are
 // needed.
-//   blocks                    of inner vertices; their bones and weights are not read
-//   patches, ends, arcs       tables of the bind pose or of the pose, by bone
-//   angle, distance, height   cylinder coordinates of the points in the bind pose about their bone: radians in [0, 2
-//   pi), from the axis, and
-//                             along the axis from the head
-//   slope_head, slope_tail    of the bind pose's separation planes at that angle
+//   blocks                of inner vertices; their bones and weights are not read
+//   patches, ends, arcs   tables of the bind pose or of the pose, by bone
+//   coordinates           five planes of point_count floats, of the points in the bind pose:
+//     angle, distance, height   cylinder coordinates about their bone: radians in [0, 2 pi), from the axis, and along
+//                               the axis from the head
+//     slope_head, slope_tail    of the bind pose's separation planes at that angle
+#include "capsule.h"
 #include "pose_math.h"
+#include "reconstruct_structs.h"
 #include "skeletex_structs.h"
 
 // What the arcs around a bone's end give to each vertex of a block: the roll, and the two parts of the slope.
@@ -30,18 +32,23 @@ __attribute__((always_inline)) void read_arcs(const int item, const int count, c
 }
 
 // The coordinates of points in the bind pose.
-//   x, y, z  relative to the origin of the patch records
+//   points   planes x, y, z, relative to the origin of the patch records
 //   loops    6 * SKIN_BLOCK floats
-__kernel void bone_coordinates(const int block_count, __global const SkinBlock* restrict blocks,
+__kernel void bone_coordinates(const BlockParameters p, __global const SkinBlock* restrict blocks,
                                __global const PatchRecord* restrict patches,
                                __global const PosedEndsRecord* restrict ends,
-                               __global const PosedArcRecord* restrict arcs, __global const float* restrict x,
-                               __global const float* restrict y, __global const float* restrict z,
-                               __global float* restrict angle, __global float* restrict distance,
-                               __global float* restrict height, __global float* restrict slope_head,
-                               __global float* restrict slope_tail, __local float* restrict loops) {
+                               __global const PosedArcRecord* restrict arcs, __global const float* restrict points,
+                               __global float* restrict coordinates, __local float* restrict loops) {
   const int group = get_group_id(0);
-  if (group >= block_count) return;
+  if (group >= p.block_count) return;
+  __global const float* restrict x = points;
+  __global const float* restrict y = x + p.point_count;
+  __global const float* restrict z = y + p.point_count;
+  __global float* restrict angle = coordinates;
+  __global float* restrict distance = angle + p.point_count;
+  __global float* restrict height = distance + p.point_count;
+  __global float* restrict slope_head = height + p.point_count;
+  __global float* restrict slope_tail = slope_head + p.point_count;
   const int vertex = blocks[group].first_vertex, count = blocks[group].vertex_count, bone = blocks[group].bone;
   __global const PatchRecord* restrict patch = patches + bone;
   __local float* restrict tail = loops + 3 * SKIN_BLOCK;
@@ -69,22 +76,26 @@ __kernel void bone_coordinates(const int block_count, __global const SkinBlock* 
 // Points with these coordinates in a pose. They are moved as SPD's texels are: their axial parameter is that of the
 // foot from which SPD's ray leads to the point in the bind pose, the ray turns with the frame there, and the point's
 // distance from the bone is restored.
-//   is_distance_kept  0: the point keeps its distance from the foot instead
-//   bind_patches      for their lengths
-//   x, y, z           relative to the origin of the posed patch records
-//   loops             6 * SKIN_BLOCK floats
-__kernel void pose_by_coordinates(const int block_count, const int is_distance_kept,
-                                  __global const SkinBlock* restrict blocks,
+//   bind_patches   for their lengths
+//   points         planes x, y, z, relative to the origin of the posed patch records
+//   loops          6 * SKIN_BLOCK floats
+__kernel void pose_by_coordinates(const BlockParameters p, __global const SkinBlock* restrict blocks,
                                   __global const PatchRecord* restrict bind_patches,
                                   __global const PatchRecord* restrict patches,
                                   __global const PosedEndsRecord* restrict ends,
-                                  __global const PosedArcRecord* restrict arcs, __global const float* restrict angle,
-                                  __global const float* restrict distance, __global const float* restrict height,
-                                  __global const float* restrict slope_head, __global const float* restrict slope_tail,
-                                  __global float* restrict x, __global float* restrict y, __global float* restrict z,
+                                  __global const PosedArcRecord* restrict arcs,
+                                  __global const float* restrict coordinates, __global float* restrict points,
                                   __local float* restrict loops) {
   const int group = get_group_id(0);
-  if (group >= block_count) return;
+  if (group >= p.block_count) return;
+  __global const float* restrict angle = coordinates;
+  __global const float* restrict distance = angle + p.point_count;
+  __global const float* restrict height = distance + p.point_count;
+  __global const float* restrict slope_head = height + p.point_count;
+  __global const float* restrict slope_tail = slope_head + p.point_count;
+  __global float* restrict x = points;
+  __global float* restrict y = x + p.point_count;
+  __global float* restrict z = y + p.point_count;
   const int vertex = blocks[group].first_vertex, count = blocks[group].vertex_count, bone = blocks[group].bone;
   __global const PatchRecord* restrict patch = patches + bone;
   const float head_x = patch->head[0], head_y = patch->head[1], head_z = patch->head[2];
@@ -92,8 +103,8 @@ __kernel void pose_by_coordinates(const int block_count, const int is_distance_k
   const float b_x = patch->b[0], b_y = patch->b[1], b_z = patch->b[2];
   const float o_x = patch->axis[0], o_y = patch->axis[1], o_z = patch->axis[2];
   const float bind_length = bind_patches[bone].length, length = patch->length;
-  const float bind_reach_head = ends[bone].bind_reach[0], bind_reach_tail = ends[bone].bind_reach[1];
-  const float reach_head = ends[bone].reach[0], reach_tail = ends[bone].reach[1];
+  const float bind_extension_head = ends[bone].bind_extension[0], bind_extension_tail = ends[bone].bind_extension[1];
+  const float extension_head = ends[bone].extension[0], extension_tail = ends[bone].extension[1];
   __local float* restrict tail = loops + 3 * SKIN_BLOCK;
   const int item = get_local_id(0);
   read_arcs(item, count, ends[bone].arc_count[0], arcs + ends[bone].first_arc[0], angle + vertex, loops);
@@ -131,24 +142,20 @@ __kernel void pose_by_coordinates(const int block_count, const int is_distance_k
     const float q_s = (across * turn_cosine - ray * change) * scale;
     const float q_o = (across * change + ray * turn_cosine) * scale;
 
-    // Where it leaves the capsule, in ray lengths (leave_capsule of frame.h). Near seams both capsules are drawn out
-    // (PosedRow).
+    // Where it leaves the capsule, in ray lengths. Near seams both capsules extend past the bone's ends (PosedRow).
     const float near_head = fmax(0.0f, 1.0f - axial / POSED_SEAM_SHARE),
                 near_tail = fmax(0.0f, 1.0f - (1.0f - axial) / POSED_SEAM_SHARE);
     const float share_head = near_tail * near_tail, share_tail = near_head * near_head;
-    const float past =
-        fmax(0.0f, fmax(-share_head * bind_reach_head - along, along - bind_length - share_tail * bind_reach_tail));
+    const float past = fmax(
+        0.0f, fmax(-share_head * bind_extension_head - along, along - bind_length - share_tail * bind_extension_tail));
     const float e2 = across * across + ray * ray;
     const float e2_inverse = e2 > 0.0f ? 1.0f / e2 : 0.0f;
     const float radius2 = (across * across + past * past) * e2_inverse;
-    const float sin2 = q_s * q_s * e2_inverse;
     const float foot = axial * length;
-    const float rest = q_o < 0.0f ? foot + share_head * reach_head : length - foot + share_tail * reach_tail;
-    const float rest2 = rest * rest * e2_inverse;
-    const int is_cylinder = q_o * q_o * e2_inverse * radius2 <= rest2 * sin2;
-    const float root = sqrt(is_cylinder ? radius2 / sin2 : fmax(0.0f, radius2 - rest2 * sin2));
-    const float m_capsule = is_cylinder ? root : rest * fabs(q_o) * e2_inverse + root;
-    const float m = is_distance_kept ? (e2 > 0.0f ? m_capsule : 0.0f) : 1.0f;
+    const float m_capsule =
+        leave_capsule_of_radius(q_o, q_s * q_s * e2_inverse, e2_inverse, foot + share_head * extension_head,
+                                length - foot + share_tail * extension_tail, radius2);
+    const float m = p.is_distance_kept ? (e2 > 0.0f ? m_capsule : 0.0f) : 1.0f;
 
     SIN_COS(turned + roll_head + eased * (roll_tail - roll_head), sine, cosine);
     const float p_s = m * q_s * cosine;

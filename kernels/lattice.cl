@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The decoder's triangles over points per texel, while texels still move. A quad is that to the right of and above its
 // texel, between inner rows; see quad_diagonal.h for its diagonals.
-//   choose_diagonals         of all quads
-//   choose_listed_diagonals  of some
 #include "quad_diagonal.h"
 #include "row_group.h"
 #include "skeletex_structs.h"
@@ -117,43 +115,4 @@ kernel void choose_diagonals(const int row_count, const int band, const int text
       }
     }
   }
-}
-
-#define RUN 8  // as in lattice_mesh.cpp
-
-// Of the quads of a run those that are asked for; all are away from where columns wrap round.
-__attribute__((always_inline)) void choose_run(int texel, int asked, int one, int texture_width, int has_before,
-                                               int has_after, int is_smooth, global const float* restrict x,
-                                               global const float* restrict y, global const float* restrict z,
-                                               global int* restrict diagonals) {
-  for (int j = 0; j < RUN * one; ++j) {
-    const int diagonal =
-        second_diagonal(texel + j, -one, one, 2 * one, texture_width, has_before, has_after, is_smooth, x, y, z);
-    diagonals[texel + j] = (asked >> j) & 1 ? diagonal : diagonals[texel + j];
-  }
-}
-
-// NDRange (count). Those of some texels anew, by runs of RUN columns that follow each other. No two have a quad in
-// common. in   listed: a run's first texel; asked: a bit for each of its quads; listed_patches: per run
-kernel void choose_listed_diagonals(const int count, const int texture_width, const int is_smooth,
-                                    global const int* restrict listed, global const int* restrict asked,
-                                    global const int* restrict listed_patches,
-                                    global const PatchRecord* restrict patches, global const float* restrict x,
-                                    global const float* restrict y, global const float* restrict z,
-                                    global int* restrict diagonals) {
-  const int i = (int)get_global_id(0);
-  if (i >= count) return;
-  global const PatchRecord* restrict p = patches + listed_patches[i];
-  const int texel = listed[i], line = texel / texture_width, row = line - p->y,
-            column = texel - line * texture_width - p->x, width = p->width;
-  const int has_before = row > 1, has_after = row + 2 < p->height - 1, one = min(width, 1), own = asked[i];
-  if (column >= 1 && column + RUN + 2 <= width && is_smooth)
-    choose_run(texel, own, one, texture_width, has_before, has_after, 1, x, y, z, diagonals);
-  else if (column >= 1 && column + RUN + 2 <= width)
-    choose_run(texel, own, one, texture_width, has_before, has_after, 0, x, y, z, diagonals);
-  else
-    for (int j = 0; own >> j != 0; ++j)
-      if ((own >> j) & 1)
-        diagonals[texel + j] =
-            second_diagonal_at(texel + j, column + j, width, texture_width, has_before, has_after, is_smooth, x, y, z);
 }

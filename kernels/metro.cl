@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: MIT
 // The nearest triangle of a mesh to each of many points.
 //
-// In:   px, py, pz       points, planes of `count`; relative to the tree's origin, in units of its scale. Points that
-//                        follow each other should be near each other: each starts from its predecessor's block.
+// In:   points           planes x, y, z; relative to the tree's origin, in units of its scale. Points that follow each
+//                        other should be near each other: each starts from its predecessor's block.
 //       boxes            six vectors per node: least x, y, z and greatest x, y, z of its eight children
 //       blocks           nine vectors per block of eight triangles: first vertex, edge to the second, edge to the third
 //       level_begin      per level of the tree, its first node in `boxes`; level 0 are the blocks
 //                        (layout: core/skeletex/geometry/triangle_tree.h)
-//       enough_squared   a triangle so near need not be the nearest; 0: always the nearest
-//       bounds_squared   with has_bounds per point how far, squared, the nearest triangle is at most; a point with
-//       nothing so near is looked at without
+//       bounds_squared   per point an upper bound of the squared distance to the nearest triangle, if has_bounds; a
+//                        point with no triangle within its bound is searched for again without
 // Out:  nearest          per point, the nearest triangle's place in the tree
 //       nearest_squared  per point, its squared distance, as exact as float32 allows
 // NDRange: one item per `run` consecutive points.
@@ -17,6 +16,8 @@
 // Vectors of eight are the width of the tree, not of a pixel: one point against eight boxes or triangles at a time
 // fills the registers of a CPU and is plain scalar code on a GPU. At most 8 levels above the blocks (134 million
 // triangles).
+
+#include "metro_structs.h"
 
 #define STACK_SIZE 64
 #define BEYOND_ALL 1e30f  // less than to the places past the end
@@ -76,14 +77,15 @@ inline float8 squared_to_boxes(global const float8* restrict node, const float p
   return dx * dx + dy * dy + dz * dz;
 }
 
-kernel void find_nearest_triangles(global const float* restrict px, global const float* restrict py,
-                                   global const float* restrict pz, const int count, const int run,
+kernel void find_nearest_triangles(const NearestParameters p, global const float* restrict points,
                                    global const float8* restrict boxes, global const float8* restrict blocks,
-                                   constant int* restrict level_begin, const int top_level, const float enough_squared,
-                                   const int has_bounds, global const float* restrict bounds_squared,
+                                   constant int* restrict level_begin, global const float* restrict bounds_squared,
                                    global int* restrict nearest, global float* restrict nearest_squared) {
-  const int begin = (int)get_global_id(0) * run;
-  const int end = min(begin + run, count);
+  global const float* restrict px = points;
+  global const float* restrict py = px + p.count;
+  global const float* restrict pz = py + p.count;
+  const int begin = (int)get_global_id(0) * p.run;
+  const int end = min(begin + p.run, p.count);
   int block = -1;  // the previous point's
   for (int i = begin; i < end; ++i) {
     const float x = px[i], y = py[i], z = pz[i];
@@ -91,7 +93,7 @@ kernel void find_nearest_triangles(global const float* restrict px, global const
     float best = BEYOND_ALL;
     int best_place = -1;
     // Again where there is nothing within the bound.
-    for (int round = has_bounds ? 0 : 1; round < 2 && best_place < 0; ++round) {
+    for (int round = p.has_bounds ? 0 : 1; round < 2 && best_place < 0; ++round) {
       best = round == 0 ? bounds_squared[i] : BEYOND_ALL;
       if (first_block >= 0) {
         const float8 squared = squared_to_block(blocks + 9 * first_block, x, y, z);
@@ -104,8 +106,8 @@ kernel void find_nearest_triangles(global const float* restrict px, global const
       int stack_node[STACK_SIZE];
       float stack_squared[STACK_SIZE];
       int size = 0;
-      int level = top_level, index = 0;
-      while (best > enough_squared) {
+      int level = p.top_level, index = 0;
+      while (best > p.enough_squared) {
         if (level > 0) {
           const float8 squared = squared_to_boxes(boxes + 6 * (level_begin[level] + index), x, y, z);
           uint lanes = bits_of(squared < (float8)(best));

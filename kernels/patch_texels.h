@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Texels of a patch and their neighbours.
+#include "skeletex_structs.h"
 
 // The texel at (column, row) of a patch; a column may be beyond either end by less than the width, it wraps round.
 int texel_at(global const PatchRecord* restrict p, int texture_width, int column, int row) {

@@ -5,26 +5,32 @@
 // Rows and launches as in reconstruct.cl: a table of lattice rows, four ints each (patch, row, number of its first
 // vertex, unused), one work-group per row, work-items take columns in turn, plain scalars and selects so that the loop
 // over columns becomes vector instructions on a CPU.
-//   bind_patches, rows, bind_columns   the bind pose's tables; columns as four planes: cosine, sine, slope_head,
-//   slope_tail patches, posed_rows, columns       the pose's; columns as four planes: roll_head, roll_tail, slope_head,
-//   slope_tail along, around, out                 texels x, y, z                            the points, relative to the
-//   origin of the posed patch records
+//   rows, bind_columns              tables of the bind pose; columns as four planes: cosine, sine, slope_head,
+//   slope_tail patches, posed_rows, columns    of the pose; columns as four planes: roll_head, roll_tail, slope_head,
+//   slope_tail texels                          planes along, around, out points                          planes x, y,
+//   z, relative to the origin of the posed patch records
+#include "capsule.h"
 #include "pose_math.h"
+#include "reconstruct_structs.h"
 #include "skeletex_structs.h"
 
 // Rows whose capsule is the bone's own. The texel's length is its distance from the bone; see displace for the rest.
-__kernel void displace_posed(const int row_count, const int texture_width, const int column_count,
-                             __global const int* restrict lattice_rows, __global const RowRecord* restrict rows,
-                             __global const float* restrict bind_columns, __global const PatchRecord* restrict patches,
-                             __global const float* restrict columns, __global const float* restrict along,
-                             __global const float* restrict around, __global const float* restrict out,
-                             __global float* restrict x, __global float* restrict y, __global float* restrict z) {
+__kernel void displace_posed(const DisplaceParameters p, __global const int* restrict lattice_rows,
+                             __global const RowRecord* restrict rows, __global const float* restrict bind_columns,
+                             __global const PatchRecord* restrict patches, __global const float* restrict columns,
+                             __global const float* restrict texels, __global float* restrict points) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
+  if (k >= p.row_count) return;
+  __global const float* restrict along = texels;
+  __global const float* restrict around = along + p.texel_count;
+  __global const float* restrict out = around + p.texel_count;
+  __global float* restrict x = points;
+  __global float* restrict y = x + p.point_count;
+  __global float* restrict z = y + p.point_count;
   __global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
   const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
   const int width = patch->width;
-  const int texel = (patch->y + row) * texture_width + patch->x;
+  const int texel = (patch->y + row) * p.texture_width + patch->x;
   const float head_x = patch->head[0], head_y = patch->head[1], head_z = patch->head[2];
   const float s_x = patch->s[0], s_y = patch->s[1], s_z = patch->s[2];
   const float b_x = patch->b[0], b_y = patch->b[1], b_z = patch->b[2];
@@ -34,13 +40,13 @@ __kernel void displace_posed(const int row_count, const int texture_width, const
   const float eased = EASED(axial), ahead = axial - eased;
   const float foot = axial * patch->length, foot_to_tail = patch->length - foot;
   __global const float* restrict cosines = bind_columns + patch->column_begin;
-  __global const float* restrict sines = cosines + column_count;
-  __global const float* restrict bind_head_slopes = sines + column_count;
-  __global const float* restrict bind_tail_slopes = bind_head_slopes + column_count;
+  __global const float* restrict sines = cosines + p.column_count;
+  __global const float* restrict bind_head_slopes = sines + p.column_count;
+  __global const float* restrict bind_tail_slopes = bind_head_slopes + p.column_count;
   __global const float* restrict head_rolls = columns + patch->column_begin;
-  __global const float* restrict tail_rolls = head_rolls + column_count;
-  __global const float* restrict head_slopes = tail_rolls + column_count;
-  __global const float* restrict tail_slopes = head_slopes + column_count;
+  __global const float* restrict tail_rolls = head_rolls + p.column_count;
+  __global const float* restrict head_slopes = tail_rolls + p.column_count;
+  __global const float* restrict tail_slopes = head_slopes + p.column_count;
 
   const int step = get_local_size(0);
   for (int j = get_local_id(0); j < width; j += step) {
@@ -63,15 +69,7 @@ __kernel void displace_posed(const int row_count, const int texture_width, const
     const float across2 = q_s * q_s + c * c;
     const float e2 = across2 + q_o2;
     const float e2_inverse = 1.0f / e2;
-    const float sin2 = across2 * e2_inverse;
-    const float rest = q_o < 0.0f ? foot : foot_to_tail;
-    const float rest2 = rest * rest;
-    const float remainder2 = fmax(0.0f, 1.0f - rest2 * e2_inverse * sin2);
-    const int is_cylinder = q_o2 <= rest2 * sin2;
-    const float root = sqrt(is_cylinder ? sin2 : remainder2);
-    const float m_cylinder = 1.0f / root;
-    const float m_sphere = rest * fabs(q_o) * e2_inverse + root;
-    const float m_capsule = is_cylinder ? m_cylinder : m_sphere;
+    const float m_capsule = leave_capsule_of_own_length(q_o, across2 * e2_inverse, e2_inverse, foot, foot_to_tail);
     const float m = e2 > 0.0f ? m_capsule : 0.0f;
 
     const float p_s = m * (q_s * cosine - c * sine);
@@ -83,23 +81,28 @@ __kernel void displace_posed(const int row_count, const int texture_width, const
   }
 }
 
-// Any rows. The bind pose's point is restored first: near seams the capsule is drawn out past the bone's ends, in the
-// bind pose and in this one alike (PosedRowRecord), and its radius is the bind point's distance from the drawn-out
-// bone. With is_distance_kept = 0 the point keeps its distance from the foot instead.
-__kernel void displace_posed_from_bind(
-    const int row_count, const int texture_width, const int column_count, const int is_distance_kept,
-    __global const int* restrict lattice_rows, __global const PatchRecord* restrict bind_patches,
-    __global const RowRecord* restrict rows, __global const float* restrict bind_columns,
-    __global const PatchRecord* restrict patches, __global const PosedRowRecord* restrict posed_rows,
-    __global const float* restrict columns, __global const float* restrict along, __global const float* restrict around,
-    __global const float* restrict out, __global float* restrict x, __global float* restrict y,
-    __global float* restrict z) {
+// Any rows. The bind pose's point is restored first. Near seams the capsule extends past the bone's ends, in the bind
+// pose and in this one alike (PosedRowRecord), and its radius is the bind point's distance from the extended bone. With
+// is_distance_kept = 0 the point keeps its distance from the foot instead.
+__kernel void displace_posed_from_bind(const DisplaceParameters p, __global const int* restrict lattice_rows,
+                                       __global const RowRecord* restrict rows,
+                                       __global const float* restrict bind_columns,
+                                       __global const PatchRecord* restrict patches,
+                                       __global const PosedRowRecord* restrict posed_rows,
+                                       __global const float* restrict columns, __global const float* restrict texels,
+                                       __global float* restrict points) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
+  if (k >= p.row_count) return;
+  __global const float* restrict along = texels;
+  __global const float* restrict around = along + p.texel_count;
+  __global const float* restrict out = around + p.texel_count;
+  __global float* restrict x = points;
+  __global float* restrict y = x + p.point_count;
+  __global float* restrict z = y + p.point_count;
   __global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
   const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
   const int width = patch->width;
-  const int texel = (patch->y + row) * texture_width + patch->x;
+  const int texel = (patch->y + row) * p.texture_width + patch->x;
   const float head_x = patch->head[0], head_y = patch->head[1], head_z = patch->head[2];
   const float s_x = patch->s[0], s_y = patch->s[1], s_z = patch->s[2];
   const float b_x = patch->b[0], b_y = patch->b[1], b_z = patch->b[2];
@@ -108,20 +111,20 @@ __kernel void displace_posed_from_bind(
   const float axial = record->axial, cap_cos = record->cap_cos, cap_sin = record->cap_sin;
   const float eased = EASED(axial), ahead = axial - eased;
   __global const PosedRowRecord* restrict posed_row = posed_rows + patch->row_begin + row;
-  const float bind_length = bind_patches[lattice_rows[4 * k]].length;
+  const float bind_length = posed_row->bind_length;
   const float bind_foot = axial * bind_length, bind_foot_to_tail = bind_length - bind_foot;
-  const float lowest = -posed_row->bind_reach_head, highest = bind_length + posed_row->bind_reach_tail;
+  const float lowest = -posed_row->bind_extension_head, highest = bind_length + posed_row->bind_extension_tail;
   const float foot = axial * patch->length;
-  const float foot_to_lower = foot + posed_row->reach_head,
-              foot_to_upper = patch->length + posed_row->reach_tail - foot;
+  const float foot_to_lower = foot + posed_row->extension_head,
+              foot_to_upper = patch->length + posed_row->extension_tail - foot;
   __global const float* restrict cosines = bind_columns + patch->column_begin;
-  __global const float* restrict sines = cosines + column_count;
-  __global const float* restrict bind_head_slopes = sines + column_count;
-  __global const float* restrict bind_tail_slopes = bind_head_slopes + column_count;
+  __global const float* restrict sines = cosines + p.column_count;
+  __global const float* restrict bind_head_slopes = sines + p.column_count;
+  __global const float* restrict bind_tail_slopes = bind_head_slopes + p.column_count;
   __global const float* restrict head_rolls = columns + patch->column_begin;
-  __global const float* restrict tail_rolls = head_rolls + column_count;
-  __global const float* restrict head_slopes = tail_rolls + column_count;
-  __global const float* restrict tail_slopes = head_slopes + column_count;
+  __global const float* restrict tail_rolls = head_rolls + p.column_count;
+  __global const float* restrict head_slopes = tail_rolls + p.column_count;
+  __global const float* restrict tail_slopes = head_slopes + p.column_count;
 
   const int step = get_local_size(0);
   for (int j = get_local_id(0); j < width; j += step) {
@@ -137,13 +140,8 @@ __kernel void displace_posed_from_bind(
     const float bind_q_s = (w * cap_cos - a * bind_f_o) * bind_f_inverse;
     const float bind_q_o = (w * bind_f_o + a * cap_cos) * bind_f_inverse;
     const float bind_across2 = bind_q_s * bind_q_s + c2;
-    const float bind_sin2 = bind_across2 * e2_inverse;
-    const float bind_rest = bind_q_o < 0.0f ? bind_foot : bind_foot_to_tail;
-    const float bind_rest2 = bind_rest * bind_rest;
-    const int is_bind_cylinder = bind_q_o * bind_q_o <= bind_rest2 * bind_sin2;
-    const float bind_root =
-        sqrt(is_bind_cylinder ? 1.0f / bind_sin2 : fmax(0.0f, 1.0f - bind_rest2 * e2_inverse * bind_sin2));
-    const float bind_m = is_bind_cylinder ? bind_root : bind_rest * fabs(bind_q_o) * e2_inverse + bind_root;
+    const float bind_m =
+        leave_capsule_of_radius(bind_q_o, bind_across2 * e2_inverse, e2_inverse, bind_foot, bind_foot_to_tail, 1.0f);
 
     // The radius, squared, in units of e^2.
     const float bind_z = bind_foot + bind_m * bind_q_o;
@@ -156,13 +154,9 @@ __kernel void displace_posed_from_bind(
     const float f_inverse = 1.0f / sqrt(cap_cos * cap_cos + f_o * f_o);
     const float q_s = (w * cap_cos - a * f_o) * f_inverse;
     const float q_o = (w * f_o + a * cap_cos) * f_inverse;
-    const float sin2 = (q_s * q_s + c2) * e2_inverse;
-    const float rest = q_o < 0.0f ? foot_to_lower : foot_to_upper;
-    const float rest2 = rest * rest;
-    const int is_cylinder = q_o * q_o * g <= rest2 * sin2;
-    const float root = sqrt(is_cylinder ? g / sin2 : fmax(0.0f, g - rest2 * e2_inverse * sin2));
-    const float m_capsule = is_cylinder ? root : rest * fabs(q_o) * e2_inverse + root;
-    const float m_any = is_distance_kept ? m_capsule : bind_m;
+    const float m_capsule =
+        leave_capsule_of_radius(q_o, (q_s * q_s + c2) * e2_inverse, e2_inverse, foot_to_lower, foot_to_upper, g);
+    const float m_any = p.is_distance_kept ? m_capsule : bind_m;
     const float m = e2 > 0.0f ? m_any : 0.0f;
 
     const float roll = head_rolls[j] + eased * (tail_rolls[j] - head_rolls[j]);

@@ -4,30 +4,36 @@
 // Rows. Every kernel runs over a table of lattice rows, so that one launch serves all patches: four ints per row,
 // (patch, row, number of its first vertex in the planes of points, number of its first quad). NDRange: one work-group
 // per row, of any size; work-items take columns in turn, so that neighbours touch neighbouring texels. On a GPU a group
-// of some warps is meant; on a CPU groups of one, where the loop over columns is what the compiler turns into vector
+// of some warps is meant. On a CPU groups of one are, and the compiler turns the loop over columns into vector
 // instructions: hence plain scalars on separate planes, selects instead of branches, and what belongs to the row loaded
-// before the loop. A texel lies at (patch.y + row) * texture_width + patch.x + column of its plane. The column table
-// comes as four planes of column_count floats behind each other: cosine, sine, slope_head, slope_tail (see
-// ColumnRecord).
+// before the loop.
+// Planes. Points (x, y, z) and texels (along, around, out) are planes behind each other in one buffer. A texel lies at
+// (patch.y + row) * texture_width + patch.x + column of its plane. The column table is four planes of column_count
+// floats: cosine, sine, slope_head, slope_tail (see ColumnRecord).
+#include "capsule.h"
 #include "quad_diagonal.h"
+#include "reconstruct_structs.h"
 #include "skeletex_structs.h"
 
-// in   along, around, out: texels
-// out  x, y, z: the points, relative to the origin of the patch records
-// The point is foot + m q, where q is the texel turned into the bone's own axes (s', o x s', o) and m q leaves the
-// capsule of radius |q| around the bone: its cylinder, or the sphere at the end that q runs towards.
-__kernel void displace(const int row_count, const int texture_width, const int column_count,
-                       __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
-                       __global const RowRecord* restrict rows, __global const float* restrict columns,
-                       __global const float* restrict along, __global const float* restrict around,
-                       __global const float* restrict out, __global float* restrict x, __global float* restrict y,
-                       __global float* restrict z) {
+// The points of texels, relative to the origin of the patch records.
+// The point is foot + m q, where q is the texel turned into the bone's own axes (s', o x s', o), and m q is where the
+// ray along q leaves the capsule of radius |q| around the bone (capsule.h).
+__kernel void displace(const DisplaceParameters p, __global const int* restrict lattice_rows,
+                       __global const PatchRecord* restrict patches, __global const RowRecord* restrict rows,
+                       __global const float* restrict columns, __global const float* restrict texels,
+                       __global float* restrict points) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
+  if (k >= p.row_count) return;
+  __global const float* restrict along = texels;
+  __global const float* restrict around = along + p.texel_count;
+  __global const float* restrict out = around + p.texel_count;
+  __global float* restrict x = points;
+  __global float* restrict y = x + p.point_count;
+  __global float* restrict z = y + p.point_count;
   __global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
   const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
   const int width = patch->width;
-  const int texel = (patch->y + row) * texture_width + patch->x;
+  const int texel = (patch->y + row) * p.texture_width + patch->x;
   const float head_x = patch->head[0], head_y = patch->head[1], head_z = patch->head[2];
   const float s_x = patch->s[0], s_y = patch->s[1], s_z = patch->s[2];
   const float b_x = patch->b[0], b_y = patch->b[1], b_z = patch->b[2];
@@ -36,9 +42,9 @@ __kernel void displace(const int row_count, const int texture_width, const int c
   const float axial = record->axial, cap_cos = record->cap_cos, cap_sin = record->cap_sin;
   const float foot = axial * patch->length, foot_to_tail = patch->length - foot;
   __global const float* restrict cosines = columns + patch->column_begin;
-  __global const float* restrict sines = cosines + column_count;
-  __global const float* restrict head_slopes = sines + column_count;
-  __global const float* restrict tail_slopes = head_slopes + column_count;
+  __global const float* restrict sines = cosines + p.column_count;
+  __global const float* restrict head_slopes = sines + p.column_count;
+  __global const float* restrict tail_slopes = head_slopes + p.column_count;
 
   const int step = get_local_size(0);
   for (int j = get_local_id(0); j < width; j += step) {
@@ -53,23 +59,11 @@ __kernel void displace(const int row_count, const int texture_width, const int c
     const float q_s = (w * f_s - a * f_o) * f_inverse;
     const float q_o = (w * f_o + a * f_s) * f_inverse;
 
-    // Where m q leaves the cylinder m = 1 / sin, sin = |q across o| / |q|; that is no further than the end ahead when
-    // |q_o| <= rest sin. Else |foot + m q - end| = |q| gives m = |q_o| rest / |q|^2 + sqrt(1 - rest^2 sin^2 / |q|^2).
-    // One square root serves both: two next to each other would be paired by PoCL's compiler, which then no longer
-    // vectorises the loop.
     const float q_o2 = q_o * q_o;
     const float across2 = q_s * q_s + c * c;
     const float e2 = across2 + q_o2;
     const float e2_inverse = 1.0f / e2;
-    const float sin2 = across2 * e2_inverse;
-    const float rest = q_o < 0.0f ? foot : foot_to_tail;
-    const float rest2 = rest * rest;
-    const float remainder2 = fmax(0.0f, 1.0f - rest2 * e2_inverse * sin2);
-    const int is_cylinder = q_o2 <= rest2 * sin2;
-    const float root = sqrt(is_cylinder ? sin2 : remainder2);
-    const float m_cylinder = 1.0f / root;
-    const float m_sphere = rest * fabs(q_o) * e2_inverse + root;
-    const float m_capsule = is_cylinder ? m_cylinder : m_sphere;
+    const float m_capsule = leave_capsule_of_own_length(q_o, across2 * e2_inverse, e2_inverse, foot, foot_to_tail);
     const float m = e2 > 0.0f ? m_capsule : 0.0f;
 
     const float p_s = m * (q_s * cosine - c * sine);
@@ -103,15 +97,18 @@ void vertices_around(int vertex, int width, int column, int has_before, int has_
   }
 }
 
-// Both triangles of every quad between a row and the next, by the nearer diagonal.
-// in   x, y, z: the vertices of inner rows; the next row follows its row in them
+// Both triangles of every quad between a row and the next, by the nearer diagonal or, for models whose texels lie on
+// edges of the surface, by the smoother one.
+// in   points: the vertices of inner rows; the next row follows its row in them
 // out  triangles: six indices per quad, counter-clockwise from outside (u along, v around is clockwise)
-__kernel void triangulate_quads(const int row_count, __global const int* restrict lattice_rows,
-                                __global const PatchRecord* restrict patches, __global const float* restrict x,
-                                __global const float* restrict y, __global const float* restrict z,
-                                __global int* restrict triangles) {
+__kernel void triangulate(const TriangulateParameters p, __global const int* restrict lattice_rows,
+                          __global const PatchRecord* restrict patches, __global const float* restrict points,
+                          __global int* restrict triangles) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
+  if (k >= p.row_count) return;
+  __global const float* restrict x = points;
+  __global const float* restrict y = x + p.point_count;
+  __global const float* restrict z = y + p.point_count;
   const int width = patches[lattice_rows[4 * k]].width;
   const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2], quad = lattice_rows[4 * k + 3];
   const int has_before = row > 1, has_after = row + 2 < patches[lattice_rows[4 * k]].height - 1;
@@ -119,42 +116,30 @@ __kernel void triangulate_quads(const int row_count, __global const int* restric
   for (int j = get_local_id(0); j < width; j += step) {
     int at[4][4];
     vertices_around(vertex, width, j, has_before, has_after, at);
-    write_quad(triangles + 6 * (quad + j), takes_second_if_nearer(at, has_before, has_after, x, y, z), at);
-  }
-}
-
-// The same by the smoother diagonal, for models whose texels sit on edges of the surface.
-__kernel void triangulate_smoothly(const int row_count, __global const int* restrict lattice_rows,
-                                   __global const PatchRecord* restrict patches, __global const float* restrict x,
-                                   __global const float* restrict y, __global const float* restrict z,
-                                   __global int* restrict triangles) {
-  const int k = get_group_id(0);
-  if (k >= row_count) return;
-  const int width = patches[lattice_rows[4 * k]].width;
-  const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2], quad = lattice_rows[4 * k + 3];
-  const int has_before = row > 1, has_after = row + 2 < patches[lattice_rows[4 * k]].height - 1;
-  const int step = get_local_size(0);
-  for (int j = get_local_id(0); j < width; j += step) {
-    int at[4][4];
-    vertices_around(vertex, width, j, has_before, has_after, at);
-    write_quad(triangles + 6 * (quad + j), takes_second_if_smoother(at, has_before, has_after, x, y, z), at);
+    const int is_second = p.is_smooth ? takes_second_if_smoother(at, has_before, has_after, x, y, z)
+                                      : takes_second_if_nearer(at, has_before, has_after, x, y, z);
+    write_quad(triangles + 6 * (quad + j), is_second, at);
   }
 }
 
 // One axis of a resampling: out at (new row, column) = sum of weights times in at old rows of the same column.
 // in   taps: per new row of all patches, in the order of the row table, four ints: (first old row, count, first weight,
-//      unused); patches: the new ones; widths, first_in: per patch the row length of `in` and where the patch begins in
-//      it
-// out  planes; rows of `widths` columns
-__kernel void filter_rows(const int row_count, __global const int* restrict lattice_rows,
+//      unused). patches: the new ones. widths, first_in: per patch the row length of `in` and where the patch begins in
+//      it. in: points
+// out  points in rows of `widths` columns
+__kernel void filter_rows(const ResampleParameters p, __global const int* restrict lattice_rows,
                           __global const PatchRecord* restrict patches, __global const int* restrict widths,
                           __global const int* restrict first_in, __global const int* restrict taps,
-                          __global const float* restrict weights, __global const float* restrict in_x,
-                          __global const float* restrict in_y, __global const float* restrict in_z,
-                          __global float* restrict out_x, __global float* restrict out_y,
-                          __global float* restrict out_z) {
+                          __global const float* restrict weights, __global const float* restrict in,
+                          __global float* restrict out) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
+  if (k >= p.row_count) return;
+  __global const float* restrict in_x = in;
+  __global const float* restrict in_y = in_x + p.in_count;
+  __global const float* restrict in_z = in_y + p.in_count;
+  __global float* restrict out_x = out;
+  __global float* restrict out_y = out_x + p.out_count;
+  __global float* restrict out_z = out_y + p.out_count;
   const int patch = lattice_rows[4 * k], vertex = lattice_rows[4 * k + 2];
   const int width = widths[patch];
   __global const int* restrict tap = taps + 4 * (patches[patch].row_begin + lattice_rows[4 * k + 1]);
@@ -182,17 +167,21 @@ __kernel void filter_rows(const int row_count, __global const int* restrict latt
 // The other axis: columns, which wrap round.
 // in   taps: per new column of all patches, in the order of the column table, four ints: (first old column, count,
 // first
-//      weight, unused), the first in [0, old width) and the count at most the old width; the rest as above
-// out  planes; rows as wide as the patches
-__kernel void filter_columns(const int row_count, __global const int* restrict lattice_rows,
+//      weight, unused), the first in [0, old width) and the count at most the old width. The rest as above
+// out  points in rows as wide as the patches
+__kernel void filter_columns(const ResampleParameters p, __global const int* restrict lattice_rows,
                              __global const PatchRecord* restrict patches, __global const int* restrict widths,
                              __global const int* restrict first_in, __global const int* restrict taps,
-                             __global const float* restrict weights, __global const float* restrict in_x,
-                             __global const float* restrict in_y, __global const float* restrict in_z,
-                             __global float* restrict out_x, __global float* restrict out_y,
-                             __global float* restrict out_z) {
+                             __global const float* restrict weights, __global const float* restrict in,
+                             __global float* restrict out) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
+  if (k >= p.row_count) return;
+  __global const float* restrict in_x = in;
+  __global const float* restrict in_y = in_x + p.in_count;
+  __global const float* restrict in_z = in_y + p.in_count;
+  __global float* restrict out_x = out;
+  __global float* restrict out_y = out_x + p.out_count;
+  __global float* restrict out_z = out_y + p.out_count;
   const int patch = lattice_rows[4 * k], vertex = lattice_rows[4 * k + 2];
   const int old_width = widths[patch], width = patches[patch].width;
   const int row = first_in[patch] + lattice_rows[4 * k + 1] * old_width;
@@ -217,16 +206,22 @@ __kernel void filter_columns(const int row_count, __global const int* restrict l
 }
 
 // Keeps fitted points near sampled ones: a fitted point is off by at most `share` of an edge of the sampled lattice
-// that ends there, the longer of (the shorter one along the rows, the shorter one around). A least-squares fit moves
-// points by a small part of an edge where the surface is smooth; where it jumps, one edge is long and the fit swings
-// out beside it. in   sampled_x, _y, _z; x, y, z: fitted; both in the order of the rows, all rows of every patch out x,
-// y, z
-__kernel void limit_fit(const int row_count, const float share, __global const int* restrict lattice_rows,
-                        __global const PatchRecord* restrict patches, __global const float* restrict sampled_x,
-                        __global const float* restrict sampled_y, __global const float* restrict sampled_z,
-                        __global float* restrict x, __global float* restrict y, __global float* restrict z) {
+// that ends there. That edge is the longer of two: the shorter one along the rows and the shorter one around. A
+// least-squares fit moves points by a small part of an edge where the surface is smooth; where it jumps, one edge is
+// long, and the fit swings out next to it.
+// in      sampled: points of all rows of every patch, in_count per plane
+// in/out  fitted: the same, out_count per plane
+__kernel void limit_fit(const ResampleParameters p, __global const int* restrict lattice_rows,
+                        __global const PatchRecord* restrict patches, __global const float* restrict sampled,
+                        __global float* restrict fitted) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
+  if (k >= p.row_count) return;
+  __global const float* restrict sampled_x = sampled;
+  __global const float* restrict sampled_y = sampled_x + p.in_count;
+  __global const float* restrict sampled_z = sampled_y + p.in_count;
+  __global float* restrict x = fitted;
+  __global float* restrict y = x + p.out_count;
+  __global float* restrict z = y + p.out_count;
   __global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
   const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
   const int width = patch->width;
@@ -243,7 +238,7 @@ __kernel void limit_fit(const int row_count, const float share, __global const i
                   ez = sampled_z[neighbours[i]] - pz;
       lengths2[i] = ex * ex + ey * ey + ez * ez;
     }
-    const float most2 = share * share * fmax(fmin(lengths2[0], lengths2[1]), fmin(lengths2[2], lengths2[3]));
+    const float most2 = p.share * p.share * fmax(fmin(lengths2[0], lengths2[1]), fmin(lengths2[2], lengths2[3]));
     const float dx = x[v] - px, dy = y[v] - py, dz = z[v] - pz;
     const float move2 = dx * dx + dy * dy + dz * dz;
     const float kept = move2 > most2 ? sqrt(most2 / move2) : 1.0f;
@@ -255,29 +250,32 @@ __kernel void limit_fit(const int row_count, const float share, __global const i
 
 // Texels of points: the inverse of displace. A texel is the direction from the foot in the frame (along, around, out),
 // scaled to the distance of the point from the bone.
-// in   x, y, z: points in the bone's own axes: from H along s, b, o
-// out  along, around, out: texels, at their places in the texture
-__kernel void enter_tangent_space(const int row_count, const int texture_width, const int column_count,
-                                  __global const int* restrict lattice_rows,
+// in   points: in the bone's own axes, from H along s, b, o
+// out  texels, at their places in the texture
+__kernel void enter_tangent_space(const DisplaceParameters p, __global const int* restrict lattice_rows,
                                   __global const PatchRecord* restrict patches, __global const RowRecord* restrict rows,
-                                  __global const float* restrict columns, __global const float* restrict x,
-                                  __global const float* restrict y, __global const float* restrict z,
-                                  __global float* restrict along, __global float* restrict around,
-                                  __global float* restrict out) {
+                                  __global const float* restrict columns, __global const float* restrict points,
+                                  __global float* restrict texels) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
+  if (k >= p.row_count) return;
+  __global const float* restrict x = points;
+  __global const float* restrict y = x + p.point_count;
+  __global const float* restrict z = y + p.point_count;
+  __global float* restrict along = texels;
+  __global float* restrict around = along + p.texel_count;
+  __global float* restrict out = around + p.texel_count;
   __global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
   const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
   const int width = patch->width;
-  const int texel = (patch->y + row) * texture_width + patch->x;
+  const int texel = (patch->y + row) * p.texture_width + patch->x;
   const float bone_length = patch->length;
   __global const RowRecord* restrict record = rows + patch->row_begin + row;
   const float axial = record->axial, cap_cos = record->cap_cos, cap_sin = record->cap_sin;
   const float foot = axial * bone_length;
   __global const float* restrict cosines = columns + patch->column_begin;
-  __global const float* restrict sines = cosines + column_count;
-  __global const float* restrict head_slopes = sines + column_count;
-  __global const float* restrict tail_slopes = head_slopes + column_count;
+  __global const float* restrict sines = cosines + p.column_count;
+  __global const float* restrict head_slopes = sines + p.column_count;
+  __global const float* restrict tail_slopes = head_slopes + p.column_count;
 
   const int step = get_local_size(0);
   for (int j = get_local_id(0); j < width; j += step) {

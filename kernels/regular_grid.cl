@@ -39,19 +39,26 @@ void slopes_in(SurfaceCell c, global const float* restrict p, float* along_x, fl
 
 // One step of every texel towards the mean of its four neighbours, along the bilinear surface through the points. Rows
 // 0 and height - 1 and patches with `is_kept` do not move.
-// in   x, y, z: the lattice's own points
+// in   points: planes x, y, z of the lattice's own points
 //      offsets: from each texel's own point to its place, in cells: a plane along the columns, a plane along the rows
-//      at_x, at_y, at_z: the point there
+//      at: planes x, y, z of the points there
 // out  next_...: the same after the step
 kernel void slide_points(const SlideParameters slide, global const int* restrict lattice_rows,
                          global const PatchRecord* restrict patches, global const int* restrict is_kept,
-                         global const float* restrict x, global const float* restrict y, global const float* restrict z,
-                         global const float* restrict offsets, global const float* restrict at_x,
-                         global const float* restrict at_y, global const float* restrict at_z,
-                         global float* restrict next_offsets, global float* restrict next_x,
-                         global float* restrict next_y, global float* restrict next_z) {
+                         global const float* restrict points, global const float* restrict offsets,
+                         global const float* restrict at, global float* restrict next_offsets,
+                         global float* restrict next) {
   const int k = get_group_id(0), count = slide.point_count;
   if (k >= slide.row_count) return;
+  global const float* restrict x = points;
+  global const float* restrict y = x + count;
+  global const float* restrict z = y + count;
+  global const float* restrict at_x = at;
+  global const float* restrict at_y = at_x + count;
+  global const float* restrict at_z = at_y + count;
+  global float* restrict next_x = next;
+  global float* restrict next_y = next_x + count;
+  global float* restrict next_z = next_y + count;
   global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
   const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
   const int width = patch->width, height = patch->height;
@@ -85,13 +92,18 @@ kernel void slide_points(const SlideParameters slide, global const int* restrict
 }
 
 // The prefilter on inner rows. The table has the rows to do.
-// in   at_x, at_y, at_z    out  x, y, z
+// in   at: planes x, y, z    out  points: the same
 kernel void prefilter_rows(const SlideParameters slide, global const int* restrict lattice_rows,
-                           global const PatchRecord* restrict patches, global const float* restrict at_x,
-                           global const float* restrict at_y, global const float* restrict at_z,
-                           global float* restrict x, global float* restrict y, global float* restrict z) {
-  const int k = get_group_id(0);
+                           global const PatchRecord* restrict patches, global const float* restrict at,
+                           global float* restrict points) {
+  const int k = get_group_id(0), count = slide.point_count;
   if (k >= slide.row_count) return;
+  global const float* restrict at_x = at;
+  global const float* restrict at_y = at_x + count;
+  global const float* restrict at_z = at_y + count;
+  global float* restrict x = points;
+  global float* restrict y = x + count;
+  global float* restrict z = y + count;
   const int vertex = lattice_rows[4 * k + 2], width = patches[lattice_rows[4 * k]].width;
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
     const int own = vertex + j;

@@ -42,17 +42,18 @@ typedef struct ColumnRecord {
   float slope_tail;  ///< k_T(v)
 } ColumnRecord;
 
-/// What a pose adds to a row: how far past the bone's ends its capsule is drawn out (world units), in the bind pose and
-/// in this one.
+/// What a pose adds to a row: how far the row's capsule extends past the bone's ends, in the bind pose and in this one.
+/// World units.
 typedef struct PosedRowRecord {
-  float bind_reach_head;
-  float bind_reach_tail;
-  float reach_head;
-  float reach_tail;
+  float bind_extension_head;
+  float bind_extension_tail;
+  float extension_head;
+  float extension_tail;
+  float bind_length;  ///< of the bone in the bind pose
 } PosedRowRecord;
 
-/// The share of a bone's length, from a seam on, over which its capsule is drawn out: by (1 - axial parameter /
-/// share)^2 of what it is at the seam.
+/// The share of a bone's length, from a seam on, over which its capsule is extended: by (1 - axial parameter /
+/// share)^2 of the extension at the seam.
 #define POSED_SEAM_SHARE 0.25f
 
 /// What a pose adds to a column, at the bone's head and tail.
@@ -77,9 +78,9 @@ typedef struct PosedArcRecord {
 typedef struct PosedEndsRecord {
   SKELETEX_INT first_arc[2];  ///< in the table of PosedArcRecord
   SKELETEX_INT arc_count[2];
-  float bind_reach[2];  ///< PosedRowRecord's past the head at the tail's seam, and past the tail at the head's; world
-                        ///< units
-  float reach[2];
+  /// How far the capsule extends past the head at the tail's seam, and past the tail at the head's seam; world units.
+  float bind_extension[2];
+  float extension[2];  ///< the same in this pose
 } PosedEndsRecord;
 
 /// One joint of a walk along the skeleton, from the bone that a point belongs to towards other bones: see WeightWalks.
@@ -87,7 +88,7 @@ typedef struct WeightStep {
   float normal[3];      ///< (d_from - d_to) / girth: unit directions away from the joint along the two bones
   float girth_inverse;  ///< 1 / girth, the median distance of the seams at the joint to their bones
   float joint[3];       ///< relative to the model's origin
-  float reach;          ///< the largest distance of those seams to the joint
+  float seam_radius;    ///< the largest distance of those seams to the joint
   SKELETEX_INT bone;    ///< that the step leads to
   SKELETEX_INT before;  ///< the step before this one in the same walk; -1: it begins at the point's own bone
   SKELETEX_INT same;    ///< an earlier step of the walk that leads to the same bone; -1: none
@@ -122,7 +123,7 @@ static_assert(sizeof(BoneMotionRecord) == 4 * 17);
 static_assert(sizeof(PatchRecord) == 4 * 19);
 static_assert(sizeof(RowRecord) == 16);
 static_assert(sizeof(ColumnRecord) == 16);
-static_assert(sizeof(PosedRowRecord) == 16);
+static_assert(sizeof(PosedRowRecord) == 4 * 5);
 static_assert(sizeof(PosedColumnRecord) == 16);
 static_assert(sizeof(PosedArcRecord) == 4 * 5);
 static_assert(sizeof(PosedEndsRecord) == 4 * 8);

@@ -4,25 +4,26 @@
 // One work-group per block of at most SKIN_BLOCK vertices of a patch (SkinBlock). Work-items take vertices in turn,
 // ROW_ITEMS apart, so that neighbours touch neighbouring vertices; on a CPU groups of one, where the inner loop becomes
 // vector instructions. Every work-item reads and writes only its own vertices, so no barriers are needed.
+#include "reconstruct_structs.h"
 #include "skeletex_structs.h"
 #include "skin_weight.h"
 
 // The weights of the bones that the walk from each block's own bone leads to (see WeightWalks), those that are 0
 // included: those of step k of block b from (b * slots + k) * SKIN_BLOCK on, k = 0 the own bone. A step to a bone that
 // an earlier step leads to has none.
-//   first_block  the number of the block that the first group works on
-//   x, y, z      points in the bind pose, relative to the model's origin
-__kernel void bone_weights(const int block_count, const int first_block, const int slots,
-                           __global const SkinBlock* restrict blocks, __global const int* restrict first_steps,
-                           __global const WeightStep* restrict steps, __global const float* restrict x,
-                           __global const float* restrict y, __global const float* restrict z,
-                           __global float* restrict weights) {
+//   points   planes x, y, z in the bind pose, relative to the model's origin
+__kernel void bone_weights(const BlockParameters p, __global const SkinBlock* restrict blocks,
+                           __global const int* restrict first_steps, __global const WeightStep* restrict steps,
+                           __global const float* restrict points, __global float* restrict weights) {
   const int group = get_group_id(0);
-  if (group >= block_count) return;
-  __global const SkinBlock* restrict block = blocks + first_block + group;
+  if (group >= p.block_count) return;
+  __global const float* restrict x = points;
+  __global const float* restrict y = x + p.point_count;
+  __global const float* restrict z = y + p.point_count;
+  __global const SkinBlock* restrict block = blocks + p.first_block + group;
   const int vertex = block->first_vertex, count = block->vertex_count;
   const int first_step = first_steps[block->bone], step_count = first_steps[block->bone + 1] - first_step;
-  __global float* restrict own = weights + (size_t)group * slots * SKIN_BLOCK;
+  __global float* restrict own = weights + (size_t)group * p.slots * SKIN_BLOCK;
   const int item = get_local_id(0);
 
   for (int i = item; i < count; i += ROW_ITEMS) own[i] = 0.0f;
@@ -30,14 +31,14 @@ __kernel void bone_weights(const int block_count, const int first_block, const i
     __global const WeightStep* restrict step = steps + first_step + k;
     const float normal_x = step->normal[0], normal_y = step->normal[1], normal_z = step->normal[2];
     const float joint_x = step->joint[0], joint_y = step->joint[1], joint_z = step->joint[2];
-    const float reach = step->reach, girth_inverse = step->girth_inverse;
+    const float seam_radius = step->seam_radius, girth_inverse = step->girth_inverse;
     __global const float* restrict before = own + (step->before + 1) * SKIN_BLOCK;
     __global float* restrict here = own + (k + 1) * SKIN_BLOCK;
     for (int i = item; i < count; i += ROW_ITEMS) {
       const float from_x = x[vertex + i] - joint_x, from_y = y[vertex + i] - joint_y, from_z = z[vertex + i] - joint_z;
       const float height = from_x * normal_x + from_y * normal_y + from_z * normal_z;
       const float excess =
-          fmax(0.0f, sqrt(from_x * from_x + from_y * from_y + from_z * from_z) - reach) * girth_inverse;
+          fmax(0.0f, sqrt(from_x * from_x + from_y * from_y + from_z * from_z) - seam_radius) * girth_inverse;
       here[i] = before[i] + SKIN_CROSSING(height, excess);
     }
   }
@@ -99,18 +100,23 @@ __kernel void bone_weights(const int block_count, const int first_block, const i
   }
 
 // Bind points moved by the blend of their bones' motions (Kavan et al. 2008).
-//   block_bones, weights          as SkinBlock says
-//   motions                       per bone
-//   bind_x, bind_y, bind_z        points in the bind pose, relative to the model's origin
-//   x, y, z                       points in the pose, relative to the pose's origin
-//   is_stretched                  0 where no bone changes its length
-__kernel void skin(const int block_count, const int is_stretched, __global const SkinBlock* restrict blocks,
+//   block_bones, weights   as SkinBlock says
+//   motions                per bone
+//   bind_points            planes x, y, z in the bind pose, relative to the model's origin
+//   points                 planes x, y, z in the pose, relative to the pose's origin
+__kernel void skin(const BlockParameters p, __global const SkinBlock* restrict blocks,
                    __global const int* restrict block_bones, __global const float* restrict weights,
-                   __global const BoneMotionRecord* restrict motions, __global const float* restrict bind_x,
-                   __global const float* restrict bind_y, __global const float* restrict bind_z,
-                   __global float* restrict x, __global float* restrict y, __global float* restrict z) {
+                   __global const BoneMotionRecord* restrict motions, __global const float* restrict bind_points,
+                   __global float* restrict points) {
   const int group = get_group_id(0);
-  if (group >= block_count) return;
+  if (group >= p.block_count) return;
+  const int is_stretched = p.is_stretched;
+  __global const float* restrict bind_x = bind_points;
+  __global const float* restrict bind_y = bind_x + p.point_count;
+  __global const float* restrict bind_z = bind_y + p.point_count;
+  __global float* restrict x = points;
+  __global float* restrict y = x + p.point_count;
+  __global float* restrict z = y + p.point_count;
   __global const SkinBlock* restrict block = blocks + group;
   const int vertex = block->first_vertex, count = block->vertex_count, bone_count = block->bone_count;
   __global const int* restrict bones = block_bones + block->first_bone;

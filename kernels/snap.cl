@@ -4,8 +4,6 @@
 //                               vertices, strongest first, take the nearest texel that is free
 //   place_on_edges              free texels follow their neighbours half way, then go to the nearest point of a creased
 //   edge part_colours                rows by colour, see below; read_snapped in encode.cl has them the other way again
-//   put_listed_back             texels of a list, and what then folds in the map or in space, go back to the regular
-//   grid
 // A reading position is an offset from the texel's own place in the lattice, in cells: two planes over the texture, x
 // around, y along. Rows 0 and height-1 stay. `anchors` says what holds a texel: 0 nothing, 1 + i vertex i of the list
 // of vertices, -1 - i edge i. Vertices and edges come with their patch and their place (x, y) in its cells, x
@@ -29,17 +27,6 @@
 #define LOOKED_AT 1        // a mark of a texel's quad
 #define NONE -1            // of a bin's edges
 #define FLATTEST 5.0f      // of edges that texels look for again, see EdgeRecord: dihedral angles of 0.1 rad
-
-// The smallest cross product at the four corners of a quad in the map; 1 in the regular grid.
-float quad_cross(const float x[4], const float y[4]) {
-  float least = INFINITY;
-  for (int i = 0; i < 4; ++i) {
-    const int before = (i + 3) & 3, after = (i + 1) & 3;
-    const float cross = (x[after] - x[i]) * (y[before] - y[i]) - (y[after] - y[i]) * (x[before] - x[i]);
-    least = fmin(least, cross);
-  }
-  return least;
-}
 
 // A texel among its row's by colour; columns one beyond either end wrap round.
 int coloured_at(global const PatchRecord* restrict p, int texture_width, int column, int row) {
@@ -524,126 +511,4 @@ kernel void part_colours(const int row_count, const int texture_width, global co
   }
   if (get_local_id(0) == 0 && (width & 1))
     offset_x[odd - 1] = home_x[first + width - 1], offset_y[odd - 1] = home_y[first + width - 1];
-}
-
-void cross_product(const float a[3], const float b[3], const float c[3], float n[3]) {
-  const float u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-  n[0] = u[1] * v[2] - u[2] * v[1];
-  n[1] = u[2] * v[0] - u[0] * v[2];
-  n[2] = u[0] * v[1] - u[1] * v[0];
-}
-
-// Whether a triangle does not look along a direction; one without area looks along every direction.
-int is_turned(const float a[3], const float b[3], const float c[3], const float direction[3]) {
-  float n[3];
-  cross_product(a, b, c, n);
-  const float dot = n[0] * direction[0] + n[1] * direction[1] + n[2] * direction[2];
-  const float lengths2 = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) *
-                         (direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2]);
-  return dot < LEAST_COSINE * sqrt(lengths2);
-}
-
-// Whether the quad to the right of and above a texel folds in the map, or for both its diagonals a triangle is turned
-// from the regular grid's quad where the regular grid's own is not. Quads next to seams and poles take the points of
-// the end rows.
-int is_bad_quad(global const PatchRecord* restrict p, int texture_width, int column, int row,
-                global const float* restrict offset_x, global const float* restrict offset_y,
-                global const float* restrict even_x, global const float* restrict even_y,
-                global const float* restrict even_z, global const float* restrict x, global const float* restrict y,
-                global const float* restrict z) {
-  const int texel = texel_at(p, texture_width, column, row), right = texel_at(p, texture_width, column + 1, row);
-  const int at[4] = {texel, right, right + texture_width, texel + texture_width};
-  float map_x[4], map_y[4], even[4][3], now[4][3];
-  int is_moved = 0;
-  for (int i = 0; i < 4; ++i) {
-    const int t = at[i];
-    map_x[i] = (float)(i == 1 || i == 2) + offset_x[t], map_y[i] = (float)(i >= 2) + offset_y[t];
-    even[i][0] = even_x[t], even[i][1] = even_y[t], even[i][2] = even_z[t];
-    now[i][0] = x[t], now[i][1] = y[t], now[i][2] = z[t];
-    is_moved |= even[i][0] != now[i][0] || even[i][1] != now[i][1] || even[i][2] != now[i][2];
-  }
-  if (!is_moved) return 0;
-  if (quad_cross(map_x, map_y) <= 0.0f) return 1;
-  // The quad's normal: the sum of those of its triangles.
-  float normal[3], other[3];
-  cross_product(even[0], even[1], even[2], normal);
-  cross_product(even[0], even[2], even[3], other);
-  for (int i = 0; i < 3; ++i) normal[i] += other[i];
-  const int first = (is_turned(now[0], now[1], now[2], normal) && !is_turned(even[0], even[1], even[2], normal)) ||
-                    (is_turned(now[0], now[2], now[3], normal) && !is_turned(even[0], even[2], even[3], normal));
-  if (!first) return 0;
-  return (is_turned(now[0], now[1], now[3], normal) && !is_turned(even[0], even[1], even[3], normal)) ||
-         (is_turned(now[1], now[2], now[3], normal) && !is_turned(even[1], even[2], even[3], normal));
-}
-
-// The k-th quad around a texel: its number, and where it begins.
-int quad_at(global const PatchRecord* restrict p, int texture_width, int texel, int k, int* column, int* row) {
-  const int line = texel / texture_width, from = texel - line * texture_width - p->x - (k & 1);
-  *column = from < 0 ? from + p->width : from, *row = line - p->y - (k >> 1);
-  return texel_at(p, texture_width, *column, *row);
-}
-
-// NDRange: one work-group of ROW_ITEMS. Texels of a list go back, those on vertices only `with_vertices`; and in rounds
-// those of bad quads at texels that have gone back in the round before. Rounds are many, but soon of few texels, and a
-// launch takes longer than most of them. What a texel does within a round does not depend on others, so that their
-// order is any. in   before_x, before_y, before_z: where they were in and out  marks: per texel bits; `taken`: it has
-// gone back, or was there, set in none before; LOOKED_AT: its quad, in none
-//              counts: how many are on these lists, 0 before
-// out  back: those that have gone back; bad: quads of a round
-kernel void put_listed_back(const int count, const int with_vertices, const int taken, const int texture_width,
-                            global const int* restrict listed, global const int* restrict texel_patches,
-                            global const PatchRecord* restrict patches, global const float* restrict even_x,
-                            global const float* restrict even_y, global const float* restrict even_z,
-                            global const float* restrict before_x, global const float* restrict before_y,
-                            global const float* restrict before_z, global const float* restrict home_x,
-                            global const float* restrict home_y, volatile global int* marks,
-                            global int* restrict anchors, global float* offset_x, global float* offset_y,
-                            global float* x, global float* y, global float* z, global int* back, global int* bad,
-                            volatile global int* counts) {
-  const int own = (int)get_local_id(0);
-  for (int begin = 0, end = -1; begin != end;) {
-    // The texels of the list in the first round, then those of bad quads.
-    const int is_first = end < 0, candidates = is_first ? count : 4 * counts[1];
-    for (int i = own; i < candidates; i += ROW_ITEMS) {
-      int texel;
-      if (is_first) {
-        texel = listed[i];
-        if (anchors[texel] > 0 && !with_vertices) continue;
-      } else {
-        const int quad = bad[i >> 2];
-        global const PatchRecord* p = patches + texel_patches[quad];
-        const int line = quad / texture_width, row = line - p->y + ((i >> 1) & 1);
-        if (row < 1 || row > p->height - 2) continue;
-        texel = texel_at(p, texture_width, quad - line * texture_width - p->x + (i & 1), row);
-        if (atomic_or(marks + texel, taken) & taken) continue;
-      }
-      if (x[texel] == before_x[texel] && y[texel] == before_y[texel] && z[texel] == before_z[texel]) continue;
-      if (is_first) atomic_or(marks + texel, taken);
-      x[texel] = before_x[texel], y[texel] = before_y[texel], z[texel] = before_z[texel];
-      offset_x[texel] = home_x[texel], offset_y[texel] = home_y[texel];
-      anchors[texel] = 0;
-      back[atomic_inc(counts)] = texel;
-    }
-    WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
-    begin = max(end, 0), end = counts[0];
-    if (own == 0) counts[1] = 0;
-    WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
-    for (int i = 4 * begin + own; i < 4 * end; i += ROW_ITEMS) {
-      int column, row;
-      global const PatchRecord* p = patches + texel_patches[back[i >> 2]];
-      const int quad = quad_at(p, texture_width, back[i >> 2], i & 3, &column, &row);
-      // Once, whichever of its texels have gone back.
-      if ((atomic_or(marks + quad, LOOKED_AT) & LOOKED_AT) == 0 &&
-          is_bad_quad(p, texture_width, column, row, offset_x, offset_y, even_x, even_y, even_z, x, y, z))
-        bad[atomic_inc(counts + 1)] = quad;
-    }
-    WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
-    for (int i = 4 * begin + own; i < 4 * end; i += ROW_ITEMS) {
-      int column, row;
-      const int quad =
-          quad_at(patches + texel_patches[back[i >> 2]], texture_width, back[i >> 2], i & 3, &column, &row);
-      atomic_and(marks + quad, ~LOOKED_AT);
-    }
-    WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
-  }
 }

@@ -106,21 +106,21 @@ int row_of_point(float x, float z, int begin, int end, global const RowRecord* r
 
 // NDRange (columns of all patches, tiles of tile_rows rows): each work-item owns a column's part and goes through its
 // list.
-kernel void cast_rays(const int column_count, const int tile_rows, const int wants_last,
-                      global const SpdPatch* restrict patches, global const int* restrict column_patches,
-                      global const RowRecord* restrict rows, global const int* restrict row_guesses,
-                      global const ColumnRecord* restrict columns, global const int* restrict list_begins,
-                      global const int* restrict list_triangles, global const float* restrict points,
-                      global int* restrict hit_triangles, global float* restrict hit_distances) {
+kernel void cast_rays(const CastParameters p, global const SpdPatch* restrict patches,
+                      global const RowRecord* restrict rows, global const ColumnRecord* restrict columns,
+                      global const int* restrict tables, global const int* restrict list_triangles,
+                      global const float* restrict points, global int* restrict hit_triangles,
+                      global float* restrict hit_distances) {
   const int c = (int)get_global_id(0);
-  if (c >= column_count) return;
-  const SpdPatch patch = patches[column_patches[c]];
-  const int begin = (int)get_global_id(1) * tile_rows;
-  const int end = min(patch.height, begin + tile_rows);
+  if (c >= p.column_count) return;
+  const SpdPatch patch = patches[tables[c]];
+  const int begin = (int)get_global_id(1) * p.tile_rows;
+  const int end = min(patch.height, begin + p.tile_rows);
   if (begin >= end) return;
   const ColumnRecord column = columns[c];
   rows += patch.row_begin;
-  row_guesses += patch.guess_begin;
+  global const int* row_guesses = tables + p.guesses + patch.guess_begin;
+  global const int* list_begins = tables + p.list_begins;
   hit_triangles += patch.texel_begin + (c - patch.column_begin);
   hit_distances += patch.texel_begin + (c - patch.column_begin);
   for (int r = begin; r < end; ++r) {
@@ -149,7 +149,7 @@ kernel void cast_rays(const int column_count, const int tile_rows, const int wan
       const float t = sqrt(x * x + z * z);
       const int at = r * patch.width;
       const bool is_first = hit_triangles[at] < 0;
-      if (is_first || (wants_last ? t > hit_distances[at] : t < hit_distances[at])) {
+      if (is_first || (p.wants_last ? t > hit_distances[at] : t < hit_distances[at])) {
         hit_triangles[at] = list_triangles[i];
         hit_distances[at] = t;
       }
@@ -159,12 +159,12 @@ kernel void cast_rays(const int column_count, const int tile_rows, const int wan
 
 // NDRange (triangles). Lists are by sector and by slab: slab k of a sector holds the triangles with points at a height
 // z in [k, k + 1) slab_height above the chart's lowest point. `spheres` hold each triangle: centre x, y, z and radius.
-kernel void find_hidden(const int triangle_count, global const SpdSightLine* restrict lines,
+kernel void find_hidden(const HideParameters parameters, global const SpdSightLine* restrict lines,
                         global const int* restrict list_begins, global const int* restrict list_triangles,
                         global const float* restrict spheres, global const float* restrict points,
                         global int* restrict is_hidden) {
   const int triangle = (int)get_global_id(0);
-  if (triangle >= triangle_count) return;
+  if (triangle >= parameters.triangle_count) return;
   const SpdSightLine line = lines[triangle];
   const float nearer = line.distance * (1.0f - 1e-5f);
   const float dx = line.out * line.cosine, dy = line.out * line.sine, dz = line.along;

@@ -40,7 +40,20 @@ typedef struct SpdSightLine {
   SKELETEX_INT first_list, last_list;  ///< the lists of triangles at this angle, from the foot's height to the centre's
 } SpdSightLine;
 
+typedef struct CastParameters {
+  SKELETEX_INT column_count;  ///< of all patches
+  SKELETEX_INT tile_rows;     ///< rows that a work-item takes
+  SKELETEX_INT wants_last;    ///< the last hit of a ray counts, not the first
+  SKELETEX_INT guesses;       ///< in `tables`, see SpdPatch; the columns' patches are at 0
+  SKELETEX_INT list_begins;   ///< in `tables`, per column and one more: its list of triangles
+} CastParameters;
+
+typedef struct HideParameters {
+  SKELETEX_INT triangle_count;
+} HideParameters;
+
 #ifndef __OPENCL_VERSION__
+static_assert(sizeof(CastParameters) == 20);
 static_assert(sizeof(SpdPatch) == 56);
 static_assert(sizeof(SpdSightLine) == 32);
 }  // namespace skeletex

@@ -52,18 +52,25 @@ static float read_at(const Place* restrict p, __global const float* restrict pla
 // planes differ, and with corrections at both ends.
 // in   corrections: planes of column_count floats, [((end * bands + band) * 2 + is_slope) * 3 + axis]: the offset where
 //      the part begins (first_row and last_row of the columns), and its change per row from there
-//      in_s, in_b, in_o: points of the source's lattice, all rows, in the axes of their own bones from their heads
-//      target_s, target_b, target_o: the same of the target's
-// out  s, b, o: points in the axes of the result's bones from their heads
+//      source: planes s, b, o of the points of the source's lattice, all rows, in the axes of their own bones from
+//      their heads. target: the same of the target's
+// out  points: planes s, b, o, in the axes of the result's bones from their heads
 __kernel void place_part(const TransferParameters transfer, __global const TransferRow* restrict rows,
                          __global const TransferPatch* restrict patches,
                          __global const TransferColumn* restrict columns, __global const float* restrict corrections,
-                         __global const float* restrict in_s, __global const float* restrict in_b,
-                         __global const float* restrict in_o, __global const float* restrict target_s,
-                         __global const float* restrict target_b, __global const float* restrict target_o,
-                         __global float* restrict s, __global float* restrict b, __global float* restrict o) {
+                         __global const float* restrict source, __global const float* restrict target,
+                         __global float* restrict points) {
   const int k = get_group_id(0);
   if (k >= transfer.row_count) return;
+  __global const float* restrict in_s = source;
+  __global const float* restrict in_b = in_s + transfer.source_count;
+  __global const float* restrict in_o = in_b + transfer.source_count;
+  __global const float* restrict target_s = target;
+  __global const float* restrict target_b = target_s + transfer.target_count;
+  __global const float* restrict target_o = target_b + transfer.target_count;
+  __global float* restrict s = points;
+  __global float* restrict b = s + transfer.point_count;
+  __global float* restrict o = b + transfer.point_count;
   const int row = rows[k].row, vertex = rows[k].vertex, width = rows[k].width, column_count = transfer.column_count;
   __global const TransferPatch* restrict from = patches + rows[k].patch;
   const float sign = from->sign;
@@ -118,14 +125,19 @@ __kernel void place_part(const TransferParameters transfer, __global const Trans
 }
 
 // Reads any points of the source's lattice at the places where place_part reads them.
-// in   in_x, in_y, in_z: the points     out  x, y, z
+// in   source: planes x, y, z of the points     out  points: planes x, y, z
 __kernel void read_source(const TransferParameters transfer, __global const TransferRow* restrict rows,
                           __global const TransferPatch* restrict patches,
-                          __global const TransferColumn* restrict columns, __global const float* restrict in_x,
-                          __global const float* restrict in_y, __global const float* restrict in_z,
-                          __global float* restrict x, __global float* restrict y, __global float* restrict z) {
+                          __global const TransferColumn* restrict columns, __global const float* restrict source,
+                          __global float* restrict points) {
   const int k = get_group_id(0);
   if (k >= transfer.row_count) return;
+  __global const float* restrict in_x = source;
+  __global const float* restrict in_y = in_x + transfer.source_count;
+  __global const float* restrict in_z = in_y + transfer.source_count;
+  __global float* restrict x = points;
+  __global float* restrict y = x + transfer.point_count;
+  __global float* restrict z = y + transfer.point_count;
   const int patch = rows[k].patch, row = rows[k].row, vertex = rows[k].vertex, width = rows[k].width;
   const float axial = rows[k].axial;
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
@@ -139,15 +151,19 @@ __kernel void read_source(const TransferParameters transfer, __global const Tran
 }
 
 // Restores the target's texels, bit by bit, where it keeps its surface.
-// in   in_along, in_around, in_out: the target's texels     in and out  along, around, out: the result's
+// in   target: planes along, around, out of the target's texels     in and out  texels: the same of the result's
 __kernel void keep_target(const TransferParameters transfer, __global const TransferRow* restrict rows,
                           __global const TransferPatch* restrict patches,
-                          __global const TransferColumn* restrict columns, __global const float* restrict in_along,
-                          __global const float* restrict in_around, __global const float* restrict in_out,
-                          __global float* restrict along, __global float* restrict around,
-                          __global float* restrict out) {
+                          __global const TransferColumn* restrict columns, __global const float* restrict target,
+                          __global float* restrict texels) {
   const int k = get_group_id(0);
   if (k >= transfer.row_count) return;
+  __global const float* restrict in_along = target;
+  __global const float* restrict in_around = in_along + transfer.target_count;
+  __global const float* restrict in_out = in_around + transfer.target_count;
+  __global float* restrict along = texels;
+  __global float* restrict around = along + transfer.target_count;
+  __global float* restrict out = around + transfer.target_count;
   const int row = rows[k].row, texel = rows[k].texel, width = rows[k].width;
   __global const TransferColumn* restrict here = columns + patches[rows[k].patch].column_begin;
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {

@@ -53,17 +53,20 @@ typedef struct TransferColumn {
   float last_row;   ///< and from this one on; in between the source's
 } TransferColumn;
 
-/// What the kernels take.
+/// What the kernels take. Each reads those that it needs.
 typedef struct TransferParameters {
   int row_count;
   int column_count;  ///< of the result's patches
+  int source_count;  ///< values per plane of the source
+  int target_count;  ///< values per plane of the target; of the result's texels, too
+  int point_count;   ///< values per plane of the result's points
 } TransferParameters;
 
 #ifndef __OPENCL_C_VERSION__
 static_assert(sizeof(TransferPatch) == 60);
 static_assert(sizeof(TransferRow) == 28);
 static_assert(sizeof(TransferColumn) == 32);
-static_assert(sizeof(TransferParameters) == 8);
+static_assert(sizeof(TransferParameters) == 20);
 }  // namespace skeletex
 #endif
 #endif

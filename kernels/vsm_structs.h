@@ -3,7 +3,8 @@
 #ifndef SKELETEX_VSM_STRUCTS_H
 #define SKELETEX_VSM_STRUCTS_H
 
-#define VSM_TILE 8  // rows and columns of dense matrices are padded to this
+#define VSM_SLICE 32     // rows whose entries lie together
+#define VSM_POLE (-128)  // the jump to a pole
 
 #ifdef __OPENCL_C_VERSION__
 #define SKELETEX_INT int
@@ -13,39 +14,23 @@
 namespace skeletex {
 #endif
 
-/// Vertices that are eliminated together, and what comes of it: a dense matrix whose columns are first the pivots, then
-/// the boundary, both padded.
-typedef struct FrontRecord {
-  SKELETEX_INT chart;
-  SKELETEX_INT axes;   ///< 1: of the system of u; 2: of v; 3: of both, which are the same here
-  SKELETEX_INT first;  ///< the pivots are rows first to first + pivots - 1 of the system
-  SKELETEX_INT pivots;
-  SKELETEX_INT
-      boundary;         ///< vertices that come later and are neighbours; the last column stands for all fixed vertices
-  SKELETEX_INT list;    ///< first entry of the boundary in `boundary_rows` and `parent_columns`
-  SKELETEX_INT shared;  ///< so many of these, the first, are pivots of the parent
-  SKELETEX_INT
-      child_begin;  ///< fronts whose boundaries lie in this front: children[child_begin] to children[child_end - 1]
-  SKELETEX_INT child_end;
-  SKELETEX_INT rows;     ///< the pivots' rows in `matrices`, in tiles' rows (VSM_TILE floats)
-  SKELETEX_INT rest;     ///< the boundary's rows there
-  SKELETEX_INT vectors;  ///< four rows of `vectors`, in the same unit
-} FrontRecord;
-
-/// A chart, and what of each list is its own.
-typedef struct ChartRecord {
-  SKELETEX_INT chart;
-  SKELETEX_INT slice_begin;
-  SKELETEX_INT slice_end;
-  SKELETEX_INT front_begin;
-  SKELETEX_INT front_end;
-  SKELETEX_INT triangle_begin;
-  SKELETEX_INT triangle_end;
-} ChartRecord;
+/// Sizes, and where the tables and planes begin in the buffers of vsm.cl.
+typedef struct VsmLayout {
+  SKELETEX_INT rows;                    ///< vertices of all charts, with padding
+  SKELETEX_INT entries;                 ///< of all rows, with padding
+  SKELETEX_INT triangles;               ///< of all charts
+  SKELETEX_INT slice_begin;             ///< in `tables`, per slice: its first entry; the slice's chart is at 0
+  SKELETEX_INT row_length;              ///< in `tables`, per row: its entries
+  SKELETEX_INT later_end;               ///< per row: its entries whose neighbours are eliminated later
+  SKELETEX_INT fixed_end;               ///< per row: these and those with fixed neighbours
+  SKELETEX_INT matrix_begin;            ///< per row: where the elimination has its values
+  SKELETEX_INT columns;                 ///< per entry: the neighbour
+  SKELETEX_INT triangles_at;            ///< two planes, per entry: the triangles at the edge
+  SKELETEX_INT fixed, roots, residual;  ///< in `system`, see EliminationLayout
+} VsmLayout;
 
 #ifndef __OPENCL_C_VERSION__
-static_assert(sizeof(ChartRecord) == 4 * 7);
-static_assert(sizeof(FrontRecord) == 4 * 12);
+static_assert(sizeof(VsmLayout) == 4 * 13);
 }  // namespace skeletex
 #endif
 #undef SKELETEX_INT

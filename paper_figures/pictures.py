@@ -130,3 +130,25 @@ def fig19_morph_methods(results, folder):
     methods = style.unique(row["parameters"]["method"] for row in rows)
     return [style.sheet(results, "morph_methods", [[f"{pair}-{method}.png" for method in methods] for pair in pairs], [method.upper() for method in methods], pairs, folder,
                         "fig19_morph_methods", cell=3.4)]
+
+
+SKINNING_PAIRS = [[("smooth", "smooth"), ("dual_quaternions", "dual quaternion skinning")], [("polished", "smooth, polished"), ("paper", "paper's rule")]]
+
+
+def skinning(results, folder):
+    made = []
+    for row in style.rows(results, "skinning") or []:
+        body, columns = row["parameters"]["body"], row["columns"]
+        for pair in SKINNING_PAIRS:
+            titles = [f"{label}: {columns[f'{rule}_new_folds']} new folds, {columns[f'{rule}_new_intersections']} new intersections" for rule, label in pair]
+            made.append(style.sheet(results, "skinning", [[f"{body}-{rule}.png" for rule, _ in pair]], titles, None, folder, f"skinning_{body}_{pair[0][0]}_{pair[1][0]}", cell=9.3))
+    return made
+
+
+def reach(results, folder):
+    rows = style.rows(results, "reach")
+    if not rows:
+        return []
+    joints = [row["parameters"]["joint"] for row in rows]
+    return [style.sheet(results, "reach", [[f"{joint}-{kind}.png" for kind in ("weights", "posed")] for joint in joints], ["the bone's weights", "turned by 60 degrees"],
+                        [joint.replace("_", " ") for joint in joints], folder, "reach", cell=5.0)]

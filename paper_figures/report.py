@@ -46,6 +46,13 @@ SECTIONS = [
     ("Beyond the paper: poses beside skinning", "posing", sweeps.draw_posing,
      "New folds (edges that bend beyond 90 degrees) and new intersecting pairs of triangles, summed over the poses of configs/poses/evaluation, by each rule of this project and by skinning with each "
      "vertex' own bone diffused over 0.05 of the diagonal (narrow: 0.025)."),
+    ("Beyond the paper: poses beside dual quaternion skinning", "skinning", pictures.skinning,
+     "The bear has 60 degrees at every joint below its root, the man sits, the armadillo has an elbow and a knee bent by 90 degrees; 256 x 256 texels. The smooth rule makes fewer new folds than dual "
+     "quaternion skinning, whose weights are each vertex' own bone diffused over 0.05 of the diagonal. It looks worse at the root of the sitting man's left thigh, where it leaves a blunt step, and at "
+     "the bear's ear, which it stretches. Polishing takes away single folds and leaves the form. The paper's rule crumples the surface at the separation planes."),
+    ("Beyond the paper: how far a joint reaches", "reach", pictures.reach,
+     "Weights of the bone that turns, from 0 (dark) to 1 (bright); the bones beyond it go along as a whole. The man's upper arm moves the arm and its shoulder alone. A joint in the middle of a wide trunk "
+     "reaches as far as the trunk is wide: the thighs of the camel and the cow take part of the other thigh along, and the armadillo's neck its chest, shell and upper arms."),
     ("Beyond the paper: iterations of VSM", "iterations", sweeps.draw_iterations,
      "The paper's weights w A even out areas in the texture; divided by a power of the surface area they even out the texels on the surface."),
     ("Beyond the paper: what the recipe's parts bring", "recipe", sweeps.draw_recipe, "The paper's own recipe, the default, the default on an even lattice, and that with one part taken back."),

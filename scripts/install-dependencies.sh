@@ -12,6 +12,7 @@ packages=(
   libegl-dev libopengl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libcairo2-dev pkg-config fonts-dejavu-core  # renderer, without a GPU too
   libcli11-dev libspdlog-dev libembree-dev                           # program (bench compares with Embree)
   libgtest-dev openexr oclgrind                                      # tests (models against exrheader, kernels under Oclgrind)
+  clang-format clang-tidy                                            # scripts/lint.sh
   libbenchmark-dev python3 python3-matplotlib                                           # benchmarks, tables of the experiments
   libmeshoptimizer-dev libcgal-dev draco                                                # what the experiments compare with
   chromium                                                                              # test: the report in a browser

@@ -57,8 +57,6 @@ Chart chart_of(const MadeSegment& made) {
   return make_chart(made.segment, made.skeleton, SeparationPlanes(made.skeleton));
 }
 
-bool is_pole(ChartVertex kind) { return is_twin_pole(kind); }
-
 double surface(const Chart& chart) {
   TriangleMesh mesh{chart.positions, chart.triangles};
   return surface_area(mesh);

@@ -11,9 +11,12 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <regex>
 #include <set>
 #include <thread>
 
+#include "skeletex/device/kernel_source.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/skeleton_file.h"
 #include "support/shapes.h"
@@ -526,31 +529,42 @@ TEST_F(Program, RunsWithAnyNumberOfDeviceThreads) {
   }
 }
 
-TEST_F(Program, CompilesEachKernelOnceAndNothingInASecondProcess) {
-  const char* const own = std::getenv("POCL_CACHE_DIR");
-  const std::string before = own ? own : "";
-  const fs::path cache = folder_ / "kernels";
-  fs::create_directory(cache);
-  ::setenv("POCL_CACHE_DIR", cache.c_str(), 1);
-  const auto encode = [] {
-    return run({"encode", "y.ply", "y.skeleton.json", "-o", "c.skx.exr", "--size", "64", "--snap", "--fit"}).code;
-  };
-  const auto compiled = [&] {
+/// The driver's own files of compiled kernels and programs (PoCL), empty at first.
+class KernelCache {
+ public:
+  explicit KernelCache(const fs::path& folder) : folder_(folder) {
+    if (const char* own = std::getenv("POCL_CACHE_DIR")) before_ = own;
+    fs::remove_all(folder);
+    fs::create_directory(folder);
+    ::setenv("POCL_CACHE_DIR", folder.c_str(), 1);
+  }
+  ~KernelCache() { before_ ? ::setenv("POCL_CACHE_DIR", before_->c_str(), 1) : ::unsetenv("POCL_CACHE_DIR"); }
+  KernelCache(const KernelCache&) = delete;
+  KernelCache& operator=(const KernelCache&) = delete;
+
+  std::map<fs::path, fs::file_time_type> files() const {
     std::map<fs::path, fs::file_time_type> files;
-    for (const auto& entry : fs::recursive_directory_iterator(cache))
+    for (const auto& entry : fs::recursive_directory_iterator(folder_))
       if (entry.path().extension() == ".so" || entry.path().extension() == ".bc")
         files[entry.path()] = entry.last_write_time();
     return files;
+  }
+
+ private:
+  fs::path folder_;
+  std::optional<std::string> before_;
+};
+
+TEST_F(Program, CompilesEachKernelOnceAndNothingInASecondProcess) {
+  const KernelCache cache(folder_ / "kernels");
+  const auto encode = [] {
+    return run({"encode", "y.ply", "y.skeleton.json", "-o", "c.skx.exr", "--size", "64", "--snap", "--fit"}).code;
   };
-  const int first_code = encode();
-  const auto first = compiled();
-  const int second_code = encode();
-  const auto second = compiled();
-  own ? ::setenv("POCL_CACHE_DIR", before.c_str(), 1) : ::unsetenv("POCL_CACHE_DIR");
-  EXPECT_EQ(first_code, 0);
-  EXPECT_EQ(second_code, 0);
+  EXPECT_EQ(encode(), 0);
+  const auto first = cache.files();
+  EXPECT_EQ(encode(), 0);
   if (first.empty()) GTEST_SKIP() << "the device is none of PoCL's";
-  EXPECT_EQ(first, second);
+  EXPECT_EQ(first, cache.files());
   // Folders: a program, a kernel, its versions by size of work-groups.
   std::set<fs::path> programs, kernels;
   for (const auto& [path, time] : first) {
@@ -561,6 +575,41 @@ TEST_F(Program, CompilesEachKernelOnceAndNothingInASecondProcess) {
   }
   EXPECT_EQ(programs.size(), 1u);
   EXPECT_GT(kernels.size(), 30u);
+}
+
+TEST_F(Program, CompilesAllKernelsAhead) {
+  const KernelCache cache(folder_ / "kernels");
+  std::set<std::string> launched;
+  const nlohmann::json compiled = json_of({"devices", "--compile"});
+  for (const auto& kernel : compiled["kernels"]) launched.insert(kernel["kernel"]);
+  // Some kernels are for meshes that are larger, or worse, than the one that is run.
+  static const std::regex pattern("kernel [A-Z_ ]*void (\\w+)");
+  std::size_t all = 0, found = 0;
+  for (const EmbeddedKernelFile& file : embedded_kernel_files()) {
+    const std::string text(file.text);
+    std::size_t of_file = 0, found_of_file = 0;
+    for (std::sregex_iterator i(text.begin(), text.end(), pattern), end; i != end; ++i, ++of_file)
+      found_of_file += launched.count(std::string(file.name) + ':' + i->str(1));
+    EXPECT_TRUE(of_file == 0 || found_of_file > 0) << file.name;
+    all += of_file, found += found_of_file;
+  }
+  EXPECT_GT(found, all * 9 / 10) << "of " << all;
+  const std::size_t ahead = cache.files().size();
+  if (ahead == 0) GTEST_SKIP() << "the device is none of PoCL's";
+  EXPECT_EQ(run({"encode", "y.ply", "y.skeleton.json", "-o", "c.skx.exr", "--size", "64"}).code, 0);
+  EXPECT_EQ(run({"reconstruct", "c.skx.exr", "-o", "c.ply"}).code, 0);
+  EXPECT_LE(cache.files().size(), ahead + 2);
+  expect_refused(2, {"devices", "--device", "cpu"}, {"--compile"});
+}
+
+TEST_F(Program, TellsWhatWasDoneToEachBoneOnRequest) {
+  const std::vector<std::string> arguments{"encode", "y.ply", "y.skeleton.json", "-o", "v.skx.exr", "--size", "64"};
+  const std::string plain = run(arguments).out;
+  EXPECT_EQ(plain.find("columns x rows"), std::string::npos) << plain;
+  EXPECT_NE(plain.find("64 x 64 texels"), std::string::npos) << plain;
+  std::vector<std::string> verbose = arguments;
+  verbose.push_back("--verbose");
+  EXPECT_NE(run(verbose).out.find("columns x rows"), std::string::npos);
 }
 
 TEST_F(Program, TakesThePapersRecipeAndItsPartsAlike) {
@@ -581,11 +630,11 @@ TEST_F(Program, SnapsTexelsAndSaysHowMany) {
   EXPECT_FALSE(snapped.contains("fit"));
   EXPECT_GT(snapped["snap"]["snapped_vertices"], 0);
   EXPECT_LE(snapped["snap"]["snapped_vertices"], snapped["snap"]["vertices"]);
-  EXPECT_TRUE(json_of({"inspect", "a.skx.exr"})["encoder"]["snap"]);
+  EXPECT_TRUE(json_of({"inspect", "a.skx.exr"})["sampling"]["snapped"]);
   const nlohmann::json fitted =
       json_of({"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--size", "64", "--fit"});
   EXPECT_GE(fitted["fit"]["residuals"].size(), 2u);
-  EXPECT_LE(fitted["turned_triangles"]["lattice"], 64 * 64);
+  EXPECT_LE(fitted["inverted_triangles"]["lattice"], 64 * 64);
   const nlohmann::json header = json_of({"inspect", "a.skx.exr"});
   EXPECT_EQ(header["diagonals"], "smooth");
   EXPECT_EQ(header["encoder"]["fitted"]["residuals"], fitted["fit"]["residuals"]);

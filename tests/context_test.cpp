@@ -209,15 +209,11 @@ TEST_F(Kernels, TakesAStructOfParameters) {
   auto values = context.upload(std::vector<float>{1, 2, 3});
   context.launch({"scale.cl", "scale"}, ClRange(3), Scale{2, 10}, values);
   EXPECT_EQ(context.download(values), (std::vector<float>{10, 20, 3}));
-  // A struct of another size, or a number in its place, is named.
-  struct Larger {
-    int count;
-    float factor, offset;
-  };
+  // Drivers do not tell the size of a struct.
   expect_contains(device_error([&] {
-                    context.launch({"scale.cl", "scale"}, ClRange(3), Larger{2, 10, 0}, values);
+                    context.launch({"scale.cl", "scale"}, ClRange(3), 2, values);
                   }),
-                  "argument 0");
+                  "argument 0: the kernel takes a struct, not an int");
 }
 
 TEST_F(Kernels, ComeFromTheFolderThatTheVariableNames) {

@@ -128,13 +128,13 @@ void for_each_inner(const SkeletexModel& model, const Lattice& lattice, const Us
 /// The largest distance of a posed inner vertex or pole from where posed_by_coordinates has it.
 double largest_error(const SkeletexModel& model, const Skeleton& posed, const TriangleMesh& bound, DistanceRule rule) {
   const Lattice lattice = number_lattice(model);
-  const SeparationPlanes bind(model.skeleton);
+  const PreparedModel prepared(model);
   const PosedPlanes separation(model, posed);
   const TriangleMesh mesh = posed_mesh(model, posed, rule);
   double worst = 0;
   const auto compare = [&](int bone, int vertex) {
     const double error =
-        (mesh.positions[vertex] - posed_by_coordinates(model, bind, separation, bone, bound.positions[vertex], rule))
+        (mesh.positions[vertex] - posed_by_coordinates(prepared, separation, bone, bound.positions[vertex], rule))
             .norm();
     worst = error <= worst ? worst : error;  // NaN counts
   };
@@ -169,6 +169,7 @@ TEST(Coordinates, AreTheInverseOfTheSpdRayAndPosesAreThoseOfItsTexel) {
     const SyntheticSurface surface(named.skeleton, named.radius);
     const SkeletexModel model = model_of(surface);
     const SeparationPlanes& bind = surface.separation();
+    const PreparedModel prepared(model);
     std::mt19937 random(1);
     std::uniform_real_distribution<double> unit(0, 1);
     int compared = 0, in_caps = 0;
@@ -195,7 +196,7 @@ TEST(Coordinates, AreTheInverseOfTheSpdRayAndPosesAreThoseOfItsTexel) {
           if (axial_of(u, bind.is_free(bone, BoneEnd::kHead), bind.is_free(bone, BoneEnd::kTail)).latitude != 0)
             ++in_caps;
           for (const DistanceRule rule : kRules)
-            ASSERT_LT((posed_by_coordinates(model, bind, separation, bone, point, rule) -
+            ASSERT_LT((posed_by_coordinates(prepared, separation, bone, point, rule) -
                        posed_point(model, bind, separation, bone, u, turn, texel, rule))
                           .norm(),
                       1e-8)
@@ -229,6 +230,7 @@ TEST(Coordinates, BothSidesOfEverySeamAgreeWithThePosedSeam) {
     const SyntheticSurface surface(named.skeleton, named.radius);
     const SkeletexModel model = model_of(surface);
     const SeparationPlanes& bind = surface.separation();
+    const PreparedModel prepared(model);
     double worst = 0;
     for (unsigned seed = 0; seed < 40; ++seed) {
       const Skeleton posed = random_pose(model.skeleton, seed);
@@ -240,7 +242,7 @@ TEST(Coordinates, BothSidesOfEverySeamAgreeWithThePosedSeam) {
             const BoneEnd end = model.skeleton.bones[arc.bones[0]].head == arc.node ? BoneEnd::kHead : BoneEnd::kTail;
             const Vec3 point = bind.seam_point(arc.bones[0], end, arc.samples[i].turn, arc.samples[i].distance);
             for (const int bone : arc.bones)
-              worst = std::max(worst, (posed_by_coordinates(model, bind, separation, bone, point, rule) -
+              worst = std::max(worst, (posed_by_coordinates(prepared, separation, bone, point, rule) -
                                        separation.sample_point(a, i, rule))
                                           .norm());
           }
@@ -300,7 +302,7 @@ TEST(Coordinates, TheKernelAgreesWithItsTwinFarFromTheSurfaceToo) {
   for (const NamedSkeleton& named : skeletons) {
     const SkeletexModel model = model_of(SyntheticSurface(named.skeleton, named.radius));
     const Lattice lattice = number_lattice(model);
-    const SeparationPlanes bind(model.skeleton);
+    const PreparedModel prepared(model);
     const Skeleton posed = random_pose(model.skeleton, 11);
     const PosedPlanes separation(model, posed);
     std::mt19937 random(12);
@@ -317,18 +319,15 @@ TEST(Coordinates, TheKernelAgreesWithItsTwinFarFromTheSurfaceToo) {
         planes[axis].push_back(
             static_cast<float>(middle[axis] + 0.7 * bone_length(model.skeleton, bone) * normal(random)));
     });
-    DevicePlanes points{device().upload(planes[0]), device().upload(planes[1]), device().upload(planes[2])};
+    DevicePlanes points = upload_planes(device(), planes[0], planes[1], planes[2]);
     const DeviceCoordinates coordinates = make_coordinates(device(), model, points);
     for (const DistanceRule rule : kRules) {
       pose_by_coordinates(device(), model, coordinates, separation, rule, Vec3::Zero(), points);
-      const std::vector<float> x = device().download(points.x), y = device().download(points.y),
-                               z = device().download(points.z);
+      const auto [x, y, z] = download_planes(device(), points);
       int compared = 0;
       for (std::size_t i = 0; i < bones.size(); ++i) {
         const Vec3 point = model.origin + Vec3(planes[0][i], planes[1][i], planes[2][i]);
-        const auto twin = [&](const Vec3& p) {
-          return posed_by_coordinates(model, bind, separation, bones[i], p, rule);
-        };
+        const auto twin = [&](const Vec3& p) { return posed_by_coordinates(prepared, separation, bones[i], p, rule); };
         // Where two crossed planes meet, neighbouring points part.
         double parting = 0;
         for (const Vec3& step : {Vec3(1e-4, 0, 0), Vec3(0, 1e-4, 0), Vec3(0, 0, 1e-4)})

@@ -55,7 +55,7 @@ struct TwinSurface {
 TwinSurface twin_surface(const SkeletexModel& model) {
   TwinSurface result{upload_surface(device(), model), {}, {}, {}};
   result.points = download_vectors(device(), result.surface.points);
-  const std::vector<Triangle> ends = end_triangles(model, result.surface.lattice, result.surface.positions);
+  const std::vector<Triangle> ends = end_triangles(model, result.surface.positions);
   result.triangles = twin::surface_triangles(model, result.surface.lattice, ends);
   result.matrices = twin::surface_matrices(result.triangles, result.points);
   return result;
@@ -144,7 +144,7 @@ TEST(Neighbours, AreThoseOfTheMeshOnBothSidesOfEverySeam) {
   for (const SkeletexModel& model : twin_models()) {
     const Lattice lattice = number_lattice(model);
     const TriangleMesh mesh = reconstruct_mesh(device(), model);
-    const Neighbours table = find_neighbours(model, lattice, end_triangles(model, lattice, mesh.positions));
+    const Neighbours table = find_neighbours(model, lattice, end_triangles(model, mesh.positions));
     std::set<std::pair<int, int>> edges;  // of the mesh, at vertices in no row: poles, samples, corners
     for (const Triangle& t : mesh.triangles)
       for (int i = 0; i < 3; ++i)
@@ -508,7 +508,7 @@ TEST(Filters, KeepARealModelClosedWithItsGenus) {
   const TestModel bear = load_standard_model("bear");
   EncodeOptions options;
   options.width = options.height = 128;
-  options.method = EncodeMethod::kSpd;
+  options.method = Method::kSpd;
   const SkeletexModel model = encode_model(device(), bear.mesh, bear.skeleton, options).model;
   SmoothOptions smooth;
   smooth.scale = 0.02;
@@ -581,7 +581,7 @@ TEST(Filters, LeaveOtherBonesBitByBitAndFadeOutTowardsThem) {
       for (const int v : end_row(model, lattice, bone, end)) EXPECT_EQ(weights[v], 0);
   for (int v = lattice.first_sample[0]; v < lattice.vertex_count; ++v)
     EXPECT_EQ(weights[v], 0) << "all seams lead out of the region";
-  const Neighbours table = find_neighbours(model, lattice, end_triangles(model, lattice, positions));
+  const Neighbours table = find_neighbours(model, lattice, end_triangles(model, positions));
   for (std::size_t k = 0; k + 1 < table.fan_vertices.size(); ++k)
     for (int i = table.fan_vertices[k].begin; i < table.fan_vertices[k + 1].begin; ++i)
       EXPECT_LT(std::abs(weights[table.fan_vertices[k].vertex] - weights[table.fans[i][0]]), 0.25)

@@ -300,7 +300,7 @@ TEST(Fit, LeavesALatticeAloneThatIsTheMesh) {
   }
 }
 
-TEST(Guard, NeitherTheMaximumNorFoldsAreAboveThoseOfTheRegularGrid) {
+TEST(RevertFaults, NeitherTheMaximumNorFoldsAreAboveThoseOfTheRegularGrid) {
   const TestModel model = load_standard_model("bear");
   // The furthest of middles of triangles and sides, and of the mesh's vertices.
   const auto furthest = [&](const TriangleMesh& mesh) {
@@ -323,12 +323,13 @@ TEST(Guard, NeitherTheMaximumNorFoldsAreAboveThoseOfTheRegularGrid) {
   options.has_snap = options.has_fit = true;
   const EncodeResult encoded = encode_model(device(), model.mesh, model.skeleton, options);
   const TriangleMesh mesh = reconstruct_mesh(device(), encoded.model);
-  EXPECT_GT(encoded.report.fit->texels_put_back, 0);
+  EXPECT_GT(encoded.report.fit->reverted_texels, 0);
   // Quads of the regular grid may have their other diagonal beside moved ones.
   EXPECT_LT(furthest(mesh), 1.02f * furthest(plain));
   EXPECT_LE(static_cast<double>(count_self_intersections(mesh)),
             1.2 * static_cast<double>(count_self_intersections(plain)) + 10);
-  EXPECT_LE(encoded.report.turned_triangles, 1.2 * encoded.report.even_turned_triangles + 10);
+  const RevertReport& revert = encoded.report.revert.value();
+  EXPECT_LE(revert.inverted_triangles, 1.2 * revert.regular_inverted_triangles + 10);
 }
 
 }  // namespace skeletex

@@ -48,7 +48,7 @@ struct Encoded {
   TriangleMesh mesh;  ///< of the exact one
   Lattice lattice;
 };
-Encoded encode(const std::string& name, EncodeMethod method, int size, bool has_prefilter = true) {
+Encoded encode(const std::string& name, std::optional<Method> method, int size, bool has_prefilter = true) {
   const TestModel source = load_standard_model(name);
   EncodeOptions options;
   options.width = options.height = size;
@@ -97,7 +97,7 @@ SkeletexModel with_nearest(const SkeletexModel& model) {
 TEST(HalfTexels, ArePointsNearTheSurfaceAsTheReportSays) {
   for (const char* const name : {"bear", "armadillo"})
     for (const int size : {128, 300}) {
-      const Encoded encoded = encode(name, EncodeMethod::kVsm, size);
+      const Encoded encoded = encode(name, Method::kVsm, size);
       const double chosen = distance_from_planes(encoded, encoded.rounded),
                    nearest = distance_from_planes(encoded, with_nearest(encoded.exact));
       EXPECT_LT(chosen, 0.5 * nearest) << name << size;
@@ -108,7 +108,7 @@ TEST(HalfTexels, ArePointsNearTheSurfaceAsTheReportSays) {
 }
 
 TEST(HalfTexels, AreHalvesOfWhichSomeAreNotTheNearest) {
-  const Encoded encoded = encode("bear", EncodeMethod::kVsm, 128);
+  const Encoded encoded = encode("bear", Method::kVsm, 128);
   const Planes exact = planes_of(encoded.exact.texture), rounded = planes_of(encoded.rounded.texture);
   int others = 0, all = 0;
   for_each_inner(encoded.exact, encoded.lattice, [&](std::size_t texel, int, bool) {
@@ -129,7 +129,7 @@ TEST(HalfTexels, AreHalvesOfWhichSomeAreNotTheNearest) {
 
 TEST(HalfTexels, TurnNoMoreTrianglesThanTheNearest) {
   for (const char* const name : {"bear", "bunny00", "armadillo", "man"}) {
-    const Encoded encoded = encode(name, EncodeMethod::kVsm, 256);
+    const Encoded encoded = encode(name, Method::kVsm, 256);
     const auto turned = [&](const SkeletexModel& model) {
       const std::vector<Vec3> points = lattice_positions(device(), model);
       return std::count_if(encoded.mesh.triangles.begin(), encoded.mesh.triangles.end(), [&](const Triangle& t) {
@@ -146,7 +146,7 @@ TEST(HalfTexels, TurnNoMoreTrianglesThanTheNearest) {
 }
 
 TEST(HalfTexels, OfSpdPatchesStayOnTheirRays) {
-  const Encoded encoded = encode("bear", EncodeMethod::kSpd, 96, false);
+  const Encoded encoded = encode("bear", Method::kSpd, 96, false);
   const Planes exact = planes_of(encoded.exact.texture), rounded = planes_of(encoded.rounded.texture);
   for_each_inner(encoded.exact, encoded.lattice, [&](std::size_t texel, int, bool) {
     for (int i = 0; i < 3; ++i) ASSERT_EQ(rounded[i][texel], nearest_half(exact[i][texel])) << texel;
@@ -155,7 +155,7 @@ TEST(HalfTexels, OfSpdPatchesStayOnTheirRays) {
 }
 
 TEST(HalfTexels, OfAFinishedModelAreThoseOfTheEncoder) {
-  for (const EncodeMethod method : {EncodeMethod::kVsm, EncodeMethod::kSpd}) {
+  for (const Method method : {Method::kVsm, Method::kSpd}) {
     const Encoded encoded = encode("bear", method, 128);
     const RoundedModel again = round_to_half(device(), encoded.exact);
     const Planes own = planes_of(encoded.rounded.texture), other = planes_of(again.model.texture);

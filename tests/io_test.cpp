@@ -171,6 +171,48 @@ TEST(MeshFiles, TextMayHaveAnyLineEndsSpacesAndContinuations) {
             1);
 }
 
+TEST(MeshFiles, TextMayBeginWithAByteOrderMark) {
+  const ScratchFolder folder;
+  for (const auto& [extension, text] : {small_files()[0], small_files()[1], small_files()[2], small_files()[3]})
+    EXPECT_EQ(read_as(folder, extension, "\xef\xbb\xbf" + text).mesh.triangles.size(), 4u) << extension;
+}
+
+TEST(MeshFiles, NumbersKeepDoublePrecision) {
+  const ScratchFolder folder;
+  const std::string numbers = "0.1234567890123456 -1e-50 100000.00000000001";
+  const Vec3 expected(0.1234567890123456, -1e-50, 100000.00000000001);
+  const std::string others = "1 0 0\n0 1 0\n";
+  EXPECT_EQ(read_as(folder, ".off", "OFF\n3 1 0\n" + numbers + "\n" + others + "3 0 1 2\n").mesh.positions[0],
+            expected);
+  EXPECT_EQ(read_as(folder, ".obj", "v " + numbers + "\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").mesh.positions[0], expected);
+  const auto ply = [](const std::string& format, const std::string& values) {
+    return "ply\nformat " + format +
+           " 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\n"
+           "element face 1\nproperty list uchar int vertex_indices\nend_header\n" +
+           values;
+  };
+  EXPECT_EQ(read_as(folder, ".ply", ply("ascii", numbers + "\n" + others + "3 0 1 2\n")).mesh.positions[0], expected);
+  for (const bool is_big : {false, true}) {
+    std::string values;
+    for (const Vec3& p : {expected, Vec3(1, 0, 0), Vec3(0, 1, 0)})
+      for (const double x : p) put(values, x, is_big);
+    put(values, std::uint8_t{3});
+    for (const int i : {0, 1, 2}) put(values, i, is_big);
+    const std::string format = is_big ? "binary_big_endian" : "binary_little_endian";
+    EXPECT_EQ(read_as(folder, ".ply", ply(format, values)).mesh.positions[0], expected);
+  }
+}
+
+TEST(MeshFiles, StlMergesCornersThatAreEqualInSinglePrecision) {
+  const ScratchFolder folder;
+  std::string text = stl_ascii();
+  const std::size_t at = text.find("vertex 1 0 0", text.find("vertex 1 0 0") + 1);
+  text.replace(at, 12, "vertex 1.00000000001 -0.0 0");
+  const MeshFile file = read_as(folder, ".stl", text);
+  EXPECT_EQ(file.mesh.positions.size(), 4u);
+  EXPECT_EQ(file.merged_vertices, 8);
+}
+
 TEST(MeshFiles, PolygonsBecomeFansAndFacesAreCountedInAndOut) {
   const ScratchFolder folder;
   const MeshFile file = read_as(
@@ -321,7 +363,7 @@ TEST(MeshFiles, WrittenMeshesComeBackAsTheyWere) {
     EXPECT_EQ(file.mesh.triangles, mesh.triangles);
     ASSERT_EQ(file.mesh.positions.size(), mesh.positions.size());
     for (std::size_t i = 0; i < mesh.positions.size(); ++i)
-      EXPECT_EQ(file.mesh.positions[i], mesh.positions[i]) << name << " " << i;
+      EXPECT_EQ(file.mesh.positions[i].cast<float>(), mesh.positions[i].cast<float>()) << name << " " << i;
   }
   EXPECT_EQ(folder.file_count(), 3);
   EXPECT_TRUE(contains(error_of([&] { write_mesh(folder / "a.stl", mesh); }), ".ply or .obj"));

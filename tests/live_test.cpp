@@ -201,13 +201,12 @@ TEST(Mix, KernelAndTwinAgreeOnRandomAndUglyTexels) {
     std::array<std::vector<float>, 6> planes;
     for (auto& plane : planes)
       for (int i = 0; i < width * height; ++i) plane.push_back(random() % 5 == 0 ? ugly[random() % 6] : unit(random));
-    const DevicePlanes first{device().upload(planes[0]), device().upload(planes[1]), device().upload(planes[2])};
-    const DevicePlanes second{device().upload(planes[3]), device().upload(planes[4]), device().upload(planes[5])};
+    const DevicePlanes first = upload_planes(device(), planes[0], planes[1], planes[2]);
+    const DevicePlanes second = upload_planes(device(), planes[3], planes[4], planes[5]);
     for (const float share : {0.0f, 0.3f, 1.0f}) {
       DevicePlanes mixed;
       mix_texels(device(), first, second, share, width, mixed);
-      const std::vector<float> out[3] = {device().download(mixed.x), device().download(mixed.y),
-                                         device().download(mixed.z)};
+      const auto out = download_planes(device(), mixed);
       for (int c = 0; c < 3; ++c) {
         if (share == 0 || share == 1) {
           EXPECT_TRUE(same_bits(out[c], planes[share == 0 ? c : c + 3]));

@@ -11,6 +11,7 @@
 #include <set>
 
 #include "bench/stages/embree_scene.h"
+#include "metro_structs.h"
 #include "skeletex/geometry/hilbert_order.h"
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/geometry/point_triangle.h"
@@ -269,14 +270,13 @@ TEST(Metro, TheKernelFindsTheTwinsTriangles) {
         points.push_back(mesh.positions[a] + random.uniform(0, 1) * (mesh.positions[b] - mesh.positions[c]) +
                          1e-6 * random.normal());
       }
-      std::vector<float> x, y, z;
+      std::vector<float> planes(3 * points.size());
       std::vector<double> expected;
       for (const Vec3& p : points) {
         expected.push_back(static_cast<double>(twin_distance_to_mesh(mesh, p)));
         const Vec3 local = (p - tree.origin) / tree.scale;
-        x.push_back(static_cast<float>(local.x()));
-        y.push_back(static_cast<float>(local.y()));
-        z.push_back(static_cast<float>(local.z()));
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          planes[axis * points.size() + expected.size() - 1] = static_cast<float>(local[axis]);
       }
       // Whatever the points an item follows one another with: the first has no block to start from, the others do.
       // Bounds, as shares of the distance: none, wide and narrow ones, and one that nothing lies within.
@@ -295,10 +295,9 @@ TEST(Metro, TheKernelFindsTheTwinsTriangles) {
           for (const double distance : expected)
             bounds_squared.push_back(static_cast<float>(std::pow(bound * distance / tree.scale + 1e-5, 2)));
           context().launch({"metro.cl", "find_nearest_triangles"}, ClRange(block_count(count, run)),
-                           context().upload(x), context().upload(y), context().upload(z), count, run,
-                           context().upload(tree.boxes), context().upload(tree.blocks),
-                           context().upload(tree.level_begin), tree.top_level(), enough_squared,
-                           static_cast<int>(bound > 0), context().upload(bounds_squared), nearest, squared);
+                           NearestParameters{count, run, tree.top_level(), static_cast<int>(bound > 0), enough_squared},
+                           context().upload(planes), context().upload(tree.boxes), context().upload(tree.blocks),
+                           context().upload(tree.level_begin), context().upload(bounds_squared), nearest, squared);
           const std::vector<int> places = context().download(nearest);
           const std::vector<float> squares = context().download(squared);
           for (int i = 0; i < count; ++i) {

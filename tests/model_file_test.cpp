@@ -9,6 +9,7 @@
 #include <limits>
 #include <random>
 
+#include "skeletex/io/check_model.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_json.h"
 #include "skeletex/model/error.h"
@@ -61,6 +62,7 @@ void fill(SkeletexModel& model, int width, int height, Numbers& numbers) {
     (*plane)[0] = -0.0f;
     (*plane)[1] = std::numeric_limits<float>::denorm_min();
   }
+  model.sampling = {.is_prefiltered = true, .is_snapped = false, .is_fitted = true};
   model.encoder_settings = R"({"method":"vsm","size":[512,512]})";
 }
 
@@ -116,6 +118,10 @@ void expect_same(const SeamSample& a, const SeamSample& b) {
   expect_same(a.distance, b.distance);
 }
 
+std::array<bool, 3> flags_of(const TexelSampling& sampling) {
+  return {sampling.is_prefiltered, sampling.is_snapped, sampling.is_fitted};
+}
+
 void expect_same(const SkeletexModel& a, const SkeletexModel& b) {
   ASSERT_EQ(a.skeleton.nodes.size(), b.skeleton.nodes.size());
   ASSERT_EQ(a.skeleton.bones.size(), b.skeleton.bones.size());
@@ -133,6 +139,7 @@ void expect_same(const SkeletexModel& a, const SkeletexModel& b) {
   expect_same(a.diagonal, b.diagonal);
   EXPECT_EQ(a.genus, b.genus);
   EXPECT_EQ(a.diagonals, b.diagonals);
+  EXPECT_EQ(flags_of(a.sampling), flags_of(b.sampling));
   EXPECT_EQ(a.encoder_settings, b.encoder_settings);
   ASSERT_EQ(a.patches.size(), b.patches.size());
   for (std::size_t i = 0; i < a.patches.size(); ++i) {
@@ -283,6 +290,30 @@ TEST(ModelFile, TheHeaderAloneHoldsEverythingButTexels) {
   EXPECT_EQ(header["patches"].size(), 4u);
   EXPECT_EQ(header["encoder"]["method"], "vsm");
   expect_same(model, model_from_json(header, "header"));
+}
+
+/// Files before "sampling" have it in the encoder's record.
+TEST(ModelFile, OlderHeadersTellTheSamplingInTheEncodersRecord) {
+  nlohmann::json header = model_to_json(branch_model(), "header");
+  header.erase("sampling");
+  const auto sampling_of = [&](const char* record) {
+    header["encoder"] = nlohmann::json::parse(record);
+    return flags_of(model_from_json(header, "header").sampling);
+  };
+  EXPECT_EQ(sampling_of(R"({"prefilter": true, "snap": true, "fit": false})"), (std::array{true, true, false}));
+  EXPECT_EQ(sampling_of(R"({"prefilter": true, "fit": true})"), (std::array{true, false, true}));
+  EXPECT_EQ(sampling_of(R"({"prefilter": null, "snap": 1, "fit": "true"})"), (std::array{false, false, false}));
+  EXPECT_EQ(sampling_of("{}"), (std::array{false, false, false}));
+  header.erase("encoder");
+  EXPECT_EQ(flags_of(model_from_json(header, "header").sampling), (std::array{false, false, false}));
+}
+
+TEST(ModelFile, NothingDependsOnTheEncodersRecordWhereTheSamplingIsTold) {
+  nlohmann::json header = model_to_json(branch_model(), "header");
+  header["encoder"] = {{"prefilter", nullptr}, {"snap", true}};
+  EXPECT_EQ(flags_of(model_from_json(header, "header").sampling), flags_of(branch_model().sampling));
+  header["sampling"]["snapped"] = "no";
+  EXPECT_TRUE(contains(error_of([&] { model_from_json(header, "m.skx.exr"); }), "\"sampling\", \"snapped\""));
 }
 
 TEST(ModelFile, RefusesModelsWhosePartsDoNotFitTogether) {

@@ -30,15 +30,15 @@ ClContext& device() {
   return context;
 }
 
-SkeletexModel encoded(const TriangleMesh& mesh, const Skeleton& skeleton, EncodeMethod method, int size) {
+SkeletexModel encoded(const TriangleMesh& mesh, const Skeleton& skeleton, std::optional<Method> method, int size) {
   EncodeOptions options;
   options.width = options.height = size;
   options.method = method;
   return encode_model(device(), mesh, skeleton, options).model;
 }
 
-const SkeletexModel& standard(const std::string& name, EncodeMethod method = EncodeMethod::kVsm, int size = 96) {
-  static std::map<std::tuple<std::string, EncodeMethod, int>, SkeletexModel> models;
+const SkeletexModel& standard(const std::string& name, std::optional<Method> method = Method::kVsm, int size = 96) {
+  static std::map<std::tuple<std::string, std::optional<Method>, int>, SkeletexModel> models;
   const auto [it, is_new] = models.try_emplace({name, method, size});
   if (is_new) {
     const TestModel source = load_standard_model(name);
@@ -92,13 +92,13 @@ double largest_distance(const TriangleMesh& from, const TriangleMesh& to) {
 
 struct Pair {
   const char *a, *b;
-  EncodeMethod method;
+  std::optional<Method> method;
 };
-const Pair kPairs[] = {{"man", "homer", EncodeMethod::kVsm},
-                       {"bear", "bear_bis", EncodeMethod::kVsm},
-                       {"bear", "bear_bis", EncodeMethod::kSpd},
-                       {"bull", "camel", EncodeMethod::kVsm},
-                       {"cow", "bull_16", EncodeMethod::kVsm}};
+const Pair kPairs[] = {{"man", "homer", Method::kVsm},
+                       {"bear", "bear_bis", Method::kVsm},
+                       {"bear", "bear_bis", Method::kSpd},
+                       {"bull", "camel", Method::kVsm},
+                       {"cow", "bull_16", Method::kVsm}};
 
 }  // namespace
 
@@ -178,7 +178,7 @@ TEST(Morph, DoesNotCareAboutNamesOrderAndDirectionsOfBones) {
     if (random() % 2) std::swap(bone.head, bone.tail);
   }
   std::shuffle(other.bones.begin(), other.bones.end(), random);
-  const SkeletexModel a = standard("man"), b = encoded(source.mesh, other, EncodeMethod::kVsm, 96);
+  const SkeletexModel a = standard("man"), b = encoded(source.mesh, other, Method::kVsm, 96);
   const TriangleMesh mesh = reconstruct_mesh(device(), at(morph_of(a, b), 0.4));
   EXPECT_LT(mean_distance(source.mesh, mesh), 2 * mean_distance(source.mesh, reconstruct_mesh(device(), a)));
   const Distortion distortion = measure_distortion(
@@ -225,7 +225,7 @@ TEST(Morph, RowsEndOnTheSeamsAsThoseOfTheModelsDo) {
       EXPECT_LT(gap.at_columns, own + 1.5e-3) << pair.a << " " << t << " bone " << a.skeleton.bones[gap.bone].name;
       EXPECT_LT(gap.row_to_seam, 0.01) << pair.a << " " << t;
     }
-    RecordProperty(std::string(pair.a) + (pair.method == EncodeMethod::kSpd ? "_spd" : "_vsm"),
+    RecordProperty(std::string(pair.a) + (pair.method == Method::kSpd ? "_spd" : "_vsm"),
                    std::to_string(widest_gap) + " between, " + std::to_string(own) + " of the models");
   }
 }
@@ -249,7 +249,7 @@ TEST(Morph, IsClosedFromTheSmallestSizesToLargeOnes) {
 }
 
 TEST(Morph, OfSeveralModelsIsClosedWhateverTheWeights) {
-  const SkeletexModel &a = standard("man"), &b = standard("homer"), &c = standard("man", EncodeMethod::kSpd);
+  const SkeletexModel &a = standard("man"), &b = standard("homer"), &c = standard("man", Method::kSpd);
   const Morph morph(
       device(), {a, b, c},
       std::vector{find_correspondence(a.skeleton, b.skeleton), find_correspondence(a.skeleton, c.skeleton)});
@@ -275,8 +275,8 @@ TEST(Morph, KeepsTheGenusOfCyclicSkeletons) {
 }
 
 TEST(Morph, MixesSizesMethodsAndThreeModels) {
-  const SkeletexModel &a = standard("bear", EncodeMethod::kVsm), &b = standard("bear_bis", EncodeMethod::kSpd),
-                      &c = standard("bear", EncodeMethod::kVsm, 48);
+  const SkeletexModel &a = standard("bear", Method::kVsm), &b = standard("bear_bis", Method::kSpd),
+                      &c = standard("bear", Method::kVsm, 48);
   const std::vector<Correspondence> from_first{find_correspondence(a.skeleton, b.skeleton),
                                                find_correspondence(a.skeleton, c.skeleton)};
   const Morph morph(device(), {a, b, c}, from_first);
@@ -423,11 +423,10 @@ TEST(Blend, KernelAndTwinAgreeOnRandomPlacesAndUglyWidths) {
   FrameTables frames = frame_tables(skeleton, SeparationPlanes(skeleton), patches, Vec3::Zero());
   for (ColumnRecord& column : frames.columns)
     column.slope_head = 2 * unit(random), column.slope_tail = 2 * unit(random);
-  const DevicePlanes texels{device().upload(in[0]), device().upload(in[1]), device().upload(in[2])};
+  const DevicePlanes texels = upload_planes(device(), in[0], in[1], in[2]);
   DevicePlanes blended = allocate_planes(device(), static_cast<std::size_t>(texture_width) * y);
   blend_texels(device(), tables, rows, frames, texture_width, texels, blended);
-  const std::vector<float> out[3] = {device().download(blended.x), device().download(blended.y),
-                                     device().download(blended.z)};
+  const auto out = download_planes(device(), blended);
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const auto [bone, row, vertex, quad] = rows[k];
     const Rectangle& rectangle = patches[bone].rectangle;

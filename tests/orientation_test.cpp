@@ -74,7 +74,7 @@ TEST(Orientation, EqualsItsTwinOnAMorphAndOnNoise) {
         pull_orientations(device(), surface, laplace, sources, shares_without_tips(given.model, surface.lattice), 0.1);
 
     const std::vector<Vec3> points = download_vectors(device(), surface.points);
-    const std::vector<Triangle> ends = end_triangles(given.model, surface.lattice, surface.positions);
+    const std::vector<Triangle> ends = end_triangles(given.model, surface.positions);
     const twin::SurfaceMatrices matrices =
         twin::surface_matrices(twin::surface_triangles(given.model, surface.lattice, ends), points);
     const twin::OrientationPull expected =

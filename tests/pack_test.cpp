@@ -13,12 +13,12 @@ namespace skeletex {
 namespace {
 
 /// Shares over two orders of magnitude, side ratios from long limbs to flat trunks.
-std::vector<PatchDemand> random_demands(int count, unsigned seed) {
+std::vector<PatchRequest> random_requests(int count, unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
-  std::vector<PatchDemand> demands(count);
-  for (PatchDemand& demand : demands) demand = {std::exp(normal(random)), std::exp(0.7 * normal(random) + 0.3)};
-  return demands;
+  std::vector<PatchRequest> requests(count);
+  for (PatchRequest& request : requests) request = {std::exp(normal(random)), std::exp(0.7 * normal(random) + 0.3)};
+  return requests;
 }
 
 double texels(const Rectangle& r) { return static_cast<double>(r.width) * r.height; }
@@ -49,7 +49,7 @@ TEST(Pack, FillsEveryTextureWithoutGapOrOverlap) {
        {std::pair{64, 64}, {100, 100}, {128, 512}, {1000, 64}, {777, 513}, {4096, 4096}, {4096, 256}})
     for (const int count : {1, 2, 3, 4, 7, 15, 23, 40, 60}) {
       SCOPED_TRACE(std::to_string(count) + " patches, " + std::to_string(width) + " x " + std::to_string(height));
-      const AtlasLayout layout = pack_atlas(random_demands(count, 7u * count), width, height);
+      const AtlasLayout layout = pack_atlas(random_requests(count, 7u * count), width, height);
       ASSERT_EQ(layout.rectangles.size(), static_cast<std::size_t>(count));
       expect_tiling(layout, width, height);
       EXPECT_GE(layout.used_fraction, 0.95);
@@ -58,7 +58,7 @@ TEST(Pack, FillsEveryTextureWithoutGapOrOverlap) {
 
 TEST(Pack, PaintsEveryTexelOfASmallTextureOnce) {
   for (const int count : {1, 5, 23, 60}) {
-    const AtlasLayout layout = pack_atlas(random_demands(count, 3u * count), 64, 96);
+    const AtlasLayout layout = pack_atlas(random_requests(count, 3u * count), 64, 96);
     std::vector<int> painted(64 * 96, 0);
     for (const Rectangle& r : layout.rectangles)
       for (int y = r.y; y < r.y + r.height; ++y)
@@ -68,51 +68,51 @@ TEST(Pack, PaintsEveryTexelOfASmallTextureOnce) {
 }
 
 TEST(Pack, HoldsAsManyPatchesAsSmallestRectanglesFit) {
-  expect_tiling(pack_atlas(random_demands(40, 1), 32, 32), 32, 32);
-  expect_tiling(pack_atlas(random_demands(64, 2), 32, 32), 32, 32);
-  expect_tiling(pack_atlas(random_demands(49, 3), 31, 31), 31, 31);
-  expect_tiling(pack_atlas(random_demands(60, 4), 4, 240), 4, 240);
-  expect_tiling(pack_atlas(random_demands(1, 5), 4, 4), 4, 4);
+  expect_tiling(pack_atlas(random_requests(40, 1), 32, 32), 32, 32);
+  expect_tiling(pack_atlas(random_requests(64, 2), 32, 32), 32, 32);
+  expect_tiling(pack_atlas(random_requests(49, 3), 31, 31), 31, 31);
+  expect_tiling(pack_atlas(random_requests(60, 4), 4, 240), 4, 240);
+  expect_tiling(pack_atlas(random_requests(1, 5), 4, 4), 4, 4);
 }
 
 TEST(Pack, GivesEveryPatchItsShareOfTheTexels) {
   for (const int count : {4, 15, 40}) {
-    const auto demands = random_demands(count, 11u * count);
+    const auto requests = random_requests(count, 11u * count);
     double sum = 0;
-    for (const PatchDemand& demand : demands) sum += demand.share;
-    const AtlasLayout layout = pack_atlas(demands, 1024, 1024);
+    for (const PatchRequest& request : requests) sum += request.share;
+    const AtlasLayout layout = pack_atlas(requests, 1024, 1024);
     for (int i = 0; i < count; ++i) {
       // Each cut is rounded to a texel and the tree is rarely deeper than a dozen levels.
-      const double wanted = demands[i].share / sum * 1024 * 1024;
+      const double wanted = requests[i].share / sum * 1024 * 1024;
       EXPECT_NEAR(texels(layout.rectangles[i]) / wanted, 1, 12 / std::sqrt(wanted)) << count << " patches, patch " << i;
     }
   }
 }
 
 TEST(Pack, GivesTinyPatchesTheSmallestRectangleAndTheRestItsProportions) {
-  std::vector<PatchDemand> demands(8, {1e-9, 1});
-  demands.push_back({2, 1});
-  demands.push_back({1, 1});
-  const AtlasLayout layout = pack_atlas(demands, 256, 256);
+  std::vector<PatchRequest> requests(8, {1e-9, 1});
+  requests.push_back({2, 1});
+  requests.push_back({1, 1});
+  const AtlasLayout layout = pack_atlas(requests, 256, 256);
   expect_tiling(layout, 256, 256);
   for (int i = 0; i < 8; ++i) EXPECT_LE(texels(layout.rectangles[i]), 64);
   EXPECT_NEAR(texels(layout.rectangles[8]) / texels(layout.rectangles[9]), 2, 0.1);
 }
 
 TEST(Pack, MatchesWantedSideRatios) {
-  // Mean of |log(got / wanted)| weighted by share. Unit squares would be off by 0.56 in the mean for these demands.
+  // Mean of |log(got / wanted)| weighted by share. Unit squares would be off by 0.56 in the mean for these requests.
   for (const int count : {15, 40}) {
     double mismatch = 0;
     const int layouts = 6;
     for (int seed = 0; seed < layouts; ++seed) {
-      const auto demands = random_demands(count, 100u + seed);
+      const auto requests = random_requests(count, 100u + seed);
       double sum = 0;
-      for (const PatchDemand& demand : demands) sum += demand.share;
-      const AtlasLayout layout = pack_atlas(demands, 512, 512);
+      for (const PatchRequest& request : requests) sum += request.share;
+      const AtlasLayout layout = pack_atlas(requests, 512, 512);
       for (int i = 0; i < count; ++i) {
         const Rectangle& r = layout.rectangles[i];
-        mismatch += demands[i].share / sum *
-                    std::abs(std::log(static_cast<double>(r.width) / r.height / demands[i].columns_per_row));
+        mismatch += requests[i].share / sum *
+                    std::abs(std::log(static_cast<double>(r.width) / r.height / requests[i].columns_per_row));
       }
     }
     EXPECT_LT(mismatch / layouts, 0.25) << count;
@@ -121,8 +121,8 @@ TEST(Pack, MatchesWantedSideRatios) {
 
 TEST(Pack, FindsALayoutThatMatchesExactly) {
   // A square cut in two by 3 : 1, the slice cut again into halves.
-  const std::vector<PatchDemand> demands{{6, 0.75}, {1, 0.5}, {1, 0.5}};
-  const AtlasLayout layout = pack_atlas(demands, 256, 256);
+  const std::vector<PatchRequest> requests{{6, 0.75}, {1, 0.5}, {1, 0.5}};
+  const AtlasLayout layout = pack_atlas(requests, 256, 256);
   EXPECT_EQ(layout.rectangles[0].width, 192);
   EXPECT_EQ(layout.rectangles[0].height, 256);
   for (int i = 1; i < 3; ++i) {
@@ -132,9 +132,9 @@ TEST(Pack, FindsALayoutThatMatchesExactly) {
 }
 
 TEST(Pack, GivesTheSameLayoutForTheSameDemands) {
-  const auto demands = random_demands(25, 5);
-  const AtlasLayout a = pack_atlas(demands, 512, 512), b = pack_atlas(demands, 512, 512);
-  for (std::size_t i = 0; i < demands.size(); ++i) {
+  const auto requests = random_requests(25, 5);
+  const AtlasLayout a = pack_atlas(requests, 512, 512), b = pack_atlas(requests, 512, 512);
+  for (std::size_t i = 0; i < requests.size(); ++i) {
     EXPECT_EQ(a.rectangles[i].x, b.rectangles[i].x);
     EXPECT_EQ(a.rectangles[i].y, b.rectangles[i].y);
     EXPECT_EQ(a.rectangles[i].width, b.rectangles[i].width);
@@ -143,17 +143,17 @@ TEST(Pack, GivesTheSameLayoutForTheSameDemands) {
 }
 
 TEST(Pack, DoesNotDependOnTheUnitOfTheShares) {
-  auto demands = random_demands(25, 5);
-  const AtlasLayout a = pack_atlas(demands, 512, 512);
-  for (PatchDemand& demand : demands) demand.share *= 1024;
-  const AtlasLayout b = pack_atlas(demands, 512, 512);
-  for (std::size_t i = 0; i < demands.size(); ++i) EXPECT_EQ(a.rectangles[i].x, b.rectangles[i].x);
+  auto requests = random_requests(25, 5);
+  const AtlasLayout a = pack_atlas(requests, 512, 512);
+  for (PatchRequest& request : requests) request.share *= 1024;
+  const AtlasLayout b = pack_atlas(requests, 512, 512);
+  for (std::size_t i = 0; i < requests.size(); ++i) EXPECT_EQ(a.rectangles[i].x, b.rectangles[i].x);
 }
 
 TEST(Pack, RefusesATextureThatIsTooSmallAndNamesOneThatIsNot) {
   const auto message = [](int count, int width, int height) -> std::string {
     try {
-      pack_atlas(random_demands(count, 1), width, height);
+      pack_atlas(random_requests(count, 1), width, height);
     } catch (const InputError& error) {
       return error.what();
     }
@@ -169,8 +169,8 @@ TEST(Pack, RefusesATextureThatIsTooSmallAndNamesOneThatIsNot) {
 
 TEST(Pack, RefusesDemandsThatAreNoPositiveNumbers) {
   const double nan = std::nan("");
-  for (const PatchDemand bad : {PatchDemand{0, 1}, {-1, 1}, {1, 0}, {nan, 1}, {1, nan}, {INFINITY, 1}})
-    EXPECT_THROW(pack_atlas(std::vector<PatchDemand>{{1, 1}, bad}, 64, 64), InputError);
+  for (const PatchRequest bad : {PatchRequest{0, 1}, {-1, 1}, {1, 0}, {nan, 1}, {1, nan}, {INFINITY, 1}})
+    EXPECT_THROW(pack_atlas(std::vector<PatchRequest>{{1, 1}, bad}, 64, 64), InputError);
   EXPECT_THROW(pack_atlas({}, 64, 64), InputError);
 }
 

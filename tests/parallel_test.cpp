@@ -60,46 +60,5 @@ TEST(RunBeside, ThrowsWhatItsThreadThrowsWhereTheResultIsTaken) {
   }
 }
 
-#ifdef __linux__
-TEST(ForEachBlock, LeavesItsThreadsAllProcessors) {
-  cpu_set_t allowed;
-  ASSERT_EQ(sched_getaffinity(0, sizeof allowed, &allowed), 0);
-  std::vector<int> counts(64, 0);
-  for_each_block(counts.size(), 1, [&](std::size_t block, std::size_t, std::size_t) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));  // so that each thread takes some
-    cpu_set_t own;
-    if (sched_getaffinity(0, sizeof own, &own) == 0 && CPU_EQUAL(&own, &allowed)) counts[block] = 1;
-  });
-  EXPECT_EQ(counts, std::vector<int>(64, 1));
-}
-
-TEST(LeaveProcessor, GoesOnOnAnother) {
-  cpu_set_t allowed;
-  ASSERT_EQ(sched_getaffinity(0, sizeof allowed, &allowed), 0);
-  if (CPU_COUNT(&allowed) < 2) GTEST_SKIP() << "one processor";
-  cpu_set_t one;
-  CPU_ZERO(&one);
-  int processor = 0;
-  while (!CPU_ISSET(processor, &allowed)) ++processor;
-  CPU_SET(processor, &one);
-  // Where it starts is certain, then it may go anywhere.
-  ASSERT_EQ(sched_setaffinity(0, sizeof one, &one), 0);
-  EXPECT_EQ(sched_getcpu(), processor);
-  leave_processor(processor);
-  EXPECT_EQ(sched_getcpu(), processor) << "it was given no other";
-  ASSERT_EQ(sched_setaffinity(0, sizeof allowed, &allowed), 0);
-  bool has_moved = false;
-  for (int i = 0; i < 20; ++i) {
-    const int before = sched_getcpu();
-    leave_processor(before);
-    has_moved = has_moved || sched_getcpu() != before;
-  }
-  EXPECT_TRUE(has_moved);
-  cpu_set_t now;
-  ASSERT_EQ(sched_getaffinity(0, sizeof now, &now), 0);
-  EXPECT_TRUE(CPU_EQUAL(&now, &allowed));
-}
-#endif
-
 }  // namespace
 }  // namespace skeletex

@@ -5,12 +5,10 @@
 #include <algorithm>
 #include <filesystem>
 #include <numeric>
-#include <set>
 
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/analysis/metro.h"
 #include "skeletex/convert/encode_model.h"
-#include "skeletex/convert/sample/encoding_kernels.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "support/load_model.h"
@@ -23,6 +21,11 @@ const char* const kStandardModels[] = {
     "armadillo", "bear",     "bear_bis", "bull",       "bull_16",      "bunny00",     "bunny00_9",      "cactus",
     "camel",     "camel_16", "cow",      "diplodocus", "double_torus", "eight",       "eight_dumbbell", "eight_theta",
     "homer",     "knot1",    "man",      "pinion",     "pinion_5",     "triceratops", "triceratops_17"};
+
+/// Every method for all bones, and each bone's own.
+const std::optional<Method> kMethodChoices[] = {Method::kVsm, Method::kSpd, std::nullopt};
+
+std::string name_of(const std::optional<Method>& method) { return method ? to_string(*method) : "hybrid"; }
 
 void expect_watertight(const TriangleMesh& mesh, int genus, const std::string& what) {
   const ManifoldReport report = measure_manifold(mesh);
@@ -42,12 +45,12 @@ class StandardModel : public testing::TestWithParam<const char*> {};
 TEST_P(StandardModel, ComesBackClosedByEveryMethod) {
   ClContext context;
   const TestModel model = load_standard_model(GetParam());
-  for (const EncodeMethod method : {EncodeMethod::kVsm, EncodeMethod::kSpd, EncodeMethod::kHybrid}) {
+  for (const std::optional<Method>& method : kMethodChoices) {
     EncodeOptions options;
     options.method = method;
     options.width = options.height = 128;
     const EncodeResult encoded = encode_model(context, model.mesh, model.skeleton, options);
-    const std::string what = model.name + " method " + std::to_string(static_cast<int>(method));
+    const std::string what = model.name + " method " + name_of(method);
     EXPECT_GE(encoded.report.used_fraction, 0.95) << what;
     double area = 0;
     for (const BoneReport& bone : encoded.report.bones) {
@@ -96,7 +99,7 @@ TEST(Hybrid, StaysWithinHalfAsMuchAgainOfVsmWhereSpdLosesMost) {
   ClContext context;
   for (const char* const name : {"bunny00", "armadillo"}) {
     const TestModel model = load_standard_model(name);
-    const auto mean_error = [&](EncodeMethod method) {
+    const auto mean_error = [&](std::optional<Method> method) {
       EncodeOptions options;
       options.method = method;
       options.width = options.height = 1024;
@@ -105,40 +108,10 @@ TEST(Hybrid, StaysWithinHalfAsMuchAgainOfVsmWhereSpdLosesMost) {
           measure_metro(context, model.mesh,
                         reconstruct_mesh(context, encode_model(context, model.mesh, model.skeleton, options).model)));
     };
-    const double ratio = mean_error(EncodeMethod::kHybrid) / mean_error(EncodeMethod::kVsm);
+    const double ratio = mean_error(std::nullopt) / mean_error(Method::kVsm);
     RecordProperty(name, std::to_string(ratio));
     EXPECT_LE(ratio, 1.5) << name;
   }
-}
-
-TEST(Pipeline, LaunchesNoKernelThatIsNotListedForIt) {
-  const TestModel model = load_standard_model("bear");
-  for (const EncodeMethod method : {EncodeMethod::kVsm, EncodeMethod::kSpd, EncodeMethod::kHybrid})
-    for (const bool is_snapped : {false, true}) {
-      EncodeOptions options;
-      options.method = method;
-      options.width = options.height = 96;
-      options.has_snap = options.has_fit = is_snapped;
-      options.has_half_texels = true;
-      ClContext context;
-      std::set<std::string> listed;
-      for (const KernelVariant& kernel : encoding_kernels(context, options))
-        listed.insert(std::string(kernel.name.file) + ":" + std::string(kernel.name.kernel));
-      encode_model(context, model.mesh, model.skeleton, options);
-      for (const ClProfileEntry& launched : context.profile())
-        EXPECT_TRUE(listed.contains(launched.kernel))
-            << launched.kernel << " by method " << static_cast<int>(method) << ", snapped " << is_snapped;
-    }
-}
-
-TEST(Pipeline, KernelsCompiledAheadDoNothing) {
-  ClContext context;
-  EncodeOptions options;
-  options.method = EncodeMethod::kHybrid;
-  options.has_snap = options.has_fit = options.has_half_texels = true;
-  for (const KernelVariant& kernel : encoding_kernels(context, options))
-    EXPECT_NO_THROW(context.compile(kernel.name, kernel.range)) << kernel.name.kernel;
-  EXPECT_TRUE(context.profile().empty());
 }
 
 TEST(Pipeline, ASecondEncodeGivesTheSameBytes) {
@@ -176,7 +149,7 @@ TEST(Pipeline, ThePapersRecipeAndOtherOptionsWorkOnGeneratedShapes) {
     options.row_spacing = RowSpacing::kUniform;
     options.has_prefilter = false;
     options.texel_share = TexelShare::kArea;
-    for (const EncodeMethod method : {EncodeMethod::kVsm, EncodeMethod::kSpd}) {
+    for (const Method method : {Method::kVsm, Method::kSpd}) {
       options.method = method;
       const EncodeResult encoded = encode_model(context, shape.mesh, shape.skeleton, options);
       expect_watertight(reconstruct_mesh(context, encoded.model), genus, name);

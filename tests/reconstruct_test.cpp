@@ -347,8 +347,7 @@ TEST(ReconstructKernels, DisplaceAgreesWithItsTwinOnRandomAndUglyTexels) {
     const DeviceLattice lattice = upload_lattice(device(), tables, model.patches, model.texture, choice);
     DevicePlanes points = allocate_planes(device(), lattice.vertex_count);
     displace(device(), lattice, points);
-    const std::vector<float> x = device().download(points.x), y = device().download(points.y),
-                             z = device().download(points.z);
+    const auto [x, y, z] = download_planes(device(), points);
     std::size_t vertex = 0;
     for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
       const PatchRecord& patch = tables.patches[bone];

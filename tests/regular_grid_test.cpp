@@ -28,7 +28,7 @@ ClContext& device() {
   return context;
 }
 
-SkeletexModel encoded(const std::string& name, int size, bool is_snapped, EncodeMethod method = EncodeMethod::kVsm) {
+SkeletexModel encoded(const std::string& name, int size, bool is_snapped, std::optional<Method> method = Method::kVsm) {
   const TestModel model = load_standard_model(name);
   EncodeOptions options;
   options.width = options.height = size;
@@ -136,16 +136,17 @@ TEST(RegularGrid, SlidesAsItsTwinDoes) {
       const auto upload = [&](const std::vector<float>& values) { return device().upload(values); };
       std::vector<float> both = x;
       both.insert(both.end(), y.begin(), y.end());
-      auto next = upload(both), px = upload(x), py = upload(x), pz = upload(x);
+      const DevicePlanes own = upload_planes(device(), planes[0], planes[1], planes[2]),
+                         now = upload_planes(device(), at[0], at[1], at[2]),
+                         next_points = allocate_planes(device(), own.count);
+      const auto next = upload(both);
       device().launch({"regular_grid.cl", "slide_points"}, row_range(device(), rows.size()),
                       SlideParameters{static_cast<int>(rows.size()), kWidth * kHeight}, device().upload(rows),
                       device().upload(std::vector<PatchRecord>{record}), device().upload(std::vector<int>{is_kept}),
-                      upload(planes[0]), upload(planes[1]), upload(planes[2]), upload(both), upload(at[0]),
-                      upload(at[1]), upload(at[2]), next, px, py, pz);
+                      own.values, upload(both), now.values, next, next_points.values);
       const std::vector<float> got = device().download(next), got_x(got.begin(), got.begin() + kWidth * kHeight),
                                got_y(got.begin() + kWidth * kHeight, got.end());
-      const std::array<std::vector<float>, 3> points{device().download(px), device().download(py),
-                                                     device().download(pz)};
+      const std::array<std::vector<float>, 3> points = download_planes(device(), next_points);
       for (int r = 0; r < kHeight; ++r)
         for (int j = 0; j < kWidth; ++j) {
           const std::size_t i = static_cast<std::size_t>(r) * kWidth + j;
@@ -208,7 +209,7 @@ TEST(RegularGrid, StaysOnTheSurfaceAndMakesMorphsAsSmoothAsOfEvenModels) {
     EXPECT_LT(from_snapped, 1.02 * from_regular);
     // Means of the texels themselves are rougher by half.
     SkeletexModel untold[2] = {snapped[0], snapped[1]};
-    for (SkeletexModel& model : untold) model.encoder_settings = "{}";
+    for (SkeletexModel& model : untold) model.sampling = {};
     const double mixed = mean_angle(half_way({untold[0], untold[1]}));
     EXPECT_GT(mixed, 1.2 * from_snapped);
     RecordProperty(

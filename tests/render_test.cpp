@@ -33,7 +33,7 @@ ClContext& cl() {
 SkeletexModel model_of(const Shape& shape, Method method) {
   EncodeOptions options;
   options.width = options.height = 64;
-  options.method = method == Method::kSpd ? EncodeMethod::kSpd : EncodeMethod::kVsm;
+  options.method = method;
   return encode_model(cl(), shape.mesh, shape.skeleton, options).model;
 }
 
@@ -67,8 +67,7 @@ TEST(Render, ShaderAndLibraryPlaceEveryVertexAlikeInEveryPose) {
                                      reconstruct_mesh(cl(), model, posed, {Deformation::kPaper, rule}).positions),
                   1e-5 * model.diagonal);
       }
-      const Skin skin =
-          make_skin(cl(), model, displace_inner(cl(), model, SeparationPlanes(model.skeleton), number_lattice(model)));
+      const Skin skin = make_skin(cl(), model, row_points(cl(), model, RowChoice::kInner));
       const GpuSkin gpu_skin = upload_skin(skin, bind);
       Skeleton stretched = posed;
       for (Node& node : stretched.nodes) node.position *= 1.3;
@@ -218,7 +217,7 @@ TEST(Render, NamesEachTrianglesBoneAndKeepsItsCheckerTogether) {
     EXPECT_GE(counts[bone], 2 * rectangle.width * (rectangle.height - 3)) << bone;  // its quads; and strips and fans
   }
   const int cells = 24;
-  const std::vector<std::array<float, 2>> uv = checker_coordinates(model, lattice, mesh, cells);
+  const std::vector<std::array<float, 2>> uv = checker_coordinates(model, mesh, cells);
   ASSERT_EQ(uv.size(), 3 * mesh.triangles.size());
   for (std::size_t i = 0; i < uv.size(); i += 3)
     for (int c = 0; c < 3; ++c) {

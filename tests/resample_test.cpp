@@ -8,6 +8,7 @@
 #include <numeric>
 #include <random>
 
+#include "reconstruct_structs.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/lattice.h"
@@ -326,13 +327,13 @@ TEST(ResampleKernels, FiltersAgreeWithTheirTwinOnRandomPlanes) {
     }
     const std::vector<LatticeRow> rows = lattice_rows(is_rows ? middle.patches : target.patches, RowChoice::kAll);
     DevicePlanes out = allocate_planes(device(), out_size);
-    device().launch({"reconstruct.cl", is_rows ? "filter_rows" : "filter_columns"}, row_range(device(), rows.size()),
-                    static_cast<int>(rows.size()), device().upload(rows), device().upload(tables.patches),
-                    device().upload(widths), device().upload(first_in), device().upload(taps.taps),
-                    device().upload(taps.weights), device().upload(planes[0]), device().upload(planes[1]),
-                    device().upload(planes[2]), out.x, out.y, out.z);
-    const std::vector<float> results[3] = {device().download(out.x), device().download(out.y),
-                                           device().download(out.z)};
+    device().launch(
+        {"reconstruct.cl", is_rows ? "filter_rows" : "filter_columns"}, row_range(device(), rows.size()),
+        ResampleParameters{static_cast<int>(rows.size()), static_cast<int>(in_size), static_cast<int>(out_size), 0},
+        device().upload(rows), device().upload(tables.patches), device().upload(widths), device().upload(first_in),
+        device().upload(taps.taps), device().upload(taps.weights),
+        upload_planes(device(), planes[0], planes[1], planes[2]).values, out.values);
+    const auto results = download_planes(device(), out);
     std::size_t at = 0;
     for (std::size_t i = 0; i < 6; ++i)
       for (int r = 0; r < new_sizes[i].second; ++r)
@@ -372,12 +373,13 @@ TEST(ResampleKernels, FitsAreLimitedAsByTheirTwin) {
     sampled[p][7] = sampled[p][8] = sampled[p][6];  // edges of no length
     fitted[p][20] = sampled[p][20];
   }
-  DevicePlanes points{device().upload(fitted[0]), device().upload(fitted[1]), device().upload(fitted[2])};
-  device().launch({"reconstruct.cl", "limit_fit"}, row_range(device(), rows.size()), static_cast<int>(rows.size()),
-                  0.25f, device().upload(rows), device().upload(tables.patches), device().upload(sampled[0]),
-                  device().upload(sampled[1]), device().upload(sampled[2]), points.x, points.y, points.z);
-  const std::vector<float> x = device().download(points.x), y = device().download(points.y),
-                           z = device().download(points.z);
+  DevicePlanes points = upload_planes(device(), fitted[0], fitted[1], fitted[2]);
+  device().launch(
+      {"reconstruct.cl", "limit_fit"}, row_range(device(), rows.size()),
+      ResampleParameters{static_cast<int>(rows.size()), static_cast<int>(size), static_cast<int>(size), 0.25f},
+      device().upload(rows), device().upload(tables.patches),
+      upload_planes(device(), sampled[0], sampled[1], sampled[2]).values, points.values);
+  const auto [x, y, z] = download_planes(device(), points);
   std::size_t first = 0;
   for (const Patch& patch : model.patches) {
     const int width = patch.rectangle.width, height = patch.rectangle.height;
@@ -424,12 +426,9 @@ TEST(ResampleKernels, TangentSpaceIsEnteredAsByItsTwin) {
   const DeviceTables device_tables = upload_tables(device(), tables);
   const std::size_t area = static_cast<std::size_t>(model.texture.width) * model.texture.height;
   DevicePlanes texels = allocate_planes(device(), area);
-  device().launch({"reconstruct.cl", "enter_tangent_space"}, row_range(device(), rows.size()),
-                  static_cast<int>(rows.size()), model.texture.width, device_tables.column_count, device().upload(rows),
-                  device_tables.patches, device_tables.rows, device_tables.columns, device().upload(p[0]),
-                  device().upload(p[1]), device().upload(p[2]), texels.x, texels.y, texels.z);
-  const std::vector<float> along = device().download(texels.x), around = device().download(texels.y),
-                           out = device().download(texels.z);
+  enter_tangent_space(device(), device_tables, device().upload(rows), model.texture.width,
+                      upload_planes(device(), p[0], p[1], p[2]), texels);
+  const auto [along, around, out] = download_planes(device(), texels);
   std::size_t at = 0;
   for (const PatchRecord& patch : tables.patches)
     for (int r = 0; r < patch.height; ++r)

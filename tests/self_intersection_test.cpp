@@ -4,11 +4,15 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <numeric>
 #include <random>
 
 #include "skeletex/analysis/manifold.h"
+#include "skeletex/geometry/point_triangle.h"
 #include "skeletex/geometry/predicates.h"
 #include "support/load_model.h"
 #include "support/shapes.h"
@@ -168,6 +172,40 @@ TEST(SelfIntersection, OfACrumpledTorusTheTreeFindsThePairsOfBruteForce) {
         if (do_triangles_intersect(mesh, i, j)) expected.push_back({i, j});
     EXPECT_GT(expected.size(), 1u);
     EXPECT_EQ(find_self_intersections(mesh), expected) << "seed " << seed;
+    // Of a query set the pairs that have one of its triangles.
+    std::vector<int> query;
+    for (int i = 0; i < count; ++i)
+      if (random() % 5 == 0) query.push_back(i);
+    const auto is_queried = [&](int i) { return std::binary_search(query.begin(), query.end(), i); };
+    std::erase_if(expected, [&](const auto& pair) { return !is_queried(pair[0]) && !is_queried(pair[1]); });
+    TriangleTree tree = build_triangle_tree(mesh);
+    EXPECT_EQ(find_self_intersections(mesh, tree, query), expected) << "seed " << seed;
+    EXPECT_TRUE(find_self_intersections(mesh, tree, {}).empty());
+
+    // A tree that is made to fit moved triangles finds what one of its own does, also over a given order.
+    std::vector<int> places;
+    for (int place = 0; place < count; ++place)
+      if (tree.order[place] < 100) places.push_back(place);
+    for (int vertex = 0; vertex < kAlong * kAround; ++vertex)
+      if (std::none_of(mesh.triangles.begin() + 100, mesh.triangles.end(),
+                       [&](const Triangle& t) { return t[0] == vertex || t[1] == vertex || t[2] == vertex; }))
+        mesh.positions[vertex] += 0.1 * Vec3(normal(random), normal(random), normal(random));
+    update_triangle_tree(mesh, places, tree);
+    std::vector<int> order(count);
+    std::iota(order.begin(), order.end(), 0);
+    const auto moved = find_self_intersections(mesh);
+    EXPECT_EQ(find_self_intersections(mesh, tree), moved);
+    EXPECT_EQ(find_self_intersections(mesh, build_triangle_tree(mesh, order)), moved);
+    for (int i = 0; i < 50; ++i) {
+      const Vec3 point(normal(random), normal(random), normal(random));
+      double least = std::numeric_limits<double>::infinity();
+      for (const auto& [a, b, c] : mesh.triangles)
+        least = std::min(least,
+                         offset_from_triangle(point, mesh.positions[a], mesh.positions[b], mesh.positions[c]).norm());
+      EXPECT_EQ(find_nearest_triangle(mesh, tree, point).distance, least);
+      EXPECT_EQ(find_nearest_triangle(mesh, tree, point, least).triangle, -1);
+      EXPECT_EQ(find_nearest_triangle(mesh, tree, point, 1.01 * least).distance, least);
+    }
   }
 }
 

@@ -79,9 +79,9 @@ TEST(Skin, WeightsAgreeOnBothSidesOfEverySeam) {
     SCOPED_TRACE(named.name);
     const SkeletexModel model = model_of(named);
     const SeparationPlanes separation(model.skeleton);
-    const WeightWalks walks = make_weight_walks(model);
+    const WeightWalks walks = make_weight_walks(model, SeparationPlanes(model.skeleton));
     const auto check = [&](int node, const auto& bones, const SeamSample& sample) {
-      const BoneEnd end = model.skeleton.bones[bones[0]].head == node ? BoneEnd::kHead : BoneEnd::kTail;
+      const BoneEnd end = end_at(model.skeleton, bones[0], node);
       const Vec3 point = separation.seam_point(bones[0], end, sample.turn, sample.distance) - model.origin;
       const auto weights = bone_weights(walks, bones[0], point);
       for (const int other : bones) EXPECT_LT(largest_difference(weights, bone_weights(walks, other, point)), 1e-5);
@@ -99,7 +99,7 @@ TEST(Skin, WeightsOfAStraightJointAreALogisticFunctionOfTheHeight) {
   skeleton.bones = {{"left", 0, 1, Vec3::UnitZ()}, {"right", 1, 2, Vec3::UnitZ()}};
   const double radius = 0.2;
   const SkeletexModel model = SyntheticSurface(skeleton, radius).model({{24, 11}, {24, 11}});
-  const WeightWalks walks = make_weight_walks(model);
+  const WeightWalks walks = make_weight_walks(model, SeparationPlanes(model.skeleton));
   std::vector<double> distances;
   for (const SeamSample& sample : model.arcs[0].samples) distances.push_back(sample.distance);
   std::sort(distances.begin(), distances.end());
@@ -120,7 +120,7 @@ TEST(Skin, KernelsMoveVerticesAsTheHostDoesInDoublePrecision) {
     SCOPED_TRACE(named.name);
     const SkeletexModel model = model_of(named);
     const TriangleMesh bind = reconstruct_mesh(device(), model);
-    const WeightWalks walks = make_weight_walks(model);
+    const WeightWalks walks = make_weight_walks(model, SeparationPlanes(model.skeleton));
     const Lattice lattice = number_lattice(model);
     const Skeleton posed = moved(model.skeleton, 7);
     const std::vector<BoneMotion> motions = bone_motions(model.skeleton, posed);

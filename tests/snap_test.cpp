@@ -13,6 +13,7 @@
 #include "skeletex/analysis/metro.h"
 #include "skeletex/convert/encode_model.h"
 #include "skeletex/convert/layout/row_profile.h"
+#include "skeletex/convert/snap/revert_texels.h"
 #include "skeletex/geometry/self_intersection.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "support/load_model.h"
@@ -324,7 +325,7 @@ TEST(Snap, DoesNotDependOnTheOrderOfTheVertices) {
   EXPECT_EQ(first.y, second.y);
 }
 
-TEST(Snap, WithTexelsThatGoBackGoesWhatThenFoldsAndNothingElse) {
+TEST(Snap, WithTexelsThatRevertGoesWhatThenFoldsAndNothingElse) {
   std::mt19937 random(11);
   const OnePatch patch({4, 2, 31, 29});
   const int width = patch.rectangle().width, height = patch.rectangle().height;
@@ -345,29 +346,30 @@ TEST(Snap, WithTexelsThatGoBackGoesWhatThenFoldsAndNothingElse) {
     for (int j = 0; j < width; ++j)
       if (random() % 2 == 0)
         for (int i = 0; i < 3; ++i) moved[i][patch.texel(j, r)] += normal(random);
-  const TexelPoints even_points{device().upload(even[0]), device().upload(even[1]), device().upload(even[2])};
-  TexelPoints points{device().upload(moved[0]), device().upload(moved[1]), device().upload(moved[2])};
-  ReadingPositions positions = even_positions(device(), patch.layout);
+  SkeletexModel model;
+  model.skeleton = patch.skeleton, model.patches = patch.patches, model.ends.resize(1);
+  model.texture.width = kTextureWidth, model.texture.height = kTextureHeight;
+  const LatticeFrame frame = frame_lattice(device(), model);
+  const std::vector<float> no_offsets(size, 0);
+  const PlacedTexels regular{even, no_offsets, no_offsets, std::vector<int>(size, 0), std::vector<int>(size, 0)};
+  PlacedTexels texels = regular;
+  texels.points = moved;
   std::vector<int> marks(size, 0);
   std::vector<int> marked;
   for (int r = 1; r + 1 < height; ++r)
     for (int j = 0; j < width; ++j)
       if (random() % 10 == 0) marks[patch.texel(j, r)] = 1, marked.push_back(static_cast<int>(patch.texel(j, r)));
-  TexelReturns returns(device(), patch.layout);
   // In three calls: what a quad was in one of them may no longer hold in the next.
   std::vector<int> back;
   std::shuffle(marked.begin(), marked.end(), random);
   for (std::size_t call = 0, third = marked.size() / 3 + 1; call < 3; ++call) {
     const std::vector<int> some(marked.begin() + std::min(marked.size(), call * third),
                                 marked.begin() + std::min(marked.size(), (call + 1) * third));
-    const std::vector<int> more =
-        put_back_listed(device(), patch.layout, even_points, even_points, some, true, returns, positions, points)
-            .texels;
+    const std::vector<int> more = revert_texels(frame, some, true, regular, texels);
     EXPECT_FALSE(more.empty());
     back.insert(back.end(), more.begin(), more.end());
   }
-  const std::array<std::vector<float>, 3> got{device().download(points.x), device().download(points.y),
-                                              device().download(points.z)};
+  const TexelPlanes& got = texels.points;
 
   const auto point = [&](const std::array<std::vector<float>, 3>& planes, int j, int r) {
     const std::size_t texel = patch.texel((j + width) % width, r);
@@ -424,7 +426,7 @@ TEST(Snap, BringsABearToAThirdOfTheErrorWithoutFoldingIt) {
   const TriangleMesh snapped_mesh = reconstruct_mesh(device(), encoded.model);
   const SnapReport& report = encoded.report.snap.value();
   EXPECT_GT(report.snapped_vertices, 0.95 * report.vertices);
-  EXPECT_LT(report.texels_put_back, 0.02 * 256 * 256);
+  EXPECT_LT(report.reverted_texels, 0.02 * 256 * 256);
   const MetroReport before = measure_metro(device(), model.mesh, plain),
                     after = measure_metro(device(), model.mesh, snapped_mesh);
   EXPECT_LT(symmetric_mean(after), 0.3 * symmetric_mean(before));
@@ -433,11 +435,11 @@ TEST(Snap, BringsABearToAThirdOfTheErrorWithoutFoldingIt) {
   options.has_prefilter = false;
   const EncodeResult unfiltered = encode_model(device(), model.mesh, model.skeleton, options);
   EXPECT_LT(measure_metro(device(), reconstruct_mesh(device(), unfiltered.model), model.mesh).vertex.max, 2e-6);
-  // With it only what goes back to the regular grid lies elsewhere.
+  // With it only what reverts to the regular grid lies elsewhere.
   int differing = 0;
   for (std::size_t i = 0; i < unfiltered.model.texture.out.size(); ++i)
     differing += unfiltered.model.texture.out[i] != encoded.model.texture.out[i];
-  EXPECT_LE(differing, report.texels_put_back + unfiltered.report.snap->texels_put_back);
+  EXPECT_LE(differing, report.reverted_texels + unfiltered.report.snap->reverted_texels);
   options.has_prefilter = true;
   EXPECT_TRUE(measure_manifold(snapped_mesh).is_closed_manifold());
   EXPECT_LE(static_cast<double>(count_self_intersections(snapped_mesh)),
@@ -469,7 +471,7 @@ TEST(Snap, AndFitAreOnWhereTheyPayUnlessToldOtherwise) {
   EXPECT_EQ(reported(128, few, [](EncodeOptions& o) { o.has_snap = true, o.has_fit = false; }), std::pair(true, false));
   EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.has_prefilter = false; }),
             std::pair(true, false));  // texels on the mesh were asked for
-  EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.method = EncodeMethod::kSpd; }), std::pair(false, false));
+  EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.method = Method::kSpd; }), std::pair(false, false));
 }
 
 TEST(Snap, LeavesNoWideGapsBetweenSeamSamples) {

@@ -368,14 +368,10 @@ TEST(PlacePart, KernelAndTwinAgreeOnRandomTables) {
     }
   }
   for (std::size_t i = 0; i < tables.correction_size(); ++i) tables.corrections.push_back(0.1f * unit(random));
-  const DevicePlanes source_planes{device().upload(in[0]), device().upload(in[1]), device().upload(in[2])};
-  const DevicePlanes target_planes{device().upload(target[0]), device().upload(target[1]), device().upload(target[2])};
-  const DevicePlanes placed = place_part(device(), tables, source_planes, target_planes);
-  const std::vector<float> out[3] = {device().download(placed.x), device().download(placed.y),
-                                     device().download(placed.z)};
-  const DevicePlanes read = read_source(device(), tables, source_planes);
-  const std::vector<float> read_out[3] = {device().download(read.x), device().download(read.y),
-                                          device().download(read.z)};
+  const DevicePlanes source_planes = upload_planes(device(), in[0], in[1], in[2]);
+  const DevicePlanes target_planes = upload_planes(device(), target[0], target[1], target[2]);
+  const auto out = download_planes(device(), place_part(device(), tables, source_planes, target_planes));
+  const auto read_out = download_planes(device(), read_source(device(), tables, source_planes));
   for (std::size_t k = 0; k < tables.rows.size(); ++k) {
     const TransferRow& row = tables.rows[k];
     const int p = row.patch, vertex = row.vertex;

@@ -33,15 +33,15 @@ struct Rule {
   std::vector<TriangleEnergy> energies{};  // of all poses
 };
 
-std::vector<int> own_bones(const SkeletexModel& model) {
-  const Lattice lattice = number_lattice(model);
+std::vector<int> own_bones(const PreparedModel& prepared) {
+  const SkeletexModel& model = prepared.model;
   std::vector<int> own;
   for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
     own.insert(
         own.end(),
         static_cast<std::size_t>(model.patches[bone].rectangle.width) * (model.patches[bone].rectangle.height - 2),
         bone);
-  const std::vector<int> shared = bones_of_shared_vertices(model, lattice);
+  const std::vector<int> shared = bones_of_shared_vertices(prepared);
   own.insert(own.end(), shared.begin(), shared.end());
   return own;
 }
@@ -83,23 +83,24 @@ Json run(const std::string& model_path, const std::string& pose_path, const std:
   const SkeletexModel model = read_model(model_path);
   const PoseAnimation animation = read_animation(pose_path, model.skeleton);
   ClContext context(device);
-  const BindSurface bind = make_bind_surface(reconstruct_mesh(context, model));
-  const int first_seam = number_lattice(model).first_sample.empty() ? number_lattice(model).first_corner
-                                                                    : number_lattice(model).first_sample[0];
+  const PreparedModel prepared(model);
+  const BindSurface bind = make_bind_surface(reconstruct_mesh(context, prepared));
+  const Lattice& lattice = prepared.lattice;
+  const int first_seam = lattice.first_sample.empty() ? lattice.first_corner : lattice.first_sample[0];
   std::vector<bool> is_seam;
   for (const auto& [a, b] : bind.edges.vertices) is_seam.push_back(b >= first_seam);  // vertices of seams come last
 
   std::vector<Rule> rules;
   for (const Deformation deformation : {Deformation::kSmooth, Deformation::kCoordinates, Deformation::kPaper})
     rules.push_back({to_string(deformation), [&, deformation](const Skeleton& posed) {
-                       return reconstruct_mesh(context, model, posed, {deformation}).positions;
+                       return reconstruct_mesh(context, prepared, posed, {deformation}).positions;
                      }});
   rules.push_back({"polished", [&](const Skeleton& posed) {
-                     std::vector<Vec3> positions = reconstruct_mesh(context, model, posed).positions;
+                     std::vector<Vec3> positions = reconstruct_mesh(context, prepared, posed).positions;
                      polish_pose(bind.mesh, positions);
                      return positions;
                    }});
-  const std::vector<int> own = own_bones(model);
+  const std::vector<int> own = own_bones(prepared);
   const auto weights = [&](double width) {
     return diffused_weights(bind.mesh, own, static_cast<int>(model.skeleton.bones.size()), width * model.diagonal);
   };

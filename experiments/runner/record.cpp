@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 #include <sys/utsname.h>
 
-#include <CL/opencl.hpp>
 #include <Eigen/Core>
 #include <array>
 #include <cstdio>

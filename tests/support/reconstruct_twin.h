@@ -31,8 +31,9 @@ inline DisplacedPoint displace(const PatchRecord& patch, const RowRecord& row, c
   return {point, (point - frame.foot).norm(), texel.norm()};
 }
 
-/// Kernel triangulate_quads, one quad of a patch: whether its diagonal from (row, column + 1) to (row + 1, column) is
-/// taken. `vertex(row, column)` gives the points of inner rows; `is_clear` says whether single precision can tell.
+/// Kernel triangulate by the nearer diagonal, one quad of a patch: whether its diagonal from (row, column + 1) to
+/// (row + 1, column) is taken. `vertex(row, column)` gives the points of inner rows; `is_clear` says whether single
+/// precision can tell.
 template <class Vertices>
 bool takes_second_diagonal(const Vertices& vertex, int row, int column, int height, bool& is_clear) {
   const auto point = [&](int r, int j) -> Vec3 {
@@ -54,7 +55,7 @@ bool takes_second_diagonal(const Vertices& vertex, int row, int column, int heig
   return second < first;
 }
 
-/// Kernel triangulate_smoothly, likewise.
+/// The same by the smoother diagonal.
 template <class Vertices>
 bool takes_smoother_diagonal(const Vertices& vertex, int row, int column, int height, bool& is_clear) {
   // A quad's two triangles by its diagonal: each holds two of the sides 0 (below), 1 (right), 2 (above), 3 (left).

@@ -13,21 +13,9 @@
 namespace skeletex {
 namespace {
 
-/// Below these, in diagonals and as a distance of unit vectors, two things are in the same place or direction. The
-/// second is what segment_mesh refuses.
-constexpr double kSamePlace = 1e-9;
+/// Unit directions that are nearer to each other count as the same: segment_mesh refuses them.
 constexpr double kSameDirection = 1e-3;
 constexpr double kSmallAngleDegrees = 5;
-
-std::string name_of_node(const Skeleton& skeleton, int n) {
-  const std::string& name = skeleton.nodes[n].name;
-  return name.empty() ? fmt::format("node {}", n) : fmt::format("node \"{}\"", name);
-}
-
-std::string name_of_bone(const Skeleton& skeleton, int b) {
-  const std::string& name = skeleton.bones[b].name;
-  return name.empty() ? fmt::format("bone {}", b) : fmt::format("bone \"{}\"", name);
-}
 
 /// The component of each node; nodes without bones are their own.
 std::vector<int> components_of(const Skeleton& skeleton) {
@@ -113,6 +101,44 @@ Approach nearest_of_segments(const Vec3& a, const Vec3& b, const Vec3& c, const 
   return {s, t, (w + s * u - t * v).norm()};
 }
 
+bool have_same_nodes(const Bone& a, const Bone& b) {
+  return (a.head == b.head && a.tail == b.tail) || (a.head == b.tail && a.tail == b.head);
+}
+
+/// Two bones that leave a node in about the same direction.
+void find_equal_directions(const Skeleton& skeleton, BoneAtNode a, BoneAtNode b, std::vector<Finding>& findings) {
+  const double apart = (direction_from(skeleton, a) - direction_from(skeleton, b)).norm();
+  const double degrees = 2 * std::asin(std::min(1.0, apart / 2)) * 180 / std::numbers::pi;
+  if (degrees >= kSmallAngleDegrees) return;
+  const int node = end_node(skeleton, a.bone, a.end);
+  const bool is_error = apart < kSameDirection;
+  const double shift = 2 * std::sin(kSmallAngleDegrees * std::numbers::pi / 360) * bone_length(skeleton, b.bone);
+  findings.push_back(
+      {is_error ? Severity::kError : Severity::kWarning, "bone-direction",
+       fmt::format("{} and {} leave {} at {} in {} direction ({:.3g} degrees apart){}", name_of_bone(skeleton, a.bone),
+                   name_of_bone(skeleton, b.bone), name_of_node(skeleton, node), text_of(skeleton.nodes[node].position),
+                   is_error ? "the same" : "nearly the same", degrees,
+                   is_error ? ", so that no separation plane separates them" : ""),
+       fmt::format("move the far end of {} sideways by {:.3g} or more, or let it branch off further along",
+                   name_of_bone(skeleton, b.bone), shift)});
+}
+
+/// Two bones without a common node that touch.
+void find_contact(const Skeleton& skeleton, int i, int j, double diagonal, std::vector<Finding>& findings) {
+  const Vec3 &head = end_position(skeleton, i, BoneEnd::kHead), &tail = end_position(skeleton, i, BoneEnd::kTail);
+  const Approach near = nearest_of_segments(head, tail, end_position(skeleton, j, BoneEnd::kHead),
+                                            end_position(skeleton, j, BoneEnd::kTail));
+  const double lengths = bone_length(skeleton, i) + bone_length(skeleton, j);
+  const auto is_at_end = [&](double share, int bone) {
+    return std::min(share, 1 - share) * bone_length(skeleton, bone) <= kSamePlace * diagonal;
+  };
+  if (near.distance > 1e-6 * lengths || (is_at_end(near.first, i) && is_at_end(near.second, j))) return;
+  findings.push_back({Severity::kError, "bone-contact",
+                      fmt::format("{} and {} meet at {} without a node there", name_of_bone(skeleton, i),
+                                  name_of_bone(skeleton, j), text_of(head + near.first * (tail - head))),
+                      "split the bones there, so that they share a node, or move them apart"});
+}
+
 void find_between_bones(const Skeleton& skeleton, const std::vector<bool>& has_length, double diagonal,
                         std::vector<Finding>& findings) {
   const int count = static_cast<int>(skeleton.bones.size());
@@ -120,8 +146,7 @@ void find_between_bones(const Skeleton& skeleton, const std::vector<bool>& has_l
     for (int j = i + 1; j < count; ++j) {
       if (!has_length[i] || !has_length[j]) continue;
       const Bone &a = skeleton.bones[i], &b = skeleton.bones[j];
-      const bool is_same_pair = (a.head == b.head && a.tail == b.tail) || (a.head == b.tail && a.tail == b.head);
-      if (is_same_pair) {
+      if (have_same_nodes(a, b)) {
         findings.push_back(
             {Severity::kError, "bone-duplicate",
              fmt::format("{} and {} both run between {} and {}, on the same straight line", name_of_bone(skeleton, i),
@@ -131,97 +156,41 @@ void find_between_bones(const Skeleton& skeleton, const std::vector<bool>& has_l
       }
       bool has_common_node = false;
       for (const BoneEnd end_a : {BoneEnd::kHead, BoneEnd::kTail})
-        for (const BoneEnd end_b : {BoneEnd::kHead, BoneEnd::kTail}) {
-          if (end_node(skeleton, i, end_a) != end_node(skeleton, j, end_b)) continue;
-          has_common_node = true;
-          const int node = end_node(skeleton, i, end_a);
-          const Vec3 da = direction_from(skeleton, {i, end_a}), db = direction_from(skeleton, {j, end_b});
-          const double apart = (da - db).norm();
-          const double degrees = 2 * std::asin(std::min(1.0, apart / 2)) * 180 / std::numbers::pi;
-          if (degrees >= kSmallAngleDegrees) continue;
-          const bool is_error = apart < kSameDirection;
-          const double shift = 2 * std::sin(kSmallAngleDegrees * std::numbers::pi / 360) * bone_length(skeleton, j);
-          findings.push_back(
-              {is_error ? Severity::kError : Severity::kWarning, "bone-direction",
-               fmt::format("{} and {} leave {} at {} in {} direction ({:.3g} degrees apart){}",
-                           name_of_bone(skeleton, i), name_of_bone(skeleton, j), name_of_node(skeleton, node),
-                           text_of(skeleton.nodes[node].position), is_error ? "the same" : "nearly the same", degrees,
-                           is_error ? ", so that no separation plane separates them" : ""),
-               fmt::format("move the far end of {} sideways by {:.3g} or more, or let it branch off further along",
-                           name_of_bone(skeleton, j), shift)});
-        }
-      if (has_common_node) continue;
-      const Approach near =
-          nearest_of_segments(end_position(skeleton, i, BoneEnd::kHead), end_position(skeleton, i, BoneEnd::kTail),
-                              end_position(skeleton, j, BoneEnd::kHead), end_position(skeleton, j, BoneEnd::kTail));
-      const double lengths = bone_length(skeleton, i) + bone_length(skeleton, j);
-      const auto is_at_end = [&](double share, int bone) {
-        return std::min(share, 1 - share) * bone_length(skeleton, bone) <= kSamePlace * diagonal;
-      };
-      if (near.distance > 1e-6 * lengths || (is_at_end(near.first, i) && is_at_end(near.second, j))) continue;
-      const Vec3 place =
-          end_position(skeleton, i, BoneEnd::kHead) +
-          near.first * (end_position(skeleton, i, BoneEnd::kTail) - end_position(skeleton, i, BoneEnd::kHead));
-      findings.push_back({Severity::kError, "bone-contact",
-                          fmt::format("{} and {} meet at {} without a node there", name_of_bone(skeleton, i),
-                                      name_of_bone(skeleton, j), text_of(place)),
-                          "split the bones there, so that they share a node, or move them apart"});
+        for (const BoneEnd end_b : {BoneEnd::kHead, BoneEnd::kTail})
+          if (end_node(skeleton, i, end_a) == end_node(skeleton, j, end_b)) {
+            has_common_node = true;
+            find_equal_directions(skeleton, {i, end_a}, {j, end_b}, findings);
+          }
+      if (!has_common_node) find_contact(skeleton, i, j, diagonal, findings);
     }
 }
 
-}  // namespace
-
-std::string text_of(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x(), p.y(), p.z()); }
-
-std::string text_of_distance(double distance, double diagonal) {
-  return fmt::format("{:.4g} ({:.2g} % of the diagonal)", distance, diagonal > 0 ? 100 * distance / diagonal : 0);
-}
-
-int count_cycles(const Skeleton& skeleton) {
-  const std::vector<int> component = components_of(skeleton);
-  const std::vector<bool> is_used = used_nodes(skeleton);
-  int nodes = 0, parts = 0;
-  for (int n = 0; n < static_cast<int>(skeleton.nodes.size()); ++n) {
-    nodes += is_used[n];
-    parts += is_used[n] && component[n] == n;
-  }
-  return static_cast<int>(skeleton.bones.size()) - nodes + parts;
-}
-
-bool find_in_skeleton(const Skeleton& skeleton, double diagonal, std::vector<Finding>& findings) {
-  const int node_count = static_cast<int>(skeleton.nodes.size()), bone_count = static_cast<int>(skeleton.bones.size());
-  if (bone_count == 0) {
-    findings.push_back({Severity::kError, "empty", "the skeleton has no bones", "give it at least one"});
-    return false;
-  }
-  bool is_usable = true;
-  for (int b = 0; b < bone_count; ++b)
+/// Indices and positions that cannot be used. \return whether there are none
+bool find_unusable(const Skeleton& skeleton, std::vector<Finding>& findings) {
+  const int node_count = static_cast<int>(skeleton.nodes.size());
+  const std::size_t before = findings.size();
+  for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b)
     for (const int n : {skeleton.bones[b].head, skeleton.bones[b].tail})
-      if (n < 0 || n >= node_count) {
+      if (n < 0 || n >= node_count)
         findings.push_back(
             {Severity::kError, "bone-node",
              fmt::format("{} ends at node {}, and there are {} nodes", name_of_bone(skeleton, b), n, node_count),
              "let it end at a node that exists"});
-        is_usable = false;
-      }
   for (int n = 0; n < node_count; ++n)
-    if (!skeleton.nodes[n].position.allFinite()) {
+    if (!skeleton.nodes[n].position.allFinite())
       findings.push_back(
           {Severity::kError, "finite",
            fmt::format("{} has no finite position: {}", name_of_node(skeleton, n), text_of(skeleton.nodes[n].position)),
            "give it three finite numbers"});
-      is_usable = false;
-    }
-  if (!is_usable) return false;
+  return findings.size() == before;
+}
 
-  double unit = diagonal;
-  if (!(unit > 0))
-    for (const Node& node : skeleton.nodes)
-      unit = std::max(unit, (node.position - skeleton.nodes.front().position).norm());
-  std::vector<bool> has_length(bone_count);
-  for (int b = 0; b < bone_count; ++b) {
+/// Bones by themselves. \return whether each has a length
+std::vector<bool> find_in_bones(const Skeleton& skeleton, double diagonal, std::vector<Finding>& findings) {
+  std::vector<bool> has_length(skeleton.bones.size());
+  for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b) {
     const Bone& bone = skeleton.bones[b];
-    has_length[b] = bone_length(skeleton, b) > kSamePlace * unit;
+    has_length[b] = bone_length(skeleton, b) > kSamePlace * diagonal;
     if (!has_length[b]) {
       const std::string what =
           bone.head == bone.tail
@@ -241,125 +210,62 @@ bool find_in_skeleton(const Skeleton& skeleton, double diagonal, std::vector<Fin
            fmt::format("{}: its \"s\" {} gives no direction across the bone", name_of_bone(skeleton, b), text_of(s)),
            "give a direction across the bone, or leave \"s\" out"});
   }
+  return has_length;
+}
+
+void find_unused_nodes(const Skeleton& skeleton, std::vector<Finding>& findings) {
   const std::vector<bool> is_used = used_nodes(skeleton);
-  for (int n = 0; n < node_count; ++n)
+  for (int n = 0; n < static_cast<int>(skeleton.nodes.size()); ++n)
     if (!is_used[n])
       findings.push_back({Severity::kWarning, "node-unused",
                           fmt::format("{} at {} is the end of no bone", name_of_node(skeleton, n),
                                       text_of(skeleton.nodes[n].position)),
                           "remove it, or give it a bone; it is ignored"});
+}
+
+}  // namespace
+
+std::string name_of_node(const Skeleton& skeleton, int n) {
+  const std::string& name = skeleton.nodes[n].name;
+  return name.empty() ? fmt::format("node {}", n) : fmt::format("node \"{}\"", name);
+}
+
+std::string name_of_bone(const Skeleton& skeleton, int b) {
+  const std::string& name = skeleton.bones[b].name;
+  return name.empty() ? fmt::format("bone {}", b) : fmt::format("bone \"{}\"", name);
+}
+
+std::string text_of_distance(double distance, double diagonal) {
+  return fmt::format("{:.4g} ({:.2g} % of the diagonal)", distance, diagonal > 0 ? 100 * distance / diagonal : 0);
+}
+
+int count_cycles(const Skeleton& skeleton) {
+  const std::vector<int> component = components_of(skeleton);
+  const std::vector<bool> is_used = used_nodes(skeleton);
+  int nodes = 0, parts = 0;
+  for (int n = 0; n < static_cast<int>(skeleton.nodes.size()); ++n) {
+    nodes += is_used[n];
+    parts += is_used[n] && component[n] == n;
+  }
+  return static_cast<int>(skeleton.bones.size()) - nodes + parts;
+}
+
+bool find_in_skeleton(const Skeleton& skeleton, double diagonal, std::vector<Finding>& findings) {
+  if (skeleton.bones.empty()) {
+    findings.push_back({Severity::kError, "empty", "the skeleton has no bones", "give it at least one"});
+    return false;
+  }
+  if (!find_unusable(skeleton, findings)) return false;
+  double unit = diagonal;
+  if (!(unit > 0))
+    for (const Node& node : skeleton.nodes)
+      unit = std::max(unit, (node.position - skeleton.nodes.front().position).norm());
+  const std::vector<bool> has_length = find_in_bones(skeleton, unit, findings);
+  find_unused_nodes(skeleton, findings);
   find_parts(skeleton, findings);
   find_equal_places(skeleton, unit, findings);
   find_between_bones(skeleton, has_length, unit, findings);
   return true;
-}
-
-void find_between(const SurfaceProbe& surface, bool is_closed, const Skeleton& skeleton,
-                  std::vector<Finding>& findings) {
-  const double diagonal = surface.diagonal();
-  const std::vector<bool> is_used = used_nodes(skeleton);
-  std::vector<int> nodes;
-  std::vector<Vec3> points;
-  for (int n = 0; n < static_cast<int>(skeleton.nodes.size()); ++n) {
-    if (!is_used[n]) continue;
-    nodes.push_back(n);
-    points.push_back(skeleton.nodes[n].position);
-  }
-  const std::vector<double> windings = surface.winding_numbers(points, is_closed);
-  const char* doubt = is_closed ? "" : " (as far as a surface that is not closed has an inside)";
-
-  std::vector<bool> is_outside(skeleton.nodes.size(), false);
-  std::size_t outside = 0;
-  std::vector<Finding> node_findings;
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    const Vec3& position = points[i];
-    const NearestPoint nearest = surface.nearest(position);
-    const bool is_on_surface = nearest.distance <= 1e-6 * diagonal;
-    if (windings[i] > 0.5 && !is_on_surface) continue;
-    is_outside[nodes[i]] = true;
-    outside += !is_on_surface;
-    const Vec3 inward = is_on_surface ? Vec3(-nearest.normal) : Vec3((nearest.point - position).normalized());
-    const Vec3 target = surface.middle_of_body(nearest.point, inward);
-    const std::string where = fmt::format("{} at {} lies", name_of_node(skeleton, nodes[i]), text_of(position));
-    if (is_on_surface)
-      node_findings.push_back({Severity::kError, "node-inside", fmt::format("{} on the surface{}", where, doubt),
-                               fmt::format("move it into the body, for example to {}, by {}", text_of(target),
-                                           text_of_distance((target - position).norm(), diagonal))});
-    else
-      node_findings.push_back(
-          {Severity::kError, "node-inside",
-           fmt::format("{} outside the mesh, {} from its surface{}", where,
-                       text_of_distance(nearest.distance, diagonal), doubt),
-           fmt::format("move it by more than {:.4g} towards {}, for example on to {}, the middle of the body there",
-                       nearest.distance, text_of(nearest.point), text_of(target))});
-  }
-  if (outside == nodes.size() && nodes.size() > 1) {
-    Vec3 lower = points.front(), upper = points.front();
-    for (const Vec3& p : points) {
-      lower = lower.cwiseMin(p);
-      upper = upper.cwiseMax(p);
-    }
-    const Vec3 middle = 0.5 * (lower + upper);
-    const NearestPoint nearest = surface.nearest(middle);
-    findings.push_back(
-        {Severity::kError, "frame",
-         fmt::format("no node of the skeleton lies in the mesh: its nodes fill the box {} to {} (diagonal {:.4g}), the "
-                     "mesh has a diagonal of {:.4g}, "
-                     "and its surface comes nearest to that box's centre at {}",
-                     text_of(lower), text_of(upper), (upper - lower).norm(), diagonal, text_of(nearest.point)),
-         "check that mesh and skeleton share units, axes and origin"});
-  }
-  findings.insert(findings.end(), node_findings.begin(), node_findings.end());
-
-  for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b) {
-    const Bone& bone = skeleton.bones[b];
-    const Vec3 &head = skeleton.nodes[bone.head].position, &tail = skeleton.nodes[bone.tail].position;
-    if (!((tail - head).norm() > kSamePlace * diagonal)) continue;
-    const std::vector<Crossing> crossings = surface.crossings(head, tail);
-    if (crossings.empty()) continue;
-    std::string list;
-    for (std::size_t c = 0; c < crossings.size() && c < 8; ++c)
-      list += fmt::format("{}{} at {} ({:.0f} % of the way)", c ? ", " : "", crossings[c].is_leaving ? "out" : "in",
-                          text_of(crossings[c].point), 100 * crossings[c].share);
-    if (crossings.size() > 8) list += fmt::format(" and {} more", crossings.size() - 8);
-
-    // The stretch outside that strays furthest from the body.
-    double furthest = -1;
-    NearestPoint nearest;
-    Vec3 stray = head;
-    for (std::size_t c = 0; c + 1 < crossings.size(); ++c) {
-      if (!crossings[c].is_leaving || crossings[c + 1].is_leaving) continue;
-      constexpr int kSteps = 8;
-      for (int step = 1; step < kSteps; ++step) {
-        const Vec3 point =
-            crossings[c].point + static_cast<double>(step) / kSteps * (crossings[c + 1].point - crossings[c].point);
-        const NearestPoint there = surface.nearest(point);
-        if (there.distance <= furthest) continue;
-        furthest = there.distance;
-        nearest = there;
-        stray = point;
-      }
-    }
-    std::string remedy = "move its ends into the body, or bend it with a node in between";
-    if (furthest > 0) {
-      const Vec3 inward = (nearest.point - stray).normalized();
-      remedy = fmt::format(
-          "at {} shift it by more than {} towards {}: bend it with a node, for example at {}, the middle of the body "
-          "there, or move its ends",
-          text_of(stray), text_of_distance(furthest, diagonal), text_of(nearest.point),
-          text_of(surface.middle_of_body(nearest.point, inward)));
-    } else if (is_outside[bone.head] || is_outside[bone.tail]) {
-      remedy = fmt::format(
-          "move {} into the body",
-          is_outside[bone.head] && is_outside[bone.tail]
-              ? fmt::format("{} and {}", name_of_node(skeleton, bone.head), name_of_node(skeleton, bone.tail))
-              : name_of_node(skeleton, is_outside[bone.head] ? bone.head : bone.tail));
-    }
-    findings.push_back({Severity::kError, "bone-crossing",
-                        fmt::format("{} from {} to {} goes through the surface: {}", name_of_bone(skeleton, b),
-                                    name_of_node(skeleton, bone.head), name_of_node(skeleton, bone.tail), list),
-                        remedy});
-  }
 }
 
 }  // namespace skeletex

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The parts of validate_input: each appends what it finds, with place and remedy.
+// The parts of validate_input. Each appends its findings, with place and remedy.
 #pragma once
 #include <string>
 #include <vector>
@@ -10,8 +10,12 @@
 
 namespace skeletex {
 
-/// "(0.12, 0.4, 0.03)"
-std::string text_of(const Vec3& p);
+/// Two points that are nearer to each other are in the same place; diagonals.
+inline constexpr double kSamePlace = 1e-9;
+
+/// "node "neck"", or "node 3" if it has no name
+std::string name_of_node(const Skeleton& skeleton, int node);
+std::string name_of_bone(const Skeleton& skeleton, int bone);
 /// "0.0123 (0.8 % of the diagonal)"
 std::string text_of_distance(double distance, double diagonal);
 
@@ -27,7 +31,7 @@ TriangleMesh usable_surface(const TriangleMesh& mesh, const ManifoldReport& repo
 /// \return whether its indices and positions can be used at all
 bool find_in_skeleton(const Skeleton& skeleton, double diagonal, std::vector<Finding>& findings);
 
-/// Where nodes and bones leave the body. \param is_closed  whether the surface has an inside without doubt
+/// Nodes and bones that leave the body. \param is_closed  whether the surface has an inside without doubt
 void find_between(const SurfaceProbe& surface, bool is_closed, const Skeleton& skeleton,
                   std::vector<Finding>& findings);
 

@@ -65,8 +65,8 @@ NearestPoint SurfaceProbe::nearest(const Vec3& point) const {
       const auto& [i, j, k] = mesh_.triangles[t];
       const Vec3 &a = mesh_.positions[i], &b = mesh_.positions[j], &c = mesh_.positions[k];
       // No point of a triangle is further from one of its corners than the longer edge there; most triangles end here.
-      const double reach = 1.000001 * std::sqrt(std::max((b - a).squaredNorm(), (c - a).squaredNorm())),
-                   limit = reach + std::sqrt(nearest.squared);
+      const double extent = 1.000001 * std::sqrt(std::max((b - a).squaredNorm(), (c - a).squaredNorm())),
+                   limit = extent + std::sqrt(nearest.squared);
       if ((a - point).squaredNorm() > limit * limit) continue;
       const Vec3 offset = offset_from_triangle(point, a, b, c);
       if (offset.squaredNorm() < nearest.squared) nearest = {offset.squaredNorm(), offset, t};

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <future>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -15,6 +14,7 @@
 #include "skeletex/convert/layout/row_profile.h"
 #include "skeletex/convert/sample/sample_seams.h"
 #include "skeletex/convert/segment/segment_mesh.h"
+#include "skeletex/device/stopwatch.h"
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/model/error.h"
 
@@ -24,20 +24,6 @@ namespace {
 // With fewer, vertices pull texels about without making edges between them; the fit makes up for some of that.
 constexpr double kSnapTexelsPerVertex = 2, kFittedSnapTexelsPerVertex = 1.5;
 constexpr double kLeastDihedral = 0.004;  // radians: flatter edges are no creases to snap to
-
-class Stopwatch {
- public:
-  /// Milliseconds since construction or the last call.
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const double ms = std::chrono::duration<double, std::milli>(now - start_).count();
-    start_ = now;
-    return ms;
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 void check_options(const EncodeOptions& options, const Skeleton& skeleton) {
   if (options.vsm.iterations < 0 || options.vsm.iterations > 100)
@@ -53,9 +39,8 @@ void check_options(const EncodeOptions& options, const Skeleton& skeleton) {
 
 std::vector<Method> choose_methods(const EncodeOptions& options, const Skeleton& skeleton,
                                    std::span<const double> unseen) {
-  std::vector<Method> methods(skeleton.bones.size(),
-                              options.method == EncodeMethod::kSpd ? Method::kSpd : Method::kVsm);
-  if (options.method != EncodeMethod::kHybrid) return methods;
+  std::vector<Method> methods(skeleton.bones.size(), options.method.value_or(Method::kVsm));
+  if (options.method) return methods;
   for (std::size_t bone = 0; bone < methods.size(); ++bone)
     methods[bone] = unseen[bone] > options.hybrid_unseen_threshold ? Method::kVsm : Method::kSpd;
   for (const auto& [name, method] : options.hybrid_overrides)
@@ -115,10 +100,7 @@ std::vector<RowProfile> spd_profiles(ClContext& context, const Skeleton& skeleto
 
 nlohmann::json settings_json(const EncodeOptions& options, const TexelPlacing& placing,
                              const std::vector<double>& unseen) {
-  const char* method = options.method == EncodeMethod::kSpd   ? "spd"
-                       : options.method == EncodeMethod::kVsm ? "vsm"
-                                                              : "hybrid";
-  nlohmann::json json{{"method", method},
+  nlohmann::json json{{"method", options.method ? to_string(*options.method) : "hybrid"},
                       {"size", {options.width, options.height}},
                       {"vsm",
                        {{"iterations", options.vsm.iterations},
@@ -130,7 +112,7 @@ nlohmann::json settings_json(const EncodeOptions& options, const TexelPlacing& p
                       {"snap", placing.has_snap},
                       {"fit", placing.has_fit},
                       {"spd_hit", options.spd_hit == SpdHit::kFirst ? "first" : "last"}};
-  if (options.method == EncodeMethod::kHybrid) json["hybrid_unseen_threshold"] = options.hybrid_unseen_threshold;
+  if (!options.method) json["hybrid_unseen_threshold"] = options.hybrid_unseen_threshold;
   if (!unseen.empty()) json["unseen_area_fractions"] = unseen;
   return json;
 }
@@ -141,17 +123,18 @@ void add_results(const TexelReport& report, double diagonal, nlohmann::json& jso
   if (report.snap)
     json["snapped"] = {{"vertices", share(report.snap->snapped_vertices, report.snap->vertices)},
                        {"edges", share(report.snap->snapped_edges, report.snap->edges)},
-                       {"texels_put_back", report.snap->texels_put_back}};
+                       {"texels_reverted", report.snap->reverted_texels}};
   if (report.fit) {
     nlohmann::json residuals = nlohmann::json::array();
     for (const double residual : report.fit->residuals) residuals.push_back(residual / diagonal);
-    json["fitted"] = {{"residuals", std::move(residuals)}, {"texels_put_back", report.fit->texels_put_back}};
+    json["fitted"] = {{"residuals", std::move(residuals)}, {"texels_reverted", report.fit->reverted_texels}};
   }
   if (report.rounding)
     json["rounded"] = {{"nearest", report.rounding->nearest / diagonal},
                        {"chosen", report.rounding->chosen / diagonal}};
-  if (report.snap || report.fit)
-    json["turned_triangles"] = {{"lattice", report.turned_triangles}, {"even", report.even_turned_triangles}};
+  if (report.revert)
+    json["inverted_triangles"] = {{"lattice", report.revert->inverted_triangles},
+                                {"regular", report.revert->regular_inverted_triangles}};
 }
 
 /// Vertices where the pole of a chart's free end lies.
@@ -197,10 +180,10 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   Stopwatch watch;
   progress("half edges", 0);
   CutMesh half_edges = cut_mesh_of(mesh);
-  report.half_edge_ms = watch.lap();
+  report.half_edge_ms = watch.lap_ms();
   progress("segmentation", 0.05);
   const Segmentation segmentation = segment_mesh(context, std::move(half_edges), skeleton);
-  report.segmentation_ms = watch.lap();
+  report.segmentation_ms = watch.lap_ms();
 
   progress("parameterization", 0.2);
   std::vector<Chart> charts(bones);
@@ -209,49 +192,34 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   });
   const std::vector<double> unseen = unseen_area_fractions(context, skeleton, separation, charts);
   const std::vector<Method> methods = choose_methods(options, skeleton, unseen);
-  std::vector<VsmReport> vsm_reports(bones);
-  {
-    std::vector<Chart> mapped;
-    for (int bone = 0; bone < bones; ++bone)
-      if (methods[bone] == Method::kVsm) mapped.push_back(std::move(charts[bone]));
-    const std::vector<VsmReport> solved =
-        mapped.empty() ? std::vector<VsmReport>{} : solve_vsm(context, mapped, options.vsm);
-    for (int bone = 0, i = 0; bone < bones; ++bone)
-      if (methods[bone] == Method::kVsm) {
-        charts[bone] = std::move(mapped[i]);
-        vsm_reports[bone] = solved[i++];
-      }
-  }
-  report.parameterization_ms = watch.lap();
+  const std::vector<MapReport> map_reports = map_charts(context, methods, charts, {options.vsm});
+  report.parameterization_ms = watch.lap_ms();
 
   progress("encoding", 0.6);
   // Texels are shared out by detail; rectangles have the sides' ratio of girth to length.
-  const std::vector<RowProfile> rays = std::find(methods.begin(), methods.end(), Method::kSpd) == methods.end()
-                                           ? std::vector<RowProfile>(bones)
-                                           : spd_profiles(context, skeleton, separation, charts, options.spd_hit);
-  const bool is_all_spd = std::find(methods.begin(), methods.end(), Method::kVsm) == methods.end();
+  const std::vector<RowProfile> rays = std::any_of(methods.begin(), methods.end(), is_height_field)
+                                           ? spd_profiles(context, skeleton, separation, charts, options.spd_hit)
+                                           : std::vector<RowProfile>(bones);
+  const bool is_all_spd = std::all_of(methods.begin(), methods.end(), is_height_field);
   std::vector<RowProfile> profiles(bones);
   for_each_block(profiles.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-    profiles[i] = methods[i] == Method::kVsm ? row_profile(charts[i]) : rays[i];
+    profiles[i] = is_height_field(methods[i]) ? rays[i] : row_profile(charts[i]);
   });
   std::vector<PatchSource> sources;
   std::vector<double> areas;
   for (int bone = 0; bone < bones; ++bone) {
     const TriangleMesh& part = segmentation.segments[bone].mesh;
     areas.push_back(surface_area(part));
-    sources.push_back({methods[bone], &charts[bone], static_cast<double>(part.triangles.size()), areas[bone],
+    sources.push_back({is_height_field(methods[bone]) ? nullptr : &charts[bone],
+                       static_cast<double>(part.triangles.size()), areas[bone],
                        std::max(profiles[bone].length, 1e-9 * model.diagonal)});
   }
   const bool has_even_rows = options.row_spacing == RowSpacing::kUniform;
-  const std::vector<PatchDemand> demands =
-      patch_demands(sources, has_even_rows ? std::span<const RowProfile>() : profiles,
-                    options.texel_share.value_or(is_all_spd ? TexelShare::kArea : TexelShare::kError));
+  const std::vector<PatchRequest> requests =
+      patch_requests(sources, has_even_rows ? std::span<const RowProfile>() : profiles,
+                     options.texel_share.value_or(is_all_spd ? TexelShare::kArea : TexelShare::kError));
   const TexelPlacing placing = choose_placing(options, mesh, is_all_spd);
-  // Packing is one processor's work, and so is most of what comes before the device reads texels: features are found
-  // and listed beside.
-  std::future<MapFeatures> finding_features;
-  if (placing.has_snap) finding_features = run_beside([&] { return find_features(charts, methods, kLeastDihedral); });
-  const AtlasLayout layout = pack_atlas(demands, options.width, options.height);
+  const AtlasLayout layout = pack_atlas(requests, options.width, options.height);
   report.used_fraction = layout.used_fraction;
 
   for (int bone = 0; bone < bones; ++bone) {
@@ -261,16 +229,11 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
                       : spread_rows_uniformly(patch.rectangle.height);
     model.patches.push_back(std::move(patch));
   }
-  std::shared_future<DeviceSnapTables> listing_features;
-  if (placing.has_snap) {
-    auto list = [&, on = context.beside()] {
-      return upload_tables(*on,
-                           tables_of(place_features(finding_features.get(), charts, model.patches), model.patches));
-    };
-    listing_features =
-        (context.can_run_beside() ? run_beside(std::move(list)) : std::async(std::launch::deferred, std::move(list)))
-            .share();
-  }
+  std::optional<DeviceSnapTables> features;
+  if (placing.has_snap)
+    features = upload_tables(
+        context, tables_of(place_features(find_features(charts, methods, kLeastDihedral), charts, model.patches),
+                           model.patches));
   model.diagonals =
       options.diagonals.value_or(placing.has_snap || placing.has_fit ? DiagonalRule::kSmooth : DiagonalRule::kNearest);
   Seams seams = sample_seams(segmentation, skeleton, separation, layout.rectangles,
@@ -279,20 +242,12 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   model.corners = std::move(seams.corners);
   model.ends = std::move(seams.ends);
   model.texture.width = options.width, model.texture.height = options.height;
-  std::shared_future<GuardFrame> framing_guard;
-  if (placing.has_snap || placing.has_fit)
-    framing_guard =
-        run_beside([&, listing = context.can_run_beside() ? listing_features : std::shared_future<DeviceSnapTables>()] {
-          if (listing.valid()) listing.wait();  // two at once would take turns with what all wait for
-          return frame_guard(model, charts);
-        }).share();
-
   std::vector<SpdHits> hits(bones);
   {
     std::vector<Chart> cast_charts;
     std::vector<Patch> cast_patches;
     for (int bone = 0; bone < bones; ++bone)
-      if (methods[bone] == Method::kSpd) {
+      if (is_height_field(methods[bone])) {
         cast_charts.push_back(charts[bone]);
         cast_patches.push_back(model.patches[bone]);
       }
@@ -300,7 +255,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
         cast_charts.empty() ? std::vector<SpdHits>{}
                             : cast_spd_rays(context, skeleton, separation, cast_charts, cast_patches, options.spd_hit);
     for (int bone = 0, i = 0; bone < bones; ++bone)
-      if (methods[bone] == Method::kSpd) hits[bone] = std::move(cast[i++]);
+      if (is_height_field(methods[bone])) hits[bone] = std::move(cast[i++]);
   }
   std::vector<std::array<std::vector<Vec3>, 2>> end_points(bones);
   for (int bone = 0; bone < bones; ++bone)
@@ -314,20 +269,26 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
             points_on_loop(segmentation.segments[bone], skeleton, separation, end, model.patches[bone].rectangle.width);
     }
   progress("encoding", 0.8);
-  const GuardSources guard{model, mesh, options.tree, charts, std::move(framing_guard)};
+  std::optional<TriangleTree> own_tree;
+  if ((placing.has_snap || placing.has_fit) && !options.tree) own_tree = build_triangle_tree(mesh);
+  std::optional<RevertSources> revert;
+  if (placing.has_snap || placing.has_fit)
+    revert.emplace(RevertSources{model, mesh, options.tree ? *options.tree : *own_tree, charts});
   TexelOptions texel_options{
       .has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_fit = placing.has_fit};
   if (options.has_half_texels) texel_options.half_rule = model.diagonals;
-  TexelResult texels =
-      read_texels(context, skeleton, separation, {charts, model.patches, hits, end_points, &guard, listing_features},
-                  options.width, options.height, model.origin, texel_options);
+  TexelResult texels = read_texels(
+      context, skeleton, separation,
+      {charts, model.patches, hits, end_points, revert ? &*revert : nullptr, features ? &*features : nullptr},
+      options.width, options.height, model.origin, texel_options);
   model.texture = std::move(texels.texture);
+  model.sampling = {options.has_prefilter, placing.has_snap, placing.has_fit};
   {
     nlohmann::json settings = settings_json(options, placing, unseen);
     add_results(texels.report, model.diagonal, settings);
     model.encoder_settings = settings.dump();
   }
-  report.encoding_ms = watch.lap();
+  report.encoding_ms = watch.lap_ms();
 
   report.vertices = static_cast<int>(mesh.positions.size());
   report.triangles = static_cast<int>(mesh.triangles.size());
@@ -337,8 +298,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   report.snap = texels.report.snap;
   report.fit = texels.report.fit;
   report.rounding = texels.report.rounding;
-  report.turned_triangles = texels.report.turned_triangles;
-  report.even_turned_triangles = texels.report.even_turned_triangles;
+  report.revert = texels.report.revert;
   report.device = context.device().name;
   for (int bone = 0; bone < bones; ++bone) {
     const Segment& segment = segmentation.segments[bone];
@@ -351,10 +311,10 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
     entry.triangles = static_cast<int>(segment.mesh.triangles.size());
     entry.rectangle = layout.rectangles[bone];
     entry.unseen_area_fraction = unseen[bone];
-    entry.flipped_triangles = vsm_reports[bone].flipped_triangles;
+    entry.flipped_triangles = map_reports[bone].flipped_triangles;
     entry.sampled_triangle_fraction = texels.report.sampled_triangle_fractions[bone];
     entry.missed_texels = texels.report.missed_texels[bone];
-    entry.vsm = vsm_reports[bone];
+    entry.map = map_reports[bone];
     report.bones.push_back(std::move(entry));
   }
   progress("done", 1);

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "skeletex/convert/layout/patch_demands.h"
+#include "skeletex/convert/layout/patch_requests.h"
 #include "skeletex/convert/parameterize/spd.h"
 #include "skeletex/convert/parameterize/vsm.h"
 #include "skeletex/convert/sample/read_texels.h"
@@ -15,7 +15,6 @@
 
 namespace skeletex {
 
-enum class EncodeMethod { kSpd, kVsm, kHybrid };
 /// How rows are spread along a bone: evenly in surface length (the default), or evenly in the map's u (the paper).
 enum class RowSpacing { kSurfaceLength, kUniform };
 /// Up to here the fit is the default: beyond it gains little, and takes longest.
@@ -23,7 +22,8 @@ inline constexpr std::size_t kMostFittedTexels = 256 * 256;
 
 struct EncodeOptions {
   int width = 512, height = 512;
-  EncodeMethod method = EncodeMethod::kVsm;
+  /// Of all bones; without, each bone takes SPD or VSM (hybrid).
+  std::optional<Method> method = Method::kVsm;
   /// Hybrid: bones whose unseen share of area is above this take VSM, the others SPD (docs/spd.md).
   double hybrid_unseen_threshold = 0.01;
   /// Hybrid: bones by name whose method the user chose.
@@ -58,10 +58,10 @@ struct BoneReport {
   int vertices = 0, triangles = 0;
   Rectangle rectangle;
   double unseen_area_fraction = 0;
-  int flipped_triangles = 0;             ///< of the map; VSM only
+  int flipped_triangles = 0;             ///< of the map
   double sampled_triangle_fraction = 0;  ///< share of the segment's triangles that a texel reads
   int missed_texels = 0;                 ///< SPD rays that hit nothing, filled from their neighbours
-  VsmReport vsm;
+  MapReport map;
 };
 
 struct EncodeReport {
@@ -69,11 +69,11 @@ struct EncodeReport {
   double diagonal = 0;
   std::vector<BoneReport> bones;
   double used_fraction = 0;
-  std::optional<UnfoldReport> unfold;                   ///< when it was on
-  std::optional<SnapReport> snap;                       ///< when it was on
-  std::optional<FitReport> fit;                         ///< when it was on
-  std::optional<RoundingReport> rounding;               ///< to half floats, when it was on
-  int turned_triangles = 0, even_turned_triangles = 0;  ///< with snapping or fit: see GuardReport
+  std::optional<UnfoldReport> unfold;      ///< when it was on
+  std::optional<SnapReport> snap;          ///< when it was on
+  std::optional<FitReport> fit;            ///< when it was on
+  std::optional<RoundingReport> rounding;  ///< to half floats, when it was on
+  std::optional<RevertReport> revert;      ///< with snapping or fit
   double half_edge_ms = 0, segmentation_ms = 0, parameterization_ms = 0, encoding_ms = 0;
   std::string device;
 };

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-#include <CL/opencl.hpp>
-#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <initializer_list>
-#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -34,10 +32,13 @@ struct ClDeviceInfo {
 /// All devices of all platforms, in the driver loader's order; empty where no driver is installed.
 std::vector<ClDeviceInfo> list_devices();
 
-/// Device memory for `size` values of T. Owned; moves.
+/// The driver's buffer.
+struct ClMemory;
+
+/// Device memory for `size` values of T. Copies share it.
 template <class T>
 struct ClBuffer {
-  ::cl::Buffer memory;
+  std::shared_ptr<ClMemory> memory;
   std::size_t size = 0;
 };
 
@@ -47,26 +48,14 @@ template <class T>
 class ClMapping {
  public:
   ClMapping() = default;
-  ClMapping(::cl::CommandQueue queue, ::cl::Buffer memory, const void* values, std::size_t size)
-      : queue_(std::move(queue)), memory_(std::move(memory)), values_(static_cast<const T*>(values)), size_(size) {}
-  ClMapping(ClMapping&& other) noexcept { *this = std::move(other); }
-  ClMapping& operator=(ClMapping&& other) noexcept {
-    std::swap(queue_, other.queue_), std::swap(memory_, other.memory_), std::swap(values_, other.values_),
-        std::swap(size_, other.size_);
-    return *this;
-  }
-  ~ClMapping() {
-    if (values_) ::clEnqueueUnmapMemObject(queue_(), memory_(), const_cast<T*>(values_), 0, nullptr, nullptr);
-  }
+  ClMapping(std::shared_ptr<const void> values, std::size_t size) : values_(std::move(values)), size_(size) {}
 
-  const T* data() const { return values_; }
+  const T* data() const { return static_cast<const T*>(values_.get()); }
   std::size_t size() const { return size_; }
-  const T& operator[](std::size_t i) const { return values_[i]; }
+  const T& operator[](std::size_t i) const { return data()[i]; }
 
  private:
-  ::cl::CommandQueue queue_;
-  ::cl::Buffer memory_;
-  const T* values_ = nullptr;
+  std::shared_ptr<const void> values_;
   std::size_t size_ = 0;
 };
 
@@ -101,9 +90,35 @@ struct ClProfileEntry {
 };
 
 /// What kind of value a kernel takes as an argument, or is given.
-enum class ClArgument { kUnknown, kBuffer, kLocal, kInt, kUnsigned, kFloat, kStruct };
+enum class ClKind { kUnknown, kBuffer, kLocal, kInt, kUnsigned, kFloat, kStruct };
 
-/// The one owner of OpenCL state: device, context, an in-order queue, programs and profiling events.
+/// An argument of a launch: a ClBuffer, ClLocal, a scalar of the kernel's own type (int, unsigned, float), or a struct
+/// of such. Refers to the value.
+struct ClArgument {
+  ClKind kind = ClKind::kUnknown;
+  std::size_t bytes = 0;
+  const void* value = nullptr;  ///< of a buffer its ClMemory; of local memory none
+
+  template <class T>
+  ClArgument(const ClBuffer<T>& buffer) : kind(ClKind::kBuffer), value(buffer.memory.get()) {}
+  ClArgument(const ClLocal& local) : kind(ClKind::kLocal), bytes(local.bytes) {}
+  template <class T>
+  requires std::is_arithmetic_v<T> ClArgument(const T& scalar)
+      : kind(std::is_floating_point_v<T> ? ClKind::kFloat
+             : std::is_signed_v<T>       ? ClKind::kInt
+                                         : ClKind::kUnsigned),
+        bytes(sizeof(T)),
+        value(&scalar) {
+    static_assert(sizeof(T) == 4, "pass int, unsigned or float: the kernel's own type");
+  }
+  template <class T>
+  requires std::is_class_v<T> ClArgument(const T& parameters)
+      : kind(ClKind::kStruct), bytes(sizeof(T)), value(&parameters) {
+    static_assert(std::is_trivially_copyable_v<T>, "a kernel takes a struct of scalars by value");
+  }
+};
+
+/// The one owner of the driver's state: device, context, an in-order queue, programs and profiling events.
 /// Not safe for use by several threads at once.
 class ClContext {
  public:
@@ -118,9 +133,8 @@ class ClContext {
   /// A queue of another thread's own, with the same device, buffers and programs. Neither queue waits for the other:
   /// `finish` before the other one uses what this one makes.
   std::unique_ptr<ClContext> beside() const;
-  /// Whether another thread may use that queue while this one is used, as OpenCL has it: Oclgrind runs one kernel at a
-  /// time.
-  bool can_run_beside() const { return info_.platform != "Oclgrind"; }
+  /// Whether another thread may use that queue while this one is used.
+  bool can_run_beside() const;
   /// Adds what was launched on such a queue to the profile. Waits for it.
   void take_profile(ClContext& beside);
 
@@ -148,13 +162,13 @@ class ClContext {
   template <class T>
   void write(ClBuffer<T>& buffer, const std::vector<T>& values) {
     check_fits(values.size(), buffer.size);
-    write_bytes(buffer.memory, values.data(), values.size() * sizeof(T));
+    write_bytes(*buffer.memory, values.data(), values.size() * sizeof(T));
   }
   /// Waits for the queue and copies the whole buffer to the host.
   template <class T>
   std::vector<T> download(const ClBuffer<T>& buffer) {
     std::vector<T> values(buffer.size);
-    read_bytes(buffer.memory, values.data(), values.size() * sizeof(T));
+    read_bytes(*buffer.memory, values.data(), values.size() * sizeof(T));
     return values;
   }
   /// The same of several buffers, waiting once.
@@ -163,7 +177,7 @@ class ClContext {
     std::tuple<std::vector<T>...> all{std::vector<T>(buffers.size)...};
     std::apply(
         [&](auto&... values) {
-          read_all({{&buffers.memory, values.data(), values.size() * sizeof(T)}...});
+          read_all({{buffers.memory.get(), values.data(), values.size() * sizeof(T)}...});
         },
         all);
     return all;
@@ -179,136 +193,73 @@ class ClContext {
   requires(sizeof...(T) > 1) std::tuple<ClMapping<T>...> map(const ClBuffer<T>&... buffers) {
     return map_all(buffers...);
   }
+  /// Copies the whole of a buffer to the front of another one. In the profile it is "copy".
+  /// \throw DeviceError when it does not fit
+  template <class T>
+  void copy(const ClBuffer<T>& from, ClBuffer<T>& to) {
+    check_fits(from.size, to.size);
+    copy_bytes(*from.memory, *to.memory, from.size * sizeof(T));
+  }
   /// Sets every byte of the buffer to that of a repeated 4-byte pattern.
   template <class T>
   void fill(ClBuffer<T>& buffer, std::type_identity_t<T> value) {
     static_assert(sizeof(T) == 4);
-    fill_bytes(buffer.memory, &value, sizeof(T), buffer.size * sizeof(T));
+    fill_bytes(*buffer.memory, &value, sizeof(T), buffer.size * sizeof(T));
   }
 
-  /// Queues a kernel. Arguments: ClBuffer, ClLocal, scalars of the kernel's own types (int, unsigned, float), or a
-  /// struct of such, which a header in kernels/ shares with the kernel. Programs are built on first use and kept, see
-  /// programs_with. \throw DeviceError naming the kernel, the failing call and its code in words; the argument whose
-  /// number or kind is
-  ///        not the kernel's own (kinds where the driver tells them); for a build the log with the kernel file's lines
+  /// Queues a kernel. A struct of parameters is one that a header in kernels/ shares with the kernel. Programs are
+  /// built on first use and kept, see programs_with. \throw DeviceError naming the kernel, the failing call and its
+  /// code in words; the argument whose number or kind is not the kernel's own (kinds where the driver tells them); for
+  /// a build the log with the kernel file's lines
   template <class... Args>
   void launch(const ClKernelName& name, const ClRange& range, const Args&... args) {
-    const BuiltKernel& kernel = get_kernel(name);
-    constexpr std::array<ClArgument, sizeof...(Args)> kinds{kind_of(static_cast<const Args*>(nullptr))...};
-    check_arguments(kernel, name, kinds);
-    unsigned index = 0;
-    (set_argument(kernel.kernel, name, index++, args), ...);
-    enqueue(kernel.kernel, name, range);
+    launch_with(name, range, std::array<ClArgument, sizeof...(Args)>{ClArgument(args)...});
   }
   void finish();
 
-  /// Builds or loads the program of a kernel before its first launch.
-  void prepare(const ClKernelName& name) { get_kernel(name); }
-  /// Has the driver compile a kernel for a size of groups, by a launch with zeros for all its arguments and in its
-  /// buffers, which must do nothing. Most drivers have compiled it with its program, but PoCL does so at the first
-  /// launch with that size. \throw DeviceError as launch
-  void compile(const ClKernelName& name, const ClRange& range);
+  /// Calls `watch` before each program is built or loaded and before the first launch of each kernel, which is when
+  /// drivers compile, with the seconds that this has taken so far. Empty: none.
+  void watch_compiling(std::function<void(double seconds)> watch);
 
   /// Launches since the last reset, by kernel, longest first. Waits for the queue.
   std::vector<ClProfileEntry> profile();
   void reset_profile();
 
-  /// Work-items of a group where a kernel has one group per row of a lattice: a loop of one over the columns on a CPU,
-  /// neighbouring columns side by side on all else. Kernels know it as ROW_ITEMS: with a step that the compiler knows,
-  /// PoCL makes vector instructions of such a loop before other passes pair up what is in it.
-  std::size_t row_items() const {
-    return info_.type == "cpu" ? 1 : std::min<std::size_t>(128, info_.max_work_group_size);
-  }
+  /// Work-items of a group where a kernel has one group per row of a lattice: one that loops over the columns on a CPU,
+  /// neighbouring columns side by side on all else. Kernels know it as ROW_ITEMS.
+  std::size_t row_items() const;
 
   /// The largest work-group, at most `wanted`, that this kernel can run with here.
   std::size_t work_group_size(const ClKernelName& name, std::size_t wanted);
 
-  const ::cl::Context& handle() const { return context_; }
-  const ::cl::CommandQueue& queue() const { return queue_; }
-
  private:
-  struct BuiltKernel {
-    ::cl::Kernel kernel;
-    std::vector<ClArgument> arguments;  ///< kUnknown where the driver does not tell
-  };
-  const BuiltKernel& get_kernel(const ClKernelName& name);
-  ::cl::Program get_program(const ClKernelName& name);
-  static void check_arguments(const BuiltKernel& kernel, const ClKernelName& name, std::span<const ClArgument> given);
-  static void check_fits(std::size_t values, std::size_t room);
-  ::cl::Buffer allocate_bytes(std::size_t bytes, const void* values = nullptr);
-  void write_bytes(const ::cl::Buffer& buffer, const void* data, std::size_t bytes);
-  void read_bytes(const ::cl::Buffer& buffer, void* data, std::size_t bytes);
+  struct Driver;
   struct Read {
-    const ::cl::Buffer* from;
+    const ClMemory* from;
     void* to;
     std::size_t bytes;
   };
+  explicit ClContext(std::unique_ptr<Driver> driver);
+
+  static void check_fits(std::size_t values, std::size_t room);
+  std::shared_ptr<ClMemory> allocate_bytes(std::size_t bytes, const void* values = nullptr);
+  void write_bytes(ClMemory& buffer, const void* data, std::size_t bytes);
+  void read_bytes(const ClMemory& buffer, void* data, std::size_t bytes);
   void read_all(std::initializer_list<Read> reads);
-  const void* map_bytes(const ::cl::Buffer& buffer, std::size_t bytes);  ///< read once the queue has come by
+  void copy_bytes(const ClMemory& from, ClMemory& to, std::size_t bytes);
+  void fill_bytes(ClMemory& buffer, const void* pattern, std::size_t pattern_bytes, std::size_t bytes);
+  /// The values can be read when the queue has come by.
+  std::shared_ptr<const void> map_bytes(const std::shared_ptr<ClMemory>& buffer, std::size_t bytes);
   template <class... T>
   std::tuple<ClMapping<T>...> map_all(const ClBuffer<T>&... buffers) {
-    std::tuple<ClMapping<T>...> all{
-        ClMapping<T>(queue_, buffers.memory, map_bytes(buffers.memory, buffers.size * sizeof(T)), buffers.size)...};
+    std::tuple<ClMapping<T>...> all{ClMapping<T>(map_bytes(buffers.memory, buffers.size * sizeof(T)), buffers.size)...};
     finish();
     return all;
   }
-  void fill_bytes(const ::cl::Buffer& buffer, const void* pattern, std::size_t pattern_bytes, std::size_t bytes);
-  void enqueue(const ::cl::Kernel& kernel, const ClKernelName& name, const ClRange& range);
-  static void check_argument(cl_int code, const ClKernelName& name, unsigned index);
-
-  template <class T>
-  static constexpr ClArgument kind_of(const ClBuffer<T>*) {
-    return ClArgument::kBuffer;
-  }
-  static constexpr ClArgument kind_of(const ClLocal*) { return ClArgument::kLocal; }
-  template <class T>
-  requires std::is_class_v<T>
-  static constexpr ClArgument kind_of(const T*) { return ClArgument::kStruct; }
-  template <class T>
-  requires std::is_arithmetic_v<T>
-  static constexpr ClArgument kind_of(const T*) {
-    return std::is_floating_point_v<T> ? ClArgument::kFloat
-           : std::is_signed_v<T>       ? ClArgument::kInt
-                                       : ClArgument::kUnsigned;
-  }
-  template <class T>
-  static void set_argument(const ::cl::Kernel& kernel, const ClKernelName& name, unsigned index,
-                           const ClBuffer<T>& buffer) {
-    check_argument(::clSetKernelArg(kernel(), index, sizeof(cl_mem), &buffer.memory()), name, index);
-  }
-  static void set_argument(const ::cl::Kernel& kernel, const ClKernelName& name, unsigned index, const ClLocal& local) {
-    check_argument(::clSetKernelArg(kernel(), index, local.bytes, nullptr), name, index);
-  }
-  template <class T>
-  requires std::is_arithmetic_v<T>
-  static void set_argument(const ::cl::Kernel& kernel, const ClKernelName& name, unsigned index, const T& value) {
-    static_assert(sizeof(T) == 4, "pass int, unsigned or float: the kernel's own type");
-    check_argument(::clSetKernelArg(kernel(), index, sizeof(T), &value), name, index);
-  }
-  template <class T>
-  requires std::is_class_v<T>
-  static void set_argument(const ::cl::Kernel& kernel, const ClKernelName& name, unsigned index, const T& value) {
-    static_assert(std::is_trivially_copyable_v<T>, "a kernel takes a struct of scalars by value");
-    check_argument(::clSetKernelArg(kernel(), index, sizeof(T), &value), name, index);
-  }
-
-  struct Beside {};
-  ClContext(const ClContext& other, Beside);
-
-  struct PendingEvent {
-    std::string kernel;
-    ::cl::Event event;
-  };
-  void collect_events();
+  void launch_with(const ClKernelName& name, const ClRange& range, std::span<const ClArgument> arguments);
 
   ClDeviceInfo info_;
-  ::cl::Device device_;
-  ::cl::Context context_;
-  ::cl::CommandQueue queue_;
-  std::map<std::string, ::cl::Program> programs_;
-  std::map<std::string, BuiltKernel> kernels_;
-  std::vector<PendingEvent> pending_;
-  std::map<std::string, ClProfileEntry> profile_;
+  std::unique_ptr<Driver> driver_;
 };
 
 }  // namespace skeletex

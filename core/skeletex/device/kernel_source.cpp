@@ -23,8 +23,7 @@ namespace {
 // as well.
 const std::vector<std::vector<std::string_view>> kPrograms{
     {"metro.cl"},
-    {"segment.cl", "vsm.cl", "encode.cl", "unfold.cl", "snap.cl", "fit.cl", "guard.cl", "lattice.cl", "metro.cl",
-     "spd.cl"},
+    {"segment.cl", "vsm.cl", "elimination.cl", "encode.cl", "unfold.cl", "snap.cl", "fit.cl", "lattice.cl", "metro.cl", "spd.cl"},
     {"reconstruct.cl", "pose.cl", "regular_grid.cl", "blend.cl", "transfer.cl"},
     {"filter.cl", "orientation.cl"}};
 

@@ -4,8 +4,6 @@
 #include <utility>
 
 #include "regular_grid_structs.h"
-#include "skeletex/edit/morph/blend.h"
-#include "skeletex/model/encoder_settings.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/skeleton/separation_planes.h"
@@ -34,8 +32,8 @@ SlidingPoints slide(ClContext& context, const DeviceLattice& lattice, const std:
   const SlideParameters parameters{static_cast<int>(lattice.rows.size), static_cast<int>(count)};
   for (int step = 0; step < kSteps; ++step) {
     context.launch({"regular_grid.cl", "slide_points"}, row_range(context, lattice.rows.size), parameters, lattice.rows,
-                   lattice.tables.patches, kept, own.x, own.y, own.z, now.offsets, now.points.x, now.points.y,
-                   now.points.z, next.offsets, next.points.x, next.points.y, next.points.z);
+                   lattice.tables.patches, kept, own.values, now.offsets, now.points.values, next.offsets,
+                   next.points.values);
     now = next;
     std::swap(next, spare);
   }
@@ -45,17 +43,15 @@ SlidingPoints slide(ClContext& context, const DeviceLattice& lattice, const std:
 }  // namespace
 
 SkeletexModel regular_grid(ClContext& context, const SkeletexModel& model) {
-  nlohmann::json settings = parsed_encoder_settings(model);
-  if (settings["snap"] != true) return model;
+  if (!model.sampling.is_snapped) return model;
   SkeletexModel result = model;
   result.diagonals = DiagonalRule::kNearest;
-  settings["snap"] = settings["fit"] = false;
-  result.encoder_settings = settings.dump();
+  result.sampling.is_snapped = result.sampling.is_fitted = false;
   const SeparationPlanes separation(model.skeleton);
   const FrameTables tables = in_bone_axes(frame_tables(model.skeleton, separation, model.patches, model.origin));
-  const DeviceLattice lattice = upload_lattice(context, tables, model.patches, model.texture, RowChoice::kAll);
+  DeviceLattice lattice = upload_lattice(context, tables, model.patches, model.texture, RowChoice::kAll);
   std::vector<int> is_kept;
-  for (const Patch& patch : model.patches) is_kept.push_back(patch.method == Method::kSpd);
+  for (const Patch& patch : model.patches) is_kept.push_back(is_height_field(patch.method));
   DevicePlanes points = slide(context, lattice, is_kept).points;
   // Only texels that move are stored, so that the others keep their bits.
   std::vector<LatticeRow> slid = lattice_rows(model.patches, RowChoice::kAll);
@@ -64,18 +60,14 @@ SkeletexModel regular_grid(ClContext& context, const SkeletexModel& model) {
   });
   if (slid.empty()) return result;
   const auto slid_rows = context.upload(slid);
-  const int slid_count = static_cast<int>(slid.size());
-  if (settings["prefilter"] == true) {
+  if (model.sampling.is_prefiltered) {
     DevicePlanes filtered = allocate_planes(context, lattice.vertex_count);
     context.launch({"regular_grid.cl", "prefilter_rows"}, row_range(context, slid.size()),
-                   SlideParameters{slid_count, static_cast<int>(lattice.vertex_count)}, slid_rows,
-                   lattice.tables.patches, points.x, points.y, points.z, filtered.x, filtered.y, filtered.z);
+                   SlideParameters{static_cast<int>(slid.size()), static_cast<int>(lattice.vertex_count)}, slid_rows,
+                   lattice.tables.patches, points.values, filtered.values);
     points = filtered;
   }
-  context.launch({"reconstruct.cl", "enter_tangent_space"}, row_range(context, slid.size()), slid_count,
-                 model.texture.width, lattice.tables.column_count, slid_rows, lattice.tables.patches,
-                 lattice.tables.rows, lattice.tables.columns, points.x, points.y, points.z, lattice.texels.x,
-                 lattice.texels.y, lattice.texels.z);
+  enter_tangent_space(context, lattice.tables, slid_rows, model.texture.width, points, lattice.texels);
   download_texels(context, lattice.texels, result.texture);
   return result;
 }

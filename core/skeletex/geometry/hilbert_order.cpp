@@ -6,7 +6,6 @@
 #include <cstddef>
 
 #include "skeletex/geometry/parallel.h"
-#include "skeletex/geometry/wide_too.h"
 
 namespace skeletex {
 namespace {
@@ -31,7 +30,7 @@ constexpr int kLanes = 8;
 using Cells = std::array<std::array<std::uint32_t, kLanes>, 3>;  // by coordinate
 
 /// Positions of eight cells along the curve (Skilling 2004).
-SKELETEX_WIDE_TOO std::array<std::uint64_t, kLanes> keys_of(const Cells& cells) {
+std::array<std::uint64_t, kLanes> keys_of(const Cells& cells) {
   std::array<std::uint32_t, kLanes> x = cells[0], y = cells[1], z = cells[2];
   constexpr std::uint32_t kTop = 1u << (kBits - 1);
   const auto turn = [&](std::array<std::uint32_t, kLanes>& axis, std::uint32_t q) {

@@ -52,8 +52,6 @@ std::vector<double> nearest_increasing_loop(const std::vector<double>& y, const 
   return {x.begin() + n, x.begin() + 2 * n};
 }
 
-double wrapped(double turn) { return turn - std::round(turn); }
-
 }  // namespace
 
 std::optional<std::vector<double>> loop_turns(const std::vector<Vec3>& points, const std::vector<double>& turns,
@@ -63,7 +61,7 @@ std::optional<std::vector<double>> loop_turns(const std::vector<Vec3>& points, c
   std::vector<double> lifted{turns[0]}, spacing(count);
   double total = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    lifted.push_back(lifted.back() + wrapped(turns[(i + 1) % count] - turns[i]));
+    lifted.push_back(lifted.back() + shortest_turn(turns[(i + 1) % count] - turns[i]));
     total += spacing[i] = (points[(i + 1) % count] - points[i]).norm();
   }
   if (!(std::abs(lifted.back() - lifted.front() - 1) <= 1e-6)) return {};  // also when an angle is no number
@@ -84,7 +82,7 @@ std::vector<double> arc_shares(const std::vector<Vec3>& points, const std::vecto
   std::vector<double> lifted{0}, spacing(steps), weights(steps + 1, 0);
   double total = 0;
   for (std::size_t i = 0; i < steps; ++i) {
-    lifted.push_back(lifted.back() + wrapped(turns[i + 1] - turns[i]));
+    lifted.push_back(lifted.back() + shortest_turn(turns[i + 1] - turns[i]));
     total += spacing[i] = (points[i + 1] - points[i]).norm();
   }
   // Whichever way the angles run; on an arc of no angle all that counts is the length.

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <cmath>
 #include <optional>
 #include <vector>
 
 #include "skeletex/geometry/mesh.h"
 
 namespace skeletex {
+
+/// Turns without whole ones: the shortest way to the same angle, from -1/2 to 1/2.
+inline double shortest_turn(double turns) { return turns - std::round(turns); }
 
 /// The v of a boundary loop's points: the angles about the bone, as near as possible in the least-squares sense (along
 /// the loop's length, however densely it is sampled) while v grows everywhere, by at least `least_density` of the mean

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/geometry/mesh.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 
 namespace skeletex {
+
+std::string text_of(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x(), p.y(), p.z()); }
 
 BoundingBox bounding_box(const TriangleMesh& mesh) {
   if (mesh.positions.empty()) return {};

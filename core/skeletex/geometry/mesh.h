@@ -2,6 +2,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <string>
 #include <vector>
 
 namespace skeletex {
@@ -23,6 +24,8 @@ struct BoundingBox {
   double diagonal() const { return (upper - lower).norm(); }
 };
 
+/// A point for messages: "(0.12, 0.4, 0.03)".
+std::string text_of(const Vec3& point);
 /// Bounding box of all positions; zero for an empty mesh.
 BoundingBox bounding_box(const TriangleMesh& mesh);
 /// Area vector of a triangle: half the cross product of its edges, along the outward normal.

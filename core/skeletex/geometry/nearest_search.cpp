@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "metro_structs.h"
 #include "skeletex/geometry/parallel.h"
 
 namespace skeletex {
@@ -30,13 +31,11 @@ void NearestSearch::find(std::span<const Vec3> points, std::span<int> triangles,
                          float enough, std::span<const float> bounds) {
   const std::size_t count = points.size();
   if (count == 0) return;
-  for (std::vector<float>* plane : {&x_, &y_, &z_}) plane->resize(count);
+  points_.resize(3 * count);
   for_each_block(count, kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Vec3 p = (points[i] - origin_) / scale_;
-      x_[i] = static_cast<float>(p.x());
-      y_[i] = static_cast<float>(p.y());
-      z_[i] = static_cast<float>(p.z());
+      for (std::size_t axis = 0; axis < 3; ++axis) points_[axis * count + i] = static_cast<float>(p[axis]);
     }
   });
   if (nearest_.size != count)
@@ -51,9 +50,10 @@ void NearestSearch::find(std::span<const Vec3> points, std::span<int> triangles,
     bounds_squared.push_back(std::min(kBeyondAll, scaled * scaled));
   }
   context_.launch(kFindNearest, ClRange({items, 1}, {context_.work_group_size(kFindNearest, 32), 1}),
-                  context_.upload(x_), context_.upload(y_), context_.upload(z_), static_cast<int>(count), kRun, boxes_,
-                  blocks_, level_begin_, top_level_, scaled_enough * scaled_enough, static_cast<int>(!bounds.empty()),
-                  context_.upload(bounds_squared), nearest_, nearest_squared_);
+                  NearestParameters{static_cast<int>(count), kRun, top_level_, static_cast<int>(!bounds.empty()),
+                                    scaled_enough * scaled_enough},
+                  context_.upload(points_), boxes_, blocks_, level_begin_, context_.upload(bounds_squared), nearest_,
+                  nearest_squared_);
   const auto [places, squared] = context_.download(nearest_, nearest_squared_);
   for (std::size_t i = 0; i < count; ++i) triangles[i] = order_[places[i]];
   if (distances.empty()) return;

@@ -32,7 +32,7 @@ class NearestSearch {
   std::vector<int> order_;
   ClBuffer<float> boxes_, blocks_, nearest_squared_;
   ClBuffer<int> level_begin_, nearest_;
-  std::vector<float> x_, y_, z_;
+  std::vector<float> points_;  ///< planes x, y, z
 };
 
 }  // namespace skeletex

@@ -9,36 +9,10 @@
 #include <thread>
 #include <utility>
 #include <vector>
-#ifdef __linux__
-#include <sched.h>
-#endif
 
 namespace skeletex {
 
-/// The one that the calling thread is on now; -1: not known.
-inline int current_processor() {
-#ifdef __linux__
-  return sched_getcpu();
-#else
-  return -1;
-#endif
-}
-
-/// Has the calling thread go on on another processor than a given one, as long as it may. A new thread can be put on
-/// the processor of the one that made it, and Linux takes up to tens of milliseconds to move one of two threads to a
-/// processor that is idle meanwhile.
-inline void leave_processor([[maybe_unused]] int processor) {
-#ifdef __linux__
-  cpu_set_t allowed, others;
-  if (processor < 0 || processor >= CPU_SETSIZE || sched_getaffinity(0, sizeof allowed, &allowed) != 0) return;
-  others = allowed;
-  CPU_CLR(processor, &others);
-  if (CPU_COUNT(&others) == 0 || sched_setaffinity(0, sizeof others, &others) != 0) return;
-  sched_setaffinity(0, sizeof allowed, &allowed);
-#endif
-}
-
-/// As many as there are when it is first asked for: the system library opens a file for every answer.
+/// Processors of the machine. Counted once, as the system library opens a file for every answer.
 inline std::size_t processor_count() {
   static const std::size_t count = std::max(1u, std::thread::hardware_concurrency());
   return count;
@@ -47,10 +21,7 @@ inline std::size_t processor_count() {
 /// Calls act() on a thread of its own. The future's destructor waits for it.
 template <class Act>
 auto run_beside(Act act) {
-  return std::async(std::launch::async, [processor = current_processor(), act = std::move(act)]() mutable {
-    leave_processor(processor);
-    return act();
-  });
+  return std::async(std::launch::async, std::move(act));
 }
 
 /// Calls act(block, begin, end) for consecutive blocks of [0, size) on all processors. Blocks depend on the sizes
@@ -73,13 +44,8 @@ void for_each_block(std::size_t size, std::size_t block_size, const Act& act) {
       next = blocks;
     }
   };
-  const int processor = current_processor();
   std::vector<std::jthread> others;
-  for (std::size_t i = 1; i < threads; ++i)
-    others.emplace_back([&] {
-      leave_processor(processor);
-      work();
-    });
+  for (std::size_t i = 1; i < threads; ++i) others.emplace_back(work);
   work();
   others.clear();
   if (failure) std::rethrow_exception(failure);

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
+#include <span>
+#include <utility>
 
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/geometry/predicates.h"
@@ -60,16 +63,51 @@ bool does_segment_meet(const Vec3& p, const Vec3& q, const Corners& t, int plane
 
 enum class Answer { kNo, kYes, kUnsure };
 
+constexpr double kRounding = 1e-14;  // of products of differences: some ten times what their last digits add up to
+
+/// The part of a line that lies in a triangle, by one coordinate.
+struct LinePart {
+  double low = 0, high = 0, error = 0;
+
+  void add(double at) {
+    low = is_empty ? at : std::min(low, at);
+    high = is_empty ? at : std::max(high, at);
+    is_empty = false;
+  }
+  bool is_empty = true;
+};
+
+/// Where a triangle meets the line of its plane and another one.
+/// \param normal, origin  of the other plane \param axis    the coordinate by which the line is measured
+/// \param first           1 when the first vertex lies in the other plane, else 0
+Answer cut_by_plane(const Corners& points, const Vec3& normal, const Vec3& origin, double extent, Eigen::Index axis,
+                    int first, LinePart& part) {
+  const double error = kRounding * extent * (extent * extent + normal.lpNorm<1>());
+  std::array<double, 3> heights;
+  int above = 0, below = 0;
+  for (int k = first; k < 3; ++k) {
+    heights[k] = normal.dot(points[k] - origin);
+    above += heights[k] > error;
+    below += heights[k] < -error;
+  }
+  if (above + below < 3 - first) return Answer::kUnsure;
+  if (above == 0 || below == 0) return Answer::kNo;
+  for (int k = first; k < 3 - first; ++k) {
+    const int next = (k + 1) % 3;
+    if ((heights[k] > 0) == (heights[next] > 0)) continue;
+    const double span = std::abs(heights[k] - heights[next]);
+    part.add(points[k][axis] + (points[next][axis] - points[k][axis]) * (std::abs(heights[k]) / span));
+    part.error = std::max(part.error, extent * (8 * error / span + kRounding));
+  }
+  return Answer::kYes;
+}
+
 /// Where two triangles meet the line of both their planes (Moeller 1997), in plain double precision: unsure wherever
-/// rounding could decide, or they are nearly in one plane, or have no area. \param shared  whether their first vertex
-/// is one: then of meeting elsewhere
+/// rounding could decide, or they are nearly in one plane, or have no area.
+/// \param shared  whether their first vertex is one: then whether they meet elsewhere
 Answer meet_on_line(const Corners& s, const Corners& t, bool shared) {
-  constexpr double kRounding = 1e-14;  // of products of differences: some ten times what their last digits add up to
   constexpr double kLeastSine = 1e-6;
-  struct Cut {
-    double low = 0, high = 0, error = 0;
-  };
-  std::array<Vec3, 3> own, other;  // from the first vertex of s
+  Corners own, other;  // from the first vertex of s
   double extent = 0;
   for (int k = 0; k < 3; ++k) {
     own[k] = s[k] - s[0], other[k] = t[k] - s[0];
@@ -82,38 +120,22 @@ Answer meet_on_line(const Corners& s, const Corners& t, bool shared) {
   if (along <= kLeastSine * own_normal.lpNorm<1>() * other_normal.lpNorm<1>() || own_normal.isZero() ||
       other_normal.isZero())
     return Answer::kUnsure;
-  // A triangle from the other's plane, and the part of the line in it.
-  const auto cut = [&](const std::array<Vec3, 3>& points, const Vec3& normal, const Vec3& origin, Cut& found) {
-    const double error = kRounding * extent * (extent * extent + normal.lpNorm<1>());
-    std::array<double, 3> heights;
-    int above = 0, below = 0;
-    for (int k = shared ? 1 : 0; k < 3; ++k) {
-      heights[k] = normal.dot(points[k] - origin);
-      above += heights[k] > error, below += heights[k] < -error;
-    }
-    if (above + below < (shared ? 2 : 3)) return Answer::kUnsure;
-    if (above == 0 || below == 0) return Answer::kNo;
-    bool is_first = true;
-    for (int k = shared ? 1 : 0; k < (shared ? 2 : 3); ++k) {
-      const int next = (k + 1) % 3;
-      if ((heights[k] > 0) == (heights[next] > 0)) continue;
-      const double span = std::abs(heights[k] - heights[next]);
-      const double at = points[k][axis] + (points[next][axis] - points[k][axis]) * (std::abs(heights[k]) / span);
-      found.low = is_first ? at : std::min(found.low, at), found.high = is_first ? at : std::max(found.high, at);
-      found.error = std::max(found.error, extent * (8 * error / span + kRounding));
-      is_first = false;
-    }
-    return Answer::kYes;
-  };
-  Cut first, second;
-  if (const Answer answer = cut(own, other_normal, other[0], first); answer != Answer::kYes) return answer;
-  if (const Answer answer = cut(other, own_normal, Vec3::Zero(), second); answer != Answer::kYes) return answer;
+  LinePart first, second;
+  const int begin = shared ? 1 : 0;
+  if (const Answer answer = cut_by_plane(own, other_normal, other[0], extent, axis, begin, first);
+      answer != Answer::kYes)
+    return answer;
+  if (const Answer answer = cut_by_plane(other, own_normal, Vec3::Zero(), extent, axis, begin, second);
+      answer != Answer::kYes)
+    return answer;
   const double error = first.error + second.error;
-  // Both parts begin at a shared vertex: whether they lie on one side of it.
-  const double common = shared
-                            ? (std::abs(first.low) > error && std::abs(second.low) > error ? first.low * second.low : 0)
-                            : std::min(first.high, second.high) - std::max(first.low, second.low);
-  if (shared) return common > 0 ? Answer::kYes : common < 0 ? Answer::kNo : Answer::kUnsure;
+  if (shared) {
+    // Both parts begin at the shared vertex: whether they lie on one side of it.
+    if (std::abs(first.low) <= error || std::abs(second.low) <= error) return Answer::kUnsure;
+    const double common = first.low * second.low;
+    return common > 0 ? Answer::kYes : common < 0 ? Answer::kNo : Answer::kUnsure;
+  }
+  const double common = std::min(first.high, second.high) - std::max(first.low, second.low);
   return common > error ? Answer::kYes : common < -error ? Answer::kNo : Answer::kUnsure;
 }
 
@@ -154,68 +176,199 @@ bool do_triangles_at_edge_meet(const Vec3& a, const Vec3& b, const Vec3& c, cons
          0;
 }
 
+/// The corners of a mesh's triangles by vertex: those of vertex v, as 3 triangle + corner, are corners[begin[v]] to
+/// corners[begin[v + 1] - 1].
+struct VertexCorners {
+  std::vector<int> begin, corners;
+};
+
+VertexCorners list_vertex_corners(const TriangleMesh& mesh) {
+  VertexCorners list{std::vector<int>(mesh.positions.size() + 1, 0), std::vector<int>(3 * mesh.triangles.size())};
+  for (const Triangle& t : mesh.triangles)
+    for (const int vertex : t) ++list.begin[vertex + 1];
+  std::partial_sum(list.begin.begin(), list.begin.end(), list.begin.begin());
+  std::vector<int> next(list.begin.begin(), list.begin.end() - 1);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (int k = 0; k < 3; ++k) list.corners[next[mesh.triangles[t][k]]++] = static_cast<int>(3 * t) + k;
+  return list;
+}
+
+constexpr int kMostCorners = 24;  // of a vertex that is looked at
+
+/// Whether the triangles at a vertex go once around it, all facing one way.
+bool is_plain_vertex(const TriangleMesh& mesh, int vertex, std::span<const int> corners) {
+  constexpr double kLeastCosine = 0.1;
+  const int n = static_cast<int>(corners.size());
+  if (n < 3 || n > kMostCorners) return false;
+  std::array<std::array<int, 2>, kMostCorners> sides;
+  std::array<Vec3, kMostCorners> normals;
+  const Vec3& p = mesh.positions[vertex];
+  Vec3 mean = Vec3::Zero();
+  for (int i = 0; i < n; ++i) {
+    const Triangle& t = mesh.triangles[corners[i] / 3];
+    const int k = corners[i] % 3;
+    sides[i] = {t[(k + 1) % 3], t[(k + 2) % 3]};
+    normals[i] = (mesh.positions[sides[i][0]] - p).cross(mesh.positions[sides[i][1]] - p).normalized();
+    mean += normals[i];
+  }
+  const double least = kLeastCosine * mean.norm();
+  for (int i = 0; i < n; ++i) {
+    int followers = 0;
+    for (int j = 0; j < n; ++j) followers += sides[j][0] == sides[i][1];
+    if (followers != 1 || !(normals[i].dot(mean) > least)) return false;
+  }
+  // How often they go around: how often they pass one direction.
+  Eigen::Index axis;
+  mean.cwiseAbs().minCoeff(&axis);
+  const Vec3 across = mean.cross(Vec3::Unit(axis));
+  int turns = 0;
+  for (int i = 0; i < n; ++i)
+    turns += (mesh.positions[sides[i][0]] - p).dot(across) <= 0 && (mesh.positions[sides[i][1]] - p).dot(across) > 0;
+  return turns == 1;
+}
+
 /// Vertices whose triangles go once around them, all facing one way: seen from there their corners lie side by side, so
 /// no two of them meet but where they touch. Most are such, and most pairs of boxes that overlap are of triangles at
 /// such a vertex.
 std::vector<char> find_plain_vertices(const TriangleMesh& mesh) {
-  constexpr int kMostTriangles = 24;
-  constexpr double kLeastCosine = 0.1;
-  const std::size_t count = mesh.positions.size();
-  std::vector<int> begin(count + 1, 0);
-  for (const Triangle& t : mesh.triangles)
-    for (const int vertex : t) ++begin[vertex + 1];
-  for (std::size_t v = 0; v < count; ++v) begin[v + 1] += begin[v];
-  std::vector<int> corners(3 * mesh.triangles.size()), next(begin.begin(), begin.end() - 1);
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-    for (int k = 0; k < 3; ++k) corners[next[mesh.triangles[t][k]]++] = static_cast<int>(3 * t) + k;
-  std::vector<char> is_plain(count, 0);
-  for_each_block(count, 1 << 12, [&](std::size_t, std::size_t first, std::size_t last) {
-    std::array<std::array<int, 2>, kMostTriangles> sides;
-    std::array<Vec3, kMostTriangles> normals;
-    for (std::size_t v = first; v < last; ++v) {
-      const int n = begin[v + 1] - begin[v];
-      if (n < 3 || n > kMostTriangles) continue;
-      const Vec3& p = mesh.positions[v];
-      Vec3 mean = Vec3::Zero();
-      for (int i = 0; i < n; ++i) {
-        const int corner = corners[begin[v] + i];
-        const Triangle& t = mesh.triangles[corner / 3];
-        sides[i] = {t[(corner % 3 + 1) % 3], t[(corner % 3 + 2) % 3]};
-        normals[i] = (mesh.positions[sides[i][0]] - p).cross(mesh.positions[sides[i][1]] - p).normalized();
-        mean += normals[i];
-      }
-      const double least = kLeastCosine * mean.norm();
-      bool is_one_way = true;
-      for (int i = 0; i < n; ++i) {
-        is_one_way &= normals[i].dot(mean) > least;
-        int followers = 0;
-        for (int j = 0; j < n; ++j) followers += sides[j][0] == sides[i][1];
-        is_one_way &= followers == 1;
-      }
-      if (!is_one_way) continue;
-      // How often they go around: how often they pass one direction.
-      Eigen::Index axis;
-      mean.cwiseAbs().minCoeff(&axis);
-      const Vec3 across = mean.cross(Vec3::Unit(axis));
-      int turns = 0;
-      for (int i = 0; i < n; ++i)
-        turns +=
-            (mesh.positions[sides[i][0]] - p).dot(across) <= 0 && (mesh.positions[sides[i][1]] - p).dot(across) > 0;
-      is_plain[v] = turns == 1;
-    }
+  const VertexCorners list = list_vertex_corners(mesh);
+  std::vector<char> is_plain(mesh.positions.size(), 0);
+  for_each_block(is_plain.size(), 1 << 12, [&](std::size_t, std::size_t first, std::size_t last) {
+    for (std::size_t v = first; v < last; ++v)
+      is_plain[v] = is_plain_vertex(mesh, static_cast<int>(v),
+                                    std::span(list.corners).subspan(list.begin[v], list.begin[v + 1] - list.begin[v]));
   });
   return is_plain;
 }
 
-}  // namespace
+constexpr int kWidth = TriangleTree::kWidth;
 
-bool do_triangles_intersect(const TriangleMesh& mesh, int first, int second) {
-  return do_triangles_intersect(mesh.triangles[first], corners_of(mesh, first), mesh.triangles[second],
-                                corners_of(mesh, second));
+using Box = std::array<float, 6>;  // least x, y, z, greatest x, y, z, in the tree's units
+using Pairs = std::vector<std::array<int, 2>>;
+
+/// Boxes of a block's triangles, as the tree has them for its blocks: six planes of eight.
+std::array<float, 6 * kWidth> boxes_of_block(const TriangleTree& tree, std::size_t block) {
+  constexpr float kMargin = 3e-7f;  // rounding of the corners and of the edges that lead to them
+  std::array<float, 6 * kWidth> boxes;
+  const float* from = tree.blocks.data() + block * 9 * kWidth;
+  for (int d = 0; d < 3; ++d)
+    for (int k = 0; k < kWidth; ++k) {
+      const float corner = from[d * kWidth + k], second = from[(3 + d) * kWidth + k],
+                  third = from[(6 + d) * kWidth + k];
+      boxes[d * kWidth + k] = corner + std::min(0.0f, std::min(second, third)) - kMargin;
+      boxes[(3 + d) * kWidth + k] = corner + std::max(0.0f, std::max(second, third)) + kMargin;
+    }
+  return boxes;
 }
 
-bool do_triangles_intersect(const Triangle& i, const std::array<Vec3, 3>& s, const Triangle& j,
-                            const std::array<Vec3, 3>& t) {
+/// How far each of eight boxes is from one along the axis that parts them most: at most 0 where they overlap. (Without
+/// branches: the compiler takes lanes.)
+std::array<float, kWidth> gaps_between(const float* planes, const Box& box) {
+  std::array<float, kWidth> gaps;
+  for (int k = 0; k < kWidth; ++k) {
+    const float x = std::max(planes[k] - box[3], box[0] - planes[3 * kWidth + k]),
+                y = std::max(planes[kWidth + k] - box[4], box[1] - planes[4 * kWidth + k]);
+    gaps[k] = std::max(std::max(x, y), std::max(planes[2 * kWidth + k] - box[5], box[2] - planes[5 * kWidth + k]));
+  }
+  return gaps;
+}
+
+/// The search for pairs that intersect, block of the tree by block.
+struct PairSearch {
+  const TriangleMesh& mesh;
+  const TriangleTree& tree;
+  std::vector<char> is_plain;    // per vertex; empty: not known
+  std::vector<char> is_queried;  // per triangle; empty: all are
+
+  bool is_in_query(int triangle) const { return is_queried.empty() || is_queried[triangle] != 0; }
+
+  bool do_share_plain_vertex(const Triangle& a, const Triangle& b) const {
+    if (is_plain.empty()) return false;
+    return std::any_of(a.begin(), a.end(),
+                       [&](int v) { return (v == b[0] || v == b[1] || v == b[2]) && is_plain[v] != 0; });
+  }
+
+  /// Blocks whose boxes overlap one. \param first  blocks before it are left out
+  void list_blocks(const Box& box, std::size_t first, std::vector<std::size_t>& listed) const {
+    struct Entry {
+      int level;
+      std::size_t index;
+    };
+    listed.clear();
+    std::vector<Entry> open{{tree.top_level(), 0}};
+    while (!open.empty()) {
+      const auto [level, index] = open.back();
+      open.pop_back();
+      if (level == 0) {
+        listed.push_back(index);
+        continue;
+      }
+      const auto gaps = gaps_between(tree.boxes.data() + (tree.level_begin[level] + index) * 6 * kWidth, box);
+      for (int k = 0; k < kWidth; ++k) {
+        const std::size_t child = kWidth * index + k;  // it covers 8^(level - 1) blocks
+        if (gaps[k] <= 0 && (child + 1) << (3 * (level - 1)) > first) open.push_back({level - 1, child});
+      }
+    }
+  }
+
+  /// Pairs of the triangle at a place with those of a block; each pair once, from the earlier place of two in the
+  /// query set. \param boxes  of the block's triangles
+  void add_pairs(std::size_t place, const Box& box, std::size_t block, const float* boxes, Pairs& found) const {
+    const auto gaps = gaps_between(boxes, box);
+    const int own = tree.order[place];
+    for (int k = 0; k < kWidth; ++k) {
+      const std::size_t other_place = kWidth * block + k;
+      if (gaps[k] > 0 || other_place >= tree.order.size() || other_place == place) continue;
+      const int other = tree.order[other_place];
+      if (other_place < place && is_in_query(other)) continue;
+      if (do_share_plain_vertex(mesh.triangles[own], mesh.triangles[other])) continue;
+      const int first = std::min(own, other), second = std::max(own, other);
+      if (do_triangles_intersect(mesh, first, second)) found.push_back({first, second});
+    }
+  }
+
+  /// Pairs of the queried triangles of a block.
+  void search_block(std::size_t block, std::vector<std::size_t>& listed, Pairs& found) const {
+    const std::size_t begin = block * kWidth, end = std::min(tree.order.size(), begin + kWidth);
+    std::array<Box, kWidth> boxes;
+    std::array<std::size_t, kWidth> places;
+    int count = 0;
+    const std::array<float, 6 * kWidth> planes = boxes_of_block(tree, block);
+    Box around{};
+    for (std::size_t place = begin; place < end; ++place) {
+      if (!is_in_query(tree.order[place])) continue;
+      Box& box = boxes[count];
+      for (int d = 0; d < 6; ++d) box[d] = planes[d * kWidth + (place - begin)];
+      for (int d = 0; d < 3; ++d) {
+        around[d] = count == 0 ? box[d] : std::min(around[d], box[d]);
+        around[3 + d] = count == 0 ? box[3 + d] : std::max(around[3 + d], box[3 + d]);
+      }
+      places[count++] = place;
+    }
+    if (count == 0) return;
+    list_blocks(around, is_queried.empty() ? block : 0, listed);
+    for (const std::size_t other : listed) {
+      const std::array<float, 6 * kWidth> others = boxes_of_block(tree, other);
+      for (int i = 0; i < count; ++i) add_pairs(places[i], boxes[i], other, others.data(), found);
+    }
+  }
+
+  Pairs find() const {
+    constexpr std::size_t kAtOnce = 128;
+    const std::size_t blocks = block_count(tree.order.size(), kWidth);
+    std::vector<Pairs> found(block_count(blocks, kAtOnce));
+    for_each_block(blocks, kAtOnce, [&](std::size_t part, std::size_t begin, std::size_t end) {
+      std::vector<std::size_t> listed;
+      for (std::size_t block = begin; block < end; ++block) search_block(block, listed, found[part]);
+    });
+    Pairs pairs;
+    for (const Pairs& some : found) pairs.insert(pairs.end(), some.begin(), some.end());
+    std::sort(pairs.begin(), pairs.end());
+    return pairs;
+  }
+};
+
+bool do_corners_intersect(const Triangle& i, const Corners& s, const Triangle& j, const Corners& t) {
   int shared = 0, at_i = 0, at_j = 0, free_i = 0, free_j = 0;
   for (int k = 0; k < 3; ++k) {
     const auto there = std::find(j.begin(), j.end(), i[k]);
@@ -238,103 +391,28 @@ bool do_triangles_intersect(const Triangle& i, const std::array<Vec3, 3>& s, con
   }
 }
 
+}  // namespace
+
+bool do_triangles_intersect(const TriangleMesh& mesh, int first, int second) {
+  return do_corners_intersect(mesh.triangles[first], corners_of(mesh, first), mesh.triangles[second],
+                              corners_of(mesh, second));
+}
+
 std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh) {
   if (mesh.triangles.empty()) return {};
   return find_self_intersections(mesh, build_triangle_tree(mesh));
 }
 
 std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh, const TriangleTree& tree) {
-  constexpr int kWidth = TriangleTree::kWidth;
-  const std::size_t count = tree.order.size();
-  // Boxes of the triangles as the tree has them for its blocks: by place, six planes of eight per block.
-  std::vector<float> triangle_boxes(block_count(count, kWidth) * 6 * kWidth);
-  constexpr float kMargin = 3e-7f;  // rounding of the corners and of the edges that lead to them
-  for_each_block(block_count(count, kWidth), 1 << 12, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t block = begin; block < end; ++block) {
-      const float* from = tree.blocks.data() + block * 9 * kWidth;
-      float* to = triangle_boxes.data() + block * 6 * kWidth;
-      for (int d = 0; d < 3; ++d)
-        for (int k = 0; k < kWidth; ++k) {
-          const float corner = from[d * kWidth + k], second = from[(3 + d) * kWidth + k],
-                      third = from[(6 + d) * kWidth + k];
-          to[d * kWidth + k] = corner + std::min(0.0f, std::min(second, third)) - kMargin;
-          to[(3 + d) * kWidth + k] = corner + std::max(0.0f, std::max(second, third)) + kMargin;
-        }
-    }
-  });
+  return PairSearch{mesh, tree, find_plain_vertices(mesh), {}}.find();
+}
 
-  const std::vector<char> is_plain = find_plain_vertices(mesh);
-  const auto do_share_plain_vertex = [&](const Triangle& a, const Triangle& b) {
-    for (const int v : a)
-      if ((v == b[0] || v == b[1] || v == b[2]) && is_plain[v]) return true;
-    return false;
-  };
-  // Blocks of the tree are asked as wholes, then their triangles one by one.
-  constexpr std::size_t kAtOnce = 128;
-  const std::size_t blocks = block_count(count, kWidth);
-  std::vector<std::vector<std::array<int, 2>>> found(block_count(blocks, kAtOnce));
-  for_each_block(blocks, kAtOnce, [&](std::size_t part, std::size_t first_block, std::size_t end_block) {
-    struct Entry {
-      int level;
-      std::size_t index;
-    };
-    std::vector<Entry> stack;
-    // By how much each of eight boxes is apart from one: at most 0 where they overlap. (Without branches: the compiler
-    // takes lanes.)
-    const auto gaps_to = [](const float* planes, const std::array<float, 6>& box) {
-      std::array<float, kWidth> gaps;
-      for (int k = 0; k < kWidth; ++k) {
-        const float x = std::max(planes[k] - box[3], box[0] - planes[3 * kWidth + k]),
-                    y = std::max(planes[kWidth + k] - box[4], box[1] - planes[4 * kWidth + k]);
-        gaps[k] = std::max(std::max(x, y), std::max(planes[2 * kWidth + k] - box[5], box[2] - planes[5 * kWidth + k]));
-      }
-      return gaps;
-    };
-    for (std::size_t block = first_block; block < end_block; ++block) {
-      const std::size_t begin = block * kWidth, end = std::min(count, begin + kWidth);
-      const float* own = triangle_boxes.data() + block * 6 * kWidth;
-      std::array<std::array<float, 6>, kWidth> boxes;
-      std::array<float, 6> box;
-      for (std::size_t place = begin; place < end; ++place) {
-        std::array<float, 6>& mine = boxes[place - begin];
-        for (int d = 0; d < 6; ++d) mine[d] = own[d * kWidth + (place - begin)];
-        for (int d = 0; d < 3; ++d) {
-          box[d] = place == begin ? mine[d] : std::min(box[d], mine[d]);
-          box[3 + d] = place == begin ? mine[3 + d] : std::max(box[3 + d], mine[3 + d]);
-        }
-      }
-      stack.push_back({tree.top_level(), 0});
-      while (!stack.empty()) {
-        const auto [level, index] = stack.back();
-        stack.pop_back();
-        if (level > 0) {
-          const auto gaps = gaps_to(tree.boxes.data() + (tree.level_begin[level] + index) * 6 * kWidth, box);
-          for (int k = 0; k < kWidth; ++k) {
-            const std::size_t child = kWidth * index + k;
-            // Every pair once: with the blocks that come later. A child of this level covers 8^(level - 1) blocks.
-            if (gaps[k] <= 0 && (child + 1) << (3 * (level - 1)) > block) stack.push_back({level - 1, child});
-          }
-          continue;
-        }
-        const float* planes = triangle_boxes.data() + index * 6 * kWidth;
-        for (std::size_t place = begin; place < end; ++place) {
-          const auto gaps = gaps_to(planes, boxes[place - begin]);
-          for (int k = 0; k < kWidth; ++k) {
-            const std::size_t other = kWidth * index + k;
-            if (gaps[k] > 0 || other >= count || other <= place) continue;
-            const int first = std::min(tree.order[place], tree.order[other]),
-                      second = std::max(tree.order[place], tree.order[other]);
-            if (do_share_plain_vertex(mesh.triangles[first], mesh.triangles[second])) continue;
-            if (do_triangles_intersect(mesh, first, second)) found[part].push_back({first, second});
-          }
-        }
-      }
-    }
-  });
-  std::vector<std::array<int, 2>> pairs;
-  for (const auto& some : found) pairs.insert(pairs.end(), some.begin(), some.end());
-  std::sort(pairs.begin(), pairs.end());
-  return pairs;
+std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh, const TriangleTree& tree,
+                                                        std::span<const int> query) {
+  if (query.empty()) return {};
+  std::vector<char> is_queried(mesh.triangles.size(), 0);
+  for (const int triangle : query) is_queried[triangle] = 1;
+  return PairSearch{mesh, tree, {}, std::move(is_queried)}.find();
 }
 
 long count_self_intersections(const TriangleMesh& mesh) {

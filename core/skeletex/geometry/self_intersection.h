@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <array>
+#include <span>
 #include <vector>
 
 #include "skeletex/geometry/mesh.h"
@@ -13,9 +14,6 @@ namespace skeletex {
 /// counts, and so does a gap that double precision cannot tell from contact. Triangles without area count as segments;
 /// two of them do not meet.
 bool do_triangles_intersect(const TriangleMesh& mesh, int first, int second);
-/// The same of two triangles of any mesh, by their vertices' numbers and places.
-bool do_triangles_intersect(const Triangle& first, const std::array<Vec3, 3>& first_corners, const Triangle& second,
-                            const std::array<Vec3, 3>& second_corners);
 
 /// All pairs of triangles that intersect so, the smaller index first, sorted.
 /// \pre indices in range, coordinates finite
@@ -23,6 +21,10 @@ bool do_triangles_intersect(const Triangle& first, const std::array<Vec3, 3>& fi
 std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh);
 /// \param tree  of the mesh
 std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh, const TriangleTree& tree);
+/// Of these, the pairs with a triangle of a query set at least; the cost grows with that set alone.
+/// \param query  triangles
+std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh, const TriangleTree& tree,
+                                                        std::span<const int> query);
 /// How many there are.
 long count_self_intersections(const TriangleMesh& mesh);
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -29,5 +30,22 @@ struct TriangleTree {
 /// Cost: O(triangles), about 0.3 s per million.
 /// \pre at least one triangle; indices in range, coordinates finite
 TriangleTree build_triangle_tree(const TriangleMesh& mesh);
+/// The same over the triangles in a given order, in which those that follow each other lie near each other.
+/// \param order  each triangle once
+TriangleTree build_triangle_tree(const TriangleMesh& mesh, std::vector<int> order);
+
+/// Makes a tree fit again after triangles have moved, by no more than their mesh's extent.
+/// \param places  theirs in the order of the tree
+void update_triangle_tree(const TriangleMesh& mesh, std::span<const int> places, TriangleTree& tree);
+
+struct NearestTriangle {
+  int triangle = -1;  ///< none where nothing is nearer than the bound
+  double distance = std::numeric_limits<double>::infinity();
+};
+/// The triangle nearest to a point, on the host and in double precision; of few points, else see NearestSearch.
+/// \param tree   of the mesh
+/// \param bound  triangles that are not nearer are left out
+NearestTriangle find_nearest_triangle(const TriangleMesh& mesh, const TriangleTree& tree, const Vec3& point,
+                                      double bound = std::numeric_limits<double>::infinity());
 
 }  // namespace skeletex

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <string_view>
 
 #include "skeletex/model/error.h"
@@ -98,15 +99,8 @@ ExrSurvey read_header(Reader& in) {
   return survey;
 }
 
-/// Checks the attributes and takes the size from them. \return rows per chunk
-int check_header(const Reader& in, int max_size, bool is_one_of_several, ExrSurvey& survey) {
-  const auto required = [&](const char* name, const char* type, std::size_t size) -> const std::string& {
-    const auto found = survey.attributes.find(name);
-    if (found == survey.attributes.end() || found->second.type != type || found->second.value.size() != size)
-      in.fail(fmt::format("the header is damaged (no \"{}\")", name));
-    return found->second.value;
-  };
-  // OpenEXR allocates by these two kinds of attribute before it looks at what follows.
+/// OpenEXR allocates by these two kinds of attribute before it looks at what follows.
+void check_allocations(const Reader& in, const ExrSurvey& survey) {
   for (const auto& [name, attribute] : survey.attributes) {
     const std::string& value = attribute.value;
     if (attribute.type == "preview") {
@@ -122,6 +116,17 @@ int check_header(const Reader& in, int max_size, bool is_one_of_several, ExrSurv
         in.fail(fmt::format("an image of {} channels; a model has at most {}", channels, kMaxChannels));
     }
   }
+}
+
+/// Checks the attributes and takes the size from them. \return rows per chunk
+int check_header(const Reader& in, int max_size, bool is_one_of_several, ExrSurvey& survey) {
+  check_allocations(in, survey);
+  const auto required = [&](const char* name, const char* type, std::size_t size) -> const std::string& {
+    const auto found = survey.attributes.find(name);
+    if (found == survey.attributes.end() || found->second.type != type || found->second.value.size() != size)
+      in.fail(fmt::format("the header is damaged (no \"{}\")", name));
+    return found->second.value;
+  };
   std::int32_t window[4];
   std::memcpy(window, required("dataWindow", "box2i", sizeof window).data(), sizeof window);
   const std::int64_t width = std::int64_t{window[2]} - window[0] + 1, height = std::int64_t{window[3]} - window[1] + 1;
@@ -142,6 +147,24 @@ int check_header(const Reader& in, int max_size, bool is_one_of_several, ExrSurv
       in.fail(fmt::format("the header is damaged ({} chunks for {} rows)", chunks, height));
   }
   return rows;
+}
+
+/// A line of the offset table: whether the chunk at `offset` is that of the row.
+void check_chunk(Reader& in, std::uint64_t offset, std::uint64_t begin, std::size_t row, std::optional<int> part) {
+  const auto missing = [&] {
+    in.fail(fmt::format(
+        "the file ends early: texel rows from {} on are missing; it was not copied or written completely", row));
+  };
+  if (offset == 0 || offset > in.size()) missing();
+  if (offset < begin) in.fail(fmt::format("damaged (the texel rows from {} on lie inside the header)", row));
+  if (in.size() - offset < (part ? 12 : 8)) missing();
+  in.seek(offset);
+  if (part && in.number<std::int32_t>() != *part)
+    in.fail(fmt::format("damaged (at texel row {} of part {})", row, *part));
+  const auto y = in.number<std::int32_t>();
+  const auto bytes = in.number<std::int32_t>();
+  if (y != static_cast<std::int64_t>(row) || bytes < 0) in.fail(fmt::format("damaged (at texel row {})", row));
+  if (static_cast<std::uint64_t>(bytes) > in.size() - in.position()) missing();
 }
 
 }  // namespace
@@ -174,23 +197,10 @@ std::vector<ExrSurvey> survey_exr(const std::filesystem::path& path, int max_siz
   const std::uint64_t begin = in.position();
   for (std::size_t part = 0; part < parts.size(); ++part)
     for (std::size_t i = 0; i < tables[part].size() / 8; ++i) {
-      const std::size_t row = i * static_cast<std::size_t>(rows[part]);
       std::uint64_t offset;
       std::memcpy(&offset, tables[part].data() + 8 * i, 8);
-      const auto missing = [&] {
-        in.fail(fmt::format(
-            "the file ends early: texel rows from {} on are missing; it was not copied or written completely", row));
-      };
-      if (offset == 0 || offset > in.size()) missing();
-      if (offset < begin) in.fail(fmt::format("damaged (the texel rows from {} on lie inside the header)", row));
-      if (in.size() - offset < (has_several ? 12 : 8)) missing();
-      in.seek(offset);
-      if (has_several && in.number<std::int32_t>() != static_cast<std::int32_t>(part))
-        in.fail(fmt::format("damaged (at texel row {} of part {})", row, part));
-      const auto y = in.number<std::int32_t>();
-      const auto bytes = in.number<std::int32_t>();
-      if (y != static_cast<std::int64_t>(row) || bytes < 0) in.fail(fmt::format("damaged (at texel row {})", row));
-      if (static_cast<std::uint64_t>(bytes) > in.size() - in.position()) missing();
+      check_chunk(in, offset, begin, i * static_cast<std::size_t>(rows[part]),
+                  has_several ? std::optional(static_cast<int>(part)) : std::nullopt);
     }
   return parts;
 }

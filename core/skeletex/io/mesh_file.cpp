@@ -3,21 +3,12 @@
 
 #include <fmt/format.h>
 
-#include <OpenMesh/Core/IO/reader/OBJReader.hh>
-#include <OpenMesh/Core/IO/reader/PLYReader.hh>
-#include <OpenMesh/Core/IO/reader/STLReader.hh>
-#include <OpenMesh/Core/System/omstream.hh>
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <cmath>
-#include <cstring>
-#include <mutex>
-#include <sstream>
 
 #include "skeletex/io/atomic_file.h"
-#include "skeletex/io/mesh_importer.h"
-#include "skeletex/io/mesh_survey.h"
+#include "skeletex/io/mesh/mesh_builder.h"
 #include "skeletex/io/read_file.h"
 #include "skeletex/model/error.h"
 
@@ -29,66 +20,6 @@ std::string lower_extension(const std::filesystem::path& path) {
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return extension;
-}
-
-/// OpenMesh writes its opinions to global streams, which the library keeps quiet while it reads.
-class Silence {
- public:
-  Silence() : log_(omlog().is_enabled()), out_(omout().is_enabled()), err_(omerr().is_enabled()) {
-    omlog().disable();
-    omout().disable();
-    omerr().disable();
-  }
-  ~Silence() {
-    if (log_) omlog().enable();
-    if (out_) omout().enable();
-    if (err_) omerr().enable();
-  }
-  Silence(const Silence&) = delete;
-  Silence& operator=(const Silence&) = delete;
-
- private:
-  bool log_, out_, err_;
-};
-
-bool read_with_openmesh(MeshFormat format, std::istream& stream, MeshImporter& importer) {
-  OpenMesh::IO::Options options;
-  switch (format) {
-    case MeshFormat::kObj: return OpenMesh::IO::OBJReader().read(stream, importer, options);
-    case MeshFormat::kOff: break;
-    case MeshFormat::kPly: return OpenMesh::IO::PLYReader().read(stream, importer, options);
-    case MeshFormat::kStlBinary: options += OpenMesh::IO::Options::Binary; [[fallthrough]];
-    case MeshFormat::kStlAscii: return OpenMesh::IO::STLReader().read(stream, importer, options);
-  }
-  return false;
-}
-
-/// The plain OFF text of a survey: OpenMesh reads it word by word through a stream, which takes longer than all the
-/// rest.
-void take_off(const MeshSurvey& survey, MeshImporter& importer) {
-  const char *at = survey.plain.data(), *const end = at + survey.plain.size();
-  const auto next = [&]<class Number>(Number& value) {
-    while (at < end && (*at == ' ' || *at == '\n')) ++at;
-    at = std::from_chars(at, end, value).ptr;
-  };
-  for (int lines = 0; lines < 2; ++at) lines += *at == '\n';
-  for (std::size_t v = 0; v < survey.vertices; ++v) {
-    OpenMesh::Vec3f point(0, 0, 0);  // what is nearer to 0 than any float is out of range
-    for (int axis = 0; axis < 3; ++axis) next(point[axis]);
-    importer.add_vertex(point);
-  }
-  MeshImporter::VHandles corners;
-  for (std::size_t f = 0; f < survey.faces; ++f) {
-    std::size_t size = 0;
-    next(size);
-    corners.clear();
-    for (std::size_t i = 0; i < size; ++i) {
-      int corner = 0;
-      next(corner);
-      corners.emplace_back(corner);
-    }
-    importer.add_face(corners);
-  }
 }
 
 template <typename T>
@@ -173,34 +104,15 @@ void write_obj(OutputFile& file, const TriangleMesh& mesh) {
 }  // namespace
 
 MeshFile read_mesh(const std::filesystem::path& path) {
-  const std::string where = path.string();
-  MeshSurvey survey = survey_mesh(read_file(path), lower_extension(path), where);
-  const bool is_welded = survey.format == MeshFormat::kStlAscii || survey.format == MeshFormat::kStlBinary;
-  MeshImporter importer;
-  bool ok = true;
-  if (survey.format == MeshFormat::kOff) {
-    take_off(survey, importer);
-  } else {
-    std::istringstream stream(std::move(survey.plain));
-    static std::mutex mutex;  // OpenMesh's readers are singletons that keep the file's state in members
-    const std::lock_guard lock(mutex);
-    const Silence silence;
-    ok = read_with_openmesh(survey.format, stream, importer);
-  }
-  // What the readers leave out themselves: OBJ faces with too few vertices, and STL triangles that welding closed.
-  const std::size_t left_out = survey.faces - std::min(survey.faces, importer.n_faces());
-  if (!ok || (!is_welded && (importer.n_vertices() != survey.vertices || left_out != survey.small_faces)))
-    throw IoError(
-        fmt::format("{}: OpenMesh took {} of {} vertices and {} of {} faces from this file; save it in another format",
-                    where, importer.n_vertices(), survey.vertices, importer.n_faces(), survey.faces));
-  for (const MeshSurvey::OddCoordinate& odd : survey.odd_coordinates)
-    importer.set_coordinate(odd.vertex, odd.axis, odd.value);
-  MeshFile result = importer.take(where);
-  result.degenerate_faces += static_cast<int>(left_out);
-  result.faces_in_file = static_cast<int>(survey.faces);
-  result.vertices_in_file = static_cast<int>(survey.vertices);
-  result.merged_vertices = static_cast<int>(survey.vertices - result.mesh.positions.size());
-  return result;
+  const std::string where = path.string(), extension = lower_extension(path);
+  const std::string bytes = read_file(path);
+  if (bytes.empty()) throw IoError(where + ": the file is empty");
+  if (extension == ".obj") return read_obj(bytes, where);
+  if (extension == ".off") return read_off(bytes, where);
+  if (extension == ".ply") return read_ply(bytes, where);
+  if (extension == ".stl") return read_stl(bytes, where);
+  throw IoError(
+      fmt::format("{}: meshes are read from .obj, .off, .ply and .stl files, not from \"{}\"", where, extension));
 }
 
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, const PlyAttributes& attributes) {

@@ -19,10 +19,9 @@ struct MeshFile {
   int merged_vertices = 0;   ///< equal positions welded (STL; other formats are not welded)
 };
 
-/// Reads OBJ, PLY (ascii, binary), OFF or STL through OpenMesh; faces are counted in and out, so that nothing the
-/// reader dislikes is dropped silently: faces in file = triangles - (corners beyond three of kept polygons) +
-/// degenerate faces. Positions have single precision, which is what OpenMesh's readers deliver; NaN and infinity are
-/// kept (not in STL) for validation to report.
+/// Reads OBJ, PLY (ascii, binary), OFF or STL by the ending, in double precision. Faces are counted in and out, so that
+/// nothing is dropped silently: faces in file = triangles - (corners beyond three of kept polygons) + degenerate faces.
+/// NaN and infinity are kept (not in STL) for validation to report. An UTF-8 byte order mark is skipped.
 /// \throw IoError naming the file, what is wrong and, where the format allows, the line
 MeshFile read_mesh(const std::filesystem::path& path);
 

@@ -21,6 +21,7 @@
 #include <thread>
 
 #include "skeletex/io/atomic_file.h"
+#include "skeletex/io/check_model.h"
 #include "skeletex/io/exr_survey.h"
 #include "skeletex/io/json_file.h"
 #include "skeletex/io/model_json.h"

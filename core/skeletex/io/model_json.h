@@ -10,8 +10,6 @@ namespace skeletex {
 
 /// Version of the model file's JSON that this library writes, and the newest it reads.
 inline constexpr int kModelFileVersion = 1;
-/// Largest width and height of a model's texture.
-inline constexpr int kMaxTextureSize = 16384;
 
 /// Everything of a model but its texels (docs/file-formats.md). Doubles come back bit by bit.
 /// \throw IoError when names or settings are no valid text
@@ -25,11 +23,5 @@ SkeletexModel model_from_json(const nlohmann::json& json, const std::string& whe
 std::vector<std::string> weight_channels(const Skeleton& skeleton);
 /// The channels that a header names for its weights, one per bone; empty: it names none. \throw IoError
 std::vector<std::string> weight_channels(const nlohmann::json& header, std::size_t bones, const std::string& where);
-
-/// Whether the parts of a model fit together, so that whatever uses it may take every index and size for granted: all
-/// indices exist, rectangles lie in the texture apart from each other, rows increase from 0 to 1, each end's arcs close
-/// up to one loop, and each arc is used by its two bones. Texels are not looked at.
-/// \throw IoError naming the entry
-void check_model(const SkeletexModel& model, const std::string& where);
 
 }  // namespace skeletex

@@ -6,12 +6,12 @@
 
 namespace skeletex {
 
-/// SkeletexModel::encoder_settings, parsed; an empty object where it is none. Two of them are more than a record: with
-/// `prefilter` inner texels lie 1/16 of their second differences off the surface, unless they are snapped or fitted;
-/// with `snap` beside their places of an regular grid.
-inline nlohmann::json parsed_encoder_settings(const SkeletexModel& model) {
+/// Adds an entry to SkeletexModel::encoder_settings.
+inline void record_setting(SkeletexModel& model, const char* key, const nlohmann::json& value) {
   nlohmann::json settings = nlohmann::json::parse(model.encoder_settings, nullptr, false);
-  return settings.is_object() ? settings : nlohmann::json::object();
+  if (!settings.is_object()) settings = nlohmann::json::object();
+  settings[key] = value;
+  model.encoder_settings = settings.dump();
 }
 
 }  // namespace skeletex

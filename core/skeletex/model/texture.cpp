@@ -3,8 +3,6 @@
 
 namespace skeletex {
 
-const char* to_string(Method method) { return method == Method::kSpd ? "spd" : "vsm"; }
-
 const char* to_string(SegmentTopology topology) {
   switch (topology) {
     case SegmentTopology::kAnnulus: return "annulus";

@@ -4,13 +4,12 @@
 #include <string>
 #include <vector>
 
+#include "skeletex/model/method.h"
 #include "skeletex/model/segment.h"
 #include "skeletex/skeleton/skeleton.h"
 
 namespace skeletex {
 
-enum class Method { kSpd, kVsm };
-const char* to_string(Method method);
 const char* to_string(SegmentTopology topology);
 
 /// A rectangle of texels: columns [x, x + width), rows [y, y + height).
@@ -70,6 +69,13 @@ enum class DiagonalRule {
              ///< edges
 };
 
+/// How inner texels were taken from the surface. What other sizes and morphs of the model make of them depends on it.
+struct TexelSampling {
+  bool is_prefiltered = false;  ///< 1/16 of their second differences off the surface, unless they are snapped or fitted
+  bool is_snapped = false;      ///< those of VSM patches lie on the mesh's vertices and edges where they can
+  bool is_fitted = false;  ///< those of VSM patches were moved so that the triangles between lie nearer to the mesh
+};
+
 /// Lengths, in the units of the mesh, whose squares single precision holds with room to spare: diagonals of models lie
 /// between them.
 inline constexpr double kSmallestDiagonal = 1e-15, kLargestDiagonal = 1e15;
@@ -83,6 +89,7 @@ struct SkeletexModel {
   double diagonal = 0;         ///< of the input mesh's bounding box
   int genus = 0;
   DiagonalRule diagonals = DiagonalRule::kNearest;
+  TexelSampling sampling;
   DisplacementTexture texture;
   std::vector<Patch> patches;                 ///< one per bone
   std::vector<std::array<PatchEnd, 2>> ends;  ///< one pair per bone: head, tail
@@ -91,7 +98,7 @@ struct SkeletexModel {
   /// How much each bone moves each texel in a smooth pose, where that is painted or imported: per bone a plane as the
   /// texture's, values of at least 0 whose sum does not matter. Empty: weights in closed form (weight_walk.h).
   std::vector<std::vector<float>> bone_weights;
-  std::string encoder_settings;  ///< JSON object: the options and version of the encoder, for the record
+  std::string encoder_settings;  ///< JSON object: how the model was made, for the record; nothing depends on it
 };
 
 }  // namespace skeletex

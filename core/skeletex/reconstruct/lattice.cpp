@@ -21,7 +21,7 @@ void check_end(const SkeletexModel& model, int bone, int end, const std::vector<
     const SeamArc& arc = model.arcs[uses[i].arc];
     if (arc.is_closed()) {
       if (uses.size() > 1 || arc.samples.size() < 3)
-        refuse(model, bone, end, "a closed arc needs three samples and no other arc beside it");
+        refuse(model, bone, end, "a closed arc needs three samples and no other arc at its end");
       continue;
     }
     if (arc.samples.empty())
@@ -37,6 +37,21 @@ void check_end(const SkeletexModel& model, int bone, int end, const std::vector<
 }
 
 }  // namespace
+
+std::vector<LatticeRow> lattice_rows(const std::vector<Patch>& patches, RowChoice choice) {
+  const int margin = choice == RowChoice::kInner ? 1 : 0;
+  std::vector<LatticeRow> rows;
+  int vertex = 0, quad = 0;
+  for (int bone = 0; bone < static_cast<int>(patches.size()); ++bone) {
+    const Rectangle& rectangle = patches[bone].rectangle;
+    for (int row = margin; row < rectangle.height - margin; ++row) {
+      rows.push_back({bone, row, vertex, quad});
+      vertex += rectangle.width;
+      if (row + 1 < rectangle.height - margin) quad += rectangle.width;
+    }
+  }
+  return rows;
+}
 
 Lattice number_lattice(const SkeletexModel& model) {
   const int count = static_cast<int>(model.patches.size());

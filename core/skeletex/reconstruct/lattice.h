@@ -23,6 +23,15 @@ struct Lattice {
   int triangle_count = 0;  ///< quads, fans and strips together
 };
 
+/// A lattice row as the kernels see it: patch, row, number of its first vertex, number of its first quad. Quads of a
+/// row lie between it and the next row of the table's patch.
+using LatticeRow = std::array<int, 4>;
+
+enum class RowChoice { kAll, kInner };  ///< kInner leaves out rows 0 and height - 1
+
+/// The chosen rows of every patch. Vertices and quads are numbered patch by patch, row by row.
+std::vector<LatticeRow> lattice_rows(const std::vector<Patch>& patches, RowChoice choice);
+
 /// \throw InputError when a rectangle is below 4 x 4 or arcs and ends do not fit together, naming the bone
 Lattice number_lattice(const SkeletexModel& model);
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "reconstruct_structs.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/skin.h"
@@ -47,14 +48,18 @@ EndTables end_tables(const SkeletexModel& model, const PosedPlanes& posed) {
       record.first_arc[end] = static_cast<int>(tables.arcs.size());
       record.arc_count[end] = static_cast<int>(arcs.size());
       tables.arcs.insert(tables.arcs.end(), arcs.begin(), arcs.end());
-      // The seam at one end draws the capsule out past the other.
+      // The seam at one end extends the capsule past the other.
       const PosedRow row = posed_row(model, posed, bone, {end == 0 ? 1.0 : 0.0, 0});
-      record.bind_reach[end] = static_cast<float>(row.bind_reaches[end]);
-      record.reach[end] = static_cast<float>(row.reaches[end]);
+      record.bind_extension[end] = static_cast<float>(row.bind_extensions[end]);
+      record.extension[end] = static_cast<float>(row.extensions[end]);
     }
     tables.ends.push_back(record);
   }
   return tables;
+}
+
+BlockParameters block_parameters(const ClBuffer<SkinBlock>& blocks, const DevicePlanes& points) {
+  return {.block_count = static_cast<int>(blocks.size), .point_count = static_cast<int>(points.count)};
 }
 
 ClLocal loops_of_block() { return ClLocal{6 * SKIN_BLOCK * sizeof(float)}; }
@@ -80,8 +85,10 @@ BoneCoordinates bone_coordinates(const Skeleton& skeleton, const SeparationPlane
   return {u_of(at, is_head_free, is_tail_free), turn};
 }
 
-Vec3 posed_by_coordinates(const SkeletexModel& model, const SeparationPlanes& bind, const PosedPlanes& posed, int bone,
-                          const Vec3& point, DistanceRule rule) {
+Vec3 posed_by_coordinates(const PreparedModel& prepared, const PosedPlanes& posed, int bone, const Vec3& point,
+                          DistanceRule rule) {
+  const SkeletexModel& model = prepared.model;
+  const SeparationPlanes& bind = prepared.separation;
   const auto [u, turn] = bone_coordinates(model.skeleton, bind, bone, point);
   const Vec3 texel = encode_texel(tangent_frame(model.skeleton, bind, bone, u, turn), point,
                                   end_position(model.skeleton, bone, BoneEnd::kHead),
@@ -89,22 +96,15 @@ Vec3 posed_by_coordinates(const SkeletexModel& model, const SeparationPlanes& bi
   return posed_point(model, bind, posed, bone, u, turn, texel, rule);
 }
 
-DeviceCoordinates make_coordinates(ClContext& context, const SkeletexModel& model, const DevicePlanes& points) {
-  const SeparationPlanes separation(model.skeleton);
+DeviceCoordinates make_coordinates(ClContext& context, const PreparedModel& prepared, const DevicePlanes& points) {
+  const SkeletexModel& model = prepared.model;
   const EndTables tables = end_tables(model, PosedPlanes(model, model.skeleton));
-  const std::size_t size = points.x.size;
-  DeviceCoordinates made{context.upload(skin_blocks(model.patches)),
-                         context.upload(frame_tables(model.skeleton, separation, model.patches, model.origin).patches),
-                         context.allocate<float>(size),
-                         context.allocate<float>(size),
-                         context.allocate<float>(size),
-                         context.allocate<float>(size),
-                         context.allocate<float>(size)};
+  DeviceCoordinates made{context.upload(skin_blocks(model.patches)), context.upload(prepared.tables.patches),
+                         context.allocate<float>(5 * points.count)};
   if (made.blocks.size > 0)
     context.launch({"coordinates.cl", "bone_coordinates"}, block_range(context, made.blocks.size),
-                   static_cast<int>(made.blocks.size), made.blocks, made.patches, context.upload(tables.ends),
-                   context.upload(tables.arcs), points.x, points.y, points.z, made.angle, made.distance, made.height,
-                   made.slope_head, made.slope_tail, loops_of_block());
+                   block_parameters(made.blocks, points), made.blocks, made.patches, context.upload(tables.ends),
+                   context.upload(tables.arcs), points.values, made.values, loops_of_block());
   return made;
 }
 
@@ -112,22 +112,21 @@ void pose_by_coordinates(ClContext& context, const SkeletexModel& model, const D
                          const PosedPlanes& posed, DistanceRule rule, const Vec3& origin, DevicePlanes& points) {
   if (coordinates.blocks.size == 0) return;
   const EndTables tables = end_tables(model, posed);
-  context.launch({"coordinates.cl", "pose_by_coordinates"}, block_range(context, coordinates.blocks.size),
-                 static_cast<int>(coordinates.blocks.size), static_cast<int>(rule == DistanceRule::kFromBone),
+  BlockParameters parameters = block_parameters(coordinates.blocks, points);
+  parameters.is_distance_kept = static_cast<int>(rule == DistanceRule::kFromBone);
+  context.launch({"coordinates.cl", "pose_by_coordinates"}, block_range(context, coordinates.blocks.size), parameters,
                  coordinates.blocks, coordinates.patches, context.upload(posed_patches(model, posed, origin)),
-                 context.upload(tables.ends), context.upload(tables.arcs), coordinates.angle, coordinates.distance,
-                 coordinates.height, coordinates.slope_head, coordinates.slope_tail, points.x, points.y, points.z,
+                 context.upload(tables.ends), context.upload(tables.arcs), coordinates.values, points.values,
                  loops_of_block());
 }
 
-void place_shared_by_coordinates(const SkeletexModel& model, const PosedPlanes& posed, const Lattice& lattice,
-                                 DistanceRule rule, std::vector<Vec3>& positions) {
-  const SeparationPlanes bind(model.skeleton);
-  place_shared_vertices(model, posed, lattice, rule, positions);
+void place_shared_by_coordinates(const PreparedModel& model, const PosedPlanes& posed, DistanceRule rule,
+                                 std::vector<Vec3>& positions) {
+  place_shared_vertices(model, posed, rule, positions);
   std::vector<Vec3> bind_positions(positions.size());
-  place_shared_vertices(model, bind, lattice, bind_positions);
-  for_each_pole(model, lattice, [&](int vertex, int bone, int, std::size_t) {
-    positions[vertex] = posed_by_coordinates(model, bind, posed, bone, bind_positions[vertex], rule);
+  place_shared_vertices(model, bind_positions);
+  for_each_pole(model.model, model.lattice, [&](int vertex, int bone, int, std::size_t) {
+    positions[vertex] = posed_by_coordinates(model, posed, bone, bind_positions[vertex], rule);
   });
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "reconstruct_structs.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/reconstruct/pose_by_coordinates.h"
@@ -13,20 +14,9 @@
 #include "skeletex/reconstruct/skin.h"
 
 namespace skeletex {
-namespace {
-
-void download_points(ClContext& context, const DevicePlanes& points, const Vec3& origin, std::vector<Vec3>& positions) {
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::vector<float> plane = context.download(axis == 0 ? points.x : axis == 1 ? points.y : points.z);
-    for (std::size_t i = 0; i < plane.size(); ++i) positions[i][axis] = origin[axis] + static_cast<double>(plane[i]);
-  }
-}
-
-}  // namespace
-
-DevicePose upload_pose(ClContext& context, const SkeletexModel& model, const PosedPlanes& posed, RowChoice choice,
+DevicePose upload_pose(ClContext& context, const PreparedModel& model, const PosedPlanes& posed, RowChoice choice,
                        DistanceRule rule) {
-  const PoseTables tables = pose_tables(model, posed);
+  const PoseTables tables = pose_tables(model.model, posed);
   const std::size_t count = tables.columns.size();
   std::vector<float> columns(4 * count);
   for (std::size_t i = 0; i < count; ++i) {
@@ -35,11 +25,11 @@ DevicePose upload_pose(ClContext& context, const SkeletexModel& model, const Pos
     columns[2 * count + i] = tables.columns[i].slope_head;
     columns[3 * count + i] = tables.columns[i].slope_tail;
   }
-  std::vector<LatticeRow> plain = lattice_rows(model.patches, choice), other;
+  std::vector<LatticeRow> plain = model.rows(choice), other;
   const auto is_plain = [&](const LatticeRow& row) {
     const PosedRowRecord& record = tables.rows[tables.patches[row[0]].row_begin + row[1]];
-    return rule == DistanceRule::kFromBone && record.bind_reach_head == 0 && record.bind_reach_tail == 0 &&
-           record.reach_head == 0 && record.reach_tail == 0;
+    return rule == DistanceRule::kFromBone && record.bind_extension_head == 0 && record.bind_extension_tail == 0 &&
+           record.extension_head == 0 && record.extension_tail == 0;
   };
   std::copy_if(plain.begin(), plain.end(), std::back_inserter(other),
                [&](const LatticeRow& row) { return !is_plain(row); });
@@ -49,85 +39,85 @@ DevicePose upload_pose(ClContext& context, const SkeletexModel& model, const Pos
           context.upload(columns),
           context.upload(plain),
           context.upload(other),
-          plain.size(),
-          other.size(),
           rule == DistanceRule::kFromBone,
           tables.origin};
 }
 
 void displace_posed(ClContext& context, const DeviceLattice& lattice, const DevicePose& pose, DevicePlanes& points) {
   const DeviceTables& bind = lattice.tables;
-  if (pose.plain_count > 0)
-    context.launch({"pose.cl", "displace_posed"}, row_range(context, pose.plain_count),
-                   static_cast<int>(pose.plain_count), lattice.texture_width, bind.column_count, pose.plain_rows,
-                   bind.rows, bind.columns, pose.patches, pose.columns, lattice.texels.x, lattice.texels.y,
-                   lattice.texels.z, points.x, points.y, points.z);
-  if (pose.other_count > 0)
-    context.launch({"pose.cl", "displace_posed_from_bind"}, row_range(context, pose.other_count),
-                   static_cast<int>(pose.other_count), lattice.texture_width, bind.column_count,
-                   static_cast<int>(pose.is_distance_kept), pose.other_rows, bind.patches, bind.rows, bind.columns,
-                   pose.patches, pose.rows, pose.columns, lattice.texels.x, lattice.texels.y, lattice.texels.z,
-                   points.x, points.y, points.z);
+  const auto parameters = [&](std::size_t row_count) {
+    DisplaceParameters made = displace_parameters(row_count, lattice.texture_width, bind, lattice.texels, points);
+    made.is_distance_kept = static_cast<int>(pose.is_distance_kept);
+    return made;
+  };
+  if (pose.plain_rows.size > 0)
+    context.launch({"pose.cl", "displace_posed"}, row_range(context, pose.plain_rows.size),
+                   parameters(pose.plain_rows.size), pose.plain_rows, bind.rows, bind.columns, pose.patches,
+                   pose.columns, lattice.texels.values, points.values);
+  if (pose.other_rows.size > 0)
+    context.launch({"pose.cl", "displace_posed_from_bind"}, row_range(context, pose.other_rows.size),
+                   parameters(pose.other_rows.size), pose.other_rows, bind.rows, bind.columns, pose.patches, pose.rows,
+                   pose.columns, lattice.texels.values, points.values);
 }
 
-void place_shared_vertices(const SkeletexModel& model, const PosedPlanes& separation, const Lattice& lattice,
-                           DistanceRule rule, std::vector<Vec3>& positions) {
-  const SeparationPlanes bind(model.skeleton);
-  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
-    for (const int end : {0, 1}) {
-      if (lattice.poles[bone][end] < 0) continue;
-      const Rectangle& rectangle = model.patches[bone].rectangle;
-      const std::size_t at =
-          static_cast<std::size_t>(rectangle.y + (end == 0 ? 0 : rectangle.height - 1)) * model.texture.width +
-          rectangle.x;
-      const Vec3 texel(model.texture.along[at], model.texture.around[at], model.texture.out[at]);
-      positions[lattice.poles[bone][end]] = posed_point(model, bind, separation, bone, end, 0, texel, rule);
-    }
+void place_shared_vertices(const PreparedModel& prepared, const PosedPlanes& posed, DistanceRule rule,
+                           std::vector<Vec3>& positions) {
+  const SkeletexModel& model = prepared.model;
+  const DisplacementTexture& texture = model.texture;
+  for_each_pole(model, prepared.lattice, [&](int vertex, int bone, int end, std::size_t texel) {
+    positions[vertex] = posed_point(model, prepared.separation, posed, bone, end, 0,
+                                    Vec3(texture.along[texel], texture.around[texel], texture.out[texel]), rule);
+  });
   for (int a = 0; a < static_cast<int>(model.arcs.size()); ++a)
     for (int i = 0; i < static_cast<int>(model.arcs[a].samples.size()); ++i)
-      positions[lattice.first_sample[a] + i] = separation.sample_point(a, i, rule);
+      positions[prepared.lattice.first_sample[a] + i] = posed.sample_point(a, i, rule);
   for (int c = 0; c < static_cast<int>(model.corners.size()); ++c)
-    positions[lattice.first_corner + c] = separation.corner_point(c, rule);
+    positions[prepared.lattice.first_corner + c] = posed.corner_point(c, rule);
 }
 
 namespace {
 
-void pose_smoothly(ClContext& context, const SkeletexModel& model, const Skeleton& posed, const Lattice& lattice,
+void pose_smoothly(ClContext& context, const PreparedModel& model, const Skeleton& posed, DevicePlanes bind,
                    std::vector<Vec3>& positions) {
-  DevicePlanes bind = displace_inner(context, model, SeparationPlanes(model.skeleton), lattice);
   const Skin skin = make_skin(context, model, bind);
   const DeviceSkin device = upload_skin(context, skin, std::move(bind));
-  const std::vector<BoneMotion> motions = bone_motions(model.skeleton, posed);
+  const std::vector<BoneMotion> motions = bone_motions(model.model.skeleton, posed);
   const Vec3 origin = middle_of_nodes(posed);
-  DevicePlanes points = allocate_planes(context, lattice.inner_count);
+  DevicePlanes points = allocate_planes(context, model.lattice.inner_count);
   pose_skin(context, skin, device, motions, origin, points);
   download_points(context, points, origin, positions);
   pose_shared_vertices(skin, motions, positions);
 }
 
-void pose_by_own_coordinates(ClContext& context, const SkeletexModel& model, const Skeleton& posed,
-                             const Lattice& lattice, DistanceRule rule, std::vector<Vec3>& positions) {
-  const PosedPlanes separation(model, posed);
-  const DeviceCoordinates coordinates =
-      make_coordinates(context, model, displace_inner(context, model, SeparationPlanes(model.skeleton), lattice));
+void pose_by_own_coordinates(ClContext& context, const PreparedModel& model, const Skeleton& posed,
+                             const DevicePlanes& bind, DistanceRule rule, std::vector<Vec3>& positions) {
+  const PosedPlanes separation(model.model, posed);
+  const DeviceCoordinates coordinates = make_coordinates(context, model, bind);
   const Vec3 origin = middle_of_nodes(posed);
-  DevicePlanes points = allocate_planes(context, lattice.inner_count);
-  pose_by_coordinates(context, model, coordinates, separation, rule, origin, points);
+  DevicePlanes points = allocate_planes(context, model.lattice.inner_count);
+  pose_by_coordinates(context, model.model, coordinates, separation, rule, origin, points);
   download_points(context, points, origin, positions);
-  place_shared_by_coordinates(model, separation, lattice, rule, positions);
+  place_shared_by_coordinates(model, separation, rule, positions);
 }
 
-void pose_by_paper(ClContext& context, const SkeletexModel& model, const Skeleton& posed, const Lattice& lattice,
-                   DistanceRule rule, std::vector<Vec3>& positions) {
-  const SeparationPlanes bind(model.skeleton);
-  const PosedPlanes separation(model, posed);
-  const DeviceLattice device = upload_lattice(context, frame_tables(model.skeleton, bind, model.patches, model.origin),
-                                              model.patches, model.texture, RowChoice::kInner);
-  const DevicePose pose = upload_pose(context, model, separation, RowChoice::kInner, rule);
-  DevicePlanes points = allocate_planes(context, device.vertex_count);
-  displace_posed(context, device, pose, points);
+/// The points of a lattice in a pose by the paper's rules, world.
+std::vector<Vec3> paper_positions(ClContext& context, const PreparedModel& model, const PosedPlanes& posed,
+                                  const DeviceLattice& lattice, RowChoice choice, DistanceRule rule) {
+  const DevicePose pose = upload_pose(context, model, posed, choice, rule);
+  DevicePlanes points = allocate_planes(context, lattice.vertex_count);
+  displace_posed(context, lattice, pose, points);
+  std::vector<Vec3> positions(lattice.vertex_count);
   download_points(context, points, pose.origin, positions);
-  place_shared_vertices(model, separation, lattice, rule, positions);
+  return positions;
+}
+
+void pose_by_paper(ClContext& context, const PreparedModel& model, const Skeleton& posed, DistanceRule rule,
+                   std::vector<Vec3>& positions) {
+  const PosedPlanes separation(model.model, posed);
+  const std::vector<Vec3> inner = paper_positions(
+      context, model, separation, upload_lattice(context, model, RowChoice::kInner), RowChoice::kInner, rule);
+  std::copy(inner.begin(), inner.end(), positions.begin());
+  place_shared_vertices(model, separation, rule, positions);
 }
 
 }  // namespace
@@ -141,38 +131,32 @@ const char* to_string(Deformation deformation) {
   return "?";
 }
 
-TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model, const Skeleton& posed,
+TriangleMesh reconstruct_mesh(ClContext& context, const PreparedModel& model, const Skeleton& posed,
                               const PoseRule& rule) {
-  TriangleMesh mesh = reconstruct_mesh(context, model);
-  const Lattice lattice = number_lattice(model);
+  auto [mesh, bind] = reconstruct_bind_mesh(context, model);
   switch (rule.deformation) {
-    case Deformation::kSmooth: pose_smoothly(context, model, posed, lattice, mesh.positions); break;
+    case Deformation::kSmooth: pose_smoothly(context, model, posed, std::move(bind), mesh.positions); break;
     case Deformation::kCoordinates:
-      pose_by_own_coordinates(context, model, posed, lattice, rule.distance, mesh.positions);
+      pose_by_own_coordinates(context, model, posed, bind, rule.distance, mesh.positions);
       break;
-    case Deformation::kPaper: pose_by_paper(context, model, posed, lattice, rule.distance, mesh.positions); break;
+    case Deformation::kPaper: pose_by_paper(context, model, posed, rule.distance, mesh.positions); break;
   }
-  return mesh;
+  return std::move(mesh);
 }
 
-TriangleMesh constant_offset_mesh(ClContext& context, const SkeletexModel& model, const Skeleton& posed,
+TriangleMesh constant_offset_mesh(ClContext& context, const PreparedModel& prepared, const Skeleton& posed,
                                   std::span<const int> bones, double offset, DistanceRule rule) {
   if (!(offset > 0))
     throw InputError(
         fmt::format("a plane in bone tangent space lies outside the bones: its offset, {}, must be above 0", offset));
-  const SeparationPlanes bind(model.skeleton);
-  const PosedPlanes separation(model, posed);
+  const SkeletexModel& model = prepared.model;
   DisplacementTexture plane = model.texture;
   std::fill(plane.along.begin(), plane.along.end(), 0.f);
   std::fill(plane.around.begin(), plane.around.end(), 0.f);
   std::fill(plane.out.begin(), plane.out.end(), static_cast<float>(offset));
-  const DeviceLattice device = upload_lattice(context, frame_tables(model.skeleton, bind, model.patches, model.origin),
-                                              model.patches, plane, RowChoice::kAll);
-  const DevicePose pose = upload_pose(context, model, separation, RowChoice::kAll, rule);
-  DevicePlanes points = allocate_planes(context, device.vertex_count);
-  displace_posed(context, device, pose, points);
-  std::vector<Vec3> positions(device.vertex_count);
-  download_points(context, points, pose.origin, positions);
+  const std::vector<Vec3> positions = paper_positions(
+      context, prepared, PosedPlanes(model, posed),
+      upload_lattice(context, prepared.tables, model.patches, plane, RowChoice::kAll), RowChoice::kAll, rule);
 
   std::vector<int> firsts(model.patches.size() + 1, 0), all(model.patches.size());
   for (std::size_t i = 0; i < model.patches.size(); ++i)

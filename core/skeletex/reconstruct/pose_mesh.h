@@ -21,21 +21,22 @@ struct PoseRule {
   DistanceRule distance = DistanceRule::kFromBone;  ///< of kPaper and kCoordinates
 };
 
-/// The model's mesh in a pose: the vertices, triangles and numbering of reconstruct_mesh(context, model), with posed
-/// positions. So all poses of a model share their triangles, and every pose is as closed as the bind pose.
-/// \param posed  apply_pose(model.skeleton, ...)
-TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model, const Skeleton& posed,
+/// The model's mesh in a pose. Vertices and triangles are numbered as in reconstruct_mesh(context, model): all poses of
+/// a model share their triangles, and every pose is as closed as the bind pose. \param posed apply_pose(model.skeleton,
+/// ...)
+TriangleMesh reconstruct_mesh(ClContext& context, const PreparedModel& model, const Skeleton& posed,
                               const PoseRule& rule = {});
 
-/// Poles, seam samples and corners of a pose by the paper's rules: few, and shared by several patches, so they are made
-/// on the host in double. \param positions  by lattice vertex, world; inner vertices are left as they are
-void place_shared_vertices(const SkeletexModel& model, const PosedPlanes& separation, const Lattice& lattice,
-                           DistanceRule rule, std::vector<Vec3>& positions);
+/// Places poles, seam samples and corners of a pose by the paper's rules. They are few, and several patches share them,
+/// so the host does this in double precision. \param positions  by lattice vertex, world; inner vertices are left as
+/// they are
+void place_shared_vertices(const PreparedModel& model, const PosedPlanes& posed, DistanceRule rule,
+                           std::vector<Vec3>& positions);
 
 /// A plane of constant texels (0, 0, offset) in bone tangent space (paper, Figure 7): per chosen bone all rows and
 /// columns of its patch as a mesh that is closed around the bone and open at its ends.
 /// \param bones   empty: all    \param offset  world units, > 0
-TriangleMesh constant_offset_mesh(ClContext& context, const SkeletexModel& model, const Skeleton& posed,
+TriangleMesh constant_offset_mesh(ClContext& context, const PreparedModel& model, const Skeleton& posed,
                                   std::span<const int> bones, double offset,
                                   DistanceRule rule = DistanceRule::kFromBone);
 
@@ -43,13 +44,13 @@ TriangleMesh constant_offset_mesh(ClContext& context, const SkeletexModel& model
 struct DevicePose {
   ClBuffer<PatchRecord> patches;
   ClBuffer<PosedRowRecord> rows;
-  ClBuffer<float> columns;                      ///< four planes: roll_head, roll_tail, slope_head, slope_tail
-  ClBuffer<LatticeRow> plain_rows, other_rows;  ///< those whose capsule is the bone's own, and the rest; sizes below
-  std::size_t plain_count = 0, other_count = 0;
+  ClBuffer<float> columns;          ///< four planes: roll_head, roll_tail, slope_head, slope_tail
+  ClBuffer<LatticeRow> plain_rows;  ///< whose capsule is the bone's own
+  ClBuffer<LatticeRow> other_rows;  ///< the rest
   bool is_distance_kept = true;
   Vec3 origin;  ///< world position that the points are relative to
 };
-DevicePose upload_pose(ClContext& context, const SkeletexModel& model, const PosedPlanes& posed, RowChoice choice,
+DevicePose upload_pose(ClContext& context, const PreparedModel& model, const PosedPlanes& posed, RowChoice choice,
                        DistanceRule rule);
 
 /// Queues the posed points of all rows (two launches at most), relative to the pose's origin.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "reconstruct_structs.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/reconstruct/seam_strip.h"
@@ -10,11 +11,6 @@
 
 namespace skeletex {
 namespace {
-
-/// The end of a bone that lies at a node.
-BoneEnd end_at(const Skeleton& skeleton, int bone, int node) {
-  return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
-}
 
 Vec3 sample_point(const Skeleton& skeleton, const SeparationPlanes& separation, int node, int bone,
                   const SeamSample& sample) {
@@ -45,59 +41,16 @@ void for_each_pole(const SkeletexModel& model, const Lattice& lattice,
     }
 }
 
-void place_shared_vertices(const SkeletexModel& model, const SeparationPlanes& separation, const Lattice& lattice,
-                           std::vector<Vec3>& positions) {
+void place_shared_vertices(const PreparedModel& prepared, std::vector<Vec3>& positions) {
+  const SkeletexModel& model = prepared.model;
   const DisplacementTexture& texture = model.texture;
-  for_each_pole(model, lattice, [&](int vertex, int bone, int end, std::size_t texel) {
-    positions[vertex] = decode_texel(tangent_frame(model.skeleton, separation, bone, end, 0),
+  for_each_pole(model, prepared.lattice, [&](int vertex, int bone, int end, std::size_t texel) {
+    positions[vertex] = decode_texel(tangent_frame(model.skeleton, prepared.separation, bone, end, 0),
                                      Vec3(texture.along[texel], texture.around[texel], texture.out[texel]),
                                      end_position(model.skeleton, bone, BoneEnd::kHead),
                                      end_position(model.skeleton, bone, BoneEnd::kTail));
   });
-  place_seams(model, separation, lattice, positions);
-}
-
-DevicePlanes displace_inner(ClContext& context, const SkeletexModel& model, const SeparationPlanes& separation,
-                            const Lattice& lattice) {
-  DevicePlanes points = allocate_planes(context, lattice.inner_count);
-  displace(context,
-           upload_lattice(context, frame_tables(model.skeleton, separation, model.patches, model.origin), model.patches,
-                          model.texture, RowChoice::kInner),
-           points);
-  return points;
-}
-
-namespace {
-
-std::vector<Vec3> place_vertices(ClContext& context, const SkeletexModel& model, const SeparationPlanes& separation,
-                                 const Lattice& lattice, const DevicePlanes& inner) {
-  std::vector<Vec3> positions(lattice.vertex_count);
-  place_shared_vertices(model, separation, lattice, positions);
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::vector<float> plane = context.download(axis == 0 ? inner.x : axis == 1 ? inner.y : inner.z);
-    for (int i = 0; i < lattice.inner_count; ++i)
-      positions[i][axis] = model.origin[axis] + static_cast<double>(plane[i]);
-  }
-  return positions;
-}
-
-}  // namespace
-
-std::vector<Vec3> lattice_positions(ClContext& context, const SkeletexModel& model) {
-  const Lattice lattice = number_lattice(model);
-  const SeparationPlanes separation(model.skeleton);
-  return place_vertices(context, model, separation, lattice, displace_inner(context, model, separation, lattice));
-}
-
-std::vector<Triangle> end_triangles(const SkeletexModel& model, const Lattice& lattice,
-                                    const std::vector<Vec3>& positions) {
-  const SeparationPlanes separation(model.skeleton);
-  std::vector<Triangle> triangles;
-  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
-    for (const BoneEnd which : {BoneEnd::kHead, BoneEnd::kTail})
-      append_end_triangles(model, lattice, positions, end_seam(model, separation, lattice, positions, bone, which),
-                           bone, which, triangles);
-  return triangles;
+  place_seams(model, prepared.separation, prepared.lattice, positions);
 }
 
 EndSeam end_seam(const SkeletexModel& model, const SeparationPlanes& separation, const Lattice& lattice,
@@ -114,6 +67,33 @@ EndSeam end_seam(const SkeletexModel& model, const SeparationPlanes& separation,
   return seam;
 }
 
+namespace {
+
+std::vector<Vec3> place_vertices(ClContext& context, const PreparedModel& prepared, const DevicePlanes& inner) {
+  std::vector<Vec3> positions(prepared.lattice.vertex_count);
+  place_shared_vertices(prepared, positions);
+  download_points(context, inner, prepared.model.origin, positions);
+  return positions;
+}
+
+}  // namespace
+
+DeviceQuads upload_quads(ClContext& context, const PreparedModel& prepared) {
+  std::vector<LatticeRow> rows = prepared.inner_rows;
+  std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == prepared.tables.patches[row[0]].height - 2; });
+  return {context.upload(rows), context.upload(prepared.tables.patches)};
+}
+
+ClBuffer<Triangle> triangulate(ClContext& context, DiagonalRule rule, const DeviceQuads& quads, const Lattice& lattice,
+                               const DevicePlanes& inner) {
+  auto triangles = context.allocate<Triangle>(lattice.triangle_count);
+  context.launch({"reconstruct.cl", "triangulate"}, row_range(context, quads.rows.size),
+                 TriangulateParameters{static_cast<int>(quads.rows.size), static_cast<int>(inner.count),
+                                       static_cast<int>(rule == DiagonalRule::kSmooth)},
+                 quads.rows, quads.patches, inner.values, triangles);
+  return triangles;
+}
+
 void append_end_triangles(const SkeletexModel& model, const Lattice& lattice, std::span<const Vec3> positions,
                           const EndSeam& seam, int bone, BoneEnd end, std::vector<Triangle>& triangles) {
   if (seam.ring.vertices.empty()) {
@@ -126,35 +106,34 @@ void append_end_triangles(const SkeletexModel& model, const Lattice& lattice, st
   append_seam_strip(positions, seam.ring, seam.turns, row, end, triangles);
 }
 
-DeviceQuads upload_quads(ClContext& context, const SkeletexModel& model, const SeparationPlanes& separation) {
-  std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kInner);
-  std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == model.patches[row[0]].rectangle.height - 2; });
-  return {context.upload(rows),
-          context.upload(frame_tables(model.skeleton, separation, model.patches, model.origin).patches)};
+std::vector<Vec3> lattice_positions(ClContext& context, const PreparedModel& model) {
+  return place_vertices(context, model, row_points(context, model, RowChoice::kInner));
 }
 
-ClBuffer<Triangle> triangulate(ClContext& context, DiagonalRule rule, const DeviceQuads& quads, const Lattice& lattice,
-                               const DevicePlanes& inner) {
-  // Room for the strips and fans at the end, so that the host's copy need not grow.
-  auto triangles = context.allocate<Triangle>(lattice.triangle_count);
-  context.launch({"reconstruct.cl", rule == DiagonalRule::kSmooth ? "triangulate_smoothly" : "triangulate_quads"},
-                 row_range(context, quads.rows.size), static_cast<int>(quads.rows.size), quads.rows, quads.patches,
-                 inner.x, inner.y, inner.z, triangles);
+std::vector<Triangle> end_triangles(const PreparedModel& model, const std::vector<Vec3>& positions) {
+  std::vector<Triangle> triangles;
+  for (int bone = 0; bone < static_cast<int>(model.model.patches.size()); ++bone)
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
+      append_end_triangles(model.model, model.lattice, positions,
+                           end_seam(model.model, model.separation, model.lattice, positions, bone, end), bone, end,
+                           triangles);
   return triangles;
 }
 
-TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model) {
-  const Lattice lattice = number_lattice(model);
-  const SeparationPlanes separation(model.skeleton);
-  const DevicePlanes points = displace_inner(context, model, separation, lattice);
-  TriangleMesh mesh;
-  mesh.positions = place_vertices(context, model, separation, lattice, points);
-  mesh.triangles = context.download(
-      triangulate(context, model.diagonals, upload_quads(context, model, separation), lattice, points));
-  mesh.triangles.resize(2 * static_cast<std::size_t>(lattice.quad_count));
-  const std::vector<Triangle> ends = end_triangles(model, lattice, mesh.positions);
-  mesh.triangles.insert(mesh.triangles.end(), ends.begin(), ends.end());
-  return mesh;
+BindMesh reconstruct_bind_mesh(ClContext& context, const PreparedModel& model) {
+  BindMesh bind;
+  bind.inner = row_points(context, model, RowChoice::kInner);
+  bind.mesh.positions = place_vertices(context, model, bind.inner);
+  bind.mesh.triangles = context.download(
+      triangulate(context, model.model.diagonals, upload_quads(context, model), model.lattice, bind.inner));
+  bind.mesh.triangles.resize(2 * static_cast<std::size_t>(model.lattice.quad_count));
+  const std::vector<Triangle> ends = end_triangles(model, bind.mesh.positions);
+  bind.mesh.triangles.insert(bind.mesh.triangles.end(), ends.begin(), ends.end());
+  return bind;
+}
+
+TriangleMesh reconstruct_mesh(ClContext& context, const PreparedModel& model) {
+  return reconstruct_bind_mesh(context, model).mesh;
 }
 
 }  // namespace skeletex

@@ -14,17 +14,23 @@
 
 namespace skeletex {
 
-/// A mesh from a model, in its bind pose, at the model's own resolution (paper 3.6). Closed, oriented, 2-manifold and
-/// of the input's genus by construction: inner rows are vertices of their own, seams and corners are shared polylines
-/// that both sides fill up to, poles are single vertices. Quads take diagonals by the model's rule.
+/// The mesh of a model in its bind pose, at the model's own resolution (paper 3.6). It is closed, oriented, 2-manifold
+/// and of the input's genus by construction: inner rows are vertices of their own, seams and corners are polylines that
+/// the patches on both sides share, and poles are single vertices. Quads take diagonals by the model's rule.
 /// \throw DeviceError
-TriangleMesh reconstruct_mesh(ClContext& context, const SkeletexModel& model);
+TriangleMesh reconstruct_mesh(ClContext& context, const PreparedModel& model);
+
+/// That mesh, and its inner vertices as they are on the device, relative to the model's origin.
+struct BindMesh {
+  TriangleMesh mesh;
+  DevicePlanes inner;
+};
+BindMesh reconstruct_bind_mesh(ClContext& context, const PreparedModel& model);
 
 /// The vertices of that mesh alone, in the order of lattice.h. \throw DeviceError
-std::vector<Vec3> lattice_positions(ClContext& context, const SkeletexModel& model);
+std::vector<Vec3> lattice_positions(ClContext& context, const PreparedModel& model);
 /// Its triangles that touch a pole or a seam: fans and strips. \param positions  of all vertices of the lattice
-std::vector<Triangle> end_triangles(const SkeletexModel& model, const Lattice& lattice,
-                                    const std::vector<Vec3>& positions);
+std::vector<Triangle> end_triangles(const PreparedModel& model, const std::vector<Vec3>& positions);
 
 /// The seam of an end, and its turns as strips take them; empty at a pole. \param positions  at least of seams
 struct EndSeam {
@@ -33,35 +39,34 @@ struct EndSeam {
 };
 EndSeam end_seam(const SkeletexModel& model, const SeparationPlanes& separation, const Lattice& lattice,
                  std::span<const Vec3> positions, int bone, BoneEnd end);
-/// The triangles of one end, appended.
+/// Appends the triangles between an end and the inner row next to it: a fan at a pole, else a strip.
 void append_end_triangles(const SkeletexModel& model, const Lattice& lattice, std::span<const Vec3> positions,
                           const EndSeam& seam, int bone, BoneEnd end, std::vector<Triangle>& triangles);
-/// Seam samples and corners: few, and shared by several patches, so they are made on the host in double.
-void place_seams(const SkeletexModel& model, const SeparationPlanes& separation, const Lattice& lattice,
-                 std::span<Vec3> positions);
-/// All vertices of the lattice that are not inner ones, in the bind pose: poles, seam samples and corners.
-void place_shared_vertices(const SkeletexModel& model, const SeparationPlanes& separation, const Lattice& lattice,
-                           std::vector<Vec3>& positions);
-/// The inner vertices in the bind pose, relative to the model's origin.
-DevicePlanes displace_inner(ClContext& context, const SkeletexModel& model, const SeparationPlanes& separation,
-                            const Lattice& lattice);
-/// Every pole, and the texel that holds it.
-void for_each_pole(const SkeletexModel& model, const Lattice& lattice,
-                   const std::function<void(int vertex, int bone, int end, std::size_t texel)>& place);
 
-/// The quads between inner rows on the device: their rows, and the patches.
+/// What the device needs to choose the diagonals of quads between inner rows.
 struct DeviceQuads {
-  ClBuffer<LatticeRow> rows;  ///< those that quads begin at
+  ClBuffer<LatticeRow> rows;  ///< that quads begin at
   ClBuffer<PatchRecord> patches;
 };
-DeviceQuads upload_quads(ClContext& context, const SkeletexModel& model, const SeparationPlanes& separation);
-/// Queues their triangles (one launch), behind which there is room for those at the ends.
+DeviceQuads upload_quads(ClContext& context, const PreparedModel& model);
+/// Queues the triangles of the quads between inner rows (one launch); those at ends are not written.
+/// \param inner  points of the inner vertices    \return room for all triangles of the lattice
 ClBuffer<Triangle> triangulate(ClContext& context, DiagonalRule rule, const DeviceQuads& quads, const Lattice& lattice,
                                const DevicePlanes& inner);
 
-/// The same model with rectangles scaled to another texture size (longer side `size`, at least 4 x 4 each): texels are
-/// resampled as bind-pose positions, averaged where the lattice gets coarser, seams are kept and resampled.
+/// Places seam samples and corners. They are few, and several patches share them, so the host does this in double
+/// precision.
+void place_seams(const SkeletexModel& model, const SeparationPlanes& separation, const Lattice& lattice,
+                 std::span<Vec3> positions);
+/// Places all vertices of the lattice that are not inner ones, in the bind pose: poles, seam samples and corners.
+void place_shared_vertices(const PreparedModel& model, std::vector<Vec3>& positions);
+/// Calls `place` with every pole and the texel that holds it.
+void for_each_pole(const SkeletexModel& model, const Lattice& lattice,
+                   const std::function<void(int vertex, int bone, int end, std::size_t texel)>& place);
+
+/// The same model with rectangles scaled to another texture size (longer side `size`, at least 4 x 4 each). Texels are
+/// resampled as bind-pose positions, averaged where the lattice gets coarser; seams are resampled as polylines.
 /// \throw InputError when the size is too small for the number of bones
-SkeletexModel resample_model(ClContext& context, const SkeletexModel& model, int size);
+SkeletexModel resample_model(ClContext& context, const PreparedModel& model, int size);
 
 }  // namespace skeletex

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "reconstruct_structs.h"
 #include "skeletex/convert/layout/pack_atlas.h"
 #include "skeletex/model/encoder_settings.h"
 #include "skeletex/reconstruct/displace.h"
@@ -69,39 +70,47 @@ struct OpenWeights {
   }
 };
 
-/// Folds weights of an axis that runs on past its ends back onto its samples: round the period, or by reflection in
-/// the end point, p(-x) = 2 p(0) - p(x), which keeps the end and straight lines.
-void append_folded(const OpenWeights& open, int count, bool is_periodic, FilterTaps& taps) {
-  int first = 0, last = -1;
-  std::vector<double> folded;
+/// Weights of samples first, first + 1, ...
+struct FoldedWeights {
+  int first = 0;
+  std::vector<double> values;
+};
+
+FoldedWeights folded_round(const OpenWeights& open, int count) {
+  const auto wrap = [count](int index) { return (index % count + count) % count; };
   const int size = static_cast<int>(open.values.size());
-  if (is_periodic && size < count) {
-    first = (open.first % count + count) % count;
-    folded = open.values;
-  } else if (is_periodic) {
-    folded.assign(count, 0.0);
-    for (int k = 0; k < size; ++k) folded[((open.first + k) % count + count) % count] += open.values[k];
-  } else {
-    std::vector<double> all(count, 0.0);
-    first = count;
-    const auto add = [&](int index, double weight) {
-      all[index] += weight;
-      first = std::min(first, index);
-      last = std::max(last, index);
-    };
-    for (int k = 0; k < size; ++k) {
-      int index = open.first + k;
-      double weight = open.values[k];
-      while (index < 0 || index >= count) {
-        const int end = index < 0 ? 0 : count - 1;
-        add(end, 2 * weight);
-        index = 2 * end - index;
-        weight = -weight;
-      }
-      add(index, weight);
+  if (size < count) return {wrap(open.first), open.values};
+  FoldedWeights folded{0, std::vector<double>(count, 0.0)};
+  for (int k = 0; k < size; ++k) folded.values[wrap(open.first + k)] += open.values[k];
+  return folded;
+}
+
+/// By reflection in the end point, p(-x) = 2 p(0) - p(x), which keeps the end and straight lines.
+FoldedWeights folded_at_ends(const OpenWeights& open, int count) {
+  std::vector<double> all(count, 0.0);
+  int first = count, last = -1;
+  const auto add = [&](int index, double weight) {
+    all[index] += weight;
+    first = std::min(first, index);
+    last = std::max(last, index);
+  };
+  for (int k = 0; k < static_cast<int>(open.values.size()); ++k) {
+    int index = open.first + k;
+    double weight = open.values[k];
+    while (index < 0 || index >= count) {
+      const int end = index < 0 ? 0 : count - 1;
+      add(end, 2 * weight);
+      index = 2 * end - index;
+      weight = -weight;
     }
-    folded.assign(all.begin() + first, all.begin() + last + 1);
+    add(index, weight);
   }
+  return {first, {all.begin() + first, all.begin() + last + 1}};
+}
+
+/// Appends the weights of an axis that runs on past its ends, folded back onto its samples.
+void append_folded(const OpenWeights& open, int count, bool is_periodic, FilterTaps& taps) {
+  const auto [first, folded] = is_periodic ? folded_round(open, count) : folded_at_ends(open, count);
   double sum = 0;
   for (const double weight : folded) sum += weight;
   taps.taps.push_back({first, static_cast<int>(folded.size()), static_cast<int>(taps.weights.size()), 0});
@@ -109,7 +118,7 @@ void append_folded(const OpenWeights& open, int count, bool is_periodic, FilterT
 }
 
 /// Inverse of the mass matrix of linear elements, [1 4 1] / 6: g(k) = sqrt(3) z^|k|, z = sqrt(3) - 2.
-constexpr int kProjectionReach = 7;
+constexpr int kProjectionRange = 7;
 double inverse_mass(int k) { return std::numbers::sqrt3 * std::pow(std::numbers::sqrt3 - 2, std::abs(k)); }
 
 }  // namespace
@@ -129,7 +138,7 @@ FilterTaps filter_taps(int old_count, int new_count, bool is_periodic, ResampleF
     } else if (filter == ResampleFilter::kAverage) {
       open.add_tent(interpolant, x, spacing, 1);
     } else {
-      for (int k = -kProjectionReach; k <= kProjectionReach; ++k)
+      for (int k = -kProjectionRange; k <= kProjectionRange; ++k)
         open.add_tent(interpolant, x + k * spacing, spacing, inverse_mass(k));
     }
     append_folded(open, old_count, is_periodic, taps);
@@ -137,54 +146,78 @@ FilterTaps filter_taps(int old_count, int new_count, bool is_periodic, ResampleF
   return taps;
 }
 
-std::vector<Vec3> resample_polyline(const std::vector<Vec3>& points, bool is_closed, int cells, ResampleFilter filter) {
-  const int edges = static_cast<int>(points.size()) - (is_closed ? 0 : 1);
-  const auto point = [&](int i) -> const Vec3& { return points[i % points.size()]; };
-  std::vector<double> reached{0.0};  // length up to each point
-  for (int i = 0; i < edges; ++i) reached.push_back(reached.back() + (point(i + 1) - point(i)).norm());
-  const double total = reached.back();
-  const int count = is_closed ? cells : cells + 1;
-  if (!(total > 0)) return std::vector<Vec3>(count, points[0]);
-  const auto read = [&](int edge, double at) {
-    const double length = reached[edge + 1] - reached[edge];
-    const double share = length > 0 ? std::clamp((at - reached[edge]) / length, 0.0, 1.0) : 0;
-    return Vec3((1 - share) * point(edge) + share * point(edge + 1));
-  };
+namespace {
 
-  const double spacing = total / cells;
-  std::vector<Vec3> samples(count), averages(count, Vec3::Zero());
-  int edge = 0;
-  for (int i = 0; i < cells; ++i) {
-    const double begin = i * spacing, end = (i + 1) * spacing;
-    while (edge + 1 < edges && reached[edge + 1] <= begin) ++edge;
-    samples[i] = read(edge, begin);
-    // Integrals of the old polyline times the two tents of this cell; quadratic between its points: Simpson is exact.
-    const int next = (i + 1) % count;
+/// A polyline by its length; a closed one does not repeat its first point.
+class Polyline {
+ public:
+  Polyline(const std::vector<Vec3>& points, bool is_closed)
+      : points_(points), edges_(static_cast<int>(points.size()) - (is_closed ? 0 : 1)) {
+    for (int i = 0; i < edges_; ++i) lengths_.push_back(lengths_.back() + (point(i + 1) - point(i)).norm());
+  }
+  double total() const { return lengths_.back(); }
+
+  /// Points at equal steps along it, and the integrals of the polyline times the tent around each of them, over a step.
+  /// \param count  of points: cells + 1 of an open one, whose last entries are not complete
+  void sample(int cells, int count, std::vector<Vec3>& samples, std::vector<Vec3>& averages) const {
+    const double spacing = total() / cells;
+    samples.assign(count, Vec3::Zero()), averages.assign(count, Vec3::Zero());
+    int edge = 0;
+    for (int i = 0; i < cells; ++i) {
+      const double begin = i * spacing, end = (i + 1) * spacing;
+      while (edge + 1 < edges_ && lengths_[edge + 1] <= begin) ++edge;
+      samples[i] = read(edge, begin);
+      add_cell(edge, begin, end, spacing, averages[i], averages[(i + 1) % count]);
+    }
+  }
+
+ private:
+  const Vec3& point(int i) const { return points_[i % points_.size()]; }
+  Vec3 read(int edge, double at) const {
+    const double length = lengths_[edge + 1] - lengths_[edge];
+    const double share = length > 0 ? std::clamp((at - lengths_[edge]) / length, 0.0, 1.0) : 0;
+    return (1 - share) * point(edge) + share * point(edge + 1);
+  }
+  /// The integrals are quadratic between the polyline's points: Simpson's rule is exact.
+  void add_cell(int edge, double begin, double end, double spacing, Vec3& here, Vec3& next) const {
     double a = begin;
-    for (int k = edge; a < end && k < edges; ++k) {
-      const double b = k + 1 < edges ? std::min(end, reached[k + 1]) : end;
+    for (int k = edge; a < end && k < edges_; ++k) {
+      const double b = k + 1 < edges_ ? std::min(end, lengths_[k + 1]) : end;
       for (int s = 0; s < 3; ++s) {
         const double at = a + 0.5 * s * (b - a);
         const double share = (at - begin) / spacing;
         const Vec3 value = (s == 1 ? 4 : 1) * (b - a) / (6 * spacing) * read(k, at);
-        averages[i] += (1 - share) * value;
-        averages[next] += share * value;
+        here += (1 - share) * value;
+        next += share * value;
       }
       a = b;
     }
   }
+
+  const std::vector<Vec3>& points_;
+  int edges_;
+  std::vector<double> lengths_{0.0};  ///< up to each point
+};
+
+}  // namespace
+
+std::vector<Vec3> resample_polyline(const std::vector<Vec3>& points, bool is_closed, int cells, ResampleFilter filter) {
+  const Polyline polyline(points, is_closed);
+  const int count = is_closed ? cells : cells + 1;
+  if (!(polyline.total() > 0)) return std::vector<Vec3>(count, points[0]);
+  std::vector<Vec3> samples, averages;
+  polyline.sample(cells, count, samples, averages);
   if (!is_closed) samples[cells] = points.back();
   if (filter == ResampleFilter::kSample) return samples;
-  const int first = is_closed ? 0 : 1, last = is_closed ? cells : cells - 1;
+  const int first = is_closed ? 0 : 1;
   std::vector<Vec3> result = samples;
   if (filter == ResampleFilter::kAverage) {
-    std::copy(averages.begin() + first, averages.begin() + last + (is_closed ? 0 : 1), result.begin() + first);
-    if (!is_closed) result[cells] = points.back();
+    std::copy(averages.begin() + first, averages.begin() + cells, result.begin() + first);
     return result;
   }
   // [1 4 1] / 6 c = averages; Gauss-Seidel gains more than a factor 4 per sweep.
   for (int sweep = 0; sweep < 40; ++sweep)
-    for (int i = first; i < (is_closed ? cells : cells); ++i)
+    for (int i = first; i < cells; ++i)
       result[i] = (6 * averages[i] - result[(i + count - 1) % count] - result[(i + 1) % count]) / 4;
   return result;
 }
@@ -233,11 +266,11 @@ std::vector<Patch> scale_patches(const SkeletexModel& model, int width, int heig
   std::vector<Rectangle> rectangles =
       scale_rectangles(model.patches, model.texture.width, model.texture.height, width, height);
   if (rectangles.empty()) {
-    std::vector<PatchDemand> demands;
+    std::vector<PatchRequest> requests;
     for (const Patch& patch : model.patches)
-      demands.push_back({static_cast<double>(patch.rectangle.width) * patch.rectangle.height,
+      requests.push_back({static_cast<double>(patch.rectangle.width) * patch.rectangle.height,
                          static_cast<double>(patch.rectangle.width) / patch.rectangle.height});
-    rectangles = pack_atlas(demands, width, height).rectangles;
+    rectangles = pack_atlas(requests, width, height).rectangles;
   }
   std::vector<Patch> patches = model.patches;
   for (std::size_t i = 0; i < patches.size(); ++i) {
@@ -261,7 +294,7 @@ struct LatticeTaps {
   FilterTaps rows, columns;
 };
 LatticeTaps lattice_taps(const SkeletexModel& model, const std::vector<Patch>& patches, ResampleFilter filter) {
-  const double softness = parsed_encoder_settings(model)["prefilter"] == true ? kPrefilter : 0;
+  const double softness = model.sampling.is_prefiltered ? kPrefilter : 0;
   LatticeTaps taps;
   for (std::size_t bone = 0; bone < patches.size(); ++bone) {
     const Rectangle &from = model.patches[bone].rectangle, &to = patches[bone].rectangle;
@@ -271,71 +304,76 @@ LatticeTaps lattice_taps(const SkeletexModel& model, const std::vector<Patch>& p
   return taps;
 }
 
-void resample_texels(ClContext& context, const SkeletexModel& model, const SeparationPlanes& separation,
-                     SkeletexModel& result) {
-  const int count = static_cast<int>(model.patches.size());
-  std::vector<int> widths, first_old, first_middle;  // of the old lattice, and of the one with new rows and old columns
-  std::vector<Patch> middle = result.patches;
-  int old_size = 0, middle_size = 0, new_size = 0;
-  for (int bone = 0; bone < count; ++bone) {
-    const Rectangle &from = model.patches[bone].rectangle, &to = result.patches[bone].rectangle;
-    middle[bone].rectangle.width = from.width;
-    widths.push_back(from.width);
-    first_old.push_back(old_size);
-    first_middle.push_back(middle_size);
-    old_size += from.width * from.height;
-    middle_size += from.width * to.height;
-    new_size += to.width * to.height;
+/// The two steps of a resampling on the device: first along the bones, then around them.
+class TexelResampling {
+ public:
+  TexelResampling(ClContext& context, const PreparedModel& from, const SkeletexModel& to)
+      : context_(context),
+        from_(from),
+        to_(to),
+        tables_(upload_tables(
+            context, in_bone_axes(frame_tables(from.model.skeleton, from.separation, to.patches, from.model.origin)))),
+        rows_(context.upload(lattice_rows(to.patches, RowChoice::kAll))),
+        old_points_(points_in_bone_axes(context, from)) {
+    std::vector<int> widths, first_old, first_middle;
+    std::vector<Patch> middle = to.patches;  // new rows, old columns
+    int old_size = 0;
+    for (std::size_t bone = 0; bone < middle.size(); ++bone) {
+      const Rectangle &old = from.model.patches[bone].rectangle, &made = to.patches[bone].rectangle;
+      middle[bone].rectangle.width = old.width;
+      widths.push_back(old.width);
+      first_old.push_back(old_size);
+      first_middle.push_back(middle_size_);
+      old_size += old.width * old.height;
+      middle_size_ += old.width * made.height;
+      new_size_ += made.width * made.height;
+    }
+    middle_rows_ = context.upload(lattice_rows(middle, RowChoice::kAll));
+    widths_ = context.upload(widths);
+    first_old_ = context.upload(first_old), first_middle_ = context.upload(first_middle);
   }
 
-  const FrameTables tables = in_bone_axes(frame_tables(model.skeleton, separation, result.patches, model.origin));
-  const DeviceTables device_tables = upload_tables(context, tables);
-  const auto old_widths = context.upload(widths), from_old = context.upload(first_old),
-             from_middle = context.upload(first_middle);
-  const std::vector<LatticeRow> rows = lattice_rows(result.patches, RowChoice::kAll),
-                                middle_rows = lattice_rows(middle, RowChoice::kAll);
-  const auto device_rows = context.upload(rows), device_middle_rows = context.upload(middle_rows);
-  const int row_count = static_cast<int>(rows.size());
-  const ClRange range = row_range(context, rows.size());
-
-  DevicePlanes old_points = allocate_planes(context, old_size);
-  {
-    const FrameTables old_tables = in_bone_axes(frame_tables(model.skeleton, separation, model.patches, model.origin));
-    displace(context, upload_lattice(context, old_tables, model.patches, model.texture, RowChoice::kAll), old_points);
-  }
-  const auto filtered = [&](ResampleFilter filter) {
-    const LatticeTaps taps = lattice_taps(model, result.patches, filter);
-    DevicePlanes between = allocate_planes(context, middle_size), points = allocate_planes(context, new_size);
-    context.launch({"reconstruct.cl", "filter_rows"}, range, row_count, device_middle_rows, device_tables.patches,
-                   old_widths, from_old, context.upload(taps.rows.taps), context.upload(taps.rows.weights),
-                   old_points.x, old_points.y, old_points.z, between.x, between.y, between.z);
-    context.launch({"reconstruct.cl", "filter_columns"}, range, row_count, device_rows, device_tables.patches,
-                   old_widths, from_middle, context.upload(taps.columns.taps), context.upload(taps.columns.weights),
-                   between.x, between.y, between.z, points.x, points.y, points.z);
-    return points;
-  };
-  DevicePlanes points = filtered(ResampleFilter::kProject);
-  {
+  /// The texels of the new texture.
+  void run(DisplacementTexture& texture) {
+    DevicePlanes points = filtered(ResampleFilter::kProject);
     const DevicePlanes sampled = filtered(ResampleFilter::kSample);
-    context.launch({"reconstruct.cl", "limit_fit"}, range, row_count, kLargestFit, device_rows, device_tables.patches,
-                   sampled.x, sampled.y, sampled.z, points.x, points.y, points.z);
-    context.finish();
+    context_.launch({"reconstruct.cl", "limit_fit"}, row_range(context_, rows_.size), parameters(sampled, points),
+                    rows_, tables_.patches, sampled.values, points.values);
+    DevicePlanes texels = allocate_planes(context_, static_cast<std::size_t>(texture.width) * texture.height);
+    context_.fill(texels.values, 0);
+    enter_tangent_space(context_, tables_, rows_, texture.width, points, texels);
+    download_texels(context_, texels, texture);
   }
 
-  const std::size_t area = static_cast<std::size_t>(result.texture.width) * result.texture.height;
-  DevicePlanes texels = allocate_planes(context, area);
-  for (ClBuffer<float>* plane : {&texels.x, &texels.y, &texels.z}) context.fill(*plane, 0);
-  context.launch({"reconstruct.cl", "enter_tangent_space"}, range, row_count, result.texture.width,
-                 device_tables.column_count, device_rows, device_tables.patches, device_tables.rows,
-                 device_tables.columns, points.x, points.y, points.z, texels.x, texels.y, texels.z);
-  result.texture.along = context.download(texels.x);
-  result.texture.around = context.download(texels.y);
-  result.texture.out = context.download(texels.z);
-}
+ private:
+  ResampleParameters parameters(const DevicePlanes& in, const DevicePlanes& out) const {
+    return {static_cast<int>(rows_.size), static_cast<int>(in.count), static_cast<int>(out.count), kLargestFit};
+  }
 
-BoneEnd end_at(const Skeleton& skeleton, int bone, int node) {
-  return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
-}
+  /// The points of all new rows.
+  DevicePlanes filtered(ResampleFilter filter) {
+    const LatticeTaps taps = lattice_taps(from_.model, to_.patches, filter);
+    const ClRange range = row_range(context_, rows_.size);
+    DevicePlanes between = allocate_planes(context_, middle_size_), points = allocate_planes(context_, new_size_);
+    context_.launch({"reconstruct.cl", "filter_rows"}, range, parameters(old_points_, between), middle_rows_,
+                    tables_.patches, widths_, first_old_, context_.upload(taps.rows.taps),
+                    context_.upload(taps.rows.weights), old_points_.values, between.values);
+    context_.launch({"reconstruct.cl", "filter_columns"}, range, parameters(between, points), rows_, tables_.patches,
+                    widths_, first_middle_, context_.upload(taps.columns.taps), context_.upload(taps.columns.weights),
+                    between.values, points.values);
+    return points;
+  }
+
+  ClContext& context_;
+  const PreparedModel& from_;
+  const SkeletexModel& to_;
+  DeviceTables tables_;  ///< of the new patches
+  ClBuffer<LatticeRow> rows_, middle_rows_;
+  DevicePlanes old_points_;
+  ClBuffer<int> widths_;                    ///< of the old patches
+  ClBuffer<int> first_old_, first_middle_;  ///< points of each patch
+  int middle_size_ = 0, new_size_ = 0;
+};
 
 SeamArc resample_arc(const SkeletexModel& model, const SeparationPlanes& separation, const SeamArc& arc, int cells) {
   const int bone = arc.bones[0];
@@ -390,20 +428,20 @@ std::vector<float> resample_plane(const std::vector<float>& values, const Skelet
 
 }  // namespace
 
-SkeletexModel resample_model(ClContext& context, const SkeletexModel& model, int size) {
+SkeletexModel resample_model(ClContext& context, const PreparedModel& prepared, int size) {
+  const SkeletexModel& model = prepared.model;
   const int longer = std::max(model.texture.width, model.texture.height);
   const auto side = [&](int old) { return static_cast<int>(std::lround(static_cast<double>(old) * size / longer)); };
   const int width = side(model.texture.width), height = side(model.texture.height);
   if (width == model.texture.width && height == model.texture.height) return model;
 
-  const SeparationPlanes separation(model.skeleton);
   SkeletexModel result = model;
   result.texture = {};
   result.texture.width = width;
   result.texture.height = height;
   result.patches = scale_patches(model, width, height);
   result.diagonals = DiagonalRule::kNearest;  // new texels lie evenly
-  resample_texels(context, model, separation, result);
+  TexelResampling(context, prepared, result).run(result.texture);
   for (std::vector<float>& weights : result.bone_weights) weights = resample_plane(weights, model, result);
   for (SeamArc& arc : result.arcs) {
     double ratio = 0;
@@ -411,15 +449,12 @@ SkeletexModel resample_model(ClContext& context, const SkeletexModel& model, int
       ratio = std::max(ratio,
                        static_cast<double>(result.patches[bone].rectangle.width) / model.patches[bone].rectangle.width);
     const int old_cells = static_cast<int>(arc.samples.size()) + (arc.is_closed() ? 0 : 1);
-    arc = resample_arc(model, separation, arc,
+    arc = resample_arc(model, prepared.separation, arc,
                        std::max(arc.is_closed() ? 3 : 2, static_cast<int>(std::lround(old_cells * ratio))));
   }
-  // For the record, and because a fit straddles the surface as prefiltered texels do.
-  nlohmann::json settings = parsed_encoder_settings(model);
-  settings["prefilter"] = true;
-  settings["snap"] = settings["fit"] = false;
-  settings["resampled_from"] = {model.texture.width, model.texture.height};
-  result.encoder_settings = settings.dump();
+  // The filter fits the surface between texels, which leaves them off it as the prefilter does.
+  result.sampling = {.is_prefiltered = true, .is_snapped = false, .is_fitted = false};
+  record_setting(result, "resampled_from", {model.texture.width, model.texture.height});
   return result;
 }
 

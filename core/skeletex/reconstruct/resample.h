@@ -27,9 +27,9 @@ struct FilterTaps {
 ///                     otherwise at i / (count - 1), and the two ends are kept as they are
 FilterTaps filter_taps(int old_count, int new_count, bool is_periodic, ResampleFilter filter, double softness);
 
-/// A polyline with `cells` edges of equal length in place of another one: its first and last point stay, the others
-/// are those of the polyline nearest to it in the least-squares sense. Closed ones do not repeat their first point;
-/// no point of theirs stays.
+/// A polyline with `cells` edges in place of another one. The first and last point of an open one stay; the others are
+/// those of the polyline that is nearest to the given one in the least-squares sense, or as the filter says. A closed
+/// polyline does not repeat its first point, and none of its points stays.
 std::vector<Vec3> resample_polyline(const std::vector<Vec3>& points, bool is_closed, int cells, ResampleFilter filter);
 
 /// The rectangles of a width x height texture scaled to another one: edges keep their places relative to it, to

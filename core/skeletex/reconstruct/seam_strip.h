@@ -15,9 +15,9 @@ struct Ring {
 };
 
 /// Fills the strip between a seam and the inner row next to it with triangles, outward. Every edge of both rings is an
-/// edge of exactly one triangle, and no edge between the rings occurs twice, whatever the rings are. Among the merges
-/// whose cross edges stay within about a cell of v the one with the smallest sum of squared lengths is taken.
-/// \param turns  of the seam, in place of its own: see seam_turns
+/// edge of exactly one triangle, and no edge between the rings occurs twice, whatever the rings are. Edges between the
+/// rings span about a cell of v at most; among these merges the one with the smallest sum of their squared lengths is
+/// taken. \param turns  of the seam, in place of its own: see seam_turns
 /// \pre seam has at least 3 vertices, row at least 4
 void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::span<const double> turns,
                        const Ring& row, BoneEnd end, std::vector<Triangle>& triangles);
@@ -25,8 +25,8 @@ void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::s
 void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, const Ring& row, BoneEnd end,
                        std::vector<Triangle>& triangles);
 
-/// v of a seam's vertices: that of its loop (loop_turns), the first in [0,1), with no step above 0.45 of a turn; evenly
-/// spread when the points do not wind once around the bone.
+/// v of a seam's vertices: that of its loop (loop_turns), the first in [0,1), with no step above 0.45 of a turn. If the
+/// points do not wind once around the bone, it is evenly spread.
 std::vector<double> seam_turns(const std::vector<Vec3>& points, const std::vector<double>& turns);
 
 }  // namespace skeletex

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "reconstruct_structs.h"
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
@@ -39,9 +40,12 @@ void weigh_inner_vertices(ClContext& context, const WeightWalks& walks, const De
   auto device_weights = context.allocate<float>(std::min(kBlocksAtOnce, skin.blocks.size()) * slots * SKIN_BLOCK);
   for (std::size_t begin = 0; begin < skin.blocks.size(); begin += kBlocksAtOnce) {
     const std::size_t count = std::min(kBlocksAtOnce, skin.blocks.size() - begin);
-    context.launch({"skin.cl", "bone_weights"}, block_range(context, count), static_cast<int>(count),
-                   static_cast<int>(begin), static_cast<int>(slots), blocks, first_steps, steps, points.x, points.y,
-                   points.z, device_weights);
+    context.launch({"skin.cl", "bone_weights"}, block_range(context, count),
+                   BlockParameters{.block_count = static_cast<int>(count),
+                                   .first_block = static_cast<int>(begin),
+                                   .slots = static_cast<int>(slots),
+                                   .point_count = static_cast<int>(points.count)},
+                   blocks, first_steps, steps, points.values, device_weights);
     const ClMapping<float> weights = context.map(device_weights);
     for (std::size_t b = 0; b < count; ++b) {
       SkinBlock& block = skin.blocks[begin + b];
@@ -102,22 +106,22 @@ std::vector<std::vector<BoneWeight>> shared_weights_of(const SkeletexModel& mode
     weights.push_back(
         weights_at(model, bone, end == BoneEnd::kHead ? 0 : model.patches[bone].rectangle.height - 1, turn));
   };
-  const auto end_at = [&](int bone, int node) {
-    return model.skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
-  };
   for (int bone = 0; bone < static_cast<int>(lattice.poles.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
       if (lattice.poles[bone][static_cast<int>(end)] >= 0) at(bone, end, 0);
   for (const SeamArc& arc : model.arcs)
-    for (const SeamSample& sample : arc.samples) at(arc.bones[0], end_at(arc.bones[0], arc.node), sample.turn);
+    for (const SeamSample& sample : arc.samples)
+      at(arc.bones[0], end_at(model.skeleton, arc.bones[0], arc.node), sample.turn);
   for (const SeamCorner& corner : model.corners)
-    at(corner.bones[0], end_at(corner.bones[0], corner.node), corner.sample.turn);
+    at(corner.bones[0], end_at(model.skeleton, corner.bones[0], corner.node), corner.sample.turn);
   return weights;
 }
 
 }  // namespace
 
-std::vector<int> bones_of_shared_vertices(const SkeletexModel& model, const Lattice& lattice) {
+std::vector<int> bones_of_shared_vertices(const PreparedModel& prepared) {
+  const SkeletexModel& model = prepared.model;
+  const Lattice& lattice = prepared.lattice;
   std::vector<int> bones(lattice.vertex_count - lattice.inner_count, -1);
   for (int bone = 0; bone < static_cast<int>(lattice.poles.size()); ++bone)
     for (const int pole : lattice.poles[bone])
@@ -146,23 +150,24 @@ ClRange block_range(const ClContext& context, std::size_t blocks) {
   return {{blocks * group, 1}, {group, 1}};
 }
 
-Skin make_skin(ClContext& context, const SkeletexModel& model, const DevicePlanes& points) {
-  const Lattice lattice = number_lattice(model);
+Skin make_skin(ClContext& context, const PreparedModel& prepared, const DevicePlanes& points) {
+  const SkeletexModel& model = prepared.model;
+  const Lattice& lattice = prepared.lattice;
   Skin skin;
   skin.blocks = skin_blocks(model.patches);
   skin.inner_count = lattice.inner_count;
   skin.origin = model.origin;
   std::vector<Vec3> positions(lattice.vertex_count);
-  place_shared_vertices(model, SeparationPlanes(model.skeleton), lattice, positions);
+  place_shared_vertices(prepared, positions);
   skin.shared_points.assign(positions.begin() + lattice.inner_count, positions.end());
   if (!model.bone_weights.empty()) {
     take_inner_weights(model, skin);
     skin.shared_weights = shared_weights_of(model, lattice);
     return skin;
   }
-  const WeightWalks walks = make_weight_walks(model);
+  const WeightWalks walks = make_weight_walks(model, prepared.separation);
   weigh_inner_vertices(context, walks, points, skin);
-  const std::vector<int> bones = bones_of_shared_vertices(model, lattice);
+  const std::vector<int> bones = bones_of_shared_vertices(prepared);
   for (std::size_t i = 0; i < bones.size(); ++i)
     skin.shared_weights.push_back(bone_weights(walks, bones[i], skin.shared_points[i] - model.origin));
   return skin;
@@ -181,21 +186,21 @@ std::vector<float> vertex_weights(const Skin& skin, int bone) {
   return weights;
 }
 
-std::vector<std::vector<float>> weight_planes(ClContext& context, const SkeletexModel& model) {
-  const WeightWalks walks = make_weight_walks(model);
-  const DevicePlanes device = row_points(context, model, SeparationPlanes(model.skeleton));
-  const std::vector<float> x = context.download(device.x), y = context.download(device.y),
-                           z = context.download(device.z);
+std::vector<std::vector<float>> weight_planes(ClContext& context, const PreparedModel& prepared) {
+  const SkeletexModel& model = prepared.model;
+  const WeightWalks walks = make_weight_walks(model, prepared.separation);
+  const DevicePlanes device = row_points(context, prepared, RowChoice::kAll);
+  const std::array<std::vector<float>, 3> points = download_planes(context, device);
   const std::size_t texels = static_cast<std::size_t>(model.texture.width) * model.texture.height;
   std::vector<std::vector<float>> planes(model.skeleton.bones.size(), std::vector<float>(texels, 0.f));
-  const std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kAll);
+  const std::vector<LatticeRow>& rows = prepared.all_rows;
   for_each_block(rows.size(), 8, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       const auto [bone, row, vertex, quad] = rows[k];
       const Rectangle& r = model.patches[bone].rectangle;
       for (int j = 0; j < r.width; ++j)
         for (const auto& [moving, weight] :
-             bone_weights(walks, bone, Vec3(x[vertex + j], y[vertex + j], z[vertex + j])))
+             bone_weights(walks, bone, Vec3(points[0][vertex + j], points[1][vertex + j], points[2][vertex + j])))
           planes[moving][static_cast<std::size_t>(r.y + row) * model.texture.width + r.x + j] =
               static_cast<float>(weight);
     }
@@ -237,9 +242,11 @@ void pose_skin(ClContext& context, const Skin& skin, const DeviceSkin& device, s
                const Vec3& posed_origin, DevicePlanes& points) {
   if (skin.blocks.empty()) return;
   const auto records = context.upload(motion_records(motions, skin.origin, posed_origin));
-  context.launch({"skin.cl", "skin"}, block_range(context, skin.blocks.size()), static_cast<int>(skin.blocks.size()),
-                 static_cast<int>(is_stretched(motions)), device.blocks, device.block_bones, device.weights, records,
-                 device.points.x, device.points.y, device.points.z, points.x, points.y, points.z);
+  context.launch({"skin.cl", "skin"}, block_range(context, skin.blocks.size()),
+                 BlockParameters{.block_count = static_cast<int>(skin.blocks.size()),
+                                 .point_count = static_cast<int>(points.count),
+                                 .is_stretched = static_cast<int>(is_stretched(motions))},
+                 device.blocks, device.block_bones, device.weights, records, device.points.values, points.values);
 }
 
 void pose_shared_vertices(const Skin& skin, std::span<const BoneMotion> motions, std::vector<Vec3>& positions) {

@@ -12,16 +12,15 @@
 
 namespace skeletex {
 
-/// What smooth posing needs of a model, made once: its points in the bind pose and their weights. Any pose of them is
-/// one pass.
+/// What smooth posing needs of a model: its points in the bind pose and their weights. Made once; every pose is then
+/// one launch.
 struct Skin {
   std::vector<SkinBlock> blocks;  ///< all inner vertices of the lattice (lattice.h), in order
   std::vector<int> block_bones;   ///< block by block
   std::vector<float> weights;     ///< SKIN_BLOCK per entry of block_bones
   int inner_count = 0;
-  Vec3 origin = Vec3::Zero();  ///< world position that the device's points are relative to
-  std::vector<Vec3>
-      shared_points;  ///< poles, seam samples and corners in the bind pose, world; behind the inner vertices
+  Vec3 origin = Vec3::Zero();                           ///< world position that the device's points are relative to
+  std::vector<Vec3> shared_points;                      ///< poles, seam samples and corners in the bind pose, world
   std::vector<std::vector<BoneWeight>> shared_weights;  ///< of each of them
 };
 
@@ -39,12 +38,12 @@ std::vector<SkinBlock> skin_blocks(const std::vector<Patch>& patches);
 ClRange block_range(const ClContext& context, std::size_t blocks);
 
 /// A bone that each pole, seam sample and corner belongs to, in the order of their vertices.
-std::vector<int> bones_of_shared_vertices(const SkeletexModel& model, const Lattice& lattice);
+std::vector<int> bones_of_shared_vertices(const PreparedModel& model);
 
 /// Weights of the model's own (SkeletexModel::bone_weights) where it has them, else in closed form (weight_walk.h).
 /// \param points  of the inner vertices in the bind pose, relative to the model's origin
 /// \throw DeviceError
-Skin make_skin(ClContext& context, const SkeletexModel& model, const DevicePlanes& points);
+Skin make_skin(ClContext& context, const PreparedModel& model, const DevicePlanes& points);
 DeviceSkin upload_skin(ClContext& context, const Skin& skin, DevicePlanes points);
 
 /// How much a bone moves each vertex of the model's mesh, 0 to 1.
@@ -52,7 +51,7 @@ std::vector<float> vertex_weights(const Skin& skin, int bone);
 
 /// Weights in closed form of all texels, per bone a plane of the texture's size, as SkeletexModel::bone_weights has
 /// them; 0 outside patches.
-std::vector<std::vector<float>> weight_planes(ClContext& context, const SkeletexModel& model);
+std::vector<std::vector<float>> weight_planes(ClContext& context, const PreparedModel& model);
 
 /// The motions as the kernels read them: from the bind origin to the posed one.
 std::vector<BoneMotionRecord> motion_records(std::span<const BoneMotion> motions, const Vec3& bind_origin,
@@ -64,7 +63,7 @@ bool is_stretched(std::span<const BoneMotion> motions);
 void pose_skin(ClContext& context, const Skin& skin, const DeviceSkin& device, std::span<const BoneMotion> motions,
                const Vec3& posed_origin, DevicePlanes& points);
 
-/// The other vertices: few, and shared by several patches, so they are moved on the host in double precision.
+/// Moves the other vertices. They are few, and several patches share them, so the host does this in double precision.
 /// \param positions  by lattice vertex, world; inner vertices are left as they are
 void pose_shared_vertices(const Skin& skin, std::span<const BoneMotion> motions, std::vector<Vec3>& positions);
 

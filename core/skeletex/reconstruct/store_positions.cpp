@@ -17,10 +17,6 @@
 namespace skeletex {
 namespace {
 
-BoneEnd end_at(const Skeleton& skeleton, int bone, int node) {
-  return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
-}
-
 /// The points of a patch's first or last row: the pole, or where the seam's polyline passes the columns.
 std::vector<Vec3> end_row_points(const SkeletexModel& model, const SeparationPlanes& separation, const Lattice& lattice,
                                  int bone, BoneEnd end, std::span<const Vec3> positions) {
@@ -45,10 +41,13 @@ bool has_end_moved(const SkeletexModel& model, const Lattice& lattice, int bone,
   return std::any_of(loop.begin(), loop.end(), [&](int vertex) { return before[vertex] != after[vertex]; });
 }
 
-void store_texels(ClContext& context, const SeparationPlanes& separation, const Lattice& lattice,
-                  std::span<const Vec3> before, std::span<const Vec3> after, SkeletexModel& model) {
+/// \param result  the texels of points that have moved are set
+void store_texels(ClContext& context, const PreparedModel& prepared, std::span<const Vec3> before,
+                  std::span<const Vec3> after, DisplacementTexture& result) {
+  const SkeletexModel& model = prepared.model;
+  const SeparationPlanes& separation = prepared.separation;
+  const Lattice& lattice = prepared.lattice;
   // All rows of all patches, in each bone's own axes: from H along s, b, o.
-  const std::vector<LatticeRow> rows = lattice_rows(model.patches, RowChoice::kAll);
   std::array<std::vector<float>, 3> planes;
   std::vector<char> is_stored;
   for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
@@ -71,27 +70,22 @@ void store_texels(ClContext& context, const SeparationPlanes& separation, const 
     for (int vertex = first; vertex < last; ++vertex) add(after[vertex], before[vertex] != after[vertex]);
     add_end(BoneEnd::kTail);
   }
-  const DeviceTables tables =
-      upload_tables(context, frame_tables(model.skeleton, separation, model.patches, model.origin));
-  DevicePlanes texels{context.upload(model.texture.along), context.upload(model.texture.around),
-                      context.upload(model.texture.out)};
-  context.launch({"reconstruct.cl", "enter_tangent_space"}, row_range(context, rows.size()),
-                 static_cast<int>(rows.size()), model.texture.width, tables.column_count, context.upload(rows),
-                 tables.patches, tables.rows, tables.columns, context.upload(planes[0]), context.upload(planes[1]),
-                 context.upload(planes[2]), texels.x, texels.y, texels.z);
-  const auto keep_moved = [&](const ClBuffer<float>& stored, std::vector<float>& plane) {
-    const std::vector<float> all = context.download(stored);
+  DevicePlanes texels = upload_texels(context, model.texture);
+  enter_tangent_space(context, upload_tables(context, prepared.tables), context.upload(prepared.all_rows),
+                      model.texture.width, upload_planes(context, planes[0], planes[1], planes[2]), texels);
+  const std::array<std::vector<float>, 3> stored = download_planes(context, texels);
+  const auto keep_moved = [&](const std::vector<float>& all, std::vector<float>& plane) {
     std::size_t point = 0;
-    for (const LatticeRow& row : rows) {
+    for (const LatticeRow& row : prepared.all_rows) {
       const Rectangle& rectangle = model.patches[row[0]].rectangle;
       std::size_t texel = static_cast<std::size_t>(rectangle.y + row[1]) * model.texture.width + rectangle.x;
       for (int j = 0; j < rectangle.width; ++j, ++point, ++texel)
         if (is_stored[point]) plane[texel] = all[texel];
     }
   };
-  keep_moved(texels.x, model.texture.along);
-  keep_moved(texels.y, model.texture.around);
-  keep_moved(texels.z, model.texture.out);
+  keep_moved(stored[0], result.along);
+  keep_moved(stored[1], result.around);
+  keep_moved(stored[2], result.out);
 }
 
 /// The point in the separation plane through `node` with unit normal `separation plane` that p comes to by the shortest
@@ -114,8 +108,10 @@ Vec3 slide_to_ray(const Vec3& p, const Vec3& normal, const Vec3& node, const Vec
 
 }  // namespace
 
-SkeletexModel store_positions(ClContext& context, const SkeletexModel& model, std::span<const Vec3> positions) {
-  const Lattice lattice = number_lattice(model);
+SkeletexModel store_positions(ClContext& context, const PreparedModel& prepared, std::span<const Vec3> positions) {
+  const SkeletexModel& model = prepared.model;
+  const SeparationPlanes& separation = prepared.separation;
+  const Lattice& lattice = prepared.lattice;
   if (static_cast<int>(positions.size()) != lattice.vertex_count)
     throw InputError(
         fmt::format("{} positions are given for a model of {} vertices", positions.size(), lattice.vertex_count));
@@ -123,10 +119,9 @@ SkeletexModel store_positions(ClContext& context, const SkeletexModel& model, st
   if (bad != positions.end())
     throw InputError(fmt::format("the position of vertex {} is not a finite number", bad - positions.begin()));
 
-  const std::vector<Vec3> before = lattice_positions(context, model);
-  const SeparationPlanes separation(model.skeleton);
+  const std::vector<Vec3> before = lattice_positions(context, prepared);
   SkeletexModel result = model;
-  store_texels(context, separation, lattice, before, positions, result);
+  store_texels(context, prepared, before, positions, result.texture);
   for (std::size_t a = 0; a < model.arcs.size(); ++a) {
     const SeamArc& arc = model.arcs[a];
     const int bone = arc.bones[0];
@@ -151,9 +146,10 @@ SkeletexModel store_positions(ClContext& context, const SkeletexModel& model, st
   return result;
 }
 
-void slide_to_separation(const SkeletexModel& model, std::span<const Vec3> normals, std::span<Vec3> positions) {
-  const Lattice lattice = number_lattice(model);
-  const SeparationPlanes separation(model.skeleton);
+void slide_to_separation(const PreparedModel& prepared, std::span<const Vec3> normals, std::span<Vec3> positions) {
+  const SkeletexModel& model = prepared.model;
+  const SeparationPlanes& separation = prepared.separation;
+  const Lattice& lattice = prepared.lattice;
   for (std::size_t a = 0; a < model.arcs.size(); ++a) {
     const SeamArc& arc = model.arcs[a];
     const auto away = [&](int bone) {

@@ -61,7 +61,102 @@ View parse_view(const nlohmann::json& json, const std::string& source) {
   return view;
 }
 
-Camera fit_camera(const View& view, std::span<const Vec3> points, int width, int height) {
+namespace {
+
+/// The box around the places of points. \param place  (point) -> place
+template <class Place>
+BoundingBox bounds_of(std::span<const Vec3> points, const Place& place) {
+  if (points.empty()) return {};
+  BoundingBox bounds{Vec3::Constant(std::numeric_limits<double>::infinity()),
+                     Vec3::Constant(-std::numeric_limits<double>::infinity())};
+  for (const Vec3& p : points) {
+    bounds.lower = bounds.lower.cwiseMin(place(p));
+    bounds.upper = bounds.upper.cwiseMax(place(p));
+  }
+  return bounds;
+}
+
+/// Places a camera, whose axes and opening are set, so that all points are in its picture.
+class CameraFit {
+ public:
+  /// \param radius  half the diagonal of the points' box
+  CameraFit(const View& view, std::span<const Vec3> points, double radius, const Vec3& target, Camera& camera)
+      : view_(view), points_(points), radius_(radius), target_(target), camera_(camera) {}
+
+  void run() {
+    if (view_.eye)
+      keep_eye();
+    else if (camera_.is_orthographic)
+      fit_orthographic();
+    else
+      fit_perspective();
+  }
+
+ private:
+  static constexpr double kUsable = 1 - 2 * kMargin;
+
+  /// As the camera sees it, about the target.
+  Vec3 seen(const Vec3& p) const {
+    return {camera_.right.dot(p - target_), camera_.up.dot(p - target_), camera_.back.dot(p - target_)};
+  }
+
+  void keep_eye() {
+    camera_.eye = *view_.eye;
+    if (!camera_.is_orthographic) return;
+    double scale = 1e-12;
+    for (const Vec3& p : points_)
+      scale = std::max({scale, std::abs(seen(p).x()) / camera_.tan_x, std::abs(seen(p).y()) / camera_.tan_y});
+    camera_.tan_x *= scale / kUsable;
+    camera_.tan_y *= scale / kUsable;
+  }
+
+  void fit_orthographic() {
+    const auto [low, high] = bounds_of(points_, [this](const Vec3& p) { return seen(p); });
+    if (!view_.target) target_ += 0.5 * (low.x() + high.x()) * camera_.right + 0.5 * (low.y() + high.y()) * camera_.up;
+    const double scale =
+        std::max({0.5 * (high.x() - low.x()) / camera_.tan_x, 0.5 * (high.y() - low.y()) / camera_.tan_y, 1e-12}) /
+        kUsable / view_.zoom;
+    camera_.tan_x *= scale;
+    camera_.tan_y *= scale;
+    camera_.eye = target_ + 3 * radius_ * camera_.back;
+  }
+
+  /// The pyramid through a point meets the axis at z + |x| / tan. Its four sides fix the tightest eye and its shift.
+  void fit_perspective() {
+    double distance = 0;
+    for (int pass = 0; pass < 8; ++pass) {
+      double left_most = -1e300, right_most = -1e300, top = -1e300, bottom = -1e300;
+      for (const Vec3& p : points_) {
+        const Vec3 q = seen(p);
+        right_most = std::max(right_most, q.x() + q.z() * camera_.tan_x * kUsable);
+        left_most = std::max(left_most, -q.x() + q.z() * camera_.tan_x * kUsable);
+        top = std::max(top, q.y() + q.z() * camera_.tan_y * kUsable);
+        bottom = std::max(bottom, -q.y() + q.z() * camera_.tan_y * kUsable);
+      }
+      if (points_.empty()) left_most = right_most = top = bottom = radius_;
+      if (view_.target) {
+        distance = std::max(std::max(right_most, left_most) / (camera_.tan_x * kUsable),
+                            std::max(top, bottom) / (camera_.tan_y * kUsable));
+        break;
+      }
+      target_ += 0.5 * (right_most - left_most) * camera_.right + 0.5 * (top - bottom) * camera_.up;
+      distance = std::max(0.5 * (right_most + left_most) / (camera_.tan_x * kUsable),
+                          0.5 * (top + bottom) / (camera_.tan_y * kUsable));
+    }
+    camera_.eye = target_ + distance * camera_.back;
+    camera_.tan_x /= view_.zoom;
+    camera_.tan_y /= view_.zoom;
+  }
+
+  const View& view_;
+  std::span<const Vec3> points_;
+  double radius_;
+  Vec3 target_;
+  Camera& camera_;
+};
+
+/// Sets the camera's axes.
+void turn_camera(const View& view, const Vec3& target, Camera& camera) {
   if (!(view.up.norm() > 0)) throw InputError("the view's up direction has no length");
   const Vec3 up = view.up.normalized();
   Vec3 front = view.front - up * up.dot(view.front);
@@ -69,19 +164,9 @@ Camera fit_camera(const View& view, std::span<const Vec3> points, int width, int
     throw InputError("the view's front direction must not be parallel to its up direction");
   front.normalize();
   const Vec3 left = up.cross(front);
-  Vec3 lower = Vec3::Constant(std::numeric_limits<double>::infinity()), upper = -lower;
-  for (const Vec3& p : points) {
-    lower = lower.cwiseMin(p);
-    upper = upper.cwiseMax(p);
-  }
-  if (points.empty()) lower = upper = Vec3::Zero();
-  const double radius = std::max(0.5 * (upper - lower).norm(), 1e-12);
-
-  Camera camera;
   const double azimuth = view.azimuth_deg * kRadians, elevation = view.elevation_deg * kRadians;
   const Vec3 sideways = std::cos(azimuth) * front + std::sin(azimuth) * left;
   camera.back = std::cos(elevation) * sideways + std::sin(elevation) * up;
-  Vec3 target = view.target.value_or(0.5 * (lower + upper));
   if (view.eye) {
     camera.back = *view.eye - target;
     if (!(camera.back.norm() > 0)) throw InputError("the view's eye lies on its target");
@@ -91,63 +176,23 @@ Camera fit_camera(const View& view, std::span<const Vec3> points, int width, int
   if (camera.right.norm() < 1e-9) camera.right = -sideways.cross(up);  // from straight above or below
   camera.right.normalize();
   camera.up = camera.back.cross(camera.right);
+}
+
+}  // namespace
+
+Camera fit_camera(const View& view, std::span<const Vec3> points, int width, int height) {
+  const auto [lower, upper] = bounds_of(points, [](const Vec3& p) { return p; });
+  const double radius = std::max(0.5 * (upper - lower).norm(), 1e-12);
+  const Vec3 target = view.target.value_or(0.5 * (lower + upper));
+  Camera camera;
+  turn_camera(view, target, camera);
   camera.is_orthographic = view.fov_deg == 0;
   const double aspect = static_cast<double>(width) / height;
   const double half = camera.is_orthographic ? 1 : std::tan(0.5 * view.fov_deg * kRadians);
   camera.tan_x = aspect >= 1 ? half * aspect : half;
   camera.tan_y = aspect >= 1 ? half : half / aspect;
+  CameraFit(view, points, radius, target, camera).run();
 
-  // Extents as the camera sees them, about the target.
-  const auto seen = [&](const Vec3& p) {
-    return Vec3(camera.right.dot(p - target), camera.up.dot(p - target), camera.back.dot(p - target));
-  };
-  const double usable = 1 - 2 * kMargin;
-  if (view.eye) {
-    camera.eye = *view.eye;
-    if (camera.is_orthographic) {
-      double scale = 1e-12;
-      for (const Vec3& p : points)
-        scale = std::max({scale, std::abs(seen(p).x()) / camera.tan_x, std::abs(seen(p).y()) / camera.tan_y});
-      camera.tan_x *= scale / usable;
-      camera.tan_y *= scale / usable;
-    }
-  } else if (camera.is_orthographic) {
-    Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
-    for (const Vec3& p : points) {
-      low = low.cwiseMin(seen(p));
-      high = high.cwiseMax(seen(p));
-    }
-    if (points.empty()) low = high = Vec3::Zero();
-    if (!view.target) target += 0.5 * (low.x() + high.x()) * camera.right + 0.5 * (low.y() + high.y()) * camera.up;
-    const double scale =
-        std::max({0.5 * (high.x() - low.x()) / camera.tan_x, 0.5 * (high.y() - low.y()) / camera.tan_y, 1e-12}) /
-        usable / view.zoom;
-    camera.tan_x *= scale;
-    camera.tan_y *= scale;
-    camera.eye = target + 3 * radius * camera.back;
-  } else {
-    // The pyramid through a point meets the axis at z + |x| / tan. Its four sides fix the tightest eye and its shift.
-    double distance = 0;
-    for (int pass = 0; pass < 8; ++pass) {
-      double left_most = -1e300, right_most = -1e300, top = -1e300, bottom = -1e300;
-      for (const Vec3& p : points) {
-        const Vec3 q = seen(p);
-        right_most = std::max(right_most, q.x() + q.z() * camera.tan_x * usable);
-        left_most = std::max(left_most, -q.x() + q.z() * camera.tan_x * usable);
-        top = std::max(top, q.y() + q.z() * camera.tan_y * usable);
-        bottom = std::max(bottom, -q.y() + q.z() * camera.tan_y * usable);
-      }
-      if (points.empty()) left_most = right_most = top = bottom = radius;
-      if (!view.target) target += 0.5 * (right_most - left_most) * camera.right + 0.5 * (top - bottom) * camera.up;
-      const double across = view.target ? std::max(right_most, left_most) : 0.5 * (right_most + left_most);
-      const double along = view.target ? std::max(top, bottom) : 0.5 * (top + bottom);
-      distance = std::max(across / (camera.tan_x * usable), along / (camera.tan_y * usable));
-      if (view.target) break;
-    }
-    camera.eye = target + distance * camera.back;
-    camera.tan_x /= view.zoom;
-    camera.tan_y /= view.zoom;
-  }
   double nearest = std::numeric_limits<double>::infinity(), farthest = 0;
   for (const Vec3& p : points) {
     const double depth = camera.back.dot(camera.eye - p);

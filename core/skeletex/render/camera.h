@@ -21,16 +21,15 @@ struct View {
   std::optional<Vec3> eye = std::nullopt;     ///< world; with it angles and zoom do not count
 };
 
-/// A view from JSON; keys as the members above: up, front, azimuth, elevation, fov, zoom, target, eye. All may be
-/// missing. \param where  name of the JSON in messages, e.g. its path \throw IoError naming the key that is unknown or
-/// has no such value
+/// A view from JSON. Its keys are up, front, azimuth, elevation, fov, zoom, target and eye, as the members above; all
+/// may be missing. \param where  name of the JSON in messages, for example its path \throw IoError naming a key that is
+/// unknown or has no such value
 View parse_view(const nlohmann::json& json, const std::string& where);
 
 /// A camera in world space. The axes are orthonormal and right-handed: right, up, back.
 struct Camera {
   Vec3 eye = Vec3::Zero(), right = Vec3::UnitX(), up = Vec3::UnitY(), back = Vec3::UnitZ();
-  double tan_x = 0.2,
-         tan_y = 0.2;  ///< half of the picture's extent at distance 1; orthographic: half extents, world units
+  double tan_x = 0.2, tan_y = 0.2;  ///< half the picture's extent at distance 1; orthographic: in world units
   bool is_orthographic = false;
   double near = 0.1, far = 10;
 };

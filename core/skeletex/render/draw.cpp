@@ -144,6 +144,103 @@ void draw_geometry(GlContext& context, const GpuSurface& surface, const SurfaceP
   glDrawArrays(GL_TRIANGLES, 0, 3 * surface.triangle_count);
 }
 
+/// What is drawn of a surface before it is lit: pictures of one size.
+struct GeometryBuffers {
+  GeometryBuffers(int width, int height)
+      : albedo(GL_RGBA16F, width, height),
+        normals(GL_RGBA16F, width, height),
+        depth(GL_DEPTH_COMPONENT32F, width, height),
+        irradiance(GL_RGBA32F, width, height),
+        geometry(std::array{albedo.id(), normals.id()}, depth.id()),
+        lighting(std::array{irradiance.id()}, 0) {}
+  GlTexture albedo, normals, depth, irradiance;
+  GlFramebuffer geometry, lighting;
+};
+
+/// Adds the light of the lamps to the irradiance.
+class Lamps {
+ public:
+  Lamps(GlContext& context, const GpuSurface& surface, const Camera& camera, const GeometryBuffers& buffers,
+        std::array<int, 2> size)
+      : context_(context),
+        surface_(surface),
+        buffers_(buffers),
+        size_(size),
+        bounds_(bounding_sphere(surface)),
+        unprojection_(view_projection(camera, surface.origin).inverse()) {}
+
+  /// \param taps, spread  of the filter that softens a shadow's edge
+  void shine(std::span<const Light> lights, const ShadowMaps& maps, int taps, float spread) const {
+    maps.draw(context_, surface_, lights, bounds_);
+    buffers_.lighting.bind();
+    glViewport(0, 0, size_[0], size_[1]);
+    glDisable(GL_DEPTH_TEST);
+    glEnable(GL_BLEND);
+    glBlendFunc(GL_ONE, GL_ONE);
+    glUseProgram(context_.program({"screen.vert", "light.frag"}));
+    glBindTextureUnit(0, buffers_.normals.id());
+    glBindTextureUnit(1, buffers_.depth.id());
+    glBindTextureUnit(2, maps.depths.id());
+    set_matrix(0, unprojection_);
+    glUniform1i(1, static_cast<int>(lights.size()));
+    glUniform1f(2, static_cast<float>((static_cast<float>(taps) * spread + 1) * 2.6 * bounds_.radius / maps.size));
+    glUniform1i(3, taps);
+    glUniform1f(4, spread);
+    for (int i = 0; i < static_cast<int>(lights.size()); ++i) {
+      set_matrix(8 + i, light_projection(bounds_, lights[i].direction));
+      set_vector(16 + i, lights[i].direction);
+      set_vector(24 + i, lights[i].intensity);
+    }
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+  }
+
+ private:
+  GlContext& context_;
+  const GpuSurface& surface_;
+  const GeometryBuffers& buffers_;
+  std::array<int, 2> size_;
+  Sphere bounds_;
+  Eigen::Matrix4d unprojection_;
+};
+
+void light_surface(const Lamps& lamps, const GpuSurface& surface, const Camera& camera, int sky_lights,
+                   const VertexArray& array) {
+  glEnableVertexArrayAttrib(array.id(), 0);
+  glVertexArrayVertexBuffer(array.id(), 0, surface.positions.id(), 0, 3 * sizeof(float));
+  glVertexArrayAttribFormat(array.id(), 0, 3, GL_FLOAT, GL_FALSE, 0);
+  glVertexArrayAttribBinding(array.id(), 0, 0);
+  glVertexArrayElementBuffer(array.id(), surface.indices.id());
+  lamps.shine(std::array{key_light(camera)}, ShadowMaps(kKeyShadowSize, 1), 2, 1.5f);
+  const std::vector<Light> sky = sky_light(camera, sky_lights);
+  const ShadowMaps maps(kShadowSize, kBatch);
+  for (std::size_t i = 0; i < sky.size(); i += kBatch)
+    lamps.shine(std::span(sky).subspan(i, std::min<std::size_t>(kBatch, sky.size() - i)), maps, 0, 0);
+  glDisable(GL_BLEND);
+}
+
+/// The lit picture, each pixel the mean of its samples.
+Image resolve(GlContext& context, const GeometryBuffers& buffers, const DrawOptions& options, int samples) {
+  const GlTexture picture(GL_RGBA32F, options.width, options.height);
+  const GlFramebuffer resolved(std::array{picture.id()}, 0);
+  resolved.bind();
+  glViewport(0, 0, options.width, options.height);
+  glDisable(GL_DEPTH_TEST);
+  glUseProgram(context.program({"screen.vert", "resolve.frag"}));
+  glBindTextureUnit(0, buffers.albedo.id());
+  glBindTextureUnit(1, buffers.normals.id());
+  glBindTextureUnit(2, buffers.irradiance.id());
+  glUniform1i(0, samples);
+  glUniform3f(1, kAmbient[0], kAmbient[1], kAmbient[2]);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+
+  Image image = make_image(options.width, options.height), flipped = image;
+  glReadPixels(0, 0, options.width, options.height, GL_RGBA, GL_FLOAT, flipped.rgba.data());
+  check_gl("drawing");
+  for (int y = 0; y < image.height; ++y)
+    std::copy_n(flipped.at(0, image.height - 1 - y), 4 * static_cast<std::size_t>(image.width), image.at(0, y));
+  return image;
+}
+
 }  // namespace
 
 GlBuffer upload_colours(std::span<const VertexColour> colours) {
@@ -165,75 +262,16 @@ Image draw(GlContext& context, const GpuSurface& surface, const SurfacePaint& pa
                     options.width, options.height, samples, largest));
   const VertexArray array;
   array.bind();
-  const GlTexture albedo(GL_RGBA16F, width, height), normals(GL_RGBA16F, width, height),
-      depth(GL_DEPTH_COMPONENT32F, width, height);
-  const GlTexture irradiance(GL_RGBA32F, width, height);
-  const GlFramebuffer geometry(std::array{albedo.id(), normals.id()}, depth.id());
-  const GlFramebuffer lighting(std::array{irradiance.id()}, 0);
-  geometry.bind();
+  const GeometryBuffers buffers(width, height);
+  buffers.geometry.bind();
   glViewport(0, 0, width, height);
   draw_geometry(context, surface, paint, camera, options);
-  lighting.bind();
+  buffers.lighting.bind();
   glClear(GL_COLOR_BUFFER_BIT);
-
-  if (options.lighting > 0 && paint.paint != Paint::kNormal) {
-    const Sphere bounds = bounding_sphere(surface);
-    const Eigen::Matrix4d unprojection = view_projection(camera, surface.origin).inverse();
-    glEnableVertexArrayAttrib(array.id(), 0);
-    glVertexArrayVertexBuffer(array.id(), 0, surface.positions.id(), 0, 3 * sizeof(float));
-    glVertexArrayAttribFormat(array.id(), 0, 3, GL_FLOAT, GL_FALSE, 0);
-    glVertexArrayAttribBinding(array.id(), 0, 0);
-    glVertexArrayElementBuffer(array.id(), surface.indices.id());
-    const auto shine = [&](std::span<const Light> lights, const ShadowMaps& maps, int taps, float spread) {
-      maps.draw(context, surface, lights, bounds);
-      lighting.bind();
-      glViewport(0, 0, width, height);
-      glDisable(GL_DEPTH_TEST);
-      glEnable(GL_BLEND);
-      glBlendFunc(GL_ONE, GL_ONE);
-      glUseProgram(context.program({"screen.vert", "light.frag"}));
-      glBindTextureUnit(0, normals.id());
-      glBindTextureUnit(1, depth.id());
-      glBindTextureUnit(2, maps.depths.id());
-      set_matrix(0, unprojection);
-      glUniform1i(1, static_cast<int>(lights.size()));
-      glUniform1f(2, static_cast<float>((static_cast<float>(taps) * spread + 1) * 2.6 * bounds.radius / maps.size));
-      glUniform1i(3, taps);
-      glUniform1f(4, spread);
-      for (int i = 0; i < static_cast<int>(lights.size()); ++i) {
-        set_matrix(8 + i, light_projection(bounds, lights[i].direction));
-        set_vector(16 + i, lights[i].direction);
-        set_vector(24 + i, lights[i].intensity);
-      }
-      glDrawArrays(GL_TRIANGLES, 0, 3);
-    };
-    shine(std::array{key_light(camera)}, ShadowMaps(kKeyShadowSize, 1), 2, 1.5f);
-    const std::vector<Light> sky = sky_light(camera, options.sky_lights);
-    const ShadowMaps maps(kShadowSize, kBatch);
-    for (std::size_t i = 0; i < sky.size(); i += kBatch)
-      shine(std::span(sky).subspan(i, std::min<std::size_t>(kBatch, sky.size() - i)), maps, 0, 0);
-    glDisable(GL_BLEND);
-  }
-
-  const GlTexture picture(GL_RGBA32F, options.width, options.height);
-  const GlFramebuffer resolved(std::array{picture.id()}, 0);
-  resolved.bind();
-  glViewport(0, 0, options.width, options.height);
-  glDisable(GL_DEPTH_TEST);
-  glUseProgram(context.program({"screen.vert", "resolve.frag"}));
-  glBindTextureUnit(0, albedo.id());
-  glBindTextureUnit(1, normals.id());
-  glBindTextureUnit(2, irradiance.id());
-  glUniform1i(0, samples);
-  glUniform3f(1, kAmbient[0], kAmbient[1], kAmbient[2]);
-  glDrawArrays(GL_TRIANGLES, 0, 3);
-
-  Image image = make_image(options.width, options.height), flipped = image;
-  glReadPixels(0, 0, options.width, options.height, GL_RGBA, GL_FLOAT, flipped.rgba.data());
-  check_gl("drawing");
-  for (int y = 0; y < image.height; ++y)
-    std::copy_n(flipped.at(0, image.height - 1 - y), 4 * static_cast<std::size_t>(image.width), image.at(0, y));
-  return image;
+  if (options.lighting > 0 && paint.paint != Paint::kNormal)
+    light_surface(Lamps(context, surface, camera, buffers, {width, height}), surface, camera, options.sky_lights,
+                  array);
+  return resolve(context, buffers, options, samples);
 }
 
 }  // namespace skeletex

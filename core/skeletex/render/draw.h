@@ -31,8 +31,8 @@ struct DrawOptions {
   int sky_lights = 40;     ///< directions that make up the soft light from above; each costs a depth map
 };
 
-/// Draws a surface: smooth or flat, a key light from the upper left and a sky of many directions, each with its
-/// shadows, so that folds and contacts are dark as they are outdoors. The background stays clear. \throw DeviceError
+/// Draws a surface, smooth or flat. A key light shines from the upper left, and a sky from many directions, each with
+/// its shadows, so that folds and contacts are dark. The background stays clear. \throw DeviceError
 Image draw(GlContext& context, const GpuSurface& surface, const SurfacePaint& paint, const Camera& camera,
            const DrawOptions& options);
 

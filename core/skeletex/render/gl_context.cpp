@@ -62,10 +62,22 @@ EGLDisplay surfaceless_display() {
   return get(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr);
 }
 
-std::string_view shader_text(const std::string& file) {
+std::string_view embedded_text(std::string_view file) {
   for (const EmbeddedKernelFile& embedded : embedded_shader_files())
     if (embedded.name == file) return embedded.text;
   throw DeviceError(fmt::format("there is no shader {}", file));
+}
+
+/// A shader's text, with headers in place of its lines `#include "x.h"`.
+std::string shader_text(std::string_view file) {
+  constexpr std::string_view kInclude = "\n#include \"";
+  std::string text(embedded_text(file));
+  for (std::size_t at; (at = text.find(kInclude)) != std::string::npos;) {
+    const std::size_t name = at + kInclude.size(), end = text.find('"', name);
+    const std::string header(embedded_text(text.substr(name, end - name)));
+    text.replace(at + 1, end - at, header);
+  }
+  return text;
 }
 
 GLenum stage_of(const std::string& file) {
@@ -163,7 +175,7 @@ unsigned GlContext::program(const std::vector<std::string>& files) {
   GLint is_good = 0;
   for (const std::string& file : files) {
     const GLuint shader = glCreateShader(stage_of(file));
-    const std::string_view text = shader_text(file);
+    const std::string text = shader_text(file);
     const char* begin = text.data();
     const auto length = static_cast<GLint>(text.size());
     glShaderSource(shader, 1, &begin, &length);

@@ -44,33 +44,29 @@ void write_shared_vertices(std::span<const Vec3> positions, int inner_count, Gpu
 
 }  // namespace
 
-GpuModel upload_model(const SkeletexModel& model) {
+GpuModel upload_model(const PreparedModel& prepared) {
+  const SkeletexModel& model = prepared.model;
   GpuModel device;
-  device.lattice = number_lattice(model);
   const DisplacementTexture& texture = model.texture;
   std::vector<std::array<float, 3>> texels(texture.along.size());
   for (std::size_t i = 0; i < texels.size(); ++i) texels[i] = {texture.along[i], texture.around[i], texture.out[i]};
   device.texels = GlTexture(GL_RGB32F, texture.width, texture.height);
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
   glTextureSubImage2D(device.texels.id(), 0, 0, 0, texture.width, texture.height, GL_RGB, GL_FLOAT, texels.data());
-  const SeparationPlanes separation(model.skeleton);
-  const FrameTables tables = frame_tables(model.skeleton, separation, model.patches, model.origin);
-  const std::vector<LatticeRow> lattice_rows = skeletex::lattice_rows(model.patches, RowChoice::kInner);
-  device.lattice_rows = gl_buffer(lattice_rows);
-  device.row_count = static_cast<int>(lattice_rows.size());
-  device.patches = gl_buffer(tables.patches);
-  device.rows = gl_buffer(tables.rows);
-  device.columns = upload_planes(tables.columns);
-  device.column_count = static_cast<int>(tables.columns.size());
+  device.lattice_rows = gl_buffer(prepared.inner_rows);
+  device.row_count = static_cast<int>(prepared.inner_rows.size());
+  device.rows = gl_buffer(prepared.tables.rows);
+  device.columns = upload_planes(prepared.tables.columns);
+  device.column_count = static_cast<int>(prepared.tables.columns.size());
   for (const Patch& patch : model.patches) device.widest = std::max(device.widest, patch.rectangle.width);
   check_gl("a model");
   return device;
 }
 
-void displace(GlContext& context, const GpuModel& device, const SkeletexModel& model, const Skeleton& posed,
+void displace(GlContext& context, const GpuModel& device, const PreparedModel& model, const Skeleton& posed,
               DistanceRule rule, GpuSurface& surface) {
-  const PosedPlanes separation(model, posed);
-  const PoseTables tables = pose_tables(model, separation);
+  const PosedPlanes separation(model.model, posed);
+  const PoseTables tables = pose_tables(model.model, separation);
   const GlBuffer patches = gl_buffer(tables.patches), rows = gl_buffer(tables.rows),
                  columns = upload_planes(tables.columns);
   surface.origin = tables.origin;
@@ -78,20 +74,19 @@ void displace(GlContext& context, const GpuModel& device, const SkeletexModel& m
   glBindTextureUnit(0, device.texels.id());
   surface.positions.bind(0);
   device.lattice_rows.bind(1);
-  device.patches.bind(2);
-  patches.bind(3);
-  device.rows.bind(4);
-  rows.bind(5);
-  device.columns.bind(6);
-  columns.bind(7);
+  patches.bind(2);
+  device.rows.bind(3);
+  rows.bind(4);
+  device.columns.bind(5);
+  columns.bind(6);
   glUniform1i(0, device.column_count);
   glUniform1i(1, rule == DistanceRule::kFromBone ? 1 : 0);
   glDispatchCompute((device.widest + 63) / 64, device.row_count, 1);
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
 
-  std::vector<Vec3> points(device.lattice.vertex_count);
-  place_shared_vertices(model, separation, device.lattice, rule, points);
-  write_shared_vertices(points, device.lattice.inner_count, surface);
+  std::vector<Vec3> points(model.lattice.vertex_count);
+  place_shared_vertices(model, separation, rule, points);
+  write_shared_vertices(points, model.lattice.inner_count, surface);
   check_gl("displacing");
   update_normals(context, surface);
 }

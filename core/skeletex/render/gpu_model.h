@@ -1,27 +1,26 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include "skeletex/model/texture.h"
-#include "skeletex/reconstruct/lattice.h"
+#include "skeletex/reconstruct/prepared_model.h"
 #include "skeletex/reconstruct/skin.h"
 #include "skeletex/render/gpu_surface.h"
 #include "skeletex/skeleton/posed_planes.h"
 
 namespace skeletex {
 
-/// A model on the GL device (paper 3.6): its texture, and the tables that place every texel of a lattice per bone.
+/// A model on the GL device (paper 3.6): its texture, and the tables that place the texels of every bone.
 struct GpuModel {
-  Lattice lattice;
   GlTexture texels;  ///< along, around, out
-  GlBuffer lattice_rows, patches, rows, columns;
+  GlBuffer lattice_rows, rows, columns;
   int row_count = 0, widest = 0, column_count = 0;
 };
-GpuModel upload_model(const SkeletexModel& model);
+GpuModel upload_model(const PreparedModel& model);
 
-/// Moves a surface's vertices to the model's points in a pose by the paper's rules, in a compute shader that reads the
-/// texture; seams and poles, few and shared, are made on the host. Normals follow. \param surface  upload_surface of
-/// reconstruct_mesh(.., model), whose numbering it keeps \param posed    apply_pose(model.skeleton, ..), or the model's
-/// own skeleton for the bind pose
-void displace(GlContext& context, const GpuModel& device, const SkeletexModel& model, const Skeleton& posed,
+/// Moves a surface's vertices to the model's points in a pose by the paper's rules. A compute shader that reads the
+/// texture moves the inner vertices; the host moves seams and poles. Normals follow.
+/// \param posed    apply_pose(model.skeleton, ..), or the model's own skeleton for the bind pose
+/// \param surface  upload_surface of reconstruct_mesh(.., model), whose numbering it keeps
+void displace(GlContext& context, const GpuModel& device, const PreparedModel& model, const Skeleton& posed,
               DistanceRule rule, GpuSurface& surface);
 
 /// A skin on the GL device.
@@ -32,7 +31,7 @@ struct GpuSkin {
 /// \param bind  the model's mesh in its bind pose
 GpuSkin upload_skin(const Skin& skin, const TriangleMesh& bind);
 
-/// Moves a surface's vertices as pose_skin does, in a compute shader; the few shared vertices are moved on the host.
+/// Moves a surface's vertices as the other pose_skin does: inner vertices in a compute shader, shared ones on the host.
 /// Normals follow. \param posed  the skeleton that the motions lead to
 void pose_skin(GlContext& context, const GpuSkin& device, const Skin& skin, std::span<const BoneMotion> motions,
                const Skeleton& posed, GpuSurface& surface);

@@ -45,7 +45,8 @@ std::vector<int> triangle_bones(const Lattice& lattice, const std::vector<Triang
   std::vector<int> bones;
   bones.reserve(triangles.size());
   for (const Triangle& t : triangles) {
-    // Inner vertices come first, and every triangle has one: seams and poles never join up without the row beside them.
+    // Inner vertices come first, and every triangle has one: seams and poles never join up without the row next to
+    // them.
     const int vertex = *std::min_element(t.begin(), t.end());
     bones.push_back(static_cast<int>(std::upper_bound(lattice.first_inner.begin(), lattice.first_inner.end(), vertex) -
                                      lattice.first_inner.begin()) -
@@ -54,53 +55,76 @@ std::vector<int> triangle_bones(const Lattice& lattice, const std::vector<Triang
   return bones;
 }
 
-std::vector<std::array<float, 2>> checker_coordinates(const SkeletexModel& model, const Lattice& lattice,
-                                                      const TriangleMesh& mesh, int cells) {
-  const SeparationPlanes separation(model.skeleton);
-  const std::vector<int> bones = triangle_bones(lattice, mesh.triangles);
-  const int count = static_cast<int>(model.patches.size());
-  std::vector<double> rows_in_cells(count);
-  for (int bone = 0; bone < count; ++bone) {
-    const Rectangle& rectangle = model.patches[bone].rectangle;
-    rows_in_cells[bone] = std::max(1.0, std::round(static_cast<double>(cells) * rectangle.height / rectangle.width));
+namespace {
+
+/// Checker coordinates of the corners of one triangle. Poles have no v of their own: they take the mean of the others.
+class CheckerTriangle {
+ public:
+  CheckerTriangle(const PreparedModel& model, const TriangleMesh& mesh, int bone, const Triangle& triangle)
+      : model_(model), mesh_(mesh), bone_(bone), rectangle_(model.model.patches[bone].rectangle), triangle_(triangle) {
+    int row = 1;
+    for (const int vertex : triangle) row = std::max(row, row_of(vertex));
+    const BoneEnd near_end = row <= 1 ? BoneEnd::kHead : BoneEnd::kTail;
+    for (int c = 0; c < 3; ++c) place(c, near_end);
   }
-  std::vector<std::array<float, 2>> coordinates;
-  coordinates.reserve(3 * mesh.triangles.size());
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const int bone = bones[t];
-    const auto [x, y, width, height] = model.patches[bone].rectangle;
-    const auto row_of = [&](int vertex) {
-      const int inner = vertex - lattice.first_inner[bone];
-      return inner >= 0 && inner < width * (height - 2) ? 1 + inner / width : -1;
-    };
-    std::array<double, 3> u{}, v{};
-    std::array<bool, 3> is_pole{};
-    int known_row = 1;
-    for (const int vertex : mesh.triangles[t]) known_row = std::max(known_row, row_of(vertex));
-    const BoneEnd near_end = known_row <= 1 ? BoneEnd::kHead : BoneEnd::kTail;
-    for (int c = 0; c < 3; ++c) {
-      const int vertex = mesh.triangles[t][c], row = row_of(vertex);
-      is_pole[c] = vertex == lattice.poles[bone][0] || vertex == lattice.poles[bone][1];
-      if (row >= 0) {
-        u[c] = static_cast<double>(row) / (height - 1);
-        v[c] = static_cast<double>((vertex - lattice.first_inner[bone]) % width) / width;
-      } else {
-        u[c] = near_end == BoneEnd::kHead ? 0 : 1;
-        if (!is_pole[c])
-          v[c] = separation.turn_of(bone, mesh.positions[vertex] - end_position(model.skeleton, bone, near_end));
-      }
-    }
-    const int anchor = is_pole[0] ? 1 : 0;
+
+  /// \param rows  of cells along the bone    \param cells  around it
+  void append(double rows, int cells, std::vector<std::array<float, 2>>& coordinates) {
+    const int anchor = is_pole_[0] ? 1 : 0;
     double sum = 0;
     for (int c = 0; c < 3; ++c) {
-      v[c] += std::round(v[anchor] - v[c]);
-      sum += is_pole[c] ? 0 : v[c];
+      v_[c] += std::round(v_[anchor] - v_[c]);
+      sum += is_pole_[c] ? 0 : v_[c];
     }
-    const double others = 3 - static_cast<double>(std::count(is_pole.begin(), is_pole.end(), true));
+    const double others = 3 - static_cast<double>(std::count(is_pole_.begin(), is_pole_.end(), true));
     for (int c = 0; c < 3; ++c)
-      coordinates.push_back({static_cast<float>(u[c] * rows_in_cells[bone]),
-                             static_cast<float>((is_pole[c] ? sum / others : v[c]) * cells)});
+      coordinates.push_back(
+          {static_cast<float>(u_[c] * rows), static_cast<float>((is_pole_[c] ? sum / others : v_[c]) * cells)});
   }
+
+ private:
+  int inner_number(int vertex) const { return vertex - model_.lattice.first_inner[bone_]; }
+  /// -1 for vertices of seams and poles
+  int row_of(int vertex) const {
+    const int inner = inner_number(vertex);
+    return inner >= 0 && inner < rectangle_.width * (rectangle_.height - 2) ? 1 + inner / rectangle_.width : -1;
+  }
+  void place(int c, BoneEnd near_end) {
+    const int vertex = triangle_[c], row = row_of(vertex);
+    const auto& poles = model_.lattice.poles[bone_];
+    is_pole_[c] = vertex == poles[0] || vertex == poles[1];
+    if (row >= 0) {
+      u_[c] = static_cast<double>(row) / (rectangle_.height - 1);
+      v_[c] = static_cast<double>(inner_number(vertex) % rectangle_.width) / rectangle_.width;
+      return;
+    }
+    u_[c] = near_end == BoneEnd::kHead ? 0 : 1;
+    if (!is_pole_[c])
+      v_[c] = model_.separation.turn_of(bone_,
+                                        mesh_.positions[vertex] - end_position(model_.model.skeleton, bone_, near_end));
+  }
+
+  const PreparedModel& model_;
+  const TriangleMesh& mesh_;
+  int bone_;
+  Rectangle rectangle_;
+  Triangle triangle_;
+  std::array<double, 3> u_{}, v_{};
+  std::array<bool, 3> is_pole_{};
+};
+
+}  // namespace
+
+std::vector<std::array<float, 2>> checker_coordinates(const PreparedModel& model, const TriangleMesh& mesh, int cells) {
+  const std::vector<int> bones = triangle_bones(model.lattice, mesh.triangles);
+  std::vector<double> rows_in_cells;
+  for (const Patch& patch : model.model.patches)
+    rows_in_cells.push_back(
+        std::max(1.0, std::round(static_cast<double>(cells) * patch.rectangle.height / patch.rectangle.width)));
+  std::vector<std::array<float, 2>> coordinates;
+  coordinates.reserve(3 * mesh.triangles.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    CheckerTriangle(model, mesh, bones[t], mesh.triangles[t]).append(rows_in_cells[bones[t]], cells, coordinates);
   return coordinates;
 }
 

@@ -3,8 +3,7 @@
 #include <array>
 #include <vector>
 
-#include "skeletex/model/texture.h"
-#include "skeletex/reconstruct/lattice.h"
+#include "skeletex/reconstruct/prepared_model.h"
 
 namespace skeletex {
 
@@ -12,10 +11,9 @@ namespace skeletex {
 std::vector<int> triangle_bones(const Lattice& lattice, const std::vector<Triangle>& triangles);
 
 /// (u, v) of the corners of each triangle, three pairs each, in cells of a checker that is about as long as wide on
-/// every bone: `cells` around, and along by length over girth; v does not jump inside a triangle. \param mesh  the
-/// model's mesh in its bind pose
-std::vector<std::array<float, 2>> checker_coordinates(const SkeletexModel& model, const Lattice& lattice,
-                                                      const TriangleMesh& mesh, int cells);
+/// every bone: `cells` around, and along by length over girth. v does not jump inside a triangle.
+/// \param mesh  the model's mesh in its bind pose
+std::vector<std::array<float, 2>> checker_coordinates(const PreparedModel& model, const TriangleMesh& mesh, int cells);
 
 /// A skeleton as a closed mesh to look at: a ball per node, a spindle per bone that is thicker at the head.
 /// \param radius  of the balls, world units

@@ -14,7 +14,7 @@
 namespace skeletex {
 
 /// Crossings of the ray from the point along +z, with sign. Sides of edges are found from the lower vertex, and
-/// vertices at the ray's y count as above it, so neighbouring triangles never both or neither claim the ray.
+/// vertices at the ray's y count as above it, so neighbouring triangles never both or neither count the ray.
 int winding_number(std::span<const Vec3> positions, std::span<const int> corners, const Vec3& point) {
   const auto is_above = [&](int v) { return positions[v].y() >= point.y(); };
   int winding = 0;
@@ -43,8 +43,6 @@ int winding_number(std::span<const Vec3> positions, std::span<const int> corners
 }
 
 namespace {
-
-std::string text_of(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x(), p.y(), p.z()); }
 
 /// Where a bone first meets the surface on its way from head to tail: its parameter, or infinity.
 double first_crossing(const CutMesh& mesh, const Vec3& head, const Vec3& tail) {

@@ -2,7 +2,7 @@
 #pragma once
 #include <span>
 
-#include "skeletex/convert/segment/cut.h"
+#include "skeletex/geometry/cut_mesh.h"
 #include "skeletex/skeleton/skeleton.h"
 
 namespace skeletex {

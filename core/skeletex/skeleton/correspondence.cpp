@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -14,6 +13,7 @@
 #include <optional>
 #include <queue>
 
+#include "skeletex/geometry/best_rotation.h"
 #include "skeletex/model/error.h"
 #include "skeletex/skeleton/separation_planes.h"
 
@@ -50,45 +50,70 @@ Correspondence composed(const Correspondence& a_to_b, const Correspondence& b_to
   return result;
 }
 
+namespace {
+
+/// The separation planes at one end of a bone. In direction s'(angle) + x d the cell begins at the largest x over the
+/// planes, x = -s'.n / d.n. So each plane is a sinusoid of the angle, and the upper envelope of sinusoids changes hands
+/// where two of them cross.
+class PlaneEnvelope {
+ public:
+  PlaneEnvelope(const Skeleton& skeleton, BoneAtNode at) : d_(direction_from(skeleton, at)) {
+    const auto at_nodes = bones_at_nodes(skeleton);
+    for (const BoneAtNode& other : at_nodes[end_node(skeleton, at.bone, at.end)])
+      if (other.bone != at.bone) planes_.emplace_back(other.bone, d_ - direction_from(skeleton, other));
+    s_ = d_.unitOrthogonal();
+    b_ = d_.cross(s_);
+  }
+  bool is_empty() const { return planes_.empty(); }
+  int first_bone() const { return planes_[0].first; }
+
+  /// Angles where two planes cross, sorted, in [0, 2 pi).
+  std::vector<double> crossings() const {
+    std::vector<double> angles;
+    for (std::size_t i = 0; i < planes_.size(); ++i)
+      for (std::size_t j = i + 1; j < planes_.size(); ++j) {
+        const Vec3 difference =
+            planes_[i].second / d_.dot(planes_[i].second) - planes_[j].second / d_.dot(planes_[j].second);
+        const double angle = std::atan2(s_.dot(difference), -b_.dot(difference));
+        for (const double a : {angle, angle + std::numbers::pi})
+          angles.push_back(a - 2 * std::numbers::pi * std::floor(a / (2 * std::numbers::pi)));
+      }
+    std::sort(angles.begin(), angles.end());
+    return angles;
+  }
+
+  /// The bone whose plane is the highest at an angle.
+  int bone_at(double angle) const {
+    const auto height = [&](const Vec3& n) {
+      return -(std::cos(angle) * s_.dot(n) + std::sin(angle) * b_.dot(n)) / d_.dot(n);
+    };
+    std::size_t best = 0;
+    for (std::size_t n = 1; n < planes_.size(); ++n)
+      if (height(planes_[n].second) > height(planes_[best].second)) best = n;
+    return planes_[best].first;
+  }
+
+ private:
+  Vec3 d_, s_, b_;
+  std::vector<std::pair<int, Vec3>> planes_;  ///< bone and normal
+};
+
+}  // namespace
+
 std::vector<NeighbourInterval> neighbour_order(const Skeleton& skeleton, BoneAtNode at) {
-  const int node = end_node(skeleton, at.bone, at.end);
-  const Vec3 d = direction_from(skeleton, at);
-  std::vector<std::pair<int, Vec3>> normals;
-  const auto at_nodes = bones_at_nodes(skeleton);
-  for (const BoneAtNode& other : at_nodes[node])
-    if (other.bone != at.bone) normals.emplace_back(other.bone, d - direction_from(skeleton, other));
-  if (normals.empty()) return {};
-  Vec3 s = d.unitOrthogonal();
-  const Vec3 b = d.cross(s);
-  // In direction s'(angle) + x d the cell begins at the largest x over the separation planes, x = -s'.n / d.n: each
-  // separation plane is a sinusoid of the angle, and the upper envelope of sinusoids changes hands where two of them
-  // cross.
-  const auto height = [&](const Vec3& n, double angle) {
-    return -(std::cos(angle) * s.dot(n) + std::sin(angle) * b.dot(n)) / d.dot(n);
-  };
-  std::vector<double> bounds;
-  for (std::size_t i = 0; i < normals.size(); ++i)
-    for (std::size_t j = i + 1; j < normals.size(); ++j) {
-      const Vec3 difference =
-          normals[i].second / d.dot(normals[i].second) - normals[j].second / d.dot(normals[j].second);
-      const double angle = std::atan2(s.dot(difference), -b.dot(difference));
-      for (const double a : {angle, angle + std::numbers::pi})
-        bounds.push_back(a - 2 * std::numbers::pi * std::floor(a / (2 * std::numbers::pi)));
-    }
-  std::sort(bounds.begin(), bounds.end());
-  if (bounds.empty()) return {{normals[0].first, 1.0}};
+  const PlaneEnvelope envelope(skeleton, at);
+  if (envelope.is_empty()) return {};
+  const std::vector<double> bounds = envelope.crossings();
+  if (bounds.empty()) return {{envelope.first_bone(), 1.0}};
   std::vector<NeighbourInterval> order;
   for (std::size_t i = 0; i < bounds.size(); ++i) {
     const double begin = bounds[i], end = i + 1 < bounds.size() ? bounds[i + 1] : bounds[0] + 2 * std::numbers::pi;
-    int best = 0;
-    for (std::size_t n = 1; n < normals.size(); ++n)
-      if (height(normals[n].second, (begin + end) / 2) > height(normals[best].second, (begin + end) / 2))
-        best = static_cast<int>(n);
+    const int bone = envelope.bone_at((begin + end) / 2);
     const double turns = (end - begin) / (2 * std::numbers::pi);
-    if (!order.empty() && order.back().bone == normals[best].first)
+    if (!order.empty() && order.back().bone == bone)
       order.back().turns += turns;
     else
-      order.push_back({normals[best].first, turns});
+      order.push_back({bone, turns});
   }
   if (order.size() > 1 && order.front().bone == order.back().bone) {
     order.front().turns += order.back().turns;
@@ -122,8 +147,6 @@ struct Side {
   const std::string& node_name(int node) const { return skeleton->nodes[node].name; }
 };
 
-BoneEnd opposite(BoneEnd end) { return end == BoneEnd::kHead ? BoneEnd::kTail : BoneEnd::kHead; }
-
 /// Search for the cheapest isomorphism under a fixed rotation of A onto B. Partial assignments grow from a pair of
 /// directed bones; a subtree's best assignment does not depend on what lies before it, so trees are solved by memo.
 class Search {
@@ -141,24 +164,11 @@ class Search {
     std::optional<Correspondence> best;
     for (int j = 0; j < b_.count(); ++j)
       for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
+        bound_ = best ? best->cost : kImpossible;
         State state = empty_state();
         if (!assign_bone(state, start, {j, end})) continue;
-        double cost = bone_cost(start, {j, end});
-        if (is_tree_) {
-          cost += subtree_cost(start, {j, end}) + subtree_cost({0, BoneEnd::kTail}, {j, opposite(end)});
-          if (cost == kImpossible || (best && cost >= best->cost)) continue;
-          if (!expand_tree(state, start, {j, end}) || !expand_tree(state, {0, BoneEnd::kTail}, {j, opposite(end)}))
-            continue;
-        } else {
-          bound_ = best ? best->cost : kImpossible;
-          std::vector<std::pair<int, int>> open{{a_.node(start), b_.node({j, end})},
-                                                {a_.node({0, BoneEnd::kTail}), b_.node({j, opposite(end)})}};
-          std::optional<std::pair<double, State>> found = expand_graph(state, open, cost);
-          if (!found) continue;
-          cost = found->first;
-          state = found->second;
-        }
-        best = Correspondence{state.bones, state.is_reversed, state.nodes, cost};
+        const double cost = is_tree_ ? assign_tree(state, start, {j, end}) : assign_graph(state, start, {j, end});
+        if (cost < kImpossible) best = Correspondence{state.bones, state.is_reversed, state.nodes, cost};
       }
     return best;
   }
@@ -168,6 +178,23 @@ class Search {
     std::vector<int> bones, nodes;
     std::vector<bool> is_reversed, is_taken, is_node_taken;
   };
+  /// Assigns all bones when x becomes y. \return the cost, or kImpossible if it is not below the bound
+  double assign_tree(State& state, BoneAtNode x, BoneAtNode y) {
+    const BoneAtNode behind_x{x.bone, opposite(x.end)}, behind_y{y.bone, opposite(y.end)};
+    double cost = bone_cost(x, y);
+    cost += subtree_cost(x, y) + subtree_cost(behind_x, behind_y);
+    if (cost >= bound_ || !expand_tree(state, x, y) || !expand_tree(state, behind_x, behind_y)) return kImpossible;
+    return cost;
+  }
+  double assign_graph(State& state, BoneAtNode x, BoneAtNode y) {
+    const BoneAtNode behind_x{x.bone, opposite(x.end)}, behind_y{y.bone, opposite(y.end)};
+    std::vector<std::pair<int, int>> open{{a_.node(x), b_.node(y)}, {a_.node(behind_x), b_.node(behind_y)}};
+    const std::optional<std::pair<double, State>> found = expand_graph(state, open, bone_cost(x, y));
+    if (!found) return kImpossible;
+    state = found->second;
+    return found->first;
+  }
+
   State empty_state() const {
     State s;
     s.bones.assign(a_.count(), -1);
@@ -345,20 +372,37 @@ class Search {
   double bound_ = kImpossible;
 };
 
-/// The rotation that turns A's bone directions best onto those they correspond to (Kabsch).
+/// The rotation that turns A's bone directions best onto those they correspond to.
 Eigen::Matrix3d best_rotation(const Side& a, const Side& b, const Correspondence& c) {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   for (int i = 0; i < a.count(); ++i) {
     const Vec3 to = direction_from(*b.skeleton, {c.bones[i], c.is_reversed[i] ? BoneEnd::kTail : BoneEnd::kHead});
     covariance += to * direction_from(*a.skeleton, {i, BoneEnd::kHead}).transpose();
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d flip = Eigen::Matrix3d::Identity();
-  flip(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  return svd.matrixU() * flip * svd.matrixV().transpose();
+  return skeletex::best_rotation(covariance);
 }
 
-/// Why there is no isomorphism: the two graphs are walked side by side from the nodes that look most alike.
+/// The nodes breadth first from the one with the most bones, those with more bones first.
+std::vector<int> walk_from_busiest(const Side& side) {
+  int start = 0;
+  for (std::size_t n = 0; n < side.at.size(); ++n)
+    if (side.at[n].size() > side.at[start].size()) start = static_cast<int>(n);
+  std::vector<int> order{start};
+  std::vector<bool> seen(side.at.size(), false);
+  seen[start] = true;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    std::vector<int> next;
+    for (const BoneAtNode& bone : side.at[order[i]]) {
+      const int far = side.node({bone.bone, opposite(bone.end)});
+      if (!seen[far]) seen[far] = true, next.push_back(far);
+    }
+    std::sort(next.begin(), next.end(), [&](int p, int q) { return side.at[p].size() > side.at[q].size(); });
+    order.insert(order.end(), next.begin(), next.end());
+  }
+  return order;
+}
+
+/// Why there is no isomorphism: both graphs are walked from the nodes that look most alike.
 std::string first_difference(const Side& a, const Side& b) {
   std::map<std::string, int> named;
   for (std::size_t n = 0; n < b.skeleton->nodes.size(); ++n)
@@ -370,25 +414,7 @@ std::string first_difference(const Side& a, const Side& b) {
                          b.at[it->second].size());
   }
   // Without names: degrees along a breadth-first walk from the busiest nodes.
-  const auto walk = [](const Side& side) {
-    int start = 0;
-    for (std::size_t n = 0; n < side.at.size(); ++n)
-      if (side.at[n].size() > side.at[start].size()) start = static_cast<int>(n);
-    std::vector<int> order{start};
-    std::vector<bool> seen(side.at.size(), false);
-    seen[start] = true;
-    for (std::size_t i = 0; i < order.size(); ++i) {
-      std::vector<int> next;
-      for (const BoneAtNode& bone : side.at[order[i]]) {
-        const int far = side.node({bone.bone, opposite(bone.end)});
-        if (!seen[far]) seen[far] = true, next.push_back(far);
-      }
-      std::sort(next.begin(), next.end(), [&](int p, int q) { return side.at[p].size() > side.at[q].size(); });
-      order.insert(order.end(), next.begin(), next.end());
-    }
-    return order;
-  };
-  const std::vector<int> left = walk(a), right = walk(b);
+  const std::vector<int> left = walk_from_busiest(a), right = walk_from_busiest(b);
   for (std::size_t i = 0; i < std::min(left.size(), right.size()); ++i)
     if (a.at[left[i]].size() != b.at[right[i]].size())
       return fmt::format("node \"{}\" of the first joins {} bones, node \"{}\" of the second joins {}",
@@ -405,36 +431,45 @@ std::string first_difference(const Side& a, const Side& b) {
 
 }  // namespace
 
+namespace {
+
+int index_of(const Skeleton& skeleton, const std::string& name, const char* which) {
+  for (std::size_t i = 0; i < skeleton.bones.size(); ++i)
+    if (skeleton.bones[i].name == name) return static_cast<int>(i);
+  throw InputError(fmt::format("the {} skeleton has no bone \"{}\"", which, name));
+}
+
+/// The cheapest isomorphism under any rotation. Models may face any way: the turns about each axis are tried, and each
+/// is refined by the alignment that it leads to.
+std::optional<Correspondence> cheapest_isomorphism(const Side& left, const Side& right, Search& search) {
+  std::vector<Eigen::Matrix3d> rotations{Eigen::Matrix3d::Identity()};
+  for (const Vec3& axis : {Vec3(Vec3::UnitY()), Vec3(Vec3::UnitZ()), Vec3(Vec3::UnitX())})
+    for (const int quarter : {2, 1, 3})
+      rotations.push_back(Eigen::AngleAxisd(quarter * std::numbers::pi / 2, axis).toRotationMatrix());
+  std::optional<Correspondence> best;
+  for (const Eigen::Matrix3d& initial : rotations) {
+    Eigen::Matrix3d rotation = initial;
+    for (int round = 0; round < 3; ++round) {
+      const std::optional<Correspondence> found = search.run(rotation);
+      if (!found) break;
+      if (!best || found->cost < best->cost - 1e-12) best = found;
+      rotation = best_rotation(left, right, *found);
+    }
+    if (!best) break;  // no isomorphism under any rotation
+  }
+  return best;
+}
+
+}  // namespace
+
 Correspondence find_correspondence(const Skeleton& a, const Skeleton& b, const CorrespondenceOptions& options) {
   const Side left(a), right(b);
-  const auto index_of = [](const Skeleton& skeleton, const std::string& name, const char* which) {
-    for (std::size_t i = 0; i < skeleton.bones.size(); ++i)
-      if (skeleton.bones[i].name == name) return static_cast<int>(i);
-    throw InputError(fmt::format("the {} skeleton has no bone \"{}\"", which, name));
-  };
   std::vector<int> given(a.bones.size(), -1);
   for (const auto& [from, to] : options.given) given[index_of(a, from, "first")] = index_of(b, to, "second");
-
-  std::optional<Correspondence> best;
   if (left.count() == right.count() && a.nodes.size() == b.nodes.size() && left.count() > 0) {
     Search search(left, right, options, given);
-    // Models may face any way: try the turns about each axis, then refine by the alignment that was found.
-    std::vector<Eigen::Matrix3d> rotations{Eigen::Matrix3d::Identity()};
-    for (const Vec3& axis : {Vec3(Vec3::UnitY()), Vec3(Vec3::UnitZ()), Vec3(Vec3::UnitX())})
-      for (const int quarter : {2, 1, 3})
-        rotations.push_back(Eigen::AngleAxisd(quarter * std::numbers::pi / 2, axis).toRotationMatrix());
-    for (const Eigen::Matrix3d& initial : rotations) {
-      Eigen::Matrix3d rotation = initial;
-      for (int round = 0; round < 3; ++round) {
-        const std::optional<Correspondence> found = search.run(rotation);
-        if (!found) break;
-        if (!best || found->cost < best->cost - 1e-12) best = found;
-        rotation = best_rotation(left, right, *found);
-      }
-      if (!best) break;  // no isomorphism under any rotation
-    }
+    if (const std::optional<Correspondence> best = cheapest_isomorphism(left, right, search)) return *best;
   }
-  if (best) return *best;
   if (!options.given.empty()) {
     const CorrespondenceOptions free{{}, options.sliver_turn};
     find_correspondence(a, b, free);  // throws when there is none at all

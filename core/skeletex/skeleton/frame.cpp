@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "capsule.h"
+
 namespace skeletex {
 namespace {
 
@@ -71,28 +73,13 @@ Vec3 decode_texel(const TangentFrame& frame, const Vec3& texel, const Vec3& head
   const double length = (tail - head).norm();
   const Vec3 o = (tail - head) / length;
   const double along = d.dot(o);
-  const double across = (d - along * o).norm();
-  const double z = (frame.foot - head).dot(o);
-  // Leave the cylinder; where that is past an end, leave that end's sphere instead.
-  if (across > 0) {
-    const double c = e / across;
-    const double z_exit = z + c * along;
-    if (z_exit >= 0 && z_exit <= length) return frame.foot + c * d;
-  }
-  const double a = along < 0 ? z : length - z;  // distance from the foot to the end node it runs towards
-  const double q = across * a;                  // how far the ray passes from that node: a sin(beta)
-  return frame.foot + (std::abs(along) * a + std::sqrt(std::max(0.0, (e - q) * (e + q)))) * d;
+  return frame.foot + leave_capsule((frame.foot - head).dot(o), along, (d - along * o).norm(), e, 0, length) * d;
 }
 
 double leave_capsule(double z, double along, double across, double radius, double lower, double upper) {
-  if (across > 0) {
-    const double c = radius / across;
-    if (z + c * along >= lower && z + c * along <= upper) return c;
-  }
-  const double length = std::hypot(along, across);
-  const double a = along < 0 ? z - lower : upper - z;
-  const double p = std::abs(along) / length * a, side = across / length * a;
-  return (p + std::sqrt(std::max(0.0, (radius - side) * (radius + side)))) / length;
+  const double inverse2 = 1 / (along * along + across * across);
+  return leave_capsule_of_radius(along, across * across * inverse2, inverse2, z - lower, upper - z,
+                                 radius * radius * inverse2);
 }
 
 FrameTables frame_tables(const Skeleton& skeleton, const SeparationPlanes& separation,

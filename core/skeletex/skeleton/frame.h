@@ -6,15 +6,15 @@
 
 namespace skeletex {
 
-/// Where the foot of map coordinate u lies, and how far a cap has turned there (paper 3.4; caps after 3.2.1).
-/// Along a bone with two neighbours the axial parameter is u. A free end takes half of the rectangle (a third each,
-/// when both ends are free) for its cap: the foot stays on the end node and the frame turns through the hemisphere.
+/// The axial parameter of map coordinate u: where the foot lies, and how far a cap has turned there (paper 3.4; caps
+/// after 3.2.1). Along a bone with two neighbours it is u. A free end takes half of the rectangle for its cap, or a
+/// third if both ends are free; in a cap the foot stays on the end node, and the frame turns through the hemisphere.
 struct Axial {
   double axial = 0;     ///< position of the foot W between head (0) and tail (1)
   double latitude = 0;  ///< radians: 0 outside caps, up to +pi/2 at the tail's pole, down to -pi/2 at the head's
 };
 Axial axial_of(double u, bool is_head_free, bool is_tail_free);
-/// Map coordinate u of a axial parameter outside caps, and of a cap's latitude inside them: the inverse of station_of.
+/// Map coordinate u of an axial parameter, or of a latitude in a cap: the inverse of axial_of.
 double u_of(const Axial& axial, bool is_head_free, bool is_tail_free);
 
 /// The bone tangent frame at (u, turn): out = f / |f|, around = o x s', along = out x around (a left-handed triple
@@ -33,8 +33,8 @@ Vec3 encode_texel(const TangentFrame& frame, const Vec3& point, const Vec3& head
 /// (paper 3.6.1 and appendix A). The inverse of encode_texel.
 Vec3 decode_texel(const TangentFrame& frame, const Vec3& texel, const Vec3& head, const Vec3& tail);
 
-/// c at which the ray foot + c direction leaves the capsule of a radius around an axis from lower to upper; the foot
-/// lies on the axis, at z, inside the capsule. \param along, across  parts of the direction, not both 0
+/// The c at which the ray foot + c direction leaves a capsule around an axis from lower to upper (kernels/capsule.h).
+/// The foot lies on the axis, at z, inside the capsule. \param along, across  parts of the direction, not both 0
 double leave_capsule(double z, double along, double across, double radius, double lower, double upper);
 
 /// The tables that the kernels read (see skeletex_structs.h), for all patches of a model or of a layout.

@@ -4,13 +4,13 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <deque>
 #include <numbers>
 #include <random>
 
+#include "skeletex/geometry/best_rotation.h"
 #include "skeletex/model/error.h"
 #include "skeletex/skeleton/separation_planes.h"
 
@@ -34,9 +34,7 @@ struct Component {
   int first_cycle_bone = -1;  ///< the first bone that closes a cycle; -1: a tree
 };
 
-int other_end(const Skeleton& skeleton, BoneAtNode at) {
-  return at.end == BoneEnd::kHead ? skeleton.bones[at.bone].tail : skeleton.bones[at.bone].head;
-}
+int other_end(const Skeleton& skeleton, BoneAtNode at) { return end_node(skeleton, at.bone, opposite(at.end)); }
 
 Component walk_from(const Skeleton& skeleton, const std::vector<std::vector<BoneAtNode>>& at, int root) {
   Component component;
@@ -64,18 +62,6 @@ Component walk_from(const Skeleton& skeleton, const std::vector<std::vector<Bone
     }
   }
   return component;
-}
-
-/// The rotation that takes directions a to b best. Where they leave a turn about one axis open, the smallest.
-Matrix3d fitted_rotation(const Matrix3d& moment) {
-  const Eigen::JacobiSVD<Matrix3d> svd(moment, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double scale = svd.singularValues()[0];
-  if (!(scale > 0)) return Matrix3d::Identity();
-  if (svd.singularValues()[1] < 1e-12 * scale)
-    return Quaterniond::FromTwoVectors(Vec3(svd.matrixV().col(0)), Vec3(svd.matrixU().col(0))).toRotationMatrix();
-  Matrix3d flip = Matrix3d::Identity();
-  flip(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  return svd.matrixU() * flip * svd.matrixV().transpose();
 }
 
 Quaterniond smallest_rotation(const Vec3& from, const Vec3& to) {
@@ -122,7 +108,7 @@ void follow_nodes(const Skeleton& bind, const Skeleton& posed, const Component& 
   for (const Link& link : component.links)
     moment +=
         std::pow(0.1, link.depth) * bone_direction(posed, link.bone) * bone_direction(bind, link.bone).transpose();
-  const Quaterniond root(fitted_rotation(moment));
+  const Quaterniond root(best_rotation(moment));
   for (const Link& link : component.links) {
     const Quaterniond before = link.before < 0 ? root : rotations[link.before];
     rotations[link.bone] =
@@ -146,7 +132,7 @@ void spread_twist(const Skeleton& bind, const Skeleton& posed, const std::vector
   Matrix3d moment = Matrix3d::Zero();
   for (const Link& link : component.links)
     moment += bone_direction(posed, link.bone) * bone_direction(bind, link.bone).transpose();
-  const Quaterniond fit(fitted_rotation(moment));
+  const Quaterniond fit(best_rotation(moment));
   const std::vector<BoneBasis> bound = bone_bases(bind);
   std::vector<BoneBasis> turned = bound;
   std::vector<int> place(bind.bones.size(), -1);
@@ -180,6 +166,26 @@ void spread_twist(const Skeleton& bind, const Skeleton& posed, const std::vector
     const int bone = component.links[i].bone;
     rotations[bone] =
         Quaterniond(Eigen::AngleAxisd(rolls[static_cast<Eigen::Index>(i)], turned[bone].o)) * rotations[bone];
+  }
+}
+
+/// Turns the bones of a hierarchy, each about its end nearer to the root and together with all behind it.
+/// \throw InputError when a bone of a component with a cycle is to be turned
+void turn_bones(const Skeleton& bind, const Pose& pose, const Component& component, Skeleton& posed,
+                std::vector<Quaterniond>& rotations) {
+  for (const Link& link : component.links) {
+    if (component.first_cycle_bone >= 0) {
+      if (pose.rotations[link.bone].isApprox(Quaterniond::Identity(), 0)) continue;
+      throw InputError(
+          fmt::format("bone \"{}\" cannot be turned: bone \"{}\" closes a cycle, so there is no hierarchy to turn; "
+                      "give node positions",
+                      bind.bones[link.bone].name, bind.bones[component.first_cycle_bone].name));
+    }
+    rotations[link.bone] =
+        ((link.before < 0 ? Quaterniond::Identity() : rotations[link.before]) * pose.rotations[link.bone]).normalized();
+    const int pivot = end_node(bind, link.bone, link.pivot), moved = other_end(bind, {link.bone, link.pivot});
+    posed.nodes[moved].position =
+        posed.nodes[pivot].position + rotations[link.bone] * (bind.nodes[moved].position - bind.nodes[pivot].position);
   }
 }
 
@@ -228,33 +234,16 @@ Skeleton apply_pose(const Skeleton& bind, const Pose& pose) {
   if (!pose.nodes.empty()) {
     for (std::size_t i = 0; i < posed.nodes.size(); ++i) posed.nodes[i].position = pose.nodes[i];
     check_lengths(posed);
-  }
-  if (!pose.nodes.empty() || !pose.rotations.empty())
     for (const int root : root_nodes(bind)) {
       const Component component = walk_from(bind, at, root);
-      if (!pose.nodes.empty()) {
-        if (component.first_cycle_bone < 0)
-          follow_nodes(bind, posed, walk_from(bind, at, central_node(bind, at, root)), rotations);
-        else
-          spread_twist(bind, posed, at, component, rotations);
-        continue;
-      }
-      for (const Link& link : component.links) {
-        if (component.first_cycle_bone >= 0) {
-          if (pose.rotations[link.bone].isApprox(Quaterniond::Identity(), 0)) continue;
-          throw InputError(
-              fmt::format("bone \"{}\" cannot be turned: bone \"{}\" closes a cycle, so there is no hierarchy to turn; "
-                          "give node positions",
-                          bind.bones[link.bone].name, bind.bones[component.first_cycle_bone].name));
-        }
-        rotations[link.bone] =
-            ((link.before < 0 ? Quaterniond::Identity() : rotations[link.before]) * pose.rotations[link.bone])
-                .normalized();
-        const int pivot = end_node(bind, link.bone, link.pivot), moved = other_end(bind, {link.bone, link.pivot});
-        posed.nodes[moved].position = posed.nodes[pivot].position +
-                                      rotations[link.bone] * (bind.nodes[moved].position - bind.nodes[pivot].position);
-      }
+      if (component.first_cycle_bone < 0)
+        follow_nodes(bind, posed, walk_from(bind, at, central_node(bind, at, root)), rotations);
+      else
+        spread_twist(bind, posed, at, component, rotations);
     }
+  } else if (!pose.rotations.empty()) {
+    for (const int root : root_nodes(bind)) turn_bones(bind, pose, walk_from(bind, at, root), posed, rotations);
+  }
   const std::vector<BoneBasis> bases = bone_bases(bind);
   for (std::size_t i = 0; i < bind.bones.size(); ++i) {
     Vec3 s = rotations[i] * bases[i].s;

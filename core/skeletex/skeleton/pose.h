@@ -29,29 +29,34 @@ struct PoseFrame {
 struct PoseAnimation {
   std::vector<PoseFrame> frames;  ///< by growing time, at least one
 };
-/// The pose at a time: rotations by slerp, the shorter way, bone by bone; nodes and rolls linear; before the first
-/// frame the first, after the last the last. What only one of two neighbouring frames has counts as bound in the other.
-/// \throw InputError when one of the two frames turns bones and the other one moves nodes
+/// The pose at a time. Rotations are interpolated by slerp, the shorter way, bone by bone; nodes and rolls linearly.
+/// Times outside the animation give its first or last frame. Where only one of two neighbouring frames gives a value,
+/// the other counts as the bind pose. \throw InputError when one of the two frames turns bones and the other one moves
+/// nodes
 Pose pose_at(const Skeleton& bind, const PoseAnimation& animation, double time);
 
-/// Where the hierarchy of each component starts: the node that the most bones point away from (in a hierarchy all of
-/// them do), the first of several. One node per component, in the order of the nodes.
+/// The root of each component's hierarchy: the node that the most bones point away from, and the first of several such.
+/// In a hierarchy all bones point away from it. One node per component, in the order of the nodes.
 std::vector<int> root_nodes(const Skeleton& skeleton);
 
 /// The bind skeleton in a pose: node positions, and every bone's s.
 ///
-/// Rotations carry s along. Moved nodes: trees fit a rotation to the directions of all bones, where each step away
-/// from the tree's centre (the node with the shortest ways to all others) counts a tenth (Kabsch), and then turn bone
-/// by bone from there on with the smallest rotation relative to the bone before. In graphs with cycles there is no bone
-/// before: every bone takes the smallest rotation relative to one fit of the whole component, and then the rolls about
-/// the bones that spread the remaining twist evenly over all joints. Either way, a rigid motion of all nodes is that
-/// motion of all bases, and neither names nor order nor direction of the bones matter. \throw InputError when sizes do
-/// not match, rotations meet a cycle, or a bone has no length, naming the bone
+/// Rotations carry s along. When nodes move, each bone needs a rotation that takes it to its new direction:
+///   - In a tree one rotation is fitted to the directions of all bones (Kabsch); a bone's weight is a tenth of that of
+///     the bone before it, seen from the tree's centre, the node with the shortest ways to all others. From the centre
+///     on, every bone then takes the smallest rotation relative to the bone before.
+///   - In a graph with cycles there is no bone before. Every bone takes the smallest rotation relative to one fit of
+///   the
+///     whole component, and then a roll about itself; the rolls spread the remaining twist evenly over all joints.
+/// Either way, a rigid motion of all nodes is that motion of all bases, and neither names nor order nor direction of
+/// the bones matter. \throw InputError when sizes do not match, a bone of a cycle is to be turned, or a bone has no
+/// length; it names the
+///         bone
 Skeleton apply_pose(const Skeleton& bind, const Pose& pose);
 
-/// Every bone that is not at a root turns about an axis that is uniform on the sphere, by an angle uniform in [0,
-/// largest]. The same seed gives the same pose on every machine. \param largest  radians    \throw InputError for
-/// skeletons with cycles, whose bones cannot be turned
+/// A random pose: every bone that is not at a root turns about an axis that is uniform on the sphere, by an angle that
+/// is uniform in [0, largest]. The same seed gives the same pose on every machine. \param largest  radians    \throw
+/// InputError for skeletons with cycles, whose bones cannot be turned
 Pose make_random_pose(const Skeleton& skeleton, double largest, std::uint64_t seed);
 
 }  // namespace skeletex

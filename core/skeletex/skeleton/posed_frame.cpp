@@ -24,8 +24,8 @@ PosedRow posed_row(const SkeletexModel& model, const PosedPlanes& posed, int bon
     if (model.ends[bone][end].arcs.empty()) continue;
     const int node = end_node(model.skeleton, bone, static_cast<BoneEnd>(end));
     const double share = fade(end == 0 ? at.axial : 1 - at.axial);
-    row.bind_reaches[1 - end] = share * (posed.bind_reach(node) - bone_length(model.skeleton, bone));
-    row.reaches[1 - end] = share * (posed.reach(node) - bone_length(posed.skeleton(), bone));
+    row.bind_extensions[1 - end] = share * (posed.bind_longest_at(node) - bone_length(model.skeleton, bone));
+    row.extensions[1 - end] = share * (posed.longest_at(node) - bone_length(posed.skeleton(), bone));
   }
   return row;
 }
@@ -59,10 +59,10 @@ Vec3 posed_point(const SkeletexModel& model, const SeparationPlanes& bind, const
   double stretch = bound_stretch;
   if (rule == DistanceRule::kFromBone) {
     const double z = at.axial * bind_length + bound_stretch * bound[2];
-    if (row.bind_reaches[0] > 0 || row.bind_reaches[1] > 0)
+    if (row.bind_extensions[0] > 0 || row.bind_extensions[1] > 0)
       radius = std::hypot(bound_stretch * across(bound),
-                          std::max({0.0, -row.bind_reaches[0] - z, z - bind_length - row.bind_reaches[1]}));
-    stretch = leave_capsule(at.axial * length, q[2], across(q), radius, -row.reaches[0], length + row.reaches[1]);
+                          std::max({0.0, -row.bind_extensions[0] - z, z - bind_length - row.bind_extensions[1]}));
+    stretch = leave_capsule(at.axial * length, q[2], across(q), radius, -row.extensions[0], length + row.extensions[1]);
   }
   const double angle = 2 * std::numbers::pi * (turn + mix(head.roll, tail.roll, eased));
   const BoneBasis& basis = posed.bases()[bone];
@@ -103,8 +103,9 @@ PoseTables pose_tables(const SkeletexModel& model, const PosedPlanes& posed) {
     for (const double u : patch.row_u) {
       const PosedRow row = posed_row(model, posed, bone,
                                      axial_of(u, model.ends[bone][0].arcs.empty(), model.ends[bone][1].arcs.empty()));
-      tables.rows.push_back({static_cast<float>(row.bind_reaches[0]), static_cast<float>(row.bind_reaches[1]),
-                             static_cast<float>(row.reaches[0]), static_cast<float>(row.reaches[1])});
+      tables.rows.push_back({static_cast<float>(row.bind_extensions[0]), static_cast<float>(row.bind_extensions[1]),
+                             static_cast<float>(row.extensions[0]), static_cast<float>(row.extensions[1]),
+                             static_cast<float>(bone_length(model.skeleton, bone))});
     }
     for (int j = 0; j < patch.rectangle.width; ++j) {
       const double turn = static_cast<double>(j) / patch.rectangle.width;

@@ -5,13 +5,13 @@
 
 namespace skeletex {
 
-/// How a row of a patch keeps distances in a pose. Bones of different length meet at a seam, and where the surface lies
-/// past the end of the shorter one their distances disagree: there all take the longest one's length
-/// (PosedWalls::reach). So near a seam a bone's capsule is drawn out past its other end, at the seam by what is
-/// missing, less and less over the first quarter of the bone.
+/// How a row of a patch keeps distances in a pose. Bones of different length meet at a seam. Where the surface lies
+/// past the end of the shorter one, their distances from it disagree, so there all bones count as long as the longest
+/// (PosedPlanes::longest_at). Therefore a bone's capsule extends past its other end near a seam: at the seam by the
+/// missing length, and less and less over the first quarter of the bone.
 struct PosedRow {
-  std::array<double, 2> bind_reaches{0, 0},
-      reaches{0, 0};  ///< past head and tail, in the bind pose and in this one; world units
+  /// How far the capsule extends past head and tail, in the bind pose and in this one; world units.
+  std::array<double, 2> bind_extensions{0, 0}, extensions{0, 0};
 };
 PosedRow posed_row(const SkeletexModel& model, const PosedPlanes& posed, int bone, const Axial& at);
 
@@ -24,7 +24,8 @@ Vec3 posed_point(const SkeletexModel& model, const SeparationPlanes& bind, const
 /// \param origin  world position that posed device coordinates are relative to
 std::vector<PatchRecord> posed_patches(const SkeletexModel& model, const PosedPlanes& posed, const Vec3& origin);
 
-/// What the kernels read for a pose, beside the tables of the bind pose (frame_tables): same rows, same columns.
+/// What the kernels read for a pose, in addition to the tables of the bind pose (frame_tables): same rows, same
+/// columns.
 struct PoseTables {
   std::vector<PatchRecord> patches;
   std::vector<PosedRowRecord> rows;

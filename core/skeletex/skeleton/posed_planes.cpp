@@ -2,11 +2,11 @@
 #include "skeletex/skeleton/posed_planes.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "skeletex/geometry/best_rotation.h"
 #include "skeletex/skeleton/frame.h"
 
 namespace skeletex {
@@ -15,10 +15,6 @@ namespace {
 constexpr double kTwoPi = 2 * std::numbers::pi;
 constexpr int kTrackingSteps = 64;  // three bones at a node need no tracking: their arcs are always half a turn
 constexpr double kThinArc = 1e-3;   // turns; samples on thinner arcs are spread by their number, not by their angle
-
-BoneEnd end_at(const Skeleton& skeleton, int bone, int node) {
-  return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
-}
 
 /// Into [-1/2, 1/2).
 double wrapped(double turns) { return turns - std::floor(turns + 0.5); }
@@ -54,15 +50,6 @@ double turns_between(const Vec3& axis, const Vec3& from, const Vec3& to) {
   return std::atan2(axis.dot(p.cross(q)), p.dot(q)) / kTwoPi;
 }
 
-Eigen::Matrix3d best_rotation(const std::vector<Vec3>& from, const std::vector<Vec3>& to) {
-  Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
-  for (std::size_t i = 0; i < from.size(); ++i) moment += to[i] * from[i].transpose();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(moment, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d flip = Eigen::Matrix3d::Identity();
-  flip(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  return svd.matrixU() * flip * svd.matrixV().transpose();
-}
-
 }  // namespace
 
 PosedPlanes::PosedPlanes(const SkeletexModel& model, const Skeleton& posed)
@@ -70,16 +57,16 @@ PosedPlanes::PosedPlanes(const SkeletexModel& model, const Skeleton& posed)
       posed_(&posed),
       bind_bases_(bone_bases(model.skeleton)),
       bases_(bone_bases(posed)),
-      bind_reaches_(model.skeleton.nodes.size(), 0),
-      reaches_(model.skeleton.nodes.size(), 0),
+      bind_longest_(model.skeleton.nodes.size(), 0),
+      longest_(model.skeleton.nodes.size(), 0),
       arcs_(model.arcs.size()),
       bind_corners_(model.corners.size(), Vec3::Zero()),
       corners_(model.corners.size(), Vec3::Zero()),
       loops_(model.skeleton.bones.size()) {
   for (int bone = 0; bone < static_cast<int>(model.skeleton.bones.size()); ++bone)
     for (const int node : {model.skeleton.bones[bone].head, model.skeleton.bones[bone].tail}) {
-      bind_reaches_[node] = std::max(bind_reaches_[node], bone_length(model.skeleton, bone));
-      reaches_[node] = std::max(reaches_[node], bone_length(posed, bone));
+      bind_longest_[node] = std::max(bind_longest_[node], bone_length(model.skeleton, bone));
+      longest_[node] = std::max(longest_[node], bone_length(posed, bone));
     }
   std::vector<std::vector<int>> arcs_at(model.skeleton.nodes.size());
   for (int a = 0; a < static_cast<int>(arcs_.size()); ++a) {
@@ -126,67 +113,71 @@ void PosedPlanes::join_linear(Arc& arc) {
   arc.sides[1].rolls.fill(twist / 2);
 }
 
-void PosedPlanes::build_node(int node, const std::vector<int>& arcs) {
-  std::vector<int> corners;
+PosedPlanes::NodeSphere PosedPlanes::sphere_of(int node, const std::vector<int>& arcs) const {
+  NodeSphere sphere;
+  sphere.arcs = arcs;
   for (const int a : arcs)
     for (const int c : model_->arcs[a].corners)
-      if (std::find(corners.begin(), corners.end(), c) == corners.end()) corners.push_back(c);
-  std::vector<Vec3> bind, posed;
-  std::vector<int> place_of(loops_.size(), -1);
+      if (std::find(sphere.corners.begin(), sphere.corners.end(), c) == sphere.corners.end())
+        sphere.corners.push_back(c);
+  sphere.place_of.assign(loops_.size(), -1);
   const auto add_bone = [&](int bone) {
-    if (place_of[bone] >= 0) return;
-    place_of[bone] = static_cast<int>(bind.size());
-    bind.push_back(bind_direction(bone, node));
-    posed.push_back(posed_direction(bone, node));
+    if (sphere.place_of[bone] >= 0) return;
+    sphere.place_of[bone] = static_cast<int>(sphere.bind.size());
+    sphere.bind.push_back(bind_direction(bone, node));
+    sphere.posed.push_back(posed_direction(bone, node));
   };
   for (const int a : arcs)
     for (const int bone : model_->arcs[a].bones) add_bone(bone);
-  for (const int c : corners)
+  for (const int c : sphere.corners)
     for (const int bone : model_->corners[c].bones) add_bone(bone);
+  return sphere;
+}
 
-  // Corners: the axis of three bones, on the side where the corner's stored angle lies.
-  struct Triple {
-    std::array<int, 3> bones;
-    double sign;
+/// The three bones of a corner whose axis is best defined, and the side where the corner's stored angle lies.
+PosedPlanes::Triple PosedPlanes::triple_of(const NodeSphere& sphere, int c) const {
+  const SeamCorner& corner = model_->corners[c];
+  std::vector<int> places;
+  for (const int bone : corner.bones) places.push_back(sphere.place_of[bone]);
+  const auto axis_of = [&](const std::array<int, 3>& bones) {
+    return triple_axis(sphere.bind[bones[0]], sphere.bind[bones[1]], sphere.bind[bones[2]]);
   };
-  std::vector<Triple> triples;
-  for (const int c : corners) {
-    const SeamCorner& corner = model_->corners[c];
-    Triple best{{0, 0, 0}, 1};
-    double longest = -1;
-    for (std::size_t i = 0; i < corner.bones.size(); ++i)
-      for (std::size_t j = i + 1; j < corner.bones.size(); ++j)
-        for (std::size_t k = j + 1; k < corner.bones.size(); ++k) {
-          const std::array<int, 3> bones{place_of[corner.bones[i]], place_of[corner.bones[j]],
-                                         place_of[corner.bones[k]]};
-          const double length = triple_axis(bind[bones[0]], bind[bones[1]], bind[bones[2]]).norm();
-          if (length > longest) longest = length, best.bones = bones;
-        }
-    const Vec3 axis = triple_axis(bind[best.bones[0]], bind[best.bones[1]], bind[best.bones[2]]);
-    if (axis.dot(radial_of(bind_bases_[corner.bones[0]], corner.sample.turn)) < 0) best.sign = -1;
-    bind_corners_[c] = best.sign * axis.normalized();
-    triples.push_back(best);
-  }
+  Triple best;
+  double longest = -1;
+  for (std::size_t i = 0; i < places.size(); ++i)
+    for (std::size_t j = i + 1; j < places.size(); ++j)
+      for (std::size_t k = j + 1; k < places.size(); ++k) {
+        const std::array<int, 3> bones{places[i], places[j], places[k]};
+        const double length = axis_of(bones).norm();
+        if (length > longest) longest = length, best.bones = bones;
+      }
+  if (axis_of(best.bones).dot(radial_of(bind_bases_[corner.bones[0]], corner.sample.turn)) < 0) best.sign = -1;
+  return best;
+}
 
-  // Lengths of the arcs, followed on the way from the bind directions to the posed ones, so that whole turns and signs
-  // are those of a continuous motion: around every bone they keep adding up to one turn.
-  const Eigen::Quaterniond turned_back(Eigen::Matrix3d(best_rotation(bind, posed).transpose()));
+/// Follows the lengths of arcs on the way from the bind directions to the posed ones, so that whole turns and signs are
+/// those of a continuous motion: around every bone they keep adding up to one turn.
+void PosedPlanes::track_arcs(const NodeSphere& sphere, const std::vector<Triple>& triples) {
+  const std::vector<Vec3>&bind = sphere.bind, &posed = sphere.posed;
+  Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < bind.size(); ++i) moment += posed[i] * bind[i].transpose();
+  const Eigen::Quaterniond turned_back(Eigen::Matrix3d(best_rotation(moment).transpose()));
   std::vector<Eigen::Quaterniond> motions;
   for (std::size_t i = 0; i < bind.size(); ++i)
     motions.push_back(Eigen::Quaterniond::FromTwoVectors(bind[i], turned_back * posed[i]));
-  std::vector<Vec3> at(corners.size());
+  std::vector<Vec3> at;  // the corners on the way
   std::vector<int> corner_place(corners_.size(), -1);
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    at[i] = bind_corners_[corners[i]];
-    corner_place[corners[i]] = static_cast<int>(i);
+  for (const int c : sphere.corners) {
+    corner_place[c] = static_cast<int>(at.size());
+    at.push_back(bind_corners_[c]);
   }
   const auto turns_of = [&](int a, const std::vector<Vec3>& directions) {
     const SeamArc& seam = model_->arcs[a];
     const double sign = arcs_[a].sides[0].end == BoneEnd::kHead ? 1 : -1;
-    return turns_between(sign * directions[place_of[seam.bones[0]]], at[corner_place[seam.corners[0]]],
+    return turns_between(sign * directions[sphere.place_of[seam.bones[0]]], at[corner_place[seam.corners[0]]],
                          at[corner_place[seam.corners[1]]]);
   };
-  for (const int a : arcs) {
+  for (const int a : sphere.arcs) {
     const double turns = turns_of(a, bind);
     arcs_[a].bind_turns = turns < -0.25 ? turns + 1 : turns;  // cells are convex: half a turn at most
     arcs_[a].posed_turns = arcs_[a].bind_turns;
@@ -199,15 +190,25 @@ void PosedPlanes::build_node(int node, const std::vector<int>& arcs) {
           step == steps
               ? Vec3(turned_back * posed[i])
               : Vec3(Eigen::Quaterniond::Identity().slerp(static_cast<double>(step) / steps, motions[i]) * bind[i]);
-    for (std::size_t i = 0; i < corners.size(); ++i) {
+    for (std::size_t i = 0; i < at.size(); ++i) {
       const Vec3 axis = triple_axis(directions[triples[i].bones[0]], directions[triples[i].bones[1]],
                                     directions[triples[i].bones[2]]);
       if (axis.norm() > 1e-9) at[i] = triples[i].sign * axis.normalized();
     }
-    for (const int a : arcs) arcs_[a].posed_turns += wrapped(turns_of(a, directions) - arcs_[a].posed_turns);
+    for (const int a : sphere.arcs) arcs_[a].posed_turns += wrapped(turns_of(a, directions) - arcs_[a].posed_turns);
   }
-  for (std::size_t i = 0; i < corners.size(); ++i) corners_[corners[i]] = turned_back.conjugate() * at[i];
+  for (std::size_t i = 0; i < at.size(); ++i) corners_[sphere.corners[i]] = turned_back.conjugate() * at[i];
+}
 
+void PosedPlanes::build_node(int node, const std::vector<int>& arcs) {
+  const NodeSphere sphere = sphere_of(node, arcs);
+  std::vector<Triple> triples;
+  for (const int c : sphere.corners) {
+    const auto& [bones, sign] = triples.emplace_back(triple_of(sphere, c));
+    bind_corners_[c] =
+        sign * triple_axis(sphere.bind[bones[0]], sphere.bind[bones[1]], sphere.bind[bones[2]]).normalized();
+  }
+  track_arcs(sphere, triples);
   for (const int a : arcs)
     for (Side& side : arcs_[a].sides) {
       const int first = model_->arcs[a].corners[0];
@@ -324,14 +325,14 @@ Vec3 PosedPlanes::corner_point(int c, DistanceRule rule) const {
 
 double PosedPlanes::radius_at(int node, int bone, double distance, const Vec3& bound, const Vec3& direction,
                               DistanceRule rule) const {
-  // The bind point from the half-line's distance, its distance to the bone's reach, and out of the posed capsule.
+  // The bind point from the half-line's distance, its distance to the bone as extended, and out of the posed capsule.
   const double cosine = bound.dot(bind_direction(bone, node));
   const double bind_radius = cosine > 0 ? distance / std::sqrt(std::max(1e-12, 1 - cosine * cosine)) : distance;
   if (rule == DistanceRule::kFromFoot) return bind_radius;
-  const double past = bind_radius * cosine - bind_reaches_[node];
+  const double past = bind_radius * cosine - bind_longest_[node];
   const double along = direction.dot(posed_direction(bone, node));
   return leave_capsule(0, along, std::sqrt(std::max(0.0, 1 - along * along)),
-                       past > 0 ? std::hypot(distance, past) : distance, 0, reaches_[node]);
+                       past > 0 ? std::hypot(distance, past) : distance, 0, longest_[node]);
 }
 
 }  // namespace skeletex

@@ -17,31 +17,28 @@ enum class DistanceRule {
 /// How the separation planes of a model meet a bone in a pose, at one of its ends and one bind angle.
 struct PosedRadial {
   double roll = 0;   ///< turns, to be added to the bind angle; 0 at a free end
-  double slope = 0;  ///< k' of the separation plane that separates the two bones there (see Separation planes::slope),
-                     ///< at the rolled angle
+  double slope = 0;  ///< of the separation plane there, at the rolled angle (see SeparationPlanes::slope)
 };
 
-/// Where an arc around a bone's end begins, and what holds along it.
+/// Where an arc around a bone's end begins, and what holds along it. The slope of the arc's separation plane in the
+/// pose is slope_s cos a + slope_b sin a at angle a about the posed bone.
 struct PosedBound {
   double turn = 0;      ///< angle in the bind pose, turns
-  double roll = 0;      ///< turns, to be added to it
-  double end_roll = 0;  ///< where the arc ends; rolls are linear in between
-  double slope_s =
-      0;  ///< slope of the arc's separation plane in the pose along s; at angle a about the posed bone it is
-  double slope_b = 0;  ///< slope_s cos a + slope_b sin a
+  double roll = 0;      ///< turns, to be added to the angle where the arc begins
+  double end_roll = 0;  ///< the same where it ends; rolls are linear in between
+  double slope_s = 0, slope_b = 0;
 };
 
-/// The seams of a model in a pose (paper 3.3 and 3.4.1). Each node is a drawing on the sphere around it: corners are
-/// directions, arcs are curves between them, and every bone's end is the loop of arcs around it. In the bind pose this
-/// is the Voronoi diagram of the bones' directions. In a pose
-///   - a corner goes where it is equally far from the same three bones, on the side that continues the bind pose's,
+/// The seams of a model in a pose (paper 3.3 and 3.4.1). On the sphere around a node, corners are directions, arcs are
+/// curves between them, and the end of every bone is the loop of arcs around it. In the bind pose this is the Voronoi
+/// diagram of the bones' directions. In a pose
+///   - a corner is equally far from the same three bones, on the side that continues the bind pose's,
 ///   - an arc stays in the separation plane of its two bones and runs between its corners; angles move linearly along
-///   it, which both
-///     bones see alike,
-///   - around a node of two bones the separation plane is one closed curve, and both bones turn by half of the twist.
-/// Around a node of three bones every arc is half a turn in every pose. With more, directions can move so far that two
-/// corners pass each other: the arc between them then runs backwards, and the surface overlaps itself there. Distances
-/// hold and seams stay closed nevertheless.
+///     it, so that both bones see the same,
+///   - the separation plane of a node with two bones is one closed curve, and both bones turn by half of the twist.
+/// At a node of three bones every arc is half a turn in every pose. At one of more, directions can move so far that two
+/// corners pass each other. The arc between them then runs backwards, and the surface overlaps itself there; distances
+/// still hold, and seams stay closed.
 class PosedPlanes {
  public:
   /// \param model  its skeleton is the bind pose; texels are not looked at. Must outlive this
@@ -57,10 +54,10 @@ class PosedPlanes {
   /// run on from arc to arc. A closed arc begins anywhere. Empty at a free end.
   std::vector<PosedBound> bounds(int bone, BoneEnd end) const;
 
-  /// How long the bones at a node are taken to be where they meet, so that all of them restore distances alike: as long
-  /// as the longest of them. In the bind pose and in this one, world units.
-  double bind_reach(int node) const { return bind_reaches_[node]; }
-  double reach(int node) const { return reaches_[node]; }
+  /// Length of the longest bone at a node, in the bind pose and in this one; world units. All bones there count as this
+  /// long where they meet, so that they restore distances alike.
+  double bind_longest_at(int node) const { return bind_longest_[node]; }
+  double longest_at(int node) const { return longest_[node]; }
 
   /// Points of the seams, world. Every bone at a seam gives the same point; `side` chooses the one to compute it from.
   Vec3 sample_point(int arc, int sample, DistanceRule rule, int side = 0) const;
@@ -96,7 +93,22 @@ class PosedPlanes {
     std::vector<Interval> intervals;
   };
 
+  /// The directions of the bones at a node, and what is drawn on the sphere around it.
+  struct NodeSphere {
+    std::vector<int> arcs, corners;  ///< their numbers
+    std::vector<Vec3> bind, posed;   ///< directions of the bones there
+    std::vector<int> place_of;       ///< per bone its place in bind and posed; -1 for others
+  };
+  /// A corner lies on the axis that is equally far from three bones.
+  struct Triple {
+    std::array<int, 3> bones{0, 0, 0};  ///< places in NodeSphere
+    double sign = 1;                    ///< side of the axis
+  };
+
   void join_linear(Arc& arc);
+  NodeSphere sphere_of(int node, const std::vector<int>& arcs) const;
+  Triple triple_of(const NodeSphere& sphere, int corner) const;
+  void track_arcs(const NodeSphere& sphere, const std::vector<Triple>& triples);
   void build_node(int node, const std::vector<int>& arcs);
   void wind_loop(int bone, BoneEnd end);
   const Interval* interval_at(int bone, BoneEnd end, double turn, double& t) const;
@@ -109,7 +121,7 @@ class PosedPlanes {
   const SkeletexModel* model_;
   const Skeleton* posed_;
   std::vector<BoneBasis> bind_bases_, bases_;
-  std::vector<double> bind_reaches_, reaches_;  ///< per node
+  std::vector<double> bind_longest_, longest_;  ///< length of a bone, per node
   std::vector<Arc> arcs_;
   std::vector<Vec3> bind_corners_, corners_;  ///< unit directions from their node
   std::vector<std::array<Loop, 2>> loops_;    ///< per bone and end

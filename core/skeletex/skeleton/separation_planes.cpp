@@ -24,8 +24,8 @@ Vec3 SeparationPlanes::radial(int bone, double turn) const {
 
 double SeparationPlanes::turn_of(int bone, const Vec3& offset) const {
   const double turn = std::atan2(offset.dot(bases_[bone].b), offset.dot(bases_[bone].s)) / (2 * std::numbers::pi);
-  const double wrapped = turn - std::floor(turn);
-  return wrapped < 1 ? wrapped : 0;
+  const double fraction = turn - std::floor(turn);
+  return fraction < 1 ? fraction : 0;
 }
 
 namespace {

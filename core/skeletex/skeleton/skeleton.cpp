@@ -25,6 +25,10 @@ int end_node(const Skeleton& skeleton, int bone, BoneEnd end) {
   return end == BoneEnd::kHead ? skeleton.bones[bone].head : skeleton.bones[bone].tail;
 }
 
+BoneEnd end_at(const Skeleton& skeleton, int bone, int node) {
+  return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
+}
+
 const Vec3& end_position(const Skeleton& skeleton, int bone, BoneEnd end) {
   return skeleton.nodes[end_node(skeleton, bone, end)].position;
 }
@@ -81,12 +85,12 @@ Vec3 least_aligned_axis(const Vec3& o) {
 
 Vec3 orthonormalized(const Vec3& s, const Vec3& o) { return (s - o.dot(s) * o).normalized(); }
 
-}  // namespace
-
-std::vector<BoneBasis> bone_bases(const Skeleton& skeleton) {
+/// The bases of bones that give an s, and the axes of all.
+/// \param is_known  out: which bones give one
+std::vector<BoneBasis> given_bases(const Skeleton& skeleton, std::vector<bool>& is_known) {
   const int count = static_cast<int>(skeleton.bones.size());
   std::vector<BoneBasis> bases(count);
-  std::vector<bool> known(count, false);
+  is_known.assign(count, false);
   for (int i = 0; i < count; ++i) {
     const Vec3 axis = end_position(skeleton, i, BoneEnd::kTail) - end_position(skeleton, i, BoneEnd::kHead);
     if (!(axis.norm() > 0))
@@ -99,36 +103,49 @@ std::vector<BoneBasis> bone_bases(const Skeleton& skeleton) {
       throw InputError(fmt::format("bone \"{}\": its \"s\" is parallel to the bone; give a direction across it",
                                    skeleton.bones[i].name));
     bases[i].s = across.normalized();
-    known[i] = true;
+    is_known[i] = true;
   }
+  return bases;
+}
+
+/// The s of a bone, carried to another bone at its end by the reflection in the separation plane between them. The
+/// reflection takes one direction away from the node to the other, and leaves what lies in the plane where it is.
+Vec3 carried_s(const Skeleton& skeleton, const std::vector<BoneBasis>& bases, BoneAtNode from, BoneAtNode to) {
+  const Vec3 n = direction_from(skeleton, from) - direction_from(skeleton, to);
+  Vec3 s = bases[from.bone].s;
+  if (n.squaredNorm() > 1e-24) s -= 2 * s.dot(n) / n.squaredNorm() * n;
+  return orthonormalized(s, bases[to.bone].o);
+}
+
+}  // namespace
+
+std::vector<BoneBasis> bone_bases(const Skeleton& skeleton) {
+  std::vector<bool> is_known;
+  std::vector<BoneBasis> bases = given_bases(skeleton, is_known);
+  const int count = static_cast<int>(bases.size());
   const auto at = bones_at_nodes(skeleton);
   std::deque<int> queue;
-  for (int i = 0; i < count; ++i)
-    if (known[i]) queue.push_back(i);
-  for (int seed = 0; seed <= count; ++seed) {
+  const auto add = [&](int bone, const Vec3& s) {
+    bases[bone].s = s;
+    is_known[bone] = true;
+    queue.push_back(bone);
+  };
+  const auto spread = [&] {
     while (!queue.empty()) {
       const int from = queue.front();
       queue.pop_front();
-      for (const BoneEnd end : {BoneEnd::kTail, BoneEnd::kHead}) {
-        for (const BoneAtNode to : at[end_node(skeleton, from, end)]) {
-          if (known[to.bone]) continue;
-          // The reflection in the separation plane between the two takes one direction away from the node to the other
-          // and leaves what both see in their separation plane where it is. Where a tail meets a head it is the
-          // smallest rotation as well.
-          const Vec3 n = direction_from(skeleton, {from, end}) - direction_from(skeleton, to);
-          Vec3 s = bases[from].s;
-          if (n.squaredNorm() > 1e-24) s -= 2 * s.dot(n) / n.squaredNorm() * n;
-          bases[to.bone].s = orthonormalized(s, bases[to.bone].o);
-          known[to.bone] = true;
-          queue.push_back(to.bone);
-        }
-      }
+      for (const BoneEnd end : {BoneEnd::kTail, BoneEnd::kHead})
+        for (const BoneAtNode to : at[end_node(skeleton, from, end)])
+          if (!is_known[to.bone]) add(to.bone, carried_s(skeleton, bases, {from, end}, to));
     }
-    if (seed < count && !known[seed]) {
-      bases[seed].s = orthonormalized(least_aligned_axis(bases[seed].o), bases[seed].o);
-      known[seed] = true;
-      queue.push_back(seed);
-    }
+  };
+  for (int i = 0; i < count; ++i)
+    if (is_known[i]) queue.push_back(i);
+  spread();
+  for (int seed = 0; seed < count; ++seed) {
+    if (is_known[seed]) continue;
+    add(seed, orthonormalized(least_aligned_axis(bases[seed].o), bases[seed].o));
+    spread();
   }
   for (BoneBasis& basis : bases) basis.b = basis.o.cross(basis.s);
   return bases;

@@ -9,6 +9,7 @@
 namespace skeletex {
 
 enum class BoneEnd { kHead = 0, kTail = 1 };
+inline BoneEnd opposite(BoneEnd end) { return end == BoneEnd::kHead ? BoneEnd::kTail : BoneEnd::kHead; }
 
 struct Node {
   std::string name;
@@ -49,6 +50,8 @@ double bone_length(const Skeleton& skeleton, int bone);
 /// Position of the node at one end of a bone.
 const Vec3& end_position(const Skeleton& skeleton, int bone, BoneEnd end);
 int end_node(const Skeleton& skeleton, int bone, BoneEnd end);
+/// The end of a bone that lies at a node. \pre one of them does
+BoneEnd end_at(const Skeleton& skeleton, int bone, int node);
 
 /// Bases of all bones. A given `s` is made orthonormal to o; a missing one is carried from a neighbouring bone by the
 /// reflection in the separation plane between them, so that nothing twists: a point of the separation plane at angle v

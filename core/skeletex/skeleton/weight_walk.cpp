@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "skeletex/skeleton/separation_planes.h"
 #include "skin_weight.h"
 
 namespace skeletex {
@@ -14,22 +13,21 @@ namespace {
 constexpr int kMostJoints = 6;            // their weights are far below the cut beyond
 constexpr std::size_t kMostSteps = 1024;  // of one bone; in graphs with many cycles ways get many
 
-/// The size of the seams around each node, world units.
+/// The size of the seams around each node: the median distance to their bones, and the largest to the node. World
+/// units.
 struct JointSizes {
-  std::vector<double> girths, reaches;
+  std::vector<double> girths, radii;
 };
 
-JointSizes joint_sizes(const SkeletexModel& model) {
+JointSizes joint_sizes(const SkeletexModel& model, const SeparationPlanes& separation) {
   const Skeleton& skeleton = model.skeleton;
-  const SeparationPlanes separation(skeleton);
   std::vector<std::vector<double>> distances(skeleton.nodes.size());
   JointSizes sizes;
-  sizes.reaches.assign(skeleton.nodes.size(), 0);
+  sizes.radii.assign(skeleton.nodes.size(), 0);
   const auto add = [&](int node, int bone, const SeamSample& sample) {
-    const BoneEnd end = skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
-    const Vec3 point = separation.seam_point(bone, end, sample.turn, sample.distance);
+    const Vec3 point = separation.seam_point(bone, end_at(skeleton, bone, node), sample.turn, sample.distance);
     distances[node].push_back(sample.distance);
-    sizes.reaches[node] = std::max(sizes.reaches[node], (point - skeleton.nodes[node].position).norm());
+    sizes.radii[node] = std::max(sizes.radii[node], (point - skeleton.nodes[node].position).norm());
   };
   for (const SeamArc& arc : model.arcs)
     for (const SeamSample& sample : arc.samples) add(arc.node, arc.bones[0], sample);
@@ -68,7 +66,7 @@ WeightStep make_step(const SkeletexModel& model, const JointSizes& sizes, int no
     step.joint[i] = static_cast<float>(joint[i]);
   }
   step.girth_inverse = static_cast<float>(1 / sizes.girths[node]);
-  step.reach = static_cast<float>(sizes.reaches[node]);
+  step.seam_radius = static_cast<float>(sizes.radii[node]);
   step.bone = to.bone;
   return step;
 }
@@ -102,8 +100,8 @@ std::vector<WeightStep> walk_from(const SkeletexModel& model, const JointSizes& 
 
 }  // namespace
 
-WeightWalks make_weight_walks(const SkeletexModel& model) {
-  const JointSizes sizes = joint_sizes(model);
+WeightWalks make_weight_walks(const SkeletexModel& model, const SeparationPlanes& separation) {
+  const JointSizes sizes = joint_sizes(model, separation);
   const auto at = bones_at_nodes(model.skeleton);
   WeightWalks walks;
   walks.first_steps.push_back(0);
@@ -123,7 +121,7 @@ std::vector<BoneWeight> bone_weights(const WeightWalks& walks, int bone, const V
     const WeightStep& step = walks.steps[first + k];
     const Vec3 from = point - Vec3(step.joint[0], step.joint[1], step.joint[2]);
     const double height = from.dot(Vec3(step.normal[0], step.normal[1], step.normal[2]));
-    const double excess = std::max(0.0, from.norm() - step.reach) * step.girth_inverse;
+    const double excess = std::max(0.0, from.norm() - step.seam_radius) * step.girth_inverse;
     potentials[k + 1] = potentials[step.before + 1] + SKIN_CROSSING(height, excess);
   }
   const double lowest = *std::min_element(potentials.begin(), potentials.end());

@@ -24,14 +24,13 @@ constexpr const char* kCopy = "device copy of the same bytes";
 struct Frame {
   explicit Frame(ClContext& context, TextureInputPointer from)
       : input(std::move(from)),
-        lattice(upload_lattice(
-            context,
-            frame_tables(model().skeleton, SeparationPlanes(model().skeleton), model().patches, model().origin),
-            model().patches, model().texture, RowChoice::kInner)),
+        prepared(input->model),
+        lattice(upload_lattice(context, prepared, RowChoice::kInner)),
         points(allocate_planes(context, lattice.vertex_count)) {}
   const SkeletexModel& model() const { return input->model; }
 
   TextureInputPointer input;
+  PreparedModel prepared;
   DeviceLattice lattice;
   DevicePlanes points;
 };
@@ -96,8 +95,8 @@ Stage smooth_pose_stage(ClContext& context, TextureInputPointer input, const std
   std::shared_ptr<const Skin> skin;
   std::shared_ptr<const DeviceSkin> device;
   const double prepare_ms = wall_ms([&] {
-    DevicePlanes bind = displace_inner(context, model, SeparationPlanes(model.skeleton), number_lattice(model));
-    skin = std::make_shared<const Skin>(make_skin(context, model, bind));
+    DevicePlanes bind = row_points(context, frame->prepared, RowChoice::kInner);
+    skin = std::make_shared<const Skin>(make_skin(context, frame->prepared, bind));
     device = std::make_shared<const DeviceSkin>(upload_skin(context, *skin, std::move(bind)));
     context.finish();
   });
@@ -122,9 +121,10 @@ Stage paper_pose_stage(ClContext& context, TextureInputPointer input, const std:
   stage.run = [&context, frame, pose] {
     const SkeletexModel& model = frame->model();
     const Skeleton posed = apply_pose(model.skeleton, pose);
-    displace_posed(context, frame->lattice,
-                   upload_pose(context, model, PosedPlanes(model, posed), RowChoice::kInner, DistanceRule::kFromBone),
-                   frame->points);
+    displace_posed(
+        context, frame->lattice,
+        upload_pose(context, frame->prepared, PosedPlanes(model, posed), RowChoice::kInner, DistanceRule::kFromBone),
+        frame->points);
   };
   stage.run_reference = device_copy(context, 2 * kPlanes * frame->lattice.vertex_count);
   return stage;

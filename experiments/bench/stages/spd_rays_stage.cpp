@@ -14,10 +14,10 @@ namespace skeletex {
 namespace {
 
 std::vector<Patch> patches_of(const std::vector<double>& areas, int size) {
-  std::vector<PatchDemand> demands;
-  for (const double area : areas) demands.push_back({area, 1});
+  std::vector<PatchRequest> requests;
+  for (const double area : areas) requests.push_back({area, 1});
   std::vector<Patch> patches;
-  for (const Rectangle& rectangle : pack_atlas(demands, size, size).rectangles) {
+  for (const Rectangle& rectangle : pack_atlas(requests, size, size).rectangles) {
     patches.push_back({rectangle, Method::kSpd, SegmentTopology::kAnnulus, {}});
     for (int r = 0; r < rectangle.height; ++r)
       patches.back().row_u.push_back(static_cast<double>(r) / (rectangle.height - 1));

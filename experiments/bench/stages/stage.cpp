@@ -61,12 +61,10 @@ double wall_ms(const std::function<void()>& work) {
 std::function<double()> device_copy(ClContext& context, std::size_t floats) {
   // A copy reads and writes: half as many floats make the traffic.
   const std::size_t size = (floats + 1) / 2;
-  return [&context, size, from = context.allocate<float>(size), to = context.allocate<float>(size)] {
-    ::cl::Event event;
-    context.queue().enqueueCopyBuffer(from.memory, to.memory, 0, 0, size * sizeof(float), nullptr, &event);
-    event.wait();
-    return 1e-6 * static_cast<double>(event.getProfilingInfo<CL_PROFILING_COMMAND_END>() -
-                                      event.getProfilingInfo<CL_PROFILING_COMMAND_START>());
+  return [&context, from = context.allocate<float>(size), to = context.allocate<float>(size)]() mutable {
+    context.reset_profile();
+    context.copy(from, to);
+    return context.profile().front().milliseconds;
   };
 }
 

@@ -64,7 +64,7 @@ Stage vsm_stage(ClContext& context, MeshInputPointer input, int threads) {
   stage.reference = threads == 1 ? "Eigen's SimplicialLDLT on one thread" : "Eigen's SimplicialLDLT on all threads";
   const auto charts = std::make_shared<const std::vector<Chart>>(charts_of(context, *input).charts);
   const auto matrices = std::make_shared<const std::vector<Matrix>>(matrices_of(*charts));
-  const auto reports = std::make_shared<std::vector<VsmReport>>();
+  const auto reports = std::make_shared<std::vector<MapReport>>();
   // Charts keep all but their maps, which are put back.
   stage.run = [&context, charts, reports, mapped = std::make_shared<std::vector<Chart>>(*charts)] {
     for (std::size_t k = 0; k < mapped->size(); ++k) (*mapped)[k].u = (*charts)[k].u, (*mapped)[k].v = (*charts)[k].v;

@@ -18,7 +18,7 @@ struct FitOptions {
 /// What the fit did.
 struct FitReport {
   std::vector<double> residuals;  ///< before each step and after the last: mean distance of the samples, world units
-  int texels_put_back = 0;        ///< by the guard
+  int reverted_texels = 0;        ///< see revert_faults
 };
 
 /// Moves the points of VSM patches in space so that the flat triangles between them are nearer to the mesh, in both

@@ -20,14 +20,14 @@ constexpr int kMinSide = 4;
 constexpr int kSteps = 14000;
 constexpr int kStepsPerStart = 3500;
 
-/// A node of the kd-tree. Leaves are 0 .. n-1 and carry the demand of the same index; n .. 2n-2 are splits.
+/// A node of the kd-tree. Leaves are 0 .. n-1 and carry the patch of the same index; n .. 2n-2 are splits.
 struct KdNode {
   std::int16_t parent = -1;
   std::int16_t children[2] = {-1, -1};
   bool splits_width = true;
 };
 
-/// The demands in the form that the search needs.
+/// The requests in the form that the search needs.
 struct Wanted {
   int width = 0, height = 0;
   std::vector<double> share;       // sums to 1, none below the smallest rectangle's
@@ -207,16 +207,16 @@ class KdTree {
 };
 
 /// Shares that sum to 1 with none below that of the smallest rectangle: what the small ones gain the others lose.
-std::vector<double> raised_shares(std::span<const PatchDemand> demands, double smallest) {
-  const int count = static_cast<int>(demands.size());
+std::vector<double> raised_shares(std::span<const PatchRequest> requests, double smallest) {
+  const int count = static_cast<int>(requests.size());
   std::vector<double> shares(count);
   std::vector<bool> is_raised(count, false);
   for (;;) {
     double left = 1, sum = 0;
-    for (int i = 0; i < count; ++i) (is_raised[i] ? left : sum) += is_raised[i] ? -smallest : demands[i].share;
+    for (int i = 0; i < count; ++i) (is_raised[i] ? left : sum) += is_raised[i] ? -smallest : requests[i].share;
     bool is_settled = true;
     for (int i = 0; i < count; ++i) {
-      shares[i] = is_raised[i] ? smallest : demands[i].share / sum * left;
+      shares[i] = is_raised[i] ? smallest : requests[i].share / sum * left;
       if (!is_raised[i] && shares[i] < smallest) {
         is_raised[i] = true;
         is_settled = false;
@@ -226,16 +226,16 @@ std::vector<double> raised_shares(std::span<const PatchDemand> demands, double s
   }
 }
 
-Wanted wanted_from(std::span<const PatchDemand> demands, int width, int height) {
+Wanted wanted_from(std::span<const PatchRequest> requests, int width, int height) {
   Wanted wanted;
   wanted.width = width;
   wanted.height = height;
   const double texels = static_cast<double>(width) * height;
   wanted.share =
-      raised_shares(demands, std::min(kMinSide * kMinSide / texels, 1.0 / static_cast<double>(demands.size())));
+      raised_shares(requests, std::min(kMinSide * kMinSide / texels, 1.0 / static_cast<double>(requests.size())));
   for (int i = 0; i < wanted.count(); ++i) {
     wanted.log_area.push_back(std::log(wanted.share[i] * texels));
-    wanted.log_aspect.push_back(std::log(demands[i].columns_per_row));
+    wanted.log_aspect.push_back(std::log(requests[i].columns_per_row));
     // Large patches matter most, but no small one shall be ruined for them.
     wanted.weight.push_back(0.8 * wanted.share[i] + 0.2 / wanted.count());
   }
@@ -246,14 +246,14 @@ Wanted wanted_from(std::span<const PatchDemand> demands, int width, int height) 
 
 int fitting_patches(int width, int height) { return (width / kMinSide) * (height / kMinSide); }
 
-void check_input(std::span<const PatchDemand> demands, int width, int height) {
-  const int count = static_cast<int>(demands.size());
+void check_input(std::span<const PatchRequest> requests, int width, int height) {
+  const int count = static_cast<int>(requests.size());
   if (count == 0) throw InputError("there is no bone to give texels to; the skeleton needs at least one bone");
   for (int i = 0; i < count; ++i)
-    if (!(demands[i].share > 0 && demands[i].columns_per_row > 0) || !std::isfinite(demands[i].share) ||
-        !std::isfinite(demands[i].columns_per_row))
+    if (!(requests[i].share > 0 && requests[i].columns_per_row > 0) || !std::isfinite(requests[i].share) ||
+        !std::isfinite(requests[i].columns_per_row))
       throw InputError(fmt::format("patch {} asks for a share of {} and a side ratio of {}; both must be positive", i,
-                                   demands[i].share, demands[i].columns_per_row));
+                                   requests[i].share, requests[i].columns_per_row));
   if (width >= 1 && height >= 1 && fitting_patches(width, height) >= count) return;
   // The smallest texture of the same proportions that holds them.
   const double ratio = width >= 1 && height >= 1 ? static_cast<double>(height) / width : 1;
@@ -274,9 +274,9 @@ void check_input(std::span<const PatchDemand> demands, int width, int height) {
 
 }  // namespace
 
-AtlasLayout pack_atlas(std::span<const PatchDemand> demands, int width, int height) {
-  check_input(demands, width, height);
-  const Wanted wanted = wanted_from(demands, width, height);
+AtlasLayout pack_atlas(std::span<const PatchRequest> requests, int width, int height) {
+  check_input(requests, width, height);
+  const Wanted wanted = wanted_from(requests, width, height);
   const int count = wanted.count();
 
   std::vector<int> order(count);

@@ -19,10 +19,8 @@ constexpr double kExponent = 1.25;
 /// A width that rises linearly from `low` to `middle`, falls to `high`, and has the total `area`.
 struct Hat {
   double low, middle, high, area;
-  double rise = middle > low ? area / ((high - low) * (middle - low)) : 0, fall = high > middle
-                                                                                      ? area / ((high - low) *
-                                                                                                (high - middle))
-                                                                                      : 0;
+  double rise = middle > low ? area / ((high - low) * (middle - low)) : 0;
+  double fall = high > middle ? area / ((high - low) * (high - middle)) : 0;
 
   double integral_to(double u) const {
     if (u <= low) return 0;
@@ -67,10 +65,8 @@ struct Corner {
   Vec3 p;
 };
 
-}  // namespace
-
-RowProfile row_profile(const Chart& chart) {
-  // Bin borders: quantiles of the vertices' u, so that squeezed regions are resolved, and an even grid.
+/// Bin borders: quantiles of the vertices' u, so that squeezed regions are resolved, and a regular grid.
+std::vector<double> bin_borders(const Chart& chart) {
   constexpr int kBins = 2048;
   std::vector<double> sorted;
   for (std::size_t i = 0; i < chart.u.size(); ++i)
@@ -82,54 +78,65 @@ RowProfile row_profile(const Chart& chart) {
   for (std::size_t i = 0; i < sorted.size(); i += step) borders.push_back(std::clamp(sorted[i], 0.0, 1.0));
   std::sort(borders.begin(), borders.end());
   borders.erase(std::unique(borders.begin(), borders.end()), borders.end());
-  Bins bins(std::move(borders));
+  return borders;
+}
 
-  // Adds `density` (length per u) times a width over [low, high] that peaks at `middle`.
-  const auto add_hat = [&](double low, double middle, double high, double area, double density) {
-    if (!(high > low) || !(area > 0) || !std::isfinite(density)) return;
-    std::size_t bin = std::upper_bound(bins.borders.begin(), bins.borders.end(), low) - bins.borders.begin();
-    bin = bin == 0 ? 0 : bin - 1;
-    const double density_power = std::pow(density, kExponent);
-    const Hat hat{low, middle, high, area};
-    double before = hat.integral_to(bins.borders[bin]);
-    for (; bin < bins.length.size() && bins.borders[bin] < high; ++bin) {
-      const double after = hat.integral_to(bins.borders[bin + 1]);
-      bins.add(bin, after - before, density, density_power);
-      before = after;
-    }
-  };
+/// Adds `density` (length per u) times a width over [low, high] that peaks at `middle`.
+void add_hat(Bins& bins, double low, double middle, double high, double area, double density) {
+  if (!(high > low) || !(area > 0) || !std::isfinite(density)) return;
+  std::size_t bin = std::upper_bound(bins.borders.begin(), bins.borders.end(), low) - bins.borders.begin();
+  bin = bin == 0 ? 0 : bin - 1;
+  const double density_power = std::pow(density, kExponent);
+  const Hat hat{low, middle, high, area};
+  double before = hat.integral_to(bins.borders[bin]);
+  for (; bin < bins.length.size() && bins.borders[bin] < high; ++bin) {
+    const double after = hat.integral_to(bins.borders[bin + 1]);
+    bins.add(bin, after - before, density, density_power);
+    before = after;
+  }
+}
 
+/// The trapezoid of a pole over the opposite edge, in slices of the edge: a parallelogram-free sum of boxes.
+void add_pole_triangle(Bins& bins, const Corner& pole, const Corner& a, const Corner& b) {
+  constexpr int kSlices = 4;
+  for (int i = 0; i < kSlices; ++i) {
+    const double lambda = (i + 0.5) / kSlices;
+    const double u = a.u + lambda * (b.u - a.u), width = std::abs(b.v - a.v) / kSlices;
+    const double length = (pole.p - (a.p + lambda * (b.p - a.p))).norm();
+    const double low = std::min(u, pole.u), high = std::max(u, pole.u);
+    if (!(high > low)) continue;
+    // A constant width is the sum of a rising and a falling ramp.
+    add_hat(bins, low, low, high, width * (high - low) / 2, length / (high - low));
+    add_hat(bins, low, high, high, width * (high - low) / 2, length / (high - low));
+  }
+}
+
+void add_triangle(Bins& bins, const std::array<Corner, 3>& c) {
+  const double du1 = c[1].u - c[0].u, dv1 = c[1].v - c[0].v, du2 = c[2].u - c[0].u, dv2 = c[2].v - c[0].v;
+  const double determinant = du1 * dv2 - du2 * dv1;
+  if (determinant == 0) return;
+  const double density = ((c[1].p - c[0].p) * dv2 - (c[2].p - c[0].p) * dv1).norm() / std::abs(determinant);
+  std::array<double, 3> u{c[0].u, c[1].u, c[2].u};
+  std::sort(u.begin(), u.end());
+  add_hat(bins, u[0], u[1], u[2], std::abs(determinant) / 2, density);
+}
+
+}  // namespace
+
+RowProfile row_profile(const Chart& chart) {
+  Bins bins(bin_borders(chart));
   for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
     std::array<Corner, 3> c;
     int pole = -1;
     for (int k = 0; k < 3; ++k) {
       const int vertex = chart.triangles[t][k];
       c[k] = {chart.u[vertex], chart.v[vertex] + chart.turns[t][k], chart.positions[vertex]};
-      if (chart.kinds[vertex] == ChartVertex::kHeadPole || chart.kinds[vertex] == ChartVertex::kTailPole) pole = k;
+      if (is_pole(chart.kinds[vertex])) pole = k;
     }
-    if (pole >= 0) {
-      // The trapezoid over the opposite edge, in slices of the edge: a parallelogram-free sum of boxes.
-      const Corner &a = c[(pole + 1) % 3], &b = c[(pole + 2) % 3];
-      constexpr int kSlices = 4;
-      for (int i = 0; i < kSlices; ++i) {
-        const double lambda = (i + 0.5) / kSlices;
-        const double u = a.u + lambda * (b.u - a.u), width = std::abs(b.v - a.v) / kSlices;
-        const double length = (c[pole].p - (a.p + lambda * (b.p - a.p))).norm();
-        const double low = std::min(u, c[pole].u), high = std::max(u, c[pole].u);
-        if (!(high > low)) continue;
-        // A constant width is the sum of a rising and a falling ramp.
-        add_hat(low, low, high, width * (high - low) / 2, length / (high - low));
-        add_hat(low, high, high, width * (high - low) / 2, length / (high - low));
-      }
-      continue;
-    }
-    const double du1 = c[1].u - c[0].u, dv1 = c[1].v - c[0].v, du2 = c[2].u - c[0].u, dv2 = c[2].v - c[0].v;
-    const double determinant = du1 * dv2 - du2 * dv1;
-    if (determinant == 0) continue;
-    const double density = ((c[1].p - c[0].p) * dv2 - (c[2].p - c[0].p) * dv1).norm() / std::abs(determinant);
-    std::array<double, 3> u{c[0].u, c[1].u, c[2].u};
-    std::sort(u.begin(), u.end());
-    add_hat(u[0], u[1], u[2], std::abs(determinant) / 2, density);
+    if (pole >= 0)
+      add_pole_triangle(bins, c[pole], c[(pole + 1) % 3], c[(pole + 2) % 3]);
+    else
+      add_triangle(bins, c);
   }
   return finish(std::move(bins));
 }

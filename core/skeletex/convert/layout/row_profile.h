@@ -19,11 +19,11 @@ struct RowProfile {
 /// vertices. \pre chart.u and chart.v are filled
 RowProfile row_profile(const Chart& chart);
 
-/// Profile of points on an regular grid in u: `positions` holds rows x columns points, row-major, row r at
+/// Profile of points on a regular grid in u: `positions` holds rows x columns points, row-major, row r at
 /// u = r / (rows - 1), the columns at any angles.
 RowProfile row_profile(std::span<const Vec3> positions, int rows, int columns);
 
-/// g(u), with what lies between its places.
+/// g(u), linear between the entries.
 double share_below(const RowProfile& profile, double u);
 
 /// Where `height` rows are read: evenly in surface length, u_r = g^-1(r / (height - 1)).

@@ -20,10 +20,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// A pole's hit this close to a vertex or an edge (in barycentric units) is moved onto it: no needle triangles.
 constexpr double kPoleSnap = 1e-3;
 
-double wrapped(double turns) { return turns - std::round(turns); }
-
 bool is_row(ChartVertex kind) { return kind == ChartVertex::kHeadRow || kind == ChartVertex::kTailRow; }
-bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind == ChartVertex::kTailPole; }
 
 /// One boundary row: lifted angles, first as measured, then made strictly increasing.
 struct Row {
@@ -47,7 +44,7 @@ Row make_row(const BoundaryLoop& loop, const Segment& segment, const Skeleton& s
   double lift = turns.empty() ? 0 : turns[0];
   for (int i = 0; i < count; ++i) {
     row.measured.push_back(lift);
-    lift += wrapped(turns[(i + 1) % count] - turns[i]);
+    lift += shortest_turn(turns[(i + 1) % count] - turns[i]);
   }
   std::optional<std::vector<double>> lifted = loop_turns(points, turns);
   if (!lifted)
@@ -223,7 +220,7 @@ class Unroller {
     }
     if (cut_position[0] >= 0 && cut_position[1] >= 0) {
       double turn = rows[0].measured[cut_position[0]] - rows[1].measured[cut_position[1]];
-      for (std::size_t i = 0; i + 1 < path.size(); ++i) turn += wrapped(angles_[path[i + 1]] - angles_[path[i]]);
+      for (std::size_t i = 0; i + 1 < path.size(); ++i) turn += shortest_turn(angles_[path[i + 1]] - angles_[path[i]]);
       twist = static_cast<int>(std::lround(turn));
     }
     std::vector<int> row_turns(chart_.positions.size(), 0);
@@ -256,6 +253,16 @@ class Unroller {
     } while (h >= 0 && h != first_[vertex]);
   }
 
+  /// Length of an edge in the metric ds / r around the axis, r its distance from the axis; at a pole that of its other
+  /// end.
+  double length_around_axis(int v, int w) const {
+    const bool has_pole = is_pole(chart_.kinds[v]) || is_pole(chart_.kinds[w]);
+    const double length = (chart_.positions[w] - chart_.positions[v]).norm();
+    const double r = has_pole ? std::max(std::hypot(seen_[v][0], seen_[v][1]), std::hypot(seen_[w][0], seen_[w][1]))
+                              : axis_distance(seen_[v], seen_[w]);
+    return length / std::max(r, 1e-6 * length);
+  }
+
   /// A path from the head's row or pole to the tail's through inner vertices, the shortest in the metric ds / r around
   /// the axis: where the surface is pierced by the axis that metric is infinite, so the turns along the path mean
   /// something, and they do not depend on how vertices are numbered.
@@ -268,6 +275,14 @@ class Unroller {
     for (int v = 0; v < count; ++v)
       if (chart_.kinds[v] == ChartVertex::kHeadRow || chart_.kinds[v] == ChartVertex::kHeadPole)
         queue.push({distance[v] = 0, v});
+    const auto relax = [&](int v, int w) {
+      if (chart_.kinds[w] == ChartVertex::kHeadRow || chart_.kinds[w] == ChartVertex::kHeadPole) return;
+      const double candidate = distance[v] + length_around_axis(v, w);
+      if (candidate >= distance[w]) return;
+      distance[w] = candidate;
+      parent[w] = v;
+      queue.push({candidate, w});
+    };
     while (!queue.empty()) {
       const auto [d, v] = queue.top();
       queue.pop();
@@ -278,21 +293,9 @@ class Unroller {
         std::reverse(path.begin(), path.end());
         return path;
       }
-      const auto relax = [&](int w) {
-        if (chart_.kinds[w] == ChartVertex::kHeadRow || chart_.kinds[w] == ChartVertex::kHeadPole) return;
-        const bool has_pole = is_pole(chart_.kinds[v]) || is_pole(chart_.kinds[w]);
-        const double length = (chart_.positions[w] - chart_.positions[v]).norm();
-        const double r = has_pole ? std::max(std::hypot(seen_[v][0], seen_[v][1]), std::hypot(seen_[w][0], seen_[w][1]))
-                                  : axis_distance(seen_[v], seen_[w]);
-        const double candidate = distance[v] + length / std::max(r, 1e-6 * length);
-        if (candidate >= distance[w]) return;
-        distance[w] = candidate;
-        parent[w] = v;
-        queue.push({candidate, w});
-      };
-      visit_fan(v, [&](int h) {
-        relax(to(h));
-        if (table_.twins[HalfEdgeTable::previous(h)] < 0) relax(from(HalfEdgeTable::previous(h)));
+      visit_fan(v, [&, from_vertex = v](int h) {
+        relax(from_vertex, to(h));
+        if (table_.twins[HalfEdgeTable::previous(h)] < 0) relax(from_vertex, from(HalfEdgeTable::previous(h)));
       });
     }
     throw TopologyError(
@@ -323,47 +326,51 @@ class Unroller {
     }
   }
 
-  /// u by the number of edges to both ends, v by the measured angle, carried from vertex to vertex.
-  void guess() {
-    const int count = static_cast<int>(chart_.positions.size());
-    std::array<std::vector<int>, 2> hops;
-    for (const int e : {0, 1}) {
-      hops[e].assign(count, -1);
-      std::vector<int> queue;
-      for (int v = 0; v < count; ++v) {
-        const ChartVertex kind = chart_.kinds[v];
-        if (kind == (e == 0 ? ChartVertex::kHeadRow : ChartVertex::kTailRow) ||
-            kind == (e == 0 ? ChartVertex::kHeadPole : ChartVertex::kTailPole)) {
-          hops[e][v] = 0;
-          queue.push_back(v);
-        }
+  /// Per vertex the number of edges to a row or pole; -1 where there is no way.
+  std::vector<int> count_edges_from(ChartVertex row, ChartVertex pole) const {
+    std::vector<int> counts(chart_.positions.size(), -1), queue;
+    for (int v = 0; v < static_cast<int>(counts.size()); ++v)
+      if (chart_.kinds[v] == row || chart_.kinds[v] == pole) {
+        counts[v] = 0;
+        queue.push_back(v);
       }
-      for (std::size_t i = 0; i < queue.size(); ++i)
-        visit_fan(queue[i], [&](int h) {
-          for (const int w : {to(h), from(HalfEdgeTable::previous(h))})
-            if (hops[e][w] < 0) {
-              hops[e][w] = hops[e][queue[i]] + 1;
-              queue.push_back(w);
-            }
-        });
-    }
+    for (std::size_t i = 0; i < queue.size(); ++i)
+      visit_fan(queue[i], [&](int h) {
+        for (const int w : {to(h), from(HalfEdgeTable::previous(h))})
+          if (counts[w] < 0) {
+            counts[w] = counts[queue[i]] + 1;
+            queue.push_back(w);
+          }
+      });
+    return counts;
+  }
+
+  /// u by the number of edges to both ends, v by the measured angle.
+  void guess() {
+    const std::vector<int> from_head = count_edges_from(ChartVertex::kHeadRow, ChartVertex::kHeadPole),
+                           from_tail = count_edges_from(ChartVertex::kTailRow, ChartVertex::kTailPole);
+    for (std::size_t v = 0; v < chart_.u.size(); ++v)
+      chart_.u[v] = static_cast<double>(from_head[v]) / std::max(1, from_head[v] + from_tail[v]);
+    carry_angles();
+  }
+
+  /// v by the measured angle, carried from vertex to vertex: from the rows on, or from one vertex of a lone bone.
+  void carry_angles() {
     std::vector<int> queue;
-    std::vector<bool> is_known(count, false);
-    const auto reach = [&](int v) {
+    std::vector<bool> is_known(chart_.positions.size(), false);
+    const auto add = [&](int v) {
       is_known[v] = true;
       queue.push_back(v);
     };
-    for (int v = 0; v < count; ++v) {
-      chart_.u[v] = static_cast<double>(hops[0][v]) / std::max(1, hops[0][v] + hops[1][v]);
-      if (is_row(chart_.kinds[v])) reach(v);
+    for (int v = 0; v < static_cast<int>(is_known.size()); ++v) {
+      if (is_row(chart_.kinds[v])) add(v);
       if (is_pole(chart_.kinds[v])) is_known[v] = true;
     }
-    if (queue.empty())
-      for (int v = 0; v < count && queue.empty(); ++v)
-        if (!is_known[v]) {
-          chart_.v[v] = angles_[v];
-          reach(v);
-        }
+    if (queue.empty()) {
+      const auto first = std::find(is_known.begin(), is_known.end(), false) - is_known.begin();
+      chart_.v[first] = angles_[first];
+      add(static_cast<int>(first));
+    }
     for (std::size_t i = 0; i < queue.size(); ++i) {
       const int v = queue[i];
       visit_fan(v, [&](int h) {
@@ -371,8 +378,8 @@ class Unroller {
         for (const int c : {HalfEdgeTable::next(h) % 3, HalfEdgeTable::previous(h) % 3}) {
           const int w = chart_.triangles[h / 3][c];
           if (is_known[w]) continue;
-          chart_.v[w] = chart_.v[v] + turns[h % 3] - turns[c] + wrapped(angles_[w] - angles_[v]);
-          reach(w);
+          chart_.v[w] = chart_.v[v] + turns[h % 3] - turns[c] + shortest_turn(angles_[w] - angles_[v]);
+          add(w);
         }
       });
     }

@@ -17,6 +17,7 @@ enum class ChartVertex : std::uint8_t {
   kHeadPole,  ///< u = 0, no v: acts on its ring through u only
   kTailPole,  ///< u = 1, no v
 };
+inline bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind == ChartVertex::kTailPole; }
 
 /// A segment made ready to be mapped to its rectangle, and then its map: u from head (0) to tail (1), v periodic with
 /// period 1. The v of a triangle's corner is v[vertex] + turns[triangle][corner]; over a triangle these lifted values

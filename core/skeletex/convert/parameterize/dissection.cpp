@@ -11,28 +11,28 @@
 namespace skeletex {
 namespace {
 
-constexpr std::size_t kLeaf = 32;  // so many vertices are eliminated together at most where nothing separates them
+constexpr std::size_t kLeaf = 32;  // up to so many vertices are not divided
 
-/// A vertex as it is sorted: with what is asked for, so that this lies together.
+/// A vertex as it is sorted.
 struct Item {
   std::array<float, 3> at;
-  float reach;  ///< the longest edge here
+  float longest_edge;  ///< at this vertex
   int vertex;
 };
 
 class Dissector {
  public:
-  Dissector(const Chart& chart, Dissection& result)
-      : table_(chart.half_edges), d_(result), side_(chart.positions.size(), 0) {
+  Dissector(const SparseGraph& graph, Dissection& result)
+      : graph_(graph), d_(result), side_(graph.positions.size(), 0) {
     items_.reserve(d_.order.size());
     for (const int v : d_.order) {
-      double reach2 = 0;
-      for (const int w : neighbours(v))
-        reach2 = std::max(reach2, (chart.positions[w] - chart.positions[v]).squaredNorm());
-      const Eigen::Vector3f p = chart.positions[v].cast<float>();
+      double longest2 = 0;
+      for (const int w : graph.neighbours(v))
+        longest2 = std::max(longest2, (graph.positions[w] - graph.positions[v]).squaredNorm());
+      const Eigen::Vector3f p = graph.positions[v].cast<float>();
       // More than rounding can take away.
       items_.push_back({{p.x(), p.y(), p.z()},
-                        1.0001f * static_cast<float>(std::sqrt(reach2)) + 1e-6f * p.cwiseAbs().maxCoeff(),
+                        1.0001f * static_cast<float>(std::sqrt(longest2)) + 1e-6f * p.cwiseAbs().maxCoeff(),
                         v});
     }
   }
@@ -41,16 +41,12 @@ class Dissector {
   void run(int end) {
     std::vector<int> roots = divide(0, end);
     if (const int all = static_cast<int>(d_.order.size()); end < all)
-      d_.fronts[add_front(end, all, std::move(roots))].is_beside_poles = true;
+      d_.fronts[add_front(end, all, std::move(roots))].is_last = true;
     for (std::size_t i = 0; i < items_.size(); ++i) d_.order[i] = items_[i].vertex;
     find_boundaries();
   }
 
  private:
-  std::span<const int> neighbours(int v) const {
-    return std::span(table_.targets).subspan(table_.begin[v], table_.begin[v + 1] - table_.begin[v]);
-  }
-
   static constexpr signed char kLeft = 1, kRight = 2, kSeparator = 4;
 
   /// Orders items_[begin] to items_[end - 1]. \return the fronts that have no parent yet
@@ -63,16 +59,16 @@ class Dissector {
     std::nth_element(all.begin(), middle, all.end(),
                      [&](const Item& a, const Item& b) { return a.at[axis] < b.at[axis]; });
     const float border = middle->at[axis];
-    // Only vertices that reach the border can have a neighbour beyond it.
+    // Only vertices with an edge that is long enough can have a neighbour beyond the border.
     near_.clear();
     for (auto item = all.begin(); item != all.end(); ++item)
-      if (std::abs(item->at[axis] - border) <= item->reach) {
+      if (std::abs(item->at[axis] - border) <= item->longest_edge) {
         side_[item->vertex] = item < middle ? kLeft : kRight;
         near_.push_back(item->vertex);
       }
     const auto is_at_cut = [&](int v) {
-      const std::span<const int> beside = neighbours(v);
-      return std::any_of(beside.begin(), beside.end(), [&](int w) { return side_[w] == kLeft + kRight - side_[v]; });
+      const std::span<const int> near = graph_.neighbours(v);
+      return std::any_of(near.begin(), near.end(), [&](int w) { return side_[w] == kLeft + kRight - side_[v]; });
     };
     // The half that has fewer vertices at the cut gives them.
     for (std::vector<int>& cut : cuts_) cut.clear();
@@ -112,7 +108,7 @@ class Dissector {
         front.boundary.push_back(number);
       };
       for (int i = front.first; i < after; ++i)
-        for (const int v : neighbours(d_.order[i])) take(d_.number[v]);
+        for (const int v : graph_.neighbours(d_.order[i])) take(d_.number[v]);
       for (const int child : front.children)
         for (const int number : d_.fronts[child].boundary) take(number);
       std::sort(front.boundary.begin(), front.boundary.end());
@@ -147,7 +143,7 @@ class Dissector {
     return id;
   }
 
-  const HalfEdgeTable& table_;
+  const SparseGraph& graph_;
   Dissection& d_;
   std::vector<Item> items_;
   std::vector<signed char> side_;
@@ -157,19 +153,12 @@ class Dissector {
 
 }  // namespace
 
-Dissection dissect(const Chart& chart) {
+Dissection dissect(const SparseGraph& graph) {
   Dissection d;
-  const auto is_pole = [&](int v) {
-    return chart.kinds[v] == ChartVertex::kHeadPole || chart.kinds[v] == ChartVertex::kTailPole;
-  };
-  std::vector<bool> is_beside_pole(chart.kinds.size(), false);
-  for (const Triangle& t : chart.triangles)
-    if (std::any_of(t.begin(), t.end(), is_pole))
-      for (const int v : t) is_beside_pole[v] = true;
-  for (int v = 0; v < static_cast<int>(chart.kinds.size()); ++v)
-    if (chart.kinds[v] == ChartVertex::kInner) d.order.push_back(v);
-  const auto rings = std::stable_partition(d.order.begin(), d.order.end(), [&](int v) { return !is_beside_pole[v]; });
-  Dissector(chart, d).run(static_cast<int>(rings - d.order.begin()));
+  for (int v = 0; v < static_cast<int>(graph.positions.size()); ++v)
+    if (graph.is_unknown[v]) d.order.push_back(v);
+  const auto last = std::stable_partition(d.order.begin(), d.order.end(), [&](int v) { return graph.is_last[v] == 0; });
+  Dissector(graph, d).run(static_cast<int>(last - d.order.begin()));
   return d;
 }
 

@@ -141,68 +141,184 @@ void append_guesses(std::span<const RowRecord> rows, SpdPatch& patch, std::vecto
   }
 }
 
-}  // namespace
-
-std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton, const SeparationPlanes& separation,
-                                   std::span<const Chart> charts, std::span<const Patch> patches, SpdHit which) {
-  const LocalTriangles local = localize(skeleton, separation, charts);
-  std::vector<SpdPatch> records;
-  std::vector<int> column_patches;
+/// The rays of patches in the layout of spd.cl.
+struct RayTables {
+  std::vector<SpdPatch> patches;
   std::vector<RowRecord> rows;
-  std::vector<int> row_guesses;
   std::vector<ColumnRecord> columns;
+  std::vector<int> column_patches, row_guesses;
   int texels = 0, tallest = 0;
-  for (std::size_t i = 0; i < charts.size(); ++i) {
-    const int bone = charts[i].bone, width = patches[i].rectangle.width, height = patches[i].rectangle.height;
+
+  void add(const Skeleton& skeleton, const SeparationPlanes& separation, int bone, const Patch& patch, double extent) {
+    const int width = patch.rectangle.width, height = patch.rectangle.height;
     const bool is_head_free = separation.is_free(bone, BoneEnd::kHead),
                is_tail_free = separation.is_free(bone, BoneEnd::kTail);
     // Cuts lie off the separation planes by the segmentation's perturbation and by rounding; both are relative to the
     // model's size.
-    const float tolerance = static_cast<float>(4e-6 * local.extent);
-    records.push_back({static_cast<float>(bone_length(skeleton, bone)), tolerance, is_head_free ? 0 : tolerance,
+    const float tolerance = static_cast<float>(4e-6 * extent);
+    column_patches.resize(column_patches.size() + width, static_cast<int>(patches.size()));
+    patches.push_back({static_cast<float>(bone_length(skeleton, bone)), tolerance, is_head_free ? 0 : tolerance,
                        is_tail_free ? 0 : tolerance, width, height, static_cast<int>(rows.size()),
                        static_cast<int>(columns.size()), texels, is_head_free, is_tail_free,
                        static_cast<int>(row_guesses.size()), 0, 0});
     tallest = std::max(tallest, height);
     texels += width * height;
-    for (const double u : patches[i].row_u) {
+    for (const double u : patch.row_u) {
       const Axial at = axial_of(u, is_head_free, is_tail_free);
       rows.push_back({static_cast<float>(u), static_cast<float>(at.axial),
                       static_cast<float>(std::max(kPoleCosine, std::cos(at.latitude))),
                       static_cast<float>(std::sin(at.latitude))});
     }
-    append_guesses(std::span(rows).last(height), records.back(), row_guesses);
+    append_guesses(std::span(rows).last(height), patches.back(), row_guesses);
     for (int j = 0; j < width; ++j) {
       const double turn = static_cast<double>(j) / width, angle = 2 * std::numbers::pi * turn;
       columns.push_back({static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)),
                          static_cast<float>(separation.slope(bone, BoneEnd::kHead, turn)),
                          static_cast<float>(separation.slope(bone, BoneEnd::kTail, turn))});
-      column_patches.push_back(static_cast<int>(i));
     }
   }
-  const Lists lists = fill_lists(static_cast<int>(columns.size()), charts.size(), [&](std::size_t i, auto&& visit) {
-    for (int t = local.begins[i]; t < local.begins[i + 1]; ++t)
-      for_each_angle(local, t, records[i].width, AngleCell::kAngle,
-                     [&](int j) { visit(records[i].column_begin + j, t); });
-  });
+};
 
-  const int column_count = static_cast<int>(columns.size());
-  const int tile_rows = context.device().type == "cpu" ? std::max(tallest, 1) : kTileRowsGpu;
-  const std::size_t tiles = (tallest + tile_rows - 1) / tile_rows;
-  auto hit_triangles = context.allocate<int>(texels);
-  auto hit_distances = context.allocate<float>(texels);
+/// Each chart cut into sectors about its bone and slabs along it: as many as leave lists as long as in small charts,
+/// however fine the mesh.
+struct SightGrid {
+  int sectors = 0, slabs = 0;
+  int first_list = 0;
+  float lowest = 0, slabs_per_height = 0;
+
+  int slab_of(float z) const { return std::clamp(static_cast<int>((z - lowest) * slabs_per_height), 0, slabs - 1); }
+};
+
+std::vector<SightGrid> make_sight_grids(const LocalTriangles& local, std::span<const Chart> charts) {
+  std::vector<SightGrid> grids(charts.size());
+  int lists = 0;
+  for (std::size_t i = 0; i < charts.size(); ++i) {
+    SightGrid& grid = grids[i];
+    const double finer = std::max(1.0, std::sqrt(static_cast<double>(charts[i].triangles.size()) / kSightTriangles));
+    grid.sectors = static_cast<int>(finer * kSightSectors);
+    grid.slabs = static_cast<int>(finer * kSightSlabs);
+    grid.first_list = lists;
+    lists += grid.sectors * grid.slabs;
+    grid.lowest = std::numeric_limits<float>::max();
+    float high = std::numeric_limits<float>::lowest();
+    for (int p = 3 * local.begins[i]; p < 3 * local.begins[i + 1]; ++p) {
+      grid.lowest = std::min(grid.lowest, local.points[3 * static_cast<std::size_t>(p) + 2]);
+      high = std::max(high, local.points[3 * static_cast<std::size_t>(p) + 2]);
+    }
+    grid.slabs_per_height = high > grid.lowest ? static_cast<float>(grid.slabs) / (high - grid.lowest) : 0;
+  }
+  return grids;
+}
+
+Lists list_by_sight_grid(const LocalTriangles& local, std::span<const SightGrid> grids) {
+  const int count = grids.empty() ? 0 : grids.back().first_list + grids.back().sectors * grids.back().slabs;
+  return fill_lists(count, grids.size(), [&](std::size_t i, auto&& visit) {
+    const SightGrid& grid = grids[i];
+    for (int t = local.begins[i]; t < local.begins[i + 1]; ++t) {
+      const float* p = &local.points[9 * static_cast<std::size_t>(t)];
+      const int first = grid.slab_of(std::min({p[2], p[5], p[8]})), last = grid.slab_of(std::max({p[2], p[5], p[8]}));
+      for_each_angle(local, t, grid.sectors, AngleCell::kSector, [&](int sector) {
+        for (int slab = first; slab <= last; ++slab) visit(grid.first_list + sector * grid.slabs + slab, t);
+      });
+    }
+  });
+}
+
+/// The ray from the bone's axis to a triangle's centre.
+SpdSightLine sight_line_to(const Skeleton& skeleton, const SeparationPlanes& separation, const Chart& chart,
+                           const Triangle& triangle, const SightGrid& grid) {
+  const BoneBasis& basis = separation.bases()[chart.bone];
+  const Vec3 centre = (chart.positions[triangle[0]] + chart.positions[triangle[1]] + chart.positions[triangle[2]]) / 3;
+  const SpdCoordinates at = spd_coordinates(skeleton, separation, chart.bone, centre);
+  const Vec3 offset = centre - end_position(skeleton, chart.bone, BoneEnd::kHead);
+  const double x = offset.dot(basis.s), y = offset.dot(basis.b), r = std::hypot(x, y);
+  SpdSightLine none{};
+  none.distance = -1;
+  if (!(at.u >= 0 && at.u <= 1 && r > 0)) return none;
+  const Axial axial =
+      axial_of(at.u, separation.is_free(chart.bone, BoneEnd::kHead), separation.is_free(chart.bone, BoneEnd::kTail));
+  const double foot = axial.axial * bone_length(skeleton, chart.bone);
+  const double z = offset.dot(basis.o) - foot, distance = std::hypot(r, z);
+  const double slack = 1e-6 * (std::abs(foot) + std::abs(z) + distance);
+  const int sector = std::min(grid.sectors - 1, static_cast<int>(at.turn * grid.sectors));
+  const int list = grid.first_list + sector * grid.slabs;
+  return {static_cast<float>(x / r),
+          static_cast<float>(y / r),
+          static_cast<float>(foot),
+          static_cast<float>(r / distance),
+          static_cast<float>(z / distance),
+          static_cast<float>(distance),
+          list + grid.slab_of(static_cast<float>(foot + std::min(z, 0.0) - slack)),
+          list + grid.slab_of(static_cast<float>(foot + std::max(z, 0.0) + slack))};
+}
+
+/// Spheres around all triangles: centre and radius.
+std::vector<float> bounding_spheres(const LocalTriangles& local) {
+  const float radius_slack = static_cast<float>(1e-6 * local.extent);
+  std::vector<float> spheres(4 * static_cast<std::size_t>(local.count()));
+  for_each_block(local.count(), 1024, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const Eigen::Map<const Eigen::Matrix3f> corners(&local.points[9 * t]);
+      const Eigen::Vector3f middle = corners.rowwise().mean();
+      const float radius = std::sqrt((corners.colwise() - middle).colwise().squaredNorm().maxCoeff());
+      Eigen::Map<Eigen::Vector4f>(&spheres[4 * t]) << middle, radius + radius_slack;
+    }
+  });
+  return spheres;
+}
+
+/// The share of a chart's area that is hidden. \param is_hidden  per triangle
+double hidden_fraction(const Chart& chart, std::span<const int> is_hidden) {
+  double unseen = 0, area = 0;
+  for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
+    const Triangle& triangle = chart.triangles[t];
+    const Vec3& p = chart.positions[triangle[0]];
+    const double a = 0.5 * (chart.positions[triangle[1]] - p).cross(chart.positions[triangle[2]] - p).norm();
+    area += a;
+    if (is_hidden[t]) unseen += a;
+  }
+  return area > 0 ? unseen / area : 0;
+}
+
+/// Appends tables behind each other. \return where the second one begins
+int append(std::vector<int>& tables, const std::vector<int>& more) {
+  const int begin = static_cast<int>(tables.size());
+  tables.insert(tables.end(), more.begin(), more.end());
+  return begin;
+}
+
+}  // namespace
+
+std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton, const SeparationPlanes& separation,
+                                   std::span<const Chart> charts, std::span<const Patch> patches, SpdHit which) {
+  const LocalTriangles local = localize(skeleton, separation, charts);
+  RayTables rays;
+  for (std::size_t i = 0; i < charts.size(); ++i)
+    rays.add(skeleton, separation, charts[i].bone, patches[i], local.extent);
+  const int columns = static_cast<int>(rays.columns.size());
+  const Lists lists = fill_lists(columns, charts.size(), [&](std::size_t i, auto&& visit) {
+    for (int t = local.begins[i]; t < local.begins[i + 1]; ++t)
+      for_each_angle(local, t, rays.patches[i].width, AngleCell::kAngle,
+                     [&](int j) { visit(rays.patches[i].column_begin + j, t); });
+  });
+  const int tile_rows = context.device().type == "cpu" ? std::max(rays.tallest, 1) : kTileRowsGpu;
+  const std::size_t tiles = (rays.tallest + tile_rows - 1) / tile_rows;
+  std::vector<int> tables = std::move(rays.column_patches);
+  const int guesses = append(tables, rays.row_guesses), list_begins = append(tables, lists.begins);
+  const CastParameters parameters{columns, tile_rows, which == SpdHit::kLast ? 1 : 0, guesses, list_begins};
+  auto hit_triangles = context.allocate<int>(rays.texels);
+  auto hit_distances = context.allocate<float>(rays.texels);
   const ClKernelName kernel{"spd.cl", "cast_rays"};
-  context.launch(kernel, ClRange({columns.size(), tiles}, {context.work_group_size(kernel, kWorkGroup), 1}),
-                 column_count, tile_rows, which == SpdHit::kLast ? 1 : 0, context.upload(records),
-                 context.upload(column_patches), context.upload(rows), context.upload(row_guesses),
-                 context.upload(columns), context.upload(lists.begins), context.upload(lists.triangles),
-                 context.upload(local.points), hit_triangles, hit_distances);
-  const std::vector<int> found = context.download(hit_triangles);
-  const std::vector<float> distances = context.download(hit_distances);
+  context.launch(kernel, ClRange({rays.columns.size(), tiles}, {context.work_group_size(kernel, kWorkGroup), 1}),
+                 parameters, context.upload(rays.patches), context.upload(rays.rows), context.upload(rays.columns),
+                 context.upload(tables), context.upload(lists.triangles), context.upload(local.points), hit_triangles,
+                 hit_distances);
+  const auto [found, distances] = context.download(hit_triangles, hit_distances);
 
   std::vector<SpdHits> hits(charts.size());
   for (std::size_t i = 0; i < charts.size(); ++i) {
-    const int begin = records[i].texel_begin, end = begin + records[i].width * records[i].height;
+    const SpdPatch& patch = rays.patches[i];
+    const int begin = patch.texel_begin, end = begin + patch.width * patch.height;
     hits[i].triangles.assign(found.begin() + begin, found.begin() + end);
     hits[i].distances.assign(distances.begin() + begin, distances.begin() + end);
     for (int& triangle : hits[i].triangles)
@@ -214,101 +330,25 @@ std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton,
 std::vector<double> unseen_area_fractions(ClContext& context, const Skeleton& skeleton,
                                           const SeparationPlanes& separation, std::span<const Chart> charts) {
   const LocalTriangles local = localize(skeleton, separation, charts);
-  // Each chart cut into sectors about its bone and slabs along it: as many as leave lists as long as in small charts,
-  // however fine the mesh.
-  std::vector<int> sectors, slabs, first_lists{0};
-  for (const Chart& chart : charts) {
-    const double finer = std::max(1.0, std::sqrt(static_cast<double>(chart.triangles.size()) / kSightTriangles));
-    sectors.push_back(static_cast<int>(finer * kSightSectors));
-    slabs.push_back(static_cast<int>(finer * kSightSlabs));
-    first_lists.push_back(first_lists.back() + sectors.back() * slabs.back());
-  }
-  std::vector<float> lowest(charts.size(), 0), slabs_per_height(charts.size(), 0);
-  for (std::size_t i = 0; i < charts.size(); ++i) {
-    const auto [first, last] = std::pair{3 * local.begins[i], 3 * local.begins[i + 1]};
-    float low = std::numeric_limits<float>::max(), high = std::numeric_limits<float>::lowest();
-    for (int p = first; p < last; ++p) {
-      low = std::min(low, local.points[3 * static_cast<std::size_t>(p) + 2]);
-      high = std::max(high, local.points[3 * static_cast<std::size_t>(p) + 2]);
-    }
-    lowest[i] = low;
-    slabs_per_height[i] = high > low ? static_cast<float>(slabs[i]) / (high - low) : 0;
-  }
-  const auto slab_of = [&](std::size_t chart, float z) {
-    return std::clamp(static_cast<int>((z - lowest[chart]) * slabs_per_height[chart]), 0, slabs[chart] - 1);
-  };
-  const Lists lists = fill_lists(first_lists.back(), charts.size(), [&](std::size_t i, auto&& visit) {
-    for (int t = local.begins[i]; t < local.begins[i + 1]; ++t) {
-      const float* p = &local.points[9 * static_cast<std::size_t>(t)];
-      const int first = slab_of(i, std::min({p[2], p[5], p[8]})), last = slab_of(i, std::max({p[2], p[5], p[8]}));
-      for_each_angle(local, t, sectors[i], AngleCell::kSector, [&](int sector) {
-        for (int slab = first; slab <= last; ++slab) visit(first_lists[i] + sector * slabs[i] + slab, t);
-      });
-    }
-  });
+  const std::vector<SightGrid> grids = make_sight_grids(local, charts);
+  const Lists lists = list_by_sight_grid(local, grids);
   std::vector<SpdSightLine> lines(local.count());
-  std::vector<float> spheres(4 * static_cast<std::size_t>(local.count()));
-  const float radius_slack = static_cast<float>(1e-6 * local.extent);
-  for (std::size_t i = 0; i < charts.size(); ++i) {
-    const Chart& chart = charts[i];
-    const BoneBasis& basis = separation.bases()[chart.bone];
-    const Vec3& head = end_position(skeleton, chart.bone, BoneEnd::kHead);
-    const double length = bone_length(skeleton, chart.bone);
-    const bool is_head_free = separation.is_free(chart.bone, BoneEnd::kHead),
-               is_tail_free = separation.is_free(chart.bone, BoneEnd::kTail);
-    for_each_block(chart.triangles.size(), 1024, [&](std::size_t, std::size_t begin, std::size_t end) {
-      for (std::size_t k = begin; k < end; ++k) {
-        const Triangle& triangle = chart.triangles[k];
-        const Vec3 centre =
-            (chart.positions[triangle[0]] + chart.positions[triangle[1]] + chart.positions[triangle[2]]) / 3;
-        const SpdCoordinates at = spd_coordinates(skeleton, separation, chart.bone, centre);
-        const Vec3 offset = centre - head;
-        const double x = offset.dot(basis.s), y = offset.dot(basis.b), r = std::hypot(x, y);
-        SpdSightLine line{};
-        line.distance = -1;
-        if (at.u >= 0 && at.u <= 1 && r > 0) {
-          const double foot = axial_of(at.u, is_head_free, is_tail_free).axial * length;
-          const double z = offset.dot(basis.o) - foot, distance = std::hypot(r, z);
-          const double slack = 1e-6 * (std::abs(foot) + std::abs(z) + distance);
-          const int sector = std::min(sectors[i] - 1, static_cast<int>(at.turn * sectors[i]));
-          const int list = first_lists[i] + sector * slabs[i];
-          line = {static_cast<float>(x / r),
-                  static_cast<float>(y / r),
-                  static_cast<float>(foot),
-                  static_cast<float>(r / distance),
-                  static_cast<float>(z / distance),
-                  static_cast<float>(distance),
-                  list + slab_of(i, static_cast<float>(foot + std::min(z, 0.0) - slack)),
-                  list + slab_of(i, static_cast<float>(foot + std::max(z, 0.0) + slack))};
-        }
-        const std::size_t t = static_cast<std::size_t>(local.begins[i]) + k;
-        lines[t] = line;
-        const Eigen::Map<const Eigen::Matrix3f> corners(&local.points[9 * t]);
-        const Eigen::Vector3f middle = corners.rowwise().mean();
-        const float radius = std::sqrt((corners.colwise() - middle).colwise().squaredNorm().maxCoeff());
-        Eigen::Map<Eigen::Vector4f>(&spheres[4 * t]) << middle, radius + radius_slack;
-      }
+  for (std::size_t i = 0; i < charts.size(); ++i)
+    for_each_block(charts[i].triangles.size(), 1024, [&](std::size_t, std::size_t begin, std::size_t end) {
+      for (std::size_t t = begin; t < end; ++t)
+        lines[local.begins[i] + t] = sight_line_to(skeleton, separation, charts[i], charts[i].triangles[t], grids[i]);
     });
-  }
-
   auto is_hidden = context.allocate<int>(lines.size());
   const ClKernelName kernel{"spd.cl", "find_hidden"};
-  context.launch(kernel, ClRange({lines.size(), 1}, {context.work_group_size(kernel, kWorkGroup), 1}), local.count(),
-                 context.upload(lines), context.upload(lists.begins), context.upload(lists.triangles),
-                 context.upload(spheres), context.upload(local.points), is_hidden);
+  context.launch(kernel, ClRange({lines.size(), 1}, {context.work_group_size(kernel, kWorkGroup), 1}),
+                 HideParameters{local.count()}, context.upload(lines), context.upload(lists.begins),
+                 context.upload(lists.triangles), context.upload(bounding_spheres(local)), context.upload(local.points),
+                 is_hidden);
   const std::vector<int> hidden = context.download(is_hidden);
 
   std::vector<double> fractions(charts.size(), 0);
   for_each_block(charts.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-    double unseen = 0, area = 0;
-    for (std::size_t t = 0; t < charts[i].triangles.size(); ++t) {
-      const Triangle& triangle = charts[i].triangles[t];
-      const Vec3& p = charts[i].positions[triangle[0]];
-      const double a = 0.5 * (charts[i].positions[triangle[1]] - p).cross(charts[i].positions[triangle[2]] - p).norm();
-      area += a;
-      if (hidden[local.begins[i] + t]) unseen += a;
-    }
-    fractions[i] = area > 0 ? unseen / area : 0;
+    fractions[i] = hidden_fraction(charts[i], std::span(hidden).subspan(local.begins[i]));
   });
   return fractions;
 }
@@ -334,5 +374,18 @@ SpdCoordinates spd_coordinates(const Skeleton& skeleton, const SeparationPlanes&
     axial = z < a_head ? std::min((z - a_head) / length, -1e-9) : 1 + std::max((z - a_tail) / length, 1e-9);
   return {u_of({axial, 0}, is_head_free, is_tail_free), turn};
 }
+
+namespace {
+
+class SpdMethod : public ParameterizationMethod {
+ public:
+  std::vector<MapReport> map(ClContext&, std::span<Chart> charts, const MapOptions&) const override {
+    return std::vector<MapReport>(charts.size());
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<ParameterizationMethod> make_spd_method() { return std::make_unique<SpdMethod>(); }
 
 }  // namespace skeletex

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <memory>
 #include <span>
 #include <vector>
 
-#include "skeletex/convert/parameterize/chart.h"
-#include "skeletex/device/context.h"
+#include "skeletex/convert/parameterize/method.h"
 #include "skeletex/skeleton/frame.h"
 
 namespace skeletex {
+
+/// The method whose texels are the hits of rays from the bone.
+std::unique_ptr<ParameterizationMethod> make_spd_method();
 
 enum class SpdHit { kFirst, kLast };
 

@@ -6,8 +6,6 @@
 namespace skeletex {
 namespace {
 
-bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind == ChartVertex::kTailPole; }
-
 /// A number as two floats whose sum is exact to 2^-48.
 struct SplitValues {
   std::vector<float> high, low;
@@ -39,7 +37,7 @@ DeviceMaps upload_maps(ClContext& context, std::span<const Chart> charts, std::s
   DeviceMaps maps;
   for (std::size_t bone = 0; bone < charts.size(); ++bone) {
     maps.first_triangle.push_back(maps.triangle_count);
-    if (patches[bone].method == Method::kVsm) maps.triangle_count += static_cast<int>(charts[bone].triangles.size());
+    if (!is_height_field(patches[bone].method)) maps.triangle_count += static_cast<int>(charts[bone].triangles.size());
   }
   maps.first_triangle.push_back(maps.triangle_count);
   const std::size_t count = maps.triangle_count;
@@ -49,7 +47,7 @@ DeviceMaps upload_maps(ClContext& context, std::span<const Chart> charts, std::s
   for (std::size_t bone = 0; bone < charts.size(); ++bone) {
     const int base = static_cast<int>(x.size());
     maps.first_vertex.push_back(base);
-    if (patches[bone].method != Method::kVsm) continue;
+    if (is_height_field(patches[bone].method)) continue;
     const Chart& chart = charts[bone];
     for (std::size_t i = 0; i < chart.positions.size(); ++i) {
       u.push_back(chart.u[i]);

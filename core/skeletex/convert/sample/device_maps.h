@@ -9,6 +9,11 @@
 
 namespace skeletex {
 
+/// Planes of points on the device, one value per texel.
+struct TexelPoints {
+  ClBuffer<float> x, y, z;
+};
+
 /// The rectangles of a texture on the device.
 struct DeviceLayout {
   int width = 0, height = 0;      ///< of the texture

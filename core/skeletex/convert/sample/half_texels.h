@@ -24,7 +24,7 @@ struct RoundingReport {
 /// \param texels   in and out: along, around, out
 RoundingReport round_to_half(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches,
                              const DeviceLayout& layout, const ClBuffer<RowRecord>& rows,
-                             const ClBuffer<ColumnRecord>& columns, const DevicePlanes& points, DevicePlanes& texels);
+                             const ClBuffer<ColumnRecord>& columns, const TexelPoints& points, TexelPoints& texels);
 
 struct RoundedModel {
   SkeletexModel model;

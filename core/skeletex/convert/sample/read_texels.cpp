@@ -3,9 +3,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <future>
 #include <limits>
-#include <memory>
 
 #include "skeletex/geometry/parallel.h"
 
@@ -65,7 +63,7 @@ int fill_missed(const SpdHits& hits, const Rectangle& r, std::vector<float>& dis
 std::vector<int> fill_uncovered(std::span<const Patch> patches, int texture_width, std::vector<int>& texel_triangles) {
   std::vector<int> counts(patches.size(), 0);
   for (std::size_t bone = 0; bone < patches.size(); ++bone) {
-    if (patches[bone].method != Method::kVsm) continue;
+    if (is_height_field(patches[bone].method)) continue;
     const Rectangle& r = patches[bone].rectangle;
     for (int row = 1; row + 1 < r.height; ++row) {
       int* line = texel_triangles.data() + (r.y + row) * static_cast<std::size_t>(texture_width) + r.x;
@@ -88,7 +86,7 @@ TexelPoints allocate_points(ClContext& context, std::size_t size) {
 
 template <class T>
 void copy_plane(ClContext& context, const ClBuffer<T>& from, ClBuffer<T>& to) {
-  context.queue().enqueueCopyBuffer(from.memory, to.memory, 0, 0, from.size * sizeof(T));
+  context.copy(from, to);
 }
 
 TexelPoints copy_points(ClContext& context, const TexelPoints& points) {
@@ -126,16 +124,32 @@ std::vector<int> vsm_texels(std::span<const Patch> patches, int texture_width, i
     const Rectangle& r = patch.rectangle;
     for (int row = 0; row < r.height; ++row)
       std::fill_n(is_vsm.begin() + (r.y + row) * static_cast<std::size_t>(texture_width) + r.x, r.width,
-                  static_cast<int>(patch.method == Method::kVsm));
+                  static_cast<int>(!is_height_field(patch.method)));
   }
   return is_vsm;
 }
 
-SnapReport report_snap(int vertices, int edges, int put_back, const std::vector<int>& anchors) {
+bool has_spd(std::span<const Patch> patches) {
+  return std::any_of(patches.begin(), patches.end(), [](const Patch& patch) { return is_height_field(patch.method); });
+}
+
+PlacedTexels download_texels(ClContext& context, const TexelPoints& points, const ClBuffer<float>& offset_x,
+                             const ClBuffer<float>& offset_y, const ClBuffer<int>& anchors,
+                             const ClBuffer<int>& map_triangles) {
+  auto [x, y, z, own_x, own_y, own_anchors, triangles] =
+      context.download(points.x, points.y, points.z, offset_x, offset_y, anchors, map_triangles);
+  return {{std::move(x), std::move(y), std::move(z)},
+          std::move(own_x),
+          std::move(own_y),
+          std::move(own_anchors),
+          std::move(triangles)};
+}
+
+SnapReport report_snap(int vertices, int edges, int reverted, const std::vector<int>& anchors) {
   SnapReport report;
   report.vertices = vertices;
   report.edges = edges;
-  report.texels_put_back = put_back;
+  report.reverted_texels = reverted;
   // Signs, as 0 and -1.
   const Eigen::Map<const Eigen::ArrayXi> numbers(anchors.data(), static_cast<Eigen::Index>(anchors.size()));
   report.snapped_vertices = -(-numbers).shiftRight<31>().sum(),
@@ -148,173 +162,260 @@ SnapReport report_snap(int vertices, int edges, int put_back, const std::vector<
   return report;
 }
 
+/// What all steps read: the layout and the maps on the device.
+struct TexelStage {
+  ClContext& context;
+  const TexelSources& sources;
+  FrameTables tables;
+  DeviceLayout layout;
+  ClBuffer<RowRecord> rows;
+  ClBuffer<ColumnRecord> columns;
+  ClBuffer<LatticeRow> inner_rows, all_rows;
+  DeviceMaps maps;
+  bool has_gaps = false;  // between rectangles
+
+  std::vector<Patch> patches() const { return {sources.patches.begin(), sources.patches.end()}; }
+  bool has_maps() const { return maps.triangle_count > 0; }
+};
+
+/// Where texels read, and what they have read.
+struct ReadTexels {
+  TexelPoints points;
+  ReadingPositions positions;
+  ClBuffer<int> map_triangles;  // per texel; kNoTriangle: none
+};
+
+TexelStage prepare_stage(ClContext& context, const Skeleton& skeleton, const SeparationPlanes& separation,
+                         const TexelSources& sources, int width, int height, const Vec3& origin) {
+  const std::vector<Patch> patches(sources.patches.begin(), sources.patches.end());
+  const FrameTables tables = frame_tables(skeleton, separation, patches, origin);
+  std::size_t in_patches = 0;
+  for (const Patch& patch : patches)
+    in_patches += static_cast<std::size_t>(patch.rectangle.width) * patch.rectangle.height;
+  TexelStage stage{context,
+                   sources,
+                   tables,
+                   upload_layout(context, patches, tables, width, height),
+                   context.upload(tables.rows),
+                   context.upload(tables.columns),
+                   context.upload(lattice_rows(patches, RowChoice::kInner)),
+                   context.upload(lattice_rows(patches, RowChoice::kAll)),
+                   upload_maps(context, sources.charts, patches, origin)};
+  stage.has_gaps = in_patches < stage.layout.size();
+  return stage;
+}
+
+/// VSM patches at the places of their texels. \param missed  out, per bone
+ReadTexels read_regular_grid(const TexelStage& stage, ClBuffer<int>& is_read, std::vector<int>& missed) {
+  ClContext& context = stage.context;
+  const DeviceLayout& layout = stage.layout;
+  const DeviceMaps& maps = stage.maps;
+  ReadTexels texels{allocate_points(context, layout.size()), even_positions(context, layout),
+                    context.allocate<int>(layout.size())};
+  for (ClBuffer<float>* plane : {&texels.points.x, &texels.points.y, &texels.points.z}) context.fill(*plane, 0.f);
+  context.fill(texels.map_triangles, kNoTriangle);
+  if (!stage.has_maps()) return texels;
+  // A CPU looks at each triangle once; a GPU needs more work-items for the rows of tall ones.
+  const std::size_t shares = context.device().type == "cpu" ? 1 : 8;
+  context.launch({"encode.cl", "cover_texels"}, ClRange(maps.triangle_count, shares), maps.triangle_count, maps.corners,
+                 maps.turns, maps.poles, maps.triangle_patches, maps.u_high, maps.u_low, maps.v_high, maps.v_low,
+                 layout.patches, maps.row_high, maps.row_low, layout.width, texels.map_triangles);
+  std::vector<int> map_triangles = context.download(texels.map_triangles);
+  missed = fill_uncovered(stage.sources.patches, layout.width, map_triangles);
+  context.write(texels.map_triangles, map_triangles);
+  context.launch({"encode.cl", "read_surface"}, row_range(context, stage.inner_rows.size),
+                 static_cast<int>(stage.inner_rows.size), layout.width, maps.triangle_count, stage.inner_rows,
+                 texels.map_triangles, maps.corners, maps.turns, maps.poles, maps.u_high, maps.u_low, maps.v_high,
+                 maps.v_low, maps.x, maps.y, maps.z, layout.patches, maps.row_high, maps.row_low,
+                 texels.positions.home_x, texels.positions.home_y, texels.points.x, texels.points.y, texels.points.z,
+                 is_read);
+  return texels;
+}
+
+/// The share of a chart's triangles that its rays hit.
+double hit_fraction(const SpdHits& hits, const Chart& chart) {
+  std::vector<int> seen = hits.triangles;
+  std::sort(seen.begin(), seen.end());
+  seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+  if (!seen.empty() && seen.front() < 0) seen.erase(seen.begin());
+  return static_cast<double>(seen.size()) / static_cast<double>(chart.triangles.size());
+}
+
+/// SPD patches, by their rays.
+void place_spd_patches(const TexelStage& stage, TexelPoints& points, TexelReport& report) {
+  const DeviceLayout& layout = stage.layout;
+  std::vector<float> distances(layout.size(), -1);
+  for (std::size_t bone = 0; bone < stage.sources.patches.size(); ++bone) {
+    if (!is_height_field(stage.sources.patches[bone].method)) continue;
+    const Rectangle& r = stage.sources.patches[bone].rectangle;
+    const SpdHits& hits = stage.sources.spd_hits[bone];
+    std::vector<float> filled;
+    report.missed_texels[bone] = fill_missed(hits, r, filled);
+    for (int row = 0; row < r.height; ++row)
+      std::copy_n(filled.begin() + static_cast<std::size_t>(row) * r.width, r.width,
+                  distances.begin() + (r.y + row) * static_cast<std::size_t>(layout.width) + r.x);
+    report.sampled_triangle_fractions[bone] = hit_fraction(hits, stage.sources.charts[bone]);
+  }
+  stage.context.launch({"encode.cl", "place_spd_points"}, layout.range(), layout.width, layout.height,
+                       layout.texel_patches, stage.context.upload(distances), layout.patches, stage.rows, stage.columns,
+                       points.x, points.y, points.z);
+}
+
+UnfoldReport unfold(const TexelStage& stage, ClBuffer<int>& is_read, ReadTexels& texels) {
+  const DeviceLayout& layout = stage.layout;
+  const DeviceMaps& maps = stage.maps;
+  const auto read_listed = [&](const ClBuffer<int>& listed, int count) {
+    stage.context.launch({"encode.cl", "read_listed"}, ClRange(count), count, layout.width, maps.triangle_count, listed,
+                         layout.texel_patches, texels.map_triangles, maps.corners, maps.turns, maps.poles, maps.across,
+                         maps.u_high, maps.u_low, maps.v_high, maps.v_low, maps.x, maps.y, maps.z, layout.patches,
+                         maps.row_high, maps.row_low, texels.positions.home_x, texels.positions.home_y, texels.points.x,
+                         texels.points.y, texels.points.z, is_read);
+  };
+  return unfold_lattice(stage.context, layout, stage.sources.patches, maps, texels.map_triangles, read_listed,
+                        texels.positions, texels.points);
+}
+
+/// Texels of VSM patches where they snap to. \param regular  its positions are taken over
+ReadTexels snap(const TexelStage& stage, ClBuffer<int>& is_read, ReadTexels& regular) {
+  ClContext& context = stage.context;
+  const DeviceLayout& layout = stage.layout;
+  const DeviceMaps& maps = stage.maps;
+  const DeviceSnapTables& features = *stage.sources.features;
+  const SnappedPositions snapped = snap_positions(context, layout, features, regular.positions);
+  const std::size_t size = layout.size();
+  ReadTexels texels{allocate_points(context, size),
+                    {context.allocate<float>(size), context.allocate<float>(size), context.allocate<int>(size),
+                     regular.positions.home_x, regular.positions.home_y},
+                    context.allocate<int>(size)};
+  if (stage.has_gaps) {
+    context.fill(texels.map_triangles, kNoTriangle), context.fill(texels.positions.anchors, 0);
+    for (ClBuffer<float>* plane : {&texels.points.x, &texels.points.y, &texels.points.z}) context.fill(*plane, 0.f);
+    context.fill(texels.positions.x, 0.f), context.fill(texels.positions.y, 0.f);
+  }
+  context.launch({"encode.cl", "read_snapped"}, row_range(context, stage.all_rows.size),
+                 static_cast<int>(stage.all_rows.size), layout.width, maps.triangle_count, stage.all_rows,
+                 regular.map_triangles, maps.corners, maps.turns, maps.poles, maps.across, maps.u_high, maps.u_low,
+                 maps.v_high, maps.v_low, maps.x, maps.y, maps.z, layout.patches, maps.row_high, maps.row_low,
+                 regular.positions.home_x, regular.positions.home_y, snapped.x, snapped.y, snapped.anchors,
+                 snapped.parameters, features.vertex_points, features.edge_points, regular.points.x, regular.points.y,
+                 regular.points.z, texels.positions.x, texels.positions.y, texels.positions.anchors,
+                 texels.map_triangles, texels.points.x, texels.points.y, texels.points.z, is_read);
+  return texels;
+}
+
+/// A copy of the regular grid, to be fitted.
+ReadTexels copy_of(const TexelStage& stage, const ReadTexels& regular) {
+  ReadTexels texels = regular;
+  texels.points = copy_points(stage.context, regular.points);
+  copy_plane(stage.context, regular.positions.home_x, texels.positions.x);
+  copy_plane(stage.context, regular.positions.home_y, texels.positions.y);
+  return texels;
+}
+
+TexelPoints prefilter(const TexelStage& stage, const TexelPoints& points, const ClBuffer<int>& are_kept, int kept) {
+  TexelPoints filtered = allocate_points(stage.context, stage.layout.size());
+  if (stage.has_gaps)
+    for (ClBuffer<float>* plane : {&filtered.x, &filtered.y, &filtered.z}) stage.context.fill(*plane, 0.f);
+  stage.context.launch({"encode.cl", "prefilter_positions"}, row_range(stage.context, stage.all_rows.size),
+                       static_cast<int>(stage.all_rows.size), stage.layout.width, kept, stage.all_rows,
+                       stage.layout.patches, are_kept, points.x, points.y, points.z, filtered.x, filtered.y,
+                       filtered.z);
+  return filtered;
+}
+
+/// Texels revert to the regular grid, as it would be stored. \return what holds them then
+std::vector<int> revert(const TexelStage& stage, const TexelOptions& options, std::span<const int> vertex_points,
+                        const ReadTexels& regular, ReadTexels& texels, TexelReport& report) {
+  ClContext& context = stage.context;
+  const TexelPoints stored =
+      options.has_prefilter ? prefilter(stage, regular.points, regular.map_triangles, kNoneIsKept) : regular.points;
+  const PlacedTexels grid = download_texels(context, stored, texels.positions.home_x, texels.positions.home_y,
+                                            texels.positions.anchors, regular.map_triangles);
+  PlacedTexels placed = download_texels(context, texels.points, texels.positions.x, texels.positions.y,
+                                        texels.positions.anchors, texels.map_triangles);
+  report.revert = revert_faults(context, *stage.sources.revert, vertex_points, grid, placed);
+  texels.points = {context.upload(placed.points[0]), context.upload(placed.points[1]),
+                   context.upload(placed.points[2])};
+  return std::move(placed.anchors);
+}
+
+/// Points of VSM patches snapped or fitted, with what then reverts.
+TexelPoints place_points(const TexelStage& stage, const TexelOptions& options, ClBuffer<int>& is_read,
+                         ReadTexels& regular, TexelReport& report) {
+  ClContext& context = stage.context;
+  const TexelSources& sources = stage.sources;
+  std::vector<int> vertex_points;
+  if (sources.features) vertex_points = context.download(sources.features->vertex_points);
+  ReadTexels texels = sources.features ? snap(stage, is_read, regular) : copy_of(stage, regular);
+  if (options.has_fit)
+    report.fit = fit_points(context, stage.layout, stage.maps, texels.map_triangles, texels.positions, texels.points);
+  // What is snapped or fitted is not filtered as well: only SPD patches are.
+  if (options.has_prefilter && has_spd(sources.patches))
+    texels.points =
+        prefilter(stage, texels.points,
+                  context.upload(vsm_texels(sources.patches, stage.layout.width, stage.layout.height)), kIsKept);
+  const std::vector<int> anchors = sources.revert ? revert(stage, options, vertex_points, regular, texels, report)
+                                                  : context.download(texels.positions.anchors);
+  const int reverted = report.revert ? report.revert->reverted_texels : 0;
+  if (report.fit) report.fit->reverted_texels = reverted;
+  if (sources.features)
+    report.snap = report_snap(static_cast<int>(vertex_points.size()),
+                              static_cast<int>(sources.features->edge_points.size), report.fit ? 0 : reverted, anchors);
+  return texels.points;
+}
+
+/// Points in bone tangent space: along, around, out.
+TexelPoints encode_points(const TexelStage& stage, const TexelPoints& points) {
+  ClContext& context = stage.context;
+  TexelPoints stored = allocate_points(context, stage.layout.size());
+  for (ClBuffer<float>* plane : {&stored.x, &stored.y, &stored.z})
+    if (stage.has_gaps) context.fill(*plane, 0.f);
+  context.launch({"encode.cl", "encode_texels"}, row_range(context, stage.all_rows.size),
+                 static_cast<int>(stage.all_rows.size), stage.layout.width, stage.all_rows, stage.layout.patches,
+                 stage.rows, stage.columns, points.x, points.y, points.z, stored.x, stored.y, stored.z);
+  return stored;
+}
+
+/// The share of each VSM chart's triangles that a texel has read.
+void report_read(const TexelStage& stage, const ClBuffer<int>& is_read, TexelReport& report) {
+  const std::vector<int> marks = stage.context.download(is_read);
+  for (std::size_t bone = 0; bone < stage.sources.patches.size(); ++bone) {
+    const int begin = stage.maps.first_triangle[bone], end = stage.maps.first_triangle[bone + 1];
+    if (end > begin)
+      report.sampled_triangle_fractions[bone] =
+          static_cast<double>(std::count(marks.begin() + begin, marks.begin() + end, 1)) / (end - begin);
+  }
+}
+
 }  // namespace
 
 TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const SeparationPlanes& separation,
                         const TexelSources& sources, int texture_width, int texture_height, const Vec3& origin,
                         const TexelOptions& options) {
-  const int bones = static_cast<int>(sources.patches.size());
   TexelResult result;
-  result.report.sampled_triangle_fractions.resize(bones, 0);
-  result.report.missed_texels.resize(bones, 0);
-
-  const FrameTables tables =
-      frame_tables(skeleton, separation, {sources.patches.begin(), sources.patches.end()}, origin);
-  const DeviceLayout layout = upload_layout(context, sources.patches, tables, texture_width, texture_height);
-  const std::size_t texels = layout.size();
-  const auto rows = context.upload(tables.rows);
-  const auto columns = context.upload(tables.columns);
-  std::size_t in_patches = 0;
-  for (const Patch& patch : sources.patches)
-    in_patches += static_cast<std::size_t>(patch.rectangle.width) * patch.rectangle.height;
-  const bool has_gaps = in_patches < texels;
-  const auto inner_rows =
-      context.upload(lattice_rows({sources.patches.begin(), sources.patches.end()}, RowChoice::kInner));
-  const int inner_row_count = static_cast<int>(inner_rows.size);
-  TexelPoints points = allocate_points(context, texels);
-  context.fill(points.x, 0.f), context.fill(points.y, 0.f), context.fill(points.z, 0.f);
-  ReadingPositions positions = even_positions(context, layout);
-
-  const DeviceMaps maps = upload_maps(context, sources.charts, sources.patches, origin);
-  const bool is_snapped = sources.features.valid() && maps.triangle_count > 0,
-             is_fitted = options.has_fit && maps.triangle_count > 0;
-  auto covering = context.allocate<int>(texels);
-  auto is_read = context.allocate<int>(std::max(1, maps.triangle_count));
+  TexelReport& report = result.report;
+  report.sampled_triangle_fractions.resize(sources.patches.size(), 0);
+  report.missed_texels.resize(sources.patches.size(), 0);
+  const TexelStage stage = prepare_stage(context, skeleton, separation, sources, texture_width, texture_height, origin);
+  auto is_read = context.allocate<int>(std::max(1, stage.maps.triangle_count));
   context.fill(is_read, 0);
-  if (maps.triangle_count > 0) {
-    context.fill(covering, kNoTriangle);
-    // A CPU looks at each triangle once; a GPU needs more work-items for the rows of tall ones.
-    const std::size_t shares = context.device().type == "cpu" ? 1 : 8;
-    context.launch({"encode.cl", "cover_texels"}, ClRange(maps.triangle_count, shares), maps.triangle_count,
-                   maps.corners, maps.turns, maps.poles, maps.triangle_patches, maps.u_high, maps.u_low, maps.v_high,
-                   maps.v_low, layout.patches, maps.row_high, maps.row_low, texture_width, covering);
-    std::vector<int> texel_triangles = context.download(covering);
-    result.report.missed_texels = fill_uncovered(sources.patches, texture_width, texel_triangles);
-    context.write(covering, texel_triangles);
-    context.launch({"encode.cl", "read_surface"}, row_range(context, inner_rows.size), inner_row_count, texture_width,
-                   maps.triangle_count, inner_rows, covering, maps.corners, maps.turns, maps.poles, maps.u_high,
-                   maps.u_low, maps.v_high, maps.v_low, maps.x, maps.y, maps.z, layout.patches, maps.row_high,
-                   maps.row_low, positions.home_x, positions.home_y, points.x, points.y, points.z, is_read);
-  }
 
-  // Rays.
-  std::vector<float> distances;
-  bool has_spd = false;
-  for (int bone = 0; bone < bones; ++bone) {
-    if (sources.patches[bone].method != Method::kSpd) continue;
-    if (!has_spd) distances.assign(texels, -1);
-    has_spd = true;
-    const Rectangle& r = sources.patches[bone].rectangle;
-    std::vector<float> filled;
-    result.report.missed_texels[bone] = fill_missed(sources.spd_hits[bone], r, filled);
-    for (int row = 0; row < r.height; ++row)
-      std::copy_n(filled.begin() + static_cast<std::size_t>(row) * r.width, r.width,
-                  distances.begin() + (r.y + row) * static_cast<std::size_t>(texture_width) + r.x);
-    std::vector<int> seen = sources.spd_hits[bone].triangles;
-    std::sort(seen.begin(), seen.end());
-    seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
-    if (!seen.empty() && seen.front() < 0) seen.erase(seen.begin());
-    result.report.sampled_triangle_fractions[bone] =
-        static_cast<double>(seen.size()) / static_cast<double>(sources.charts[bone].triangles.size());
-  }
-  if (has_spd) {
-    const auto device_distances = context.upload(distances);
-    context.launch({"encode.cl", "place_spd_points"}, layout.range(), texture_width, texture_height,
-                   layout.texel_patches, device_distances, layout.patches, rows, columns, points.x, points.y, points.z);
-  }
-  place_end_rows(context, sources, texture_width, origin, points);
-
-  if (options.has_unfold && maps.triangle_count > 0) {
-    const auto read_listed = [&](const ClBuffer<int>& listed, int count) {
-      context.launch({"encode.cl", "read_listed"}, ClRange(count), count, texture_width, maps.triangle_count, listed,
-                     layout.texel_patches, covering, maps.corners, maps.turns, maps.poles, maps.across, maps.u_high,
-                     maps.u_low, maps.v_high, maps.v_low, maps.x, maps.y, maps.z, layout.patches, maps.row_high,
-                     maps.row_low, positions.home_x, positions.home_y, points.x, points.y, points.z, is_read);
-    };
-    result.report.unfold =
-        unfold_lattice(context, layout, sources.patches, maps, covering, read_listed, positions, points);
-  }
-  const TexelPoints even = points;
-  const ClBuffer<int> even_covering = covering;
-  const auto all_rows = context.upload(lattice_rows({sources.patches.begin(), sources.patches.end()}, RowChoice::kAll));
-  const auto prefilter = [&](ClContext& on, const TexelPoints& from, const ClBuffer<int>& are_kept, int kept) {
-    TexelPoints filtered = allocate_points(on, texels);
-    on.launch({"encode.cl", "prefilter_positions"}, row_range(on, all_rows.size), static_cast<int>(all_rows.size),
-              texture_width, kept, all_rows, layout.patches, are_kept, from.x, from.y, from.z, filtered.x, filtered.y,
-              filtered.z);
-    return filtered;
-  };
-  // The regular grid is measured beside the snapping, on a queue of its own.
-  std::unique_ptr<ClContext> beside;
-  std::future<std::unique_ptr<Guard>> measuring_even;
-  if ((is_snapped || is_fitted) && sources.guard) {
-    context.finish();
-    beside = context.beside();
-    measuring_even = std::async(context.can_run_beside() ? std::launch::async : std::launch::deferred, [&] {
-      const TexelPoints filtered = options.has_prefilter ? prefilter(*beside, even, even_covering, kNoneIsKept) : even;
-      return std::make_unique<Guard>(*beside, *sources.guard, layout, maps, even_covering, even, filtered);
-    });
-  }
-  int put_back = 0, edges = 0;
-  std::vector<int> vertex_points;
-  if (is_snapped) {
-    const DeviceSnapTables& features = sources.features.get();
-    vertex_points = context.download(features.vertex_points), edges = static_cast<int>(features.edge_points.size);
-    const SnappedPositions snapped = snap_positions(context, layout, features, positions);
-    points = allocate_points(context, texels), covering = context.allocate<int>(texels);
-    positions.x = context.allocate<float>(texels), positions.y = context.allocate<float>(texels),
-    positions.anchors = context.allocate<int>(texels);
-    if (has_gaps) context.fill(covering, kNoTriangle), context.fill(positions.anchors, 0);
-    context.launch({"encode.cl", "read_snapped"}, row_range(context, all_rows.size), static_cast<int>(all_rows.size),
-                   texture_width, maps.triangle_count, all_rows, even_covering, maps.corners, maps.turns, maps.poles,
-                   maps.across, maps.u_high, maps.u_low, maps.v_high, maps.v_low, maps.x, maps.y, maps.z,
-                   layout.patches, maps.row_high, maps.row_low, positions.home_x, positions.home_y, snapped.x,
-                   snapped.y, snapped.anchors, snapped.parameters, features.vertex_points, features.edge_points, even.x,
-                   even.y, even.z, positions.x, positions.y, positions.anchors, covering, points.x, points.y, points.z,
-                   is_read);
-  } else if (is_fitted) {
-    copy_plane(context, positions.home_x, positions.x), copy_plane(context, positions.home_y, positions.y);
-    points = copy_points(context, even);
-  }
-  if (is_fitted) result.report.fit = fit_points(context, layout, maps, covering, positions, points);
-  // What is snapped or fitted is not filtered as well: with SPD patches beside it, only these are.
-  const bool is_placed = is_snapped || is_fitted;
-  if (options.has_prefilter && !is_placed) points = prefilter(context, points, positions.anchors, kNoneIsKept);
-  if (options.has_prefilter && is_placed && has_spd)
+  ReadTexels regular = read_regular_grid(stage, is_read, report.missed_texels);
+  if (has_spd(sources.patches)) place_spd_patches(stage, regular.points, report);
+  place_end_rows(context, sources, texture_width, origin, regular.points);
+  if (options.has_unfold && stage.has_maps()) report.unfold = unfold(stage, is_read, regular);
+  TexelPoints points;
+  if (stage.has_maps() && (sources.features || options.has_fit))
+    points = place_points(stage, options, is_read, regular, report);
+  else
     points =
-        prefilter(context, points, context.upload(vsm_texels(sources.patches, texture_width, texture_height)), kIsKept);
-  std::vector<int> anchors;
-  if (measuring_even.valid()) {
-    context.finish();
-    const std::unique_ptr<Guard> even_guard = measuring_even.get();
-    GuardReport guard = even_guard->put_back_faults(context, vertex_points, covering, positions, points);
-    context.take_profile(*beside);
-    result.report.turned_triangles = guard.turned_triangles,
-    result.report.even_turned_triangles = guard.even_turned_triangles;
-    (is_fitted ? result.report.fit->texels_put_back : put_back) += guard.texels_put_back;
-    anchors = std::move(guard.anchors);
-  }
-  if (is_snapped && anchors.empty()) anchors = context.download(positions.anchors);
-  TexelPoints stored = allocate_points(context, texels);  // along, around, out
-  for (ClBuffer<float>* plane : {&stored.x, &stored.y, &stored.z})
-    if (has_gaps) context.fill(*plane, 0.f);
-  context.launch({"encode.cl", "encode_texels"}, row_range(context, all_rows.size), static_cast<int>(all_rows.size),
-                 texture_width, all_rows, layout.patches, rows, columns, points.x, points.y, points.z, stored.x,
-                 stored.y, stored.z);
+        options.has_prefilter ? prefilter(stage, regular.points, regular.map_triangles, kNoneIsKept) : regular.points;
+  TexelPoints stored = encode_points(stage, points);
   if (options.half_rule)
-    result.report.rounding =
-        round_to_half(context, *options.half_rule, {sources.patches.begin(), sources.patches.end()}, layout, rows,
-                      columns, points, stored);
-  if (is_snapped)
-    result.report.snap =
-        report_snap(static_cast<int>(vertex_points.size()), edges, put_back, anchors);  // beside the device's work
-  auto [along, around, out, marks] = context.download(stored.x, stored.y, stored.z, is_read);
-  for (int bone = 0; bone < bones; ++bone) {
-    const int begin = maps.first_triangle[bone], end = maps.first_triangle[bone + 1];
-    if (end > begin)
-      result.report.sampled_triangle_fractions[bone] =
-          static_cast<double>(std::count(marks.begin() + begin, marks.begin() + end, 1)) / (end - begin);
-  }
+    report.rounding = round_to_half(context, *options.half_rule, stage.patches(), stage.layout, stage.rows,
+                                    stage.columns, points, stored);
+  report_read(stage, is_read, report);
+  auto [along, around, out] = context.download(stored.x, stored.y, stored.z);
   result.texture = {texture_width, texture_height, std::move(along), std::move(around), std::move(out)};
   return result;
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <array>
-#include <future>
 #include <optional>
 #include <span>
 #include <vector>
@@ -11,7 +10,7 @@
 #include "skeletex/convert/parameterize/spd.h"
 #include "skeletex/convert/sample/half_texels.h"
 #include "skeletex/convert/sample/unfold.h"
-#include "skeletex/convert/snap/guard.h"
+#include "skeletex/convert/snap/revert_faults.h"
 #include "skeletex/convert/snap/snap.h"
 #include "skeletex/device/context.h"
 #include "skeletex/skeleton/frame.h"
@@ -25,10 +24,10 @@ struct TexelSources {
   std::span<const SpdHits> spd_hits;  ///< per bone; of VSM patches empty
   /// Per bone and end, the points of row 0 and of the last row: `width` points on a seam, or one point for a pole.
   std::span<const std::array<std::vector<Vec3>, 2>> end_points;
-  /// With snapping or fit, what the finished lattice is compared with; without it there is no such guard.
-  const GuardSources* guard = nullptr;
-  /// With snapping, what texels of VSM patches move to; waited for when the regular grid is there.
-  std::shared_future<DeviceSnapTables> features = {};
+  /// With snapping or fit, what the finished lattice is compared with, see revert_faults; without, no texel reverts.
+  const RevertSources* revert = nullptr;
+  /// With snapping, what texels of VSM patches move to.
+  const DeviceSnapTables* features = nullptr;
 };
 
 struct TexelOptions {
@@ -44,7 +43,7 @@ struct SnapReport {
   int vertices = 0, snapped_vertices = 0;  ///< inner vertices that are not flat; those that a texel sits on
   int edges = 0, snapped_edges = 0;        ///< creased edges; those with a texel between their ends
   int texels_on_edges = 0;
-  int texels_put_back = 0;  ///< by the guard
+  int reverted_texels = 0;  ///< see revert_faults
 };
 
 struct TexelReport {
@@ -53,8 +52,8 @@ struct TexelReport {
   std::optional<SnapReport> snap;
   std::optional<UnfoldReport> unfold;
   std::optional<FitReport> fit;
-  std::optional<RoundingReport> rounding;               ///< to half floats
-  int turned_triangles = 0, even_turned_triangles = 0;  ///< with snapping or fit: see GuardReport
+  std::optional<RoundingReport> rounding;  ///< to half floats
+  std::optional<RevertReport> revert;      ///< with snapping or fit
 };
 
 struct TexelResult {

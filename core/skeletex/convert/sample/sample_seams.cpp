@@ -11,12 +11,6 @@
 namespace skeletex {
 namespace {
 
-BoneEnd end_at(const Skeleton& skeleton, int bone, int node) {
-  return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
-}
-
-double wrapped(double turn) { return turn - std::round(turn); }
-
 /// Moves evenly spread places along a polyline to its bends, the sharpest first, each to the nearest place that is free
 /// and within 0.7 of a step; their order stays, and no gap gets wider than 1.5 steps.
 /// \param reached  length up to each of the points
@@ -91,7 +85,8 @@ Seams sample_seams(const Segmentation& segmentation, const Skeleton& skeleton, c
       double turning = 0;
       for (std::size_t i = 1; i < points.size(); ++i) {
         const Vec3& node = skeleton.nodes[arc.node].position;
-        turning += wrapped(separation.turn_of(bone, points[i] - node) - separation.turn_of(bone, points[i - 1] - node));
+        turning +=
+            shortest_turn(separation.turn_of(bone, points[i] - node) - separation.turn_of(bone, points[i - 1] - node));
       }
       columns = std::max(columns, std::abs(turning) * rectangles[bone].width);
     }

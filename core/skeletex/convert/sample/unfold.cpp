@@ -16,7 +16,7 @@ UnfoldReport unfold_lattice(ClContext& context, const DeviceLayout& layout, std:
                             ReadingPositions& positions, TexelPoints& points) {
   std::vector<int> all;
   for (const Patch& patch : patches) {
-    if (patch.method != Method::kVsm) continue;
+    if (is_height_field(patch.method)) continue;
     const Rectangle& r = patch.rectangle;
     for (int row = 0; row + 1 < r.height; ++row)
       for (int j = 0; j < r.width; ++j) all.push_back((r.y + row) * layout.width + r.x + j);

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "segment_structs.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
@@ -70,16 +71,12 @@ ClassifyTables classify_tables(const std::vector<Vec3>& points, const std::vecto
     upper = upper.cwiseMax(p);
   }
   tables.origin = 0.5 * (lower + upper);
-  tables.x.resize(points.size());
-  tables.y.resize(points.size());
-  tables.z.resize(points.size());
+  tables.points.resize(3 * points.size());
   double radius_squared = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Vec3 p = points[i] - tables.origin;
     radius_squared = std::max(radius_squared, p.squaredNorm());
-    tables.x[i] = static_cast<float>(p.x());
-    tables.y[i] = static_cast<float>(p.y());
-    tables.z[i] = static_cast<float>(p.z());
+    for (std::size_t d = 0; d < 3; ++d) tables.points[d * points.size() + i] = static_cast<float>(p[d]);
   }
   tables.cell_begin.push_back(0);
   for (const NodeCells& node : nodes) {
@@ -100,17 +97,16 @@ ClassifyTables classify_tables(const std::vector<Vec3>& points, const std::vecto
 }
 
 std::vector<std::uint8_t> classify_on_device(ClContext& context, const ClassifyTables& tables) {
-  const std::size_t point_count = tables.x.size(), node_count = tables.margin.size();
+  const std::size_t point_count = tables.points.size() / 3, node_count = tables.margin.size();
   if (point_count == 0 || node_count == 0) return {};
-  const auto x = context.upload(tables.x);
-  const auto y = context.upload(tables.y);
-  const auto z = context.upload(tables.z);
+  const ClassifyParameters parameters{static_cast<int>(point_count), static_cast<int>(node_count)};
+  const auto points = context.upload(tables.points);
   const auto cell_begin = context.upload(tables.cell_begin);
   const auto cells = context.upload(tables.cells);
   const auto margin = context.upload(tables.margin);
   const auto labels = context.allocate<std::uint8_t>(point_count * node_count);
-  context.launch({"segment.cl", "classify_points"}, ClRange(point_count, node_count), x, y, z, cell_begin, cells,
-                 margin, labels, static_cast<int>(point_count), static_cast<int>(node_count));
+  context.launch({"segment.cl", "classify_points"}, ClRange(point_count, node_count), parameters, points, cell_begin,
+                 cells, margin, labels);
   return context.download(labels);
 }
 

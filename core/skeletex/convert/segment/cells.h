@@ -39,10 +39,10 @@ std::vector<NodeCells> node_cells(const Skeleton& skeleton, double perturbation)
 std::vector<std::uint8_t> classify_points(ClContext& context, const std::vector<Vec3>& points,
                                           const std::vector<NodeCells>& nodes);
 
-/// What the device reads and answers, for its test.
+/// What the device reads.
 struct ClassifyTables {
   Vec3 origin;                  ///< device coordinates are relative to it
-  std::vector<float> x, y, z;   ///< points
+  std::vector<float> points;    ///< planes of x, y, z
   std::vector<int> cell_begin;  ///< per node and one more: first of its cells
   std::vector<float> cells;     ///< per cell: direction, offset, so that value = x . direction + offset
   std::vector<float> margin;    ///< per node: at or below this lead over the second the cell is not certain

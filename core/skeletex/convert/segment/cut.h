@@ -4,25 +4,9 @@
 #include <vector>
 
 #include "skeletex/convert/segment/cells.h"
-#include "skeletex/geometry/mesh.h"
+#include "skeletex/geometry/cut_mesh.h"
 
 namespace skeletex {
-
-/// A closed triangle mesh that is being cut. Half-edge 3 t + c leads from corner c of triangle t to the next corner.
-struct CutMesh {
-  std::vector<Vec3> positions;
-  std::vector<int> origins;    ///< half-edge -> vertex it starts at
-  std::vector<int> opposites;  ///< half-edge -> the one of the neighbour triangle
-  std::vector<int> seams;      ///< half-edge -> seam side (node and bone, numbered by the caller), -1 off the seams
-
-  int triangle_count() const { return static_cast<int>(origins.size() / 3); }
-  static int next(int h) { return h % 3 == 2 ? h - 2 : h + 1; }
-  int target(int h) const { return origins[next(h)]; }
-};
-
-/// Corner c is the triangle's corner (c + 2) % 3.
-/// \throw InputError when the mesh is no closed, oriented 2-manifold
-CutMesh cut_mesh_of(const TriangleMesh& mesh);
 
 enum class CutStatus {
   kCut,
@@ -40,13 +24,11 @@ struct CutOutcome {
 /// Voronoi vertices of the directions leave the body first; with two bones the loop that most rays in the separation
 /// plane from the node hit first. Other parts of the separation planes are not cut. Triangles are divided into convex
 /// pieces without changing the surface. New vertices and triangles come after the old ones; a divided triangle's first
-/// piece takes its place. \param labels      cell of every vertex of the mesh (NodeCells::cell_of) \param first_seam
-/// the new half-edges' seams are first_seam + cell of the triangle on that side \return how it went; unless kCut the
-/// mesh is unchanged
+/// piece takes its place.
+/// \param labels      cell of every vertex of the mesh (NodeCells::cell_of)
+/// \param first_seam  the new half-edges' seams are first_seam + cell of the triangle on that side
+/// \return how it went; unless kCut the mesh is unchanged
 CutOutcome cut_along_separation(CutMesh& mesh, const NodeCells& node, const std::vector<std::uint8_t>& labels,
                                 int first_seam);
-
-/// Splits an edge at its middle; both parts keep its seam.
-void split_edge(CutMesh& mesh, int half_edge);
 
 }  // namespace skeletex

@@ -27,8 +27,6 @@ constexpr int kWideRounds = 2;         // of claims with a work-item per vertex;
 /// One work-item per vertex or edge, in groups of one size: PoCL compiles a kernel for every size that it meets.
 ClRange over(int count) { return {{static_cast<std::size_t>(count), 1}, {64, 1}}; }
 
-bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole || kind == ChartVertex::kTailPole; }
-
 /// Angle between unit normals, precise for small ones too.
 double angle_between(const Vec3& a, const Vec3& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
 
@@ -113,7 +111,7 @@ MapFeatures find_features(std::span<const Chart> charts, std::span<const Method>
   };
   std::vector<Strength> strengths;
   for (int bone = 0; bone < static_cast<int>(charts.size()); ++bone) {
-    if (methods[bone] != Method::kVsm) continue;
+    if (is_height_field(methods[bone])) continue;
     add_features(charts[bone], least_dihedral, features.vertices[bone], features.edges[bone]);
     for (const MapFeatures::Vertex& vertex : features.vertices[bone])
       strengths.push_back({vertex.strength, bone, static_cast<int>(&vertex - features.vertices[bone].data())});
@@ -133,7 +131,7 @@ SnapFeatures place_features(const MapFeatures& features, std::span<const Chart> 
   placed.vertices.reserve(vertex_count), placed.edges.reserve(edge_count);
   int first_point = 0;
   for (int bone = 0; bone < static_cast<int>(charts.size()); ++bone) {
-    if (patches[bone].method != Method::kVsm) continue;
+    if (is_height_field(patches[bone].method)) continue;
     const Chart& chart = charts[bone];
     const Rectangle& r = patches[bone].rectangle;
     const std::vector<double> rows = rows_of(patches[bone].row_u, chart.u);
@@ -190,7 +188,7 @@ int band_of(int row) { return (row - 1) / kBinHeight; }
 int list_rows(std::span<const Patch> patches, std::array<std::vector<LatticeRow>, 2>& rows) {
   int bins = 0;
   for (std::size_t bone = 0; bone < patches.size(); ++bone) {
-    if (patches[bone].method != Method::kVsm) continue;
+    if (is_height_field(patches[bone].method)) continue;
     const Rectangle& r = patches[bone].rectangle;
     const BinCounts counts = bins_of(r);
     for (int row = 1; row < r.height - 1; ++row)
@@ -257,7 +255,7 @@ void fill_bins(const std::vector<SnapFeatures::Edge>& edges, std::span<const Pat
   int first_bin = 0;
   auto edge = edges.begin();
   for (std::size_t bone = 0; bone < patches.size(); ++bone) {
-    if (patches[bone].method != Method::kVsm) continue;
+    if (is_height_field(patches[bone].method)) continue;
     const Rectangle& r = patches[bone].rectangle;
     const int bins = bins_of(r).bands * bins_of(r).across;
     int* const counts = begins.data() + first_bin;
@@ -355,27 +353,6 @@ SnappedPositions snap_positions(ClContext& context, const DeviceLayout& layout, 
                tables.bin_edges, tables.edges, snapped.anchors, snapped.parameters, snapped.x, snapped.y, spare,
                target_x, target_y);
   return snapped;
-}
-
-TexelReturns::TexelReturns(ClContext& context, const DeviceLayout& layout)
-    : marks(context.allocate<int>(layout.size())),
-      back(context.allocate<int>(layout.size())),
-      bad(context.allocate<int>(layout.size())) {
-  context.fill(marks, 0);
-}
-
-TexelsBack put_back_listed(ClContext& context, const DeviceLayout& layout, const TexelPoints& even,
-                           const TexelPoints& before, const std::vector<int>& texels, bool with_vertices,
-                           TexelReturns& returns, ReadingPositions& positions, TexelPoints& points) {
-  const auto device_counts = context.upload(std::vector{0, 0});
-  // One work-group: on a CPU one work-item.
-  context.launch({"snap.cl", "put_listed_back"}, row_range(context, 1), static_cast<int>(texels.size()),
-                 static_cast<int>(with_vertices), 1 << ++returns.calls, layout.width, context.upload(texels),
-                 layout.texel_patches, layout.patches, even.x, even.y, even.z, before.x, before.y, before.z,
-                 positions.home_x, positions.home_y, returns.marks, positions.anchors, positions.x, positions.y,
-                 points.x, points.y, points.z, returns.back, returns.bad, device_counts);
-  auto [counts, back, x, y, z] = context.map(device_counts, returns.back, points.x, points.y, points.z);
-  return {{back.data(), back.data() + counts[0]}, {std::move(x), std::move(y), std::move(z)}};
 }
 
 }  // namespace skeletex

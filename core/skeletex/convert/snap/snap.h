@@ -115,27 +115,4 @@ DeviceSnapTables upload_tables(ClContext& context, const SnapTables& tables);
 SnappedPositions snap_positions(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables,
                                 ReadingPositions& positions);
 
-/// Planes of points, one per texel.
-using TexelPoints = DevicePlanes;
-
-/// Lists of put_back_listed, for all its calls on one lattice: 30 at most.
-struct TexelReturns {
-  TexelReturns(ClContext& context, const DeviceLayout& layout);
-  ClBuffer<int> marks, back, bad;  ///< see put_listed_back in snap.cl
-  int calls = 0;
-};
-
-/// What put_back_listed has done.
-struct TexelsBack {
-  std::vector<int> texels;                 ///< that went back, in any order
-  std::array<ClMapping<float>, 3> points;  ///< x, y, z per texel of the texture, where all are now
-};
-/// Texels of inner rows go back to the regular grid, those on vertices only `with_vertices`; and with them the texels
-/// of quads at them that then fold in the map, or in space where the regular grid does not. \param even    the regular
-/// grid's points, the measure of folds \param before  what texels go back to: these as they would be stored \param
-/// texels  each once \throw DeviceError
-TexelsBack put_back_listed(ClContext& context, const DeviceLayout& layout, const TexelPoints& even,
-                           const TexelPoints& before, const std::vector<int>& texels, bool with_vertices,
-                           TexelReturns& returns, ReadingPositions& positions, TexelPoints& points);
-
 }  // namespace skeletex

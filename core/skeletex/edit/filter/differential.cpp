@@ -10,8 +10,8 @@ namespace skeletex {
 
 ModelSurface upload_surface(ClContext& context, const SkeletexModel& model) {
   ModelSurface surface{number_lattice(model), lattice_positions(context, model), {}, {}};
-  surface.neighbours = upload_neighbours(
-      context, find_neighbours(model, surface.lattice, end_triangles(model, surface.lattice, surface.positions)));
+  surface.neighbours =
+      upload_neighbours(context, find_neighbours(model, surface.lattice, end_triangles(model, surface.positions)));
   surface.neighbours.coarser = upload_coarser(context, model, surface.lattice, surface.positions);
   surface.points = upload_points(context, surface.positions, model.origin, model.diagonal);
   return surface;

@@ -110,7 +110,7 @@ void keep_outside(const FilterJob& job, SkeletexModel& model) {
   }
   if (!has_outside) return;
   model.diagonals = job.given.diagonals;
-  model.encoder_settings = job.given.encoder_settings;
+  model.sampling = job.given.sampling;
 }
 
 /// The model with its surface moved, by the region's weights.

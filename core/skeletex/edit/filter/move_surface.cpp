@@ -56,7 +56,8 @@ MovedModel move_surface(ClContext& context, const SkeletexModel& model, const Mo
   for (Vec3& normal : normals) normal.normalize();
 
   std::vector<Vec3> after = moved;
-  slide_to_separation(model, normals, after);
+  const PreparedModel prepared(model);
+  slide_to_separation(prepared, normals, after);
   std::vector<Vec3> slides(after.size(), Vec3::Zero());
   for (std::size_t i = 0; i < after.size(); ++i) {
     if (moved[i] == before[i])
@@ -75,7 +76,7 @@ MovedModel move_surface(ClContext& context, const SkeletexModel& model, const Mo
     area += static_cast<double>(areas[i]);
   }
   report.mean_move /= area;
-  return {store_positions(context, model, after), report};
+  return {store_positions(context, prepared, after), report};
 }
 
 }  // namespace skeletex

@@ -128,8 +128,7 @@ std::shared_ptr<const DeviceCoarseLattice> upload_coarser(ClContext& context, co
     begin.push_back(static_cast<int>(readers.size()));
   }
   DeviceNeighbours neighbours = upload_neighbours(
-      context,
-      find_neighbours(coarse.model, coarse.lattice, end_triangles(coarse.model, coarse.lattice, coarse.positions)));
+      context, find_neighbours(coarse.model, coarse.lattice, end_triangles(coarse.model, coarse.positions)));
   neighbours.coarser = upload_coarser(context, coarse.model, coarse.lattice, coarse.positions);
   return std::make_shared<const DeviceCoarseLattice>(DeviceCoarseLattice{
       std::move(neighbours), context.upload(coarse.picks), context.upload(coarse.sources),

@@ -147,30 +147,21 @@ void blend_texels(ClContext& context, const BlendTables& tables, const std::vect
   std::vector<float> slopes = tables.slopes;
   if (slopes.empty()) slopes.assign(2, 0.f);
   const BlendParameters parameters{static_cast<int>(rows.size()), tables.source_count,
-                                   static_cast<int>(result.patches.size())};
+                                   static_cast<int>(result.patches.size()), static_cast<int>(texels.count),
+                                   static_cast<int>(blended.count)};
   context.launch({"blend.cl", "blend_texels"}, row_range(context, rows.size()), parameters,
                  context.upload(blend_rows(rows, result, texture_width)), context.upload(tables.sources),
                  context.upload(tables.source_rows), context.upload(tables.columns), context.upload(slopes),
-                 context.upload(result.columns), texels.x, texels.y, texels.z, blended.x, blended.y, blended.z);
+                 context.upload(result.columns), texels.values, blended.values);
 }
 
 void mix_texels(ClContext& context, const DevicePlanes& first, const DevicePlanes& second, double share,
                 int texture_width, DevicePlanes& mixed) {
-  if (mixed.x.size != first.x.size) mixed = allocate_planes(context, first.x.size);
-  const int height = static_cast<int>(first.x.size / texture_width);
+  if (mixed.count != first.count) mixed = allocate_planes(context, first.count);
+  const int height = static_cast<int>(first.count / texture_width);
   context.launch({"blend.cl", "mix_texels"}, row_range(context, height),
-                 MixParameters{height, texture_width, static_cast<float>(share)}, first.x, first.y, first.z, second.x,
-                 second.y, second.z, mixed.x, mixed.y, mixed.z);
-}
-
-DevicePlanes upload_texels(ClContext& context, const DisplacementTexture& texture) {
-  return {context.upload(texture.along), context.upload(texture.around), context.upload(texture.out)};
-}
-
-void download_texels(ClContext& context, const DevicePlanes& texels, DisplacementTexture& texture) {
-  texture.along = context.download(texels.x);
-  texture.around = context.download(texels.y);
-  texture.out = context.download(texels.z);
+                 MixParameters{height, texture_width, static_cast<float>(share)}, first.values, second.values,
+                 mixed.values);
 }
 
 void EndMoves::add(BoneEnd end, const Vec3& move) {
@@ -185,9 +176,9 @@ void move_ends(ClContext& context, const EndMoves& moves, const std::vector<Latt
   for (const auto& end : moves.planes)
     for (const std::vector<float>& plane : end) all.insert(all.end(), plane.begin(), plane.end());
   context.launch({"blend.cl", "move_ends"}, row_range(context, rows.size()),
-                 MoveEndsParameters{static_cast<int>(rows.size()), static_cast<int>(moves.planes[0][0].size())},
-                 context.upload(blend_rows(rows, result, texture_width)), context.upload(all), texels.x, texels.y,
-                 texels.z);
+                 MoveEndsParameters{static_cast<int>(rows.size()), static_cast<int>(moves.planes[0][0].size()),
+                                    static_cast<int>(texels.count)},
+                 context.upload(blend_rows(rows, result, texture_width)), context.upload(all), texels.values);
 }
 
 }  // namespace skeletex

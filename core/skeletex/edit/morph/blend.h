@@ -44,11 +44,6 @@ void blend_texels(ClContext& context, const BlendTables& tables, const std::vect
 void mix_texels(ClContext& context, const DevicePlanes& first, const DevicePlanes& second, double share,
                 int texture_width, DevicePlanes& mixed);
 
-/// Copies a texture to the device.
-DevicePlanes upload_texels(ClContext& context, const DisplacementTexture& texture);
-/// Waits for texels on the device and copies them to a texture of their size.
-void download_texels(ClContext& context, const DevicePlanes& texels, DisplacementTexture& texture);
-
 /// Moves of the texels in the rows at the ends. Rows inside move along, less with their distance from the end.
 struct EndMoves {
   /// Head, tail; along, around, out; the columns of all patches.

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "skeletex/edit/morph/blend.h"
@@ -56,7 +55,7 @@ std::vector<Patch> mean_patches(const std::deque<SeamMap>& maps, std::span<const
     for (std::size_t m = 0; m < maps.size(); ++m) {
       if (weights[m] == 0) continue;
       const Patch& from = maps[m].model().patches[maps[m].model_bone(bone)];
-      if (from.method == Method::kVsm) patch.method = Method::kVsm;
+      if (!is_height_field(from.method)) patch.method = from.method;
       for (int r = 0; r < height; ++r)
         patch.row_u[r] += weights[m] * u_at_same_share(from, r, height, maps[m].is_reversed(bone));
     }
@@ -176,6 +175,7 @@ void Morph::set_mean_skeleton(int layout, Between& between) const {
   result.skeleton = models_[layout].skeleton;
   result.genus = models_[layout].genus;
   result.diagonals = models_[layout].diagonals;
+  result.sampling = models_[layout].sampling;
   result.encoder_settings = models_[layout].encoder_settings;
   std::vector<const Skeleton*> skeletons;
   std::vector<Correspondence> from_layout;
@@ -212,9 +212,7 @@ std::unique_ptr<Morph::Between> Morph::between(std::span<const double> given, bo
 
   result.texture.width = models_[layout].texture.width;
   result.texture.height = models_[layout].texture.height;
-  nlohmann::json settings = parsed_encoder_settings(result);
-  settings["morphed"] = weights;
-  result.encoder_settings = settings.dump();
+  record_setting(result, "morphed", weights);
   return between;
 }
 
@@ -242,9 +240,9 @@ SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) 
     append_rows(maps[m], rows, result.patches, weights[m], tables);
   }
   const std::size_t area = static_cast<std::size_t>(result.texture.width) * result.texture.height;
-  if (texels.x.size != area) {
+  if (texels.count != area) {
     texels = allocate_planes(*context_, area);
-    for (ClBuffer<float>* plane : {&texels.x, &texels.y, &texels.z}) context_->fill(*plane, 0);
+    context_->fill(texels.values, 0);
   }
   const FrameTables frames = frame_tables(result.skeleton, *separation, result.patches, result.origin);
   blend_texels(*context_, tables, rows, frames, result.texture.width, texels_, texels);

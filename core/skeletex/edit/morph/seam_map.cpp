@@ -87,12 +87,6 @@ void set_shares(const std::vector<Vec3>& positions, SeamLoop& loop) {
 
 }  // namespace
 
-BoneEnd end_at(const Skeleton& skeleton, int bone, int node) {
-  return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
-}
-
-BoneEnd opposite(BoneEnd end) { return end == BoneEnd::kHead ? BoneEnd::kTail : BoneEnd::kHead; }
-
 SeamLoops trace_seams(const SkeletexModel& model) {
   const SeparationPlanes separation(model.skeleton);
   SeamLoops loops(model.patches.size());

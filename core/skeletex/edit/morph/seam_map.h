@@ -12,8 +12,6 @@
 namespace skeletex {
 
 /// The end of a bone that lies at a node.
-BoneEnd end_at(const Skeleton& skeleton, int bone, int node);
-BoneEnd opposite(BoneEnd end);
 
 /// The seams around one end of a patch, once around in the direction of growing angle, corners included.
 struct SeamLoop {

@@ -16,7 +16,7 @@ namespace {
 
 /// Points of a model read at the places of another one's texels, as a morph reads texels. World units.
 DisplacementTexture read_points(ClContext& context, const SkeletexModel& from, const SeparationPlanes& separation,
-                                const SeamMap& map, const SeparationPlanes& to_separation) {
+                                const SeamMap& map) {
   const SkeletexModel& to = map.model();
   BlendTables tables;
   tables.source_count = 1;
@@ -33,7 +33,7 @@ DisplacementTexture read_points(ClContext& context, const SkeletexModel& from, c
   append_rows(map, rows, from.patches, 1, tables);
   DevicePlanes points = allocate_planes(context, static_cast<std::size_t>(from.texture.width) * from.texture.height);
   blend_texels(context, tables, rows, frame_tables(from.skeleton, separation, from.patches, from.origin),
-               from.texture.width, row_points(context, to, to_separation), points);
+               from.texture.width, row_points(context, to, RowChoice::kAll), points);
   DisplacementTexture read{from.texture.width, from.texture.height, {}, {}, {}};
   download_texels(context, points, read);
   return read;
@@ -70,7 +70,7 @@ std::vector<Vec3> map_surface(ClContext& context, const SkeletexModel& from, con
       map.set_target_loop(bone, end, own.model_loop(bone, end));
 
   std::vector<Vec3> positions(lattice.vertex_count);
-  set_inner(from, lattice, read_points(context, from, separation, map, to_separation), to.origin, positions);
+  set_inner(from, lattice, read_points(context, from, separation, map), to.origin, positions);
   // The point of the other seam that is found by the same angle.
   const auto seam_point = [&](int bone, int node, double turn) {
     const BoneEnd end = end_at(from.skeleton, bone, node);

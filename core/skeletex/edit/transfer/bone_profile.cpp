@@ -8,7 +8,7 @@
 namespace skeletex {
 
 BonePoints download_points(ClContext& context, const DevicePlanes& points) {
-  return {{context.download(points.x), context.download(points.y), context.download(points.z)}};
+  return {download_planes(context, points)};
 }
 
 BoneProfile bone_profile(const PatchPoints& patch, int column, BoneEnd end, double length) {

@@ -134,7 +134,7 @@ double PartPair::length_offset(int i) const {
 }
 
 void PartPair::set_rows(int i, Patch& patch) const {
-  patch.method = Method::kVsm;
+  if (is_height_field(patch.method)) patch.method = Method::kVsm;  // texels of two models lie on no common rays
   for (const PartCut& cut : cuts_)
     for (const double kept : cut.kept_rows)
       if (i == 0 && kept > 0) return;

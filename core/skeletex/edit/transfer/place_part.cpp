@@ -4,48 +4,47 @@
 #include <cmath>
 #include <numbers>
 
-#include "skeletex/skeleton/separation_planes.h"
-
 namespace skeletex {
 namespace {
 
 TransferParameters parameters_of(const TransferTables& tables) {
-  return {static_cast<int>(tables.rows.size()), static_cast<int>(tables.columns.size())};
+  TransferParameters parameters{};
+  parameters.row_count = static_cast<int>(tables.rows.size());
+  parameters.column_count = static_cast<int>(tables.columns.size());
+  parameters.point_count = static_cast<int>(tables.point_count);
+  return parameters;
 }
 
 }  // namespace
 
-DevicePlanes points_in_bone_axes(ClContext& context, const SkeletexModel& model) {
-  const SeparationPlanes separation(model.skeleton);
-  const FrameTables tables = in_bone_axes(frame_tables(model.skeleton, separation, model.patches, model.origin));
-  const DeviceLattice lattice = upload_lattice(context, tables, model.patches, model.texture, RowChoice::kAll);
-  DevicePlanes points = allocate_planes(context, lattice.vertex_count);
-  displace(context, lattice, points);
-  return points;
-}
-
 DevicePlanes place_part(ClContext& context, const TransferTables& tables, const DevicePlanes& source,
                         const DevicePlanes& target) {
   DevicePlanes points = allocate_planes(context, tables.point_count);
-  context.launch({"transfer.cl", "place_part"}, row_range(context, tables.rows.size()), parameters_of(tables),
+  TransferParameters parameters = parameters_of(tables);
+  parameters.source_count = static_cast<int>(source.count);
+  parameters.target_count = static_cast<int>(target.count);
+  context.launch({"transfer.cl", "place_part"}, row_range(context, tables.rows.size()), parameters,
                  context.upload(tables.rows), context.upload(tables.patches), context.upload(tables.columns),
-                 context.upload(tables.corrections), source.x, source.y, source.z, target.x, target.y, target.z,
-                 points.x, points.y, points.z);
+                 context.upload(tables.corrections), source.values, target.values, points.values);
   return points;
 }
 
 DevicePlanes read_source(ClContext& context, const TransferTables& tables, const DevicePlanes& points) {
   DevicePlanes read = allocate_planes(context, tables.point_count);
-  context.launch({"transfer.cl", "read_source"}, row_range(context, tables.rows.size()), parameters_of(tables),
-                 context.upload(tables.rows), context.upload(tables.patches), context.upload(tables.columns), points.x,
-                 points.y, points.z, read.x, read.y, read.z);
+  TransferParameters parameters = parameters_of(tables);
+  parameters.source_count = static_cast<int>(points.count);
+  context.launch({"transfer.cl", "read_source"}, row_range(context, tables.rows.size()), parameters,
+                 context.upload(tables.rows), context.upload(tables.patches), context.upload(tables.columns),
+                 points.values, read.values);
   return read;
 }
 
 void keep_target(ClContext& context, const TransferTables& tables, const DevicePlanes& target, DevicePlanes& texels) {
-  context.launch({"transfer.cl", "keep_target"}, row_range(context, tables.rows.size()), parameters_of(tables),
-                 context.upload(tables.rows), context.upload(tables.patches), context.upload(tables.columns), target.x,
-                 target.y, target.z, texels.x, texels.y, texels.z);
+  TransferParameters parameters = parameters_of(tables);
+  parameters.target_count = static_cast<int>(target.count);
+  context.launch({"transfer.cl", "keep_target"}, row_range(context, tables.rows.size()), parameters,
+                 context.upload(tables.rows), context.upload(tables.patches), context.upload(tables.columns),
+                 target.values, texels.values);
 }
 
 std::array<std::vector<double>, SKELETEX_TRANSFER_BANDS> wave_bands(const std::vector<double>& values) {

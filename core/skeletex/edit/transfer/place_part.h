@@ -24,9 +24,6 @@ struct TransferTables {
   }
 };
 
-/// The points of all rows of a model's lattice, each in the axes (s, b, o) of its bone from the bone's head.
-DevicePlanes points_in_bone_axes(ClContext& context, const SkeletexModel& model);
-
 /// Queues the kernel. \param source, target  points in bone axes   \return points in the axes of the result's bones
 DevicePlanes place_part(ClContext& context, const TransferTables& tables, const DevicePlanes& source,
                         const DevicePlanes& target);

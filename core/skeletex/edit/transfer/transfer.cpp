@@ -8,7 +8,6 @@
 #include <memory>
 
 #include "skeletex/analysis/folds.h"
-#include "skeletex/edit/morph/blend.h"
 #include "skeletex/edit/transfer/join_surface.h"
 #include "skeletex/edit/transfer/placement.h"
 #include "skeletex/model/error.h"
@@ -70,11 +69,8 @@ void store_placement(ClContext& context, const TransferInput& input, const Place
   DevicePlanes texels = upload_texels(context, input.target.texture);
   std::vector<LatticeRow> rows;
   for (const TransferRow& row : placement.tables.rows) rows.push_back({row.patch, row.row, row.vertex, 0});
-  const DeviceTables device = upload_tables(context, placement.frames);
-  context.launch({"reconstruct.cl", "enter_tangent_space"}, row_range(context, rows.size()),
-                 static_cast<int>(rows.size()), result.texture.width, device.column_count, context.upload(rows),
-                 device.patches, device.rows, device.columns, points.x, points.y, points.z, texels.x, texels.y,
-                 texels.z);
+  enter_tangent_space(context, upload_tables(context, placement.frames), context.upload(rows), result.texture.width,
+                      points, texels);
   keep_target(context, placement.tables, target, texels);
   download_texels(context, texels, result.texture);
 }
@@ -116,8 +112,7 @@ void join_parts(ClContext& context, const TransferInput& input, const Pairs& pai
     return static_cast<double>(measure_folds(reconstruct_mesh(context, model)).folded_edges);
   };
   const BonePoints source = download_points(
-      context,
-      read_source(context, placement.tables, row_points(context, input.regular_source, input.source_separation)));
+      context, read_source(context, placement.tables, row_points(context, input.regular_source, RowChoice::kAll)));
   for (const auto& pair : pairs) {
     if (!needs_join(pair)) continue;
     SkeletexModel joined =

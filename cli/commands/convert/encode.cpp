@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: MIT
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <charconv>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "command.h"
+#include "encode_report.h"
+#include "files.h"
+#include "progress_bar.h"
+#include "skeletex/convert/encode_model.h"
+#include "skeletex/io/model_file.h"
+#include "skeletex/io/skeleton_file.h"
+#include "skeletex/io/suggestion.h"
+#include "skeletex/model/error.h"
+
+namespace skeletex::cli {
+namespace {
+
+constexpr const char* kHybrid = "hybrid";  // each bone has a method of its own
+
+struct Arguments {
+  std::string mesh, skeleton, output, device, json, size = "512", method = "vsm";
+  int iterations = 4;
+  double alpha = 0.5, stop_spread = 0, hybrid_threshold = EncodeOptions{}.hybrid_unseen_threshold;
+  std::string rows = "surface", spd_hit = "last", share, diagonals, compression = "auto", rounding = "surface";
+  bool has_no_prefilter = false, has_no_unfold = false, is_snapped = false, is_fitted = false, is_paper_recipe = false,
+       is_half = false, is_verbose = false;
+  std::vector<std::string> bone_methods;
+};
+
+/// "512" or "1024x512".
+std::array<int, 2> parse_size(const std::string& text) {
+  std::array<int, 2> size{0, 0};
+  const char* const end = text.data() + text.size();
+  auto [rest, code] = std::from_chars(text.data(), end, size[0]);
+  size[1] = size[0];
+  if (code == std::errc() && rest != end && (*rest == 'x' || *rest == 'X')) {
+    const auto second = std::from_chars(rest + 1, end, size[1]);
+    rest = second.ptr;
+    code = second.ec;
+  }
+  if (code != std::errc() || rest != end || size[0] < 4 || size[1] < 4 || size[0] > 16384 || size[1] > 16384)
+    throw CLI::ValidationError(
+        "--size",
+        "\"" + text + "\" is no texture size; give N or WIDTHxHEIGHT, 4 to 16384 texels, e.g. 512 or 1024x512");
+  return size;
+}
+
+std::vector<std::pair<std::string, Method>> parse_bone_methods(const std::vector<std::string>& texts) {
+  std::vector<std::pair<std::string, Method>> methods;
+  for (const std::string& text : texts) {
+    const auto equals = text.rfind('=');
+    const std::string method = equals == std::string::npos ? "" : text.substr(equals + 1);
+    const std::vector<std::string> names = method_names();
+    if (std::find(names.begin(), names.end(), method) == names.end())
+      throw CLI::ValidationError("--bone-method",
+                                 fmt::format("\"{}\" is not BONE={}", text, fmt::join(names, " or BONE=")));
+    methods.emplace_back(text.substr(0, equals), method_named(method));
+  }
+  return methods;
+}
+
+TexelShare share_of(const std::string& name) {
+  return name == "area" ? TexelShare::kArea : name == "triangles" ? TexelShare::kTriangles : TexelShare::kError;
+}
+
+void take_paper_recipe(EncodeOptions& options) {
+  options.vsm = {.iterations = 1, .alpha = 0};
+  options.row_spacing = RowSpacing::kUniform;
+  options.has_prefilter = false;
+  options.has_unfold = false;
+  options.has_snap = false;
+  options.has_fit = false;
+  if (!options.method || !is_height_field(*options.method)) options.texel_share = TexelShare::kTriangles;
+}
+
+/// What is given beats the paper's recipe.
+void set_texel_options(const Arguments& arguments, const CLI::App& command, EncodeOptions& options) {
+  const auto is_given = [&](const char* name) { return command.count(name) > 0; };
+  if (is_given("--iterations")) options.vsm.iterations = arguments.iterations;
+  if (is_given("--alpha")) options.vsm.alpha = arguments.alpha;
+  options.vsm.stop_spread_change = arguments.stop_spread;
+  if (is_given("--rows"))
+    options.row_spacing = arguments.rows == "uniform" ? RowSpacing::kUniform : RowSpacing::kSurfaceLength;
+  if (arguments.has_no_prefilter) options.has_prefilter = false;
+  if (arguments.has_no_unfold) options.has_unfold = false;
+  if (is_given("--snap")) options.has_snap = arguments.is_snapped;
+  if (is_given("--fit")) options.has_fit = arguments.is_fitted;
+  if (is_given("--diagonals"))
+    options.diagonals = arguments.diagonals == "smooth" ? DiagonalRule::kSmooth : DiagonalRule::kNearest;
+  options.spd_hit = arguments.spd_hit == "first" ? SpdHit::kFirst : SpdHit::kLast;
+  if (is_given("--rounding") && !arguments.is_half) throw CLI::ValidationError("--rounding", "needs --half");
+  options.has_half_texels = arguments.is_half && arguments.rounding == "surface";
+  if (is_given("--share")) options.texel_share = share_of(arguments.share);
+}
+
+EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command) {
+  EncodeOptions options;
+  const auto size = parse_size(arguments.size);
+  options.width = size[0];
+  options.height = size[1];
+  options.method = arguments.method == kHybrid ? std::nullopt : std::optional(method_named(arguments.method));
+  options.hybrid_unseen_threshold = arguments.hybrid_threshold;
+  options.hybrid_overrides = parse_bone_methods(arguments.bone_methods);
+  if (options.method && (!arguments.bone_methods.empty() || command.count("--hybrid-threshold") > 0))
+    throw CLI::ValidationError("--bone-method and --hybrid-threshold", "need --method hybrid");
+  if (arguments.is_paper_recipe) take_paper_recipe(options);
+  set_texel_options(arguments, command, options);
+  return options;
+}
+
+void check_bone_names(const Arguments& arguments, const EncodeOptions& options, const Skeleton& skeleton) {
+  std::vector<std::string> names;
+  for (const Bone& bone : skeleton.bones) names.push_back(bone.name);
+  for (const auto& [name, method] : options.hybrid_overrides)
+    if (std::find(names.begin(), names.end(), name) == names.end())
+      throw InputError(
+          fmt::format("--bone-method: {} has no bone \"{}\"{}", arguments.skeleton, name, did_you_mean(name, names)));
+}
+
+struct Input {
+  TriangleMesh mesh;
+  std::optional<TriangleTree> tree;
+  Skeleton skeleton;
+};
+
+Input read_input(const Arguments& arguments, const EncodeOptions& options) {
+  Input input{load_mesh(arguments.mesh), {}, read_skeleton(arguments.skeleton)};
+  check_bone_names(arguments, options, input.skeleton);
+  require_valid(input.mesh, input.skeleton, &input.tree);
+  return input;
+}
+
+ExrCompression compression_of(const std::string& name) {
+  return name == "none"  ? ExrCompression::kNone
+         : name == "zip" ? ExrCompression::kZip
+         : name == "piz" ? ExrCompression::kPiz
+                         : ExrCompression::kAuto;
+}
+
+void warn_of_bones(const EncodeReport& report) {
+  for (const BoneReport& bone : report.bones) {
+    if (bone.flipped_triangles > 0)
+      warn(fmt::format("bone \"{}\": {} triangles are flipped in its map", bone.name, bone.flipped_triangles));
+    if (is_height_field(bone.method) && bone.unseen_area_fraction > EncodeOptions{}.hybrid_unseen_threshold)
+      warn(fmt::format("bone \"{}\": rays do not see {:.1f} % of its surface; --method hybrid or vsm does", bone.name,
+                       100 * bone.unseen_area_fraction));
+  }
+}
+
+void run(const Arguments& arguments, const CLI::App& command) {
+  EncodeOptions options = encode_options(arguments, command);
+  Stopwatch watch;
+  ClContext context(arguments.device);
+  std::optional<ProgressBar> bar(std::in_place, context);
+  bar->show("reading and checking the input", 0);
+  const Input input = read_input(arguments, options);
+  options.tree = input.tree ? &*input.tree : nullptr;
+  options.progress = [&](const std::string& stage, double done) {
+    bar->show(stage, done);
+    return true;
+  };
+  const EncodeResult result = encode_model(context, input.mesh, input.skeleton, options);
+  bar->show("writing", 1);
+  write_model(arguments.output, result.model,
+              {.format = arguments.is_half ? TexelFormat::kHalf : TexelFormat::kFloat,
+               .compression = compression_of(arguments.compression)});
+  bar.reset();
+  warn_of_bones(result.report);
+  const EncodedFile file{arguments.output, options.width, options.height, watch.lap_ms() / 1000};
+  Json json = encode_report_json(result.report, file);
+  json["kernels"] = profile_json(context);
+  print(arguments.json, arguments.is_verbose ? encode_details_text(result.report) : "");
+  print(arguments.json, encode_report_text(result.report, file));
+  write_json(arguments.json, json);
+}
+
+CLI::Option& add(CLI::App& command, const char* group, const char* name, auto& value, const char* description) {
+  return *command.add_option(name, value, description)->group(group);
+}
+
+void add_map_options(CLI::App& command, Arguments& a) {
+  add(command, "VSM", "--iterations", a.iterations,
+      "reweightings after the first solve, 0 to 100; 0 is the plain barycentric map")
+      .type_name("N")
+      ->check(number_in(0, 100));
+  add(command, "VSM", "--alpha", a.alpha,
+      "weights grow by texture area / surface area ^ alpha, 0 to 2; 0 evens out texture areas (the paper), 1 density "
+      "on the surface")
+      .type_name("X")
+      ->check(number_in(0.0, 2.0));
+  add(command, "VSM", "--stop-spread", a.stop_spread,
+      "stop when a reweighting changes the spread of texture areas by less than this share, e.g. 0.01; 0: never")
+      .type_name("X")
+      ->check(number_in(0.0, 1.0));
+  take_one_of(add(command, "SPD", "--spd-hit", a.spd_hit, "which hit of a ray counts where there are several"),
+              {"first", "last"});
+  add(command, "Hybrid", "--hybrid-threshold", a.hybrid_threshold,
+      "bones take vsm where spd does not see more than this share of their area, 0 to 1")
+      .type_name("X")
+      ->check(number_in(0.0, 1.0));
+  add(command, "Hybrid", "--bone-method", a.bone_methods, "method of a bone by its name; repeat for more bones")
+      .type_name(fmt::format("BONE={}", fmt::join(method_names(), "|")))
+      ->expected(1)
+      ->take_all();
+}
+
+void add_texel_options(CLI::App& command, Arguments& a) {
+  take_one_of(add(command, "Texels", "--rows", a.rows,
+                  "where rows lie along a bone: evenly in surface length, or uniform in the map (the paper)"),
+              {"surface", "uniform"});
+  take_one_of(add(command, "Texels", "--share", a.share,
+                  "what a bone's share of the texels follows, and by error its columns per row as well; unless given: "
+                  "area with --method spd, error otherwise"),
+              {"error", "triangles", "area"});
+  command.add_flag("--no-unfold", a.has_no_unfold, "the regular grid as it is, also where it folds in space");
+  command
+      .add_flag("--no-prefilter", a.has_no_prefilter,
+                "texels exactly on the mesh, so that flat triangles lie inside its curved parts")
+      ->group("Texels");
+  command
+      .add_flag("--snap,!--no-snap", a.is_snapped,
+                "texels of VSM patches sit on the mesh's own vertices and edges where they can; instead of the "
+                "prefilter (default: from 2 texels per vertex on, with the fit from 1.5)")
+      ->group("Texels");
+  command
+      .add_flag("--fit,!--no-fit", a.is_fitted,
+                "their points move so that the triangles between them are nearer to the mesh; instead of the prefilter "
+                "(default: up to 256 x 256 texels)")
+      ->group("Texels");
+  take_one_of(add(command, "Texels", "--diagonals", a.diagonals,
+                  "how the decoder cuts quads: nearest to the surface that texels around foretell, or smooth, going on "
+                  "best into the quads around; unless "
+                  "given: smooth where texels are snapped or fitted, else nearest"),
+              {"nearest", "smooth"});
+  command
+      .add_flag("--paper-recipe", a.is_paper_recipe,
+                "as the paper: --rows uniform --share triangles --alpha 0 --iterations 1 --no-unfold --no-prefilter "
+                "--no-snap --no-fit (unfold and prefilter stay off, the others can still be given)")
+      ->group("Texels");
+}
+
+void add_file_options(CLI::App& command, Arguments& a) {
+  command
+      .add_flag("--half", a.is_half,
+                "16 bits a channel: half the file, or a third, for an error of some 2e-6 of the diagonal more")
+      ->group("File");
+  take_one_of(add(command, "File", "--rounding", a.rounding,
+                  "with --half, which half floats: those near a texel whose point stays nearest to the surface, or the "
+                  "nearest ones"),
+              {"surface", "nearest"});
+  take_one_of(add(command, "File", "--compression", a.compression,
+                  "lossless compression of the file; auto: zip where it saves a sixteenth or more, else none"),
+              {"auto", "none", "zip", "piz"});
+}
+
+}  // namespace
+
+void add_encode_command(CLI::App& program) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand(
+      "encode", "Turn a closed mesh and its skeleton into a model: one texture in an OpenEXR file");
+  command.option_defaults()->always_capture_default();
+  Arguments& a = *arguments;
+  declare_input(command, &add(command, "Positionals", "MESH", a.mesh, "closed triangle mesh: .obj, .ply, .off or .stl"))
+      ->required();
+  declare_input(command, &add(command, "Positionals", "SKELETON", a.skeleton,
+                              "skeleton: JSON with nodes and bones, in the mesh's coordinates"))
+      ->required();
+  declare_output(command, &add(command, "Options", "-o,--output", a.output, "the model: .skx.exr"), {".exr"})
+      ->required()
+      ->type_name("FILE");
+  add(command, "Options", "--size", a.size, "texels: N for N x N, or WIDTHxHEIGHT").type_name("N|WxH");
+  std::vector<std::string> methods = method_names();
+  methods.push_back(kHybrid);
+  take_one_of(add(command, "Options", "--method", a.method,
+                  "how bones are mapped: spd casts rays from the bone (a height field), vsm spreads the triangles over "
+                  "the texels, hybrid takes spd "
+                  "where it sees the surface and vsm elsewhere"),
+              methods);
+  add_map_options(command, a);
+  add_texel_options(command, a);
+  add_file_options(command, a);
+  command.add_flag("--verbose", a.is_verbose, "print what was done for each bone and how long each stage took, too");
+  add_device_option(command, arguments->device);
+  add_json_option(command, arguments->json);
+  command.footer(
+      "Examples:\n"
+      "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr\n"
+      "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr --method hybrid --bone-method head=vsm --size "
+      "1024\n"
+      "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr --json - | jq .times_ms\n"
+      "Areas are in the mesh's units squared, times in milliseconds.");
+  command.callback([arguments, &command] { run(*arguments, command); });
+}
+
+}  // namespace skeletex::cli

@@ -1,0 +1,461 @@
+// SPDX-License-Identifier: MIT
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <memory>
+#include <optional>
+
+#include "command.h"
+#include "deform_option.h"
+#include "files.h"
+#include "progress_bar.h"
+#include "skeletex/analysis/metro.h"
+#include "skeletex/convert/segment/segment_mesh.h"
+#include "skeletex/io/json_file.h"
+#include "skeletex/io/model_config.h"
+#include "skeletex/io/model_file.h"
+#include "skeletex/io/pose_file.h"
+#include "skeletex/io/read_file.h"
+#include "skeletex/io/skeleton_file.h"
+#include "skeletex/model/error.h"
+#include "skeletex/reconstruct/polish.h"
+#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/reconstruct/skin.h"
+#include "skeletex/render/colours.h"
+#include "skeletex/render/draw.h"
+#include "skeletex/render/gpu_model.h"
+#include "skeletex/render/scene.h"
+#include "skeletex/render/texture_image.h"
+
+namespace skeletex::cli {
+namespace {
+
+constexpr int kCheckerCells = 24;
+
+struct Arguments {
+  std::string deform = "smooth", input, output, skeleton, pose, camera, against, device, gl_device, json, up, front,
+              bone;
+  std::string mode = "shaded", size = "1200x900", background = "white";
+  std::optional<double> time, azimuth, elevation, fov, zoom;
+  double error_max = 0;
+  int lattice = 0, views = 1, samples = 2;
+  bool is_flat = false, has_wires = false, shows_skeleton = false, is_distance_dropped = false, is_polished = false;
+};
+
+bool is_model(const std::string& path) { return has_ending(path, ".exr"); }
+
+std::array<int, 2> parse_picture_size(const std::string& text) {
+  std::array<int, 2> size{0, 0};
+  const char* const end = text.data() + text.size();
+  const auto first = std::from_chars(text.data(), end, size[0]);
+  bool is_good = first.ec == std::errc() && first.ptr != end && (*first.ptr == 'x' || *first.ptr == 'X');
+  if (is_good) {
+    const auto second = std::from_chars(first.ptr + 1, end, size[1]);
+    is_good = second.ec == std::errc() && second.ptr == end;
+  }
+  if (!is_good || size[0] < 16 || size[1] < 16 || size[0] > 8192 || size[1] > 8192)
+    throw CLI::ValidationError(
+        "--size", "\"" + text + "\" is no picture size; give WIDTHxHEIGHT, 16 to 8192 pixels, e.g. 1200x900");
+  return size;
+}
+
+Vec3 parse_direction(const char* option, const std::string& text) {
+  Vec3 v;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto [rest, code] = std::from_chars(at, end, v[axis]);
+    const bool is_last = axis == 2;
+    if (code != std::errc() || !(std::abs(v[axis]) <= 1e15) || (is_last ? rest != end : rest == end || *rest != ','))
+      throw CLI::ValidationError(option, "\"" + text + "\" is no direction; give x,y,z, e.g. 0,1,0");
+    at = rest + 1;
+  }
+  return v;
+}
+
+/// Linear colour, or nothing for "transparent".
+std::optional<LinearRgb> parse_background(const std::string& text) {
+  if (text == "transparent") return std::nullopt;
+  if (text == "white") return LinearRgb{1, 1, 1};
+  if (text == "black") return LinearRgb{0, 0, 0};
+  unsigned value = 0;
+  const char* const end = text.data() + text.size();
+  const bool is_hex = text.size() == 7 && text[0] == '#';
+  if (is_hex) {
+    const auto [rest, code] = std::from_chars(text.data() + 1, end, value, 16);
+    if (code == std::errc() && rest == end)
+      return to_linear({static_cast<unsigned char>(value >> 16), static_cast<unsigned char>(value >> 8 & 255),
+                        static_cast<unsigned char>(value & 255)});
+  }
+  throw CLI::ValidationError("--background",
+                             "\"" + text + "\" is no background; give white, black, transparent or #rrggbb");
+}
+
+View view_of(const Arguments& arguments, const nlohmann::json& own_view) {
+  View view;
+  if (!own_view.is_null()) view = parse_view(own_view, arguments.input);
+  if (!arguments.camera.empty())
+    view = parse_view(parse_json(read_file(arguments.camera), arguments.camera), arguments.camera);
+  if (!arguments.up.empty()) view.up = parse_direction("--up", arguments.up);
+  if (!arguments.front.empty()) view.front = parse_direction("--front", arguments.front);
+  // A model that stands along z looks along -y, as most tools that have z up have it.
+  else if (view.up.normalized().cross(view.front).norm() < 1e-9)
+    view.front = -Vec3::UnitY();
+  view.azimuth_deg = arguments.azimuth.value_or(view.azimuth_deg);
+  view.elevation_deg = arguments.elevation.value_or(view.elevation_deg);
+  view.fov_deg = arguments.fov.value_or(view.fov_deg);
+  view.zoom = arguments.zoom.value_or(view.zoom);
+  return view;
+}
+
+/// What is drawn, from either kind of input.
+struct Subject {
+  TriangleMesh mesh;
+  std::vector<int> bones;  ///< per triangle, where the mode asks for it
+  std::optional<SkeletexModel> model;
+  std::optional<Skeleton> skeleton;  ///< as posed
+};
+
+Subject load_subject(const Arguments& arguments, ClContext& context) {
+  Subject subject;
+  if (!arguments.skeleton.empty()) subject.skeleton = read_skeleton(arguments.skeleton);
+  if (!is_model(arguments.input)) {
+    subject.mesh = load_mesh(arguments.input);
+    if (arguments.mode == "segments") {
+      require_valid(subject.mesh, *subject.skeleton);
+      Segmentation segmentation = segment_mesh(context, subject.mesh, *subject.skeleton);
+      subject.mesh = std::move(segmentation.cut_mesh);
+      subject.bones = std::move(segmentation.triangle_bones);
+    }
+    return subject;
+  }
+  subject.model = read_model(arguments.input);
+  if (arguments.lattice > 0 &&
+      arguments.lattice != std::max(subject.model->texture.width, subject.model->texture.height))
+    subject.model = resample_model(context, *subject.model, arguments.lattice);
+  subject.skeleton = subject.model->skeleton;
+  if (!arguments.pose.empty()) {
+    const PoseAnimation animation = read_animation(arguments.pose, *subject.skeleton);
+    subject.skeleton = apply_pose(*subject.skeleton, pose_at(*subject.skeleton, animation,
+                                                             arguments.time.value_or(animation.frames.front().time)));
+  }
+  subject.mesh = reconstruct_mesh(context, *subject.model);
+  if (arguments.mode == "segments")
+    subject.bones = triangle_bones(number_lattice(*subject.model), subject.mesh.triangles);
+  return subject;
+}
+
+struct ErrorScale {
+  std::vector<VertexColour> colours;  ///< of the bar
+  double highest = 0;                 ///< of the diagonal
+};
+
+Skin skin_of(ClContext& context, const PreparedModel& model) {
+  return make_skin(context, model, row_points(context, model, RowChoice::kInner));
+}
+
+SurfacePaint paint_of(const Arguments& arguments, const Subject& subject, ClContext& context, ErrorScale& scale) {
+  SurfacePaint paint;
+  if (arguments.mode == "segments") {
+    paint.paint = Paint::kFace;
+    std::vector<VertexColour> colours;
+    for (const int bone : subject.bones) colours.push_back(bone_colour(bone));
+    paint.colours = upload_colours(colours);
+  } else if (arguments.mode == "normals") {
+    paint.paint = Paint::kNormal;
+  } else if (arguments.mode == "checker") {
+    paint.paint = Paint::kChecker;
+    paint.corner_uv = gl_buffer(checker_coordinates(*subject.model, subject.mesh, kCheckerCells));
+  } else if (arguments.mode == "weights") {
+    const int bone = bone_by_name(subject.model->skeleton, arguments.bone);
+    std::vector<VertexColour> colours;
+    for (const float weight : vertex_weights(skin_of(context, *subject.model), bone))
+      colours.push_back(viridis(weight));
+    paint.paint = Paint::kVertex;
+    paint.colours = upload_colours(colours);
+  } else if (arguments.mode == "error") {
+    const TriangleMesh other = load_mesh(arguments.against);
+    const double diagonal = bounding_box(other).diagonal();
+    std::vector<float> distances = closest_distances(context, other, subject.mesh.positions);
+    scale.highest = arguments.error_max;
+    if (!(scale.highest > 0)) {
+      std::vector<float> sorted = distances;
+      const auto at = sorted.begin() + static_cast<std::ptrdiff_t>((sorted.size() - 1) * 99 / 100);
+      std::nth_element(sorted.begin(), at, sorted.end());
+      scale.highest = std::max(*at / diagonal, 1e-12);
+    }
+    std::vector<VertexColour> colours;
+    for (const float distance : distances) colours.push_back(viridis(distance / (scale.highest * diagonal)));
+    paint.paint = Paint::kVertex;
+    paint.colours = upload_colours(colours);
+    for (int i = 0; i < 64; ++i) scale.colours.push_back(viridis((i + 0.5) / 64));
+  }
+  return paint;
+}
+
+void write_picture(const std::string& path, const Image& image) {
+  if (has_ending(path, ".exr"))
+    write_exr_image(path, image);
+  else
+    write_png(path, image);
+}
+
+void check_arguments(const Arguments& arguments) {
+  check_distance_option(arguments.is_distance_dropped, arguments.deform);
+  const bool is_texture = arguments.mode == "map" || arguments.mode == "layout";
+  if (!is_model(arguments.input)) {
+    if (arguments.mode == "weights") throw CLI::ValidationError("--mode", "weights are a model's; a mesh has none");
+    if (is_texture || arguments.mode == "checker")
+      throw CLI::ValidationError("--mode", arguments.mode + " shows a model's texture; a mesh has none");
+    if (!arguments.pose.empty())
+      throw CLI::ValidationError("--pose", "only a model can be posed; encode the mesh first");
+    if (arguments.lattice > 0) throw CLI::ValidationError("--lattice", "only a model has a lattice");
+    if (arguments.mode == "segments" && arguments.skeleton.empty())
+      throw CLI::ValidationError("--mode", "segments of a mesh need its --skeleton");
+    if (arguments.shows_skeleton && arguments.skeleton.empty())
+      throw CLI::ValidationError("--show-skeleton", "a mesh brings no skeleton; give --skeleton");
+  } else if (!arguments.skeleton.empty()) {
+    throw CLI::ValidationError("--skeleton", "a model brings its own skeleton; --show-skeleton draws it");
+  }
+  if (arguments.bone.empty() == (arguments.mode == "weights"))
+    throw CLI::ValidationError("--mode", "weights and --bone need each other: how much the bone moves the surface");
+  if (arguments.mode == "error" && arguments.against.empty())
+    throw CLI::ValidationError("--mode", "error needs the mesh to measure --against");
+}
+
+/// Moves the surface of a model to its pose on the GL device.
+void pose_surface(GlContext& gl, ClContext& context, const Arguments& arguments, const Subject& subject,
+                  GpuSurface& surface) {
+  const PreparedModel model(*subject.model);
+  const Deformation deformation = deformation_of(arguments.deform);
+  const DistanceRule distance = arguments.is_distance_dropped ? DistanceRule::kFromFoot : DistanceRule::kFromBone;
+  if (arguments.is_polished) {
+    TriangleMesh posed = reconstruct_mesh(context, model, *subject.skeleton, {deformation, distance});
+    polish_pose(subject.mesh, posed.positions);
+    surface = upload_surface(gl, posed);
+    return;
+  }
+  if (arguments.pose.empty() || deformation == Deformation::kPaper) {
+    displace(gl, upload_model(model), model, *subject.skeleton, distance, surface);
+    return;
+  }
+  if (deformation == Deformation::kCoordinates) {
+    surface = upload_surface(gl, reconstruct_mesh(context, model, *subject.skeleton, {deformation, distance}));
+    return;
+  }
+  const Skin skin = skin_of(context, model);
+  pose_skin(gl, upload_skin(skin, subject.mesh), skin, bone_motions(model.model.skeleton, *subject.skeleton),
+            *subject.skeleton, surface);
+}
+
+void draw_skeleton(GlContext& gl, const Subject& subject, const Camera& camera, const DrawOptions& options,
+                   Image& image) {
+  const TriangleMesh bones = skeleton_mesh(*subject.skeleton, 0.009 * bounding_box(subject.mesh).diagonal());
+  SurfacePaint paint;
+  paint.paint = Paint::kFace;
+  std::vector<VertexColour> colours;
+  for (const int bone : skeleton_mesh_bones(*subject.skeleton))
+    colours.push_back(bone < 0 ? VertexColour{38, 40, 46} : VertexColour{214, 92, 38});
+  paint.colours = upload_colours(colours);
+  DrawOptions plain = options;
+  plain.wire_pixels = 0;
+  plain.lighting = 0.8;
+  blend_over(image, draw(gl, upload_surface(gl, bones), paint, camera, plain), 0.85);
+}
+
+/// Takes mesh, skeleton and view from a file of configs/models. \return the view, null where there is none
+nlohmann::json resolve_config(Arguments& arguments, const CLI::App& command) {
+  if (!has_ending(arguments.input, ".json")) return {};
+  const ModelConfig config = read_model_config(arguments.input);
+  check_named_input(command, config.mesh.string(), "the mesh of " + arguments.input);
+  if (!config.skeleton.empty())
+    check_named_input(command, config.skeleton.string(), "the skeleton of " + arguments.input);
+  arguments.input = config.mesh.string();
+  if (arguments.skeleton.empty() && (arguments.shows_skeleton || arguments.mode == "segments"))
+    arguments.skeleton = config.skeleton.string();
+  return config.view;
+}
+
+/// The texture, or where its patches lie.
+void run_texture(const Arguments& arguments, int size) {
+  const SkeletexModel model = read_model(arguments.input);
+  write_picture(arguments.output, arguments.mode == "map" ? map_image(model, size) : layout_image(model, size));
+  print(arguments.json, arguments.output + '\n');
+  write_json(
+      arguments.json,
+      {{"picture", arguments.output}, {"mode", arguments.mode}, {"size", {model.texture.width, model.texture.height}}});
+}
+
+void run(Arguments arguments, const CLI::App& command) {
+  const nlohmann::json own_view = resolve_config(arguments, command);
+  check_arguments(arguments);
+  const auto [width, height] = parse_picture_size(arguments.size);
+  const std::optional<LinearRgb> background = parse_background(arguments.background);
+  const View view = view_of(arguments, own_view);
+  Stopwatch watch;
+  if (arguments.mode == "map" || arguments.mode == "layout") {
+    run_texture(arguments, std::max(width, height));
+    return;
+  }
+  ClContext context(arguments.device);
+  ProgressBar bar(context);
+  bar.show("reading", 0.05);
+  Subject subject = load_subject(arguments, context);
+  ErrorScale scale;
+  GlContext gl(arguments.gl_device);
+  const double prepare_ms = watch.lap_ms();
+  bar.show("drawing", 0.3);
+  const SurfacePaint paint = paint_of(arguments, subject, context, scale);
+  GpuSurface surface = upload_surface(gl, subject.mesh);
+  double displace_ms = 0;
+  std::vector<Vec3> points = subject.mesh.positions;
+  if (subject.model) {
+    watch.lap_ms();
+    pose_surface(gl, context, arguments, subject, surface);
+    points = download_positions(surface);
+    displace_ms = watch.lap_ms();
+  }
+  DrawOptions options{.width = width, .height = height, .samples = arguments.samples, .is_flat = arguments.is_flat};
+  if (arguments.has_wires) options.wire_pixels = 0.45;
+  if (arguments.mode == "error" || arguments.mode == "weights") options.lighting = 0.55;
+  const bool shows_skeleton =
+      subject.skeleton && (arguments.shows_skeleton || (!arguments.skeleton.empty() && arguments.mode != "segments"));
+  std::vector<Image> images;
+  for (int i = 0; i < arguments.views; ++i) {
+    bar.show("drawing", 0.3 + 0.6 * i / arguments.views);
+    View turned = view;
+    turned.azimuth_deg += 360.0 * i / arguments.views;
+    const Camera camera = fit_camera(turned, points, width, height);
+    Image image = draw(gl, surface, paint, camera, options);
+    if (shows_skeleton) draw_skeleton(gl, subject, camera, options, image);
+    images.push_back(std::move(image));
+  }
+  Image picture = tile(images, arguments.views);
+  if (background) fill_background(picture, *background);
+  const bool is_dark = background && (*background)[1] < 0.2f;
+  if (!scale.colours.empty())
+    draw_scale(picture, scale.colours, 0, scale.highest, "error / diagonal",
+               is_dark ? std::array{0.9, 0.9, 0.9} : std::array{0.1, 0.1, 0.1});
+  const double draw_ms = watch.lap_ms();
+  bar.show("writing", 0.95);
+  write_picture(arguments.output, picture);
+  print(arguments.json,
+        fmt::format(
+            "{} ({} x {}): {} vertices, {} triangles; prepare {:.0f} ms, displace {:.0f} ms, draw {:.0f} ms on {}\n",
+            arguments.output, picture.width, picture.height, surface.vertex_count, surface.triangle_count, prepare_ms,
+            displace_ms, draw_ms, gl.renderer()));
+  Json json{{"picture", arguments.output},
+            {"mode", arguments.mode},
+            {"size", {picture.width, picture.height}},
+            {"vertices", surface.vertex_count},
+            {"triangles", surface.triangle_count},
+            {"times_ms", {{"prepare", prepare_ms}, {"displace", displace_ms}, {"draw", draw_ms}}},
+            {"renderer", gl.renderer()}};
+  if (!scale.colours.empty()) json["error_max"] = scale.highest;
+  write_json(arguments.json, json);
+}
+
+void add_pose_options(CLI::App& command, Arguments& arguments) {
+  CLI::Option* pose =
+      declare_input(command, command.add_option("--pose", arguments.pose, "pose or animation of a model: .json"))
+          ->type_name("FILE");
+  command.add_option("--time", arguments.time, "time in the animation (default: its first frame)")
+      ->check(any_number())
+      ->type_name("T")
+      ->needs(pose);
+  add_deform_option(command, arguments.deform)->needs(pose);
+  command
+      .add_flag("--no-distance", arguments.is_distance_dropped,
+                "with --deform paper or coordinates: do not restore the distances to the bones")
+      ->needs(pose);
+  add_polish_option(command, arguments.is_polished, pose);
+}
+
+void add_camera_options(CLI::App& command, Arguments& arguments) {
+  declare_input(command, command.add_option("--camera", arguments.camera,
+                                            "view: .json with azimuth, elevation, fov, zoom, up, front, target, eye"))
+      ->type_name("FILE");
+  command.add_option("--azimuth", arguments.azimuth, "degrees about the up axis, 0 from the front (default: 30)")
+      ->check(any_number())
+      ->type_name("DEG");
+  command.add_option("--elevation", arguments.elevation, "degrees above the horizon (default: 15)")
+      ->check(number_in(-90.0, 90.0))
+      ->type_name("DEG");
+  command.add_option("--fov", arguments.fov, "degrees of the shorter side, 0: orthographic (default: 25)")
+      ->check(number_in(0.0, 120.0))
+      ->type_name("DEG");
+  command.add_option("--zoom", arguments.zoom, "1: the model fills the picture")
+      ->check(number_in(0.01, 1000.0))
+      ->type_name("X");
+  command.add_option("--up", arguments.up, "the model's up direction (default: 0,1,0)")->type_name("X,Y,Z");
+  command.add_option("--front", arguments.front, "where the model looks (default: 0,0,1)")->type_name("X,Y,Z");
+}
+
+}  // namespace
+
+void add_render_command(CLI::App& program) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("render", "Draw a model or a mesh to a picture");
+  declare_input(command, command.add_option(
+                             "MODEL|MESH", arguments->input,
+                             "model (.skx.exr), mesh, or .json that names mesh, skeleton and view (configs/models)"))
+      ->required();
+  declare_output(command,
+                 command.add_option("-o,--output", arguments->output, "picture: .png, or .exr for linear floats"),
+                 {".png", ".exr"})
+      ->required()
+      ->type_name("FILE");
+  const std::vector<std::string> modes{"shaded", "segments", "normals", "checker", "error", "weights", "map", "layout"};
+  take_one_of(*command.add_option("--mode", arguments->mode,
+                                  "what is shown: shaded, segments, normals, checker, error, weights, map or layout"),
+              modes);
+  command.add_option("--bone", arguments->bone, "--mode weights: the bone, by its name")->type_name("NAME");
+  command.add_flag("--flat", arguments->is_flat, "a normal per triangle");
+  command.add_flag("--wireframe", arguments->has_wires, "draw the triangles' edges");
+  declare_input(command, command.add_option("--skeleton", arguments->skeleton,
+                                            "skeleton of a mesh: .json; drawn inside, or used by --mode segments"))
+      ->type_name("FILE");
+  command.add_flag("--show-skeleton", arguments->shows_skeleton, "draw the skeleton inside");
+  declare_input(command, command.add_option("--against", arguments->against,
+                                            "--mode error: the mesh that distances are measured to"))
+      ->type_name("MESH");
+  command
+      .add_option("--error-max", arguments->error_max,
+                  "upper end of the colours, share of the diagonal (default: 99 % lie below)")
+      ->check(number_above(0))
+      ->type_name("X");
+  add_pose_options(command, *arguments);
+  command.add_option("--lattice", arguments->lattice, "draw a model at another texture size, 4 to 16384 texels")
+      ->check(number_in(4, 16384))
+      ->type_name("N");
+  add_camera_options(command, *arguments);
+  command.add_option("--views", arguments->views, "pictures side by side, all the way round")
+      ->check(number_in(1, 24))
+      ->type_name("N");
+  command.add_option("--size", arguments->size, "of one view, pixels (default: 1200x900)")->type_name("WxH");
+  command.add_option("--samples", arguments->samples, "per pixel and direction, 1 to 8 (default: 2)")
+      ->check(number_in(1, 8))
+      ->type_name("N");
+  command.add_option("--background", arguments->background, "white, black, transparent or #rrggbb")
+      ->type_name("COLOUR");
+  command
+      .add_option("--gl-device", arguments->gl_device,
+                  "EGL device: number or part of its name (default: hardware, else software)")
+      ->type_name("DEVICE");
+  add_device_option(command, arguments->device);
+  add_json_option(command, arguments->json);
+  command.footer(
+      "Examples:\n"
+      "  skeletex render bear.skx.exr -o bear.png\n"
+      "  skeletex render configs/models/bear.json --mode segments --show-skeleton -o bear.png\n"
+      "  skeletex render bear.off --skeleton bear.skeleton.json --mode segments --show-skeleton -o segments.png\n"
+      "  skeletex render bear.off --mode error --against bear.ply -o error.png\n"
+      "  skeletex render bear.skx.exr --pose wave.json --views 4 --size 600x800 -o round.png\n"
+      "No display is needed. Models are placed on the GL device, straight from their texture.");
+  command.callback([arguments, &command] { run(*arguments, command); });
+}
+
+}  // namespace skeletex::cli

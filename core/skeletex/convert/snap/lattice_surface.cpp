@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/convert/snap/lattice_surface.h"
+
+#include <algorithm>
+#include <bit>
+#include <numeric>
+
+#include "skeletex/geometry/parallel.h"
+#include "skeletex/reconstruct/prepared_model.h"
+
+namespace skeletex {
+namespace {
+
+/// Appends the quads of a square of rows and columns along a Z-order curve. \param quads  rows x columns of a patch
+void append_square(int row, int column, int size, int rows, int columns, int first_quad, std::vector<int>& triangles) {
+  if (row >= rows || column >= columns) return;
+  if (size == 1) {
+    const int quad = first_quad + row * columns + column;
+    triangles.push_back(2 * quad), triangles.push_back(2 * quad + 1);
+    return;
+  }
+  for (const int i : {0, 1})
+    for (const int j : {0, 1})
+      append_square(row + i * size / 2, column + j * size / 2, size / 2, rows, columns, first_quad, triangles);
+}
+
+std::vector<int> order_triangles(const SkeletexModel& model, const Lattice& lattice) {
+  std::vector<int> order;
+  order.reserve(lattice.triangle_count);
+  for (std::size_t patch = 0; patch < model.patches.size(); ++patch) {
+    const int columns = model.patches[patch].rectangle.width, rows = model.patches[patch].rectangle.height - 3;
+    const auto size = static_cast<int>(std::bit_ceil(static_cast<unsigned>(std::max(rows, columns))));
+    append_square(0, 0, size, rows, columns, lattice.first_quad[patch], order);
+  }
+  for (int triangle = 2 * lattice.quad_count; triangle < lattice.triangle_count; ++triangle) order.push_back(triangle);
+  return order;
+}
+
+/// Calls act(first vertex, first texel, columns) for the inner rows of all patches.
+template <class Act>
+void for_each_inner_row(const SkeletexModel& model, const Lattice& lattice, const Act& act) {
+  for (std::size_t patch = 0; patch < model.patches.size(); ++patch) {
+    const Rectangle& r = model.patches[patch].rectangle;
+    for (int row = 1; row + 1 < r.height; ++row)
+      act(lattice.first_inner[patch] + (row - 1) * r.width, (r.y + row) * model.texture.width + r.x, r.width);
+  }
+}
+
+}  // namespace
+
+LatticeFrame frame_lattice(ClContext& context, const SkeletexModel& model) {
+  const PreparedModel prepared(model);
+  const SeparationPlanes& separation = prepared.separation;
+  const Lattice& lattice = prepared.lattice;
+  LatticeFrame frame{model, lattice, upload_quads(context, prepared), {}, {}, {}, {}, {}, {}, {}};
+  frame.rows = lattice_rows(model.patches, RowChoice::kInner);
+  std::erase_if(frame.rows,
+                [&](const LatticeRow& row) { return row[1] == model.patches[row[0]].rectangle.height - 2; });
+  frame.positions.resize(lattice.vertex_count);
+  place_seams(model, separation, lattice, frame.positions);
+  frame.ends.resize(2 * model.patches.size());
+  for_each_block(frame.ends.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+    frame.ends[i] =
+        end_seam(model, separation, lattice, frame.positions, static_cast<int>(i / 2), static_cast<BoneEnd>(i % 2));
+  });
+  frame.texels.assign(lattice.vertex_count, -1);
+  for_each_inner_row(model, lattice, [&](int vertex, int texel, int columns) {
+    std::iota(frame.texels.begin() + vertex, frame.texels.begin() + vertex + columns, texel);
+  });
+  for_each_pole(model, lattice,
+                [&](int vertex, int, int, std::size_t texel) { frame.texels[vertex] = static_cast<int>(texel); });
+  frame.texel_patches.assign(static_cast<std::size_t>(model.texture.width) * model.texture.height, -1);
+  for (std::size_t patch = 0; patch < model.patches.size(); ++patch) {
+    const Rectangle& r = model.patches[patch].rectangle;
+    for (int row = r.y; row < r.y + r.height; ++row)
+      std::fill_n(frame.texel_patches.begin() + row * static_cast<std::ptrdiff_t>(model.texture.width) + r.x, r.width,
+                  static_cast<int>(patch));
+  }
+  frame.triangle_order = order_triangles(model, lattice);
+  frame.triangle_places.resize(frame.triangle_order.size());
+  for (std::size_t place = 0; place < frame.triangle_order.size(); ++place)
+    frame.triangle_places[frame.triangle_order[place]] = static_cast<int>(place);
+  return frame;
+}
+
+namespace {
+
+Vec3 position_of(const SkeletexModel& model, const TexelPlanes& points, int texel) {
+  return model.origin + Vec3(points[0][texel], points[1][texel], points[2][texel]);
+}
+
+/// Strips and fans of some ends: of patch i 2 i and 2 i + 1.
+std::vector<std::vector<Triangle>> make_ends(const LatticeFrame& frame, std::span<const int> ends,
+                                             std::span<const Vec3> positions) {
+  std::vector<std::vector<Triangle>> triangles(ends.size());
+  for_each_block(ends.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+    append_end_triangles(frame.model, frame.numbers, positions, frame.ends[ends[i]], ends[i] / 2,
+                         static_cast<BoneEnd>(ends[i] % 2), triangles[i]);
+  });
+  return triangles;
+}
+
+/// The number of an end's first triangle. There is one per column of the row next to it, and one per side of its seam.
+std::vector<int> first_triangles_of_ends(const LatticeFrame& frame) {
+  std::vector<int> firsts{2 * frame.numbers.quad_count};
+  for (std::size_t i = 0; i < frame.ends.size(); ++i)
+    firsts.push_back(firsts.back() + frame.model.patches[i / 2].rectangle.width +
+                     static_cast<int>(frame.ends[i].ring.vertices.size()));
+  return firsts;
+}
+
+/// Writes triangles over those from a number on, and lists those that are others, or have a vertex that has moved.
+void replace_triangles(std::span<const Triangle> triangles, int first, std::span<const char> has_moved,
+                       TriangleMesh& mesh, std::vector<int>& changed) {
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    Triangle& triangle = mesh.triangles[first + i];
+    const bool is_other = triangle != triangles[i];
+    triangle = triangles[i];
+    if (is_other || has_moved[triangle[0]] || has_moved[triangle[1]] || has_moved[triangle[2]])
+      changed.push_back(first + static_cast<int>(i));
+  }
+}
+
+}  // namespace
+
+LatticeMesh build_lattice_mesh(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
+                               const TexelPlanes& points) {
+  const Lattice& lattice = frame.numbers;
+  LatticeMesh result{{frame.positions, {}}, {}};
+  TriangleMesh& mesh = result.mesh;
+  for (int axis = 0; axis < 3; ++axis) {
+    result.inner[axis].reserve(lattice.inner_count);
+    for_each_inner_row(frame.model, lattice, [&](int, int texel, int columns) {
+      const auto first = points[axis].begin() + texel;
+      result.inner[axis].insert(result.inner[axis].end(), first, first + columns);
+    });
+  }
+  const auto device_triangles = triangulate(context, rule, frame.quads, lattice,
+                                            upload_planes(context, result.inner[0], result.inner[1], result.inner[2]));
+  for (int vertex = 0; vertex < lattice.vertex_count; ++vertex)
+    if (frame.texels[vertex] >= 0) mesh.positions[vertex] = position_of(frame.model, points, frame.texels[vertex]);
+  std::vector<int> ends(frame.ends.size());
+  std::iota(ends.begin(), ends.end(), 0);
+  const std::vector<std::vector<Triangle>> of_ends = make_ends(frame, ends, mesh.positions);
+  mesh.triangles = context.download(device_triangles);
+  auto next = mesh.triangles.begin() + 2 * static_cast<std::ptrdiff_t>(lattice.quad_count);
+  for (const std::vector<Triangle>& triangles : of_ends) next = std::copy(triangles.begin(), triangles.end(), next);
+  return result;
+}
+
+std::vector<int> move_texels(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
+                             std::span<const int> texels, const TexelPlanes& points, LatticeMesh& lattice) {
+  if (texels.empty()) return {};
+  const SkeletexModel& model = frame.model;
+  TriangleMesh& mesh = lattice.mesh;
+  std::vector<char> has_moved(mesh.positions.size(), 0);
+  std::vector<std::vector<char>> is_row_near(model.patches.size());
+  for (std::size_t patch = 0; patch < is_row_near.size(); ++patch)
+    is_row_near[patch].assign(model.patches[patch].rectangle.height, 0);
+  for (const int texel : texels) {
+    const int patch = frame.texel_patches[texel];
+    const Rectangle& r = model.patches[patch].rectangle;
+    const int row = texel / model.texture.width - r.y, column = texel % model.texture.width - r.x;
+    const int vertex = frame.numbers.first_inner[patch] + (row - 1) * r.width + column;
+    has_moved[vertex] = 1;
+    mesh.positions[vertex] = position_of(model, points, texel);
+    for (int axis = 0; axis < 3; ++axis) lattice.inner[axis][vertex] = points[axis][texel];
+    // The diagonal of a quad depends on the 4 x 4 vertices around it.
+    for (int i = std::max(1, row - 2); i <= std::min(r.height - 2, row + 1); ++i) is_row_near[patch][i] = 1;
+  }
+  std::vector<LatticeRow> rows;
+  for (const LatticeRow& row : frame.rows)
+    if (is_row_near[row[0]][row[1]] != 0) rows.push_back(row);
+  std::vector<int> ends;
+  for (int end = 0; end < static_cast<int>(frame.ends.size()); ++end) {
+    const std::vector<int> vertices = end_row(model, frame.numbers, end / 2, static_cast<BoneEnd>(end % 2));
+    if (std::any_of(vertices.begin(), vertices.end(), [&](int vertex) { return has_moved[vertex] != 0; }))
+      ends.push_back(end);
+  }
+
+  std::vector<int> changed;
+  if (!rows.empty()) {
+    const ClMapping<Triangle> triangles =
+        context.map(triangulate(context, rule, {context.upload(rows), frame.quads.patches}, frame.numbers,
+                                upload_planes(context, lattice.inner[0], lattice.inner[1], lattice.inner[2])));
+    for (const LatticeRow& row : rows)
+      replace_triangles(
+          {triangles.data() + 2 * row[3], 2 * static_cast<std::size_t>(model.patches[row[0]].rectangle.width)},
+          2 * row[3], has_moved, mesh, changed);
+  }
+  const std::vector<int> firsts = first_triangles_of_ends(frame);
+  const std::vector<std::vector<Triangle>> of_ends = make_ends(frame, ends, mesh.positions);
+  for (std::size_t i = 0; i < ends.size(); ++i)
+    replace_triangles(of_ends[i], firsts[ends[i]], has_moved, mesh, changed);
+  return changed;
+}
+
+}  // namespace skeletex

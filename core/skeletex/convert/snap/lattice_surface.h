@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <array>
+#include <span>
+#include <vector>
+
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+
+namespace skeletex {
+
+/// Points of a texture's texels, from the model's origin: x, y and z per texel.
+using TexelPlanes = std::array<std::vector<float>, 3>;
+
+/// What the meshes of all points of one layout have in common: numbers of vertices and triangles (lattice.h), seams.
+struct LatticeFrame {
+  const SkeletexModel& model;  ///< all but its texels
+  Lattice numbers;
+  DeviceQuads quads;
+  std::vector<LatticeRow> rows;      ///< that quads begin at
+  std::vector<EndSeam> ends;         ///< per patch, head and tail
+  std::vector<Vec3> positions;       ///< seam samples and corners; the rest is open
+  std::vector<int> texels;           ///< per vertex; of seam samples and corners -1
+  std::vector<int> texel_patches;    ///< per texel; -1 between rectangles
+  std::vector<int> triangle_order;   ///< all triangles, those next to each other in the texture near each other
+  std::vector<int> triangle_places;  ///< per triangle, in that order
+  bool is_inner(int vertex) const { return vertex < numbers.inner_count; }
+};
+LatticeFrame frame_lattice(ClContext& context, const SkeletexModel& model);
+
+/// The mesh that the model would reconstruct to, were its texels at given points: what reconstruct_mesh makes.
+struct LatticeMesh {
+  TriangleMesh mesh;
+  TexelPlanes inner;  ///< x, y and z of the inner vertices, from the model's origin
+};
+/// \param rule    of its diagonals, in place of the model's
+/// \param points  of rows 0 and height-1 only poles count
+LatticeMesh build_lattice_mesh(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
+                               const TexelPlanes& points);
+/// After inner texels have moved: diagonals and strips next to them are chosen again.
+/// \param rule, points  as for build_lattice_mesh
+/// \return the triangles that are not what they were, or not where
+std::vector<int> move_texels(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
+                             std::span<const int> texels, const TexelPlanes& points, LatticeMesh& lattice);
+
+}  // namespace skeletex

@@ -1,0 +1,32 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# Holds the code against the project's rules: clang-format, the sizes of files and folders, and clang-tidy's checks (.clang-tidy) over a
+# build made by `cmake --preset release`. Ends with 1 and names each place that breaks a rule.
+#
+#   scripts/lint.sh            everything
+#   scripts/lint.sh FILE...    clang-tidy on these sources alone
+set -euo pipefail
+cd "$(dirname "$0")/.."
+status=0
+
+mapfile -t sources < <(git ls-files '*.h' '*.cpp' '*.cl')
+clang-format --dry-run --Werror "${sources[@]}" || status=1
+
+for file in "${sources[@]}"; do
+  case $file in core/* | kernels/*) ;; *) continue ;; esac
+  lines=$(wc -l <"$file")
+  [ "$lines" -le 500 ] || { echo "$file: $lines lines; split it (at most 500)" >&2; status=1; }
+done
+for ending in h cpp; do
+  while read -r count folder; do
+    [ "$count" -le 14 ] || { echo "$folder: $count .$ending files; make folders by meaning (at most 14)" >&2; status=1; }
+  done < <(git ls-files "core/**/*.$ending" | xargs -n 1 dirname | sort | uniq -c)
+done
+
+if [ $# -gt 0 ]; then
+  checked=("$@")
+else
+  mapfile -t checked < <(git ls-files 'core/*.cpp' 'cli/*.cpp' 'experiments/*.cpp')
+fi
+printf '%s\0' "${checked[@]}" | xargs -0 -n 4 -P "$(nproc)" clang-tidy -p build/release --quiet 2> >(grep -v 'warnings\? \(generated\|treated\)' >&2) || status=1
+exit "$status"
