@@ -2,61 +2,56 @@
 // Texels as weighted sums of the texels of other textures, each read at a place of its own: morphs and transfers (paper
 // 5).
 //
-// in   lattice_rows: the rows to do, four ints each: patch, row, two unused (see reconstruct.cl)
-//      patches, rows: the result's. sources: per source and patch [source * patch_count + patch]
+// in   rows: the rows to do. sources: per source and patch [source * patch_count + patch]
 //      source_rows: per source and row to do [source * row_count + k]
-//      columns: per source and column of the result (BlendColumn). Between head and tail what is read and how slopes
-//      rise run along the curve that poses take (EASED in pose.cl), so that what differs at one end does not break the
-//      surface at the other; and what is not even around the bone, at corners, fades out within END_REACH of its end.
-//      source_slopes: pairs per column of a source: the separation planes' slopes at head and tail, as the result's
-//      bone runs. A texel is turned from the slope that its frame has in the source, with the rise, to that of the
-//      result's frame. result_columns: of the result (ColumnRecord)
-//      texels: planes along, around, out of in_count floats, of all sources
-// out  blended: the same of the result's texture, texture_width columns
-// NDRange: one work-group per row, of any size; work-items take columns in turn (see reconstruct.cl). A column of the
-// result is done by one work-item for all sources, so sums need no barrier and have a fixed order.
-// Reads are linear between the four texels around. Where a place is a texel's own, the result is weight * texel
-// exactly.
+//      columns: per source and column of the result. Between head and tail the column that is read, and the rise of the
+//      slopes, run along the curve of poses (EASED in pose_math.h), so that a difference at one end does not bend the
+//      surface at the other. Differences that vary around the bone, at corners, fade out within END_RANGE of their end.
+//      source_slopes: pairs per column of a source: the slopes of the separation planes at head and tail, in the
+//      direction of the result's bone. A texel is turned from the slope of its frame in the source, plus the rise, to
+//      the slope of the result's frame.
+//      result_columns: of the result
+//      texels: planes along, around, out of all sources
+// out  blended: planes along, around, out of the result's texture
+// NDRange: one work-group of any size per row, whose work-items take columns in turn. One work-item does a column of
+// the result for all sources, so sums need no barrier and have a fixed order. Reads are linear between the four texels
+// around. At a texel's own place the result is exactly weight * texel.
 #include "blend_structs.h"
+#include "pose_math.h"
 #include "skeletex_structs.h"
 
-// How far from an end of a bone its corners are felt, as a share of the way to the other end.
-#define END_REACH 0.3f
+// The part of a bone, from one of its ends, where corners at that end have an effect.
+#define END_RANGE 0.3f
 
-__kernel void blend_texels(const int row_count, const int source_count, const int patch_count, const int texture_width,
-                           __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
-                           __global const RowRecord* restrict rows, __global const BlendSource* restrict sources,
-                           __global const BlendRow* restrict source_rows, __global const BlendColumn* restrict columns,
-                           __global const float* restrict source_slopes,
-                           __global const ColumnRecord* restrict result_columns, const int in_count,
-                           __global const float* restrict texels, const int out_count,
+__kernel void blend_texels(const BlendParameters blend, __global const BlendRow* restrict rows,
+                           __global const BlendSource* restrict sources,
+                           __global const BlendSourceRow* restrict source_rows,
+                           __global const BlendColumn* restrict columns, __global const float* restrict source_slopes,
+                           __global const ColumnRecord* restrict result_columns, __global const float* restrict texels,
                            __global float* restrict blended) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
+  if (k >= blend.row_count) return;
   __global const float* restrict in_along = texels;
-  __global const float* restrict in_around = in_along + in_count;
-  __global const float* restrict in_out = in_around + in_count;
+  __global const float* restrict in_around = in_along + blend.texel_count;
+  __global const float* restrict in_out = in_around + blend.texel_count;
   __global float* restrict along = blended;
-  __global float* restrict around = along + out_count;
-  __global float* restrict out = around + out_count;
-  const int patch_index = lattice_rows[4 * k], row = lattice_rows[4 * k + 1];
-  __global const PatchRecord* restrict patch = patches + patch_index;
-  const int width = patch->width;
-  const int texel = (patch->y + row) * texture_width + patch->x;
-  const float axial = rows[patch->row_begin + row].axial;
-  const float eased = axial * axial * (3.0f - 2.0f * axial);
-  const float near_head = fmax(0.0f, 1.0f - axial / END_REACH),
-              near_tail = fmax(0.0f, 1.0f - (1.0f - axial) / END_REACH);
+  __global float* restrict around = along + blend.blended_count;
+  __global float* restrict out = around + blend.blended_count;
+  const int width = rows[k].width, texel = rows[k].texel;
+  const float axial = rows[k].axial, eased = EASED(axial);
+  const float near_head = fmax(0.0f, 1.0f - axial / END_RANGE),
+              near_tail = fmax(0.0f, 1.0f - (1.0f - axial) / END_RANGE);
   const float head_share = (1.0f - eased) * near_head * near_head * (3.0f - 2.0f * near_head),
               even_head_share = 1.0f - eased - head_share;
   const float tail_share = eased * near_tail * near_tail * (3.0f - 2.0f * near_tail),
               even_tail_share = eased - tail_share;
-  __global const ColumnRecord* restrict slopes = result_columns + patch->column_begin;
+  __global const ColumnRecord* restrict slopes = result_columns + rows[k].column_begin;
   const int first = get_local_id(0), step = get_local_size(0);
 
-  for (int i = 0; i < source_count; ++i) {
-    __global const BlendSource* restrict source = sources + i * patch_count + patch_index;
-    const float weight = source_rows[i * row_count + k].weight, from_row = source_rows[i * row_count + k].row;
+  for (int i = 0; i < blend.source_count; ++i) {
+    __global const BlendSource* restrict source = sources + i * blend.patch_count + rows[k].patch;
+    const float weight = source_rows[i * blend.row_count + k].weight,
+                from_row = source_rows[i * blend.row_count + k].row;
     const int source_width = source->width, stride = source->stride;
     const int below = clamp((int)from_row, 0, source->height - 2);
     const float above_share = from_row - (float)below;
@@ -86,7 +81,7 @@ __kernel void blend_texels(const int row_count, const int source_count, const in
       const float read_around =
           sign * (w00 * in_around[a] + w01 * in_around[b] + w10 * in_around[c] + w11 * in_around[d]);
       const float o_sum = w00 * in_out[a] + w01 * in_out[b] + w10 * in_out[c] + w11 * in_out[d];
-      // From the frame of slope k to that of `slope`: by the angle between (1, k) and (1, slope), where it is no
+      // From the frame of slope k to that of `slope`, by the angle between (1, k) and (1, slope), unless it is
       // rounding.
       const float slope = slopes[j].slope_head + axial * (slopes[j].slope_tail - slopes[j].slope_head);
       const int l = turns_texels ? 2 * left : 0, r = turns_texels ? 2 * right : 0;
@@ -108,45 +103,41 @@ __kernel void blend_texels(const int row_count, const int source_count, const in
   }
 }
 
-// Adds to the texels what rows miss at their ends, fading out along the bone.
-// moves: six planes of column_count floats, columns of all patches: along, around, out at the head, then at the tail
-// NDRange: rows, as above.
-__kernel void move_ends(const int row_count, const int texture_width, const int column_count,
-                        __global const int* restrict lattice_rows, __global const PatchRecord* restrict patches,
-                        __global const RowRecord* restrict rows, __global const float* restrict moves,
-                        const int texel_count, __global float* restrict texels) {
-  const int k = get_group_id(0);
-  if (k >= row_count) return;
+// Adds the moves of the rows at the ends to all texels, fading out along the bone.
+// moves: six planes over the columns of all patches: along, around, out at the head, then at the tail
+// NDRange: as above.
+__kernel void move_ends(const MoveEndsParameters ends, __global const BlendRow* restrict rows,
+                        __global const float* restrict moves, __global float* restrict texels) {
+  const int k = get_group_id(0), column_count = ends.column_count;
+  if (k >= ends.row_count) return;
   __global float* restrict along = texels;
-  __global float* restrict around = along + texel_count;
-  __global float* restrict out = around + texel_count;
-  __global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
-  const int row = lattice_rows[4 * k + 1], texel = (patch->y + row) * texture_width + patch->x;
-  const float u = rows[patch->row_begin + row].u;
-  const float to_head = fmax(0.0f, 1.0f - u / END_REACH), to_tail = fmax(0.0f, 1.0f - (1.0f - u) / END_REACH);
-  const float at_head = to_head * to_head * (3.0f - 2.0f * to_head),
-              at_tail = to_tail * to_tail * (3.0f - 2.0f * to_tail);
-  __global const float* restrict head = moves + patch->column_begin;
+  __global float* restrict around = along + ends.texel_count;
+  __global float* restrict out = around + ends.texel_count;
+  const int texel = rows[k].texel, width = rows[k].width;
+  const float u = rows[k].u;
+  const float to_head = fmax(0.0f, 1.0f - u / END_RANGE), to_tail = fmax(0.0f, 1.0f - (1.0f - u) / END_RANGE);
+  const float at_head = EASED(to_head), at_tail = EASED(to_tail);
+  __global const float* restrict head = moves + rows[k].column_begin;
   __global const float* restrict tail = head + 3 * column_count;
-  for (int j = get_local_id(0); j < patch->width; j += get_local_size(0)) {
+  for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
     along[texel + j] += at_head * head[j] + at_tail * tail[j];
     around[texel + j] += at_head * head[column_count + j] + at_tail * tail[column_count + j];
     out[texel + j] += at_head * head[2 * column_count + j] + at_tail * tail[2 * column_count + j];
   }
 }
 
-// Texels between those of two textures of one layout, at the same place. At shares of 0 and 1 they are those of the one
-// texture bit by bit, the sign of zeros included. NDRange: one work-group per row of the texture, of any size.
+// Linear interpolation. Shares of 0 and 1 give the very bits of the first and the second value.
 static float mixed(const float first, const float second, const float share) {
   const float between = (1.0f - share) * first + share * second;
   return share == 0.0f ? first : share == 1.0f ? second : between;
 }
 
-__kernel void mix_texels(const int height, const int width, const float share, __global const float* restrict first,
+// Linear interpolation between the texels of two textures of one layout.
+// NDRange: one work-group of any size per row of the texture.
+__kernel void mix_texels(const MixParameters mix, __global const float* restrict first,
                          __global const float* restrict second, __global float* restrict texels) {
-  const int row = get_group_id(0);
-  if (row >= height) return;
-  const int count = height * width;
+  const int row = get_group_id(0), count = mix.height * mix.width;
+  if (row >= mix.height) return;
   __global const float* restrict first_along = first;
   __global const float* restrict first_around = first_along + count;
   __global const float* restrict first_out = first_around + count;
@@ -156,10 +147,10 @@ __kernel void mix_texels(const int height, const int width, const float share, _
   __global float* restrict along = texels;
   __global float* restrict around = along + count;
   __global float* restrict out = around + count;
-  const int begin = row * width, end = begin + width, step = get_local_size(0);
+  const int begin = row * mix.width, end = begin + mix.width, step = get_local_size(0);
   for (int i = begin + (int)get_local_id(0); i < end; i += step) {
-    along[i] = mixed(first_along[i], second_along[i], share);
-    around[i] = mixed(first_around[i], second_around[i], share);
-    out[i] = mixed(first_out[i], second_out[i], share);
+    along[i] = mixed(first_along[i], second_along[i], mix.share);
+    around[i] = mixed(first_around[i], second_around[i], mix.share);
+    out[i] = mixed(first_out[i], second_out[i], mix.share);
   }
 }

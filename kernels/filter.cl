@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: MIT
-// Texture-space filters: the Laplace operator of the surface, normals, noise. What is solved with that operator:
-// diffusion.cl.
+// Filters on the surface: the Laplace operator, normals, noise. diffusion.cl solves equations with that operator.
 //
-// Vertices are those of the model's lattice (reconstruct/lattice.h). Who is next to whom:
-//   Inside a patch, by arithmetic. `rows` has four ints per inner row of every patch: its first vertex, its width, and
-//   whether rows before and after it are inner rows too. Columns wrap. Kernels over rows run one work-group per row, of
-//   any size, whose work-items take columns in turn (see reconstruct.cl).
-//   At the ends of patches, by a table. `fan_vertices` lists the vertices there (first and last inner row, poles, seam
-//   samples, corners); entries fan_begin[k] .. fan_begin[k + 1] of `fans` hold two ints per triangle at vertex k
-//   outside the quads between inner rows: its other two corners, counter-clockwise. Both sides of a seam are in one
-//   fan. Kernels over fans run one work-group per FAN_CHUNK vertices. They add to what kernels over rows have written.
-// Quads count half for each of their two diagonals, so that no choice between them shows.
+// Vertices are those of the model's lattice (reconstruct/lattice.h). Their neighbours are found in two ways.
+//   Inside a patch, by arithmetic. The table of rows has all inner rows of all patches (SurfaceRow). Columns wrap.
+//   A kernel with "NDRange: rows" runs one work-group of any size per row, whose work-items take columns in turn.
+//   At the ends of patches, by a table. The table of fan vertices (FanVertex) lists the vertices of the first and last
+//   inner rows, the poles, the samples of seams and the corners. The table of fans has two ints for each triangle at
+//   such a vertex that is not part of a quad between inner rows: the triangle's other two corners, counter-clockwise.
+//   The triangles on both sides of a seam are in one fan. A kernel with "NDRange: fans" runs one work-group per
+//   FAN_CHUNK vertices. It adds to what kernels over rows have written.
+// Both diagonals of a quad count half each, so that the choice between them does not matter.
 //
-// A field has one or three components, planes of `count` floats behind each other. Positions are a field of three,
-// relative to the model's origin, in diagonals.
+// A field has one plane of `count` floats per component, plane behind plane. Positions are a field of three, relative
+// to the model's origin, in diagonals.
+#include "surface_math.h"
+#include "surface_structs.h"
 
-#define FAN_CHUNK 64
-// Where twice a triangle's area is below this share of half the sum of its squared edges, it counts as that much:
-// weights stay finite, the same seen from all three corners, and the operator positive.
+// A triangle whose double area is below this share of half the sum of its squared edges counts as if it had that
+// area: weights stay finite and equal at all three corners, and the operator stays positive.
 #define LEAST_AREA 1.2e-4f
 
 // Adds half the cotangent weights of the triangle (0, e, f) to the edges from 0 to e and to f, and its area to *area.
@@ -41,22 +41,13 @@ void weigh_corner(const float* restrict b, const float* restrict c, const float*
   add_triangle(b[0], b[1], b[2], d[0], d[1], d[2], weights, weights + 2, area);
 }
 
-void edge_between(__global const float* restrict points, const int count, const int from, const int to,
-                  float* restrict edge) {
-  edge[0] = points[to] - points[from];
-  edge[1] = points[count + to] - points[count + from];
-  edge[2] = points[2 * count + to] - points[2 * count + from];
-}
-
-// Weights of the edges from each vertex of a row to its right (0, +1), and to the next row at (+1, -1), (+1, 0), (+1,
-// +1): four planes of `count`; the other four are those of its neighbours. mass: its share of the area; stiffness: the
-// sum of all its weights.
-void weigh_vertex(const int count, __global const float* restrict points, const int before, const int here,
-                  const int after, const int left, const int j, const int right, const float has_before,
-                  const float has_after, __global float* restrict weights, __global float* restrict mass,
-                  __global float* restrict stiffness) {
-  const int v = here + j;
-  float e[8][3];
+// The edges from the vertex in column j of a row to the eight around it, counter-clockwise from its right. Edges to
+// rows that are no inner rows are those to the row itself.
+void edges_around(__global const float* restrict points, const int count, const SurfaceRow row, const int j,
+                  float e[8][3]) {
+  const int here = row.first, v = here + j;
+  const int before = row.has_before ? here - row.width : here, after = row.has_after ? here + row.width : here;
+  const int left = j > 0 ? j - 1 : row.width - 1, right = j + 1 < row.width ? j + 1 : 0;
   edge_between(points, count, v, here + right, e[0]);
   edge_between(points, count, v, after + right, e[1]);
   edge_between(points, count, v, after + j, e[2]);
@@ -65,89 +56,88 @@ void weigh_vertex(const int count, __global const float* restrict points, const 
   edge_between(points, count, v, before + left, e[5]);
   edge_between(points, count, v, before + j, e[6]);
   edge_between(points, count, v, before + right, e[7]);
-  float w[4][3] = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
-  float area_after = 0.0f, area_before = 0.0f;
-  weigh_corner(e[0], e[1], e[2], w[0], &area_after);
-  weigh_corner(e[2], e[3], e[4], w[1], &area_after);
-  weigh_corner(e[4], e[5], e[6], w[2], &area_before);
-  weigh_corner(e[6], e[7], e[0], w[3], &area_before);
-  const float to_right = has_after * w[0][0] + has_before * w[3][2];
-  const float to_left = has_after * w[1][2] + has_before * w[2][0];
-  const float ahead = has_after * (w[0][2] + w[1][0]), ahead_right = has_after * w[0][1],
-              ahead_left = has_after * w[1][1];
-  const float behind = has_before * (w[2][2] + w[3][0] + w[2][1] + w[3][1]);
-  weights[v] = to_right;
-  weights[count + v] = ahead_left;
-  weights[2 * count + v] = ahead;
-  weights[3 * count + v] = ahead_right;
-  mass[v] = (has_after * area_after + has_before * area_before) / 6.0f;
-  stiffness[v] = to_right + to_left + ahead + ahead_right + ahead_left + behind;
 }
 
+// Weights of four edges of a vertex in a row, one plane of `count` each: to its right, (0, +1), and to the next row, at
+// (+1, -1), (+1, 0) and (+1, +1). Its other four edges are edges of its neighbours.
 // NDRange: rows.
-// in   points     out  weights: four planes; mass, stiffness: one plane each
-__kernel void weigh_rows(const int row_count, const int count, __global const int* restrict rows,
+// in   points
+// out  weights: four planes; mass: the vertex's share of the area; stiffness: the sum of its eight weights
+__kernel void weigh_rows(const SurfaceParameters surface, __global const SurfaceRow* restrict rows,
                          __global const float* restrict points, __global float* restrict weights,
                          __global float* restrict mass, __global float* restrict stiffness) {
-  const int k = get_group_id(0);
-  if (k >= row_count) return;
-  const int here = rows[4 * k], width = rows[4 * k + 1], has_before = rows[4 * k + 2], has_after = rows[4 * k + 3];
-  const int before = has_before ? here - width : here, after = has_after ? here + width : here;
-  const int begin = get_local_id(0), step = get_local_size(0);
-  for (int j = 1 + begin; j < width - 1; j += step)
-    weigh_vertex(count, points, before, here, after, j - 1, j, j + 1, has_before, has_after, weights, mass, stiffness);
-  if (begin == 0) {
-    weigh_vertex(count, points, before, here, after, width - 1, 0, 1, has_before, has_after, weights, mass, stiffness);
-    weigh_vertex(count, points, before, here, after, width - 2, width - 1, 0, has_before, has_after, weights, mass,
-                 stiffness);
+  const int k = get_group_id(0), count = surface.count;
+  if (k >= surface.row_count) return;
+  const SurfaceRow row = rows[k];
+  const float has_before = row.has_before, has_after = row.has_after;
+  for (int j = get_local_id(0); j < row.width; j += get_local_size(0)) {
+    const int v = row.first + j;
+    float e[8][3];
+    edges_around(points, count, row, j, e);
+    float w[4][3] = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
+    float area_after = 0.0f, area_before = 0.0f;
+    weigh_corner(e[0], e[1], e[2], w[0], &area_after);
+    weigh_corner(e[2], e[3], e[4], w[1], &area_after);
+    weigh_corner(e[4], e[5], e[6], w[2], &area_before);
+    weigh_corner(e[6], e[7], e[0], w[3], &area_before);
+    const float to_right = has_after * w[0][0] + has_before * w[3][2];
+    const float to_left = has_after * w[1][2] + has_before * w[2][0];
+    const float ahead = has_after * (w[0][2] + w[1][0]), ahead_right = has_after * w[0][1],
+                ahead_left = has_after * w[1][1];
+    const float behind = has_before * (w[2][2] + w[3][0] + w[2][1] + w[3][1]);
+    weights[v] = to_right;
+    weights[count + v] = ahead_left;
+    weights[2 * count + v] = ahead;
+    weights[3 * count + v] = ahead_right;
+    mass[v] = (has_after * area_after + has_before * area_before) / 6.0f;
+    stiffness[v] = to_right + to_left + ahead + ahead_right + ahead_left + behind;
   }
 }
 
 // Whether the edge between two vertices of one row (at least four wide, and wrapping) leads from v to its right.
 int is_right(const int v, const int other) { return other == v + 1 || other < v - 1; }
 
+// The same for the triangles of the fans. An edge along a row has all of its weight in `weights`.
 // NDRange: fans.
-// in   points     out  fan_weights: two floats per triangle, of the edges to its two corners
-// in and out  weights: edges along a row get their whole weight there, none in fan_weights; mass, stiffness: of
-// vertices in
-//      no row they begin here
-__kernel void weigh_fans(const int fan_count, const int inner_count, const int count,
-                         __global const int* restrict fan_vertices, __global const int* restrict fan_begin,
+// in          points
+// out         fan_weights: two floats per triangle, of the edges to its two corners
+// in and out  weights, mass, stiffness
+__kernel void weigh_fans(const SurfaceParameters surface, __global const FanVertex* restrict fan_vertices,
                          __global const int* restrict fans, __global const float* restrict points,
                          __global float* restrict weights, __global float* restrict fan_weights,
                          __global float* restrict mass, __global float* restrict stiffness) {
-  const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, fan_count);
+  const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, surface.fan_count);
   for (int k = begin + (int)get_local_id(0); k < end; k += get_local_size(0)) {
-    const int v = fan_vertices[k];
+    const int v = fan_vertices[k].vertex;
     float area = 0.0f, sum = 0.0f;
-    for (int i = fan_begin[k]; i < fan_begin[k + 1]; ++i) {
+    for (int i = fan_vertices[k].begin; i < fan_vertices[k + 1].begin; ++i) {
       float e[3], f[3], to[2] = {0.0f, 0.0f};
-      edge_between(points, count, v, fans[2 * i], e);
-      edge_between(points, count, v, fans[2 * i + 1], f);
+      edge_between(points, surface.count, v, fans[2 * i], e);
+      edge_between(points, surface.count, v, fans[2 * i + 1], f);
       add_triangle(e[0], e[1], e[2], f[0], f[1], f[2], to, to + 1, &area);
       sum += 2.0f * (to[0] + to[1]);
       for (int side = 0; side < 2; ++side) {
         const int other = fans[2 * i + side];
-        const int is_in_row = v < inner_count && other < inner_count;
+        const int is_in_row = v < surface.inner_count && other < surface.inner_count;
         fan_weights[2 * i + side] = is_in_row ? 0.0f : 2.0f * to[side];
         if (is_in_row && is_right(v, other)) weights[v] += 2.0f * to[side];
       }
     }
-    mass[v] = (v < inner_count ? mass[v] : 0.0f) + area / 3.0f;
-    stiffness[v] = (v < inner_count ? stiffness[v] : 0.0f) + sum;
+    mass[v] = (v < surface.inner_count ? mass[v] : 0.0f) + area / 3.0f;
+    stiffness[v] = (v < surface.inner_count ? stiffness[v] : 0.0f) + sum;
   }
 }
 
-// to: the field at the vertices of a coarser lattice (edit/coarsen.h). NDRange: those
-__kernel void pick_vertices(const int coarse_count, const int components, const int count,
-                            __global const int* restrict picks, __global const float* restrict from,
-                            __global float* restrict to) {
+// The field at the vertices of the coarser lattice (edit/filter/coarsen.h). NDRange: those vertices.
+// in   picks: per vertex there, the vertex here at its place; from     out  to
+__kernel void pick_vertices(const SurfaceParameters surface, __global const int* restrict picks,
+                            __global const float* restrict from, __global float* restrict to) {
   const int v = get_global_id(0);
-  if (v >= coarse_count) return;
-  for (int c = 0; c < components; ++c) to[c * coarse_count + v] = from[c * count + picks[v]];
+  if (v >= surface.coarse_count) return;
+  for (int c = 0; c < surface.components; ++c) to[c * surface.coarse_count + v] = from[c * surface.count + picks[v]];
 }
 
-// e x f
+// sum += share (e x f)
 void add_cross(const float* restrict e, const float* restrict f, const float share, float* restrict sum) {
   sum[0] += share * (e[1] * f[2] - e[2] * f[1]);
   sum[1] += share * (e[2] * f[0] - e[0] * f[2]);
@@ -161,62 +151,44 @@ void add_corner_vector(const float* restrict b, const float* restrict c, const f
   add_cross(b, d, share, sum);
 }
 
-void area_vector_at(const int count, __global const float* restrict points, const int before, const int here,
-                    const int after, const int left, const int j, const int right, const float has_before,
-                    const float has_after, __global float* restrict vectors) {
-  const int v = here + j;
-  float e[8][3];
-  edge_between(points, count, v, here + right, e[0]);
-  edge_between(points, count, v, after + right, e[1]);
-  edge_between(points, count, v, after + j, e[2]);
-  edge_between(points, count, v, after + left, e[3]);
-  edge_between(points, count, v, here + left, e[4]);
-  edge_between(points, count, v, before + left, e[5]);
-  edge_between(points, count, v, before + j, e[6]);
-  edge_between(points, count, v, before + right, e[7]);
-  float sum[3] = {0.0f, 0.0f, 0.0f};
-  add_corner_vector(e[0], e[1], e[2], has_after / 12.0f, sum);
-  add_corner_vector(e[2], e[3], e[4], has_after / 12.0f, sum);
-  add_corner_vector(e[4], e[5], e[6], has_before / 12.0f, sum);
-  add_corner_vector(e[6], e[7], e[0], has_before / 12.0f, sum);
-  vectors[v] = sum[0];
-  vectors[count + v] = sum[1];
-  vectors[2 * count + v] = sum[2];
-}
-
-// Each vertex's third of the area vectors around it, outward. NDRange: rows. in  points     out  vectors: field of
-// three
-__kernel void sum_row_vectors(const int row_count, const int count, __global const int* restrict rows,
+// Each vertex's third of the area vectors around it, outward.
+// NDRange: rows.
+// in   points     out  vectors: field of three
+__kernel void sum_row_vectors(const SurfaceParameters surface, __global const SurfaceRow* restrict rows,
                               __global const float* restrict points, __global float* restrict vectors) {
-  const int k = get_group_id(0);
-  if (k >= row_count) return;
-  const int here = rows[4 * k], width = rows[4 * k + 1], has_before = rows[4 * k + 2], has_after = rows[4 * k + 3];
-  const int before = has_before ? here - width : here, after = has_after ? here + width : here;
-  const int begin = get_local_id(0), step = get_local_size(0);
-  for (int j = 1 + begin; j < width - 1; j += step)
-    area_vector_at(count, points, before, here, after, j - 1, j, j + 1, has_before, has_after, vectors);
-  if (begin == 0) {
-    area_vector_at(count, points, before, here, after, width - 1, 0, 1, has_before, has_after, vectors);
-    area_vector_at(count, points, before, here, after, width - 2, width - 1, 0, has_before, has_after, vectors);
+  const int k = get_group_id(0), count = surface.count;
+  if (k >= surface.row_count) return;
+  const SurfaceRow row = rows[k];
+  const float after_share = row.has_after / 12.0f, before_share = row.has_before / 12.0f;
+  for (int j = get_local_id(0); j < row.width; j += get_local_size(0)) {
+    float e[8][3], sum[3] = {0.0f, 0.0f, 0.0f};
+    edges_around(points, count, row, j, e);
+    add_corner_vector(e[0], e[1], e[2], after_share, sum);
+    add_corner_vector(e[2], e[3], e[4], after_share, sum);
+    add_corner_vector(e[4], e[5], e[6], before_share, sum);
+    add_corner_vector(e[6], e[7], e[0], before_share, sum);
+    for (int c = 0; c < 3; ++c) vectors[c * count + row.first + j] = sum[c];
   }
 }
 
-// NDRange: fans. in  points     in and out  vectors
-__kernel void sum_fan_vectors(const int fan_count, const int inner_count, const int count,
-                              __global const int* restrict fan_vertices, __global const int* restrict fan_begin,
+// The same for the triangles of the fans.
+// NDRange: fans.
+// in   points     in and out  vectors
+__kernel void sum_fan_vectors(const SurfaceParameters surface, __global const FanVertex* restrict fan_vertices,
                               __global const int* restrict fans, __global const float* restrict points,
                               __global float* restrict vectors) {
-  const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, fan_count);
+  const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, surface.fan_count);
   for (int k = begin + (int)get_local_id(0); k < end; k += get_local_size(0)) {
-    const int v = fan_vertices[k];
+    const int v = fan_vertices[k].vertex;
     float sum[3] = {0.0f, 0.0f, 0.0f};
-    for (int i = fan_begin[k]; i < fan_begin[k + 1]; ++i) {
+    for (int i = fan_vertices[k].begin; i < fan_vertices[k + 1].begin; ++i) {
       float e[3], f[3];
-      edge_between(points, count, v, fans[2 * i], e);
-      edge_between(points, count, v, fans[2 * i + 1], f);
+      edge_between(points, surface.count, v, fans[2 * i], e);
+      edge_between(points, surface.count, v, fans[2 * i + 1], f);
       add_cross(e, f, 1.0f / 6.0f, sum);
     }
-    for (int c = 0; c < 3; ++c) vectors[c * count + v] = (v < inner_count ? vectors[c * count + v] : 0.0f) + sum[c];
+    for (int c = 0; c < 3; ++c)
+      vectors[c * surface.count + v] = (v < surface.inner_count ? vectors[c * surface.count + v] : 0.0f) + sum[c];
   }
 }
 
@@ -257,16 +229,17 @@ float gradient_noise(const float x, const float y, const float z, const uint see
   return planes[0] + sz * (planes[1] - planes[0]);
 }
 
-// Noise at every vertex by its position: octaves of half the wavelength and half the height each. NDRange: vertices.
-// in  points; frequency: 1 / wavelength, in the points' unit     out  heights: field of one
-__kernel void noise_at_points(const int count, const float frequency, const int octaves, const uint seed,
-                              __global const float* restrict points, __global float* restrict heights) {
+// Noise at every vertex by its position: octaves, each of half the wavelength and half the height of the one before.
+// NDRange: vertices.
+// in   points     out  heights: field of one
+__kernel void noise_at_points(const NoiseParameters noise, __global const float* restrict points,
+                              __global float* restrict heights) {
   const int v = get_global_id(0);
-  if (v >= count) return;
-  float sum = 0.0f, height = 1.0f, scale = frequency;
-  for (int octave = 0; octave < octaves; ++octave) {
-    sum += height * gradient_noise(scale * points[v], scale * points[count + v], scale * points[2 * count + v],
-                                   seed + (uint)octave);
+  if (v >= noise.count) return;
+  float sum = 0.0f, height = 1.0f, scale = noise.frequency;
+  for (int octave = 0; octave < noise.octaves; ++octave) {
+    sum += height * gradient_noise(scale * points[v], scale * points[noise.count + v],
+                                   scale * points[2 * noise.count + v], noise.seed + (uint)octave);
     height *= 0.5f;
     scale *= 2.0f;
   }

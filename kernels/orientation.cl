@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The orientations of an in-between surface: how its surface would have to turn at every vertex to look the way that
-// its sources do there (edit/orientation.h). Vertices, rows and fans as in filter.cl, whose head comment explains them.
-//
-// A field has planes of `count` floats behind each other. A rotation is a unit quaternion, four planes: w, x, y, z.
+// Rotations, per vertex, from a surface to the mean orientation of its sources, and the right-hand side of the surface
+// whose edges are so rotated (edit/morph/orientation.h). The head of filter.cl explains vertices, rows, fans and
+// fields. A rotation is a unit quaternion: a field of four, w, x, y, z.
+#include "surface_math.h"
+#include "surface_structs.h"
 
-#define FAN_CHUNK 64
 #define LEAST_SINE 1e-3f       // of the angle between the two directions of a surface
 #define LEAST_HALF_TURN 1e-3f  // 1 + cosine of the angle between two normals
-// Cosines of half the angles where a rotation counts in full, and no more: 50 and 100 degrees. One so large tells of a
-// map that folds or smears, not of a surface.
+// Cosines of half the angles up to which a rotation counts in full (50 degrees) and from which on it does not count
+// (100 degrees). Larger rotations come from folds of the map between the surfaces.
 #define FULL_COSINE 0.90630779f
 #define LAST_COSINE 0.64278761f
 
@@ -20,7 +20,7 @@ void cross_product(const float* restrict e, const float* restrict f, float* rest
 
 float dot_product(const float* restrict e, const float* restrict f) { return e[0] * f[0] + e[1] * f[1] + e[2] * f[2]; }
 
-// p q
+// product = p q
 void multiply_rotations(const float* restrict p, const float* restrict q, float* restrict product) {
   product[0] = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3];
   product[1] = p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2];
@@ -36,14 +36,16 @@ void rotate_vector(const float* restrict q, const float* restrict v, float* rest
   rotated[2] = v[2] + q[0] * tz + q[1] * ty - q[2] * tx;
 }
 
-void vector_between(__global const float* restrict points, const int count, const int from, const int to,
-                    float* restrict e) {
-  e[0] = points[to] - points[from];
-  e[1] = points[count + to] - points[count + from];
-  e[2] = points[2 * count + to] - points[2 * count + from];
+// The directions of a surface along and around its bone, at the vertex in column j of a row.
+void directions_at(__global const float* restrict points, const int count, const SurfaceRow row, const int j,
+                   float* restrict along, float* restrict around) {
+  const int v = row.first + j;
+  edge_between(points, count, row.has_before ? v - row.width : v, row.has_after ? v + row.width : v, along);
+  edge_between(points, count, row.first + (j > 0 ? j - 1 : row.width - 1), row.first + (j + 1 < row.width ? j + 1 : 0),
+               around);
 }
 
-// Unit normal from the directions along and around. 0 where they have none
+// Unit normal of the directions along and around. Returns 0 where they have none.
 int unit_normal(const float* restrict along, const float* restrict around, float* restrict n) {
   cross_product(along, around, n);
   const float area2 = dot_product(n, n);
@@ -54,9 +56,9 @@ int unit_normal(const float* restrict along, const float* restrict around, float
   return 1;
 }
 
-// The rotation from a surface's directions to those of another one: the least that takes normal to normal, then about
-// the normal the one that fits both directions best, whatever their lengths. None where a surface has no normal or is
-// upside down.
+// The rotation from a surface's directions to those of another one: the smallest that takes normal to normal, then the
+// rotation about the normal that fits both unit directions best. The identity where a surface has no normal, or where
+// the normals are opposite.
 void rotation_between(const float* restrict along, const float* restrict around, const float* restrict to_along,
                       const float* restrict to_around, float* restrict q) {
   float n[3], m[3];
@@ -91,128 +93,128 @@ void rotation_between(const float* restrict along, const float* restrict around,
   multiply_rotations(roll, tilt, q);
 }
 
-// Adds the rotations from a surface to a source's, times the source's weights. NDRange: rows.
-// in  facing: per row a rotation, by which the source is to be rotated first; weights: per vertex; points, source:
-// fields of three in and out  sums: four planes
-__kernel void add_rotations(const int row_count, const int count, __global const int* restrict rows,
+// Adds the rotations from a surface to a source, times the source's weights.
+// NDRange: rows.
+// in          facing: per row, the rotation by which the source is rotated first; weights: per vertex; points, source:
+//             fields of three
+// in and out  sums: field of four
+__kernel void add_rotations(const SurfaceParameters surface, __global const SurfaceRow* restrict rows,
                             __global const float* restrict facing, __global const float* restrict weights,
                             __global const float* restrict points, __global const float* restrict source,
                             __global float* restrict sums) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
-  const int here = rows[4 * k], width = rows[4 * k + 1];
-  const int before = rows[4 * k + 2] ? here - width : here, after = rows[4 * k + 3] ? here + width : here;
+  if (k >= surface.row_count) return;
+  const int here = rows[k].first, width = rows[k].width;
   float first[4];
   for (int i = 0; i < 4; ++i) first[i] = facing[4 * k + i];
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
     const float weight = weights[here + j];
     if (weight == 0.0f) continue;
-    const int left = here + (j > 0 ? j - 1 : width - 1), right = here + (j + 1 < width ? j + 1 : 0);
     float along[3], around[3], source_along[3], source_around[3], to_along[3], to_around[3], q[4];
-    vector_between(points, count, before + j, after + j, along);
-    vector_between(points, count, left, right, around);
-    vector_between(source, count, before + j, after + j, source_along);
-    vector_between(source, count, left, right, source_around);
+    directions_at(points, surface.count, rows[k], j, along, around);
+    directions_at(source, surface.count, rows[k], j, source_along, source_around);
     rotate_vector(first, source_along, to_along);
     rotate_vector(first, source_around, to_around);
     rotation_between(along, around, to_along, to_around, q);
     const float signed_weight = q[0] < 0.0f ? -weight : weight;
-    for (int i = 0; i < 4; ++i) sums[i * count + here + j] += signed_weight * q[i];
+    for (int i = 0; i < 4; ++i) sums[i * surface.count + here + j] += signed_weight * q[i];
   }
 }
 
-// Unit normals of the inner vertices, 0 where they have none. NDRange: rows. in  points     out  normals: field of
-// three
-__kernel void row_normals(const int row_count, const int count, __global const int* restrict rows,
+// Unit normals of the inner vertices, 0 where they have none.
+// NDRange: rows.
+// in   points     out  normals: field of three
+__kernel void row_normals(const SurfaceParameters surface, __global const SurfaceRow* restrict rows,
                           __global const float* restrict points, __global float* restrict normals) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
-  const int here = rows[4 * k], width = rows[4 * k + 1];
-  const int before = rows[4 * k + 2] ? here - width : here, after = rows[4 * k + 3] ? here + width : here;
+  if (k >= surface.row_count) return;
+  const int here = rows[k].first, width = rows[k].width;
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
     float along[3], around[3], n[3];
-    vector_between(points, count, before + j, after + j, along);
-    vector_between(points, count, here + (j > 0 ? j - 1 : width - 1), here + (j + 1 < width ? j + 1 : 0), around);
+    directions_at(points, surface.count, rows[k], j, along, around);
     const int has_normal = unit_normal(along, around, n);
-    for (int i = 0; i < 3; ++i) normals[i * count + here + j] = has_normal ? n[i] : 0.0f;
+    for (int i = 0; i < 3; ++i) normals[i * surface.count + here + j] = has_normal ? n[i] : 0.0f;
   }
 }
 
-// Rotations of the inner vertices from their sums: of unit length, none beyond LAST_COSINE, and as much of them as
-// their row has. NDRange: rows. in  shares: per row     in and out  rotations
-__kernel void settle_rotations(const int row_count, const int count, __global const int* restrict rows,
+// Rotations of the inner vertices from their sums: of unit length, none beyond LAST_COSINE, scaled by their row's
+// share. NDRange: rows. in   shares: per row     in and out  rotations
+__kernel void settle_rotations(const SurfaceParameters surface, __global const SurfaceRow* restrict rows,
                                __global const float* restrict shares, __global float* restrict rotations) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
-  const int here = rows[4 * k], end = here + rows[4 * k + 1];
+  if (k >= surface.row_count) return;
+  const int here = rows[k].first, end = here + rows[k].width;
   for (int v = here + (int)get_local_id(0); v < end; v += get_local_size(0)) {
     float q[4];
-    for (int i = 0; i < 4; ++i) q[i] = rotations[i * count + v];
+    for (int i = 0; i < 4; ++i) q[i] = rotations[i * surface.count + v];
     const float length = fmax(sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), 1e-6f);
     const float x = clamp((q[0] / length - LAST_COSINE) / (FULL_COSINE - LAST_COSINE), 0.0f, 1.0f);
     const float share = shares[k] * x * x * (3.0f - 2.0f * x);
     q[0] = 1.0f - share + share * q[0] / length;
     for (int i = 1; i < 4; ++i) q[i] *= share / length;
     const float scale = 1.0f / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    for (int i = 0; i < 4; ++i) rotations[i * count + v] = scale * q[i];
+    for (int i = 0; i < 4; ++i) rotations[i * surface.count + v] = scale * q[i];
   }
 }
 
-// The means of the rotations of each vertex and those next to it in the rows: where a map folds they change from vertex
-// to vertex, which would tear single ones out of the surface. NDRange: rows.
-__kernel void smooth_rotations(const int row_count, const int count, __global const int* restrict rows,
+// The mean rotation of each vertex and its neighbours in the rows. Where a map folds, rotations jump from vertex to
+// vertex, which would pull single vertices out of the surface.
+// NDRange: rows.
+__kernel void smooth_rotations(const SurfaceParameters surface, __global const SurfaceRow* restrict rows,
                                __global const float* restrict rotations, __global float* restrict smoothed) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
-  const int here = rows[4 * k], width = rows[4 * k + 1], has_before = rows[4 * k + 2], has_after = rows[4 * k + 3];
+  if (k >= surface.row_count) return;
+  const int here = rows[k].first, width = rows[k].width, has_before = rows[k].has_before, has_after = rows[k].has_after;
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
     const int left = j > 0 ? j - 1 : width - 1, right = j + 1 < width ? j + 1 : 0;
     float sum[4] = {0.0f, 0.0f, 0.0f, 0.0f};
     for (int row = -has_before; row <= has_after; ++row)
       for (int i = 0; i < 4; ++i) {
-        __global const float* restrict q = rotations + i * count + here + row * width;
+        __global const float* restrict q = rotations + i * surface.count + here + row * width;
         sum[i] += q[left] + q[j] + q[right];
       }
     const float scale = 1.0f / sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2] + sum[3] * sum[3]);
-    for (int i = 0; i < 4; ++i) smoothed[i * count + here + j] = scale * sum[i];
+    for (int i = 0; i < 4; ++i) smoothed[i * surface.count + here + j] = scale * sum[i];
   }
 }
 
-// Rotations the normals of the inner vertices. NDRange: rows. in  rotations     in and out  normals
-__kernel void rotate_normals(const int row_count, const int count, __global const int* restrict rows,
+// Rotates the normals of the inner vertices.
+// NDRange: rows.
+// in   rotations     in and out  normals
+__kernel void rotate_normals(const SurfaceParameters surface, __global const SurfaceRow* restrict rows,
                              __global const float* restrict rotations, __global float* restrict normals) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
-  const int here = rows[4 * k], end = here + rows[4 * k + 1];
+  if (k >= surface.row_count) return;
+  const int here = rows[k].first, end = here + rows[k].width;
   for (int v = here + (int)get_local_id(0); v < end; v += get_local_size(0)) {
     float q[4], n[3], rotated[3];
-    for (int i = 0; i < 4; ++i) q[i] = rotations[i * count + v];
-    for (int i = 0; i < 3; ++i) n[i] = normals[i * count + v];
+    for (int i = 0; i < 4; ++i) q[i] = rotations[i * surface.count + v];
+    for (int i = 0; i < 3; ++i) n[i] = normals[i * surface.count + v];
     rotate_vector(q, n, rotated);
-    for (int i = 0; i < 3; ++i) normals[i * count + v] = rotated[i];
+    for (int i = 0; i < 3; ++i) normals[i * surface.count + v] = rotated[i];
   }
 }
 
-// At the vertices in no row: the mean of their neighbours in rows, of length 1. NDRange: fans.
+// Sets the vertices in no row to the normalized mean of their neighbours in rows.
+// NDRange: fans.
 // in and out  field: of three or four components
-__kernel void mean_at_ends(const int fan_count, const int inner_count, const int count, const int components,
-                           __global const int* restrict fan_vertices, __global const int* restrict fan_begin,
+__kernel void mean_at_ends(const SurfaceParameters surface, __global const FanVertex* restrict fan_vertices,
                            __global const int* restrict fans, __global float* restrict field) {
-  const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, fan_count);
+  const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, surface.fan_count);
   for (int k = begin + (int)get_local_id(0); k < end; k += get_local_size(0)) {
-    const int v = fan_vertices[k];
-    if (v < inner_count) continue;
+    const int v = fan_vertices[k].vertex;
+    if (v < surface.inner_count) continue;
     float sum[4] = {0.0f, 0.0f, 0.0f, 0.0f};
-    for (int i = fan_begin[k]; i < fan_begin[k + 1]; ++i)
-      if (fans[2 * i] < inner_count)
-        for (int c = 0; c < components; ++c) sum[c] += field[c * count + fans[2 * i]];
+    for (int i = fan_vertices[k].begin; i < fan_vertices[k + 1].begin; ++i)
+      if (fans[2 * i] < surface.inner_count)
+        for (int c = 0; c < surface.components; ++c) sum[c] += field[c * surface.count + fans[2 * i]];
     const float length = sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2] + sum[3] * sum[3]);
-    for (int c = 0; c < components; ++c) field[c * count + v] = length > 1e-6f ? sum[c] / length : 0.0f;
+    for (int c = 0; c < surface.components; ++c) field[c * surface.count + v] = length > 1e-6f ? sum[c] / length : 0.0f;
   }
 }
 
-// How much an edge from one vertex to another stands out from the plane that is normal to the mean of their normals: a
-// length. n: that mean, of unit length; 0 where there is none
+// The height of an edge over the plane that is normal to the mean of the normals at its ends.
+// n: that mean, of unit length; 0 where there is none
 float height_of(const int count, __global const float* restrict normals, const int v, const int other,
                 const float* restrict e, float* restrict n) {
   for (int c = 0; c < 3; ++c) n[c] = normals[c * count + v] + normals[c * count + other];
@@ -221,20 +223,21 @@ float height_of(const int count, __global const float* restrict normals, const i
   return dot_product(n, e);
 }
 
-// Adds the slopes of a source's edges in the fans, times the source's weights at their ends. NDRange: fans.
-// in  weights: per vertex; source; normals: of the source     in and out  slopes: two per triangle of the fans, heights
-// over lengths
-__kernel void add_slopes(const int fan_count, const int count, __global const int* restrict fan_vertices,
-                         __global const int* restrict fan_begin, __global const int* restrict fans,
-                         __global const float* restrict weights, __global const float* restrict source,
-                         __global const float* restrict normals, __global float* restrict slopes) {
-  const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, fan_count);
+// Adds the slopes of a source's edges in the fans, times the source's weights at their ends.
+// NDRange: fans.
+// in          weights: per vertex; source; normals: of the source
+// in and out  slopes: two per triangle of the fans, height over length
+__kernel void add_slopes(const SurfaceParameters surface, __global const FanVertex* restrict fan_vertices,
+                         __global const int* restrict fans, __global const float* restrict weights,
+                         __global const float* restrict source, __global const float* restrict normals,
+                         __global float* restrict slopes) {
+  const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, surface.fan_count);
   for (int k = begin + (int)get_local_id(0); k < end; k += get_local_size(0)) {
-    const int v = fan_vertices[k];
-    for (int i = 2 * fan_begin[k]; i < 2 * fan_begin[k + 1]; ++i) {
+    const int v = fan_vertices[k].vertex;
+    for (int i = 2 * fan_vertices[k].begin; i < 2 * fan_vertices[k + 1].begin; ++i) {
       float e[3], n[3];
-      vector_between(source, count, fans[i], v, e);
-      const float height = height_of(count, normals, v, fans[i], e, n), length = sqrt(dot_product(e, e));
+      edge_between(source, surface.count, fans[i], v, e);
+      const float height = height_of(surface.count, normals, v, fans[i], e, n), length = sqrt(dot_product(e, e));
       if (length > 0.0f) slopes[i] += 0.5f * (weights[v] + weights[fans[i]]) * height / length;
     }
   }
@@ -253,19 +256,21 @@ void matrix_of(__global const float* restrict rotations, const int count, const 
   m[8] = 1.0f - 2.0f * (x * x + y * y);
 }
 
-// What has to be added to L x for edges that are rotated by the mean of the rotations C at their ends: b = time (D - L
-// x) with D(v) = sum of w (C(v) + C(other)) / 2 (x(v) - x(other)). These are the edges of the rows. NDRange: rows. in
-// rotations; points; weights: of the Laplace operator (filter.cl)     out  b: field of three
-__kernel void pull_rows(const int row_count, const int count, const float time, __global const int* restrict rows,
+// b = time (D - L x), where D is L x with every edge rotated by the mean of the rotations C at its ends:
+// D(v) = sum of w (C(v) + C(other)) / 2 (x(v) - x(other)). This kernel does the edges between vertices of rows.
+// NDRange: rows.
+// in   weights: of the Laplace operator (filter.cl); rotations; points
+// out  b: field of three
+__kernel void pull_rows(const SurfaceParameters surface, __global const SurfaceRow* restrict rows,
                         __global const float* restrict weights, __global const float* restrict rotations,
                         __global const float* restrict points, __global float* restrict b) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
-  const int here = rows[4 * k], width = rows[4 * k + 1], has_before = rows[4 * k + 2], has_after = rows[4 * k + 3];
+  if (k >= surface.row_count) return;
+  const int here = rows[k].first, width = rows[k].width, has_before = rows[k].has_before, has_after = rows[k].has_after;
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
     const int v = here + j, left = j > 0 ? j - 1 : width - 1, right = j + 1 < width ? j + 1 : 0;
     float m[9], sum[3] = {0.0f, 0.0f, 0.0f};
-    matrix_of(rotations, count, v, m);
+    matrix_of(rotations, surface.count, v, m);
     for (int row = -has_before; row <= has_after; ++row)
       for (int column = -1; column <= 1; ++column) {
         if (row == 0 && column == 0) continue;
@@ -273,43 +278,46 @@ __kernel void pull_rows(const int row_count, const int count, const float time, 
         // The edge's weight is stored at the vertex whose right or later row it leads to.
         const int is_ahead = row > 0 || (row == 0 && column > 0);
         const int plane = row == 0 ? 0 : 2 + row * column;
-        const float w = weights[plane * count + (is_ahead ? v : other)];
+        const float w = weights[plane * surface.count + (is_ahead ? v : other)];
         float to[9], e[3];
-        matrix_of(rotations, count, other, to);
-        vector_between(points, count, other, v, e);
+        matrix_of(rotations, surface.count, other, to);
+        edge_between(points, surface.count, other, v, e);
         for (int c = 0; c < 3; ++c)
           for (int i = 0; i < 3; ++i)
             sum[c] += w * (0.5f * (m[3 * c + i] + to[3 * c + i]) - (c == i ? 1.0f : 0.0f)) * e[i];
       }
-    for (int c = 0; c < 3; ++c) b[c * count + v] = time * sum[c];
+    for (int c = 0; c < 3; ++c) b[c * surface.count + v] = surface.time * sum[c];
   }
 }
 
-// The same for the triangles of the fans. Edges that touch a seam, vertices from `first_seam` on, get the slopes of the
-// sources' there. NDRange: fans. in  fan_weights; normals: of the rotated surface; slopes     in and out  b
-__kernel void pull_fans(const int fan_count, const int inner_count, const int first_seam, const int count,
-                        const float time, __global const int* restrict fan_vertices,
-                        __global const int* restrict fan_begin, __global const int* restrict fans,
-                        __global const float* restrict fan_weights, __global const float* restrict slopes,
-                        __global const float* restrict rotations, __global const float* restrict normals,
-                        __global const float* restrict points, __global float* restrict b) {
-  const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, fan_count);
+// The same for the triangles of the fans. Edges that touch a seam (vertices from `first_seam` on) get the slopes of the
+// sources.
+// NDRange: fans.
+// in   fan_weights; slopes; normals: of the rotated surface     in and out  b
+__kernel void pull_fans(const SurfaceParameters surface, __global const FanVertex* restrict fan_vertices,
+                        __global const int* restrict fans, __global const float* restrict fan_weights,
+                        __global const float* restrict slopes, __global const float* restrict rotations,
+                        __global const float* restrict normals, __global const float* restrict points,
+                        __global float* restrict b) {
+  const int begin = get_group_id(0) * FAN_CHUNK, end = min(begin + FAN_CHUNK, surface.fan_count);
   for (int k = begin + (int)get_local_id(0); k < end; k += get_local_size(0)) {
-    const int v = fan_vertices[k];
+    const int v = fan_vertices[k].vertex;
     float m[9], sum[3] = {0.0f, 0.0f, 0.0f};
-    matrix_of(rotations, count, v, m);
-    for (int i = 2 * fan_begin[k]; i < 2 * fan_begin[k + 1]; ++i) {
+    matrix_of(rotations, surface.count, v, m);
+    for (int i = 2 * fan_vertices[k].begin; i < 2 * fan_vertices[k + 1].begin; ++i) {
       const int other = fans[i];
       float to[9], e[3], rotated[3] = {0.0f, 0.0f, 0.0f}, n[3];
-      matrix_of(rotations, count, other, to);
-      vector_between(points, count, other, v, e);
+      matrix_of(rotations, surface.count, other, to);
+      edge_between(points, surface.count, other, v, e);
       for (int c = 0; c < 3; ++c)
         for (int d = 0; d < 3; ++d) rotated[c] += 0.5f * (m[3 * c + d] + to[3 * c + d]) * e[d];
-      const float height = height_of(count, normals, v, other, rotated, n);
-      const float out =
-          v >= first_seam || other >= first_seam ? height - slopes[i] * sqrt(dot_product(rotated, rotated)) : 0.0f;
+      const float height = height_of(surface.count, normals, v, other, rotated, n);
+      const float out = v >= surface.first_seam || other >= surface.first_seam
+                            ? height - slopes[i] * sqrt(dot_product(rotated, rotated))
+                            : 0.0f;
       for (int c = 0; c < 3; ++c) sum[c] += fan_weights[i] * (rotated[c] - out * n[c] - e[c]);
     }
-    for (int c = 0; c < 3; ++c) b[c * count + v] = (v < inner_count ? b[c * count + v] : 0.0f) + time * sum[c];
+    for (int c = 0; c < 3; ++c)
+      b[c * surface.count + v] = (v < surface.inner_count ? b[c * surface.count + v] : 0.0f) + surface.time * sum[c];
   }
 }

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
-// From texels on a mesh's own vertices and edges back to an regular grid: points slide over the surface.
-//   slide_evenly     one step
-//   prefilter_rows   as the encoder does with an regular grid
-// Rows are as in reconstruct.cl: a table of rows (patch, row, first point), a work-group of any size per row.
+// Moves texels from a mesh's own vertices and edges to a regular grid: points slide over the surface.
+//   slide_points     one step
+//   prefilter_rows   the encoder's prefilter for regular grids
+// Both take the table of rows of reconstruct.cl: patch, row, first point. NDRange: one work-group of any size per row.
 #include "prefilter.h"
+#include "regular_grid_structs.h"
 #include "skeletex_structs.h"
 
 #define LARGEST_STEP 0.25f  // cells
 #define FURTHEST 2.0f       // cells from the texel's own point, along each axis
-#define STEP_SHARE 0.7f     // of the way to the neighbours' mean: the whole way would let a chequered lattice swing
+#define STEP_SHARE 0.7f     // of the way to the neighbours' mean; with 1 a chequered pattern would oscillate
 
 // The quad that a place lies in: its corners, and the place's shares of the way across it.
 typedef struct SurfaceCell {
@@ -36,35 +37,35 @@ void slopes_in(SurfaceCell c, global const float* restrict p, float* along_x, fl
   *along_x = low + c.y * (high - low), *along_y = left + c.x * (right - left);
 }
 
-// One step of every texel towards the mean of its four neighbours, along the bilinear surface through the points. Of
-// rows 0 and height-1, and of patches with `is_kept`, nothing moves.
-// in   points: planes x, y, z of the lattice's own points. offset_x, offset_y: where each texel is now, in cells from
-//      its own point. at: the point there
+// One step of every texel towards the mean of its four neighbours, along the bilinear surface through the points. Rows
+// 0 and height - 1 and patches with `is_kept` do not move.
+// in   points: planes x, y, z of the lattice's own points
+//      offsets: from each texel's own point to its place, in cells: a plane along the columns, a plane along the rows
+//      at: planes x, y, z of the points there
 // out  next_...: the same after the step
-kernel void slide_evenly(const int row_count, global const int* restrict lattice_rows,
+kernel void slide_points(const SlideParameters slide, global const int* restrict lattice_rows,
                          global const PatchRecord* restrict patches, global const int* restrict is_kept,
-                         const int point_count, global const float* restrict points,
-                         global const float* restrict offset_x, global const float* restrict offset_y,
-                         global const float* restrict at, global float* restrict next_offset_x,
-                         global float* restrict next_offset_y, global float* restrict next) {
-  const int k = get_group_id(0);
-  if (k >= row_count) return;
+                         global const float* restrict points, global const float* restrict offsets,
+                         global const float* restrict at, global float* restrict next_offsets,
+                         global float* restrict next) {
+  const int k = get_group_id(0), count = slide.point_count;
+  if (k >= slide.row_count) return;
   global const float* restrict x = points;
-  global const float* restrict y = x + point_count;
-  global const float* restrict z = y + point_count;
+  global const float* restrict y = x + count;
+  global const float* restrict z = y + count;
   global const float* restrict at_x = at;
-  global const float* restrict at_y = at_x + point_count;
-  global const float* restrict at_z = at_y + point_count;
+  global const float* restrict at_y = at_x + count;
+  global const float* restrict at_z = at_y + count;
   global float* restrict next_x = next;
-  global float* restrict next_y = next_x + point_count;
-  global float* restrict next_z = next_y + point_count;
+  global float* restrict next_y = next_x + count;
+  global float* restrict next_z = next_y + count;
   global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
   const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
   const int width = patch->width, height = patch->height;
   const int stays = row == 0 || row == height - 1 || is_kept[lattice_rows[4 * k]];
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
     const int own = vertex + j;
-    float dx = offset_x[own], dy = offset_y[own];
+    float dx = offsets[own], dy = offsets[count + own];
     if (!stays) {
       const int left = vertex + (j > 0 ? j - 1 : width - 1), right = vertex + (j + 1 < width ? j + 1 : 0),
                 below = own - width, above = own + width;
@@ -85,24 +86,24 @@ kernel void slide_evenly(const int row_count, global const int* restrict lattice
                  fmax(-FURTHEST, 0.5f - (float)row), fmin(FURTHEST, (float)(height - 1 - row) - 0.5f));
     }
     const SurfaceCell c = cell_at(vertex - row * width, width, height, j, row, dx, dy);
-    next_offset_x[own] = dx, next_offset_y[own] = dy;
+    next_offsets[own] = dx, next_offsets[count + own] = dy;
     next_x[own] = value_in(c, x), next_y[own] = value_in(c, y), next_z[own] = value_in(c, z);
   }
 }
 
 // The prefilter on inner rows. The table has the rows to do.
-// in   at: planes x, y, z    out  points
-kernel void prefilter_rows(const int row_count, global const int* restrict lattice_rows,
-                           global const PatchRecord* restrict patches, const int point_count,
-                           global const float* restrict at, global float* restrict points) {
-  const int k = get_group_id(0);
-  if (k >= row_count) return;
+// in   at: planes x, y, z    out  points: the same
+kernel void prefilter_rows(const SlideParameters slide, global const int* restrict lattice_rows,
+                           global const PatchRecord* restrict patches, global const float* restrict at,
+                           global float* restrict points) {
+  const int k = get_group_id(0), count = slide.point_count;
+  if (k >= slide.row_count) return;
   global const float* restrict at_x = at;
-  global const float* restrict at_y = at_x + point_count;
-  global const float* restrict at_z = at_y + point_count;
+  global const float* restrict at_y = at_x + count;
+  global const float* restrict at_z = at_y + count;
   global float* restrict x = points;
-  global float* restrict y = x + point_count;
-  global float* restrict z = y + point_count;
+  global float* restrict y = x + count;
+  global float* restrict z = y + count;
   const int vertex = lattice_rows[4 * k + 2], width = patches[lattice_rows[4 * k]].width;
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
     const int own = vertex + j;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The surface of one model's bone around the bone of another (paper 5). NDRange of both kernels: one work-group per
-// row, of any size; work-items take columns in turn (see reconstruct.cl).
-#include "skeletex_structs.h"
+// The surface of one model's bone around the bone of another (paper 5). NDRange of all kernels: one work-group of any
+// size per row, whose work-items take columns in turn.
 #include "transfer_structs.h"
 
 // 1 at an end of the part, 0 from `width` rows on.
@@ -10,14 +9,14 @@ static float faded(const float rows, const float width, const int is_linear) {
   return is_linear ? 1.0f - share : 0.5f + 0.5f * cos(3.14159265f * share);
 }
 
-// Where a texel of the result lies between four points of the source's lattice.
+// Four points of the source's lattice and their weights, for one texel of the result.
 typedef struct {
   int v00, v01, v10, v11;
   float w00, w01, w10, w11;
 } Place;
 
-// column: of the source, fractions and all
-static Place place_on_source(__global const LaidPatch* restrict from, __global const LaidColumn* restrict here,
+// column: receives the source's column, with its fraction
+static Place place_on_source(__global const TransferPatch* restrict from, __global const TransferColumn* restrict here,
                              const float axial, const int row, float* restrict column) {
   const float period = (float)from->width, frequency = 1.0f / period;
   const int source_last = from->height - 1;
@@ -49,41 +48,37 @@ static float read_at(const Place* restrict p, __global const float* restrict pla
   return p->w00 * plane[p->v00] + p->w01 * plane[p->v01] + p->w10 * plane[p->v10] + p->w11 * plane[p->v11];
 }
 
-// The source's points, stretched along the bone, scaled across it, sheared where separation planes differ, and with
-// corrections at both ends. in   lattice_rows: the rows to do, four ints each: patch, row, number of the row's first
-// vertex in the planes of points, unused
-//      patches: the result's. laid: per patch of the result. laid_rows: per row to do. columns: see LaidColumn
-//      corrections: planes of column_count floats, [((end * bands + band) * 2 + is_slope) * 3 + axis]: offset where the
-//      part begins (LaidColumn's first_row and last_row) and its change per row from there
-//      source: planes s, b, o of source_count floats: points of the source's lattice, all rows, in the axes of their
-//      own bones from their heads. target: the same of the target's
+// Places the source's points around the result's bones: scaled along the bone and across it, sheared where separation
+// planes differ, and with corrections at both ends.
+// in   corrections: planes of column_count floats, [((end * bands + band) * 2 + is_slope) * 3 + axis]: the offset where
+//      the part begins (first_row and last_row of the columns), and its change per row from there
+//      source: planes s, b, o of the points of the source's lattice, all rows, in the axes of their own bones from
+//      their heads. target: the same of the target's
 // out  points: planes s, b, o, in the axes of the result's bones from their heads
-__kernel void lay_part(const int row_count, const int column_count, __global const int* restrict lattice_rows,
-                       __global const PatchRecord* restrict patches, __global const LaidPatch* restrict laid,
-                       __global const LaidRow* restrict laid_rows, __global const LaidColumn* restrict columns,
-                       __global const float* restrict corrections, const int source_count,
-                       __global const float* restrict source, const int target_count,
-                       __global const float* restrict target, const int point_count, __global float* restrict points) {
+__kernel void place_part(const TransferParameters transfer, __global const TransferRow* restrict rows,
+                         __global const TransferPatch* restrict patches,
+                         __global const TransferColumn* restrict columns, __global const float* restrict corrections,
+                         __global const float* restrict source, __global const float* restrict target,
+                         __global float* restrict points) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
+  if (k >= transfer.row_count) return;
   __global const float* restrict in_s = source;
-  __global const float* restrict in_b = in_s + source_count;
-  __global const float* restrict in_o = in_b + source_count;
+  __global const float* restrict in_b = in_s + transfer.source_count;
+  __global const float* restrict in_o = in_b + transfer.source_count;
   __global const float* restrict target_s = target;
-  __global const float* restrict target_b = target_s + target_count;
-  __global const float* restrict target_o = target_b + target_count;
+  __global const float* restrict target_b = target_s + transfer.target_count;
+  __global const float* restrict target_o = target_b + transfer.target_count;
   __global float* restrict s = points;
-  __global float* restrict b = s + point_count;
-  __global float* restrict o = b + point_count;
-  const int patch = lattice_rows[4 * k], row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
-  const int width = patches[patch].width;
-  __global const LaidPatch* restrict from = laid + patch;
+  __global float* restrict b = s + transfer.point_count;
+  __global float* restrict o = b + transfer.point_count;
+  const int row = rows[k].row, vertex = rows[k].vertex, width = rows[k].width, column_count = transfer.column_count;
+  __global const TransferPatch* restrict from = patches + rows[k].patch;
   const float sign = from->sign;
   const float frequency = 1.0f / (float)from->width, turn = 1.0f / (float)width;
-  const float axial = laid_rows[k].axial, scale = laid_rows[k].scale;
+  const float axial = rows[k].axial, scale = rows[k].scale;
 
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
-    __global const LaidColumn* restrict here = columns + from->column_begin + j;
+    __global const TransferColumn* restrict here = columns + from->column_begin + j;
     float column;
     const Place place = place_on_source(from, here, axial, row, &column);
     const float read_s = read_at(&place, in_s), read_b = read_at(&place, in_b), read_o = read_at(&place, in_o);
@@ -111,16 +106,16 @@ __kernel void lay_part(const int row_count, const int column_count, __global con
       point_o += kept * (target_o[t] - point_o);
     }
     for (int end = 0; end < 2 && from->target_begin < 0; ++end) {
-      const float rows = fmax(0.0f, end == 0 ? (float)row - here->first_row : here->last_row - (float)row);
+      const float distance = fmax(0.0f, end == 0 ? (float)row - here->first_row : here->last_row - (float)row);
       float fade_width = end == 0 ? from->head_width : from->tail_width;
       for (int band = 0; band < SKELETEX_TRANSFER_BANDS; ++band, fade_width *= 0.7f) {
-        if (rows > 0.0f && rows >= fade_width) break;
-        const float fade = faded(rows, fade_width, from->is_linear);
+        if (distance > 0.0f && distance >= fade_width) break;
+        const float fade = faded(distance, fade_width, from->is_linear);
         __global const float* restrict c =
             corrections + (end * SKELETEX_TRANSFER_BANDS + band) * 6 * column_count + from->column_begin + j;
-        point_s += fade * (c[0] + rows * c[3 * column_count]);
-        point_b += fade * (c[column_count] + rows * c[4 * column_count]);
-        point_o += fade * (c[2 * column_count] + rows * c[5 * column_count]);
+        point_s += fade * (c[0] + distance * c[3 * column_count]);
+        point_b += fade * (c[column_count] + distance * c[4 * column_count]);
+        point_o += fade * (c[2 * column_count] + distance * c[5 * column_count]);
       }
     }
     s[vertex + j] = point_s;
@@ -129,51 +124,48 @@ __kernel void lay_part(const int row_count, const int column_count, __global con
   }
 }
 
-// Where the points of lay_part come from: any points of the source's lattice, read at the same places.
-// in   as above; source: planes x, y, z of the points     out  points: planes x, y, z
-__kernel void read_part(const int row_count, __global const int* restrict lattice_rows,
-                        __global const PatchRecord* restrict patches, __global const LaidPatch* restrict laid,
-                        __global const LaidRow* restrict laid_rows, __global const LaidColumn* restrict columns,
-                        const int source_count, __global const float* restrict source, const int point_count,
-                        __global float* restrict points) {
+// Reads any points of the source's lattice at the places where place_part reads them.
+// in   source: planes x, y, z of the points     out  points: planes x, y, z
+__kernel void read_source(const TransferParameters transfer, __global const TransferRow* restrict rows,
+                          __global const TransferPatch* restrict patches,
+                          __global const TransferColumn* restrict columns, __global const float* restrict source,
+                          __global float* restrict points) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
+  if (k >= transfer.row_count) return;
   __global const float* restrict in_x = source;
-  __global const float* restrict in_y = in_x + source_count;
-  __global const float* restrict in_z = in_y + source_count;
+  __global const float* restrict in_y = in_x + transfer.source_count;
+  __global const float* restrict in_z = in_y + transfer.source_count;
   __global float* restrict x = points;
-  __global float* restrict y = x + point_count;
-  __global float* restrict z = y + point_count;
-  const int patch = lattice_rows[4 * k], row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
-  const float axial = laid_rows[k].axial;
-  for (int j = get_local_id(0); j < patches[patch].width; j += get_local_size(0)) {
+  __global float* restrict y = x + transfer.point_count;
+  __global float* restrict z = y + transfer.point_count;
+  const int patch = rows[k].patch, row = rows[k].row, vertex = rows[k].vertex, width = rows[k].width;
+  const float axial = rows[k].axial;
+  for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
     float column;
-    const Place place = place_on_source(laid + patch, columns + laid[patch].column_begin + j, axial, row, &column);
+    const Place place =
+        place_on_source(patches + patch, columns + patches[patch].column_begin + j, axial, row, &column);
     x[vertex + j] = read_at(&place, in_x);
     y[vertex + j] = read_at(&place, in_y);
     z[vertex + j] = read_at(&place, in_z);
   }
 }
 
-// Where the target keeps its surface: its texels, bit by bit.
-// in   as above; target: planes along, around, out of the target's texels
-// out  texels: the result's
-__kernel void keep_target(const int row_count, const int texture_width, __global const int* restrict lattice_rows,
-                          __global const PatchRecord* restrict patches, __global const LaidPatch* restrict laid,
-                          __global const LaidColumn* restrict columns, const int texel_count,
-                          __global const float* restrict target, __global float* restrict texels) {
+// Restores the target's texels, bit by bit, where it keeps its surface.
+// in   target: planes along, around, out of the target's texels     in and out  texels: the same of the result's
+__kernel void keep_target(const TransferParameters transfer, __global const TransferRow* restrict rows,
+                          __global const TransferPatch* restrict patches,
+                          __global const TransferColumn* restrict columns, __global const float* restrict target,
+                          __global float* restrict texels) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
+  if (k >= transfer.row_count) return;
   __global const float* restrict in_along = target;
-  __global const float* restrict in_around = in_along + texel_count;
-  __global const float* restrict in_out = in_around + texel_count;
+  __global const float* restrict in_around = in_along + transfer.target_count;
+  __global const float* restrict in_out = in_around + transfer.target_count;
   __global float* restrict along = texels;
-  __global float* restrict around = along + texel_count;
-  __global float* restrict out = around + texel_count;
-  const int patch = lattice_rows[4 * k], row = lattice_rows[4 * k + 1];
-  const int width = patches[patch].width;
-  const int texel = (patches[patch].y + row) * texture_width + patches[patch].x;
-  __global const LaidColumn* restrict here = columns + laid[patch].column_begin;
+  __global float* restrict around = along + transfer.target_count;
+  __global float* restrict out = around + transfer.target_count;
+  const int row = rows[k].row, texel = rows[k].texel, width = rows[k].width;
+  __global const TransferColumn* restrict here = columns + patches[rows[k].patch].column_begin;
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
     if ((float)row > here[j].first_row && (float)row < here[j].last_row) continue;
     along[texel + j] = in_along[texel + j];

@@ -150,15 +150,16 @@ TEST(Neighbours, AreThoseOfTheMeshOnBothSidesOfEverySeam) {
       for (int i = 0; i < 3; ++i)
         if (t[i] >= lattice.inner_count) edges.insert({t[i], t[(i + 1) % 3]});
     std::set<std::pair<int, int>> listed;
-    for (std::size_t k = 0; k < table.fan_vertices.size(); ++k) {
-      const int v = table.fan_vertices[k];
-      for (int i = table.fan_begin[k]; i < table.fan_begin[k + 1]; ++i) {
+    for (std::size_t k = 0; k + 1 < table.fan_vertices.size(); ++k) {
+      const auto [v, begin] = table.fan_vertices[k];
+      const int end = table.fan_vertices[k + 1].begin;
+      for (int i = begin; i < end; ++i) {
         if (v >= lattice.inner_count) listed.insert({v, table.fans[i][0]});
-        const bool is_last = i + 1 == table.fan_begin[k + 1];
+        const bool is_last = i + 1 == end;
         if (!is_last) {
           EXPECT_EQ(table.fans[i][1], table.fans[i + 1][0]);
         } else if (v >= lattice.inner_count) {
-          EXPECT_EQ(table.fans[i][1], table.fans[table.fan_begin[k]][0]) << "the fan is not closed";
+          EXPECT_EQ(table.fans[i][1], table.fans[begin][0]) << "the fan is not closed";
         }
       }
     }
@@ -299,8 +300,8 @@ TEST(Noise, EqualsItsTwinAndStaysWithinBounds) {
   for (float& x : points) x *= 30;
   const auto heights = device().allocate<float>(5000);
   for (const unsigned seed : {0u, 77u}) {
-    device().launch({"filter.cl", "noise_at_points"}, ClRange(5000), 5000, 0.7f, 1, seed, device().upload(points),
-                    heights);
+    device().launch({"filter.cl", "noise_at_points"}, ClRange(5000), NoiseParameters{5000, 1, seed, 0.7f},
+                    device().upload(points), heights);
     const std::vector<float> values = device().download(heights);
     double square = 0;
     for (int i = 0; i < 5000; ++i) {
@@ -581,9 +582,10 @@ TEST(Filters, LeaveOtherBonesBitByBitAndFadeOutTowardsThem) {
   for (int v = lattice.first_sample[0]; v < lattice.vertex_count; ++v)
     EXPECT_EQ(weights[v], 0) << "all seams lead out of the region";
   const Neighbours table = find_neighbours(model, lattice, end_triangles(model, positions));
-  for (std::size_t k = 0; k < table.fan_vertices.size(); ++k)
-    for (int i = table.fan_begin[k]; i < table.fan_begin[k + 1]; ++i)
-      EXPECT_LT(std::abs(weights[table.fan_vertices[k]] - weights[table.fans[i][0]]), 0.25) << "the effect jumps";
+  for (std::size_t k = 0; k + 1 < table.fan_vertices.size(); ++k)
+    for (int i = table.fan_vertices[k].begin; i < table.fan_vertices[k + 1].begin; ++i)
+      EXPECT_LT(std::abs(weights[table.fan_vertices[k].vertex] - weights[table.fans[i][0]]), 0.25)
+          << "the effect jumps";
 
   NoiseOptions noise;
   noise.amplitude = 0.02;

@@ -11,7 +11,7 @@
 
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/convert/encode_model.h"
-#include "skeletex/edit/transfer/blend.h"
+#include "skeletex/edit/morph/blend.h"
 #include "skeletex/edit/transfer/transfer.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/pose_mesh.h"

@@ -11,10 +11,10 @@
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/analysis/metro.h"
 #include "skeletex/convert/encode_model.h"
+#include "skeletex/edit/morph/blend.h"
 #include "skeletex/edit/morph/seam_network.h"
 #include "skeletex/edit/morph/surface_map.h"
 #include "skeletex/edit/regular_grid.h"
-#include "skeletex/edit/transfer/blend.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "support/blend_twin.h"
@@ -47,7 +47,7 @@ const SkeletexModel& standard(const std::string& name, std::optional<Method> met
   return it->second;
 }
 
-/// The same surface elsewhere: texels know nothing of it.
+/// The same surface elsewhere: its texels stay as they are.
 SkeletexModel moved(SkeletexModel model, const Eigen::Quaterniond& rotation, const Vec3& shift) {
   const std::vector<BoneBasis> bases = bone_bases(model.skeleton);
   for (std::size_t i = 0; i < bases.size(); ++i) model.skeleton.bones[i].s = rotation * bases[i].s;
@@ -415,7 +415,7 @@ TEST(Blend, KernelAndTwinAgreeOnRandomPlacesAndUglyWidths) {
     }
     for (const LatticeRow& row : rows) {
       const int height = tables.sources[s * patches.size() + row[0]].height;
-      tables.rows.push_back(
+      tables.source_rows.push_back(
           {random() % 4 == 0 ? static_cast<float>(height - 1) : static_cast<float>(height - 1) * std::abs(unit(random)),
            unit(random)});
     }
@@ -444,7 +444,7 @@ TEST(Blend, KernelAndTwinAgreeOnRandomPlacesAndUglyWidths) {
           return (1 - eased) * (near_head * head + (1 - near_head) * even_head) +
                  eased * (near_tail * tail + (1 - near_tail) * even_tail);
         };
-        reads.push_back({source, tables.rows[s * rows.size() + k],
+        reads.push_back({source, tables.source_rows[s * rows.size() + k],
                          mix(column.head, column.even_head, column.tail, column.even_tail),
                          (1 - axial) * slopes.slope_head + axial * slopes.slope_tail,
                          mix(column.head_rise, column.even_head_rise, column.tail_rise, column.even_tail_rise), axial});

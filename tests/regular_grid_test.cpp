@@ -11,6 +11,7 @@
 #include <numbers>
 #include <random>
 
+#include "regular_grid_structs.h"
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/analysis/metro.h"
 #include "skeletex/convert/encode_model.h"
@@ -58,7 +59,7 @@ double mean_angle(const SkeletexModel& model) {
   return sum / length * 180 / std::numbers::pi;
 }
 
-/// Kernel slide_evenly for one patch, in double precision.
+/// Kernel slide_points for one patch, in double precision.
 struct SlideTwin {
   int width, height;
   std::vector<Vec3> own;
@@ -133,15 +134,19 @@ TEST(RegularGrid, SlidesAsItsTwinDoes) {
       record.width = kWidth, record.height = kHeight;
       const std::vector<LatticeRow> rows = lattice_rows(patches, RowChoice::kAll);
       const auto upload = [&](const std::vector<float>& values) { return device().upload(values); };
-      auto next_x = upload(x), next_y = upload(y), px = upload(x), py = upload(x), pz = upload(x);
-      device().launch({"regular_grid.cl", "slide_evenly"}, row_range(device(), rows.size()),
-                      static_cast<int>(rows.size()), device().upload(rows),
+      std::vector<float> both = x;
+      both.insert(both.end(), y.begin(), y.end());
+      const DevicePlanes own = upload_planes(device(), planes[0], planes[1], planes[2]),
+                         now = upload_planes(device(), at[0], at[1], at[2]),
+                         next_points = allocate_planes(device(), own.count);
+      const auto next = upload(both);
+      device().launch({"regular_grid.cl", "slide_points"}, row_range(device(), rows.size()),
+                      SlideParameters{static_cast<int>(rows.size()), kWidth * kHeight}, device().upload(rows),
                       device().upload(std::vector<PatchRecord>{record}), device().upload(std::vector<int>{is_kept}),
-                      upload(planes[0]), upload(planes[1]), upload(planes[2]), upload(x), upload(y), upload(at[0]),
-                      upload(at[1]), upload(at[2]), next_x, next_y, px, py, pz);
-      const std::vector<float> got_x = device().download(next_x), got_y = device().download(next_y);
-      const std::array<std::vector<float>, 3> points{device().download(px), device().download(py),
-                                                     device().download(pz)};
+                      own.values, upload(both), now.values, next, next_points.values);
+      const std::vector<float> got = device().download(next), got_x(got.begin(), got.begin() + kWidth * kHeight),
+                               got_y(got.begin() + kWidth * kHeight, got.end());
+      const std::array<std::vector<float>, 3> points = download_planes(device(), next_points);
       for (int r = 0; r < kHeight; ++r)
         for (int j = 0; j < kWidth; ++j) {
           const std::size_t i = static_cast<std::size_t>(r) * kWidth + j;
@@ -156,11 +161,11 @@ TEST(RegularGrid, SlidesAsItsTwinDoes) {
   }
 }
 
-TEST(RegularGrid, LeavesEvenModelsAndSpdPatchesAndEndsAlone) {
-  const SkeletexModel even = encoded("bear", 64, false);
-  const SkeletexModel same = regular_grid(device(), even);
-  EXPECT_EQ(same.texture.out, even.texture.out);
-  EXPECT_EQ(same.texture.along, even.texture.along);
+TEST(RegularGrid, LeavesRegularModelsAndSpdPatchesAndEndsAlone) {
+  const SkeletexModel regular = encoded("bear", 64, false);
+  const SkeletexModel same = regular_grid(device(), regular);
+  EXPECT_EQ(same.texture.out, regular.texture.out);
+  EXPECT_EQ(same.texture.along, regular.texture.along);
 
   SkeletexModel snapped = encoded("bear", 256, true);
   snapped.patches[3].method = Method::kSpd;
@@ -187,21 +192,21 @@ TEST(RegularGrid, LeavesEvenModelsAndSpdPatchesAndEndsAlone) {
 TEST(RegularGrid, StaysOnTheSurfaceAndMakesMorphsAsSmoothAsOfEvenModels) {
   for (const auto& [first, second] : {std::pair{"bear", "bear_bis"}, {"man", "homer"}}) {
     SCOPED_TRACE(first);
-    const std::array even{encoded(first, 192, false), encoded(second, 192, false)},
+    const std::array regular{encoded(first, 192, false), encoded(second, 192, false)},
         snapped{encoded(first, 192, true), encoded(second, 192, true)};
     const SkeletexModel slid = regular_grid(device(), snapped[0]);
     const TriangleMesh mesh = load_standard_model(first).mesh, surface = reconstruct_mesh(device(), slid);
     EXPECT_TRUE(measure_manifold(surface).is_closed_manifold());
     EXPECT_LT(symmetric_mean(measure_metro(device(), mesh, surface)),
-              1.3 * symmetric_mean(measure_metro(device(), mesh, reconstruct_mesh(device(), even[0]))));
+              1.3 * symmetric_mean(measure_metro(device(), mesh, reconstruct_mesh(device(), regular[0]))));
 
     const auto half_way = [](const std::array<SkeletexModel, 2>& models) {
       const Correspondence bones = find_correspondence(models[0].skeleton, models[1].skeleton);
       return Morph(device(), {models[0], models[1]}, std::vector{bones}).at(std::vector{0.5, 0.5});
     };
     const double own = mean_angle(snapped[0]), from_snapped = mean_angle(half_way(snapped)),
-                 from_even = mean_angle(half_way(even));
-    EXPECT_LT(from_snapped, 1.02 * from_even);
+                 from_regular = mean_angle(half_way(regular));
+    EXPECT_LT(from_snapped, 1.02 * from_regular);
     // Means of the texels themselves are rougher by half.
     SkeletexModel untold[2] = {snapped[0], snapped[1]};
     for (SkeletexModel& model : untold) model.sampling = {};
@@ -209,8 +214,8 @@ TEST(RegularGrid, StaysOnTheSurfaceAndMakesMorphsAsSmoothAsOfEvenModels) {
     EXPECT_GT(mixed, 1.2 * from_snapped);
     RecordProperty(
         first,
-        fmt::format("{:.2f} degrees in the model, half-way {:.2f} mixed, {:.2f} made even, {:.2f} from even models",
-                    own, mixed, from_snapped, from_even));
+        fmt::format("{:.2f} degrees in the model, half-way {:.2f} mixed, {:.2f} made regular, {:.2f} from even models",
+                    own, mixed, from_snapped, from_regular));
   }
 }
 

@@ -10,8 +10,8 @@
 #include "skeletex/analysis/folds.h"
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/convert/encode_model.h"
-#include "skeletex/edit/transfer/lay_part.h"
 #include "skeletex/edit/transfer/mirror.h"
+#include "skeletex/edit/transfer/place_part.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/resample.h"
@@ -189,10 +189,10 @@ TEST(Transfer, MeetsTheSeamWithCosineAndJumpsThereWithNone) {
       edge = 0;
       for (int j = 0; j < width; ++j) {
         const int v = lattice.first_inner[bone] + row * width + j, next = row == 0 ? v + width : v - width;
-        const int beside = lattice.first_inner[bone] + row * width + (j + 1) % width;
+        const int neighbour = lattice.first_inner[bone] + row * width + (j + 1) % width;
         sum += (after[v] - before[v]).norm() / width;
         worst = std::max(worst, (after[v] - before[v]).norm());
-        edge += ((before[next] - before[v]).norm() + (before[beside] - before[v]).norm()) / (2 * width);
+        edge += ((before[next] - before[v]).norm() + (before[neighbour] - before[v]).norm()) / (2 * width);
       }
       return std::array{sum, worst};
     };
@@ -340,31 +340,15 @@ TEST(Transfer, RefusesWhatDoesNotFit) {
       InputError);
 }
 
-TEST(LayPart, KernelAndTwinAgreeOnRandomTables) {
+TEST(PlacePart, KernelAndTwinAgreeOnRandomTables) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> unit(-1, 1);
-  Skeleton skeleton;
-  std::vector<Patch> patches;
-  skeleton.nodes.push_back({"n", Vec3::Zero()});
   const std::vector<std::pair<int, int>> sizes{{4, 4}, {33, 7}, {129, 40}, {65, 65}};
-  int y = 0;
-  for (const auto& [width, height] : sizes) {
-    const int bone = static_cast<int>(patches.size());
-    skeleton.nodes.push_back({"n", Vec3(bone + 1, 0.3 * (bone % 2), 0)});
-    skeleton.bones.push_back({"b", bone, bone + 1, {}});
-    Patch patch;
-    patch.rectangle = {bone, y, width, height};
-    for (int r = 0; r < height; ++r) patch.row_u.push_back(static_cast<double>(r) / (height - 1));
-    y += height;
-    patches.push_back(patch);
-  }
-  const FrameTables frames = frame_tables(skeleton, SeparationPlanes(skeleton), patches, Vec3::Zero());
   std::vector<float> in[3], target[3];
   for (int i = 0; i < 9000; ++i)
     for (int c = 0; c < 3; ++c) in[c].push_back(unit(random)), target[c].push_back(unit(random));
-  LaidTables tables;
-  std::size_t points = 0;
-  for (std::size_t p = 0; p < patches.size(); ++p) {
+  TransferTables tables;
+  for (std::size_t p = 0; p < sizes.size(); ++p) {
     const auto [width, height] = sizes[p];
     const int source_width = 4 + static_cast<int>(random() % 50), source_height = 4 + static_cast<int>(random() % 60);
     tables.patches.push_back({static_cast<int>(random() % 1000), source_width, source_height,
@@ -378,25 +362,23 @@ TEST(LayPart, KernelAndTwinAgreeOnRandomTables) {
                                 10 * unit(random), 1 + unit(random), 3 * unit(random),
                                 static_cast<float>(height) + 3 * unit(random)});
     for (int row = 0; row < height; ++row) {
-      tables.rows.push_back({static_cast<int>(p), row, static_cast<int>(points), 0});
-      tables.laid_rows.push_back({0.5f + 0.5f * unit(random), 1 + unit(random)});
-      points += width;
+      tables.rows.push_back({static_cast<int>(p), row, width, static_cast<int>(tables.point_count), 0,
+                             0.5f + 0.5f * unit(random), 1 + unit(random)});
+      tables.point_count += width;
     }
   }
   for (std::size_t i = 0; i < tables.correction_size(); ++i) tables.corrections.push_back(0.1f * unit(random));
   const DevicePlanes source_planes = upload_planes(device(), in[0], in[1], in[2]);
   const DevicePlanes target_planes = upload_planes(device(), target[0], target[1], target[2]);
-  const DevicePlanes laid = lay_part(device(), tables, frames, source_planes, target_planes, points);
-  const auto out = download_planes(device(), laid);
-  const DevicePlanes read = read_part(device(), tables, frames, source_planes, points);
-  const auto read_out = download_planes(device(), read);
+  const auto out = download_planes(device(), place_part(device(), tables, source_planes, target_planes));
+  const auto read_out = download_planes(device(), read_source(device(), tables, source_planes));
   for (std::size_t k = 0; k < tables.rows.size(); ++k) {
-    const auto [p, row, vertex, quad] = tables.rows[k];
+    const TransferRow& row = tables.rows[k];
+    const int p = row.patch, vertex = row.vertex;
     for (int j = 0; j < sizes[p].first; ++j) {
       const std::size_t column = static_cast<std::size_t>(tables.patches[p].column_begin + j);
-      const Vec3 expected = twin::lay(
-          tables.patches[p], tables.laid_rows[k], tables.columns[column], row, j, sizes[p].first,
-          [&](int i) { return Vec3(in[0][i], in[1][i], in[2][i]); },
+      const Vec3 expected = twin::place(
+          tables.patches[p], row, tables.columns[column], j, [&](int i) { return Vec3(in[0][i], in[1][i], in[2][i]); },
           [&](int i) { return Vec3(target[0][i], target[1][i], target[2][i]); },
           [&](int end, int band, bool is_slope, int axis) {
             return tables.correction(end == 0 ? BoneEnd::kHead : BoneEnd::kTail, band, is_slope, axis, column);
@@ -405,17 +387,17 @@ TEST(LayPart, KernelAndTwinAgreeOnRandomTables) {
       // rows of up to 140 alike; both enter up to some ten times (scale, lean, corrections times rows).
       double at = 0;
       const Vec3 place = twin::read(
-          tables.patches[p], tables.laid_rows[k], tables.columns[column], row,
-          [&](int i) { return Vec3(in[0][i], in[1][i], in[2][i]); }, at);
+          tables.patches[p], row, tables.columns[column], [&](int i) { return Vec3(in[0][i], in[1][i], in[2][i]); },
+          at);
       for (int c = 0; c < 3; ++c) {
-        ASSERT_NEAR(out[c][vertex + j], expected[c], 2e-3) << p << " " << row << " " << j;
-        ASSERT_NEAR(read_out[c][vertex + j], place[c], 2e-4) << p << " " << row << " " << j;
+        ASSERT_NEAR(out[c][vertex + j], expected[c], 2e-3) << p << " " << row.row << " " << j;
+        ASSERT_NEAR(read_out[c][vertex + j], place[c], 2e-4) << p << " " << row.row << " " << j;
       }
     }
   }
 }
 
-TEST(LayPart, BandsOfWavesSumToTheirRowAndTheFirstHasTheLongest) {
+TEST(PlacePart, BandsOfWavesSumToTheirRowAndTheFirstHasTheLongest) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(-1, 1);
   for (const int count : {4, 7, 64, 301}) {

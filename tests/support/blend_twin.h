@@ -11,7 +11,7 @@ namespace skeletex::twin {
 /// One source of kernel blend_texels at one place.
 struct BlendRead {
   BlendSource source;
-  BlendRow row;
+  BlendSourceRow row;
   double column;     ///< any lift
   double slope = 0;  ///< of the result's frame there
   double rise = 0;   ///< what is added to the slope of the source's frame

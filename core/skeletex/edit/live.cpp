@@ -6,19 +6,20 @@
 #include <algorithm>
 #include <cmath>
 
-#include "skeletex/edit/transfer/blend.h"
+#include "skeletex/edit/morph/blend.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
 namespace {
 
+/// Moves a model's texels to the device.
 DevicePlanes take_texels(ClContext& context, SkeletexModel& model) {
   DevicePlanes planes = upload_texels(context, model.texture);
   model.texture = {model.texture.width, model.texture.height, {}, {}, {}};
   return planes;
 }
 
-/// Where the two differ in what a blend of texels cannot bridge; nullptr: nowhere.
+/// What the two models differ in that a blend of texels cannot join; nullptr: nothing.
 const char* difference(const SkeletexModel& a, const SkeletexModel& b) {
   const auto same_nodes = [](const Node& p, const Node& q) { return p.position == q.position; };
   const auto same_bones = [](const Bone& p, const Bone& q) {
@@ -82,7 +83,7 @@ std::vector<double> LiveMorph::weights(double t) const {
 SkeletexModel LiveMorph::queue(double t, DevicePlanes& texels) const {
   const double place = std::clamp(t * steps_, 0.0, static_cast<double>(keys_.size() - 1));
   const std::size_t key = std::min(static_cast<std::size_t>(place), keys_.size() - 2);
-  // First, so that the device mixes while the host finds the seams.
+  // Queued first, so that the device works while the host finds the seams.
   mix_texels(*context_, keys_[key], keys_[key + 1], place - static_cast<double>(key),
              morph_->models()[*morph_->layout()].texture.width, texels);
   return morph_->without_texels(weights(t));

@@ -8,19 +8,18 @@
 
 namespace skeletex {
 
-/// A lattice of about every other row, column and seam sample of another one, with all its poles and corners, and how
-/// values on it continue over the finer one: bilinear in rows and columns; along seams linear from sample to sample,
-/// and from both sides the same. It is what solvers take as their next level, no model of its own: its texture has no
-/// texels.
+/// The next level of a solver: a lattice of about every other row, column and seam sample of a finer one, and of all
+/// its poles and corners. Values on it are interpolated on the finer one: bilinear in rows and columns, linear along
+/// seams. Its model has no texels.
 struct CoarseLattice {
   SkeletexModel model;
   Lattice lattice;
   std::vector<Vec3> positions;
-  std::vector<int> picks;                    ///< per vertex here, the finer one's vertex at its place
-  std::vector<std::array<int, 4>> sources;   ///< per vertex of the finer lattice, whose values it is interpolated from,
-  std::vector<std::array<float, 4>> shares;  ///< and their shares; they sum to 1
+  std::vector<int> picks;                    ///< per vertex, the vertex of the finer lattice at its place
+  std::vector<std::array<int, 4>> sources;   ///< per vertex of the finer lattice, the vertices that it is a mean of
+  std::vector<std::array<float, 4>> shares;  ///< their shares, which sum to 1
 };
-/// \param positions  of all vertices of the model's lattice
+/// \param positions  of all vertices of the model's lattice, world units
 CoarseLattice coarsen(const SkeletexModel& model, const Lattice& lattice, const std::vector<Vec3>& positions);
 
 }  // namespace skeletex

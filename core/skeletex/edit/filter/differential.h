@@ -7,30 +7,33 @@
 
 namespace skeletex {
 
-/// A model's bind pose as a surface on the device: the vertices of its lattice and who is next to whom.
+/// A model's bind pose as a surface on the device: the vertices of its lattice and their neighbours.
 struct ModelSurface {
   Lattice lattice;
-  std::vector<Vec3> positions;  ///< world
+  std::vector<Vec3> positions;  ///< world units
   DeviceNeighbours neighbours;
   DeviceField points;  ///< relative to the model's origin, in diagonals
+
+  /// The first vertex on a seam; all later ones lie on seams, too.
+  int first_seam() const { return lattice.first_sample.empty() ? lattice.vertex_count : lattice.first_sample[0]; }
 };
 ModelSurface upload_surface(ClContext& context, const SkeletexModel& model);
 
-/// Unit normals at the vertices, outward: the mean over the triangles around each, by area.
+/// Outward unit normals of the vertices: the mean over the triangles around each, by area.
 std::vector<Vec3> vertex_normals(ClContext& context, const ModelSurface& surface);
 
 struct CurvatureResult {
-  std::vector<float> mean_curvature;  ///< per vertex, 1 / world unit: half the sum of the two; positive where convex
-  double scale = 0;                   ///< diagonals: what it is averaged over
+  std::vector<float> mean_curvature;  ///< per vertex, 1 / world unit; positive where convex
+  double scale = 0;                   ///< the distance that it is averaged over, diagonals
   SolveReport solver;
 };
-/// Mean curvature: the mean curvature normal, (M + scale^2 L)^-1 L x, which is averaged over distances of about `scale`
-/// and therefore sees no lattice, along the normal.
+/// The mean curvature: the part along the normal of the mean curvature normal (M + scale^2 L)^-1 L x, which is averaged
+/// over distances of about `scale`.
 /// \param scale  diagonals; 0: three times the mean spacing of vertices
 CurvatureResult mean_curvature(ClContext& context, const SkeletexModel& model, const ModelSurface& surface,
                                double scale = 0);
 
-/// The mean distance between neighbouring vertices: the root of a vertex's share of the area. Diagonals.
+/// The mean distance between neighbouring vertices, diagonals: the root of a vertex's share of the area.
 double mean_spacing(ClContext& context, const SurfaceOperator& surface);
 
 }  // namespace skeletex

@@ -18,15 +18,15 @@ void check_length(double value, const char* what, double least, double most) {
     throw InputError(fmt::format("{} is {}; give {} to {} diagonals", what, value, least, most));
 }
 
-/// Everything a filter needs of the model it works on.
+/// What a filter needs of the model that it works on.
 struct FilterJob {
   ClContext& context;
   const SkeletexModel& given;
-  SkeletexModel model;  ///< the given one on an regular grid: the slivers of a snapped one take the solver several
-                        ///< times the steps
+  SkeletexModel model;  ///< the given one on a regular grid, where the solver takes far fewer steps
   ModelSurface surface;
   SurfaceOperator laplace;
   std::vector<float> weights;  ///< of the region, per vertex
+  double volume = 0;           ///< world units cubed
   SolveReport solver;
 
   FilterJob(ClContext& on, const SkeletexModel& of, const FilterRegion& region);
@@ -47,22 +47,13 @@ std::vector<float> inside_region(const SkeletexModel& model, const Lattice& latt
     if (!is_chosen[bone]) continue;
     const Rectangle& rectangle = model.patches[bone].rectangle;
     std::fill_n(inside.begin() + lattice.first_inner[bone], rectangle.width * (rectangle.height - 2), 1.f);
-    for (const int pole : lattice.poles[bone])
-      if (pole >= 0) inside[pole] = 1;
   }
-  for (std::size_t a = 0; a < model.arcs.size(); ++a)
-    if (is_chosen[model.arcs[a].bones[0]] && is_chosen[model.arcs[a].bones[1]])
-      std::fill_n(inside.begin() + lattice.first_sample[a], model.arcs[a].samples.size(), 1.f);
-  for (std::size_t i = 0; i < model.corners.size(); ++i) {
-    const std::vector<int>& bones = model.corners[i].bones;
-    if (std::all_of(bones.begin(), bones.end(), [&](int bone) { return is_chosen[bone]; }))
-      inside[lattice.first_corner + i] = 1;
-  }
+  mark_ends(model, lattice, is_chosen, inside);
   return inside;
 }
 
-/// 0 at the boundary and outside, towards 1 inside: the solution of (M + falloff^2 L) w = M, which nears 1 as
-/// exp(-distance / falloff) does, made smooth at its foot.
+/// 0 at the boundary and outside, towards 1 inside: the solution of (M + falloff^2 L) w = M, which approaches 1 as
+/// exp(-distance / falloff) falls, made smooth at 0.
 std::vector<float> weigh_region(ClContext& context, const SurfaceOperator& laplace, std::vector<float> inside,
                                 double falloff, SolveReport& report) {
   if (std::find(inside.begin(), inside.end(), 0.f) == inside.end() || falloff == 0) return inside;
@@ -85,10 +76,11 @@ FilterJob::FilterJob(ClContext& on, const SkeletexModel& of, const FilterRegion&
       surface(upload_surface(on, model)),
       laplace(make_surface_operator(on, surface.neighbours, surface.points)) {
   check_length(region.falloff, "the fall-off at the region's boundary", 0, 1);
+  volume = enclosed_volume(model, surface.positions, area_vectors_at(on, model, surface, surface.positions));
   weights = weigh_region(context, laplace, inside_region(model, surface.lattice, region), region.falloff, solver);
 }
 
-/// How far a surface of some points moves when it diffuses, world units: (M + time L) d = -time L x.
+/// The moves of a surface that diffuses, world units: the solution of (M + time L) d = -time L x.
 std::vector<Vec3> diffusion_moves(FilterJob& job, const DeviceField& points, const SurfaceOperator& laplace,
                                   double scale) {
   const auto time = static_cast<float>(scale * scale);
@@ -101,7 +93,7 @@ std::vector<Vec3> diffusion_moves(FilterJob& job, const DeviceField& points, con
   return moves;
 }
 
-/// Texels beyond the region become the given model's again.
+/// Sets the texels outside of the region to those of the given model.
 void keep_outside(const FilterJob& job, SkeletexModel& model) {
   bool has_outside = false;
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
@@ -121,17 +113,17 @@ void keep_outside(const FilterJob& job, SkeletexModel& model) {
   model.sampling = job.given.sampling;
 }
 
-/// The model with its surface moved, where and as far as the region allows.
-FilterResult finish(FilterJob& job, std::vector<Vec3> moves, double volume_before) {
+/// The model with its surface moved, by the region's weights.
+FilterResult finish(FilterJob& job, std::vector<Vec3> moves) {
   for (std::size_t i = 0; i < moves.size(); ++i) moves[i] *= static_cast<double>(job.weights[i]);
   MovedModel moved = move_surface(job.context, job.model, job.surface, job.laplace, moves);
   add_solve(job.solver, moved.report.solver);
   keep_outside(job, moved.model);
-  return {std::move(moved.model), {moved.report, volume_before}};
+  return {std::move(moved.model), {moved.report, job.volume}};
 }
 
-/// Adds to the moves what brings the volume back, along the normals: Newton's method, whose slope is the area.
-void restore_volume(const FilterJob& job, double volume, std::vector<Vec3>& moves) {
+/// Adds moves along the normals that restore the volume, by Newton's method.
+void restore_volume(const FilterJob& job, std::vector<Vec3>& moves) {
   for (int round = 0; round < 4; ++round) {
     std::vector<Vec3> positions = job.surface.positions;
     for (std::size_t i = 0; i < positions.size(); ++i) positions[i] += static_cast<double>(job.weights[i]) * moves[i];
@@ -139,7 +131,7 @@ void restore_volume(const FilterJob& job, double volume, std::vector<Vec3>& move
     double area = 0;
     for (std::size_t i = 0; i < vectors.size(); ++i) area += static_cast<double>(job.weights[i]) * vectors[i].norm();
     if (!(area > 0)) return;
-    const double offset = (volume - enclosed_volume(job.model, positions, vectors)) / area;
+    const double offset = (job.volume - enclosed_volume(job.model, positions, vectors)) / area;
     for (std::size_t i = 0; i < moves.size(); ++i) moves[i] += offset * vectors[i].normalized();
   }
 }
@@ -156,8 +148,6 @@ FilterResult smooth_model(ClContext& context, const SkeletexModel& model, const 
   if (options.iterations < 1 || options.iterations > 1000)
     throw InputError(fmt::format("{} iterations of smoothing; give 1 to 1000", options.iterations));
   FilterJob job(context, model, region);
-  const double volume = enclosed_volume(job.model, job.surface.positions,
-                                        area_vectors_at(job.context, job.model, job.surface, job.surface.positions));
   const double scale = options.scale / std::sqrt(options.iterations);
   std::vector<Vec3> moves = diffusion_moves(job, job.surface.points, job.laplace, scale);
   for (int iteration = 1; iteration < options.iterations; ++iteration) {
@@ -168,8 +158,8 @@ FilterResult smooth_model(ClContext& context, const SkeletexModel& model, const 
         diffusion_moves(job, points, make_surface_operator(context, job.surface.neighbours, points), scale);
     for (std::size_t i = 0; i < moves.size(); ++i) moves[i] += more[i];
   }
-  if (options.keeps_volume) restore_volume(job, volume, moves);
-  return finish(job, moves, volume);
+  if (options.keeps_volume) restore_volume(job, moves);
+  return finish(job, moves);
 }
 
 FilterResult enhance_model(ClContext& context, const SkeletexModel& model, const EnhanceOptions& options,
@@ -178,11 +168,9 @@ FilterResult enhance_model(ClContext& context, const SkeletexModel& model, const
   if (!(options.gain >= -1 && options.gain <= 100))
     throw InputError(fmt::format("a gain of {}; give -1 (no detail) to 100", options.gain));
   FilterJob job(context, model, region);
-  const double volume = enclosed_volume(job.model, job.surface.positions,
-                                        area_vectors_at(job.context, job.model, job.surface, job.surface.positions));
   std::vector<Vec3> moves = diffusion_moves(job, job.surface.points, job.laplace, options.scale);
   for (Vec3& move : moves) move *= -options.gain;
-  return finish(job, moves, volume);
+  return finish(job, moves);
 }
 
 FilterResult add_noise(ClContext& context, const SkeletexModel& model, const NoiseOptions& options,
@@ -193,15 +181,15 @@ FilterResult add_noise(ClContext& context, const SkeletexModel& model, const Noi
     throw InputError(fmt::format("{} octaves of noise; give 1 to 16", options.octaves));
   FilterJob job(context, model, region);
   std::vector<Vec3> moves = area_vectors_at(job.context, job.model, job.surface, job.surface.positions);
-  const double volume = enclosed_volume(job.model, job.surface.positions, moves);
   const auto heights = context.allocate<float>(moves.size());
-  context.launch({"filter.cl", "noise_at_points"}, ClRange(moves.size()), static_cast<int>(moves.size()),
-                 static_cast<float>(1 / options.wavelength), options.octaves, static_cast<unsigned>(options.seed),
+  context.launch({"filter.cl", "noise_at_points"}, ClRange(moves.size()),
+                 NoiseParameters{static_cast<int>(moves.size()), options.octaves, options.seed,
+                                 static_cast<float>(1 / options.wavelength)},
                  job.surface.points.values, heights);
   const std::vector<float> noise = context.download(heights);
   for (std::size_t i = 0; i < moves.size(); ++i)
     moves[i] = options.amplitude * job.unit() * static_cast<double>(noise[i]) * moves[i].normalized();
-  return finish(job, moves, volume);
+  return finish(job, moves);
 }
 
 }  // namespace skeletex

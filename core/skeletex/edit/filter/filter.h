@@ -10,15 +10,15 @@
 
 namespace skeletex {
 
-/// Filters work on the surface of the bind pose, across seams, v = 0 and poles (neighbours.h), and write a model of the
-/// same skeleton, layout and seams' topology: it stays as closed as it was. Snapped models are made even
-/// (even_lattice.h) where the filter acts. Lengths are in diagonals.
+// Filters work on the surface of the bind pose, across seams, v = 0 and poles (neighbours.h). They return a model of
+// the same skeleton, layout and topology of seams. Where they act on a snapped model, its texels move to a regular grid
+// (regular_grid.h). Lengths are in diagonals.
 
 /// Where a filter acts.
 struct FilterRegion {
   std::vector<std::string> bones;  ///< by name; empty: the whole model
-  /// The effect grows smoothly from nothing at the region's boundary to nearly all of it some such distances inside.
-  /// Outside, texels and seams stay bit by bit.
+  /// The distance over which the effect grows from the region's boundary inwards. Outside, texels and seams stay bit by
+  /// bit.
   double falloff = 0.02;
 };
 
@@ -31,8 +31,8 @@ struct FilterResult {
 };
 
 struct SmoothOptions {
-  double scale = 0.01;        ///< what is smaller vanishes: the surface diffuses for the time scale^2 (implicit Euler)
-  int iterations = 1;         ///< steps that the time is divided into, each with the weights of the surface before it
+  double scale = 0.01;        ///< smaller detail vanishes: the surface diffuses for the time scale^2 (implicit Euler)
+  int iterations = 1;         ///< steps that the time is divided into, each with the operator of the surface before it
   bool keeps_volume = false;  ///< moves the surface along its normals until it encloses its old volume
 };
 FilterResult smooth_model(ClContext& context, const SkeletexModel& model, const SmoothOptions& options = {},
@@ -40,7 +40,7 @@ FilterResult smooth_model(ClContext& context, const SkeletexModel& model, const 
 
 struct EnhanceOptions {
   double scale = 0.01;  ///< detail is what smooth_model takes away
-  double gain = 1;      ///< adds so many times the detail
+  double gain = 1;      ///< how many times the detail is added
 };
 FilterResult enhance_model(ClContext& context, const SkeletexModel& model, const EnhanceOptions& options = {},
                            const FilterRegion& region = {});
@@ -51,8 +51,8 @@ struct NoiseOptions {
   int octaves = 3;           ///< each half the length and half the height of the one before
   std::uint32_t seed = 0;
 };
-/// Moves the surface along its normals by gradient noise of the bind pose's positions: two sides of a seam see the
-/// same.
+/// Moves the surface along its normals by gradient noise of the bind pose's positions, which is equal on both sides of
+/// a seam.
 FilterResult add_noise(ClContext& context, const SkeletexModel& model, const NoiseOptions& options = {},
                        const FilterRegion& region = {});
 

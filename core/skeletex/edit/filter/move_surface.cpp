@@ -9,21 +9,17 @@
 namespace skeletex {
 namespace {
 
-/// Lets the surface follow seams that slide over it, so that rows beside a seam keep their distance from it: the slides
-/// fade out over some of their length, in the tangent planes. Vertices that have not moved stay.
+/// Moves the surface along with seams that slide over it, so that the rows next to a seam keep their distance from it.
+/// The slides fade out with the distance from the seam, in the tangent planes. Vertices that have not moved stay.
 void spread_slides(ClContext& context, const SkeletexModel& model, const ModelSurface& surface,
                    const SurfaceOperator& laplace, std::span<const Vec3> normals, std::span<const Vec3> moves,
                    std::span<const Vec3> slides, MoveReport& report, std::vector<Vec3>& positions) {
-  const int first_seam =
-      surface.lattice.first_sample.empty() ? surface.lattice.vertex_count : surface.lattice.first_sample[0];
-  const double reach = std::max(4 * report.largest_slide, 2 * mean_spacing(context, laplace));
-  const auto time = static_cast<float>(reach * reach);
+  const int first_seam = surface.first_seam();
+  const double range = std::max(4 * report.largest_slide, 2 * mean_spacing(context, laplace));
   std::vector<float> is_free(positions.size());
   for (int i = 0; i < static_cast<int>(is_free.size()); ++i) is_free[i] = i < first_seam && moves[i] != Vec3::Zero();
-  const auto device_free = context.upload(is_free);
-  const DeviceField given = upload_points(context, slides, Vec3::Zero(), -model.diagonal);
-  const SolveResult solved = solve_diffusion(context, laplace, time, device_free,
-                                             apply_operator(context, laplace, 1, time, device_free, given), 1e-3);
+  const SolveResult solved = interpolate_field(context, laplace, range * range, is_free,
+                                               upload_points(context, slides, Vec3::Zero(), -model.diagonal));
   add_solve({solved.report.steps, 0}, report.solver);
   const std::vector<Vec3> spread = download_vectors(context, solved.x);
   for (int i = 0; i < first_seam; ++i) {
@@ -33,11 +29,6 @@ void spread_slides(ClContext& context, const SkeletexModel& model, const ModelSu
 }
 
 }  // namespace
-
-void add_solve(const SolveReport& solve, SolveReport& all) {
-  all.steps += solve.steps;
-  all.residual = std::max(all.residual, solve.residual);
-}
 
 std::vector<Vec3> area_vectors_at(ClContext& context, const SkeletexModel& model, const ModelSurface& surface,
                                   std::span<const Vec3> positions) {

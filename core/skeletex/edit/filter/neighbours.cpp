@@ -2,7 +2,7 @@
 #include "skeletex/edit/filter/neighbours.h"
 
 #include <algorithm>
-#include <numeric>
+#include <map>
 
 #include "skeletex/edit/filter/coarsen.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
@@ -12,8 +12,8 @@ namespace {
 
 constexpr int kSmallestLevel = 200;  // vertices
 
-/// Puts the pairs of one vertex in order: each begins where the one before ends. An open fan begins with the pair that
-/// none leads to, a closed one with the smallest vertex.
+/// Sorts the pairs of one vertex so that each begins where the one before ends. An open fan begins with the pair that
+/// no other leads to, a closed one with the smallest vertex.
 void order_fan(std::span<std::array<int, 2>> fan) {
   std::sort(fan.begin(), fan.end());
   const auto leads_to = [&](int vertex) {
@@ -41,45 +41,67 @@ Neighbours find_neighbours(const SkeletexModel& model, const Lattice& lattice,
       result.rows.push_back({lattice.first_inner[bone] + (row - 1) * rectangle.width, rectangle.width, row > 1,
                              row + 2 < rectangle.height});
   }
+  std::map<int, std::vector<std::array<int, 2>>> fans;
   for (const Triangle& triangle : end_triangles)
-    result.fan_vertices.insert(result.fan_vertices.end(), triangle.begin(), triangle.end());
-  std::sort(result.fan_vertices.begin(), result.fan_vertices.end());
-  result.fan_vertices.erase(std::unique(result.fan_vertices.begin(), result.fan_vertices.end()),
-                            result.fan_vertices.end());
-  const auto place_of = [&](int vertex) {
-    return std::lower_bound(result.fan_vertices.begin(), result.fan_vertices.end(), vertex) -
-           result.fan_vertices.begin();
-  };
-
-  result.fan_begin.assign(result.fan_vertices.size() + 1, 0);
-  for (const Triangle& triangle : end_triangles)
-    for (const int vertex : triangle) ++result.fan_begin[place_of(vertex) + 1];
-  std::partial_sum(result.fan_begin.begin(), result.fan_begin.end(), result.fan_begin.begin());
-  result.fans.resize(3 * end_triangles.size());
-  std::vector<int> next(result.fan_begin.begin(), result.fan_begin.end() - 1);
-  for (const Triangle& triangle : end_triangles)
-    for (int i = 0; i < 3; ++i)
-      result.fans[next[place_of(triangle[i])]++] = {triangle[(i + 1) % 3], triangle[(i + 2) % 3]};
-  for (std::size_t k = 0; k < result.fan_vertices.size(); ++k)
-    order_fan(std::span(result.fans).subspan(result.fan_begin[k], result.fan_begin[k + 1] - result.fan_begin[k]));
+    for (int i = 0; i < 3; ++i) fans[triangle[i]].push_back({triangle[(i + 1) % 3], triangle[(i + 2) % 3]});
+  for (auto& [vertex, fan] : fans) {
+    order_fan(fan);
+    result.fan_vertices.push_back({vertex, static_cast<int>(result.fans.size())});
+    result.fans.insert(result.fans.end(), fan.begin(), fan.end());
+  }
+  result.fan_vertices.push_back({-1, static_cast<int>(result.fans.size())});
   return result;
+}
+
+void mark_ends(const SkeletexModel& model, const Lattice& lattice, const std::vector<bool>& is_chosen,
+               std::vector<float>& values) {
+  const auto are_chosen = [&](const auto& bones) {
+    return std::all_of(bones.begin(), bones.end(), [&](int bone) { return is_chosen[bone]; });
+  };
+  for (std::size_t bone = 0; bone < model.patches.size(); ++bone)
+    for (const int pole : lattice.poles[bone])
+      if (pole >= 0 && is_chosen[bone]) values[pole] = 1;
+  for (std::size_t a = 0; a < model.arcs.size(); ++a)
+    if (are_chosen(model.arcs[a].bones))
+      std::fill_n(values.begin() + lattice.first_sample[a], model.arcs[a].samples.size(), 1.f);
+  for (std::size_t c = 0; c < model.corners.size(); ++c)
+    if (are_chosen(model.corners[c].bones)) values[lattice.first_corner + c] = 1;
+}
+
+SurfaceParameters DeviceNeighbours::parameters(int components) const {
+  SurfaceParameters parameters{};
+  parameters.row_count = static_cast<int>(rows.size);
+  parameters.block_count = static_cast<int>(column_blocks.size);
+  parameters.fan_count = fan_count();
+  parameters.inner_count = inner_count;
+  parameters.count = vertex_count;
+  parameters.components = components;
+  if (coarser) parameters.coarse_count = static_cast<int>(coarser->picks.size);
+  return parameters;
+}
+
+ClRange rows_range(const ClContext& context, const DeviceNeighbours& neighbours) {
+  return row_range(context, neighbours.rows.size);
+}
+
+ClRange fans_range(const ClContext& context, const DeviceNeighbours& neighbours) {
+  return row_range(context, (neighbours.fan_count() + FAN_CHUNK - 1) / FAN_CHUNK);
 }
 
 DeviceNeighbours upload_neighbours(ClContext& context, const Neighbours& neighbours) {
   constexpr int kColumnsPerBlock = 64;
-  std::vector<std::array<int, 4>> blocks;
+  std::vector<ColumnBlock> blocks;
   for (std::size_t k = 0; k < neighbours.rows.size(); ++k) {
     const auto [first, width, has_before, has_after] = neighbours.rows[k];
     if (has_before) continue;
     int rows = 1;
-    while (neighbours.rows[k + rows - 1][3]) ++rows;
+    while (neighbours.rows[k + rows - 1].has_after) ++rows;
     for (int column = 0; column < width; column += kColumnsPerBlock)
       blocks.push_back({first + column, std::min(kColumnsPerBlock, width - column), width, rows});
   }
   return {context.upload(neighbours.rows),
           context.upload(blocks),
           context.upload(neighbours.fan_vertices),
-          context.upload(neighbours.fan_begin),
           context.upload(neighbours.fans),
           neighbours.inner_count,
           neighbours.vertex_count,
@@ -91,20 +113,20 @@ std::shared_ptr<const DeviceCoarseLattice> upload_coarser(ClContext& context, co
   const CoarseLattice coarse = coarsen(model, lattice, positions);
   const int fine_count = lattice.vertex_count, count = coarse.lattice.vertex_count;
   if (count > 0.6 * fine_count || count < kSmallestLevel) return nullptr;
-  std::vector<int> begin(count + 1, 0);
+  struct Reader {
+    int vertex;
+    float share;
+  };
+  std::vector<std::vector<Reader>> readers_of(count);
   for (int v = 0; v < fine_count; ++v)
     for (int i = 0; i < 4; ++i)
-      if (coarse.shares[v][i] > 0) ++begin[coarse.sources[v][i] + 1];
-  std::partial_sum(begin.begin(), begin.end(), begin.begin());
-  std::vector<int> readers(begin.back()), next(begin.begin(), begin.end() - 1);
-  std::vector<float> shares(begin.back());
-  for (int v = 0; v < fine_count; ++v)
-    for (int i = 0; i < 4; ++i)
-      if (coarse.shares[v][i] > 0) {
-        const int at = next[coarse.sources[v][i]]++;
-        readers[at] = v;
-        shares[at] = coarse.shares[v][i];
-      }
+      if (coarse.shares[v][i] > 0) readers_of[coarse.sources[v][i]].push_back({v, coarse.shares[v][i]});
+  std::vector<int> begin{0}, readers;
+  std::vector<float> shares;
+  for (const std::vector<Reader>& of_vertex : readers_of) {
+    for (const auto [vertex, share] : of_vertex) readers.push_back(vertex), shares.push_back(share);
+    begin.push_back(static_cast<int>(readers.size()));
+  }
   DeviceNeighbours neighbours = upload_neighbours(
       context, find_neighbours(coarse.model, coarse.lattice, end_triangles(coarse.model, coarse.positions)));
   neighbours.coarser = upload_coarser(context, coarse.model, coarse.lattice, coarse.positions);

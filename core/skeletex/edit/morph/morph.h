@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "skeletex/edit/morph/overlay.h"
+#include "skeletex/edit/morph/seam_map.h"
 #include "skeletex/model/texture.h"
 #include "skeletex/reconstruct/displace.h"
 
@@ -13,16 +13,16 @@ namespace skeletex {
 
 struct MorphOptions {
   /// Number of the model whose bones (names, order, directions), rectangles and seam samples the result takes. Default:
-  /// that of the largest weight, so that a morph that ends at a model ends at its very texels (of a snapped one: see
-  /// even_lattice); of several the first.
+  /// the model of the largest weight, the first of several. So a morph that ends at a model ends at its very texels (of
+  /// a snapped model: those of regular_grid).
   std::optional<int> layout;
   int size = 0;           ///< longer side of the result's texture; 0: the largest of the models'
-  bool is_smooth = true;  ///< at(): without creases where bones of different turns meet (orientation.h)
+  bool is_smooth = true;  ///< at() removes creases where bones of different rotations meet (orientation.h)
 };
 
-/// In-between models of two or more (paper 5). Texels, distances of seams and corners, and the positions of rows along
-/// the bones are weighted means of what lies at the same place of the models: at the same share of the rows, and at the
-/// angle that the overlays of all models on the mean skeleton give.
+/// In-between models of two or more models (paper 5). Texels, the distances of seams and corners, and the positions of
+/// rows along the bones are weighted means of the models' values at corresponding places. Places correspond at the same
+/// share of the rows, and at angles given by a SeamMap from the mean skeleton to each model.
 class Morph {
  public:
   /// \param models      at least two; those of another size than the result are resampled
@@ -39,30 +39,32 @@ class Morph {
 
   /// The model at weights that sum to 1, one per model, none negative. \throw InputError otherwise
   SkeletexModel at(std::span<const double> weights) const;
-  /// The same on the device, its creases left: texels stay there, in planes of the result's size; the texture of the
-  /// returned model has a size and no texels. For frames see LiveMorph (live.h).
+  /// Queues the same on the device, with creases. The texels stay there, in planes of the result's size; the texture of
+  /// the returned model has a size and no texels. For animations see LiveMorph (live.h).
   SkeletexModel queue(std::span<const double> weights, DevicePlanes& texels) const;
-  /// What queue returns, and no work per texel.
+  /// The model that queue returns, without any work per texel.
   SkeletexModel without_texels(std::span<const double> weights) const;
 
  private:
   struct Between;
   std::unique_ptr<Between> between(std::span<const double> weights, bool has_loops) const;
+  void set_mean_skeleton(int layout, Between& between) const;
   int layout_index(std::span<const double> weights) const;
 
   ClContext* context_;
   std::vector<SkeletexModel> models_;
   std::vector<Correspondence> from_first_;  ///< per model
-  std::vector<TracedSeams> traced_seams_;   ///< per model
+  std::vector<SeamLoops> traced_seams_;     ///< per model
   std::vector<int> texel_begins_;           ///< per model: of its texture in texels_
   DevicePlanes texels_;                     ///< of all models
   std::optional<int> layout_;
   bool is_smooth_;
 };
 
-/// The mean of skeletons of one branching, in the bones of skeletons[layout]: node positions linearly, after the models
-/// are turned to face the same way; the mean of these turns is added again, so that weights of 1 give a model's own
-/// place. \param from_layout  per skeleton
+/// The mean node positions of skeletons of one branching, per node of skeletons[layout]. The skeletons are rotated to
+/// the best fit with skeletons[layout], and the mean of these rotations is undone afterwards, so that a weight of 1
+/// gives a skeleton's own positions.
+/// \param from_layout  per skeleton
 std::vector<Vec3> mean_nodes(std::span<const Skeleton* const> skeletons, std::span<const Correspondence> from_layout,
                              std::span<const double> weights, int layout);
 

@@ -1,27 +1,28 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/edit/morph/orientation.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "skeletex/geometry/best_rotation.h"
-#include "skeletex/reconstruct/displace.h"
 
 namespace skeletex {
 namespace {
 
 constexpr const char* kFile = "orientation.cl";
-constexpr int kFanChunk = 64;  // FAN_CHUNK of the kernels
 constexpr double kScale = 0.1;
 constexpr int kRotationPasses = 2;
-constexpr double kTolerance = 1e-6;  // so that a morph is the same from either side
-// Tips keep the orientation of their texels: what one source has there the other may have none of. Shares of the bone,
-// from the nearest seam, where rotations begin to fade and have faded.
+constexpr double kTolerance = 1e-6;  // so small that a morph hardly depends on the order of the models
+// Shares of the bone, from the nearest seam, where rotations begin to fade and have faded.
 constexpr double kFadeBegin = 0.4, kFadeEnd = 0.9;
 
 }  // namespace
+
+double smooth_step(double x) {
+  x = std::clamp(x, 0.0, 1.0);
+  return x * x * (3 - 2 * x);
+}
 
 std::vector<float> shares_without_tips(const SkeletexModel& model, const Lattice& lattice) {
   std::vector<float> shares;
@@ -31,8 +32,7 @@ std::vector<float> shares_without_tips(const SkeletexModel& model, const Lattice
       double from_seam = 1;
       if (lattice.poles[bone][0] < 0) from_seam = std::min(from_seam, patch.row_u[row]);
       if (lattice.poles[bone][1] < 0) from_seam = std::min(from_seam, 1 - patch.row_u[row]);
-      const double x = std::clamp((kFadeEnd - from_seam) / (kFadeEnd - kFadeBegin), 0.0, 1.0);
-      shares.push_back(static_cast<float>(x * x * (3 - 2 * x)));
+      shares.push_back(static_cast<float>(smooth_step((kFadeEnd - from_seam) / (kFadeEnd - kFadeBegin))));
     }
   }
   return shares;
@@ -69,23 +69,24 @@ OrientationPull pull_orientations(ClContext& context, const ModelSurface& surfac
                                   double scale) {
   const DeviceNeighbours& n = surface.neighbours;
   const std::size_t count = surface.positions.size();
-  const auto row_count = static_cast<int>(n.rows.size), fan_count = static_cast<int>(n.fan_vertices.size);
-  const ClRange rows = row_range(context, n.rows.size),
-                fans = row_range(context, (n.fan_vertices.size + kFanChunk - 1) / kFanChunk);
-  const auto time = static_cast<float>(scale * scale);
-  const int first_seam = surface.lattice.first_sample.empty() ? n.vertex_count : surface.lattice.first_sample[0];
+  const ClRange rows = rows_range(context, n), fans = fans_range(context, n);
+  const auto parameters = [&](int components) {
+    SurfaceParameters result = n.parameters(components);
+    result.first_seam = surface.first_seam();
+    result.time = static_cast<float>(scale * scale);
+    return result;
+  };
 
   const auto field = [&](int components) {
     return DeviceField{components, context.allocate<float>(components * count)};
   };
   const auto zeros = [&](std::size_t size) { return context.upload(std::vector<float>(size, 0.f)); };
   const auto mean_at_ends = [&](const DeviceField& of) {
-    context.launch({kFile, "mean_at_ends"}, fans, fan_count, n.inner_count, n.vertex_count, of.components,
-                   n.fan_vertices, n.fan_begin, n.fans, of.values);
+    context.launch({kFile, "mean_at_ends"}, fans, parameters(of.components), n.fan_vertices, n.fans, of.values);
   };
   const auto row_normals = [&](const DeviceField& points) {
     DeviceField normals = field(3);
-    context.launch({kFile, "row_normals"}, rows, row_count, n.vertex_count, n.rows, points.values, normals.values);
+    context.launch({kFile, "row_normals"}, rows, parameters(3), n.rows, points.values, normals.values);
     return normals;
   };
 
@@ -97,28 +98,25 @@ OrientationPull pull_orientations(ClContext& context, const ModelSurface& surfac
     std::vector<std::array<float, 4>> facing;
     for (const Eigen::Quaternionf& q : source.rotations) facing.push_back({q.w(), q.x(), q.y(), q.z()});
     const auto weights = context.upload(source.weights);
-    context.launch({kFile, "add_rotations"}, rows, row_count, n.vertex_count, n.rows, context.upload(facing), weights,
+    context.launch({kFile, "add_rotations"}, rows, parameters(4), n.rows, context.upload(facing), weights,
                    surface.points.values, source.points.values, pull.rotations.values);
-    context.launch({kFile, "add_slopes"}, fans, fan_count, n.vertex_count, n.fan_vertices, n.fan_begin, n.fans, weights,
-                   source.points.values, normals.values, slopes);
+    context.launch({kFile, "add_slopes"}, fans, parameters(3), n.fan_vertices, n.fans, weights, source.points.values,
+                   normals.values, slopes);
   }
-  context.launch({kFile, "settle_rotations"}, rows, row_count, n.vertex_count, n.rows, context.upload(row_shares),
+  context.launch({kFile, "settle_rotations"}, rows, parameters(4), n.rows, context.upload(row_shares),
                  pull.rotations.values);
   DeviceField smoothed{4, zeros(4 * count)};
   for (int pass = 0; pass < kRotationPasses; ++pass) {
-    context.launch({kFile, "smooth_rotations"}, rows, row_count, n.vertex_count, n.rows, pull.rotations.values,
-                   smoothed.values);
+    context.launch({kFile, "smooth_rotations"}, rows, parameters(4), n.rows, pull.rotations.values, smoothed.values);
     std::swap(pull.rotations, smoothed);
   }
-  context.launch({kFile, "rotate_normals"}, rows, row_count, n.vertex_count, n.rows, pull.rotations.values,
-                 pull.normals.values);
+  context.launch({kFile, "rotate_normals"}, rows, parameters(3), n.rows, pull.rotations.values, pull.normals.values);
   mean_at_ends(pull.rotations);
   mean_at_ends(pull.normals);
-  context.launch({kFile, "pull_rows"}, rows, row_count, n.vertex_count, time, n.rows, laplace.weights,
-                 pull.rotations.values, surface.points.values, pull.b.values);
-  context.launch({kFile, "pull_fans"}, fans, fan_count, n.inner_count, first_seam, n.vertex_count, time, n.fan_vertices,
-                 n.fan_begin, n.fans, laplace.fan_weights, slopes, pull.rotations.values, pull.normals.values,
+  context.launch({kFile, "pull_rows"}, rows, parameters(3), n.rows, laplace.weights, pull.rotations.values,
                  surface.points.values, pull.b.values);
+  context.launch({kFile, "pull_fans"}, fans, parameters(3), n.fan_vertices, n.fans, laplace.fan_weights, slopes,
+                 pull.rotations.values, pull.normals.values, surface.points.values, pull.b.values);
   return pull;
 }
 

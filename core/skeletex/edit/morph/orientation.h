@@ -8,38 +8,42 @@
 
 namespace skeletex {
 
-/// A surface that another one shall look like, vertex by vertex.
+/// x^2 (3 - 2 x) with x clamped to 0 .. 1.
+double smooth_step(double x);
+
+/// A surface whose orientation another one takes, vertex by vertex.
 struct OrientationSource {
-  DeviceField points;                         ///< the place of each vertex on it; as a whole it may lie anywhere
-  std::vector<float> weights;                 ///< per vertex; those of all sources have the sum 1
-  std::vector<Eigen::Quaternionf> rotations;  ///< per row of the neighbours' table: how it is to be turned first
+  DeviceField points;                         ///< each vertex's place on it; it may lie anywhere as a whole
+  std::vector<float> weights;                 ///< per vertex; the sources' weights sum to 1
+  std::vector<Eigen::Quaternionf> rotations;  ///< per row of the neighbours' table, applied to the source first
 };
-/// A source with one weight for all vertices, turned as a whole to face as the surface does.
-/// \param source  the place of each vertex on it, world units
+/// A source with one weight for all vertices, rotated as a whole to the best fit with the surface.
+/// \param source  each vertex's place on it, world units
 OrientationSource whole_source(ClContext& context, const SkeletexModel& model, const ModelSurface& surface,
                                const SurfaceOperator& laplace, const std::vector<Vec3>& source, double weight);
 
-/// What pulls a surface towards the mean of the ways that its sources face, vertex by vertex.
+/// Rotations of a surface to the mean orientation of its sources, and the right-hand side that follows from them.
 struct OrientationPull {
-  DeviceField rotations;  ///< four planes, unit quaternions w, x, y, z: the surface to that mean; little where a source
-                          ///< is mapped with folds
+  DeviceField rotations;  ///< unit quaternions w, x, y, z; near the identity where the map to a source folds
   DeviceField normals;    ///< of the rotated surface
-  DeviceField b;          ///< scale^2 (D - L x): D is L x with the edges rotated, and at seams as steep as the sources'
-                          ///< (kernels/orientation.cl)
+  DeviceField b;  ///< scale^2 (D - L x), where D is L x with rotated edges whose slopes at seams are the sources'
+                  ///< (kernels/orientation.cl)
 };
-/// \param row_shares  per row of the neighbours' table, how much of the rotations counts there
+/// \param row_shares  per row of the neighbours' table, from 0 (no rotation) to 1
 /// \param scale       diagonals
 OrientationPull pull_orientations(ClContext& context, const ModelSurface& surface, const SurfaceOperator& laplace,
                                   std::span<const OrientationSource> sources, const std::vector<float>& row_shares,
                                   double scale);
-/// Per row, so that tips, which some sources may not have, keep the orientation of their texels.
+/// Shares of the rows that fall to 0 at free ends, which therefore keep the orientation of their texels: a source may
+/// have no such tip.
 std::vector<float> shares_without_tips(const SkeletexModel& model, const Lattice& lattice);
 
-/// A morphed model whose surface is smooth across seams where its sources' are. Bones turn by different angles between
-/// the sources, so averaged texels meet at creases. Here every edge is rotated to the mean orientation of its ends, and
-/// the surface is the one with such edges (as-rigid-as-possible shapes of given rotations, Sorkine and Alexa 2007) that
-/// keeps to the given one over distances of a tenth of the diagonal: (M + scale^2 L) x' = M x + scale^2 D.
+/// A morphed model without creases at its seams. Bones turn by different angles between the sources, so that averaged
+/// texels meet at creases. Here every edge is rotated by the mean of the rotations at its ends, and the surface with
+/// such edges is solved for (as-rigid-as-possible surfaces for given rotations, Sorkine and Alexa 2007). It stays near
+/// the given one over distances of a tenth of the diagonal: (M + scale^2 L) x' = M x + scale^2 D.
 /// At a weight of 1 nothing moves.
+/// \param sources  per model, each vertex's place on it, world units; empty where the weight is 0
 MovedModel blend_orientations(ClContext& context, const SkeletexModel& model,
                               std::span<const std::vector<Vec3>> sources, std::span<const double> weights);
 

@@ -21,8 +21,8 @@ struct CellCorner {
   Vec3 direction;
 };
 
-/// All corners of three cells or more. Ties are decided as if the directions were a little others, so that exactly
-/// three cells meet in each corner and no two cells meet in more than one arc.
+/// All corners where three cells or more meet. Ties are decided by slightly perturbed directions, so that exactly three
+/// cells meet in each corner and no two cells meet in more than one arc.
 std::vector<CellCorner> cell_corners(const std::vector<Vec3>& directions) {
   std::vector<Vec3> perturbed;
   std::mt19937 random(1);
@@ -34,22 +34,24 @@ std::vector<CellCorner> cell_corners(const std::vector<Vec3>& directions) {
   const auto axis = [](const std::vector<Vec3>& d, int i, int j, int k) {
     return Vec3((d[i] - d[j]).cross(d[i] - d[k]).normalized());
   };
+  // Whether no other cell is nearer to x than cells i, j and k.
+  const auto is_nearest = [&](const Vec3& x, int i, int j, int k) {
+    for (int other = 0; other < static_cast<int>(perturbed.size()); ++other)
+      if (other != i && other != j && other != k && !(x.dot(perturbed[other]) <= x.dot(perturbed[i]))) return false;
+    return true;
+  };
   std::vector<CellCorner> corners;
   const int count = static_cast<int>(directions.size());
   for (int i = 0; i < count; ++i)
     for (int j = i + 1; j < count; ++j)
       for (int k = j + 1; k < count; ++k)
-        for (const double sign : {1.0, -1.0}) {
-          const Vec3 x = sign * axis(perturbed, i, j, k);
-          bool is_nearest = true;
-          for (int other = 0; other < count && is_nearest; ++other)
-            if (other != i && other != j && other != k) is_nearest = x.dot(perturbed[other]) <= x.dot(perturbed[i]);
-          if (is_nearest) corners.push_back({{i, j, k}, sign * axis(directions, i, j, k)});
-        }
+        for (const double sign : {1.0, -1.0})
+          if (is_nearest(sign * axis(perturbed, i, j, k), i, j, k))
+            corners.push_back({{i, j, k}, sign * axis(directions, i, j, k)});
   return corners;
 }
 
-/// Does the arc between two cells leave this corner in the direction of growing v about the first one's bone?
+/// Whether the arc between two cells leaves this corner in the direction of growing v about the first one's bone.
 bool leaves(const NodeCells& node, const CellCorner& corner, int first, int second) {
   const int third = corner.cells[0] + corner.cells[1] + corner.cells[2] - first - second;
   const auto direction = [&](int cell) -> const Vec3& { return node.cells[cell].direction; };
@@ -63,73 +65,87 @@ bool contains(const CellCorner& corner, int cell) {
   return std::find(corner.cells.begin(), corner.cells.end(), cell) != corner.cells.end();
 }
 
+std::vector<ArcUse>& arcs_of(SeamNetwork& network, BoneAtNode bone) {
+  return network.ends[bone.bone][static_cast<int>(bone.end)].arcs;
+}
+
+/// A node of two bones: one closed arc.
+void append_closed_arc(const NodeCells& node, SeamNetwork& network) {
+  const BoneAtNode a = node.cells[0].bone, b = node.cells[1].bone;
+  const int arc = static_cast<int>(network.arcs.size());
+  network.arcs.push_back({node.node, {a.bone, b.bone}, {-1, -1}, {}});
+  arcs_of(network, a).push_back({arc, false});
+  arcs_of(network, b).push_back({arc, a.end == b.end});
+}
+
+/// The corners and arcs of a node of three bones or more.
+void append_arcs(const Skeleton& skeleton, const SeparationPlanes& separation, const NodeCells& node,
+                 SeamNetwork& network) {
+  std::vector<Vec3> directions;
+  for (const Cell& cell : node.cells) directions.push_back(cell.direction);
+  const std::vector<CellCorner> corners = cell_corners(directions);
+  if (corners.size() != 2 * node.cells.size() - 4)
+    throw TopologyError(
+        fmt::format("the separation planes around node \"{}\" cannot be told apart; move the far end of one of its "
+                    "bones a little",
+                    skeleton.nodes[node.node].name));
+  const int first_corner = static_cast<int>(network.corners.size());
+  for (const CellCorner& corner : corners) {
+    std::vector<int> bones;
+    for (const int cell : corner.cells) bones.push_back(node.cells[cell].bone.bone);
+    std::sort(bones.begin(), bones.end());
+    network.corners.push_back({node.node, bones, {separation.turn_of(bones[0], corner.direction), 0}});
+    network.directions.push_back(corner.direction);
+  }
+  for (int i = 0; i < static_cast<int>(node.cells.size()); ++i)
+    for (int j = i + 1; j < static_cast<int>(node.cells.size()); ++j) {
+      SeamArc arc{node.node, {node.cells[i].bone.bone, node.cells[j].bone.bone}, {-1, -1}, {}};
+      for (int c = 0; c < static_cast<int>(corners.size()); ++c)
+        if (contains(corners[c], i) && contains(corners[c], j))
+          arc.corners[leaves(node, corners[c], i, j) ? 0 : 1] = first_corner + c;
+      if (arc.corners[0] >= 0) network.arcs.push_back(arc);
+    }
+}
+
+/// Orders the arcs around a bone at a node, from corner to corner. \param first_arc  of the node
+void close_loop(const Skeleton& skeleton, int node, BoneAtNode bone, int first_arc, SeamNetwork& network) {
+  std::vector<ArcUse> uses;
+  for (int a = first_arc; a < static_cast<int>(network.arcs.size()); ++a)
+    for (const int side : {0, 1}) {
+      const SeamArc& arc = network.arcs[a];
+      if (arc.bones[side] != bone.bone) continue;
+      const BoneEnd other = skeleton.bones[arc.bones[1 - side]].head == node ? BoneEnd::kHead : BoneEnd::kTail;
+      uses.push_back({a, side == 1 && other == bone.end});
+    }
+  const auto ends_of = [&](ArcUse use) {
+    const SeamArc& arc = network.arcs[use.arc];
+    return std::array<int, 2>{arc.corners[use.is_reversed ? 1 : 0], arc.corners[use.is_reversed ? 0 : 1]};
+  };
+  std::vector<ArcUse>& loop = arcs_of(network, bone);
+  loop.push_back(uses.front());
+  while (loop.size() < uses.size()) {
+    const auto next =
+        std::find_if(uses.begin(), uses.end(), [&](ArcUse use) { return ends_of(use)[0] == ends_of(loop.back())[1]; });
+    if (next == uses.end())
+      throw TopologyError(
+          fmt::format("the separation planes around node \"{}\" do not close", skeleton.nodes[node].name));
+    loop.push_back(*next);
+  }
+}
+
 }  // namespace
 
 SeamNetwork seam_network(const Skeleton& skeleton, const SeparationPlanes& separation) {
   SeamNetwork network;
   network.ends.resize(skeleton.bones.size());
-  const auto arcs_of = [&](BoneAtNode bone) -> std::vector<ArcUse>& {
-    return network.ends[bone.bone][static_cast<int>(bone.end)].arcs;
-  };
   for (const NodeCells& node : node_cells(skeleton, 0)) {
     if (node.cells.size() == 2) {
-      const BoneAtNode a = node.cells[0].bone, b = node.cells[1].bone;
-      const int arc = static_cast<int>(network.arcs.size());
-      network.arcs.push_back({node.node, {a.bone, b.bone}, {-1, -1}, {}});
-      arcs_of(a).push_back({arc, false});
-      arcs_of(b).push_back({arc, a.end == b.end});
+      append_closed_arc(node, network);
       continue;
     }
-    std::vector<Vec3> directions;
-    for (const Cell& cell : node.cells) directions.push_back(cell.direction);
-    const std::vector<CellCorner> corners = cell_corners(directions);
-    if (corners.size() != 2 * node.cells.size() - 4)
-      throw TopologyError(
-          fmt::format("the separation planes around node \"{}\" cannot be told apart; move the far end of one of its "
-                      "bones a little",
-                      skeleton.nodes[node.node].name));
-    const int first_corner = static_cast<int>(network.corners.size()),
-              first_arc = static_cast<int>(network.arcs.size());
-    for (const CellCorner& corner : corners) {
-      std::vector<int> bones;
-      for (const int cell : corner.cells) bones.push_back(node.cells[cell].bone.bone);
-      std::sort(bones.begin(), bones.end());
-      network.corners.push_back({node.node, bones, {separation.turn_of(bones[0], corner.direction), 0}});
-      network.directions.push_back(corner.direction);
-    }
-    for (int i = 0; i < static_cast<int>(node.cells.size()); ++i)
-      for (int j = i + 1; j < static_cast<int>(node.cells.size()); ++j) {
-        SeamArc arc{node.node, {node.cells[i].bone.bone, node.cells[j].bone.bone}, {-1, -1}, {}};
-        for (int c = 0; c < static_cast<int>(corners.size()); ++c)
-          if (contains(corners[c], i) && contains(corners[c], j))
-            arc.corners[leaves(node, corners[c], i, j) ? 0 : 1] = first_corner + c;
-        if (arc.corners[0] >= 0) network.arcs.push_back(arc);
-      }
-    // Around every cell from corner to corner.
-    for (const Cell& cell : node.cells) {
-      std::vector<ArcUse>& loop = arcs_of(cell.bone);
-      const auto ends_of = [&](ArcUse use) {
-        const SeamArc& arc = network.arcs[use.arc];
-        return std::array<int, 2>{arc.corners[use.is_reversed ? 1 : 0], arc.corners[use.is_reversed ? 0 : 1]};
-      };
-      std::vector<ArcUse> uses;
-      for (int a = first_arc; a < static_cast<int>(network.arcs.size()); ++a)
-        for (const int side : {0, 1}) {
-          const SeamArc& arc = network.arcs[a];
-          if (arc.bones[side] != cell.bone.bone) continue;
-          const BoneEnd other = skeleton.bones[arc.bones[1 - side]].head == node.node ? BoneEnd::kHead : BoneEnd::kTail;
-          uses.push_back({a, side == 1 && other == cell.bone.end});
-        }
-      loop.push_back(uses.front());
-      while (loop.size() < uses.size()) {
-        const auto next = std::find_if(uses.begin(), uses.end(),
-                                       [&](ArcUse use) { return ends_of(use)[0] == ends_of(loop.back())[1]; });
-        if (next == uses.end())
-          throw TopologyError(
-              fmt::format("the separation planes around node \"{}\" do not close", skeleton.nodes[node.node].name));
-        loop.push_back(*next);
-      }
-    }
+    const int first_arc = static_cast<int>(network.arcs.size());
+    append_arcs(skeleton, separation, node, network);
+    for (const Cell& cell : node.cells) close_loop(skeleton, node.node, cell.bone, first_arc, network);
   }
   return network;
 }

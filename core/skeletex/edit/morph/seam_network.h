@@ -8,9 +8,9 @@
 
 namespace skeletex {
 
-/// How the surface around a skeleton divides into its bones' parts, before it is known how far from the bones it lies:
-/// the separation planes' arcs without samples, the corners with their angles, and every end's way through them. Where
-/// more than three directions lie on one circle around a node, slivers without width separate them.
+/// How separation planes divide the surface around a skeleton into its bones' segments, whatever its distance from the
+/// bones: arcs without samples, corners with their angles, and the loop of arcs around every end. Where more than three
+/// directions lie on one circle around a node, arcs without length separate them.
 struct SeamNetwork {
   std::vector<SeamArc> arcs;
   std::vector<SeamCorner> corners;

@@ -5,79 +5,85 @@
 #include <algorithm>
 #include <cmath>
 
-#include "skeletex/edit/morph/overlay.h"
-#include "skeletex/edit/transfer/blend.h"
+#include "skeletex/edit/morph/blend.h"
+#include "skeletex/edit/morph/seam_map.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/skeleton/frame.h"
 
 namespace skeletex {
+namespace {
 
-std::vector<Vec3> map_surface(ClContext& context, const SkeletexModel& from, const SkeletexModel& to,
-                              const Correspondence& correspondence) {
-  const Lattice lattice = number_lattice(from);
-  const SeparationPlanes separation(from.skeleton), to_separation(to.skeleton);
-  Overlay overlay(to, from.skeleton, correspondence), own(from, from.skeleton, identity_correspondence(from.skeleton));
-  const SeamNetwork network = seam_network(from.skeleton, separation);
-  overlay.set_seams(separation, network);
-  own.set_seams(separation, network);
-  for (int bone = 0; bone < static_cast<int>(from.patches.size()); ++bone)
-    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) overlay.set_loop(bone, end, own.own_loop(bone, end));
-
-  // Inner rows and poles: positions on `to`, read as a morph reads texels.
-  const std::vector<LatticeRow> rows = lattice_rows(from.patches, RowChoice::kAll);
+/// Points of a model read at the places of another one's texels, as a morph reads texels. World units.
+DisplacementTexture read_points(ClContext& context, const SkeletexModel& from, const SeparationPlanes& separation,
+                                const SeamMap& map) {
+  const SkeletexModel& to = map.model();
   BlendTables tables;
   tables.source_count = 1;
   std::vector<int> begins{0};
   for (const Patch& patch : to.patches)
     begins.push_back(begins.back() + patch.rectangle.width * patch.rectangle.height);
   for (int bone = 0; bone < static_cast<int>(from.patches.size()); ++bone) {
-    const Rectangle& source = to.patches[overlay.model_bone(bone)].rectangle;
-    tables.sources.push_back({begins[overlay.model_bone(bone)], source.width, source.width, source.height,
+    const Rectangle& source = to.patches[map.model_bone(bone)].rectangle;
+    tables.sources.push_back({begins[map.model_bone(bone)], source.width, source.width, source.height,
                               static_cast<int>(tables.columns.size()), -1, 1.0f});
-    append_columns(overlay, bone, from.patches[bone].rectangle.width, tables);
+    append_columns(map, bone, from.patches[bone].rectangle.width, tables);
   }
-  for (const LatticeRow& row : rows) {
-    const double at =
-        row_at_same_share(row[1], from.patches[row[0]].rectangle.height,
-                          to.patches[overlay.model_bone(row[0])].rectangle.height, overlay.is_reversed(row[0]));
-    tables.rows.push_back({static_cast<float>(at), 1.0f});
-  }
-  const std::size_t area = static_cast<std::size_t>(from.texture.width) * from.texture.height;
-  DevicePlanes read = allocate_planes(context, area);
+  const std::vector<LatticeRow> rows = lattice_rows(from.patches, RowChoice::kAll);
+  append_rows(map, rows, from.patches, 1, tables);
+  DevicePlanes points = allocate_planes(context, static_cast<std::size_t>(from.texture.width) * from.texture.height);
   blend_texels(context, tables, rows, frame_tables(from.skeleton, separation, from.patches, from.origin),
-               from.texture.width, row_points(context, to, RowChoice::kAll), read);
-  const std::array<std::vector<float>, 3> planes = download_planes(context, read);
-  const auto point_at = [&](int bone, int row, int column) {
-    const Rectangle& rectangle = from.patches[bone].rectangle;
-    const std::size_t at = static_cast<std::size_t>(rectangle.y + row) * from.texture.width + rectangle.x + column;
-    return Vec3(to.origin + Vec3(planes[0][at], planes[1][at], planes[2][at]));
-  };
-  std::vector<Vec3> positions(lattice.vertex_count);
+               from.texture.width, row_points(context, to, RowChoice::kAll), points);
+  DisplacementTexture read{from.texture.width, from.texture.height, {}, {}, {}};
+  download_texels(context, points, read);
+  return read;
+}
+
+/// Sets the vertices of the inner rows and the poles.
+void set_inner(const SkeletexModel& from, const Lattice& lattice, const DisplacementTexture& points, const Vec3& origin,
+               std::vector<Vec3>& positions) {
   for (int bone = 0; bone < static_cast<int>(from.patches.size()); ++bone) {
     const auto [x, y, width, height] = from.patches[bone].rectangle;
+    const auto point_at = [&, x = x, y = y](int row, int column) {
+      const std::size_t at = static_cast<std::size_t>(y + row) * points.width + x + column;
+      return Vec3(origin + Vec3(points.along[at], points.around[at], points.out[at]));
+    };
     for (int row = 1; row + 1 < height; ++row)
-      for (int j = 0; j < width; ++j)
-        positions[lattice.first_inner[bone] + (row - 1) * width + j] = point_at(bone, row, j);
+      for (int j = 0; j < width; ++j) positions[lattice.first_inner[bone] + (row - 1) * width + j] = point_at(row, j);
     for (const int end : {0, 1})
-      if (lattice.poles[bone][end] >= 0)
-        positions[lattice.poles[bone][end]] = point_at(bone, end == 0 ? 0 : height - 1, 0);
+      if (lattice.poles[bone][end] >= 0) positions[lattice.poles[bone][end]] = point_at(end == 0 ? 0 : height - 1, 0);
   }
+}
 
-  // Seams: the point of `to`'s seam that is found by the same angle.
+}  // namespace
+
+std::vector<Vec3> map_surface(ClContext& context, const SkeletexModel& from, const SkeletexModel& to,
+                              const Correspondence& correspondence) {
+  const Lattice lattice = number_lattice(from);
+  const SeparationPlanes separation(from.skeleton), to_separation(to.skeleton);
+  SeamMap map(to, from.skeleton, correspondence), own(from, from.skeleton, identity_correspondence(from.skeleton));
+  const SeamNetwork network = seam_network(from.skeleton, separation);
+  map.set_network(separation, network);
+  own.set_network(separation, network);
+  for (int bone = 0; bone < static_cast<int>(from.patches.size()); ++bone)
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
+      map.set_target_loop(bone, end, own.model_loop(bone, end));
+
+  std::vector<Vec3> positions(lattice.vertex_count);
+  set_inner(from, lattice, read_points(context, from, separation, map), to.origin, positions);
+  // The point of the other seam that is found by the same angle.
   const auto seam_point = [&](int bone, int node, double turn) {
     const BoneEnd end = end_at(from.skeleton, bone, node);
-    const Overlay::SeamPoint point = overlay.seam_at(bone, end, turn);
-    const double sign = overlay.is_reversed(bone) ? -1 : 1;
-    return to_separation.seam_point(overlay.model_bone(bone), overlay.model_end(bone, end),
-                                    overlay.model_turn(bone, end, turn) + sign * point.turn_offset, point.distance);
+    const SeamMap::SeamPoint point = map.seam_at(bone, end, turn);
+    return to_separation.seam_point(map.model_bone(bone), map.model_end(bone, end),
+                                    map.model_turn(bone, end, turn) + map.sign(bone) * point.turn_offset,
+                                    point.distance);
   };
-  for (std::size_t a = 0; a < from.arcs.size(); ++a) {
+  for (int a = 0; a < static_cast<int>(from.arcs.size()); ++a) {
     const SeamArc& arc = from.arcs[a];
-    const std::vector<double> turns =
-        own.own_turns(arc.bones[0], end_at(from.skeleton, arc.bones[0], arc.node), static_cast<int>(a));
-    for (std::size_t i = 0; i < turns.size(); ++i)
-      positions[lattice.first_sample[a] + static_cast<int>(i)] = seam_point(arc.bones[0], arc.node, turns[i]);
+    int vertex = lattice.first_sample[a];
+    for (const double turn : own.sample_turns(arc.bones[0], end_at(from.skeleton, arc.bones[0], arc.node), a))
+      positions[vertex++] = seam_point(arc.bones[0], arc.node, turn);
   }
   for (std::size_t c = 0; c < from.corners.size(); ++c)
     positions[lattice.first_corner + static_cast<int>(c)] =

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "skeletex/edit/morph/orientation.h"
-#include "skeletex/edit/transfer/part.h"
+#include "skeletex/edit/morph/seam_map.h"
 #include "skeletex/geometry/best_rotation.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/skeleton/separation_planes.h"
@@ -14,25 +14,47 @@
 namespace skeletex {
 namespace {
 
-constexpr double kTolerance = 1e-5, kFillTolerance = 1e-3;
-constexpr int kPasses = 3;          // rotations are found on a surface that is still to move
-constexpr double kLeast = 1e-6;     // of a value that falls by e over a third of the distance
-constexpr double kSeamReach = 0.5;  // share of a bone over which its rotation goes over into that of a seam
+constexpr double kTolerance = 1e-5;
+constexpr int kPasses = 3;          // rotations depend on the surface that they move
+constexpr double kLeast = 1e-6;     // of a value that falls by a factor of e over a third of the distance
+constexpr double kSeamRange = 0.5;  // share of a bone over which its rotation becomes that of a seam
 
-double smooth_step(double x) {
-  x = std::clamp(x, 0.0, 1.0);
-  return x * x * (3 - 2 * x);
+/// A place around a bone's end, and an offset there.
+struct Gap {
+  double turn;
+  Vec3 gap;
+};
+/// Per bone and end, by growing turn.
+using EndGaps = std::vector<std::array<std::vector<Gap>, 2>>;
+
+/// The offset at an angle, linear between the nearest two.
+Vec3 gap_at(const std::vector<Gap>& gaps, double turn) {
+  const auto after =
+      std::upper_bound(gaps.begin(), gaps.end(), turn, [](double t, const Gap& gap) { return t < gap.turn; });
+  const Gap &next = after == gaps.end() ? gaps.front() : *after,
+            &last = after == gaps.begin() ? gaps.back() : *(after - 1);
+  const double step = next.turn - last.turn + (next.turn > last.turn ? 0 : 1),
+               way = turn - last.turn + (turn >= last.turn ? 0 : 1);
+  const double share = step > 0 ? way / step : 0;
+  return (1 - share) * last.gap + share * next.gap;
 }
 
-/// Solves (M + time L) x = 0 where is_free is 1, with x given elsewhere.
-/// \param negated  -x where it is given, 0 where it is free   \return x where it is free, 0 elsewhere
-DeviceField fill_in(ClContext& context, const SurfaceOperator& laplace, double time, const std::vector<float>& is_free,
-                    const DeviceField& negated) {
-  const auto device_free = context.upload(is_free);
-  const SolveResult solved = solve_diffusion(
-      context, laplace, static_cast<float>(time), device_free,
-      apply_operator(context, laplace, 1, static_cast<float>(time), device_free, negated), kFillTolerance);
-  return solved.x;
+/// The rotation from the source's surface to the placed one, as a whole.
+Eigen::Quaterniond rotation_of(const PlacedPatch& patch) {
+  const auto centred = [](const std::vector<Vec3>& points) {
+    Vec3 sum = Vec3::Zero();
+    for (const Vec3& p : points) sum += p / static_cast<double>(points.size());
+    std::vector<Vec3> result;
+    for (const Vec3& p : points) result.push_back(p - sum);
+    return result;
+  };
+  return best_rotation(centred(patch.source), centred(patch.placed));
+}
+
+/// The normalized mean of two rotations.
+Eigen::Quaterniond mix(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b, double share) {
+  return Eigen::Quaterniond(Eigen::Vector4d((1 - share) * a.coeffs() + (a.dot(b) < 0 ? -share : share) * b.coeffs()))
+      .normalized();
 }
 
 class Joining {
@@ -44,86 +66,80 @@ class Joining {
         model_(model),
         patches_(patches),
         distance_(distance),
-        home_(upload_surface(context, target)),
-        home_laplace_(make_surface_operator(context, home_.neighbours, home_.points)),
+        surface_(upload_surface(context, target)),
+        laplace_(make_surface_operator(context, surface_.neighbours, surface_.points)),
         positions_(lattice_positions(context, model)),
         is_free_(positions_.size(), 0),
+        is_in_part_(model.patches.size(), false),
         patch_of_(model.patches.size(), nullptr) {
-    for (const PlacedPatch& patch : patches) patch_of_[patch.bone] = &patch;
+    for (const PlacedPatch& patch : patches) patch_of_[patch.bone] = &patch, is_in_part_[patch.bone] = true;
     for_each_texel([&](const PlacedPatch& patch, int vertex, int row, int j) {
       is_free_[vertex] = row >= patch.rows[j][0] && row <= patch.rows[j][1];
     });
-    const Lattice& lattice = home_.lattice;
-    for (const PlacedPatch& patch : patches)
-      for (const int pole : lattice.poles[patch.bone])
-        if (pole >= 0) is_free_[pole] = 1;
-    for (std::size_t a = 0; a < model.arcs.size(); ++a)
-      if (is_inside(model.arcs[a].bones))
-        std::fill_n(is_free_.begin() + lattice.first_sample[a], model.arcs[a].samples.size(), 1.f);
-    for (std::size_t c = 0; c < model.corners.size(); ++c)
-      if (is_inside(model.corners[c].bones)) is_free_[lattice.first_corner + c] = 1;
+    mark_ends(model, surface_.lattice, is_in_part_, is_free_);
   }
 
   SkeletexModel run() {
     close_gaps();
     const std::vector<OrientationSource> sources = orientation_sources();
-    const std::vector<float> shares = shares_without_tips(model_, home_.lattice);
+    const std::vector<float> shares = shares_without_tips(model_, surface_.lattice);
     const auto free = context_.upload(is_free_);
-    ModelSurface& surface =
-        home_;  // elsewhere: weights of the edges stay the target's, for parts may come with triangles of any shape
+    // The operator stays the target's, as a part may have triangles of any shape.
     std::vector<Vec3> moves(positions_.size(), Vec3::Zero());
     for (int pass = 0; pass < kPasses; ++pass) {
       for (std::size_t i = 0; i < moves.size(); ++i) positions_[i] += moves[i];
-      surface.positions = positions_;
-      surface.points = upload_points(context_, positions_, model_.origin, model_.diagonal);
-      const OrientationPull pull = pull_orientations(context_, surface, home_laplace_, sources, shares, distance_);
+      surface_.positions = positions_;
+      surface_.points = upload_points(context_, positions_, model_.origin, model_.diagonal);
+      const OrientationPull pull = pull_orientations(context_, surface_, laplace_, sources, shares, distance_);
       moves = download_vectors(
           context_,
-          solve_diffusion(context_, home_laplace_, static_cast<float>(distance_ * distance_), free, pull.b, kTolerance)
-              .x);
+          solve_diffusion(context_, laplace_, static_cast<float>(distance_ * distance_), free, pull.b, kTolerance).x);
       for (Vec3& move : moves) move *= model_.diagonal;
     }
-    return move_surface(context_, model_, surface, home_laplace_, moves).model;
+    return move_surface(context_, model_, surface_, laplace_, moves).model;
   }
 
  private:
   template <class Bones>
   bool is_inside(const Bones& bones) const {
-    return std::all_of(bones.begin(), bones.end(), [&](int bone) { return patch_of_[bone] != nullptr; });
+    return std::all_of(bones.begin(), bones.end(), [&](int bone) { return is_in_part_[bone]; });
   }
+  /// Visits all inner texels of the part.
   template <class Visit>
   void for_each_texel(const Visit& visit) const {
     for (const PlacedPatch& patch : patches_) {
       const auto [x, y, width, height] = model_.patches[patch.bone].rectangle;
       for (int row = 1; row + 1 < height; ++row)
         for (int j = 0; j < width; ++j)
-          visit(patch, home_.lattice.first_inner[patch.bone] + (row - 1) * width + j, row, j);
+          visit(patch, surface_.lattice.first_inner[patch.bone] + (row - 1) * width + j, row, j);
     }
   }
 
-  /// A point of a bone's placed surface or of its source where it ends.
-  Vec3 end_point(const std::vector<Vec3>& points, int bone, BoneEnd end, double turn) const {
-    const std::size_t width = model_.patches[bone].rectangle.width,
-                      first = end == BoneEnd::kHead ? 0 : points.size() - width;
-    const double column = (turn - std::floor(turn)) * static_cast<double>(width), share = column - std::floor(column);
-    const std::size_t left = static_cast<std::size_t>(column) % width;
-    return (1 - share) * points[first + left] + share * points[first + (left + 1) % width];
+  /// Sets the part's poles to the first and the last of its patches' points.
+  void set_poles(std::vector<Vec3> PlacedPatch::*points, std::vector<Vec3>& positions) const {
+    for (const PlacedPatch& patch : patches_)
+      for (const int end : {0, 1})
+        if (const int pole = surface_.lattice.poles[patch.bone][end]; pole >= 0)
+          positions[pole] = end == 0 ? (patch.*points).front() : (patch.*points).back();
   }
 
-  struct Gap {
-    double turn;
-    Vec3 gap;
-  };
-  using EndGaps = std::vector<std::array<std::vector<Gap>, 2>>;
+  /// The value at an angle in the first or the last row of a patch. \param values  row by row, or of one row
+  Vec3 end_value(const std::vector<Vec3>& values, int bone, BoneEnd end, double turn) const {
+    const std::size_t width = model_.patches[bone].rectangle.width,
+                      first = end == BoneEnd::kHead ? 0 : values.size() - width;
+    const double column = (turn - std::floor(turn)) * static_cast<double>(width), share = column - std::floor(column);
+    const std::size_t left = static_cast<std::size_t>(column) % width;
+    return (1 - share) * values[first + left] + share * values[first + (left + 1) % width];
+  }
 
-  /// Puts a seam vertex between bones of the part at the mean of where they end, and notes what each of them misses.
+  /// Moves a seam vertex between bones of the part to the mean of their ends there, and appends each bone's gap to it.
   void place_seam_vertex(int vertex, int node, std::span<const int> bones, const SeparationPlanes& separation,
                          EndGaps& gaps) {
     const Vec3 offset = positions_[vertex] - model_.skeleton.nodes[node].position;
     Vec3 mean = Vec3::Zero();
     std::vector<Vec3> ends;
     for (const int bone : bones) {
-      ends.push_back(end_point(patch_of_[bone]->placed, bone, end_at(model_.skeleton, bone, node),
+      ends.push_back(end_value(patch_of_[bone]->placed, bone, end_at(model_.skeleton, bone, node),
                                separation.turn_of(bone, offset)));
       mean += ends.back() / static_cast<double>(bones.size());
     }
@@ -135,106 +151,89 @@ class Joining {
     positions_[vertex] = mean;
   }
 
-  static Vec3 gap_at(const std::vector<Gap>& gaps, double turn) {
-    const auto after =
-        std::upper_bound(gaps.begin(), gaps.end(), turn, [](double t, const Gap& gap) { return t < gap.turn; });
-    const Gap &next = after == gaps.end() ? gaps.front() : *after,
-              &last = after == gaps.begin() ? gaps.back() : *(after - 1);
-    const double step = next.turn - last.turn + (next.turn > last.turn ? 0 : 1),
-                 way = turn - last.turn + (turn >= last.turn ? 0 : 1);
-    const double share = step > 0 ? way / step : 0;
-    return (1 - share) * last.gap + share * next.gap;
-  }
-
-  /// The part as it is placed, moved over to the target and its own seams together.
-  void close_gaps() {
-    const SeparationPlanes separation(model_.skeleton);
-    const Lattice& lattice = home_.lattice;
-    EndGaps inner(model_.patches.size());
+  /// Places the seam vertices between bones of the part. \return the gaps of the bones to them
+  EndGaps place_inner_seams(const SeparationPlanes& separation) {
+    const Lattice& lattice = surface_.lattice;
+    EndGaps gaps(model_.patches.size());
     for (std::size_t a = 0; a < model_.arcs.size(); ++a)
       if (const SeamArc& arc = model_.arcs[a]; is_inside(arc.bones))
         for (int i = 0; i < static_cast<int>(arc.samples.size()); ++i)
-          place_seam_vertex(lattice.first_sample[a] + i, arc.node, arc.bones, separation, inner);
+          place_seam_vertex(lattice.first_sample[a] + i, arc.node, arc.bones, separation, gaps);
     for (std::size_t c = 0; c < model_.corners.size(); ++c)
       if (const SeamCorner& corner = model_.corners[c]; is_inside(corner.bones))
-        place_seam_vertex(lattice.first_corner + static_cast<int>(c), corner.node, corner.bones, separation, inner);
-    for (auto& ends : inner)
-      for (std::vector<Gap>& gaps : ends)
-        std::sort(gaps.begin(), gaps.end(), [](const Gap& p, const Gap& q) { return p.turn < q.turn; });
+        place_seam_vertex(lattice.first_corner + static_cast<int>(c), corner.node, corner.bones, separation, gaps);
+    for (auto& ends : gaps)
+      for (std::vector<Gap>& end : ends)
+        std::sort(end.begin(), end.end(), [](const Gap& p, const Gap& q) { return p.turn < q.turn; });
+    return gaps;
+  }
 
-    std::vector<float> is_between = is_free_;
-    std::vector<Vec3> gaps(positions_.size(), Vec3::Zero());
+  /// Gaps of the vertices where the part ends, 0 elsewhere; and where gaps are to be interpolated between them.
+  struct VertexGaps {
+    std::vector<Vec3> gaps;
+    std::vector<float> is_between;
+  };
+  /// Moves the part's vertices to their places, and finds the gaps to the target and between the part's bones.
+  VertexGaps place_part() {
+    const SeparationPlanes separation(model_.skeleton);
+    const EndGaps inner = place_inner_seams(separation);
+    VertexGaps result{std::vector<Vec3>(positions_.size(), Vec3::Zero()), is_free_};
+    set_poles(&PlacedPatch::placed, positions_);
     for_each_texel([&](const PlacedPatch& patch, int vertex, int row, int j) {
       const int width = model_.patches[patch.bone].rectangle.width;
       if (is_free_[vertex] != 0) positions_[vertex] = patch.placed[static_cast<std::size_t>(row) * width + j];
       for (const int end : {0, 1}) {
         if (const std::vector<Gap>& own = inner[patch.bone][end]; !own.empty() && row == patch.rows[j][end])
-          gaps[vertex] = gap_at(own, static_cast<double>(j) / width), is_between[vertex] = 0;
+          result.gaps[vertex] = gap_at(own, static_cast<double>(j) / width), result.is_between[vertex] = 0;
         else if (!patch.gaps[end].empty() && row == patch.rows[j][end] + (end == 0 ? -1 : 1))
-          gaps[vertex] = patch.gaps[end][j];
+          result.gaps[vertex] = patch.gaps[end][j];
       }
     });
     for (const PlacedPatch& patch : patches_)
       for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
         const std::vector<Vec3>& given = patch.gaps[static_cast<int>(end)];
         if (given.empty()) continue;
-        for (const int vertex : end_loop(model_, lattice, patch.bone, end))
-          gaps[vertex] = end_point(
+        for (const int vertex : end_loop(model_, surface_.lattice, patch.bone, end))
+          result.gaps[vertex] = end_value(
               given, patch.bone, BoneEnd::kHead,
               separation.turn_of(patch.bone, positions_[vertex] - end_position(model_.skeleton, patch.bone, end)));
       }
-    for (const PlacedPatch& patch : patches_)
-      for (const int end : {0, 1})
-        if (const int pole = lattice.poles[patch.bone][end]; pole >= 0)
-          positions_[pole] = end == 0 ? patch.placed.front() : patch.placed.back();
-    const double reach = distance_ / 2;
+    return result;
+  }
+
+  /// Places the part, and moves it to the target and its bones to each other: the gaps are spread over the part.
+  void close_gaps() {
+    const auto [gaps, is_between] = place_part();
+    const double range = distance_ / 2;
     const std::vector<Vec3> spread =
-        download_vectors(context_, fill_in(context_, home_laplace_, reach * reach, is_between,
-                                           upload_points(context_, gaps, Vec3::Zero(), -model_.diagonal)));
-    const int first_seam =
-        home_.lattice.first_sample.empty() ? home_.lattice.vertex_count : home_.lattice.first_sample[0];
-    for (int i = 0; i < first_seam; ++i)
+        download_vectors(context_, interpolate_field(context_, laplace_, range * range, is_between,
+                                                     upload_points(context_, gaps, Vec3::Zero(), -model_.diagonal))
+                                       .x);
+    for (int i = 0; i < surface_.first_seam(); ++i)
       if (is_free_[i] != 0) positions_[i] += is_between[i] != 0 ? Vec3(model_.diagonal * spread[i]) : gaps[i];
   }
 
-  /// How much of the source's orientation counts: by the distance over the surface from where the part begins, which a
-  /// screened Poisson equation tells (Varadhan).
+  /// The weights of the source's orientation: they grow with the distance over the surface from where the part begins,
+  /// which follows from a screened Poisson equation (Varadhan 1967).
   std::vector<float> source_weights() const {
     std::vector<float> outside(positions_.size());
     for (std::size_t i = 0; i < outside.size(); ++i) outside[i] = is_free_[i] - 1;
-    const double reach = distance_ / 3;
+    const double range = distance_ / 3;
     const std::vector<float> near = context_.download(
-        fill_in(context_, home_laplace_, reach * reach, is_free_, {1, context_.upload(outside)}).values);
+        interpolate_field(context_, laplace_, range * range, is_free_, {1, context_.upload(outside)}).x.values);
     std::vector<float> weights(positions_.size(), 0);
     for (std::size_t i = 0; i < weights.size(); ++i)
       if (is_free_[i] != 0)
         weights[i] = static_cast<float>(
-            smooth_step(-reach * std::log(std::clamp(static_cast<double>(near[i]), kLeast, 1.0)) / distance_));
+            smooth_step(-range * std::log(std::clamp(static_cast<double>(near[i]), kLeast, 1.0)) / distance_));
     return weights;
   }
 
-  /// From the source's surface to the placed one, as a whole.
-  Eigen::Quaterniond rotation_of(const PlacedPatch& patch) const {
-    const auto centred = [](const std::vector<Vec3>& points) {
-      Vec3 sum = Vec3::Zero();
-      for (const Vec3& p : points) sum += p / static_cast<double>(points.size());
-      std::vector<Vec3> result;
-      for (const Vec3& p : points) result.push_back(p - sum);
-      return result;
-    };
-    return best_rotation(centred(patch.source), centred(patch.placed));
-  }
-
-  /// Per inner row of all patches.
+  /// The rotation from the source to the placed surface, per inner row of all patches.
   std::vector<Eigen::Quaternionf> row_rotations() const {
     std::vector<Eigen::Quaterniond> of_bones(model_.patches.size(), Eigen::Quaterniond::Identity());
     for (const PlacedPatch& patch : patches_) of_bones[patch.bone] = rotation_of(patch);
     const auto at_node = bones_at_nodes(model_.skeleton);
-    const auto mixed = [](const Eigen::Quaterniond& a, const Eigen::Quaterniond& b, double share) {
-      return Eigen::Quaterniond(
-                 Eigen::Vector4d((1 - share) * a.coeffs() + (a.dot(b) < 0 ? -share : share) * b.coeffs()))
-          .normalized();
-    };
     const auto at_end = [&](int bone, BoneEnd end) {
       const int node = end_node(model_.skeleton, bone, end);
       Eigen::Vector4d sum = Eigen::Vector4d::Zero();
@@ -251,28 +250,22 @@ class Joining {
         const double u = patch.row_u[row];
         const Eigen::Quaterniond& nearer = u < 0.5 ? ends[0] : ends[1];
         rotations.push_back(
-            mixed(of_bones[bone], nearer, smooth_step(1 - std::min(u, 1 - u) / kSeamReach)).cast<float>());
+            mix(of_bones[bone], nearer, smooth_step(1 - std::min(u, 1 - u) / kSeamRange)).cast<float>());
       }
     }
     return rotations;
   }
 
-  std::vector<OrientationSource> orientation_sources() const {
-    const Lattice& lattice = home_.lattice;
-    std::vector<float> weights = source_weights(), rest;
-    for (const float weight : weights) rest.push_back(1 - weight);
-
-    std::vector<Vec3> points = home_.positions;
-    const auto width_of = [&](int bone) { return model_.patches[bone].rectangle.width; };
+  /// The places of the target's vertices on the source, where they are in the part.
+  std::vector<Vec3> source_positions() const {
+    const Lattice& lattice = surface_.lattice;
+    std::vector<Vec3> points = surface_.positions;
     for_each_texel([&](const PlacedPatch& patch, int vertex, int row, int j) {
-      points[vertex] = patch.source[static_cast<std::size_t>(row) * width_of(patch.bone) + j];
+      points[vertex] = patch.source[static_cast<std::size_t>(row) * model_.patches[patch.bone].rectangle.width + j];
     });
-    for (const PlacedPatch& patch : patches_)
-      for (const int end : {0, 1})
-        if (const int pole = lattice.poles[patch.bone][end]; pole >= 0)
-          points[pole] = end == 0 ? patch.source.front() : patch.source.back();
+    set_poles(&PlacedPatch::source, points);
     const auto seam_point = [&](int bone, int node, double turn) {
-      return end_point(patch_of_[bone]->source, bone, end_at(model_.skeleton, bone, node), turn);
+      return end_value(patch_of_[bone]->source, bone, end_at(model_.skeleton, bone, node), turn);
     };
     for (std::size_t a = 0; a < model_.arcs.size(); ++a)
       if (const SeamArc& arc = model_.arcs[a]; is_inside(arc.bones))
@@ -281,12 +274,18 @@ class Joining {
     for (std::size_t c = 0; c < model_.corners.size(); ++c)
       if (const SeamCorner& corner = model_.corners[c]; is_inside(corner.bones))
         points[lattice.first_corner + c] = seam_point(corner.bones[0], corner.node, corner.sample.turn);
+    return points;
+  }
 
+  std::vector<OrientationSource> orientation_sources() const {
+    std::vector<float> weights = source_weights(), rest;
+    for (const float weight : weights) rest.push_back(1 - weight);
     const Vec3& centre = patches_[0].source[0];
     std::vector<OrientationSource> sources;
-    sources.push_back({upload_points(context_, home_.positions, target_.origin, target_.diagonal), std::move(rest),
-                       std::vector<Eigen::Quaternionf>(home_.neighbours.rows.size, Eigen::Quaternionf::Identity())});
-    sources.push_back({upload_points(context_, points, centre, target_.diagonal), std::move(weights), row_rotations()});
+    sources.push_back({upload_points(context_, surface_.positions, target_.origin, target_.diagonal), std::move(rest),
+                       std::vector<Eigen::Quaternionf>(surface_.neighbours.rows.size, Eigen::Quaternionf::Identity())});
+    sources.push_back(
+        {upload_points(context_, source_positions(), centre, target_.diagonal), std::move(weights), row_rotations()});
     return sources;
   }
 
@@ -294,10 +293,11 @@ class Joining {
   const SkeletexModel &target_, &model_;
   std::span<const PlacedPatch> patches_;
   double distance_;
-  ModelSurface home_;
-  SurfaceOperator home_laplace_;
+  ModelSurface surface_;     ///< the target's, then the part's while it moves
+  SurfaceOperator laplace_;  ///< of the target's surface
   std::vector<Vec3> positions_;
-  std::vector<float> is_free_;
+  std::vector<float> is_free_;    ///< per vertex: 1 in the part
+  std::vector<bool> is_in_part_;  ///< per bone
   std::vector<const PlacedPatch*> patch_of_;
 };
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <queue>
 
+#include "skeletex/edit/morph/seam_map.h"
 #include "skeletex/model/error.h"
 #include "skeletex/skeleton/pose.h"
 
@@ -16,9 +17,9 @@ const char* const kRestOfBody = "\n";
 
 namespace {
 
-constexpr double kFalloff = 0.3;  // from bone to bone, how much a bone counts for where the rest of the body lies
+constexpr double kFalloff = 0.3;  // of a bone's weight in the direction of the rest of the body, from bone to bone
 
-/// Steps over bones from a node to every other; -1 where another component lies, or `without` is the only way.
+/// Numbers of bones between a node and every other; -1 where no path leads, or only over the bone `without`.
 std::vector<int> steps_from(const Skeleton& skeleton, int start, int without = -1) {
   const auto at = bones_at_nodes(skeleton);
   std::vector<int> steps(skeleton.nodes.size(), -1);
@@ -32,6 +33,92 @@ std::vector<int> steps_from(const Skeleton& skeleton, int start, int without = -
       queue.push(far);
     }
   return steps;
+}
+
+/// The numbers of a model's parts in an extracted part; -1 where they are not in it.
+struct PartIndex {
+  std::vector<int> bones, nodes;
+};
+
+/// Copies the bones, their nodes and patches.
+PartIndex copy_bones(const SkeletexModel& whole, Part& part) {
+  const std::vector<BoneBasis> bases = bone_bases(whole.skeleton);
+  PartIndex index{std::vector<int>(whole.skeleton.bones.size(), -1), std::vector<int>(whole.skeleton.nodes.size(), -1)};
+  Skeleton& skeleton = part.model.skeleton;
+  for (const int b : part.bones) {
+    index.bones[b] = static_cast<int>(skeleton.bones.size());
+    Bone bone = whole.skeleton.bones[b];
+    for (int* node : {&bone.head, &bone.tail}) {
+      if (index.nodes[*node] < 0) {
+        index.nodes[*node] = static_cast<int>(skeleton.nodes.size());
+        skeleton.nodes.push_back(whole.skeleton.nodes[*node]);
+      }
+      *node = index.nodes[*node];
+    }
+    bone.s = bases[b].s;
+    skeleton.bones.push_back(bone);
+    part.model.patches.push_back(whole.patches[b]);
+  }
+  return index;
+}
+
+/// Appends the bone that stands for the rest of the body, and sets the directions to it.
+void append_rest(const SkeletexModel& whole, const PartIndex& index, Part& part) {
+  const Skeleton& skeleton = whole.skeleton;
+  const int near_node = end_node(skeleton, part.bones[0], part.near);
+  const std::vector<int> steps = steps_from(skeleton, near_node);
+  const Vec3& origin = skeleton.nodes[near_node].position;
+  Vec3 near_rest = Vec3::Zero(), centre = Vec3::Zero();
+  for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b) {
+    const Bone& bone = skeleton.bones[b];
+    if (index.bones[b] >= 0 || steps[bone.head] < 0) continue;
+    const Vec3 middle = 0.5 * (skeleton.nodes[bone.head].position + skeleton.nodes[bone.tail].position) - origin;
+    if (middle.norm() > 0)
+      near_rest += std::pow(kFalloff, std::min(steps[bone.head], steps[bone.tail])) * middle.normalized();
+    centre += bone_length(skeleton, b) * middle;
+  }
+  const double length = bone_length(skeleton, part.bones[0]);
+  const Vec3 away = -direction_from(skeleton, {part.bones[0], part.near});
+  const auto unit_or_away = [&](const Vec3& v) { return v.norm() > 1e-6 * length ? Vec3(v.normalized()) : away; };
+  part.rest = {unit_or_away(near_rest), unit_or_away(centre)};
+  const Vec3 rest = unit_or_away(part.rest[0] + part.rest[1]);
+  Skeleton& own = part.model.skeleton;
+  own.nodes.push_back({kRestOfBody, origin + length * rest});
+  own.bones.push_back({kRestOfBody, static_cast<int>(own.nodes.size()) - 1, index.nodes[near_node], {}});
+  part.model.patches.push_back(part.model.patches[0]);
+}
+
+/// Copies the corners, arcs and ends of the nodes all of whose bones are in the part.
+void copy_seams(const SkeletexModel& whole, const PartIndex& index, Part& part) {
+  const auto at = bones_at_nodes(whole.skeleton);
+  const auto is_inside = [&](int node) {
+    return std::all_of(at[node].begin(), at[node].end(), [&](BoneAtNode bone) { return index.bones[bone.bone] >= 0; });
+  };
+  std::vector<int> part_arc(whole.arcs.size(), -1), part_corner(whole.corners.size(), -1);
+  for (std::size_t c = 0; c < whole.corners.size(); ++c) {
+    SeamCorner corner = whole.corners[c];
+    if (!is_inside(corner.node)) continue;
+    for (int& bone : corner.bones) bone = index.bones[bone];
+    corner.node = index.nodes[corner.node];
+    part_corner[c] = static_cast<int>(part.model.corners.size());
+    part.model.corners.push_back(corner);
+  }
+  for (std::size_t a = 0; a < whole.arcs.size(); ++a) {
+    SeamArc arc = whole.arcs[a];
+    if (!is_inside(arc.node)) continue;
+    arc.node = index.nodes[arc.node];
+    for (const int side : {0, 1}) {
+      arc.bones[side] = index.bones[arc.bones[side]];
+      if (arc.corners[side] >= 0) arc.corners[side] = part_corner[arc.corners[side]];
+    }
+    part_arc[a] = static_cast<int>(part.model.arcs.size());
+    part.model.arcs.push_back(arc);
+  }
+  part.model.ends.resize(part.model.skeleton.bones.size());
+  for (std::size_t i = 0; i < part.bones.size(); ++i)
+    for (const int end : {0, 1})
+      for (const ArcUse use : whole.ends[part.bones[i]][end].arcs)
+        if (part_arc[use.arc] >= 0) part.model.ends[i][end].arcs.push_back({part_arc[use.arc], use.is_reversed});
 }
 
 }  // namespace
@@ -65,82 +152,13 @@ std::vector<int> limb_of(const SkeletexModel& model, int bone) {
   return limb;
 }
 
-Part cut_out(const SkeletexModel& whole, std::vector<int> bones) {
+Part extract_part(const SkeletexModel& whole, std::vector<int> bones) {
   Part part;
   part.bones = std::move(bones);
   part.near = near_end(whole, part.bones[0]);
-  const std::vector<BoneBasis> bases = bone_bases(whole.skeleton);
-  const int count = static_cast<int>(part.bones.size());
-  std::vector<int> part_bone(whole.skeleton.bones.size(), -1), part_node(whole.skeleton.nodes.size(), -1);
-  Skeleton& skeleton = part.model.skeleton;
-  for (int i = 0; i < count; ++i) {
-    const int b = part.bones[i];
-    part_bone[b] = i;
-    Bone bone = whole.skeleton.bones[b];
-    for (int* node : {&bone.head, &bone.tail}) {
-      if (part_node[*node] < 0) {
-        part_node[*node] = static_cast<int>(skeleton.nodes.size());
-        skeleton.nodes.push_back(whole.skeleton.nodes[*node]);
-      }
-      *node = part_node[*node];
-    }
-    bone.s = bases[b].s;
-    skeleton.bones.push_back(bone);
-    part.model.patches.push_back(whole.patches[b]);
-  }
-
-  // Where the rest of the body lies, as seen from the near node: near bones first, and its centre of gravity.
-  const int near_node = end_node(whole.skeleton, part.bones[0], part.near);
-  const std::vector<int> steps = steps_from(whole.skeleton, near_node);
-  const Vec3& origin = whole.skeleton.nodes[near_node].position;
-  Vec3 near_rest = Vec3::Zero(), centre = Vec3::Zero();
-  for (int b = 0; b < static_cast<int>(whole.skeleton.bones.size()); ++b) {
-    const Bone& bone = whole.skeleton.bones[b];
-    if (part_bone[b] >= 0 || steps[bone.head] < 0) continue;
-    const Vec3 middle =
-        0.5 * (whole.skeleton.nodes[bone.head].position + whole.skeleton.nodes[bone.tail].position) - origin;
-    if (middle.norm() > 0)
-      near_rest += std::pow(kFalloff, std::min(steps[bone.head], steps[bone.tail])) * middle.normalized();
-    centre += bone_length(whole.skeleton, b) * middle;
-  }
-  const double length = bone_length(whole.skeleton, part.bones[0]);
-  const Vec3 away = -direction_from(whole.skeleton, {part.bones[0], part.near});
-  const auto unit_or_away = [&](const Vec3& v) { return v.norm() > 1e-6 * length ? Vec3(v.normalized()) : away; };
-  part.rest = {unit_or_away(near_rest), unit_or_away(centre)};
-  const Vec3 rest = unit_or_away(part.rest[0] + part.rest[1]);
-  skeleton.nodes.push_back({kRestOfBody, origin + length * rest});
-  skeleton.bones.push_back({kRestOfBody, static_cast<int>(skeleton.nodes.size()) - 1, part_node[near_node], {}});
-  part.model.patches.push_back(part.model.patches[0]);
-
-  const auto at = bones_at_nodes(whole.skeleton);
-  const auto is_inside = [&](int node) {
-    return std::all_of(at[node].begin(), at[node].end(), [&](BoneAtNode bone) { return part_bone[bone.bone] >= 0; });
-  };
-  std::vector<int> part_arc(whole.arcs.size(), -1), part_corner(whole.corners.size(), -1);
-  for (std::size_t c = 0; c < whole.corners.size(); ++c) {
-    SeamCorner corner = whole.corners[c];
-    if (!is_inside(corner.node)) continue;
-    for (int& bone : corner.bones) bone = part_bone[bone];
-    corner.node = part_node[corner.node];
-    part_corner[c] = static_cast<int>(part.model.corners.size());
-    part.model.corners.push_back(corner);
-  }
-  for (std::size_t a = 0; a < whole.arcs.size(); ++a) {
-    SeamArc arc = whole.arcs[a];
-    if (!is_inside(arc.node)) continue;
-    arc.node = part_node[arc.node];
-    for (const int side : {0, 1}) {
-      arc.bones[side] = part_bone[arc.bones[side]];
-      if (arc.corners[side] >= 0) arc.corners[side] = part_corner[arc.corners[side]];
-    }
-    part_arc[a] = static_cast<int>(part.model.arcs.size());
-    part.model.arcs.push_back(arc);
-  }
-  part.model.ends.resize(skeleton.bones.size());
-  for (int i = 0; i < count; ++i)
-    for (const int end : {0, 1})
-      for (ArcUse use : whole.ends[part.bones[i]][end].arcs)
-        if (part_arc[use.arc] >= 0) part.model.ends[i][end].arcs.push_back({part_arc[use.arc], use.is_reversed});
+  const PartIndex index = copy_bones(whole, part);
+  append_rest(whole, index, part);
+  copy_seams(whole, index, part);
   return part;
 }
 

@@ -8,14 +8,15 @@
 
 namespace skeletex {
 
-/// Some bones of a model that hang together, cut out: bone i is bones[i]. One more bone, the last, starts where they
-/// leave the rest of the body and points to it. Seams are kept where all bones of a node are in the part.
+/// Connected bones of a model, extracted: bone i of the part is bones[i] of the model. The part has one bone more, the
+/// last: it ends where the part leaves the rest of the body, and comes from there. The part has the seams of the nodes
+/// all of whose bones are in it.
 struct Part {
   std::vector<int> bones;
-  BoneEnd near = BoneEnd::kHead;  ///< of bones[0]
-  std::array<Vec3, 2> rest{Vec3::Zero(),
-                           Vec3::Zero()};  ///< unit directions to the bones nearby, and to the centre of all others
-  SkeletexModel model;                     ///< skeleton, patches, ends, arcs, corners; no texels
+  BoneEnd near = BoneEnd::kHead;  ///< the end of bones[0] that the rest of the body lies at
+  /// Unit directions from there to the bones nearby, and to the centre of all other bones.
+  std::array<Vec3, 2> rest{Vec3::Zero(), Vec3::Zero()};
+  SkeletexModel model;  ///< skeleton, patches, ends, arcs, corners; no texels
 };
 /// Name of the bone that stands for the rest of the body: no file's bone has it.
 extern const char* const kRestOfBody;
@@ -24,9 +25,9 @@ bool is_free_end(const SkeletexModel& model, int bone, BoneEnd end);
 
 /// The end that the rest of the body lies at: the one that is not free, else the one nearer to a root.
 BoneEnd near_end(const SkeletexModel& model, int bone);
-/// The bone and all those behind its far end.
+/// The bone and all bones behind its far end.
 /// \throw InputError when it is part of a cycle
 std::vector<int> limb_of(const SkeletexModel& model, int bone);
-Part cut_out(const SkeletexModel& whole, std::vector<int> bones);
+Part extract_part(const SkeletexModel& whole, std::vector<int> bones);
 
 }  // namespace skeletex
