@@ -148,8 +148,7 @@ void add_children(FrontView front, global const FrontRecord* record, int is_pivo
 
 // Eliminates the rows of a diagonal tile, by one work-item. Below the diagonal the tile gets a_ki / d_k. after: per row
 // what joins it to all columns after the tile's.
-void factor_tile(global float* tile, int width, global const float* root, global float* inverse,
-                 global float* after) {
+void factor_tile(global float* tile, int width, global const float* root, global float* inverse, global float* after) {
   for (int k = 0; k < ELIMINATION_TILE; ++k) {
     float left = after[k];
     for (int j = k + 1; j < ELIMINATION_TILE; ++j) left += tile[k * width + j] * root[j];
@@ -203,8 +202,7 @@ void fill_right_sides(FrontView front, global const FrontRecord* record, Elimina
                       global const FrontRecord* fronts, global const int* tables, global const float* system,
                       global float* matrices, global float* vectors) {
   for (int j = GROUP_ITEM; j < front.width; j += GROUP_ITEMS) {
-    const float2 value =
-        j < record->pivots ? vload2(record->first + j, system + at.residual) : (float2)0.0f;
+    const float2 value = j < record->pivots ? vload2(record->first + j, system + at.residual) : (float2)0.0f;
     front.u[j] = value.x;
     front.v[j] = value.y;
   }

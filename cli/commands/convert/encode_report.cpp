@@ -25,10 +25,10 @@ Json bone_json(const BoneReport& bone) {
             {"missed_texels", bone.missed_texels}};
   if (!is_height_field(bone.method))
     json[to_string(bone.method)] = {{"iterations", bone.map.iterations},
-                   {"spread", bone.map.spread},
-                   {"solver_steps", bone.map.solver_steps},
-                   {"residual", bone.map.residual},
-                   {"used_direct_solver", bone.map.used_direct_solver}};
+                                    {"spread", bone.map.spread},
+                                    {"solver_steps", bone.map.solver_steps},
+                                    {"residual", bone.map.residual},
+                                    {"used_direct_solver", bone.map.used_direct_solver}};
   return json;
 }
 

@@ -269,7 +269,7 @@ std::vector<Patch> scale_patches(const SkeletexModel& model, int width, int heig
     std::vector<PatchRequest> requests;
     for (const Patch& patch : model.patches)
       requests.push_back({static_cast<double>(patch.rectangle.width) * patch.rectangle.height,
-                         static_cast<double>(patch.rectangle.width) / patch.rectangle.height});
+                          static_cast<double>(patch.rectangle.width) / patch.rectangle.height});
     rectangles = pack_atlas(requests, width, height).rectangles;
   }
   std::vector<Patch> patches = model.patches;
