@@ -85,7 +85,7 @@ struct Egg {
     return revert_faults(device(), {model, mesh, tree, charts}, {}, regular, texels);
   }
   TriangleMesh lattice(const PlacedTexels& texels) const {
-    return build_lattice_mesh(device(), frame_lattice(device(), model), model.diagonals, texels.points).mesh;
+    return build_lattice_mesh(device(), frame_lattice(device(), model), model.diagonals, texels.points);
   }
   /// The texels whose points are not the same.
   static std::vector<int> differing(const PlacedTexels& one, const PlacedTexels& other) {
@@ -153,17 +153,17 @@ TEST(RevertFaults, MovedTexelsMakeTheMeshOfTheirPoints) {
   const LatticeFrame frame = frame_lattice(device(), egg.model);
   for (const DiagonalRule rule : {DiagonalRule::kNearest, DiagonalRule::kSmooth}) {
     PlacedTexels texels = egg.regular;
-    LatticeMesh moved = build_lattice_mesh(device(), frame, rule, texels.points);
-    const TriangleMesh before = moved.mesh;
+    TriangleMesh moved = build_lattice_mesh(device(), frame, rule, texels.points);
+    const TriangleMesh before = moved;
     std::vector<int> listed;
     for (const auto& [row, column] : {std::pair(1, 3), std::pair(8, 0), std::pair(8, 23), std::pair(19, 7)}) {
       listed.push_back(Egg::texel(row, column));
       egg.place(listed.back(), Egg::point((row + 0.3) / (Egg::kHeight - 1), (column + 0.4) / Egg::kWidth), texels);
     }
     const std::vector<int> changed = move_texels(device(), frame, rule, listed, texels.points, moved);
-    const TriangleMesh expected = build_lattice_mesh(device(), frame, rule, texels.points).mesh;
-    EXPECT_EQ(moved.mesh.positions, expected.positions);
-    EXPECT_EQ(moved.mesh.triangles, expected.triangles);
+    const TriangleMesh expected = build_lattice_mesh(device(), frame, rule, texels.points);
+    EXPECT_EQ(moved.positions, expected.positions);
+    EXPECT_EQ(moved.triangles, expected.triangles);
     std::vector<int> differing;
     for (std::size_t i = 0; i < before.triangles.size(); ++i) {
       const Triangle& t = expected.triangles[i];
@@ -189,7 +189,7 @@ TEST(RevertFaults, TheLatticeIsTheDecodersMesh) {
       if (frame.texels[vertex] >= 0)
         points[axis][frame.texels[vertex]] =
             static_cast<float>(expected.positions[vertex][axis] - encoded.origin[axis]);
-  const TriangleMesh mesh = build_lattice_mesh(device(), frame, encoded.diagonals, points).mesh;
+  const TriangleMesh mesh = build_lattice_mesh(device(), frame, encoded.diagonals, points);
   EXPECT_EQ(mesh.triangles, expected.triangles);
   for (std::size_t i = 0; i < expected.positions.size(); ++i)
     EXPECT_LT((mesh.positions[i] - expected.positions[i]).norm(), 1e-6 * encoded.diagonal);

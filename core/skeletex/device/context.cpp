@@ -398,6 +398,8 @@ void ClContext::launch_with(const ClKernelName& name, const ClRange& range, std:
 
 void ClContext::finish() { driver_->finish(); }
 
+void ClContext::prepare(const ClKernelName& name) { driver_->program(name); }
+
 void ClContext::watch_compiling(std::function<void(double seconds)> watch) { driver_->watch = std::move(watch); }
 
 std::vector<ClProfileEntry> ClContext::profile() {

@@ -208,6 +208,8 @@ class ClContext {
     launch_with(name, range, std::array<ClArgument, sizeof...(Args)>{ClArgument(args)...});
   }
   void finish();
+  /// Builds, or loads from the driver's cache, the program that a kernel is in, before its first launch.
+  void prepare(const ClKernelName& name);
 
   /// Calls `watch` before each program is built or loaded and before the first launch of each kernel, which is when
   /// drivers compile, with the seconds that this has taken so far. Empty: none.

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <bit>
 #include <numeric>
+#include <utility>
 
+#include "skeletex/convert/snap/snap.h"
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/reconstruct/prepared_model.h"
 
@@ -71,7 +73,7 @@ LatticeFrame frame_lattice(ClContext& context, const SkeletexModel& model) {
   const PreparedModel prepared(model);
   const SeparationPlanes& separation = prepared.separation;
   const Lattice& lattice = prepared.lattice;
-  LatticeFrame frame{model, lattice, upload_quads(context, prepared), {}, {}, {}, {}, {}, {}, {}};
+  LatticeFrame frame{model, lattice, context.upload(prepared.tables.patches), {}, {}, {}, {}, {}, {}, {}};
   frame.rows = lattice_rows(model.patches, RowChoice::kInner);
   std::erase_if(frame.rows,
                 [&](const LatticeRow& row) { return row[1] == model.patches[row[0]].rectangle.height - 2; });
@@ -140,44 +142,31 @@ void replace_triangles(std::span<const Triangle> triangles, int first, std::span
   }
 }
 
-}  // namespace
+/// The two triangles of the quad to the right of and above a texel, as reconstruct.cl writes them.
+std::array<Triangle, 2> quad_triangles(const LatticeFrame& frame, int patch, int row, int column,
+                                       const std::vector<int>& diagonals) {
+  const int width = frame.model.patches[patch].rectangle.width;
+  const int first = frame.numbers.first_inner[patch] + (row - 1) * width;
+  const int own = first + column, right = column + 1 < width ? own + 1 : first;
+  const int above = own + width, beyond = right + width;
+  if (diagonals[frame.texels[own]] != 0) return {{{own, right, above}, {above, right, beyond}}};
+  return {{{own, right, beyond}, {own, beyond, above}}};
+}
 
-namespace {
-
-/// The triangles between inner rows, as reconstruct.cl writes them.
-void write_quads(const LatticeFrame& frame, const std::vector<int>& diagonals, std::vector<Triangle>& triangles) {
-  for_each_block(frame.rows.size(), 16, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const auto [patch, row, unused, first_quad] = frame.rows[i];
-      const int width = frame.model.patches[patch].rectangle.width;
-      const int first = frame.numbers.first_inner[patch] + (row - 1) * width;
-      for (int j = 0; j < width; ++j) {
-        const int own = first + j, right = j + 1 < width ? own + 1 : first, above = own + width, beyond = right + width;
-        const bool is_second = diagonals[frame.texels[own]] != 0;
-        triangles[2 * (first_quad + j)] = {own, right, is_second ? above : beyond};
-        triangles[2 * (first_quad + j) + 1] = is_second ? Triangle{above, right, beyond} : Triangle{own, beyond, above};
-      }
-    }
-  });
+/// The diagonals that the decoder takes over points, on the host.
+std::vector<int> diagonals_of(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
+                              const TexelPlanes& points) {
+  return context.download(
+      choose_diagonals(context, rule, frame.model.patches, frame.patches, frame.model.texture.width, points[0].size(),
+                       {context.upload(points[0]), context.upload(points[1]), context.upload(points[2])}));
 }
 
 }  // namespace
 
-LatticeMesh build_lattice_mesh(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
-                               const TexelPlanes& points) {
+TriangleMesh build_lattice_mesh(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
+                                const TexelPlanes& points) {
   const Lattice& lattice = frame.numbers;
-  LatticeMesh result{{frame.positions, {}}, {}};
-  TriangleMesh& mesh = result.mesh;
-  for_each_block(3, 1, [&](std::size_t axis, std::size_t, std::size_t) {
-    result.inner[axis].reserve(lattice.inner_count);
-    for_each_inner_row(frame.model, lattice, [&](int, int texel, int columns) {
-      const auto first = points[axis].begin() + texel;
-      result.inner[axis].insert(result.inner[axis].end(), first, first + columns);
-    });
-  });
-  const auto device_diagonals = choose_diagonals(
-      context, rule, frame.model.patches, frame.quads.patches, frame.model.texture.width, points[0].size(),
-      TexelPoints{context.upload(points[0]), context.upload(points[1]), context.upload(points[2])});
+  TriangleMesh mesh{frame.positions, {}};
   for_each_block(lattice.vertex_count, 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t vertex = begin; vertex < end; ++vertex)
       if (frame.texels[vertex] >= 0) mesh.positions[vertex] = position_of(frame.model, points, frame.texels[vertex]);
@@ -186,56 +175,61 @@ LatticeMesh build_lattice_mesh(ClContext& context, const LatticeFrame& frame, Di
   std::iota(ends.begin(), ends.end(), 0);
   const std::vector<std::vector<Triangle>> of_ends = make_ends(frame, ends, mesh.positions);
   mesh.triangles.resize(lattice.triangle_count);
-  write_quads(frame, context.download(device_diagonals), mesh.triangles);
+  const std::vector<int> diagonals = diagonals_of(context, frame, rule, points);
+  for_each_block(frame.rows.size(), 16, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto [patch, row, unused, first_quad] = frame.rows[i];
+      for (int column = 0; column < frame.model.patches[patch].rectangle.width; ++column) {
+        const auto triangles = quad_triangles(frame, patch, row, column, diagonals);
+        std::copy(triangles.begin(), triangles.end(), mesh.triangles.begin() + 2 * (first_quad + column));
+      }
+    }
+  });
   auto next = mesh.triangles.begin() + 2 * static_cast<std::ptrdiff_t>(lattice.quad_count);
   for (const std::vector<Triangle>& triangles : of_ends) next = std::copy(triangles.begin(), triangles.end(), next);
-  return result;
+  return mesh;
 }
 
 std::vector<int> move_texels(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
-                             std::span<const int> texels, const TexelPlanes& points, LatticeMesh& lattice) {
+                             std::span<const int> texels, const TexelPlanes& points, TriangleMesh& mesh) {
   if (texels.empty()) return {};
   const SkeletexModel& model = frame.model;
-  TriangleMesh& mesh = lattice.mesh;
-  std::vector<char> has_moved(mesh.positions.size(), 0);
-  std::vector<std::vector<char>> is_row_near(model.patches.size());
-  for (std::size_t patch = 0; patch < is_row_near.size(); ++patch)
-    is_row_near[patch].assign(model.patches[patch].rectangle.height, 0);
+  std::vector<char> has_moved(mesh.positions.size(), 0), is_near(frame.numbers.quad_count, 0);
+  std::vector<int> changed;
+  const std::vector<int> diagonals = diagonals_of(context, frame, rule, points);
+  const auto place_of = [&](int texel) {
+    const Rectangle& r = model.patches[frame.texel_patches[texel]].rectangle;
+    return std::array{frame.texel_patches[texel], texel / model.texture.width - r.y, texel % model.texture.width - r.x};
+  };
   for (const int texel : texels) {
-    const int patch = frame.texel_patches[texel];
-    const Rectangle& r = model.patches[patch].rectangle;
-    const int row = texel / model.texture.width - r.y, column = texel % model.texture.width - r.x;
-    const int vertex = frame.numbers.first_inner[patch] + (row - 1) * r.width + column;
+    const auto [patch, row, column] = place_of(texel);
+    const int vertex = frame.numbers.first_inner[patch] + (row - 1) * model.patches[patch].rectangle.width + column;
     has_moved[vertex] = 1;
     mesh.positions[vertex] = position_of(model, points, texel);
-    for (int axis = 0; axis < 3; ++axis) lattice.inner[axis][vertex] = points[axis][texel];
-    // The diagonal of a quad depends on the 4 x 4 vertices around it.
-    for (int i = std::max(1, row - 2); i <= std::min(r.height - 2, row + 1); ++i) is_row_near[patch][i] = 1;
   }
-  std::vector<LatticeRow> rows;
-  for (const LatticeRow& row : frame.rows)
-    if (is_row_near[row[0]][row[1]] != 0) rows.push_back(row);
+  for (const int texel : texels) {
+    const auto [patch, row, column] = place_of(texel);
+    const Rectangle& r = model.patches[patch].rectangle;
+    // The diagonal of a quad depends on the 4 x 4 vertices around it.
+    for (int i = std::max(1, row - 2); i <= std::min(r.height - 3, row + 1); ++i)
+      for (int j = column - 2; j <= column + 1; ++j) {
+        const int quad = frame.numbers.first_quad[patch] + (i - 1) * r.width + wrapped(j, r.width);
+        if (std::exchange(is_near[quad], 1) != 0) continue;
+        replace_triangles(quad_triangles(frame, patch, i, wrapped(j, r.width), diagonals), 2 * quad, has_moved, mesh,
+                          changed);
+      }
+  }
   std::vector<int> ends;
   for (int end = 0; end < static_cast<int>(frame.ends.size()); ++end) {
     const std::vector<int> vertices = end_row(model, frame.numbers, end / 2, static_cast<BoneEnd>(end % 2));
     if (std::any_of(vertices.begin(), vertices.end(), [&](int vertex) { return has_moved[vertex] != 0; }))
       ends.push_back(end);
   }
-
-  std::vector<int> changed;
-  if (!rows.empty()) {
-    const ClMapping<Triangle> triangles =
-        context.map(triangulate(context, rule, {context.upload(rows), frame.quads.patches}, frame.numbers,
-                                upload_planes(context, lattice.inner[0], lattice.inner[1], lattice.inner[2])));
-    for (const LatticeRow& row : rows)
-      replace_triangles(
-          {triangles.data() + 2 * row[3], 2 * static_cast<std::size_t>(model.patches[row[0]].rectangle.width)},
-          2 * row[3], has_moved, mesh, changed);
-  }
   const std::vector<int> firsts = first_triangles_of_ends(frame);
   const std::vector<std::vector<Triangle>> of_ends = make_ends(frame, ends, mesh.positions);
   for (std::size_t i = 0; i < ends.size(); ++i)
     replace_triangles(of_ends[i], firsts[ends[i]], has_moved, mesh, changed);
+  std::sort(changed.begin(), changed.end());
   return changed;
 }
 

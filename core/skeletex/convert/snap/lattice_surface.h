@@ -23,7 +23,7 @@ ClBuffer<int> choose_diagonals(ClContext& context, DiagonalRule rule, const std:
 struct LatticeFrame {
   const SkeletexModel& model;  ///< all but its texels
   Lattice numbers;
-  DeviceQuads quads;
+  ClBuffer<PatchRecord> patches;
   std::vector<LatticeRow> rows;      ///< that quads begin at
   std::vector<EndSeam> ends;         ///< per patch, head and tail
   std::vector<Vec3> positions;       ///< seam samples and corners; the rest is open
@@ -36,18 +36,14 @@ struct LatticeFrame {
 LatticeFrame frame_lattice(ClContext& context, const SkeletexModel& model);
 
 /// The mesh that the model would reconstruct to, were its texels at given points: what reconstruct_mesh makes.
-struct LatticeMesh {
-  TriangleMesh mesh;
-  TexelPlanes inner;  ///< x, y and z of the inner vertices, from the model's origin
-};
 /// \param rule    of its diagonals, in place of the model's
 /// \param points  of rows 0 and height-1 only poles count
-LatticeMesh build_lattice_mesh(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
-                               const TexelPlanes& points);
+TriangleMesh build_lattice_mesh(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
+                                const TexelPlanes& points);
 /// After inner texels have moved: diagonals and strips next to them are chosen again.
 /// \param rule, points  as for build_lattice_mesh
-/// \return the triangles that are not what they were, or not where
+/// \return the triangles that are not what they were, or not where, in order
 std::vector<int> move_texels(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
-                             std::span<const int> texels, const TexelPlanes& points, LatticeMesh& lattice);
+                             std::span<const int> texels, const TexelPlanes& points, TriangleMesh& mesh);
 
 }  // namespace skeletex

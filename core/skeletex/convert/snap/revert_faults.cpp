@@ -75,7 +75,7 @@ struct RegularGrid {
 
 RegularGrid prepare_regular_grid(ClContext& context, const LatticeFrame& frame, const OriginalSurface& original,
                                  const PlacedTexels& texels) {
-  RegularGrid grid{build_lattice_mesh(context, frame, DiagonalRule::kNearest, texels.points).mesh, {}, TexelSet(frame)};
+  RegularGrid grid{build_lattice_mesh(context, frame, DiagonalRule::kNearest, texels.points), {}, TexelSet(frame)};
   grid.faults = measure_regular_grid({frame, grid.mesh, texels.map_triangles}, original);
   for (const int triangle : grid.faults.inverted) grid.near_faults.add(grid.mesh.triangles[triangle], kTolerance);
   return grid;
@@ -83,13 +83,13 @@ RegularGrid prepare_regular_grid(ClContext& context, const LatticeFrame& frame, 
 
 /// The lattice as it is in a pass.
 struct Pass {
-  LatticeMesh lattice;
-  TriangleTree tree;                         // of its mesh
+  TriangleMesh mesh;
+  TriangleTree tree;
   std::vector<MeasuredTriangle> suspects;    // triangles that are nearly too far, or inverted
   Pairs intersections;                       // of suspects
   std::vector<int> nearest_to_far_vertices;  // triangles
 
-  const Triangle& triangle(int number) const { return lattice.mesh.triangles[number]; }
+  const Triangle& triangle(int number) const { return mesh.triangles[number]; }
 };
 
 std::vector<char> held_vertices(const PlacedTexels& texels, std::span<const int> vertex_points,
@@ -104,7 +104,7 @@ std::vector<char> held_vertices(const PlacedTexels& texels, std::span<const int>
 /// \param changed  in order
 void measure(const LatticeFrame& frame, const OriginalSurface& original, std::span<const int> vertex_points,
              const PlacedTexels& texels, double limit, std::span<const int> changed, Pass& pass) {
-  const TriangleMesh& mesh = pass.lattice.mesh;
+  const TriangleMesh& mesh = pass.mesh;
   const LatticeSurface surface{frame, mesh, texels.map_triangles};
   std::erase_if(pass.suspects, [&](const MeasuredTriangle& suspect) {
     return std::binary_search(changed.begin(), changed.end(), suspect.triangle);
@@ -122,8 +122,8 @@ void measure(const LatticeFrame& frame, const OriginalSurface& original, std::sp
 Pass start_passes(ClContext& context, const LatticeFrame& frame, const OriginalSurface& original,
                   std::span<const int> vertex_points, const PlacedTexels& texels, double limit) {
   Pass pass{build_lattice_mesh(context, frame, frame.model.diagonals, texels.points), {}, {}, {}, {}};
-  pass.tree = build_triangle_tree(pass.lattice.mesh, frame.triangle_order);
-  std::vector<int> all(pass.lattice.mesh.triangles.size());
+  pass.tree = build_triangle_tree(pass.mesh, frame.triangle_order);
+  std::vector<int> all(pass.mesh.triangles.size());
   std::iota(all.begin(), all.end(), 0);
   measure(frame, original, vertex_points, texels, limit, all, pass);
   return pass;
@@ -134,10 +134,10 @@ void next_pass(ClContext& context, const LatticeFrame& frame, const OriginalSurf
                std::span<const int> vertex_points, const PlacedTexels& texels, double limit,
                std::span<const int> reverted, Pass& pass) {
   const std::vector<int> changed =
-      move_texels(context, frame, frame.model.diagonals, reverted, texels.points, pass.lattice);
+      move_texels(context, frame, frame.model.diagonals, reverted, texels.points, pass.mesh);
   std::vector<int> places;
   for (const int triangle : changed) places.push_back(frame.triangle_places[triangle]);
-  update_triangle_tree(pass.lattice.mesh, places, pass.tree);
+  update_triangle_tree(pass.mesh, places, pass.tree);
   measure(frame, original, vertex_points, texels, limit, changed, pass);
 }
 
