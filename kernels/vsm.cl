@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Vertex-sampling-maximizing maps of all charts together (design: docs/parameterization.md): areas, weights and
+// Vertex-sampling-maximizing maps of all charts together (design: docs/steps/vsm.md): areas, weights and
 // residuals; elimination.cl solves the systems.
 //
 // Vertices of all charts lie in one list: each chart has a block that begins at a multiple of VSM_SLICE and holds its

@@ -37,7 +37,7 @@ SECTIONS = [
     ("Figures 17 to 19: transfer", "transfer", pictures.fig17_transfer,
      "Chosen bones or limbs replaced by those of another model, or by the mirror image of its own, scaled to the target's bones; the target's seams stay. Without blending the whole patch is the source's and the seam shows."),
     ("Figure 19, left: what cannot be segmented", "limits", pictures.fig19_limits,
-     "Walls that cross inside the body would leave surface behind them. The skeleton is refused, with the place and what to do; the paper leaves the model incomplete."),
+     "Separation planes that cross inside the body would leave surface behind them. The skeleton is refused, with the place and what to do; the paper leaves the model incomplete."),
     ("Figure 19, middle: SPD and VSM in morphing", "morph_methods", pictures.fig19_morph_methods,
      "Half-way between the two. VSM keeps all of both surfaces, and distorts what one of them lacks; SPD is smoother and leaves out what its rays do not see."),
     ("Figure 20: animation", "animation", pictures.fig20_animation,
@@ -55,13 +55,13 @@ SECTIONS = [
      "reaches as far as the trunk is wide: the thighs of the camel and the cow take part of the other thigh along, and the armadillo's neck its chest, shell and upper arms."),
     ("Beyond the paper: iterations of VSM", "iterations", sweeps.draw_iterations,
      "The paper's weights w A even out areas in the texture; divided by a power of the surface area they even out the texels on the surface."),
-    ("Beyond the paper: what the recipe's parts bring", "recipe", sweeps.draw_recipe, "The paper's own recipe, the default, the default on an even lattice, and that with one part taken back."),
+    ("Beyond the paper: what the recipe's parts bring", "recipe", sweeps.draw_recipe, "The paper's own recipe, the default, the default on an regular grid, and that with one part taken back."),
     ("Beyond the paper: other ways to as many vertices", "simplification", sweeps.draw_simplification,
      "A texture is better than a uniform remesh. A simplification puts its vertices where the surface bends, which a lattice can where it has texels enough."),
     ("Beyond the paper: error against bytes", "bytes", sweeps.draw_bytes,
      "Half floats are those near the texels whose points stay nearest to the surface, or the nearest ones. Draco codes the input mesh alone and needs far fewer bytes. The texture pays for being editable: every texel is a displacement that can be posed, morphed and filtered."),
     ("Beyond the paper: time and memory against the number of triangles", "scale", scale.draw,
-     "encode as a whole command, files included, at 512 x 512, even lattice: the armadillo remeshed or decimated, and subdivided. The dotted line is n log n through the fewest triangles beyond 100 000."),
+     "encode as a whole command, files included, at 512 x 512, regular grid: the armadillo remeshed or decimated, and subdivided. The dotted line is n log n through the fewest triangles beyond 100 000."),
 ]
 
 STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:72rem;margin:2rem auto;padding:0 1rem;color:#222}

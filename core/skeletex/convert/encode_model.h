@@ -24,7 +24,7 @@ struct EncodeOptions {
   int width = 512, height = 512;
   /// Of all bones; without, each bone takes SPD or VSM (hybrid).
   std::optional<Method> method = Method::kVsm;
-  /// Hybrid: bones whose unseen share of area is above this take VSM, the others SPD (docs/spd.md).
+  /// Hybrid: bones whose unseen share of area is above this take VSM, the others SPD (docs/steps/spd.md).
   double hybrid_unseen_threshold = 0.01;
   /// Hybrid: bones by name whose method the user chose.
   std::vector<std::pair<std::string, Method>> hybrid_overrides;
@@ -33,14 +33,14 @@ struct EncodeOptions {
   RowSpacing row_spacing = RowSpacing::kSurfaceLength;
   bool has_prefilter = true;
   bool has_unfold = true;  ///< see unfold_lattice; snapping and fit start from the lattice that it leaves
-  /// Texels of VSM patches sit on the mesh's own vertices and edges where they can (docs/snap.md). Takes the
+  /// Texels of VSM patches sit on the mesh's own vertices and edges where they can (docs/steps/snap.md). Takes the
   /// prefilter's place. Default: from 2 texels per vertex on, with the fit from 1.5 on.
   std::optional<bool> has_snap;
-  /// Their points move so that the flat triangles between them are nearer to the mesh (docs/snap.md). Takes the
+  /// Their points move so that the flat triangles between them are nearer to the mesh (docs/steps/snap.md). Takes the
   /// prefilter's place. Default: with the prefilter, up to 256 x 256 texels.
   std::optional<bool> has_fit;
   std::optional<DiagonalRule> diagonals;  ///< default: smooth with snapping or fit, else nearest
-  /// Texels come as half floats hold them (docs/encoding.md): write_model stores them as such without loss.
+  /// Texels come as half floats hold them (docs/steps/sample.md): write_model stores them as such without loss.
   bool has_half_texels = false;
   std::optional<TexelShare> texel_share;  ///< and of the side ratio; default: area for all-SPD models, error otherwise
   /// Of the mesh, as validate_before_segmentation has built it; without, it is built where it is needed. Another mesh's

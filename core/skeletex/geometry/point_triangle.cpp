@@ -23,7 +23,7 @@ Vec3 offset_from_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec
   const double squared = normal.squaredNorm(), longest = ab.squaredNorm() * ac.squaredNorm();
   Vec3 best;
   double best_squared = std::numeric_limits<double>::infinity();
-  const auto offer = [&](const Vec3& offset) {
+  const auto consider = [&](const Vec3& offset) {
     if (offset.squaredNorm() < best_squared) {
       best = offset;
       best_squared = offset.squaredNorm();
@@ -41,12 +41,12 @@ Vec3 offset_from_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec
       offset = ap - v * ab - w * ac;
       if (!(v >= 0 && w >= 0 && v + w <= 1)) continue;
       if (!is_sliver) return offset;
-      offer(offset);
+      consider(offset);
     }
   }
-  offer(offset_from_edge(ap, ab));
-  offer(offset_from_edge(ap, ac));
-  offer(offset_from_edge(p - b, c - b));
+  consider(offset_from_edge(ap, ab));
+  consider(offset_from_edge(ap, ac));
+  consider(offset_from_edge(p - b, c - b));
   return best;
 }
 

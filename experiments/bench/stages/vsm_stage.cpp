@@ -65,7 +65,7 @@ Stage vsm_stage(ClContext& context, MeshInputPointer input, int threads) {
   const auto charts = std::make_shared<const std::vector<Chart>>(charts_of(context, *input).charts);
   const auto matrices = std::make_shared<const std::vector<Matrix>>(matrices_of(*charts));
   const auto reports = std::make_shared<std::vector<MapReport>>();
-  // Charts keep all but their maps, which are put back.
+  // Charts keep all but their maps, which are restored.
   stage.run = [&context, charts, reports, mapped = std::make_shared<std::vector<Chart>>(*charts)] {
     for (std::size_t k = 0; k < mapped->size(); ++k) (*mapped)[k].u = (*charts)[k].u, (*mapped)[k].v = (*charts)[k].v;
     *reports = solve_vsm(context, *mapped);

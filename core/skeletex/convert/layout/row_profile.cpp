@@ -13,7 +13,7 @@ constexpr double kUniformPart = 1e-4;
 
 /// The mean |dP/du| would be 1, the least error of flat triangles over a square lattice 3 (errors grow with the square
 /// of a row's length, the area that has them with the length). But 3 spends rows on the few most stretched
-/// columns; 1.25 keeps the mean error and lowers the maximum (docs/encoding.md).
+/// columns; 1.25 keeps the mean error and lowers the maximum (docs/steps/layout.md).
 constexpr double kExponent = 1.25;
 
 /// A width that rises linearly from `low` to `middle`, falls to `high`, and has the total `area`.

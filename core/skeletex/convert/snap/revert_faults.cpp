@@ -16,7 +16,7 @@ constexpr int kPasses = 7;                 // it takes some four
 constexpr int kAroundFar = 1;              // columns and rows around a triangle that is too far that revert with it
 constexpr double kShareOfFurthest = 0.85;  // what is measured is not all that there is
 constexpr double kShareOfSuspects = 0.75;  // of the limit: triangles that are nearer intersect as the original does
-constexpr std::size_t kManyPairs = 500;    // from here on the regular grid is asked whether it intersects as much
+constexpr std::size_t kManyPairs = 500;    // from here on it counts whether the regular grid intersects as much
 constexpr int kTolerance = 2;              // columns and rows around a fault of the regular grid
 constexpr double kMuchWorse = 1.1;         // the number of faults there, against the regular grid's
 
