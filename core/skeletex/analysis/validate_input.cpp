@@ -23,6 +23,49 @@ Finding finding_of(const Error& error) {
   return {Severity::kError, "segmentation", text.substr(0, cut), text.substr(cut + 2)};
 }
 
+const char* plural(std::size_t count) { return count == 1 ? "" : "s"; }
+
+/// Turns a mesh that is inside out.
+void check_volume(double diagonal, TriangleMesh& mesh, std::vector<Finding>& findings) {
+  const double volume = signed_volume(mesh);
+  if (std::abs(volume) <= 1e-12 * std::pow(diagonal, 3)) {
+    findings.push_back({Severity::kError, "volume", fmt::format("the mesh encloses no volume ({:.3g})", volume),
+                        "give a body, not a sheet"});
+  } else if (volume < 0) {
+    for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
+    findings.push_back({Severity::kNote, "orientation",
+                        fmt::format("the mesh was inside out (volume {:.6g}); all its triangles were turned", volume),
+                        "nothing to do; a file with counter-clockwise triangles avoids this note"});
+  }
+}
+
+void check_self_intersections(const TriangleMesh& mesh, const TriangleTree& tree, std::vector<Finding>& findings) {
+  const auto pairs = find_self_intersections(mesh, tree);
+  if (pairs.empty()) return;
+  const auto& [a, b] = pairs.front();
+  const Vec3 place = (mesh.positions[mesh.triangles[a][0]] + mesh.positions[mesh.triangles[a][1]] +
+                      mesh.positions[mesh.triangles[a][2]]) /
+                     3;
+  findings.push_back({Severity::kWarning, "self-intersection",
+                      fmt::format("{} pair{} of triangles intersect; the first are triangles {} and {} at {}",
+                                  pairs.size(), plural(pairs.size()), a, b, text_of(place)),
+                      "none needed: such a mesh is encoded as it is"});
+}
+
+void check_genus(const Skeleton& skeleton, int genus, std::vector<Finding>& findings) {
+  const int cycles = count_cycles(skeleton);
+  if (cycles == genus) return;
+  const int missing = std::abs(genus - cycles);
+  findings.push_back(
+      {Severity::kError, "genus",
+       fmt::format("the mesh has {} handle{} (its genus), but the skeleton has {} independent cycle{} of bones", genus,
+                   plural(genus), cycles, plural(cycles)),
+       cycles < genus
+           ? fmt::format("close {} more ring{} of bones, one around every hole of the body", missing, plural(missing))
+           : fmt::format("open {} ring{} of bones: only a hole in the body has one around it", missing,
+                         plural(missing))});
+}
+
 }  // namespace
 
 std::vector<Finding> validate_before_segmentation(TriangleMesh& mesh, const Skeleton& skeleton,
@@ -34,48 +77,17 @@ std::vector<Finding> validate_before_segmentation(TriangleMesh& mesh, const Skel
   const bool is_good_mesh = is_closed && report.non_finite_vertices.empty();
   const double diagonal = report.non_finite_vertices.empty() ? bounding_box(mesh).diagonal() : 0;
   if (is_good_mesh) {
-    const double volume = signed_volume(mesh);
-    if (std::abs(volume) <= 1e-12 * std::pow(diagonal, 3)) {
-      findings.push_back({Severity::kError, "volume", fmt::format("the mesh encloses no volume ({:.3g})", volume),
-                          "give a body, not a sheet"});
-    } else if (volume < 0) {
-      for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
-      findings.push_back({Severity::kNote, "orientation",
-                          fmt::format("the mesh was inside out (volume {:.6g}); all its triangles were turned", volume),
-                          "nothing to do; a file with counter-clockwise triangles avoids this note"});
-    }
+    check_volume(diagonal, mesh, findings);
     TriangleTree own = build_triangle_tree(mesh);
-    const auto pairs = find_self_intersections(mesh, own);
+    check_self_intersections(mesh, own, findings);
     if (tree) *tree = std::move(own);
-    if (!pairs.empty()) {
-      const auto& [a, b] = pairs.front();
-      const Vec3 place = (mesh.positions[mesh.triangles[a][0]] + mesh.positions[mesh.triangles[a][1]] +
-                          mesh.positions[mesh.triangles[a][2]]) /
-                         3;
-      findings.push_back({Severity::kWarning, "self-intersection",
-                          fmt::format("{} pair{} of triangles intersect; the first are triangles {} and {} at {}",
-                                      pairs.size(), pairs.size() == 1 ? "" : "s", a, b, text_of(place)),
-                          "none needed: such a mesh is encoded as it is"});
-    }
   }
 
   const TriangleMesh surface = usable_surface(mesh, report);
   const double unit = surface.triangles.empty() ? diagonal : bounding_box(surface).diagonal();
-  const bool is_usable_skeleton = find_in_skeleton(skeleton, unit, findings);
-  if (is_usable_skeleton && !surface.triangles.empty())
-    find_between(SurfaceProbe(surface), is_good_mesh, skeleton, findings);
-  if (is_usable_skeleton && is_closed && report.components == 1) {
-    const int cycles = count_cycles(skeleton);
-    if (cycles != report.genus)
-      findings.push_back(
-          {Severity::kError, "genus",
-           fmt::format("the mesh has {} handle{} (its genus), but the skeleton has {} independent cycle{} of bones",
-                       report.genus, report.genus == 1 ? "" : "s", cycles, cycles == 1 ? "" : "s"),
-           cycles < report.genus ? fmt::format("close {} more ring{} of bones, one around every hole of the body",
-                                               report.genus - cycles, report.genus - cycles == 1 ? "" : "s")
-                                 : fmt::format("open {} ring{} of bones: only a hole in the body has one around it",
-                                               cycles - report.genus, cycles - report.genus == 1 ? "" : "s")});
-  }
+  if (!find_in_skeleton(skeleton, unit, findings)) return findings;
+  if (!surface.triangles.empty()) find_between(SurfaceProbe(surface), is_good_mesh, skeleton, findings);
+  if (is_closed && report.components == 1) check_genus(skeleton, report.genus, findings);
   return findings;
 }
 

@@ -33,9 +33,11 @@ void check_options(const EncodeOptions& options, const Skeleton& skeleton) {
     throw InputError(fmt::format("VSM alpha is {}; give 0 to 1", options.vsm.alpha));
   if (!(options.hybrid_unseen_threshold >= 0))
     throw InputError("the hybrid threshold is negative; give a share of area, such as 0.01");
-  for (const auto& [name, method] : options.hybrid_overrides)
-    if (std::none_of(skeleton.bones.begin(), skeleton.bones.end(), [&](const Bone& b) { return b.name == name; }))
-      throw InputError(fmt::format("a method is given for bone \"{}\", which the skeleton does not have", name));
+  for (const auto& override : options.hybrid_overrides)
+    if (std::none_of(skeleton.bones.begin(), skeleton.bones.end(),
+                     [&](const Bone& bone) { return bone.name == override.first; }))
+      throw InputError(
+          fmt::format("a method is given for bone \"{}\", which the skeleton does not have", override.first));
 }
 
 std::vector<Method> choose_methods(const EncodeOptions& options, const Skeleton& skeleton,

@@ -31,7 +31,7 @@ View parse_view(const nlohmann::json& json, const std::string& source) {
   View view;
   for (const auto& [key, value] : json.items()) {
     const std::string where = fmt::format("{}: \"{}\"", source, key);
-    const auto number = [&](double lowest, double highest) {
+    const auto number = [&, &value = value](double lowest, double highest) {
       if (!value.is_number()) throw IoError(where + " must be a number");
       const double x = value.get<double>();
       if (!(x >= lowest && x <= highest))

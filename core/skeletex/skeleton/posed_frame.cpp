@@ -37,7 +37,7 @@ Vec3 posed_point(const SkeletexModel& model, const SeparationPlanes& bind, const
   const double bind_length = bone_length(model.skeleton, bone), length = bone_length(posed.skeleton(), bone);
   const PosedRow row = posed_row(model, posed, bone, at);
   const PosedRadial head = posed.radial(bone, BoneEnd::kHead, turn), tail = posed.radial(bone, BoneEnd::kTail, turn);
-  const Vec3 foot = end_position(posed.skeleton(), bone, BoneEnd::kHead) + at.axial * length * posed.bases()[bone].o;
+  Vec3 foot = end_position(posed.skeleton(), bone, BoneEnd::kHead) + at.axial * length * posed.bases()[bone].o;
   double radius = texel.norm();
   if (!(radius > 0)) return foot;
   const auto mix = [](double a, double b, double share) { return (1 - share) * a + share * b; };

@@ -32,6 +32,46 @@ DeviceLayout upload_layout(ClContext& context, std::span<const Patch> patches, c
   return layout;
 }
 
+namespace {
+
+/// The planes of all maps on the host.
+struct HostMaps {
+  std::vector<int> corners, turns, across, poles, triangle_patches;
+  SplitValues u, v;
+  std::vector<float> x, y, z;
+};
+
+void append_vertices(const Chart& chart, const Vec3& origin, HostMaps& maps) {
+  for (std::size_t i = 0; i < chart.positions.size(); ++i) {
+    maps.u.push_back(chart.u[i]);
+    maps.v.push_back(is_pole(chart.kinds[i]) ? 0 : chart.v[i]);
+    const Vec3 p = chart.positions[i] - origin;
+    maps.x.push_back(static_cast<float>(p[0]));
+    maps.y.push_back(static_cast<float>(p[1]));
+    maps.z.push_back(static_cast<float>(p[2]));
+  }
+}
+
+/// \param first  the number of the chart's first triangle    \param base  of its first vertex
+void set_triangle(const Chart& chart, std::size_t triangle, int first, int base, HostMaps& maps) {
+  const std::size_t at = first + triangle, count = maps.poles.size();
+  const Triangle& vertices = chart.triangles[triangle];
+  int pole = -1;
+  for (int k = 0; k < 3; ++k)
+    if (is_pole(chart.kinds[vertices[k]])) pole = k;
+  const int shift = pole < 0 ? 0 : (pole + 1) % 3;  // the pole becomes corner 2
+  for (int k = 0; k < 3; ++k) {
+    const int from = (k + shift) % 3;
+    maps.corners[k * count + at] = base + vertices[from];
+    maps.turns[k * count + at] = from == pole ? 0 : chart.turns[triangle][from];
+    const int twin = chart.half_edges.twins[3 * triangle + (from + 1) % 3];
+    maps.across[k * count + at] = twin < 0 ? -1 : first + twin / 3;
+  }
+  if (pole >= 0) maps.poles[at] = chart.kinds[vertices[pole]] == ChartVertex::kTailPole ? 1 : -1;
+}
+
+}  // namespace
+
 DeviceMaps upload_maps(ClContext& context, std::span<const Chart> charts, std::span<const Patch> patches,
                        const Vec3& origin) {
   DeviceMaps maps;
@@ -41,47 +81,27 @@ DeviceMaps upload_maps(ClContext& context, std::span<const Chart> charts, std::s
   }
   maps.first_triangle.push_back(maps.triangle_count);
   const std::size_t count = maps.triangle_count;
-  std::vector<int> corners(3 * count), turns(3 * count), across(3 * count), poles(count, 0), triangle_patches(count);
-  SplitValues u, v, row_u;
-  std::vector<float> x, y, z;
+  HostMaps host;
+  for (std::vector<int>* plane : {&host.corners, &host.turns, &host.across}) plane->resize(3 * count);
+  host.poles.assign(count, 0), host.triangle_patches.resize(count);
   for (std::size_t bone = 0; bone < charts.size(); ++bone) {
-    const int base = static_cast<int>(x.size());
+    const int base = static_cast<int>(host.x.size()), first = maps.first_triangle[bone];
     maps.first_vertex.push_back(base);
     if (is_height_field(patches[bone].method)) continue;
-    const Chart& chart = charts[bone];
-    for (std::size_t i = 0; i < chart.positions.size(); ++i) {
-      u.push_back(chart.u[i]);
-      v.push_back(is_pole(chart.kinds[i]) ? 0 : chart.v[i]);
-      const Vec3 p = chart.positions[i] - origin;
-      x.push_back(static_cast<float>(p[0]));
-      y.push_back(static_cast<float>(p[1]));
-      z.push_back(static_cast<float>(p[2]));
-    }
-    for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
-      const std::size_t at = maps.first_triangle[bone] + t;
-      int pole = -1;
-      for (int k = 0; k < 3; ++k)
-        if (is_pole(chart.kinds[chart.triangles[t][k]])) pole = k;
-      const int shift = pole < 0 ? 0 : (pole + 1) % 3;  // the pole becomes corner 2
-      for (int k = 0; k < 3; ++k) {
-        const int from = (k + shift) % 3;
-        corners[k * count + at] = base + chart.triangles[t][from];
-        turns[k * count + at] = from == pole ? 0 : chart.turns[t][from];
-        const int twin = chart.half_edges.twins[3 * t + (from + 1) % 3];
-        across[k * count + at] = twin < 0 ? -1 : maps.first_triangle[bone] + twin / 3;
-      }
-      if (pole >= 0) poles[at] = chart.kinds[chart.triangles[t][pole]] == ChartVertex::kTailPole ? 1 : -1;
-      triangle_patches[at] = static_cast<int>(bone);
-    }
+    append_vertices(charts[bone], origin, host);
+    for (std::size_t t = 0; t < charts[bone].triangles.size(); ++t) set_triangle(charts[bone], t, first, base, host);
+    std::fill_n(host.triangle_patches.begin() + first, charts[bone].triangles.size(), static_cast<int>(bone));
   }
+  SplitValues row_u;
   for (const Patch& patch : patches)
     for (const double value : patch.row_u) row_u.push_back(value);
 
-  maps.corners = context.upload(corners), maps.turns = context.upload(turns), maps.across = context.upload(across);
-  maps.poles = context.upload(poles), maps.triangle_patches = context.upload(triangle_patches);
-  maps.u_high = context.upload(u.high), maps.u_low = context.upload(u.low);
-  maps.v_high = context.upload(v.high), maps.v_low = context.upload(v.low);
-  maps.x = context.upload(x), maps.y = context.upload(y), maps.z = context.upload(z);
+  maps.corners = context.upload(host.corners), maps.turns = context.upload(host.turns);
+  maps.across = context.upload(host.across);
+  maps.poles = context.upload(host.poles), maps.triangle_patches = context.upload(host.triangle_patches);
+  maps.u_high = context.upload(host.u.high), maps.u_low = context.upload(host.u.low);
+  maps.v_high = context.upload(host.v.high), maps.v_low = context.upload(host.v.low);
+  maps.x = context.upload(host.x), maps.y = context.upload(host.y), maps.z = context.upload(host.z);
   maps.row_high = context.upload(row_u.high), maps.row_low = context.upload(row_u.low);
   return maps;
 }

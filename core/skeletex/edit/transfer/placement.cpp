@@ -114,7 +114,7 @@ class Placing {
     patch.target_begin = is_mixed ? static_cast<int>(input_.target_patches[bone].first) : -1;
 
     const auto columns = model_columns(pair.map(), i, width);
-    const auto shear = [&](BoneEnd end, int j) {
+    const auto shear = [&, width = width](BoneEnd end, int j) {
       // A part between two seams that are kept follows their separation planes, too.
       if (!pair.is_inner_seam(i, end) && !pair.is_between()) return 0.0f;
       return static_cast<float>(
