@@ -76,6 +76,7 @@ std::string program_of(const Step& step, const RunOptions& options) {
   return fs::is_regular_file(beside) ? beside.string() : step.tool;
 }
 
+// NOLINTNEXTLINE(readability-function-cognitive-complexity): one branch for each way in which a step can end
 OrderedJson run_item(const Experiment& experiment, const Item& item, const RunOptions& options,
                      const OrderedJson& signature, const std::map<std::string, std::string>& environment) {
   const WorkFolder work;
@@ -156,7 +157,7 @@ OrderedJson row_of(const Experiment& experiment, const OrderedJson& item) {
 
 std::string csv_cell(const OrderedJson& value) {
   if (value.is_null()) return "";
-  const std::string text = value.is_string() ? value.get<std::string>() : value.dump();
+  std::string text = value.is_string() ? value.get<std::string>() : value.dump();
   if (text.find_first_of(",\"\n") == std::string::npos) return text;
   std::string quoted = "\"";
   for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
@@ -207,6 +208,8 @@ OrderedJson experiment_json(const Experiment& experiment) {
 
 }  // namespace
 
+// The order of the run, its threads and its files in one place.
+// NOLINTNEXTLINE(readability-function-cognitive-complexity,readability-function-size)
 RunSummary run_experiment(const Experiment& experiment, const RunOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
   const std::vector<Item> items = plan_items(experiment);
