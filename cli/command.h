@@ -58,13 +58,15 @@ void write_json(const std::string& target, const Json& json);
 void print(const std::string& json_target, const std::string& text);
 void warn(const std::string& text);
 
-/// Fails before the work rather than after it. \throw IoError when the folder of `path` is missing or not writable
+/// Fails before the work rather than after it.
+/// \throw IoError when the folder of `path` is missing or not writable
 void check_output(const std::filesystem::path& path);
 
 /// Reads a mesh, and says on standard error what the reader did to it (polygons split, vertices welded).
 TriangleMesh load_mesh(const std::filesystem::path& path);
 /// Checks that mesh and skeleton fit (validate_before_segmentation, which turns a mesh that is inside out) and prints
-/// every finding to standard error. \throw CLI::RuntimeError(kExitBad) when one is an error
+/// every finding to standard error.
+/// \throw CLI::RuntimeError(kExitBad) when one is an error
 void require_valid(TriangleMesh& mesh, const Skeleton& skeleton, std::optional<TriangleTree>* tree = nullptr);
 
 /// Time on the device by kernel, for the JSON.

@@ -11,7 +11,8 @@ namespace skeletex::cli {
 CLI::Option* add_deform_option(CLI::App& command, std::string& value);
 /// --polish.
 void add_polish_option(CLI::App& command, bool& value, CLI::Option* pose);
-/// Refuses --no-distance with the smooth rule, which restores no distances. \throw CLI::ValidationError
+/// Refuses --no-distance with the smooth rule, which restores no distances.
+/// \throw CLI::ValidationError
 void check_distance_option(bool is_distance_dropped, const std::string& word);
 /// \pre one of the option's words
 Deformation deformation_of(const std::string& word);

@@ -16,9 +16,11 @@ struct FileOption {
   std::vector<std::string> endings;  ///< of an output; empty: any
 };
 
-/// What the option names is read. \return the option
+/// What the option names is read.
+/// \return the option
 CLI::Option* declare_input(CLI::App& command, CLI::Option* option);
-/// What the option names is written. \param endings  those that the command writes, the dot included; empty: any
+/// What the option names is written.
+/// \param endings  those that the command writes, the dot included; empty: any
 CLI::Option* declare_output(CLI::App& command, CLI::Option* option, std::vector<std::string> endings);
 CLI::Option* declare_output_folder(CLI::App& command, CLI::Option* option);
 /// A text that may go to standard output as well.
@@ -39,7 +41,8 @@ std::string option_name(const CLI::Option& option);
 void check_files(const CLI::App& command);
 /// The same for an output whose name the command makes of others, and which no option names.
 void check_made_output(const CLI::App& command, const std::string& path);
-/// Refuses an output that is a file which an input names in turn. \param what  the file, in words
+/// Refuses an output that is a file which an input names in turn.
+/// \param what  the file, in words
 void check_named_input(const CLI::App& command, const std::string& path, const std::string& what);
 
 /// Numbers of the command line: finite, nothing before or behind them, within limits. The message says the limits in

@@ -118,7 +118,8 @@ def fig19_limits(results, folder):
     rows = style.rows(results, "limits")
     if not rows:
         return []
-    messages = ["\n".join(textwrap.wrap(row["columns"]["message"], 60)) for row in rows]
+    refusals = [message[message.find("error:"):] for message in (row["columns"]["message"] for row in rows)]  # without warnings
+    messages = ["\n".join(textwrap.wrap(refusal, 60)) for refusal in refusals]
     return [style.sheet(results, "limits", [[f"{model}.png" for model in _models(rows)]], messages, None, folder, "fig19_limits", cell=4.2)]
 
 

@@ -55,7 +55,8 @@ struct ExperimentChanges {
 Experiment read_experiment(const std::filesystem::path& path, const ExperimentChanges& changes = {});
 /// The files that a list {"name", "experiments": [..]} names, or the path itself when it is an experiment.
 std::vector<std::filesystem::path> experiment_files(const std::filesystem::path& path);
-/// A model by its file, or by its name in `folder`/../models. \throw IoError
+/// A model by its file, or by its name in `folder`/../models.
+/// \throw IoError
 ModelConfig find_model(const std::string& name, const std::filesystem::path& folder);
 
 /// One run of all steps.
@@ -71,7 +72,8 @@ std::vector<Item> plan_items(const Experiment& experiment);
 
 /// A step's arguments for an item. Placeholders: parameters; {model}, {mesh}, {skeleton} and {config} of the item's
 /// model or, as {mesh:NAME}, of any; {work}, a folder that is the item's own and goes when it ends; {out}, the folder
-/// of the results. \throw IoError naming a placeholder that nothing sets
+/// of the results.
+/// \throw IoError naming a placeholder that nothing sets
 std::vector<std::string> fill_arguments(const Experiment& experiment, const Item& item,
                                         const std::vector<std::string>& arguments,
                                         const std::map<std::string, std::string>& more);

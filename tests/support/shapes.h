@@ -18,7 +18,9 @@ struct Shape {
 };
 
 /// One lone bone (both ends free, the segment is a sphere) along z in a capsule: a tube with hemispheres, centred at
-/// the origin. Points lie on the closed form. \param around vertices around, \param rings rings along tube and caps
+/// the origin. Points lie on the closed form.
+/// \param around vertices around,
+/// \param rings rings along tube and caps
 Shape capsule_shape(double length = 2, double radius = 0.5, int around = 32, int rings = 24);
 
 /// A chain of bones of length 1.5, each turned against the one before by `bend_rad` about y: linear nodes only, caps at
@@ -38,7 +40,8 @@ Shape x_shape(double cell = 0.16);
 Shape creature_shape(double cell = 0.13);
 
 /// A torus about z with a ring of bones on its core circle: a cyclic skeleton, no free end, genus 1. Points lie on the
-/// closed form. \pre bones >= 3
+/// closed form.
+/// \pre bones >= 3
 Shape torus_shape(int bones = 5, double core_radius = 2, double tube_radius = 0.5, int along = 64, int around = 24);
 
 /// Two nodes that three bones join, as the Greek letter theta: branches and cycles in one, genus 2.

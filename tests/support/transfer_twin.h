@@ -16,7 +16,8 @@ inline double faded(double rows, double width, bool is_linear) {
   return is_linear ? 1 - rows / width : std::pow(std::cos(std::numbers::pi / 2 * rows / width), 2);
 }
 
-/// Kernel read_source, one point. \param source  points by vertex   \param at  receives the source's column
+/// Kernel read_source, one point.
+/// \param source  points by vertex   \param at  receives the source's column
 inline Vec3 read(const TransferPatch& patch, const TransferRow& row, const TransferColumn& column,
                  const std::function<Vec3(int)>& source, double& at) {
   const double lifted = column.head_column + row.axial * (column.tail_column - column.head_column);
@@ -31,7 +32,8 @@ inline Vec3 read(const TransferPatch& patch, const TransferRow& row, const Trans
          y * ((1 - x) * point(below + 1, left) + x * point(below + 1, right));
 }
 
-/// Kernel place_part, one point. \param source, target  points by vertex
+/// Kernel place_part, one point.
+/// \param source, target  points by vertex
 inline Vec3 place(const TransferPatch& patch, const TransferRow& row, const TransferColumn& column, int j,
                   const std::function<Vec3(int)>& source, const std::function<Vec3(int)>& target,
                   const std::function<double(int, int, bool, int)>& correction) {

@@ -36,7 +36,8 @@ struct TriangleEnergy {
 };
 /// Of the triangles that have an area in the bind pose. One that is pressed to nothing counts as 1e6.
 std::vector<TriangleEnergy> triangle_energies(const BindSurface& bind, std::span<const Vec3> positions);
-/// What a share of the area lies below. \param share  0 to 1    \return 1 when there are none
+/// What a share of the area lies below.
+/// \param share  0 to 1    \return 1 when there are none
 double energy_below(std::vector<TriangleEnergy> energies, double share);
 
 /// How far a pose has spoilt a surface.

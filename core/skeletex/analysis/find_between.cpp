@@ -23,7 +23,8 @@ UsedNodes used_nodes_of(const Skeleton& skeleton) {
   return used;
 }
 
-/// A node that is not inside. \param doubt  what the message says of a surface that is not closed
+/// A node that is not inside.
+/// \param doubt  what the message says of a surface that is not closed
 Finding finding_of_node(const SurfaceProbe& surface, const std::string& name, const Vec3& position,
                         const NearestPoint& nearest, bool is_on_surface, const char* doubt) {
   const double diagonal = surface.diagonal();

@@ -165,7 +165,8 @@ void find_between_bones(const Skeleton& skeleton, const std::vector<bool>& has_l
     }
 }
 
-/// Indices and positions that cannot be used. \return whether there are none
+/// Indices and positions that cannot be used.
+/// \return whether there are none
 bool find_unusable(const Skeleton& skeleton, std::vector<Finding>& findings) {
   const int node_count = static_cast<int>(skeleton.nodes.size());
   const std::size_t before = findings.size();
@@ -185,7 +186,8 @@ bool find_unusable(const Skeleton& skeleton, std::vector<Finding>& findings) {
   return findings.size() == before;
 }
 
-/// Bones by themselves. \return whether each has a length
+/// Bones by themselves.
+/// \return whether each has a length
 std::vector<bool> find_in_bones(const Skeleton& skeleton, double diagonal, std::vector<Finding>& findings) {
   std::vector<bool> has_length(skeleton.bones.size());
   for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b) {

@@ -27,11 +27,13 @@ void find_in_mesh(const TriangleMesh& mesh, const ManifoldReport& report, std::v
 /// Empty for a one-sided surface, which has none.
 TriangleMesh usable_surface(const TriangleMesh& mesh, const ManifoldReport& report);
 
-/// What is wrong with the skeleton by itself. \param diagonal  of the mesh; 0 when there is none
+/// What is wrong with the skeleton by itself.
+/// \param diagonal  of the mesh; 0 when there is none
 /// \return whether its indices and positions can be used at all
 bool find_in_skeleton(const Skeleton& skeleton, double diagonal, std::vector<Finding>& findings);
 
-/// Nodes and bones that leave the body. \param is_closed  whether the surface has an inside without doubt
+/// Nodes and bones that leave the body.
+/// \param is_closed  whether the surface has an inside without doubt
 void find_between(const SurfaceProbe& surface, bool is_closed, const Skeleton& skeleton,
                   std::vector<Finding>& findings);
 

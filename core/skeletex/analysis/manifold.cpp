@@ -40,7 +40,8 @@ struct EdgeSides {
   std::vector<Side> sides;         ///< in a bucket by the larger vertex, then by corner
 };
 
-/// Lists triangles that cannot be used and vertices that are not. \return per triangle whether it is used
+/// Lists triangles that cannot be used and vertices that are not.
+/// \return per triangle whether it is used
 std::vector<char> find_unusable(const TriangleMesh& mesh, ManifoldReport& report) {
   const int vertex_count = report.vertices;
   std::vector<char> is_referenced(vertex_count, 0), is_used(mesh.triangles.size(), 1);

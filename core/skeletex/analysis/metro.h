@@ -41,7 +41,8 @@ MetroReport measure_metro(ClContext& context, const TriangleMesh& a, const Trian
                           const MetroOptions& options = {});
 
 /// Distance from each point to the nearest point of the mesh, as exact as above, world units. The points may come in
-/// any order. \throw InputError as above, or when a point is not finite
+/// any order.
+/// \throw InputError as above, or when a point is not finite
 std::vector<float> closest_distances(ClContext& context, const TriangleMesh& mesh, std::span<const Vec3> points);
 
 }  // namespace skeletex

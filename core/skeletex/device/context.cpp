@@ -122,7 +122,8 @@ std::vector<std::pair<ClDeviceInfo, ::cl::Device>> enumerate() {
   return found;
 }
 
-/// Position in `devices` of the one that the selector names. \throw DeviceError
+/// Position in `devices` of the one that the selector names.
+/// \throw DeviceError
 std::size_t choose_device(const std::vector<std::pair<ClDeviceInfo, ::cl::Device>>& devices,
                           const std::string& selector) {
   if (devices.empty())

@@ -150,7 +150,8 @@ class ClContext {
   ClBuffer<T> upload(const std::vector<T>& values) {
     return upload(std::span<const T>(values));
   }
-  /// Waits for the queue and copies host values to the front of a buffer. \throw DeviceError when they do not fit
+  /// Waits for the queue and copies host values to the front of a buffer.
+  /// \throw DeviceError when they do not fit
   template <class T>
   void write(ClBuffer<T>& buffer, const std::vector<T>& values) {
     check_fits(values.size(), buffer.size);
@@ -174,7 +175,8 @@ class ClContext {
         all);
     return all;
   }
-  /// Waits for the queue and lets the host read the whole buffer where it is. \throw DeviceError when the driver does
+  /// Waits for the queue and lets the host read the whole buffer where it is.
+  /// \throw DeviceError when the driver does
   /// not
   template <class T>
   ClMapping<T> map(const ClBuffer<T>& buffer) {
@@ -200,7 +202,8 @@ class ClContext {
   }
 
   /// Queues a kernel. A struct of parameters is one that a header in kernels/ shares with the kernel. Programs are
-  /// built on first use and kept, see programs_with. \throw DeviceError naming the kernel, the failing call and its
+  /// built on first use and kept, see programs_with.
+  /// \throw DeviceError naming the kernel, the failing call and its
   /// code in words; the argument whose number or kind is not the kernel's own (kinds where the driver tells them); for
   /// a build the log with the kernel file's lines
   template <class... Args>

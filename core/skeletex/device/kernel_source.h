@@ -22,7 +22,8 @@ std::vector<std::vector<std::string_view>> programs_with(std::string_view file);
 
 /// Text of kernel files, one after the other: each from the folder that SKELETEX_KERNEL_DIR names when it is set, else
 /// the embedded copy. Lines `#include "x.h"` are replaced by the file x.h (in turn), the first time, so that a program
-/// is one text on every driver; `#line` keeps the files' own line numbers. \throw DeviceError when the file does not
+/// is one text on every driver; `#line` keeps the files' own line numbers.
+/// \throw DeviceError when the file does not
 /// exist, or includes itself
 std::string kernel_source(std::span<const std::string_view> files);
 

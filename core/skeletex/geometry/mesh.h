@@ -31,7 +31,8 @@ BoundingBox bounding_box(const TriangleMesh& mesh);
 /// Area vector of a triangle: half the cross product of its edges, along the outward normal.
 Vec3 area_vector(const TriangleMesh& mesh, const Triangle& triangle);
 double surface_area(const TriangleMesh& mesh);
-/// Enclosed volume by the divergence theorem; negative when the mesh is inside out. \pre closed
+/// Enclosed volume by the divergence theorem; negative when the mesh is inside out.
+/// \pre closed
 double signed_volume(const TriangleMesh& mesh);
 
 }  // namespace skeletex

@@ -17,9 +17,11 @@ class NearestSearch {
   const std::vector<int>& order() const { return order_; }
 
   /// Per point the nearest triangle, found in single precision. Points that follow each other in space are found
-  /// fastest. \param distances  when given, those of the device: float32's resolution of the mesh's extent; world units
+  /// fastest.
+  /// \param distances  when given, those of the device: float32's resolution of the mesh's extent; world units
   /// \param enough     a triangle so near need not be the nearest: faster where only what is further matters; world
-  /// units \param bounds     when given, per point how far the nearest triangle is at most: the nearer that is, the
+  /// units
+  /// \param bounds     when given, per point how far the nearest triangle is at most: the nearer that is, the
   /// faster; world units
   void find(std::span<const Vec3> points, std::span<int> triangles, std::span<float> distances = {}, float enough = 0,
             std::span<const float> bounds = {});

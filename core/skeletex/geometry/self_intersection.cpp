@@ -78,7 +78,8 @@ struct LinePart {
 };
 
 /// Where a triangle meets the line of its plane and another one.
-/// \param normal, origin  of the other plane \param axis    the coordinate by which the line is measured
+/// \param normal, origin  of the other plane
+/// \param axis    the coordinate by which the line is measured
 /// \param first           1 when the first vertex lies in the other plane, else 0
 Answer cut_by_plane(const Corners& points, const Vec3& normal, const Vec3& origin, double extent, Eigen::Index axis,
                     int first, LinePart& part) {
@@ -288,7 +289,8 @@ struct PairSearch {
                        [&](int v) { return (v == b[0] || v == b[1] || v == b[2]) && is_plain[v] != 0; });
   }
 
-  /// Blocks whose boxes overlap one. \param first  blocks before it are left out
+  /// Blocks whose boxes overlap one.
+  /// \param first  blocks before it are left out
   void list_blocks(const Box& box, std::size_t first, std::vector<std::size_t>& listed) const {
     struct Entry {
       int level;
@@ -312,7 +314,8 @@ struct PairSearch {
   }
 
   /// Pairs of the triangle at a place with those of a block; each pair once, from the earlier place of two in the
-  /// query set. \param boxes  of the block's triangles
+  /// query set.
+  /// \param boxes  of the block's triangles
   void add_pairs(std::size_t place, const Box& box, std::size_t block, const float* boxes, Pairs& found) const {
     const auto gaps = gaps_between(boxes, box);
     const int own = tree.order[place];

@@ -29,7 +29,8 @@ Box joined(const Box& a, const Box& b) {
   return box;
 }
 
-/// Writes a block's triangles into the tree. \return their box
+/// Writes a block's triangles into the tree.
+/// \return their box
 Box fill_block(const TriangleMesh& mesh, std::size_t block, TriangleTree& tree) {
   float* planes = tree.blocks.data() + block * 9 * kWidth;
   Box around = kNoBox;

@@ -11,7 +11,8 @@ class UnionFind {
  public:
   explicit UnionFind(int count = 0) : parents_(count) { std::iota(parents_.begin(), parents_.end(), 0); }
 
-  /// Adds a number, in a set of its own. \return it
+  /// Adds a number, in a set of its own.
+  /// \return it
   int add() {
     parents_.push_back(static_cast<int>(parents_.size()));
     return parents_.back();

@@ -118,7 +118,8 @@ void check_allocations(const Reader& in, const ExrSurvey& survey) {
   }
 }
 
-/// Checks the attributes and takes the size from them. \return rows per chunk
+/// Checks the attributes and takes the size from them.
+/// \return rows per chunk
 int check_header(const Reader& in, int max_size, bool is_one_of_several, ExrSurvey& survey) {
   check_allocations(in, survey);
   const auto required = [&](const char* name, const char* type, std::size_t size) -> const std::string& {

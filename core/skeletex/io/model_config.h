@@ -16,7 +16,8 @@ struct ModelConfig {
 };
 
 /// Reads {"name", "mesh", "skeleton", "credits"} and, where it is there, "view". Whether the two files exist is not
-/// checked here. \throw IoError
+/// checked here.
+/// \throw IoError
 ModelConfig read_model_config(const std::filesystem::path& path);
 
 }  // namespace skeletex

@@ -27,7 +27,8 @@ struct ModelFileOptions {
 void write_model(const std::filesystem::path& path, const SkeletexModel& model, const ModelFileOptions& options = {});
 
 /// Writes a chain of levels of detail, the finest first, as one OpenEXR file with a part for each
-/// (docs/file-formats.md). One level is written as write_model does. \throw IoError
+/// (docs/file-formats.md). One level is written as write_model does.
+/// \throw IoError
 void write_model_levels(const std::filesystem::path& path, std::span<const SkeletexModel> levels,
                         const ModelFileOptions& options = {});
 
@@ -39,7 +40,8 @@ SkeletexModel read_model(const std::filesystem::path& path, int level = 0);
 /// The header's JSON alone, without reading texels, for `skeletex inspect`.
 nlohmann::json read_model_header(const std::filesystem::path& path, int level = 0);
 
-/// Width and height of every level in a file, without reading texels. \throw IoError
+/// Width and height of every level in a file, without reading texels.
+/// \throw IoError
 std::vector<std::array<int, 2>> read_model_levels(const std::filesystem::path& path);
 
 }  // namespace skeletex

@@ -21,7 +21,8 @@ SkeletexModel model_from_json(const nlohmann::json& json, const std::string& whe
 /// The channels that hold the weights of bones, one per bone: "weights." and the bone's name, in which all but letters,
 /// digits, - and _ is _.
 std::vector<std::string> weight_channels(const Skeleton& skeleton);
-/// The channels that a header names for its weights, one per bone; empty: it names none. \throw IoError
+/// The channels that a header names for its weights, one per bone; empty: it names none.
+/// \throw IoError
 std::vector<std::string> weight_channels(const nlohmann::json& header, std::size_t bones, const std::string& where);
 
 }  // namespace skeletex

@@ -30,7 +30,8 @@ std::vector<std::string> method_names();
 Method method_named(const std::string& name);
 
 /// Adds a method to the table. Models that name it can then be read.
-/// \pre no other thread uses the table \throw InputError when the name is taken
+/// \pre no other thread uses the table
+/// \throw InputError when the name is taken
 Method add_method_traits(MethodTraits traits);
 
 }  // namespace skeletex

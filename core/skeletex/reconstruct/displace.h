@@ -27,7 +27,8 @@ DevicePlanes upload_planes(ClContext& context, std::span<const float> x, std::sp
 DevicePlanes upload_texels(ClContext& context, const DisplacementTexture& texture);
 /// Waits for the queue and copies the planes to the host.
 std::array<std::vector<float>, 3> download_planes(ClContext& context, const DevicePlanes& planes);
-/// The same as positions. \param origin  world position that the points are relative to
+/// The same as positions.
+/// \param origin  world position that the points are relative to
 /// \param positions  the first ones are set
 void download_points(ClContext& context, const DevicePlanes& points, const Vec3& origin, std::span<Vec3> positions);
 /// Waits for the queue and copies the planes to a texture, whose size is left as it is.

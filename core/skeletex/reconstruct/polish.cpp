@@ -67,7 +67,8 @@ std::vector<int> moved_parts(const SurfaceEdges& edges, const std::vector<Vec3>&
 }
 
 /// Per part, by its number, the pairs of triangles that intersect, do not in the bind pose, and of which one is the
-/// part's. \param known  the pairs of the bind pose, sorted
+/// part's.
+/// \param known  the pairs of the bind pose, sorted
 std::vector<int> new_intersections(const std::vector<Triangle>& triangles, const std::vector<std::array<int, 2>>& known,
                                    const std::vector<Vec3>& positions, const std::vector<int>& part) {
   std::vector<int> counts(positions.size(), 0);

@@ -49,7 +49,8 @@ void pose_by_coordinates(ClContext& context, const SkeletexModel& model, const D
                          const PosedPlanes& posed, DistanceRule rule, const Vec3& origin, DevicePlanes& points);
 
 /// Places the other vertices, on the host in double precision: poles by their own coordinates, seam samples and corners
-/// by the paper's rule. \param positions  by lattice vertex, world; inner vertices are left as they are
+/// by the paper's rule.
+/// \param positions  by lattice vertex, world; inner vertices are left as they are
 void place_shared_by_coordinates(const PreparedModel& model, const PosedPlanes& posed, DistanceRule rule,
                                  std::vector<Vec3>& positions);
 

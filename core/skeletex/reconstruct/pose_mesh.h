@@ -22,13 +22,15 @@ struct PoseRule {
 };
 
 /// The model's mesh in a pose. Vertices and triangles are numbered as in reconstruct_mesh(context, model): all poses of
-/// a model share their triangles, and every pose is as closed as the bind pose. \param posed apply_pose(model.skeleton,
+/// a model share their triangles, and every pose is as closed as the bind pose.
+/// \param posed apply_pose(model.skeleton,
 /// ...)
 TriangleMesh reconstruct_mesh(ClContext& context, const PreparedModel& model, const Skeleton& posed,
                               const PoseRule& rule = {});
 
 /// Places poles, seam samples and corners of a pose by the paper's rules. They are few, and several patches share them,
-/// so the host does this in double precision. \param positions  by lattice vertex, world; inner vertices are left as
+/// so the host does this in double precision.
+/// \param positions  by lattice vertex, world; inner vertices are left as
 /// they are
 void place_shared_vertices(const PreparedModel& model, const PosedPlanes& posed, DistanceRule rule,
                            std::vector<Vec3>& positions);

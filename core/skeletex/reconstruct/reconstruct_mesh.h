@@ -27,12 +27,15 @@ struct BindMesh {
 };
 BindMesh reconstruct_bind_mesh(ClContext& context, const PreparedModel& model);
 
-/// The vertices of that mesh alone, in the order of lattice.h. \throw DeviceError
+/// The vertices of that mesh alone, in the order of lattice.h.
+/// \throw DeviceError
 std::vector<Vec3> lattice_positions(ClContext& context, const PreparedModel& model);
-/// Its triangles that touch a pole or a seam: fans and strips. \param positions  of all vertices of the lattice
+/// Its triangles that touch a pole or a seam: fans and strips.
+/// \param positions  of all vertices of the lattice
 std::vector<Triangle> end_triangles(const PreparedModel& model, const std::vector<Vec3>& positions);
 
-/// The seam of an end, and its turns as strips take them; empty at a pole. \param positions  at least of seams
+/// The seam of an end, and its turns as strips take them; empty at a pole.
+/// \param positions  at least of seams
 struct EndSeam {
   Ring ring;
   std::vector<double> turns;

@@ -33,7 +33,8 @@ FilterTaps filter_taps(int old_count, int new_count, bool is_periodic, ResampleF
 std::vector<Vec3> resample_polyline(const std::vector<Vec3>& points, bool is_closed, int cells, ResampleFilter filter);
 
 /// The rectangles of a width x height texture scaled to another one: edges keep their places relative to it, to
-/// rounding, so that nothing overlaps and covered stays covered. \return empty when a rectangle would fall below 4 x 4
+/// rounding, so that nothing overlaps and covered stays covered.
+/// \return empty when a rectangle would fall below 4 x 4
 std::vector<Rectangle> scale_rectangles(const std::vector<Patch>& patches, int width, int height, int new_width,
                                         int new_height);
 

@@ -17,7 +17,8 @@ struct Ring {
 /// Fills the strip between a seam and the inner row next to it with triangles, outward. Every edge of both rings is an
 /// edge of exactly one triangle, and no edge between the rings occurs twice, whatever the rings are. Edges between the
 /// rings span about a cell of v at most; among these merges the one with the smallest sum of their squared lengths is
-/// taken. \param turns  of the seam, in place of its own: see seam_turns
+/// taken.
+/// \param turns  of the seam, in place of its own: see seam_turns
 /// \pre seam has at least 3 vertices, row at least 4
 void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, std::span<const double> turns,
                        const Ring& row, BoneEnd end, std::vector<Triangle>& triangles);

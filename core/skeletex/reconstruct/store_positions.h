@@ -14,8 +14,10 @@ namespace skeletex {
 /// A seam lies in its separation planes, and a corner lies on the ray where separation planes meet. The model stores a
 /// seam vertex as its angle about the bone and its distance from it. So a vertex that lies in its separation plane
 /// comes back at its place (slide_to_separation moves it there); any other comes back at the point of the plane with
-/// that angle and distance. Row 0 and the last row of a patch follow the seams and poles. \param positions  of all
-/// vertices of the model's lattice (lattice.h), world units \throw InputError when their number differs or one is not
+/// that angle and distance. Row 0 and the last row of a patch follow the seams and poles.
+/// \param positions  of all
+/// vertices of the model's lattice (lattice.h), world units
+/// \throw InputError when their number differs or one is not
 /// finite; DeviceError
 SkeletexModel store_positions(ClContext& context, const PreparedModel& model, std::span<const Vec3> positions);
 

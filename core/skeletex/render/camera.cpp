@@ -63,7 +63,8 @@ View parse_view(const nlohmann::json& json, const std::string& source) {
 
 namespace {
 
-/// The box around the places of points. \param place  (point) -> place
+/// The box around the places of points.
+/// \param place  (point) -> place
 template <class Place>
 BoundingBox bounds_of(std::span<const Vec3> points, const Place& place) {
   if (points.empty()) return {};

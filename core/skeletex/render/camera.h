@@ -22,7 +22,9 @@ struct View {
 };
 
 /// A view from JSON. Its keys are up, front, azimuth, elevation, fov, zoom, target and eye, as the members above; all
-/// may be missing. \param where  name of the JSON in messages, for example its path \throw IoError naming a key that is
+/// may be missing.
+/// \param where  name of the JSON in messages, for example its path
+/// \throw IoError naming a key that is
 /// unknown or has no such value
 View parse_view(const nlohmann::json& json, const std::string& where);
 

@@ -32,7 +32,8 @@ struct DrawOptions {
 };
 
 /// Draws a surface, smooth or flat. A key light shines from the upper left, and a sky from many directions, each with
-/// its shadows, so that folds and contacts are dark. The background stays clear. \throw DeviceError
+/// its shadows, so that folds and contacts are dark. The background stays clear.
+/// \throw DeviceError
 Image draw(GlContext& context, const GpuSurface& surface, const SurfacePaint& paint, const Camera& camera,
            const DrawOptions& options);
 

@@ -21,7 +21,8 @@ std::vector<GlDeviceInfo> list_gl_devices();
 class GlContext {
  public:
   /// \param selector  "" : the first hardware device that works, else software; or a device's number or a part of its
-  /// name \throw DeviceError when there is no such device or it has no OpenGL 4.5
+  /// name
+  /// \throw DeviceError when there is no such device or it has no OpenGL 4.5
   explicit GlContext(const std::string& selector = "");
   ~GlContext();
   GlContext(const GlContext&) = delete;

@@ -32,7 +32,8 @@ struct GpuSkin {
 GpuSkin upload_skin(const Skin& skin, const TriangleMesh& bind);
 
 /// Moves a surface's vertices as the other pose_skin does: inner vertices in a compute shader, shared ones on the host.
-/// Normals follow. \param posed  the skeleton that the motions lead to
+/// Normals follow.
+/// \param posed  the skeleton that the motions lead to
 void pose_skin(GlContext& context, const GpuSkin& device, const Skin& skin, std::span<const BoneMotion> motions,
                const Skeleton& posed, GpuSurface& surface);
 

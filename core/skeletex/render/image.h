@@ -22,15 +22,18 @@ struct Image {
 Image make_image(int width, int height);
 
 LinearRgb to_linear(const VertexColour& srgb);
-/// `over` with the given opacity on top of `under`. \pre same size
+/// `over` with the given opacity on top of `under`.
+/// \pre same size
 void blend_over(Image& under, const Image& over, double opacity = 1);
 void fill_background(Image& image, const LinearRgb& colour);
 /// Pictures side by side in rows of at most `columns`, each in the middle of its cell.
 Image tile(std::span<const Image> images, int columns);
 
-/// 8 bit sRGB with straight alpha. Atomic. \throw IoError
+/// 8 bit sRGB with straight alpha. Atomic.
+/// \throw IoError
 void write_png(const std::filesystem::path& path, const Image& image);
-/// Linear float channels R, G, B, A (premultiplied, as EXR has it). Atomic. \throw IoError
+/// Linear float channels R, G, B, A (premultiplied, as EXR has it). Atomic.
+/// \throw IoError
 void write_exr_image(const std::filesystem::path& path, const Image& image);
 
 /// Text, 8 bit sRGB colour; (x, y) is the baseline's left end, or its middle.

@@ -30,7 +30,8 @@ struct BoneWeight {
 };
 
 /// A point moved by blended dual quaternions (Kavan et al., Geometric Skinning with Approximate Dual Quaternion
-/// Blending, 2008). \param weights  at least one above 0; their sum does not matter
+/// Blending, 2008).
+/// \param weights  at least one above 0; their sum does not matter
 Vec3 blend_motions(std::span<const BoneMotion> motions, std::span<const BoneWeight> weights, const Vec3& point);
 
 /// The dual part of a motion's dual quaternion, (w, x, y, z), for points that are relative to `bind_origin` before and

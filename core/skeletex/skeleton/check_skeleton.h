@@ -12,7 +12,8 @@ namespace skeletex {
 void check_skeleton_inside(const CutMesh& mesh, const Skeleton& skeleton);
 
 /// How often a closed mesh winds around a point off its surface: 1 inside, 0 outside, -1 inside a mesh that is inside
-/// out. \param corners  three vertices per triangle
+/// out.
+/// \param corners  three vertices per triangle
 int winding_number(std::span<const Vec3> positions, std::span<const int> corners, const Vec3& point);
 
 }  // namespace skeletex

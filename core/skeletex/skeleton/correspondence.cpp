@@ -178,7 +178,8 @@ class Search {
     std::vector<int> bones, nodes;
     std::vector<bool> is_reversed, is_taken, is_node_taken;
   };
-  /// Assigns all bones when x becomes y. \return the cost, or kImpossible if it is not below the bound
+  /// Assigns all bones when x becomes y.
+  /// \return the cost, or kImpossible if it is not below the bound
   double assign_tree(State& state, BoneAtNode x, BoneAtNode y) {
     const BoneAtNode behind_x{x.bone, opposite(x.end)}, behind_y{y.bone, opposite(y.end)};
     double cost = bone_cost(x, y);

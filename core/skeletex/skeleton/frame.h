@@ -34,7 +34,8 @@ Vec3 encode_texel(const TangentFrame& frame, const Vec3& point, const Vec3& head
 Vec3 decode_texel(const TangentFrame& frame, const Vec3& texel, const Vec3& head, const Vec3& tail);
 
 /// The c at which the ray foot + c direction leaves a capsule around an axis from lower to upper (kernels/capsule.h).
-/// The foot lies on the axis, at z, inside the capsule. \param along, across  parts of the direction, not both 0
+/// The foot lies on the axis, at z, inside the capsule.
+/// \param along, across  parts of the direction, not both 0
 double leave_capsule(double z, double along, double across, double radius, double lower, double upper);
 
 /// The tables that the kernels read (see skeletex_structs.h), for all patches of a model or of a layout.

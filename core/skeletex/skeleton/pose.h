@@ -31,7 +31,8 @@ struct PoseAnimation {
 };
 /// The pose at a time. Rotations are interpolated by slerp, the shorter way, bone by bone; nodes and rolls linearly.
 /// Times outside the animation give its first or last frame. Where only one of two neighbouring frames gives a value,
-/// the other counts as the bind pose. \throw InputError when one of the two frames turns bones and the other one moves
+/// the other counts as the bind pose.
+/// \throw InputError when one of the two frames turns bones and the other one moves
 /// nodes
 Pose pose_at(const Skeleton& bind, const PoseAnimation& animation, double time);
 
@@ -49,13 +50,15 @@ std::vector<int> root_nodes(const Skeleton& skeleton);
 ///   the
 ///     whole component, and then a roll about itself; the rolls spread the remaining twist evenly over all joints.
 /// Either way, a rigid motion of all nodes is that motion of all bases, and neither names nor order nor direction of
-/// the bones matter. \throw InputError when sizes do not match, a bone of a cycle is to be turned, or a bone has no
+/// the bones matter.
+/// \throw InputError when sizes do not match, a bone of a cycle is to be turned, or a bone has no
 /// length; it names the
 ///         bone
 Skeleton apply_pose(const Skeleton& bind, const Pose& pose);
 
 /// A random pose: every bone that is not at a root turns about an axis that is uniform on the sphere, by an angle that
-/// is uniform in [0, largest]. The same seed gives the same pose on every machine. \param largest  radians    \throw
+/// is uniform in [0, largest]. The same seed gives the same pose on every machine.
+/// \param largest  radians    \throw
 /// InputError for skeletons with cycles, whose bones cannot be turned
 Pose make_random_pose(const Skeleton& skeleton, double largest, std::uint64_t seed);
 

@@ -50,14 +50,16 @@ double bone_length(const Skeleton& skeleton, int bone);
 /// Position of the node at one end of a bone.
 const Vec3& end_position(const Skeleton& skeleton, int bone, BoneEnd end);
 int end_node(const Skeleton& skeleton, int bone, BoneEnd end);
-/// The end of a bone that lies at a node. \pre one of them does
+/// The end of a bone that lies at a node.
+/// \pre one of them does
 BoneEnd end_at(const Skeleton& skeleton, int bone, int node);
 
 /// Bases of all bones. A given `s` is made orthonormal to o; a missing one is carried from a neighbouring bone by the
 /// reflection in the separation plane between them, so that nothing twists: a point of the separation plane at angle v
 /// about the one bone lies at v about the other, or at -v when the same end of both is at the node. (Where a tail meets
 /// a head this is the smallest rotation between the two.) Carried breadth first from the given ones, else from the
-/// first bone of each component, whose own s is the world axis least aligned with o, made orthogonal. \throw InputError
+/// first bone of each component, whose own s is the world axis least aligned with o, made orthogonal.
+/// \throw InputError
 /// naming a bone of no length, or one whose s is parallel to it
 std::vector<BoneBasis> bone_bases(const Skeleton& skeleton);
 
@@ -65,7 +67,8 @@ std::vector<BoneBasis> bone_bases(const Skeleton& skeleton);
 /// \throw TopologyError naming the bones, the node and its place
 void check_directions(const Skeleton& skeleton);
 
-/// Centre of the nodes' bounding box. \pre there are nodes
+/// Centre of the nodes' bounding box.
+/// \pre there are nodes
 Vec3 middle_of_nodes(const Skeleton& skeleton);
 
 /// Distance from a point to the bone segment [H,T].

@@ -23,8 +23,10 @@ using MeshInputPointer = std::shared_ptr<const MeshInput>;
 /// \throw IoError naming the file that is missing and how to get the standard meshes
 MeshInputPointer read_mesh_input(const std::filesystem::path& config);
 /// The same for one of the project's models by its name: configs/models/NAME.json, looked for in the current folder and
-/// those above it, then in those above the program. \param subdivisions  every triangle becomes four, so many times
-/// over; the surface stays. mesh_path is then the unchanged mesh's \throw IoError saying where it looked, and what to
+/// those above it, then in those above the program.
+/// \param subdivisions  every triangle becomes four, so many times
+/// over; the surface stays. mesh_path is then the unchanged mesh's
+/// \throw IoError saying where it looked, and what to
 /// do
 MeshInputPointer find_mesh_input(const std::string& name, int subdivisions = 0);
 

@@ -35,17 +35,20 @@ Stage filter_stage(ClContext& context, TextureInputPointer input);
 // On meshes; against other libraries.
 
 /// Charts to maps by the default recipe; against Eigen's SimplicialLDLT on systems of the same pattern and number, one
-/// pattern analysis per chart. \param threads  of the reference: 1, or 0 for all processors
+/// pattern analysis per chart.
+/// \param threads  of the reference: 1, or 0 for all processors
 Stage vsm_stage(ClContext& context, MeshInputPointer input, int threads = 0);
 /// The rays of all texels; against Embree's packets of eight coherent rays on all processors, with its trees.
 Stage spd_rays_stage(ClContext& context, MeshInputPointer input, int size);
 /// Closest points of 16 points per triangle, in the order of a Hilbert curve; against Embree's point queries on all
-/// processors. \param noise_rel_diag  how far the points lie from the surface
+/// processors.
+/// \param noise_rel_diag  how far the points lie from the surface
 Stage metro_stage(ClContext& context, MeshInputPointer input, double noise_rel_diag = 1e-3);
 /// Half edges and cuts; against OpenMesh taking in the same faces.
 Stage segment_stage(ClContext& context, MeshInputPointer input);
 /// The command `skeletex encode`, process and files included; against OpenMesh reading the mesh file and OpenEXR
-/// writing as many texels. \param program  skeletex    \param device  selector for it
+/// writing as many texels.
+/// \param program  skeletex    \param device  selector for it
 Stage encode_stage(MeshInputPointer input, int size, const std::string& program, const std::string& device = "");
 /// What snapping and fit, as they are by default, add to that command's encoding; against its whole parameterization.
 /// Parameters as above.

@@ -24,7 +24,8 @@ struct FitReport {
 /// Moves the points of VSM patches in space so that the flat triangles between them are nearer to the mesh, in both
 /// directions: Gauss-Newton with weights 1 / |residual|, so the mean distance falls and not its square. Samples are
 /// four points of the mesh per quad of the lattice and the middle of each of its triangles. End rows stay; no point
-/// moves by more than a quarter of a cell in a step and a cell in all. See docs/steps/snap.md. \param covering  per
+/// moves by more than a quarter of a cell in a step and a cell in all. See docs/steps/snap.md.
+/// \param covering  per
 /// texel the triangle of the map that covers its place, as encode.cl's cover_texels leaves it
 FitReport fit_points(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps,
                      const ClBuffer<int>& covering, const ReadingPositions& positions, TexelPoints& points,

@@ -27,7 +27,8 @@ struct ExpectedError {
 };
 /// The expected error of a chart that is mapped. A surface of triangles bends at its edges: one of length l and
 /// dihedral angle d adds d l h^2, where h is the extent of a cell across it (that of a column plus that of a row, each
-/// as the triangles at the edge are stretched). Triangles at poles do not count. \param profile  of its rows; null:
+/// as the triangles at the edge are stretched). Triangles at poles do not count.
+/// \param profile  of its rows; null:
 /// they are even in u
 ExpectedError expected_error(const Chart& chart, const RowProfile* profile);
 
@@ -40,7 +41,8 @@ struct PatchSource {
 /// they have the ratio with the least expected error, and the share is the geometric mean of triangles and the root of
 /// that error: shares by the root have the least error all in all, where errors fall as cells get smaller; but where
 /// texels sit on vertices and edges, what counts is how many there are for each. Height fields keep the ratio of girth
-/// to length, and their share is by triangles. \param profiles  of rows, of mapped patches; empty: rows are even in u
+/// to length, and their share is by triangles.
+/// \param profiles  of rows, of mapped patches; empty: rows are even in u
 std::vector<PatchRequest> patch_requests(std::span<const PatchSource> sources, std::span<const RowProfile> profiles,
                                          TexelShare share);
 

@@ -16,7 +16,8 @@ struct RowProfile {
 };
 
 /// Profile of a map: every triangle counts with its width in v at each u, exactly, in bins whose borders follow the
-/// vertices. \pre chart.u and chart.v are filled
+/// vertices.
+/// \pre chart.u and chart.v are filled
 RowProfile row_profile(const Chart& chart);
 
 /// Profile of points on a regular grid in u: `positions` holds rows x columns points, row-major, row r at

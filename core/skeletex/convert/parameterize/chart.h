@@ -37,7 +37,8 @@ struct Chart {
 /// Fixes the boundary rows of a segment by the angle about its bone (see loop_turns for loops that are no graphs over
 /// the angle), inserts the poles at free ends (where the ray from the free node along the bone, away from it, leaves
 /// the segment last), splits edges and triangles that join two vertices of one row, and counts the turns between the
-/// rows so that the map is not twisted. \throw TopologyError naming the bone when the pole's ray misses the segment
+/// rows so that the map is not twisted.
+/// \throw TopologyError naming the bone when the pole's ray misses the segment
 Chart make_chart(const Segment& segment, const Skeleton& skeleton, const SeparationPlanes& separation);
 
 /// Signed areas in (v, u), with the trapezoid for a pole's triangle: all > 0 when the map is a bijection.

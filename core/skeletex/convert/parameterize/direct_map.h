@@ -6,7 +6,8 @@ namespace skeletex {
 
 /// The map of vsm.cl once more by a sparse factorization in double precision on the host: for charts that single
 /// precision does not do. Fills u and v of all inner vertices. Of a lone bone, whose v is free to turn, any turn will
-/// do. \param iterations, alpha  see VsmOptions
+/// do.
+/// \param iterations, alpha  see VsmOptions
 void map_directly(Chart& chart, int iterations, double alpha);
 
 }  // namespace skeletex

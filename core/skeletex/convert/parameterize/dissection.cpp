@@ -49,7 +49,8 @@ class Dissector {
  private:
   static constexpr signed char kLeft = 1, kRight = 2, kSeparator = 4;
 
-  /// Orders items_[begin] to items_[end - 1]. \return the fronts that have no parent yet
+  /// Orders items_[begin] to items_[end - 1].
+  /// \return the fronts that have no parent yet
   std::vector<int> divide(int begin, int end) {
     if (begin == end) return {};
     const std::span<Item> all = std::span(items_).subspan(begin, end - begin);

@@ -57,10 +57,12 @@ class ParameterizationMethod {
 const ParameterizationMethod& parameterization(Method method);
 
 /// Registers another method. Models can be encoded with it, written and read from then on.
-/// \pre no other thread uses the table of methods \throw InputError when the name is taken
+/// \pre no other thread uses the table of methods
+/// \throw InputError when the name is taken
 Method register_method(MethodTraits traits, std::unique_ptr<ParameterizationMethod> method);
 
-/// Maps each chart by its own method, those of one method together. \return one report per chart
+/// Maps each chart by its own method, those of one method together.
+/// \return one report per chart
 std::vector<MapReport> map_charts(ClContext& context, std::span<const Method> methods, std::vector<Chart>& charts,
                                   const MapOptions& options);
 

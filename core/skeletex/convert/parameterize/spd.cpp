@@ -267,7 +267,8 @@ std::vector<float> bounding_spheres(const LocalTriangles& local) {
   return spheres;
 }
 
-/// The share of a chart's area that is hidden. \param is_hidden  per triangle
+/// The share of a chart's area that is hidden.
+/// \param is_hidden  per triangle
 double hidden_fraction(const Chart& chart, std::span<const int> is_hidden) {
   double unseen = 0, area = 0;
   for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
@@ -280,7 +281,8 @@ double hidden_fraction(const Chart& chart, std::span<const int> is_hidden) {
   return area > 0 ? unseen / area : 0;
 }
 
-/// Appends tables behind each other. \return where the second one begins
+/// Appends tables behind each other.
+/// \return where the second one begins
 int append(std::vector<int>& tables, const std::vector<int>& more) {
   const int begin = static_cast<int>(tables.size());
   tables.insert(tables.end(), more.begin(), more.end());

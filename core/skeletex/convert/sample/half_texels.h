@@ -19,7 +19,9 @@ struct RoundingReport {
 /// Rounds the texels of inner rows to half floats (16 bits). The nearest ones move points by up to half a step of each
 /// number, in any direction; of those near them the ones are taken whose points stay nearest to the lattice's own
 /// planes around, so that they move along the surface. Texels of rows 0 and height-1, and numbers that are 0, stay: SPD
-/// texels are the nearest ones. \param rule     of the lattice's diagonals \param rows, columns  see frame_tables
+/// texels are the nearest ones.
+/// \param rule     of the lattice's diagonals
+/// \param rows, columns  see frame_tables
 /// \param points   of the texels, relative to the origin of the tables
 /// \param texels   in and out: along, around, out
 RoundingReport round_to_half(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches,
@@ -30,7 +32,8 @@ struct RoundedModel {
   SkeletexModel model;
   RoundingReport report;
 };
-/// The same for a model's texels as they are. \throw DeviceError
+/// The same for a model's texels as they are.
+/// \throw DeviceError
 RoundedModel round_to_half(ClContext& context, const SkeletexModel& model);
 
 }  // namespace skeletex

@@ -42,7 +42,8 @@ std::vector<int> known_places(const std::vector<float>& values, int line_begin, 
 }
 
 /// Distances along the rays of one SPD patch; a missed texel takes the mean of the nearest hits of its column, weighted
-/// by nearness, or of its row where the whole column missed. \return texels filled
+/// by nearness, or of its row where the whole column missed.
+/// \return texels filled
 int fill_missed(const SpdHits& hits, const Rectangle& r, std::vector<float>& distances) {
   distances = hits.distances;
   int missed = 0;
@@ -207,7 +208,8 @@ TexelStage prepare_stage(ClContext& context, const Skeleton& skeleton, const Sep
   return stage;
 }
 
-/// VSM patches at the places of their texels. \param missed  out, per bone
+/// VSM patches at the places of their texels.
+/// \param missed  out, per bone
 ReadTexels read_regular_grid(const TexelStage& stage, ClBuffer<int>& is_read, std::vector<int>& missed) {
   ClContext& context = stage.context;
   const DeviceLayout& layout = stage.layout;
@@ -277,7 +279,8 @@ UnfoldReport unfold(const TexelStage& stage, ClBuffer<int>& is_read, ReadTexels&
                         texels.positions, texels.points);
 }
 
-/// Texels of VSM patches where they snap to. \param regular  its positions are taken over
+/// Texels of VSM patches where they snap to.
+/// \param regular  its positions are taken over
 ReadTexels snap(const TexelStage& stage, ClBuffer<int>& is_read, ReadTexels& regular) {
   ClContext& context = stage.context;
   const DeviceLayout& layout = stage.layout;
@@ -325,7 +328,8 @@ TexelPoints prefilter(const TexelStage& stage, const TexelPoints& points, const 
   return filtered;
 }
 
-/// Texels revert to the regular grid, as it would be stored. \return what holds them then
+/// Texels revert to the regular grid, as it would be stored.
+/// \return what holds them then
 std::vector<int> revert(const TexelStage& stage, const TexelOptions& options, std::span<const int> vertex_points,
                         const ReadTexels& regular, ReadTexels& texels, TexelReport& report) {
   ClContext& context = stage.context;

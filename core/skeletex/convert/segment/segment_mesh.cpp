@@ -332,7 +332,8 @@ void Segmenter::find_loops() {
 }
 
 /// Turns a loop so that it begins at the corner with the smallest angle; without corners at the vertex with the
-/// smallest angle. \return whether it has corners
+/// smallest angle.
+/// \return whether it has corners
 bool Segmenter::turn_to_first_corner(int bone, int node, std::vector<int>& ring) const {
   const auto is_corner = [&](int h) { return seam_degree_[mesh_.origins[h]] != 2; };
   const bool has_corners = std::any_of(ring.begin(), ring.end(), is_corner);

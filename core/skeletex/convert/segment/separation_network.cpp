@@ -105,7 +105,8 @@ void SeparationNetwork::add_piece(const Ring& ring, int to, MixedTriangle& trian
   components_.unite(from, to);
 }
 
-/// A cell is convex: where it comes twice it is one region. \return whether one does
+/// A cell is convex: where it comes twice it is one region.
+/// \return whether one does
 bool SeparationNetwork::split_at_repeated_cell(const Ring& ring, MixedTriangle& triangle) {
   const int size = ring.size();
   for (int p = 0; p < size; ++p)

@@ -13,7 +13,8 @@
 namespace skeletex {
 namespace {
 
-/// Appends the quads of a square of rows and columns along a Z-order curve. \param quads  rows x columns of a patch
+/// Appends the quads of a square of rows and columns along a Z-order curve.
+/// \param quads  rows x columns of a patch
 void append_square(int row, int column, int size, int rows, int columns, int first_quad, std::vector<int>& triangles) {
   if (row >= rows || column >= columns) return;
   if (size == 1) {

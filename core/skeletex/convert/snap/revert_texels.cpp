@@ -23,7 +23,8 @@ struct Quad {
   std::array<bool, 4> are_inner;
 };
 
-/// \param row  of its texel, 0 to height - 2; \param column  any
+/// \param row  of its texel, 0 to height - 2;
+/// \param column  any
 Quad quad_at(const LatticeFrame& frame, int patch, int row, int column) {
   const Rectangle& r = frame.model.patches[patch].rectangle;
   const int width = frame.model.texture.width, line = (r.y + row) * width + r.x;

@@ -63,7 +63,8 @@ void add_features(const Chart& chart, double least_dihedral, std::vector<MapFeat
 }
 
 /// The order of things by the bins that they lie in, and there as they come: kernels come by texels in nearly that
-/// order. \param x, y  cells of the patch
+/// order.
+/// \param x, y  cells of the patch
 template <class X, class Y>
 std::vector<int> order_by_place(int count, const Rectangle& r, const X& x, const Y& y) {
   const int bins = (r.width + kBinWidth - 1) / kBinWidth;

@@ -54,7 +54,9 @@ inline int wrapped(int column, int width) {
   while (column >= width) column -= width;
   return column;
 }
-/// The rows of a patch, with fractions, that read at some u. \param row_u  per row, see Patch \param u  of [0, 1]
+/// The rows of a patch, with fractions, that read at some u.
+/// \param row_u  per row, see Patch
+/// \param u  of [0, 1]
 /// \return per u
 std::vector<double> rows_of(const std::vector<double>& row_u, std::span<const double> u);
 

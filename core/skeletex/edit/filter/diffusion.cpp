@@ -41,7 +41,8 @@ void sum_partials(ClContext& context, const DeviceSums& sums, std::size_t partia
                  sums.scalars);
 }
 
-/// Queues q = is_free (mass_share M + time L) p. \return the number of partial sums of p q
+/// Queues q = is_free (mass_share M + time L) p.
+/// \return the number of partial sums of p q
 std::size_t queue_operator(ClContext& context, const SurfaceOperator& surface, float mass_share, float time,
                            const ClBuffer<float>& is_free, const DeviceField& p, const DeviceField& q,
                            const ClBuffer<float>& partials) {
@@ -93,7 +94,8 @@ class Preconditioner {
     coarse_z_ = context.allocate<float>(coarse_r_.size);
   }
 
-  /// Queues z. \return the number of partial sums of r z
+  /// Queues z.
+  /// \return the number of partial sums of r z
   std::size_t queue(const ClBuffer<float>& r, const ClBuffer<float>& z, const ClBuffer<float>& partials) const {
     const DeviceNeighbours& n = *surface_->neighbours;
     SurfaceParameters parameters = parameters_;

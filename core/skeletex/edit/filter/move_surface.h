@@ -27,7 +27,8 @@ MovedModel move_surface(ClContext& context, const SkeletexModel& model, const Mo
 /// Area vectors (diffusion.h) of the surface with its vertices at given positions; world units squared.
 std::vector<Vec3> area_vectors_at(ClContext& context, const SkeletexModel& model, const ModelSurface& surface,
                                   std::span<const Vec3> positions);
-/// The volume inside of the surface, world units cubed. \param vectors  of area_vectors_at there
+/// The volume inside of the surface, world units cubed.
+/// \param vectors  of area_vectors_at there
 double enclosed_volume(const SkeletexModel& model, std::span<const Vec3> positions, std::span<const Vec3> vectors);
 
 }  // namespace skeletex

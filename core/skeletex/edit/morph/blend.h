@@ -36,7 +36,8 @@ void append_rows(const SeamMap& map, const std::vector<LatticeRow>& rows, const 
 /// target's bone.
 double u_at_same_share(const Patch& model, int row, int height, bool is_reversed);
 
-/// Queues the blend. \param texels  of all sources   \param rows  of the result's patches, those to do
+/// Queues the blend.
+/// \param texels  of all sources   \param rows  of the result's patches, those to do
 void blend_texels(ClContext& context, const BlendTables& tables, const std::vector<LatticeRow>& rows,
                   const FrameTables& result, int texture_width, const DevicePlanes& texels, DevicePlanes& blended);
 

@@ -37,7 +37,8 @@ class Morph {
   /// From the bones of one model to those of another.
   Correspondence correspondence(int from, int to) const;
 
-  /// The model at weights that sum to 1, one per model, none negative. \throw InputError otherwise
+  /// The model at weights that sum to 1, one per model, none negative.
+  /// \throw InputError otherwise
   SkeletexModel at(std::span<const double> weights) const;
   /// Queues the same on the device, with creases. The texels stay there, in planes of the result's size; the texture of
   /// the returned model has a size and no texels. For animations see LiveMorph (live.h).

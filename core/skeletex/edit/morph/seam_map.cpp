@@ -45,7 +45,8 @@ Skeleton posed_to(const Skeleton& model, const Skeleton& target, const Correspon
   return apply_pose(model, pose);
 }
 
-/// Appends the points of all arcs of an end to a loop. \return their positions
+/// Appends the points of all arcs of an end to a loop.
+/// \return their positions
 std::vector<Vec3> append_points(const SkeletexModel& model, const SeparationPlanes& separation, int bone,
                                 const std::vector<ArcUse>& uses, SeamLoop& loop) {
   std::vector<Vec3> positions;

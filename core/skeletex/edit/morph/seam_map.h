@@ -95,9 +95,11 @@ class SeamMap {
   /// The slope of the model's separation plane at one of its own angles (SeparationPlanes::slope), along the target's
   /// bone.
   double model_slope(int bone, BoneEnd end, double model_turn) const;
-  /// The texel of the model's seam at a target's v, in the directions of the target's bone. \pre set_target_loop
+  /// The texel of the model's seam at a target's v, in the directions of the target's bone.
+  /// \pre set_target_loop
   Vec3 model_end_texel(int bone, BoneEnd end, double v) const;
-  /// The texel of the target's own seam. \pre set_target_loop
+  /// The texel of the target's own seam.
+  /// \pre set_target_loop
   Vec3 target_end_texel(const Skeleton& target, const SeparationPlanes& separation, int bone, BoneEnd end,
                         double v) const;
   /// The model's own loop, with the model's angles.

@@ -35,7 +35,8 @@ class SeamMean {
     for (SeamArc& arc : network.arcs) turns_.push_back(fill_arc(network, arc));
   }
 
-  /// The loop around an end as the row follows it; empty at a free end. \pre fill
+  /// The loop around an end as the row follows it; empty at a free end.
+  /// \pre fill
   std::vector<LoopPoint> loop(const SeamNetwork& network, int bone, BoneEnd end) const {
     std::vector<LoopPoint> points;
     std::vector<Vec3> positions;
@@ -112,7 +113,8 @@ class SeamMean {
     return parameters;
   }
 
-  /// Sets the samples of an arc. \return the angles that they are found by
+  /// Sets the samples of an arc.
+  /// \return the angles that they are found by
   std::vector<double> fill_arc(const SeamNetwork& network, SeamArc& arc) const {
     double begin = 0, width = 1;
     std::array<SeamMap::SeamPoint, 2> missing;  // at the corners

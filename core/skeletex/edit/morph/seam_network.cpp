@@ -107,7 +107,8 @@ void append_arcs(const Skeleton& skeleton, const SeparationPlanes& separation, c
     }
 }
 
-/// Orders the arcs around a bone at a node, from corner to corner. \param first_arc  of the node
+/// Orders the arcs around a bone at a node, from corner to corner.
+/// \param first_arc  of the node
 void close_loop(const Skeleton& skeleton, int node, BoneAtNode bone, int first_arc, SeamNetwork& network) {
   std::vector<ArcUse> uses;
   for (int a = first_arc; a < static_cast<int>(network.arcs.size()); ++a)

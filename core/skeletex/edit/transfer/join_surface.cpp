@@ -123,7 +123,8 @@ class Joining {
           positions[pole] = end == 0 ? (patch.*points).front() : (patch.*points).back();
   }
 
-  /// The value at an angle in the first or the last row of a patch. \param values  row by row, or of one row
+  /// The value at an angle in the first or the last row of a patch.
+  /// \param values  row by row, or of one row
   Vec3 end_value(const std::vector<Vec3>& values, int bone, BoneEnd end, double turn) const {
     const std::size_t width = model_.patches[bone].rectangle.width,
                       first = end == BoneEnd::kHead ? 0 : values.size() - width;
@@ -151,7 +152,8 @@ class Joining {
     positions_[vertex] = mean;
   }
 
-  /// Places the seam vertices between bones of the part. \return the gaps of the bones to them
+  /// Places the seam vertices between bones of the part.
+  /// \return the gaps of the bones to them
   EndGaps place_inner_seams(const SeparationPlanes& separation) {
     const Lattice& lattice = surface_.lattice;
     EndGaps gaps(model_.patches.size());

@@ -20,7 +20,8 @@ struct PartCut {
 /// A part of the source and the part of the target that it replaces. Bone i is bone i of the target's part.
 class PartPair {
  public:
-  /// All but the parts must outlive this. \throw InputError when the parts do not branch alike
+  /// All but the parts must outlive this.
+  /// \throw InputError when the parts do not branch alike
   PartPair(const SkeletexModel& source, const SkeletexModel& target, Part from, Part to,
            const TransferOptions& options);
 
@@ -59,11 +60,13 @@ class PartPair {
 
   /// Sets the rows of the result's patch to the source's, unless the target keeps some of its own.
   void set_rows(int i, Patch& patch) const;
-  /// Sets the seams between bones of the part to the source's. \param separation  of the target
+  /// Sets the seams between bones of the part to the source's.
+  /// \param separation  of the target
   void set_seams(SkeletexModel& result, const SeparationPlanes& separation) const;
 
   /// How far a point at a distance of 1 from the bone (source's units) moves along the bone, from the source's
-  /// separation plane at an end to the target's. \param turn  of the result
+  /// separation plane at an end to the target's.
+  /// \param turn  of the result
   double shear(const SeparationPlanes& source_separation, const SeparationPlanes& separation, int i, BoneEnd end,
                double turn) const;
   /// The offset from the placed part's seam between bones of the part to the result's: across the bone, 0, along it.

@@ -75,7 +75,8 @@ void store_placement(ClContext& context, const TransferInput& input, const Place
   download_texels(context, texels, result.texture);
 }
 
-/// A part's patches as they are placed in the world. \param source  the same points of the source's surface
+/// A part's patches as they are placed in the world.
+/// \param source  the same points of the source's surface
 std::vector<PlacedPatch> placed_patches(const TransferInput& input, const PartPair& pair, const Placement& placement,
                                         const BonePoints& source) {
   std::vector<PlacedPatch> patches(pair.count());

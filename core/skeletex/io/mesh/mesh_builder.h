@@ -17,7 +17,8 @@ class MeshBuilder {
   int vertex_count() const { return static_cast<int>(file_.mesh.positions.size()); }
 
   /// Adds a polygon as a fan of triangles, or counts it as degenerate where fewer than three of its corners differ.
-  /// Nothing else is known of the corners. \return what is wrong with it, in which case it is not added
+  /// Nothing else is known of the corners.
+  /// \return what is wrong with it, in which case it is not added
   std::optional<std::string> add_face(std::span<const int> corners);
   int face_count() const { return file_.faces_in_file; }
 
@@ -29,7 +30,8 @@ class MeshBuilder {
   std::vector<int> polygon_, sorted_;
 };
 
-/// The readers of single formats. \param bytes  the whole file    \param where  its name in messages
+/// The readers of single formats.
+/// \param bytes  the whole file    \param where  its name in messages
 /// \throw IoError with the line (text) or the element (binary)
 MeshFile read_obj(std::string_view bytes, const std::string& where);
 MeshFile read_off(std::string_view bytes, const std::string& where);

@@ -43,7 +43,8 @@ void add_property(const std::vector<std::string_view>& words, PlyElement& elemen
   element.properties.push_back(std::move(property));
 }
 
-/// Reads a line of the header. \return false at its end
+/// Reads a line of the header.
+/// \return false at its end
 bool read_header_line(TextReader& text, PlyHeader& header) {
   const auto& words = text.split(text.next_line(), '\0');
   if (words.empty() || words[0] == "comment" || words[0] == "obj_info") return true;

@@ -35,7 +35,8 @@ struct PlyHeader {
   std::size_t vertices = 0;
 };
 
-/// Reads the lines up to "end_header". \throw IoError
+/// Reads the lines up to "end_header".
+/// \throw IoError
 PlyHeader read_ply_header(TextReader& text, const std::string& where);
 
 }  // namespace skeletex

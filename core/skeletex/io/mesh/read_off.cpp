@@ -8,7 +8,8 @@
 namespace skeletex {
 namespace {
 
-/// Reads "OFF", with the letters of what vertices have besides a position. \return the words after it on its line
+/// Reads "OFF", with the letters of what vertices have besides a position.
+/// \return the words after it on its line
 std::vector<std::string_view> read_off_header(TextReader& text, const std::string& where) {
   std::vector<std::string_view> words = text.next_words('#');
   const std::string_view header = words.empty() ? "" : words[0];
