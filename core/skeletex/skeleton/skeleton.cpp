@@ -12,6 +12,21 @@
 
 namespace skeletex {
 
+Skeleton in_unit_frame(Skeleton skeleton, const UnitFrame& frame) {
+  for (Node& node : skeleton.nodes) node.position = frame.rounded_from_user(skeleton.frame.to_user(node.position));
+  skeleton.frame = frame;
+  return skeleton;
+}
+
+Skeleton in_frame(Skeleton skeleton, const UnitFrame& frame) {
+  if (frame == skeleton.frame) return skeleton;
+  for (Node& node : skeleton.nodes) node.position = frame.from_user(skeleton.frame.to_user(node.position));
+  skeleton.frame = frame;
+  return skeleton;
+}
+
+std::string text_of(const Skeleton& skeleton, const Vec3& point) { return text_of(skeleton.frame.to_user(point)); }
+
 std::vector<std::vector<BoneAtNode>> bones_at_nodes(const Skeleton& skeleton) {
   std::vector<std::vector<BoneAtNode>> at(skeleton.nodes.size());
   for (int i = 0; i < static_cast<int>(skeleton.bones.size()); ++i) {

@@ -10,11 +10,13 @@ namespace {
 
 class ObjReader {
  public:
-  ObjReader(std::string_view bytes, const std::string& where) : text_(bytes, where), where_(where) {}
+  ObjReader(std::string_view bytes, const std::string& where) : bytes_(bytes), text_(bytes, where), where_(where) {}
 
   MeshFile read() {
     while (!text_.at_end()) {
-      const std::vector<std::string_view>& words = text_.split(next_line(), '#');
+      // Files that were put together have a mark inside.
+      const std::vector<std::string_view>& words = text_.split(without_byte_order_mark(next_line()), '#');
+      is_face_last_ = false;
       if (words.empty()) continue;
       if (words[0] == "v") {
         if (words.size() < 4) text_.fail("a vertex has three coordinates");
@@ -22,13 +24,21 @@ class ObjReader {
       } else if (words[0] == "f") {
         corners_.clear();
         for (std::size_t i = 1; i < words.size(); ++i) corners_.push_back(corner(words[i]));
+        if (corners_.size() < 3)
+          text_.fail(fmt::format("a face has three corners or more, this one {}{}", corners_.size(),
+                                 text_.at_end() ? "; the file ends here and may have been cut" : ""));
+        is_face_last_ = true;
         if (const auto fault = mesh_.add_face(corners_)) text_.fail(*fault);
+      } else if (static_cast<unsigned char>(words[0][0]) >= 0x80) {
+        text_.fail(fmt::format("{} is no keyword of OBJ; save the file as plain text", quoted_word(words[0])));
       }
     }
     if (last_corner_ >= mesh_.vertex_count())
       throw IoError(fmt::format("{}: line {}: vertex {} does not exist; the file has {}", where_, last_corner_line_,
                                 last_corner_ + 1, mesh_.vertex_count()));
-    return mesh_.take(where_);
+    MeshFile file = mesh_.take(where_);
+    file.ends_in_face = is_face_last_ && !bytes_.ends_with('\n') && !bytes_.ends_with('\r');
+    return file;
   }
 
  private:
@@ -60,6 +70,7 @@ class ObjReader {
     return static_cast<int>(index);
   }
 
+  std::string_view bytes_;
   TextReader text_;
   const std::string& where_;
   MeshBuilder mesh_;
@@ -67,6 +78,7 @@ class ObjReader {
   std::vector<int> corners_;
   int last_corner_ = -1;
   std::size_t last_corner_line_ = 0;
+  bool is_face_last_ = false;
 };
 
 }  // namespace
