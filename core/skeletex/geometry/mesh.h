@@ -16,6 +16,18 @@ struct TriangleMesh {
   std::vector<Triangle> triangles;
 };
 
+/// Values at the corners of a mesh's triangles. A vertex may have several: at creases, and where a texture is cut.
+template <class T>
+struct CornerValues {
+  std::vector<T> values;
+  std::vector<Triangle> corners;  ///< per triangle the values of its corners; empty: those with its vertices' numbers
+
+  bool empty() const { return values.empty(); }
+  const Triangle& of(const TriangleMesh& mesh, std::size_t triangle) const {
+    return corners.empty() ? mesh.triangles[triangle] : corners[triangle];
+  }
+};
+
 struct BoundingBox {
   Vec3 lower = Vec3::Zero();
   Vec3 upper = Vec3::Zero();
