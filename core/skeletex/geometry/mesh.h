@@ -42,6 +42,13 @@ std::string text_of(const Vec3& point);
 BoundingBox bounding_box(const TriangleMesh& mesh);
 /// Area vector of a triangle: half the cross product of its edges, along the outward normal.
 Vec3 area_vector(const TriangleMesh& mesh, const Triangle& triangle);
+/// Per vertex the unit mean of the normals of the triangles around, weighted by their angles there; zero where that has
+/// no direction.
+std::vector<Vec3> vertex_normals(const TriangleMesh& mesh);
+/// The same by corners: triangles that meet in an edge at more than `crease_angle` (radians) do not count for each
+/// other.
+/// \pre every directed edge occurs at most once
+CornerValues<Vec3> creased_normals(const TriangleMesh& mesh, double crease_angle);
 double surface_area(const TriangleMesh& mesh);
 /// Enclosed volume by the divergence theorem; negative when the mesh is inside out.
 /// \pre closed
