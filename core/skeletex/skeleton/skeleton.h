@@ -28,7 +28,7 @@ struct Bone {
 struct Skeleton {
   std::vector<Node> nodes;
   std::vector<Bone> bones;
-  UnitFrame frame;  ///< of the positions; a model's texels and seams are in that of its skeleton
+  UnitFrame frame{};  ///< of the positions; a model's texels and seams are in that of its skeleton
 };
 
 /// The skeleton of a mesh in the unit frame of the mesh, rounded (UnitFrame::rounded_from_user).
