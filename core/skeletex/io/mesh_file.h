@@ -16,16 +16,11 @@ struct MeshFile {
   int triangles = 0;      ///< after polygons were split into fans
   int degenerate_faces =
       0;  ///< faces with fewer than three different vertices (after welding): they have no area and are left out
-<<<<<<< HEAD
   int vertices_in_file = 0;   ///< for STL, three per triangle
   int merged_vertices = 0;    ///< equal positions welded (STL; other formats are not welded)
   bool ends_in_face = false;  ///< OBJ: the last line is a face without a line break, as where a file was cut
-=======
-  int vertices_in_file = 0;  ///< for STL, three per triangle
-  int merged_vertices = 0;   ///< equal positions welded (STL; other formats are not welded)
   MeshAttributes attributes;
   std::vector<std::string> material_files;  ///< that an OBJ names, as it names them
->>>>>>> main
 };
 
 /// Reads OBJ, PLY (ascii, binary), OFF or STL by the ending, in double precision. Faces are counted in and out, so that

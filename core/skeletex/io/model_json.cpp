@@ -206,18 +206,14 @@ json conventions() {
       {"weights",
        "where the header has \"weights\": per bone the channel of its weights in smooth poses, at least 0; their sum "
        "does not matter"},
-<<<<<<< HEAD
-      {"units",
-       "lengths and places in the unit frame, in which the input has a diagonal of 1: in the user's units a place p is "
-       "frame.offset + frame.scale p; angles in turns"},
-=======
       {"layers",
        "where the header has \"layers\": quantities of the surface at the texels' places, in channels of their own. "
        "Kind "
        "\"normal\": the unit normal (a, c, n) along, around and out as p = (a, c) / (|a| + |c| + |n|), and where n < 0 "
        "as ((1 - |p2|) sign(p1), (1 - |p1|) sign(p2)); \"colour\": linear light; \"number\": any number"},
-      {"units", "lengths in the units of the input mesh, angles in turns"},
->>>>>>> main
+      {"units",
+       "lengths and places in the unit frame, in which the input has a diagonal of 1: in the user's units a place p is "
+       "frame.offset + frame.scale p; angles in turns"},
   };
 }
 
