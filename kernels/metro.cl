@@ -18,6 +18,7 @@
 // triangles).
 
 #include "metro_structs.h"
+#include "planes.h"
 
 #define STACK_SIZE 64
 #define BEYOND_ALL 1e30f  // less than to the places past the end
@@ -81,9 +82,7 @@ kernel void find_nearest_triangles(const NearestParameters p, global const float
                                    global const float8* restrict boxes, global const float8* restrict blocks,
                                    constant int* restrict level_begin, global const float* restrict bounds_squared,
                                    global int* restrict nearest, global float* restrict nearest_squared) {
-  global const float* restrict px = points;
-  global const float* restrict py = px + p.count;
-  global const float* restrict pz = py + p.count;
+  PLANES(global const float, px, py, pz, points, p.count);
   const int begin = (int)get_global_id(0) * p.run;
   const int end = min(begin + p.run, p.count);
   int block = -1;  // the previous point's

@@ -52,8 +52,7 @@ void for_each_inner_row(const SkeletexModel& model, const Lattice& lattice, cons
 }  // namespace
 
 ClBuffer<int> choose_diagonals(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches,
-                               const ClBuffer<PatchRecord>& records, int texture_width, std::size_t texels,
-                               const TexelPoints& points) {
+                               const ClBuffer<PatchRecord>& records, int texture_width, const DevicePlanes& points) {
   constexpr int kBandRows = 16, kBandColumns = 64;  // of a group; columns as in lattice.cl
   std::vector<LatticeRow> rows = lattice_rows(patches, RowChoice::kInner);
   std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == patches[row[0]].rectangle.height - 2; });
@@ -62,11 +61,12 @@ ClBuffer<int> choose_diagonals(ClContext& context, DiagonalRule rule, const std:
   for (const Patch& patch : patches) widest = std::max(widest, patch.rectangle.width);
   ClRange groups = row_range(context, (count + kBandRows - 1) / kBandRows);
   groups.global[1] = (widest + kBandColumns - 1) / kBandColumns;
-  auto diagonals = context.allocate<int>(texels);
+  auto diagonals = context.allocate<int>(points.count);
   context.fill(diagonals, 0);
-  context.launch({"lattice.cl", "choose_diagonals"}, groups, count, kBandRows, texture_width,
-                 static_cast<int>(rule == DiagonalRule::kSmooth), context.upload(rows), records, points.x, points.y,
-                 points.z, diagonals);
+  context.launch({"lattice.cl", "choose_diagonals"}, groups,
+                 DiagonalParameters{texture_width, static_cast<int>(points.count), count, kBandRows,
+                                    static_cast<int>(rule == DiagonalRule::kSmooth)},
+                 context.upload(rows), records, points.values, diagonals);
   return diagonals;
 }
 
@@ -157,9 +157,8 @@ std::array<Triangle, 2> quad_triangles(const LatticeFrame& frame, int patch, int
 /// The diagonals that the decoder takes over points, on the host.
 std::vector<int> diagonals_of(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
                               const TexelPlanes& points) {
-  return context.download(
-      choose_diagonals(context, rule, frame.model.patches, frame.patches, frame.model.texture.width, points[0].size(),
-                       {context.upload(points[0]), context.upload(points[1]), context.upload(points[2])}));
+  return context.download(choose_diagonals(context, rule, frame.model.patches, frame.patches, frame.model.texture.width,
+                                           upload_planes(context, points[0], points[1], points[2])));
 }
 
 }  // namespace

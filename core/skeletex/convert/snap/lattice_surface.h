@@ -16,8 +16,7 @@ using TexelPlanes = std::array<std::vector<float>, 3>;
 /// \param records  see frame_tables
 /// \param points   x, y, z per texel; those of rows 0 and height-1 do not count
 ClBuffer<int> choose_diagonals(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches,
-                               const ClBuffer<PatchRecord>& records, int texture_width, std::size_t texels,
-                               const TexelPoints& points);
+                               const ClBuffer<PatchRecord>& records, int texture_width, const DevicePlanes& points);
 
 /// What the meshes of all points of one layout have in common: numbers of vertices and triangles (lattice.h), seams.
 struct LatticeFrame {
