@@ -150,7 +150,7 @@ __attribute__((always_inline)) Point point_of(const Maps maps, const MapPlace pl
 }
 
 // NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. Texels of the rows (lattice_rows) that nothing
-// holds read at their place in the lattice plus their offset; those that no triangle covers keep their points.
+// holds read at their place in the lattice plus their offset; the points of all others become 0, and are placed later.
 // in/out  texel_triangles: that cover the texels' places; where the texels read
 kernel void read_surface(const MapParameters p, global const int* restrict lattice_rows,
                          global const PatchRecord* restrict patches, global const int* restrict triangles,
@@ -175,9 +175,8 @@ kernel void read_surface(const MapParameters p, global const int* restrict latti
     const MapPlace place = {t, weights_at(m, inner_row_offset(m, maps, row, dy), turned_offset(m, j, dx, width))};
     const Point point = point_of(maps, place);
     const int walks = reads & ((dx != 0.0f) | (dy != 0.0f)) & is_outside(place.w);
-    const float px = reads ? point.x : all.x[texel], py = reads ? point.y : all.y[texel],
-                pz = reads ? point.z : all.z[texel];
-    all.x[texel] = px, all.y[texel] = py, all.z[texel] = pz;
+    all.x[texel] = reads ? point.x : 0.0f, all.y[texel] = reads ? point.y : 0.0f;
+    all.z[texel] = reads ? point.z : 0.0f;
     texel_triangles[texel] = walks ? -1 - covering : covering;
   }
   for (int j = get_local_id(0); j < width; j += ROW_ITEMS) {

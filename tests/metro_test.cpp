@@ -283,7 +283,7 @@ TEST(Metro, TheKernelFindsTheTwinsTriangles) {
         auto nearest = context().allocate<int>(count);
         context().launch({"metro.cl", "find_nearest_triangles"}, ClRange(block_count(count, run)),
                          NearestParameters{count, run, tree.top_level()}, context().upload(planes),
-                         context().upload(tree.boxes), context().upload(tree.blocks),
+                         context().upload(tree.boxes), context().upload(triangles_of_blocks(mesh, tree)),
                          context().upload(tree.level_begin), nearest);
         const std::vector<int> places = context().download(nearest);
         for (int i = 0; i < count; ++i) {

@@ -12,14 +12,14 @@ constexpr ClKernelName kFindNearest{"metro.cl", "find_nearest_triangles"};
 
 }  // namespace
 
-NearestSearch::NearestSearch(ClContext& context, const TriangleTree& tree)
+NearestSearch::NearestSearch(ClContext& context, const TriangleMesh& mesh, const TriangleTree& tree)
     : context_(context),
       origin_(tree.origin),
       scale_(tree.scale),
       top_level_(tree.top_level()),
       order_(tree.order),
       boxes_(context.upload(tree.boxes)),
-      blocks_(context.upload(tree.blocks)),
+      blocks_(context.upload(triangles_of_blocks(mesh, tree))),
       level_begin_(context.upload(tree.level_begin)) {}
 
 void NearestSearch::find(std::span<const Vec3> points, std::span<int> triangles) {

@@ -12,7 +12,8 @@ namespace skeletex {
 /// The triangles of a mesh on the device, for nearest points. Of the tree it keeps what it needs.
 class NearestSearch {
  public:
-  NearestSearch(ClContext& context, const TriangleTree& tree);
+  /// \param tree  of the mesh
+  NearestSearch(ClContext& context, const TriangleMesh& mesh, const TriangleTree& tree);
   /// Places along the curve -> triangles.
   const std::vector<int>& order() const { return order_; }
 

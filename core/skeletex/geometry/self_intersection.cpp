@@ -247,18 +247,18 @@ constexpr int kWidth = TriangleTree::kWidth;
 using Box = std::array<float, 6>;  // least x, y, z, greatest x, y, z, in the tree's units
 using Pairs = std::vector<std::array<int, 2>>;
 
-/// Boxes of a block's triangles, as the tree has them for its blocks: six planes of eight.
-std::array<float, 6 * kWidth> boxes_of_block(const TriangleTree& tree, std::size_t block) {
-  constexpr float kMargin = 3e-7f;  // rounding of the corners and of the edges that lead to them
-  std::array<float, 6 * kWidth> boxes;
-  const float* from = tree.blocks.data() + block * 9 * kWidth;
-  for (int d = 0; d < 3; ++d)
-    for (int k = 0; k < kWidth; ++k) {
-      const float corner = from[d * kWidth + k], second = from[(3 + d) * kWidth + k],
-                  third = from[(6 + d) * kWidth + k];
-      boxes[d * kWidth + k] = corner + std::min(0.0f, std::min(second, third)) - kMargin;
-      boxes[(3 + d) * kWidth + k] = corner + std::max(0.0f, std::max(second, third)) + kMargin;
-    }
+/// Boxes of a block's triangles: six planes of eight.
+std::array<float, 6 * kWidth> boxes_of_block(const TriangleMesh& mesh, const TriangleTree& tree, std::size_t block) {
+  constexpr float kMargin = 3e-7f;  // rounding of the corners
+  std::array<float, 6 * kWidth> boxes{};
+  const std::size_t begin = block * kWidth, end = std::min(begin + kWidth, tree.order.size());
+  for (std::size_t place = begin; place < end; ++place) {
+    const auto [a, b, c] = mesh.triangles[tree.order[place]];
+    const Eigen::Array3f p = tree.points[a], q = tree.points[b], r = tree.points[c];
+    const Eigen::Array3f low = p.min(q).min(r) - kMargin, high = p.max(q).max(r) + kMargin;
+    for (int d = 0; d < 3; ++d)
+      boxes[d * kWidth + place - begin] = low[d], boxes[(3 + d) * kWidth + place - begin] = high[d];
+  }
   return boxes;
 }
 
@@ -336,7 +336,7 @@ struct PairSearch {
     std::array<Box, kWidth> boxes;
     std::array<std::size_t, kWidth> places;
     int count = 0;
-    const std::array<float, 6 * kWidth> planes = boxes_of_block(tree, block);
+    const std::array<float, 6 * kWidth> planes = boxes_of_block(mesh, tree, block);
     Box around{};
     for (std::size_t place = begin; place < end; ++place) {
       if (!is_in_query(tree.order[place])) continue;
@@ -351,7 +351,7 @@ struct PairSearch {
     if (count == 0) return;
     list_blocks(around, is_queried.empty() ? block : 0, listed);
     for (const std::size_t other : listed) {
-      const std::array<float, 6 * kWidth> others = boxes_of_block(tree, other);
+      const std::array<float, 6 * kWidth> others = boxes_of_block(mesh, tree, other);
       for (int i = 0; i < count; ++i) add_pairs(places[i], boxes[i], other, others.data(), found);
     }
   }

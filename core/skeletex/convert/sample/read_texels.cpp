@@ -118,8 +118,9 @@ PlacedTexels download_texels(ClContext& context, const DevicePlanes& points, con
                              const ClBuffer<int>& anchors, const ClBuffer<int>& map_triangles) {
   const ClMapping<float> mapped = context.map(offsets);
   const float *const x = mapped.data(), *const y = x + points.count;
-  return {download_planes(context, points), std::vector(x, y), std::vector(y, y + points.count),
-          context.download(anchors), context.download(map_triangles)};
+  return {download_planes(context, points), std::vector(x, y),
+          std::vector(y, y + points.count), context.download(anchors),
+          context.download(map_triangles),  points};
 }
 
 SnapReport report_snap(int vertices, int edges, int reverted, const std::vector<int>& anchors) {
@@ -144,7 +145,7 @@ struct TexelStage {
   ClContext& context;
   const TexelSources& sources;
   DeviceLayout layout;
-  ClBuffer<LatticeRow> inner_rows, all_rows;
+  ClBuffer<LatticeRow> mapped_rows, all_rows;  // inner rows of VSM patches; all
   DeviceMaps maps;
 
   std::vector<Patch> patches() const { return {sources.patches.begin(), sources.patches.end()}; }
@@ -167,10 +168,12 @@ struct ReadTexels {
 TexelStage prepare_stage(ClContext& context, const Skeleton& skeleton, const SeparationPlanes& separation,
                          const TexelSources& sources, int width, int height, const Vec3& origin) {
   const std::vector<Patch> patches(sources.patches.begin(), sources.patches.end());
+  std::vector<LatticeRow> mapped_rows = lattice_rows(patches, RowChoice::kInner);
+  std::erase_if(mapped_rows, [&](const LatticeRow& row) { return is_height_field(patches[row[0]].method); });
   return {context,
           sources,
           upload_layout(context, patches, frame_tables(skeleton, separation, patches, origin), width, height),
-          context.upload(lattice_rows(patches, RowChoice::kInner)),
+          context.upload(mapped_rows),
           context.upload(lattice_rows(patches, RowChoice::kAll)),
           upload_maps(context, sources.charts, patches, origin)};
 }
@@ -196,10 +199,10 @@ void place_end_rows(const TexelStage& stage, const Vec3& origin, DevicePlanes& p
                        upload_planes(stage.context, values[0], values[1], values[2]).values, points.values);
 }
 
-/// Texels of VSM patches that nothing holds read where they are.
+/// Texels of VSM patches that nothing holds read where they are; the points of the others become 0.
 void read_surface(const TexelStage& stage, const ClBuffer<float>& offsets, ReadTexels& texels) {
-  stage.context.launch({"encode.cl", "read_surface"}, row_range(stage.context, stage.inner_rows.size),
-                       stage.map_parameters(stage.inner_rows.size), stage.inner_rows, stage.layout.tables.patches,
+  stage.context.launch({"encode.cl", "read_surface"}, row_range(stage.context, stage.mapped_rows.size),
+                       stage.map_parameters(stage.mapped_rows.size), stage.mapped_rows, stage.layout.tables.patches,
                        stage.maps.triangles, stage.maps.values, offsets, texels.positions.anchors, texels.map_triangles,
                        texels.points.values);
 }
@@ -273,11 +276,11 @@ ReadTexels snap(const TexelStage& stage, const ReadTexels& regular) {
   ReadTexels texels{{copy_of(context, regular.points.values), regular.points.count},
                     snap_positions(context, stage.layout, features, regular.positions),
                     copy_of(context, regular.map_triangles)};
+  read_surface(stage, texels.positions.offsets, texels);
   MapParameters parameters = stage.map_parameters(0);
   parameters.vertex_count = features.vertex_count;
   context.launch({"encode.cl", "place_anchored"}, ClRange(stage.layout.size()), parameters, texels.positions.anchors,
                  texels.positions.offsets, features.points, stage.maps.values, texels.points.values);
-  read_surface(stage, texels.positions.offsets, texels);
   return texels;
 }
 
@@ -310,7 +313,7 @@ std::vector<int> revert(const TexelStage& stage, const TexelOptions& options, st
   PlacedTexels placed =
       download_texels(context, texels.points, texels.positions.offsets, texels.positions.anchors, texels.map_triangles);
   report.revert = revert_faults(context, *stage.sources.revert, vertex_points, grid, placed);
-  texels.points = upload_planes(context, placed.points[0], placed.points[1], placed.points[2]);
+  texels.points = placed.on_device;
   return std::move(placed.anchors);
 }
 

@@ -107,10 +107,6 @@ LatticeFrame frame_lattice(ClContext& context, const SkeletexModel& model) {
 
 namespace {
 
-Vec3 position_of(const SkeletexModel& model, const TexelPlanes& points, int texel) {
-  return model.origin + Vec3(points[0][texel], points[1][texel], points[2][texel]);
-}
-
 /// Strips and fans of some ends: of patch i 2 i and 2 i + 1.
 std::vector<std::vector<Triangle>> make_ends(const LatticeFrame& frame, std::span<const int> ends,
                                              std::span<const Vec3> positions) {
@@ -145,7 +141,7 @@ void replace_triangles(std::span<const Triangle> triangles, int first, std::span
 
 /// The two triangles of the quad to the right of and above a texel, as reconstruct.cl writes them.
 std::array<Triangle, 2> quad_triangles(const LatticeFrame& frame, int patch, int row, int column,
-                                       const std::vector<int>& diagonals) {
+                                       const ClMapping<int>& diagonals) {
   const int width = frame.model.patches[patch].rectangle.width;
   const int first = frame.numbers.first_inner[patch] + (row - 1) * width;
   const int own = first + column, right = column + 1 < width ? own + 1 : first;
@@ -154,28 +150,31 @@ std::array<Triangle, 2> quad_triangles(const LatticeFrame& frame, int patch, int
   return {{{own, right, beyond}, {own, beyond, above}}};
 }
 
-/// The diagonals that the decoder takes over points, on the host.
-std::vector<int> diagonals_of(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
-                              const TexelPlanes& points) {
-  return context.download(choose_diagonals(context, rule, frame.model.patches, frame.patches, frame.model.texture.width,
-                                           upload_planes(context, points[0], points[1], points[2])));
+/// The diagonals that the decoder takes over points, for the host.
+ClMapping<int> diagonals_of(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
+                            const DevicePlanes& points) {
+  return context.map(
+      choose_diagonals(context, rule, frame.model.patches, frame.patches, frame.model.texture.width, points));
 }
 
 }  // namespace
 
 TriangleMesh build_lattice_mesh(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
-                                const TexelPlanes& points) {
+                                const DevicePlanes& points) {
   const Lattice& lattice = frame.numbers;
   TriangleMesh mesh{frame.positions, {}};
+  const ClMapping<int> diagonals = diagonals_of(context, frame, rule, points);
+  const ClMapping<float> values = context.map(points.values);
+  const float *const x = values.data(), *const y = x + points.count, *const z = y + points.count;
   for_each_block(lattice.vertex_count, 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t vertex = begin; vertex < end; ++vertex)
-      if (frame.texels[vertex] >= 0) mesh.positions[vertex] = position_of(frame.model, points, frame.texels[vertex]);
+      if (const int texel = frame.texels[vertex]; texel >= 0)
+        mesh.positions[vertex] = frame.model.origin + Vec3(x[texel], y[texel], z[texel]);
   });
   std::vector<int> ends(frame.ends.size());
   std::iota(ends.begin(), ends.end(), 0);
   const std::vector<std::vector<Triangle>> of_ends = make_ends(frame, ends, mesh.positions);
   mesh.triangles.resize(lattice.triangle_count);
-  const std::vector<int> diagonals = diagonals_of(context, frame, rule, points);
   for_each_block(frame.rows.size(), 16, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const auto [patch, row, unused, first_quad] = frame.rows[i];
@@ -191,12 +190,20 @@ TriangleMesh build_lattice_mesh(ClContext& context, const LatticeFrame& frame, D
 }
 
 std::vector<int> move_texels(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
-                             std::span<const int> texels, const TexelPlanes& points, TriangleMesh& mesh) {
+                             std::span<const int> texels, const TexelPlanes& points, DevicePlanes& on_device,
+                             TriangleMesh& mesh) {
   if (texels.empty()) return {};
   const SkeletexModel& model = frame.model;
+  TexelPlanes moved;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const int texel : texels) moved[axis].push_back(points[axis][texel]);
+  context.launch(
+      {"encode.cl", "place_points"}, ClRange(texels.size()),
+      TexelParameters{model.texture.width, static_cast<int>(on_device.count), static_cast<int>(texels.size()), 0, 0},
+      context.upload(texels), upload_planes(context, moved[0], moved[1], moved[2]).values, on_device.values);
+  const ClMapping<int> diagonals = diagonals_of(context, frame, rule, on_device);
   std::vector<char> has_moved(mesh.positions.size(), 0), is_near(frame.numbers.quad_count, 0);
   std::vector<int> changed;
-  const std::vector<int> diagonals = diagonals_of(context, frame, rule, points);
   const auto place_of = [&](int texel) {
     const Rectangle& r = model.patches[frame.texel_patches[texel]].rectangle;
     return std::array{frame.texel_patches[texel], texel / model.texture.width - r.y, texel % model.texture.width - r.x};
@@ -205,7 +212,7 @@ std::vector<int> move_texels(ClContext& context, const LatticeFrame& frame, Diag
     const auto [patch, row, column] = place_of(texel);
     const int vertex = frame.numbers.first_inner[patch] + (row - 1) * model.patches[patch].rectangle.width + column;
     has_moved[vertex] = 1;
-    mesh.positions[vertex] = position_of(model, points, texel);
+    mesh.positions[vertex] = model.origin + Vec3(points[0][texel], points[1][texel], points[2][texel]);
   }
   for (const int texel : texels) {
     const auto [patch, row, column] = place_of(texel);

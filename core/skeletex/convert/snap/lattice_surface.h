@@ -36,13 +36,15 @@ LatticeFrame frame_lattice(ClContext& context, const SkeletexModel& model);
 
 /// The mesh that the model would reconstruct to, were its texels at given points: what reconstruct_mesh makes.
 /// \param rule    of its diagonals, in place of the model's
-/// \param points  of rows 0 and height-1 only poles count
+/// \param points  per texel; of rows 0 and height-1 only poles count
 TriangleMesh build_lattice_mesh(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
-                                const TexelPlanes& points);
+                                const DevicePlanes& points);
 /// After inner texels have moved: diagonals and strips next to them are chosen again.
-/// \param rule, points  as for build_lattice_mesh
+/// \param points     where they are now
+/// \param on_device  takes over the points of those that have moved
 /// \return the triangles that are not what they were, or not where, in order
 std::vector<int> move_texels(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
-                             std::span<const int> texels, const TexelPlanes& points, TriangleMesh& mesh);
+                             std::span<const int> texels, const TexelPlanes& points, DevicePlanes& on_device,
+                             TriangleMesh& mesh);
 
 }  // namespace skeletex

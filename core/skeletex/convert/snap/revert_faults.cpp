@@ -75,7 +75,7 @@ struct RegularGrid {
 
 RegularGrid prepare_regular_grid(ClContext& context, const LatticeFrame& frame, const OriginalSurface& original,
                                  const PlacedTexels& texels) {
-  RegularGrid grid{build_lattice_mesh(context, frame, DiagonalRule::kNearest, texels.points), {}, TexelSet(frame)};
+  RegularGrid grid{build_lattice_mesh(context, frame, DiagonalRule::kNearest, texels.on_device), {}, TexelSet(frame)};
   grid.faults = measure_regular_grid({frame, grid.mesh, texels.map_triangles}, original);
   for (const int triangle : grid.faults.inverted) grid.near_faults.add(grid.mesh.triangles[triangle], kTolerance);
   return grid;
@@ -121,7 +121,7 @@ void measure(const LatticeFrame& frame, const OriginalSurface& original, std::sp
 /// The first pass measures all.
 Pass start_passes(ClContext& context, const LatticeFrame& frame, const OriginalSurface& original,
                   std::span<const int> vertex_points, const PlacedTexels& texels, double limit) {
-  Pass pass{build_lattice_mesh(context, frame, frame.model.diagonals, texels.points), {}, {}, {}, {}};
+  Pass pass{build_lattice_mesh(context, frame, frame.model.diagonals, texels.on_device), {}, {}, {}, {}};
   pass.tree = build_triangle_tree(pass.mesh, frame.triangle_order);
   std::vector<int> all(pass.mesh.triangles.size());
   std::iota(all.begin(), all.end(), 0);
@@ -131,10 +131,10 @@ Pass start_passes(ClContext& context, const LatticeFrame& frame, const OriginalS
 
 /// Further ones measure what has changed.
 void next_pass(ClContext& context, const LatticeFrame& frame, const OriginalSurface& original,
-               std::span<const int> vertex_points, const PlacedTexels& texels, double limit,
-               std::span<const int> reverted, Pass& pass) {
+               std::span<const int> vertex_points, PlacedTexels& texels, double limit, std::span<const int> reverted,
+               Pass& pass) {
   const std::vector<int> changed =
-      move_texels(context, frame, frame.model.diagonals, reverted, texels.points, pass.mesh);
+      move_texels(context, frame, frame.model.diagonals, reverted, texels.points, texels.on_device, pass.mesh);
   std::vector<int> places;
   for (const int triangle : changed) places.push_back(frame.triangle_places[triangle]);
   update_triangle_tree(pass.mesh, places, pass.tree);
