@@ -77,8 +77,9 @@ __attribute__((always_inline)) void choose_smoother(const int column, const int 
 }
 
 // NDRange: one work-group of ROW_ITEMS per band of rows and BAND_COLUMNS of the widest one's columns: many, so that
-// none is behind for long. in   lattice_rows: the rows that quads begin at, of each patch one after the other; band:
-// how many of them a group takes out  diagonals: per texel 1 for the second
+// none is behind for long.
+// in   lattice_rows: rows that quads begin at, of each patch in order; band: how many of them a group takes
+// out  diagonals: per texel of these rows 1 for the second
 kernel void choose_diagonals(const DiagonalParameters p, global const int* restrict lattice_rows,
                              global const PatchRecord* restrict patches, global const float* restrict points,
                              global int* restrict diagonals) {
@@ -87,7 +88,9 @@ kernel void choose_diagonals(const DiagonalParameters p, global const int* restr
   const int band_end = min((int)(get_group_id(0) + 1) * p.band, p.row_count),
             column = 1 + BAND_COLUMNS * get_group_id(1);
   for (int begin = get_group_id(0) * p.band, end; begin < band_end; begin = end) {
-    for (end = begin + 1; end < band_end && lattice_rows[4 * end] == lattice_rows[4 * begin];) ++end;
+    for (end = begin + 1; end < band_end && lattice_rows[4 * end] == lattice_rows[4 * begin] &&
+                          lattice_rows[4 * end + 1] == lattice_rows[4 * begin + 1] + end - begin;)
+      ++end;
     global const PatchRecord* restrict patch = patches + lattice_rows[4 * begin];
     const int first_row = lattice_rows[4 * begin + 1], rows = end - begin, width = patch->width,
               column_end = min(column + BAND_COLUMNS, width - 2);

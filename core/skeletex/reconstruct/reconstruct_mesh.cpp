@@ -79,8 +79,7 @@ std::vector<Vec3> place_vertices(ClContext& context, const PreparedModel& prepar
 /// The triangles of the quads between inner rows.
 /// \param inner  points of the inner vertices
 std::vector<Triangle> triangulate(ClContext& context, const PreparedModel& prepared, const DevicePlanes& inner) {
-  std::vector<LatticeRow> rows = prepared.inner_rows;
-  std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == prepared.tables.patches[row[0]].height - 2; });
+  const std::vector<LatticeRow> rows = quad_rows(prepared.model.patches);
   auto triangles = context.allocate<Triangle>(2 * static_cast<std::size_t>(prepared.lattice.quad_count));
   context.launch({"reconstruct.cl", "triangulate"}, row_range(context, rows.size()),
                  TriangulateParameters{static_cast<int>(rows.size()), static_cast<int>(inner.count),

@@ -20,7 +20,8 @@ double root_mean_square(std::span<const float> squares) {
 
 RoundingReport round_to_half(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches,
                              const DeviceLayout& layout, const DevicePlanes& points, DevicePlanes& texels) {
-  const auto diagonals = choose_diagonals(context, rule, patches, layout.tables.patches, layout.width, points);
+  const auto diagonals =
+      choose_diagonals(context, rule, quad_rows(patches), layout.tables.patches, layout.width, points);
   auto squares = context.allocate<float>(2 * layout.size());
   context.fill(squares, 0.f);
   const auto inner_rows = context.upload(lattice_rows(patches, RowChoice::kInner));
