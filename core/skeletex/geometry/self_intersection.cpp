@@ -336,19 +336,19 @@ struct PairSearch {
     std::array<Box, kWidth> boxes;
     std::array<std::size_t, kWidth> places;
     int count = 0;
+    for (std::size_t place = begin; place < end; ++place)
+      if (is_in_query(tree.order[place])) places[count++] = place;
+    if (count == 0) return;
     const std::array<float, 6 * kWidth> planes = boxes_of_block(mesh, tree, block);
     Box around{};
-    for (std::size_t place = begin; place < end; ++place) {
-      if (!is_in_query(tree.order[place])) continue;
-      Box& box = boxes[count];
-      for (int d = 0; d < 6; ++d) box[d] = planes[d * kWidth + (place - begin)];
+    for (int i = 0; i < count; ++i) {
+      Box& box = boxes[i];
+      for (int d = 0; d < 6; ++d) box[d] = planes[d * kWidth + (places[i] - begin)];
       for (int d = 0; d < 3; ++d) {
-        around[d] = count == 0 ? box[d] : std::min(around[d], box[d]);
-        around[3 + d] = count == 0 ? box[3 + d] : std::max(around[3 + d], box[3 + d]);
+        around[d] = i == 0 ? box[d] : std::min(around[d], box[d]);
+        around[3 + d] = i == 0 ? box[3 + d] : std::max(around[3 + d], box[3 + d]);
       }
-      places[count++] = place;
     }
-    if (count == 0) return;
     list_blocks(around, is_queried.empty() ? block : 0, listed);
     for (const std::size_t other : listed) {
       const std::array<float, 6 * kWidth> others = boxes_of_block(mesh, tree, other);
