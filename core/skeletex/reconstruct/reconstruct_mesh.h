@@ -47,17 +47,6 @@ EndSeam end_seam(const SkeletexModel& model, const SeparationPlanes& separation,
 void append_end_triangles(const SkeletexModel& model, const Lattice& lattice, std::span<const Vec3> positions,
                           const EndSeam& seam, int bone, BoneEnd end, std::vector<Triangle>& triangles);
 
-/// What the device needs to choose the diagonals of quads between inner rows.
-struct DeviceQuads {
-  ClBuffer<LatticeRow> rows;  ///< that quads begin at
-  ClBuffer<PatchRecord> patches;
-};
-DeviceQuads upload_quads(ClContext& context, const PreparedModel& model);
-/// Queues the triangles of the quads between inner rows (one launch); those at ends are not written.
-/// \param inner  points of the inner vertices    \return room for all triangles of the lattice
-ClBuffer<Triangle> triangulate(ClContext& context, DiagonalRule rule, const DeviceQuads& quads, const Lattice& lattice,
-                               const DevicePlanes& inner);
-
 /// Places seam samples and corners. They are few, and several patches share them, so the host does this in double
 /// precision.
 void place_seams(const SkeletexModel& model, const SeparationPlanes& separation, const Lattice& lattice,
