@@ -391,8 +391,8 @@ class Page {
   }
 
   resize() {
-    const stage = element('stage');
-    this.picture.resize(Math.max(1, stage.clientWidth), Math.max(1, stage.clientHeight));
+    const {clientWidth, clientHeight} = element('overlay');
+    this.picture.resize(Math.max(1, clientWidth), Math.max(1, clientHeight));
     this.orbit.apply();
     if (this.textureView.level) this.textureView.mark(this.marked, this.shown.transferred);
     this.render();

@@ -14,6 +14,10 @@ if (!browserPath || !existsSync(browserPath)) {
   console.log('no Chromium: scripts/install-dependencies.sh installs it');
   process.exit(77);
 }
+if (!existsSync(join(modules, 'playwright-core'))) {
+  console.error(`${modules} lacks playwright-core: the build without npm has no page to test; scripts/install-dependencies.sh installs npm`);
+  process.exit(1);
+}
 const {chromium} = createRequire(join(modules, 'x.js'))('playwright-core');
 
 let failures = 0;
@@ -46,18 +50,23 @@ const drawn = (page) => page.evaluate(async () => {
   return {points, vertices, triangles: Array.from(lattice.triangles), diagonal: surface.model.diagonal};
 });
 
-/** That every drawn point lies where the library's vertex does, that copies of a vertex are one point, and all occur. */
-function compare(shown, ply, what, tolerance = 1e-4) {
-  const seen = new Map();
-  let farthest = 0, isOpen = false;
+/**
+ * That every drawn point lies where the library's vertex does, that copies of a vertex are one point, and all occur.
+ * @param {number} tolerance in diagonals @param {number} share of the vertices for which it holds; of the others, ten times as much
+ */
+function compare(shown, ply, what, tolerance = 1e-4, share = 1) {
+  const seen = new Map(), distances = [];
+  let isOpen = false;
   shown.vertices.forEach((vertex, i) => {
     const own = shown.points.slice(3 * i, 3 * i + 3);
-    farthest = Math.max(farthest, Math.hypot(...own.map((x, k) => x - ply.positions[3 * vertex + k])));
+    distances.push(Math.hypot(...own.map((x, k) => x - ply.positions[3 * vertex + k])) / shown.diagonal);
     if (seen.has(vertex)) isOpen ||= seen.get(vertex).some((x, k) => x !== own[k]);
     else seen.set(vertex, own);
   });
-  console.log(`${what}: ${seen.size} vertices, farthest ${(farthest / shown.diagonal).toExponential(2)} of the diagonal`);
-  check(farthest <= tolerance * shown.diagonal, `${what}: a vertex lies ${farthest / shown.diagonal} diagonals off`);
+  distances.sort((a, b) => a - b);
+  const farthest = distances.at(-1), most = distances[Math.floor(share * (distances.length - 1))];
+  console.log(`${what}: ${seen.size} vertices, farthest ${farthest.toExponential(2)} of the diagonal`);
+  check(most <= tolerance && farthest <= (share === 1 ? 1 : 10) * tolerance, `${what}: a vertex lies ${farthest} diagonals off, ${share} of them up to ${most}`);
   check(!isOpen, `${what}: copies of a vertex lie apart`);
   check(seen.size === ply.positions.length / 3, `${what}: ${seen.size} of ${ply.positions.length / 3} vertices are drawn`);
 }
@@ -180,7 +189,7 @@ async function testPlaces() {
   const hash = await page.evaluate(() => location.hash);
   check(/pose=/.test(hash), `the address does not say the pose: ${hash}`);
   const again = await open(browser, at('bear.html'), hash);
-  compare(await drawn(again), readPly(at('posed.ply')), 'pose from the address', 2e-4);
+  compare(await drawn(again), readPly(at('posed.ply')), 'pose from the address', 1.5e-4);
   check(page.said.length + again.said.length === 0, `the page says: ${[...page.said, ...again.said].join('; ')}`);
   await page.close();
   await again.close();
@@ -188,11 +197,12 @@ async function testPlaces() {
 
 async function testMorph() {
   const page = await open(browser, at('morph.html'));
-  for (const t of [0, 0.25, 0.4, 1]) {
+  for (const t of [0, 0.25, 0.4375, 0.4, 1]) {
     run('morph', at('man.skx.exr'), at('homer.skx.exr'), '--t', String(t), '--layout', '1', '--creases', '-o', at('morph.ply'));
     await page.evaluate(async (to) => (await globalThis.skeletex).change({t: to}), t);
     const shown = await drawn(page);
-    compare(shown, readPly(at('morph.ply')), `morph at ${t}`);
+    // Exact at its keys, multiples of a sixteenth; between them but for columns at corners.
+    compare(shown, readPly(at('morph.ply')), `morph at ${t}`, 1e-4, Number.isInteger(16 * t) ? 1 : 0.98);
     checkClosed(shown, `morph at ${t}`);
   }
   run('morph', at('man.skx.exr'), at('homer.skx.exr'), '--t', '0', '--layout', '1', '--creases', '-o', at('target.skx.exr'));

@@ -30,7 +30,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kTexelStep = 5e-6;  // diagonals
-constexpr int kKeys = 8;             // intervals of a morph
+constexpr int kKeys = 16;            // intervals of a morph
 constexpr double kSwitch = 1e-4;     // where the seams of a morph change, it is found to this part of the way
 constexpr double kNearEnd = 1e-7;    // where the tables of a model without weight are taken
 constexpr const char* kPlaceOfData = "<!-- skeletex data -->";
