@@ -101,10 +101,11 @@ nlohmann::ordered_json add_texels(PageArrays& arrays, const DisplacementTexture&
   std::vector<std::uint16_t> differences, steps;
   std::vector<float> scales;
   for (const Patch& patch : patches) {
-    const auto [x, y, width, height] = patch.rectangle;
+    const Rectangle& r = patch.rectangle;
+    const int width = r.width, height = r.height;
     for (const std::vector<float>* plane : {&texture.along, &texture.around, &texture.out}) {
       const auto value = [&](int row, int column) {
-        return (*plane)[static_cast<std::size_t>(y + row) * texture.width + x + column];
+        return (*plane)[static_cast<std::size_t>(r.y + row) * texture.width + r.x + column];
       };
       float lowest = std::numeric_limits<float>::max(), highest = std::numeric_limits<float>::lowest();
       for (int row = 0; row < height; ++row)
