@@ -10,7 +10,7 @@
 namespace skeletex::cli {
 namespace {
 
-Json bone_json(const BoneReport& bone) {
+Json bone_json(const BoneReport& bone, double diagonal) {
   const Rectangle& r = bone.rectangle;
   Json json{{"name", bone.name},
             {"method", to_string(bone.method)},
@@ -22,7 +22,11 @@ Json bone_json(const BoneReport& bone) {
             {"unseen_area_fraction", bone.unseen_area_fraction},
             {"flipped_triangles", bone.flipped_triangles},
             {"sampled_triangle_fraction", bone.sampled_triangle_fraction},
-            {"missed_texels", bone.missed_texels}};
+            {"missed_texels", bone.missed_texels},
+            {"distance",
+             {{"mean", bone.distance.mean / diagonal},
+              {"furthest", bone.distance.furthest / diagonal},
+              {"place", {bone.distance.place[0], bone.distance.place[1], bone.distance.place[2]}}}}};
   if (!is_height_field(bone.method))
     json[to_string(bone.method)] = {{"iterations", bone.map.iterations},
                                     {"spread", bone.map.spread},
@@ -48,7 +52,7 @@ double read_percent(const EncodeReport& report) {
 
 Json encode_report_json(const EncodeReport& report, const EncodedFile& file) {
   Json bones = Json::array();
-  for (const BoneReport& bone : report.bones) bones.push_back(bone_json(bone));
+  for (const BoneReport& bone : report.bones) bones.push_back(bone_json(bone, report.diagonal));
   Json json{{"mesh",
              {{"vertices", report.vertices},
               {"triangles", report.triangles},

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "skeletex/convert/layout/patch_requests.h"
+#include "skeletex/convert/measure/bone_distances.h"
 #include "skeletex/convert/parameterize/spd.h"
 #include "skeletex/convert/parameterize/vsm.h"
 #include "skeletex/convert/sample/read_texels.h"
@@ -24,11 +25,13 @@ struct EncodeOptions {
   int width = 512, height = 512;
   /// Of all bones; without, each bone takes SPD or VSM (hybrid).
   std::optional<Method> method = Method::kVsm;
-  /// Hybrid: bones whose unseen share of area is above this take VSM, the others SPD (docs/steps/spd.md).
+  /// Hybrid: bones whose unseen share of area is above this take VSM; the others SPD, where it is hardly further from
+  /// the mesh than VSM (docs/steps/spd.md).
   double hybrid_unseen_threshold = 0.01;
   /// Hybrid: bones by name whose method the user chose.
   std::vector<std::pair<std::string, Method>> hybrid_overrides;
   VsmOptions vsm;
+  bool reweights_squeezed = true;  ///< bones of which VSM squeezes a part are reweighted further (docs/steps/vsm.md)
   SpdHit spd_hit = SpdHit::kLast;
   RowSpacing row_spacing = RowSpacing::kSurfaceLength;
   bool has_prefilter = true;
@@ -61,8 +64,15 @@ struct BoneReport {
   int flipped_triangles = 0;             ///< of the map
   double sampled_triangle_fraction = 0;  ///< share of the segment's triangles that a texel reads
   int missed_texels = 0;                 ///< SPD rays that hit nothing, filled from their neighbours
+  BoneDistance distance;                 ///< of its surface to the mesh that the decoder makes
   MapReport map;
 };
+
+/// Whether a part of a bone's surface is missing from the model: it is further away than ten times the bone's mean and
+/// half a percent of the diagonal.
+inline bool lacks_part(const BoneReport& bone, double diagonal) {
+  return bone.distance.furthest > 10 * bone.distance.mean && bone.distance.furthest > 0.005 * diagonal;
+}
 
 struct EncodeReport {
   int vertices = 0, triangles = 0, genus = 0;
