@@ -367,8 +367,8 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
     if (options.progress && !options.progress(stage, done)) throw Error("cancelled");
   };
   EncodeReport report;
-  SkeletexModel model = start_model(mesh, skeleton);
-  const SeparationPlanes separation(model.skeleton);
+  const SkeletexModel model = start_model(mesh, skeleton);
+  const SeparationPlanes separation(model.skeleton);  // refers to it
   Stopwatch watch;
 
   progress("half edges", 0);
@@ -388,8 +388,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   std::optional<TriangleTree> own_tree;
   if (!options.tree) own_tree = build_triangle_tree(mesh);
   const EncodeJob job{context, mesh, own_tree ? *own_tree : *options.tree, separation, options};
-  Encoding encoding =
-      options.method ? encode_surface(job, std::move(model), surface) : encode_hybrid(job, model, surface);
+  Encoding encoding = options.method ? encode_surface(job, model, surface) : encode_hybrid(job, model, surface);
   nlohmann::json settings = settings_json(options, encoding.placing, surface.unseen);
   add_results(encoding.texels, encoding.model.diagonal, settings);
   encoding.model.encoder_settings = settings.dump();
