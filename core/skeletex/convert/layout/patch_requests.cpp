@@ -87,11 +87,9 @@ std::vector<PatchRequest> patch_requests(std::span<const PatchSource> sources, T
   for (std::size_t i = 0; i < sources.size(); ++i)
     if (roots[i] > 0) triangles += sources[i].triangles, root += roots[i];
   for (std::size_t i = 0; i < sources.size(); ++i)
-    requests[i].share = std::pow(sources[i].triangles / triangles, 1 - (getenv("SP") ? atof(getenv("SP")) : 0.5)) *
-                        std::pow(roots[i] > 0    ? roots[i] / root
-                                 : triangles > 0 ? sources[i].triangles / triangles
-                                                 : 1,
-                                 getenv("SP") ? atof(getenv("SP")) : 0.5);
+    requests[i].share = std::sqrt(sources[i].triangles * (roots[i] > 0    ? roots[i] / root
+                                                          : triangles > 0 ? sources[i].triangles / triangles
+                                                                          : 1));
   return requests;
 }
 
