@@ -237,12 +237,12 @@ void add_texel_options(CLI::App& command, Arguments& a) {
   command
       .add_flag("--snap,!--no-snap", a.is_snapped,
                 "texels of VSM patches sit on the mesh's own vertices and edges where they can; instead of the "
-                "prefilter (default: from 2 texels per vertex on, with the fit from 1.5)")
+                "prefilter (default: where it is expected to lower the error, from about 0.6 texels per vertex on)")
       ->group("Texels");
   command
       .add_flag("--fit,!--no-fit", a.is_fitted,
                 "their points move so that the triangles between them are nearer to the mesh; instead of the prefilter "
-                "(default: up to 256 x 256 texels)")
+                "(default: up to 256 x 256 texels, and below 7 texels per vertex)")
       ->group("Texels");
   take_one_of(add(command, "Texels", "--diagonals", a.diagonals,
                   "how the decoder cuts quads: nearest to the surface that texels around foretell, or smooth, going on "

@@ -25,8 +25,6 @@
 namespace skeletex {
 namespace {
 
-// With fewer, vertices pull texels about without making edges between them; the fit makes up for some of that.
-constexpr double kSnapTexelsPerVertex = 2, kFittedSnapTexelsPerVertex = 1.5;
 constexpr double kHardlyWorse = 1.1;      // hybrid: of a distance, for SPD
 constexpr double kLeastDihedral = 0.004;  // radians: flatter edges are no creases to snap to
 
@@ -44,18 +42,13 @@ void check_options(const EncodeOptions& options, const Skeleton& skeleton) {
           fmt::format("a method is given for bone \"{}\", which the skeleton does not have", override.first));
 }
 
-/// Where texels read, and where their points lie.
-struct TexelPlacing {
-  bool has_snap = false, has_fit = false;
-};
-/// SPD patches are neither snapped nor fitted.
-TexelPlacing choose_placing(const EncodeOptions& options, const TriangleMesh& mesh, bool is_all_spd) {
+/// SPD patches are neither snapped nor fitted; without the prefilter texels stay on the mesh unless the fit is asked
+/// for.
+TexelPlacing placing_of(const EncodeOptions& options, const TriangleMesh& mesh, bool is_all_spd) {
   if (is_all_spd) return {};
-  const auto texels = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
-  const bool has_fit = options.has_fit.value_or(options.has_prefilter && texels <= kMostFittedTexels);
-  const double least_texels =
-      (has_fit ? kFittedSnapTexelsPerVertex : kSnapTexelsPerVertex) * static_cast<double>(mesh.positions.size());
-  return {options.has_snap.value_or(static_cast<double>(texels) >= least_texels), has_fit};
+  const std::optional<bool> has_fit = options.has_fit || options.has_prefilter ? options.has_fit : std::optional(false);
+  return choose_placing(static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height),
+                        mesh.positions.size(), options.has_snap, has_fit);
 }
 
 nlohmann::json settings_json(const EncodeOptions& options, const TexelPlacing& placing,
@@ -70,7 +63,8 @@ nlohmann::json settings_json(const EncodeOptions& options, const TexelPlacing& p
                       {"prefilter", options.has_prefilter},
                       {"unfold", options.has_unfold},
                       {"snap", placing.has_snap},
-                      {"fit", placing.has_fit},
+                      {"fit", placing.is_fitted()},
+                      {"fit_steps", placing.fit_steps},
                       {"spd_hit", options.spd_hit == SpdHit::kFirst ? "first" : "last"}};
   if (!options.method) json["hybrid_unseen_threshold"] = options.hybrid_unseen_threshold;
   if (!unseen.empty()) json["unseen_area_fractions"] = unseen;
@@ -226,9 +220,9 @@ TexelResult read_model_texels(const EncodeJob& job, const SkeletexModel& model, 
   const std::vector<SpdHits> hits = cast_rays(context, model, job.separation, surface.charts, options.spd_hit);
   const auto end_points = find_end_points(model, job.separation, surface);
   std::optional<RevertSources> revert;
-  if (placing.has_snap || placing.has_fit) revert.emplace(RevertSources{model, job.mesh, job.tree, surface.charts});
+  if (!placing.is_regular_grid()) revert.emplace(RevertSources{model, job.mesh, job.tree, surface.charts});
   TexelOptions texel_options{
-      .has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_fit = placing.has_fit};
+      .has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .fit_steps = placing.fit_steps};
   if (options.has_half_texels) texel_options.half_rule = model.diagonals;
   return read_texels(
       context, model.skeleton, job.separation,
@@ -249,18 +243,18 @@ Encoding encode_surface(const EncodeJob& job, SkeletexModel model, const MappedS
   const EncodeOptions& options = job.options;
   Encoding encoding{std::move(model), {}, {}, surface.methods, 0};
   encoding.placing =
-      choose_placing(options, job.mesh, std::all_of(surface.methods.begin(), surface.methods.end(), is_height_field));
+      placing_of(options, job.mesh, std::all_of(surface.methods.begin(), surface.methods.end(), is_height_field));
   const TexelPlacing& placing = encoding.placing;
   encoding.used_fraction = lay_out_patches(
       surface, row_profiles(job.context, encoding.model.skeleton, job.separation, surface, options.spd_hit), options,
       encoding.model);
   encoding.model.diagonals =
-      options.diagonals.value_or(placing.has_snap || placing.has_fit ? DiagonalRule::kSmooth : DiagonalRule::kNearest);
+      options.diagonals.value_or(placing.is_regular_grid() ? DiagonalRule::kNearest : DiagonalRule::kSmooth);
   add_seams(surface.segmentation, job.separation, placing.has_snap ? SeamSampling::kSnapped : SeamSampling::kEven,
             encoding.model);
   TexelResult texels = read_model_texels(job, encoding.model, surface, placing);
   encoding.model.texture = std::move(texels.texture);
-  encoding.model.sampling = {options.has_prefilter, placing.has_snap, placing.has_fit};
+  encoding.model.sampling = {options.has_prefilter, placing.has_snap, placing.is_fitted()};
   encoding.texels = std::move(texels.report);
   return encoding;
 }
@@ -325,6 +319,7 @@ void report_result(const EncodeJob& job, const Encoding& encoding, const MappedS
   report.genus = model.genus;
   report.diagonal = model.diagonal;
   report.used_fraction = encoding.used_fraction;
+  report.placing = encoding.placing;
   report.unfold = texels.unfold;
   report.snap = texels.snap;
   report.fit = texels.fit;

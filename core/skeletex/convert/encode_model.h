@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "skeletex/convert/choose_placing.h"
 #include "skeletex/convert/layout/patch_requests.h"
 #include "skeletex/convert/measure/bone_distances.h"
 #include "skeletex/convert/parameterize/spd.h"
@@ -18,9 +19,6 @@ namespace skeletex {
 
 /// How rows are spread along a bone: evenly in surface length (the default), or evenly in the map's u (the paper).
 enum class RowSpacing { kSurfaceLength, kUniform };
-/// Up to here the fit is the default: beyond it gains little, and takes longest.
-inline constexpr std::size_t kMostFittedTexels = 256 * 256;
-
 struct EncodeOptions {
   int width = 512, height = 512;
   /// Of all bones; without, each bone takes SPD or VSM (hybrid).
@@ -37,10 +35,10 @@ struct EncodeOptions {
   bool has_prefilter = true;
   bool has_unfold = true;  ///< see unfold_lattice; snapping and fit start from the lattice that it leaves
   /// Texels of VSM patches sit on the mesh's own vertices and edges where they can (docs/steps/snap.md). Takes the
-  /// prefilter's place. Default: from 2 texels per vertex on, with the fit from 1.5 on.
+  /// prefilter's place. Default: see choose_placing.
   std::optional<bool> has_snap;
   /// Their points move so that the flat triangles between them are nearer to the mesh (docs/steps/snap.md). Takes the
-  /// prefilter's place. Default: with the prefilter, up to 256 x 256 texels.
+  /// prefilter's place. Default: with the prefilter, see choose_placing.
   std::optional<bool> has_fit;
   std::optional<DiagonalRule> diagonals;  ///< default: smooth with snapping or fit, else nearest
   /// Texels come as half floats hold them (docs/steps/sample.md): write_model stores them as such without loss.
@@ -79,6 +77,7 @@ struct EncodeReport {
   double diagonal = 0;
   std::vector<BoneReport> bones;
   double used_fraction = 0;
+  TexelPlacing placing;                    ///< what was chosen for VSM patches; of SPD models 0 texels per vertex
   std::optional<UnfoldReport> unfold;      ///< when it was on
   std::optional<SnapReport> snap;          ///< when it was on
   std::optional<FitReport> fit;            ///< when it was on

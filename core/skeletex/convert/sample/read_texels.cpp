@@ -353,8 +353,9 @@ TexelPoints place_points(const TexelStage& stage, const TexelOptions& options, C
   std::vector<int> vertex_points;
   if (sources.features) vertex_points = context.download(sources.features->vertex_points);
   ReadTexels texels = sources.features ? snap(stage, is_read, regular) : copy_of(stage, regular);
-  if (options.has_fit)
-    report.fit = fit_points(context, stage.layout, stage.maps, texels.map_triangles, texels.positions, texels.points);
+  if (options.fit_steps > 0)
+    report.fit = fit_points(context, stage.layout, stage.maps, texels.map_triangles, texels.positions, texels.points,
+                            {.steps = options.fit_steps});
   // What is snapped or fitted is not filtered as well: only SPD patches are.
   if (options.has_prefilter && has_spd(sources.patches))
     texels.points =
@@ -411,7 +412,7 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Sepa
   place_end_rows(context, sources, texture_width, origin, regular.points);
   if (options.has_unfold && stage.has_maps()) report.unfold = unfold(stage, is_read, regular);
   TexelPoints points;
-  if (stage.has_maps() && (sources.features || options.has_fit))
+  if (stage.has_maps() && (sources.features || options.fit_steps > 0))
     points = place_points(stage, options, is_read, regular, report);
   else
     points =
