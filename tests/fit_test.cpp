@@ -294,7 +294,7 @@ TEST(Fit, LeavesALatticeAloneThatIsTheMesh) {
   const std::vector<SpdHits> hits(1);
   const auto read = [&](bool has_fit) {
     return read_texels(device(), skeleton, SeparationPlanes(skeleton), {charts, patches, hits, ends}, 24, 12,
-                       Vec3::Zero(), {.has_prefilter = false, .has_fit = has_fit});
+                       Vec3::Zero(), {.has_prefilter = false, .fit_steps = has_fit ? 4 : 0});
   };
   const TexelResult plain = read(false), fitted = read(true);
   EXPECT_LT(fitted.report.fit->residuals.front(), 1e-6);

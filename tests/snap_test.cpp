@@ -11,6 +11,7 @@
 
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/analysis/metro.h"
+#include "skeletex/convert/choose_placing.h"
 #include "skeletex/convert/encode_model.h"
 #include "skeletex/convert/layout/row_profile.h"
 #include "skeletex/convert/snap/revert_texels.h"
@@ -439,29 +440,56 @@ TEST(Snap, BringsABearToAThirdOfTheErrorWithoutFoldingIt) {
   EXPECT_EQ(encoded.model.texture.around, again.model.texture.around);
 }
 
-TEST(Snap, AndFitAreOnWhereTheyPayUnlessToldOtherwise) {
+TEST(Placing, IsWhatIsExpectedToBeNearestButForTheFitsTime) {
+  const auto chosen = [](std::size_t texels, std::size_t vertices, std::optional<bool> snap = {},
+                         std::optional<bool> fit = {}) {
+    const TexelPlacing placing = choose_placing(texels, vertices, snap, fit);
+    return std::pair{placing.has_snap, placing.fit_steps};
+  };
+  EXPECT_EQ(chosen(128 * 128, 40000), std::pair(false, 4));
+  EXPECT_EQ(chosen(128 * 128, 20000), std::pair(true, 4));
+  EXPECT_EQ(chosen(256 * 256, 1000), std::pair(true, 4));
+  EXPECT_EQ(chosen(512 * 512, 14000), std::pair(true, 0));
+  EXPECT_EQ(chosen(512 * 512, 150000), std::pair(true, 4));
+  EXPECT_EQ(chosen(512 * 512, 44000), std::pair(true, 2));
+  EXPECT_EQ(chosen(2048 * 2048, 4000000), std::pair(true, 0));
+  EXPECT_EQ(chosen(512 * 512, 300000, {}, false), std::pair(false, 0));
+  EXPECT_EQ(chosen(512 * 512, 14000, {}, true), std::pair(true, 4));
+  EXPECT_EQ(chosen(512 * 512, 14000, false, {}), std::pair(false, 0));
+}
+
+TEST(Placing, IsReportedAndCanBeChosen) {
   const TestModel model = load_standard_model("bear");
-  const auto reported = [&](int width, int height, const auto& change) {
+  const auto reported = [&](const auto& change) {
     EncodeOptions options;
-    options.width = width, options.height = height;
+    options.width = options.height = 96;
     change(options);
     const EncodeReport report = encode_model(device(), model.mesh, model.skeleton, options).report;
+    EXPECT_EQ(report.snap.has_value(), report.placing.has_snap);
+    EXPECT_EQ(report.fit.has_value(), report.placing.is_fitted());
     return std::pair{report.snap.has_value(), report.fit.has_value()};
   };
-  const auto nothing = [](EncodeOptions&) {};
-  const int vertices = static_cast<int>(model.mesh.positions.size());
-  const int few = (3 * vertices - 1) / 256, some = (3 * vertices + 255) / 256, less = (2 * vertices - 1) / 128,
-            enough = (2 * vertices + 127) / 128;
-  EXPECT_EQ(reported(128, few, nothing), std::pair(false, true));
-  EXPECT_EQ(reported(128, some, nothing), std::pair(true, true));
-  EXPECT_EQ(reported(128, less, [](EncodeOptions& o) { o.has_fit = false; }), std::pair(false, false));
-  EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.has_fit = false; }), std::pair(true, false));
-  EXPECT_EQ(reported(256, 257, nothing), std::pair(true, false));
-  EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.has_snap = false; }), std::pair(false, true));
-  EXPECT_EQ(reported(128, few, [](EncodeOptions& o) { o.has_snap = true, o.has_fit = false; }), std::pair(true, false));
-  EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.has_prefilter = false; }),
+  EXPECT_EQ(reported([](EncodeOptions&) {}), std::pair(true, true));
+  EXPECT_EQ(reported([](EncodeOptions& o) { o.has_fit = false; }), std::pair(false, false));
+  EXPECT_EQ(reported([](EncodeOptions& o) { o.has_snap = true, o.has_fit = false; }), std::pair(true, false));
+  EXPECT_EQ(reported([](EncodeOptions& o) { o.has_snap = false; }), std::pair(false, true));
+  EXPECT_EQ(reported([](EncodeOptions& o) { o.has_prefilter = false, o.width = 256; }),
             std::pair(true, false));  // texels on the mesh were asked for
-  EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.method = Method::kSpd; }), std::pair(false, false));
+  EXPECT_EQ(reported([](EncodeOptions& o) { o.method = Method::kSpd; }), std::pair(false, false));
+}
+
+TEST(Placing, LeavesNoSizeAtWhichTheErrorGrows) {
+  const TestModel model = load_standard_model("bunny00");
+  double last = 1;
+  for (const int size : {128, 160, 192, 224, 256, 288, 320}) {
+    EncodeOptions options;
+    options.width = options.height = size;
+    const double mean = symmetric_mean(
+        measure_metro(device(), model.mesh,
+                      reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model)));
+    EXPECT_LT(mean, last) << size;
+    last = mean;
+  }
 }
 
 TEST(Snap, LeavesNoWideGapsBetweenSeamSamples) {

@@ -328,8 +328,9 @@ ReadTexels place_texels(const TexelStage& stage, const TexelOptions& options, co
     vertex_points.resize(sources.features->vertex_count);
   }
   ReadTexels texels = sources.features ? snap(stage, regular) : copy_of(stage, regular);
-  if (options.has_fit)
-    report.fit = fit_points(context, stage.layout, stage.maps, texels.map_triangles, texels.positions, texels.points);
+  if (options.fit_steps > 0)
+    report.fit = fit_points(context, stage.layout, stage.maps, texels.map_triangles, texels.positions, texels.points,
+                            {.steps = options.fit_steps});
   // What is snapped or fitted is not filtered as well: only SPD patches are.
   if (options.has_prefilter && has_spd(sources.patches))
     texels.points =
@@ -385,7 +386,7 @@ TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const Sepa
   place_end_rows(stage, origin, regular.points);
   if (options.has_unfold && stage.has_maps()) report.unfold = unfold(stage, regular);
   ReadTexels placed = regular;
-  if (stage.has_maps() && (sources.features || options.has_fit))
+  if (stage.has_maps() && (sources.features || options.fit_steps > 0))
     placed = place_texels(stage, options, regular, report);
   else if (options.has_prefilter)
     placed.points = prefilter(stage, regular.points, regular.map_triangles, kNoneIsKept);
