@@ -8,6 +8,7 @@
 //       level_begin      per level of the tree, its first node in `boxes`; level 0 are the blocks
 //                        (layout: core/skeletex/geometry/triangle_tree.h)
 // Out:  nearest          per point, the nearest triangle's place in the tree
+//       nearest_squared  per point, its squared distance, as exact as float32 allows
 // NDRange: one item per `run` consecutive points.
 //
 // Vectors of eight are the width of the tree, not of a pixel: one point against eight boxes or triangles at a time
@@ -77,7 +78,8 @@ inline float8 squared_to_boxes(global const float8* restrict node, const float p
 
 kernel void find_nearest_triangles(const NearestParameters p, global const float* restrict points,
                                    global const float8* restrict boxes, global const float8* restrict blocks,
-                                   constant int* restrict level_begin, global int* restrict nearest) {
+                                   constant int* restrict level_begin, global int* restrict nearest,
+                                   global float* restrict nearest_squared) {
   PLANES(global const float, px, py, pz, points, p.count);
   const int begin = (int)get_global_id(0) * p.run;
   const int end = min(begin + p.run, p.count);
@@ -99,7 +101,7 @@ kernel void find_nearest_triangles(const NearestParameters p, global const float
     float stack_squared[STACK_SIZE];
     int size = 0;
     int level = p.top_level, index = 0;
-    while (best > 0.0f) {
+    while (best > p.enough_squared) {
       if (level > 0) {
         const float8 squared = squared_to_boxes(boxes + 6 * (level_begin[level] + index), x, y, z);
         uint lanes = bits_of(squared < (float8)(best));
@@ -141,5 +143,6 @@ kernel void find_nearest_triangles(const NearestParameters p, global const float
       index = stack_node[size] & INDEX_MASK;
     }
     nearest[i] = max(best_place, 0);
+    nearest_squared[i] = best;
   }
 }

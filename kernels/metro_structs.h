@@ -8,9 +8,10 @@ namespace skeletex {
 #endif
 
 typedef struct NearestParameters {
-  int count;      ///< points
-  int run;        ///< consecutive points per work-item
-  int top_level;  ///< of the tree; level 0 are the blocks
+  int count;             ///< points
+  int run;               ///< consecutive points per work-item
+  int top_level;         ///< of the tree; level 0 are the blocks
+  float enough_squared;  ///< a triangle so near need not be the nearest; 0: always the nearest
 } NearestParameters;
 
 #ifndef __OPENCL_C_VERSION__

@@ -19,7 +19,10 @@ class NearestSearch {
 
   /// Per point the nearest triangle, found in single precision. Points that follow each other in space are found
   /// fastest.
-  void find(std::span<const Vec3> points, std::span<int> triangles);
+  /// \param distances  when given, those of the device: float32's resolution of the mesh's extent; world units
+  /// \param enough     a triangle so near need not be the nearest: faster where only what is further matters; world
+  ///                   units
+  void find(std::span<const Vec3> points, std::span<int> triangles, std::span<float> distances = {}, float enough = 0);
 
  private:
   ClContext& context_;
@@ -27,7 +30,7 @@ class NearestSearch {
   double scale_;
   int top_level_;
   std::vector<int> order_;
-  ClBuffer<float> boxes_, blocks_;
+  ClBuffer<float> boxes_, blocks_, nearest_squared_;
   ClBuffer<int> level_begin_, nearest_;
   std::vector<float> points_;  ///< planes x, y, z
 };
