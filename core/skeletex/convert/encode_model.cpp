@@ -270,8 +270,8 @@ struct BothDistances {
 BothDistances measure_both(const EncodeJob& job, const SkeletexModel& model, const MappedSurface& surface) {
   const PreparedModel prepared(model);
   const TriangleMesh mesh = reconstruct_mesh(job.context, prepared);
-  BothDistances both{distances_from_bones(job.context, surface.charts, build_triangle_tree(mesh), 0),
-                     distances_to_surface(job.context, model, prepared.lattice, mesh, job.tree)};
+  BothDistances both{distances_from_bones(job.context, surface.charts, mesh, build_triangle_tree(mesh), 0),
+                     distances_to_surface(job.context, model, prepared.lattice, mesh, job.mesh, job.tree)};
   double total = 0;
   for (std::size_t bone = 0; bone < both.from.size(); ++bone) {
     const double area = surface_area(surface.segmentation.segments[bone].mesh);
@@ -326,11 +326,14 @@ void report_result(const EncodeJob& job, const Encoding& encoding, const MappedS
   report.fit = texels.fit;
   report.rounding = texels.rounding;
   report.revert = texels.revert;
-  const std::vector<BoneDistance> distances =
-      texels.revert
-          ? texels.revert->distances
-          : distances_from_bones(job.context, surface.charts, build_triangle_tree(reconstruct_mesh(job.context, model)),
-                                 kNearEnough * model.diagonal);
+  std::vector<BoneDistance> distances;
+  if (texels.revert) {
+    distances = texels.revert->distances;
+  } else {
+    const TriangleMesh decoded = reconstruct_mesh(job.context, model);
+    distances = distances_from_bones(job.context, surface.charts, decoded, build_triangle_tree(decoded),
+                                     kNearEnough * model.diagonal);
+  }
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
     const Segment& segment = surface.segmentation.segments[bone];
     BoneReport entry;
@@ -346,6 +349,7 @@ void report_result(const EncodeJob& job, const Encoding& encoding, const MappedS
     entry.sampled_triangle_fraction = texels.sampled_triangle_fractions[bone];
     entry.missed_texels = texels.missed_texels[bone];
     entry.distance = distances[bone];
+    entry.distance.place = model.skeleton.frame.to_user(distances[bone].place);
     entry.map = surface.reports[bone];
     report.bones.push_back(std::move(entry));
   }

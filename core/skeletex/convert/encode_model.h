@@ -62,7 +62,8 @@ struct BoneReport {
   int flipped_triangles = 0;             ///< of the map
   double sampled_triangle_fraction = 0;  ///< share of the segment's triangles that a texel reads
   int missed_texels = 0;                 ///< SPD rays that hit nothing, filled from their neighbours
-  BoneDistance distance;                 ///< of its surface to the mesh that the decoder makes
+  BoneDistance
+      distance;  ///< of its surface to the mesh that the decoder makes, in the unit frame; its place is the user's
   MapReport map;
 };
 
