@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "skeletex/geometry/mesh.h"
+#include "skeletex/model/mesh_attributes.h"
 
 namespace skeletex {
 
@@ -17,6 +18,8 @@ struct MeshFile {
       0;  ///< faces with fewer than three different vertices (after welding): they have no area and are left out
   int vertices_in_file = 0;  ///< for STL, three per triangle
   int merged_vertices = 0;   ///< equal positions welded (STL; other formats are not welded)
+  MeshAttributes attributes;
+  std::vector<std::string> material_files;  ///< that an OBJ names, as it names them
 };
 
 /// Reads OBJ, PLY (ascii, binary), OFF or STL by the ending, in double precision. Faces are counted in and out, so that
@@ -24,6 +27,11 @@ struct MeshFile {
 /// NaN and infinity are kept (not in STL) for validation to report. An UTF-8 byte order mark is skipped.
 /// \throw IoError naming the file, what is wrong and, where the format allows, the line
 MeshFile read_mesh(const std::filesystem::path& path);
+/// Reads the pictures of a mesh's materials, and first the files that an OBJ names for its materials.
+/// \param path  of the mesh; names are relative to its folder
+/// \return sentences about files that are missing; their materials stay as they are
+/// \throw IoError when a file is there but damaged
+std::vector<std::string> read_materials(const std::filesystem::path& path, MeshFile& file);
 
 /// Extra per-vertex data for PLY.
 struct VertexColour {

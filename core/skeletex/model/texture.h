@@ -82,6 +82,20 @@ inline constexpr double kSmallestDiagonal = 1e-15, kLargestDiagonal = 1e15;
 /// How many diagonals a model's nodes, seams and texels may lie away from its origin.
 inline constexpr double kMostDiagonals = 100;
 
+/// What the planes of a layer hold.
+enum class LayerKind {
+  kNormal,  ///< two planes: the surface's unit normal in the frame (along, around, out) of the texel, octahedral
+  kColour,  ///< three planes red, green, blue of linear light, or four with opacity; 0 to 1 for the most part
+  kNumber,  ///< one plane
+};
+
+/// A quantity of the surface beside its place: per texel its value where the texel reads.
+struct Layer {
+  std::string name;  ///< different for each layer of a model; shading normals are "normal", the colour is "colour"
+  LayerKind kind = LayerKind::kNumber;
+  std::vector<std::vector<float>> planes;  ///< as those of the texture
+};
+
 /// A model: one texture and what is needed to turn it back into a mesh.
 struct SkeletexModel {
   Skeleton skeleton;           ///< bind pose, every bone with its s
@@ -98,6 +112,7 @@ struct SkeletexModel {
   /// How much each bone moves each texel in a smooth pose, where that is painted or imported: per bone a plane as the
   /// texture's, values of at least 0 whose sum does not matter. Empty: weights in closed form (weight_walk.h).
   std::vector<std::vector<float>> bone_weights;
+  std::vector<Layer> layers;
   std::string encoder_settings;  ///< JSON object: how the model was made, for the record; nothing depends on it
 };
 
