@@ -18,6 +18,7 @@
 #include "skeletex/device/stopwatch.h"
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/model/error.h"
+#include "skeletex/skeleton/check_skeleton.h"
 
 namespace skeletex {
 namespace {
@@ -298,6 +299,7 @@ void report_result(const SkeletexModel& model, const TriangleMesh& mesh, const M
 EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& skeleton,
                           const EncodeOptions& options) {
   check_options(options, skeleton);
+  check_size(skeleton.nodes.size(), skeleton.bones.size());
   if (options.tree && options.tree->order.size() != mesh.triangles.size())
     throw InputError(fmt::format("the tree is of {} triangles, the mesh has {}; give the mesh's own, or none",
                                  options.tree->order.size(), mesh.triangles.size()));
