@@ -129,8 +129,8 @@ class Program : public ::testing::Test {
   static inline fs::path folder_;
 };
 
-const std::vector<std::string> kCommands{"encode", "reconstruct", "filter",   "transfer", "lod",
-                                         "metro",  "segment",     "validate", "inspect",  "devices"};
+const std::vector<std::string> kCommands{"encode",  "reconstruct", "filter",  "transfer", "lod",        "metro",
+                                         "segment", "validate",    "inspect", "devices",  "skeletonize"};
 
 }  // namespace
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <spdlog/spdlog.h>
 
 #include <charconv>
 #include <filesystem>
@@ -17,6 +18,7 @@
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/io/suggestion.h"
 #include "skeletex/model/error.h"
+#include "skeletex/skeletonize/skeletonize.h"
 
 namespace skeletex::cli {
 namespace {
@@ -119,8 +121,9 @@ void check_bone_names(const Arguments& arguments, const EncodeOptions& options, 
   for (const Bone& bone : skeleton.bones) names.push_back(bone.name);
   for (const auto& [name, method] : options.hybrid_overrides)
     if (std::find(names.begin(), names.end(), name) == names.end())
-      throw InputError(
-          fmt::format("--bone-method: {} has no bone \"{}\"{}", arguments.skeleton, name, did_you_mean(name, names)));
+      throw InputError(fmt::format("--bone-method: {} has no bone \"{}\"{}",
+                                   arguments.skeleton.empty() ? "the made skeleton" : arguments.skeleton, name,
+                                   did_you_mean(name, names)));
 }
 
 struct Input {
@@ -130,10 +133,29 @@ struct Input {
 };
 
 Input read_input(const Arguments& arguments, const EncodeOptions& options) {
-  Input input{load_mesh(arguments.mesh), {}, read_skeleton(arguments.skeleton)};
+  Input input{load_mesh(arguments.mesh), {}, {}};
+  if (arguments.skeleton.empty()) {
+    input.tree = require_closed(input.mesh);
+    return input;
+  }
+  input.skeleton = read_skeleton(arguments.skeleton);
   check_bone_names(arguments, options, input.skeleton);
   require_valid(input.mesh, input.skeleton, &input.tree);
   return input;
+}
+
+/// A skeleton for a mesh without one, and says so.
+Skeleton make_skeleton(ClContext& context, const Input& input, ProgressBar& bar) {
+  SkeletonizeOptions options;
+  options.progress = [&](const std::string& stage, double done) {
+    bar.show(stage, done);
+    return true;
+  };
+  SkeletonizeResult result = skeletonize(context, input.mesh, *input.tree, options);
+  bar.show("reading and checking the input", 0);
+  spdlog::info("no skeleton was given: made one of {} bones (skeletex skeletonize has options for it)",
+               result.skeleton.bones.size());
+  return std::move(result.skeleton);
 }
 
 ExrCompression compression_of(const std::string& name) {
@@ -162,7 +184,11 @@ void run(const Arguments& arguments, const CLI::App& command) {
   // Loading the kernels takes as long as reading the input: a tenth of the command each.
   std::future<Input> reading = std::async(std::launch::async, [&] { return read_input(arguments, options); });
   context.prepare({"encode.cl", "read_surface"});
-  const Input input = reading.get();
+  Input input = reading.get();
+  if (arguments.skeleton.empty()) {
+    input.skeleton = make_skeleton(context, input, *bar);
+    check_bone_names(arguments, options, input.skeleton);
+  }
   options.tree = input.tree ? &*input.tree : nullptr;
   options.progress = [&](const std::string& stage, double done) {
     bar->show(stage, done);
@@ -273,8 +299,8 @@ void add_encode_command(CLI::App& program) {
   declare_input(command, &add(command, "Positionals", "MESH", a.mesh, "closed triangle mesh: .obj, .ply, .off or .stl"))
       ->required();
   declare_input(command, &add(command, "Positionals", "SKELETON", a.skeleton,
-                              "skeleton: JSON with nodes and bones, in the mesh's coordinates"))
-      ->required();
+                              "skeleton: JSON with nodes and bones, in the mesh's coordinates; without, one is made "
+                              "(see skeletonize)"));
   declare_output(command, &add(command, "Options", "-o,--output", a.output, "the model: .skx.exr"), {".exr"})
       ->required()
       ->type_name("FILE");
@@ -295,6 +321,7 @@ void add_encode_command(CLI::App& program) {
   command.footer(
       "Examples:\n"
       "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr\n"
+      "  skeletex encode bear.off -o bear.skx.exr\n"
       "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr --method hybrid --bone-method head=vsm --size "
       "1024\n"
       "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr --json - | jq .times_ms\n"

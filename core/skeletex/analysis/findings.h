@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The parts of validate_input. Each appends its findings, with place and remedy.
 #pragma once
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,8 @@ namespace skeletex {
 
 /// Two points that are nearer to each other are in the same place; diagonals.
 inline constexpr double kSamePlace = 1e-9;
+/// A skeleton with more bones is refused.
+inline constexpr std::size_t kMostBones = 2000;
 
 /// "node "neck"", or "node 3" if it has no name
 std::string name_of_node(const Skeleton& skeleton, int node);
@@ -36,6 +39,10 @@ bool find_in_skeleton(const Skeleton& skeleton, double diagonal, std::vector<Fin
 /// \param is_closed  whether the surface has an inside without doubt
 void find_between(const SurfaceProbe& surface, bool is_closed, const Skeleton& skeleton,
                   std::vector<Finding>& findings);
+
+/// Bones whose separation planes cross inside the body, the worst first.
+/// \param tree  of the mesh
+void find_crossing_planes(const Skeleton& skeleton, const TriangleTree& tree, std::vector<Finding>& findings);
 
 /// Bones that can be taken away without the skeleton falling apart: its independent cycles.
 int count_cycles(const Skeleton& skeleton);

@@ -2,6 +2,8 @@
 #include "skeletex/geometry/triangle_tree.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <utility>
 
@@ -183,6 +185,93 @@ NearestTriangle find_nearest_triangle(const TriangleMesh& mesh, const TriangleTr
     }
   }
   return nearest;
+}
+
+namespace {
+
+/// A ray in the tree's units.
+struct TreeRay {
+  std::array<float, 3> origin, direction, inverse;
+};
+
+/// Shares at which a ray enters the children of a node; past `limit` where it does not meet them.
+std::array<float, kWidth> enter_children(const TriangleTree& tree, int level, std::size_t index, const TreeRay& ray,
+                                         float limit) {
+  const float* planes = tree.boxes.data() + (tree.level_begin[level] + index) * 6 * kWidth;
+  std::array<float, kWidth> enter{}, leave;
+  leave.fill(limit);
+  for (int d = 0; d < 3; ++d)
+    for (int k = 0; k < kWidth; ++k) {
+      const float a = (planes[d * kWidth + k] - ray.origin[d]) * ray.inverse[d],
+                  b = (planes[(3 + d) * kWidth + k] - ray.origin[d]) * ray.inverse[d];
+      enter[k] = std::max(enter[k], std::min(a, b));
+      leave[k] = std::min(leave[k], std::max(a, b));
+    }
+  for (int k = 0; k < kWidth; ++k)
+    if (enter[k] > leave[k]) enter[k] = 2 * kFarAway;
+  return enter;
+}
+
+/// The least share at which a ray meets a triangle of a block (Moeller and Trumbore 1997); `limit` without any.
+/// Triangles are a little larger than they are, so that no ray slips between two.
+float hit_block(const float* planes, const TreeRay& ray, float limit) {
+  constexpr float kOver = 1e-6f;
+  const auto plane = [&](int i, int k) { return planes[i * kWidth + k]; };
+  std::array<float, kWidth> shares{};
+  for (int k = 0; k < kWidth; ++k) {
+    const float ax = plane(3, k), ay = plane(4, k), az = plane(5, k);
+    const float bx = plane(6, k), by = plane(7, k), bz = plane(8, k);
+    const float px = ray.direction[1] * bz - ray.direction[2] * by, py = ray.direction[2] * bx - ray.direction[0] * bz,
+                pz = ray.direction[0] * by - ray.direction[1] * bx;
+    const float determinant = ax * px + ay * py + az * pz, inverse = 1 / determinant;
+    const float x = ray.origin[0] - plane(0, k), y = ray.origin[1] - plane(1, k), z = ray.origin[2] - plane(2, k);
+    const float u = (x * px + y * py + z * pz) * inverse;
+    const float qx = y * az - z * ay, qy = z * ax - x * az, qz = x * ay - y * ax;
+    const float v = (ray.direction[0] * qx + ray.direction[1] * qy + ray.direction[2] * qz) * inverse;
+    const float share = (bx * qx + by * qy + bz * qz) * inverse;
+    // A determinant of 0 makes u infinite or no number, which fails.
+    const bool is_hit = (u >= -kOver) & (v >= -kOver) & (u + v <= 1 + kOver) & (share >= 0);
+    shares[k] = is_hit ? share : limit;
+  }
+  return std::min(limit, *std::min_element(shares.begin(), shares.end()));
+}
+
+}  // namespace
+
+double find_first_hit(const TriangleTree& tree, const Vec3& origin, const Vec3& direction, double limit) {
+  TreeRay ray;
+  for (int d = 0; d < 3; ++d) {
+    ray.origin[d] = static_cast<float>((origin[d] - tree.origin[d]) / tree.scale);
+    ray.direction[d] = static_cast<float>(direction[d] / tree.scale);
+    ray.inverse[d] = 1 / (std::abs(ray.direction[d]) < 1e-20f ? 1e-20f : ray.direction[d]);
+  }
+  float least = static_cast<float>(std::min(limit, static_cast<double>(kFarAway)));
+  const float bound = least;
+  struct Open {
+    int level;
+    std::size_t index;
+    float enter;
+  };
+  std::array<Open, 128> open;  // at most 7 more a level than are taken
+  int count = 0;
+  open[count++] = {tree.top_level(), 0, 0};
+  while (count > 0) {
+    const Open node = open[--count];
+    if (node.enter >= least) continue;
+    if (node.level == 0) {
+      least = hit_block(tree.blocks.data() + node.index * 9 * kWidth, ray, least);
+      continue;
+    }
+    const std::array<float, kWidth> enter = enter_children(tree, node.level, node.index, ray, least);
+    const int begin = count;
+    for (int k = 0; k < kWidth; ++k) {
+      if (enter[k] >= least) continue;
+      int at = count++;
+      for (; at > begin && open[at - 1].enter < enter[k]; --at) open[at] = open[at - 1];
+      open[at] = {node.level - 1, kWidth * node.index + k, enter[k]};
+    }
+  }
+  return least < bound ? least : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace skeletex

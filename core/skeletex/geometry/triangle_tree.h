@@ -48,4 +48,10 @@ struct NearestTriangle {
 NearestTriangle find_nearest_triangle(const TriangleMesh& mesh, const TriangleTree& tree, const Vec3& point,
                                       double bound = std::numeric_limits<double>::infinity());
 
+/// Where a ray first meets the mesh, in single precision: origin + share * direction. Triangles count from both sides.
+/// \param limit  hits at larger shares are left out
+/// \return the share; infinity without a hit
+double find_first_hit(const TriangleTree& tree, const Vec3& origin, const Vec3& direction,
+                      double limit = std::numeric_limits<double>::infinity());
+
 }  // namespace skeletex

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include "skeletex/geometry/mesh.h"
+#include "skeletex/geometry/triangle_tree.h"
+
+namespace skeletex {
+
+/// A closed mesh and its tree, for questions about single points. Both must outlive it.
+struct Surface {
+  const TriangleMesh& mesh;
+  const TriangleTree& tree;
+  double diagonal;
+
+  Surface(const TriangleMesh& mesh_, const TriangleTree& tree_)
+      : mesh(mesh_), tree(tree_), diagonal(bounding_box(mesh_).diagonal()) {}
+  /// Distance to the surface: for a point inside, the radius of the largest ball around it.
+  double radius(const Vec3& point) const { return find_nearest_triangle(mesh, tree, point).distance; }
+  /// Whether the surface is nearer to a point than a distance. Faster than the radius, the smaller the distance.
+  bool is_near(const Vec3& point, double distance) const {
+    return find_nearest_triangle(mesh, tree, point, distance).triangle >= 0;
+  }
+  /// Whether the way from one point straight to another meets the surface.
+  bool is_between(const Vec3& from, const Vec3& to) const { return find_first_hit(tree, from, to - from, 1) <= 1; }
+};
+
+}  // namespace skeletex
