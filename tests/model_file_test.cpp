@@ -249,6 +249,43 @@ TEST(ModelFile, WeightsOfBonesAreLayersOfTheirOwn) {
   EXPECT_FALSE(std::filesystem::exists(scratch / "bad.skx.exr"));
 }
 
+TEST(ModelFile, LayersComeBackUnderTheirNames) {
+  SkeletexModel model = branch_model();
+  const std::size_t texels = model.texture.along.size();
+  const auto plane = [texels](int seed) {
+    std::vector<float> values(texels);
+    for (std::size_t i = 0; i < texels; ++i) values[i] = static_cast<float>((i * (seed + 3)) % 17) / 16 - 0.5f;
+    return values;
+  };
+  model.layers = {{"normal", LayerKind::kNormal, {plane(0), plane(1)}},
+                  {"colour", LayerKind::kColour, {plane(2), plane(3), plane(4)}},
+                  {"heat of today", LayerKind::kNumber, {plane(5)}},
+                  {"heat:of today", LayerKind::kNumber, {plane(6)}}};
+  for (float& x : model.layers[2].planes[0]) x = 1 / (x + 3);  // no half floats
+  using Names = std::vector<std::vector<std::string>>;
+  EXPECT_EQ(
+      layer_channels(model.layers),
+      (Names{
+          {"normal.R", "normal.G"}, {"colour.R", "colour.G", "colour.B"}, {"heat_of_today.Y"}, {"heat_of_today_3.Y"}}));
+  const ScratchFolder scratch;
+  write_model(scratch / "m.skx.exr", model);
+  const SkeletexModel back = read_model(scratch / "m.skx.exr");
+  expect_same(back, model);
+  ASSERT_EQ(back.layers.size(), model.layers.size());
+  for (std::size_t i = 0; i < back.layers.size(); ++i) {
+    EXPECT_EQ(back.layers[i].name, model.layers[i].name);
+    EXPECT_EQ(back.layers[i].kind, model.layers[i].kind);
+    EXPECT_EQ(back.layers[i].planes, model.layers[i].planes);
+  }
+  SkeletexModel bad = model;
+  bad.layers[0].planes[1][7] = 1.5f;  // no normal
+  EXPECT_THROW(write_model(scratch / "bad.skx.exr", bad), IoError);
+  bad = model;
+  bad.layers[1].name = "normal";
+  EXPECT_THROW(write_model(scratch / "bad.skx.exr", bad), IoError);
+  EXPECT_FALSE(std::filesystem::exists(scratch / "bad.skx.exr"));
+}
+
 TEST(ModelFile, TheSameModelGivesTheSameBytes) {
   const ScratchFolder folder;
   const SkeletexModel model = branch_model(200, 100);
@@ -426,7 +463,7 @@ TEST(ModelFile, EditedHeadersAreRefusedOrGiveFiniteMeshes) {
 
 TEST(ModelFile, MeshesWithoutFiniteNumbersAreNotWritten) {
   const ScratchFolder folder;
-  for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity(), 1e39})
+  for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity()})
     for (const char* name : {"a.ply", "a.obj"}) {
       const TriangleMesh mesh{{{0, 0, 0}, {1, bad, 0}, {0, 1, 0}}, {{0, 1, 2}}};
       try {
@@ -460,7 +497,7 @@ TEST(ModelFile, SaysWhatIsWrongWithForeignTruncatedAndNewerFiles) {
     EXPECT_NE(at, std::string::npos);
     return bytes.replace(at, from.size(), to);
   };
-  EXPECT_TRUE(contains(message_for(with("\"version\":1", "\"version\":2")), "newer"));
+  EXPECT_TRUE(contains(message_for(with("\"version\":2", "\"version\":3")), "newer"));
   EXPECT_TRUE(contains(message_for(with(std::string("skeletex\0string", 15), std::string("skeletix\0string", 15))),
                        "not a model"));
   EXPECT_TRUE(contains(message_for(with("\"width\":40", "\"width\":41")), "resized"));

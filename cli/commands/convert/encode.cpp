@@ -126,6 +126,7 @@ void check_bone_names(const Arguments& arguments, const EncodeOptions& options, 
                                    did_you_mean(name, names)));
 }
 
+/// Mesh and skeleton in the unit frame of the mesh.
 struct Input {
   TriangleMesh mesh;
   std::optional<TriangleTree> tree;
@@ -136,11 +137,18 @@ Input read_input(const Arguments& arguments, const EncodeOptions& options) {
   Input input{load_mesh(arguments.mesh), {}, {}};
   if (arguments.skeleton.empty()) {
     input.tree = require_closed(input.mesh);
-    return input;
+  } else {
+    input.skeleton = read_skeleton(arguments.skeleton);
+    check_bone_names(arguments, options, input.skeleton);
+    require_valid(input.mesh, input.skeleton, &input.tree);
   }
-  input.skeleton = read_skeleton(arguments.skeleton);
-  check_bone_names(arguments, options, input.skeleton);
-  require_valid(input.mesh, input.skeleton, &input.tree);
+  const UnitFrame frame = unit_frame(input.mesh);
+  input.mesh = in_unit_frame(std::move(input.mesh), frame);
+  input.skeleton = in_unit_frame(std::move(input.skeleton), frame);
+  if (input.tree) {  // what it holds is in this frame already
+    input.tree->origin = Vec3::Zero();
+    input.tree->scale = 1;
+  }
   return input;
 }
 
@@ -155,6 +163,7 @@ Skeleton make_skeleton(ClContext& context, const Input& input, ProgressBar& bar)
   bar.show("reading and checking the input", 0);
   spdlog::info("no skeleton was given: made one of {} bones (skeletex skeletonize has options for it)",
                result.skeleton.bones.size());
+  result.skeleton.frame = input.skeleton.frame;  // of the mesh that it was made for
   return std::move(result.skeleton);
 }
 

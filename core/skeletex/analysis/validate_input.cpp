@@ -117,7 +117,8 @@ std::vector<Finding> validate_input(ClContext& context, TriangleMesh& mesh, cons
   std::vector<Finding> findings = validate_before_segmentation(mesh, skeleton, &tree);
   if (has_errors(findings)) return findings;
   try {
-    segment_mesh(context, mesh, skeleton);
+    const UnitFrame frame = unit_frame(mesh);
+    segment_mesh(context, in_unit_frame(mesh, frame), in_unit_frame(skeleton, frame));
   } catch (const TopologyError& error) {
     find_crossing_planes(skeleton, *tree, findings);
     const auto is_told = [&](const Finding& f) { return f.rule == "separation-planes" && f.bone == error.bone(); };

@@ -159,7 +159,7 @@ void open_children(const TriangleTree& tree, const OpenNode& node, const Eigen::
 }  // namespace
 
 NearestTriangle find_nearest_triangle(const TriangleMesh& mesh, const TriangleTree& tree, const Vec3& point,
-                                      double bound) {
+                                      double bound, const std::function<bool(int triangle)>& counts) {
   constexpr double kRounding = 1e-6;  // of the tree's units: more than what rounding to float32 moves a point or box
   const Eigen::Vector3f place = ((point - tree.origin) / tree.scale).cast<float>();
   NearestTriangle nearest{-1, bound};
@@ -181,7 +181,7 @@ NearestTriangle find_nearest_triangle(const TriangleMesh& mesh, const TriangleTr
       const Triangle& t = mesh.triangles[tree.order[at]];
       const double distance =
           offset_from_triangle(point, mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]).norm();
-      if (distance < nearest.distance) nearest = {tree.order[at], distance};
+      if (distance < nearest.distance && (!counts || counts(tree.order[at]))) nearest = {tree.order[at], distance};
     }
   }
   return nearest;

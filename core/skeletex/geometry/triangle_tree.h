@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <functional>
 #include <limits>
 #include <span>
 #include <vector>
@@ -45,8 +46,10 @@ struct NearestTriangle {
 /// The triangle nearest to a point, on the host and in double precision; of few points, else see NearestSearch.
 /// \param tree   of the mesh
 /// \param bound  triangles that are not nearer are left out
+/// \param counts when given, triangles for which it is false are left out
 NearestTriangle find_nearest_triangle(const TriangleMesh& mesh, const TriangleTree& tree, const Vec3& point,
-                                      double bound = std::numeric_limits<double>::infinity());
+                                      double bound = std::numeric_limits<double>::infinity(),
+                                      const std::function<bool(int triangle)>& counts = nullptr);
 
 /// Where a ray first meets the mesh, in single precision: origin + share * direction. Triangles count from both sides.
 /// \param limit  hits at larger shares are left out

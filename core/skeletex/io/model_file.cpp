@@ -93,6 +93,15 @@ void check_texels(const SkeletexModel& model, const std::string& where) {
         plane(model.texture, i), kChannels[i], model.texture,
         [&](float x) { return std::abs(x) <= kMostDiagonals * model.diagonal; },
         "not a finite number, or beyond 100 diagonals", where);
+  const std::vector<std::vector<std::string>> names = layer_channels(model.layers);
+  for (std::size_t i = 0; i < names.size(); ++i)
+    for (std::size_t k = 0; k < names[i].size(); ++k)
+      check_plane(
+          model.layers[i].planes[k], names[i][k], model.texture,
+          [is_normal = model.layers[i].kind == LayerKind::kNormal](float x) {
+            return is_normal ? std::abs(x) <= 1 : std::isfinite(x);
+          },
+          "not a finite number, or beyond -1 to 1 in a normal", where);
   if (model.bone_weights.empty()) return;
   if (model.bone_weights.size() != model.skeleton.bones.size())
     throw IoError(fmt::format("{}: weights of {} bones are expected, not of {}", where, model.skeleton.bones.size(),
@@ -181,10 +190,9 @@ ExrPart make_part(const SkeletexModel& model, const ModelFileOptions& options, c
   } catch (const nlohmann::json::exception& error) {
     throw IoError(fmt::format("{}: a name in the skeleton is not UTF-8 text: {}", where, error.what()));
   }
-  const bool is_half = options.format == TexelFormat::kHalf;
   ExrPart part{Imf::Header(width, height), {}, {}};
   part.header.insert(kAttribute, Imf::StringAttribute(json));
-  const auto add_channel = [&](const std::string& name, const std::vector<float>& texels) {
+  const auto add_channel = [&](const std::string& name, const std::vector<float>& texels, bool is_half) {
     const void* data = texels.data();
     if (is_half) {
       const auto largest =
@@ -201,11 +209,18 @@ ExrPart make_part(const SkeletexModel& model, const ModelFileOptions& options, c
     part.frame.insert(name, Imf::Slice(type, static_cast<char*>(const_cast<void*>(data)), bytes,
                                        bytes * static_cast<std::size_t>(width)));
   };
-  for (int i = 0; i < 3; ++i) add_channel(kChannels[i], plane(model.texture, i));
+  const bool has_halves = options.format == TexelFormat::kHalf;
+  for (int i = 0; i < 3; ++i) add_channel(kChannels[i], plane(model.texture, i), has_halves);
   if (!model.bone_weights.empty()) {
     const std::vector<std::string> channels = weight_channels(model.skeleton);
-    for (std::size_t bone = 0; bone < channels.size(); ++bone) add_channel(channels[bone], model.bone_weights[bone]);
+    for (std::size_t bone = 0; bone < channels.size(); ++bone)
+      add_channel(channels[bone], model.bone_weights[bone], has_halves);
   }
+  // Half floats hold directions to 0.03 degrees, and more colours than the 8 bits of a picture.
+  const std::vector<std::vector<std::string>> names = layer_channels(model.layers);
+  for (std::size_t i = 0; i < names.size(); ++i)
+    for (std::size_t k = 0; k < names[i].size(); ++k)
+      add_channel(names[i][k], model.layers[i].planes[k], model.layers[i].kind != LayerKind::kNumber);
   const bool has_zip = options.compression == ExrCompression::kZip ||
                        (options.compression == ExrCompression::kAuto && pays_zip(part, width, height));
   part.header.compression() = has_zip                                       ? Imf::ZIP_COMPRESSION
@@ -285,6 +300,7 @@ SkeletexModel read_model(const std::filesystem::path& path, int level) {
   const std::string where = path.string();
   SkeletexModel model;
   std::vector<std::string> weight_names;
+  std::vector<std::vector<std::string>> layer_names;
   {
     const std::vector<ExrSurvey> parts = survey_exr(path, kMaxTextureSize, false);
     const ExrSurvey& survey = part_of(parts, level, where);
@@ -292,6 +308,9 @@ SkeletexModel read_model(const std::filesystem::path& path, int level) {
     model = model_from_json(header, where);
     weight_names = weight_channels(header, model.skeleton.bones.size(), where);
     model.bone_weights.resize(weight_names.size());
+    NamedLayers named = layers_from_json(header, where);
+    model.layers = std::move(named.layers);
+    layer_names = std::move(named.channels);
     if (model.texture.width != survey.width || model.texture.height != survey.height)
       throw IoError(fmt::format(
           "{}: the image has {} x {} texels, but the model in its header {} x {}; it was resized by another program",
@@ -308,8 +327,8 @@ SkeletexModel read_model(const std::filesystem::path& path, int level) {
       const Imf::Channel* channel = exr.header().channels().findChannel(name);
       if (channel == nullptr || channel->xSampling != 1 || channel->ySampling != 1 || channel->type == Imf::UINT)
         throw IoError(
-            fmt::format("{}: a model has the channels R, G, B and those of its weights in full resolution, float or "
-                        "half; {} is not like that",
+            fmt::format("{}: a model has the channels R, G, B and those of its weights and layers in full resolution, "
+                        "float or half; {} is not like that",
                         where, name));
       values.resize(width * height);
       frame.insert(
@@ -318,6 +337,8 @@ SkeletexModel read_model(const std::filesystem::path& path, int level) {
     for (int i = 0; i < 3; ++i) add_channel(kChannels[i], plane(model.texture, i));
     for (std::size_t bone = 0; bone < weight_names.size(); ++bone)
       add_channel(weight_names[bone], model.bone_weights[bone]);
+    for (std::size_t i = 0; i < layer_names.size(); ++i)
+      for (std::size_t k = 0; k < layer_names[i].size(); ++k) add_channel(layer_names[i][k], model.layers[i].planes[k]);
     const Imath::Box2i window = exr.header().dataWindow();
     if (window.min != Imath::V2i(0, 0) || window.max != Imath::V2i(model.texture.width - 1, model.texture.height - 1))
       throw IoError(where + ": the file changed while it was read");

@@ -107,6 +107,19 @@ TexelSampling sampling_from(const Entry& header) {
   return {is_true("prefilter"), is_true("snap"), is_true("fit")};
 }
 
+Vec3 vector_from(const Entry& entry) {
+  const std::vector<double> values = entry.numbers();
+  if (values.size() != 3) entry.fail("three numbers are expected");
+  return {values[0], values[1], values[2]};
+}
+
+/// Models of version 1 are in the user's units.
+UnitFrame frame_from(const Entry& header) {
+  if (!header.has("frame")) return {};
+  const Entry frame = header.member("frame");
+  return {vector_from(frame.member("offset")), frame.member("scale").number()};
+}
+
 SeamCorner corner_from(const Entry& entry, const Skeleton& skeleton) {
   SeamCorner corner;
   corner.node = entry.member("node").index_into(skeleton.nodes.size());
@@ -153,6 +166,24 @@ std::string layer_word(const std::string& name) {
   return word;
 }
 
+constexpr std::array<LayerKind, 3> kLayerKinds{LayerKind::kNormal, LayerKind::kColour, LayerKind::kNumber};
+const char* to_string(LayerKind kind) {
+  switch (kind) {
+    case LayerKind::kNormal: return "normal";
+    case LayerKind::kColour: return "colour";
+    case LayerKind::kNumber: return "number";
+  }
+  return "";
+}
+bool has_planes_of(LayerKind kind, std::size_t planes) {
+  switch (kind) {
+    case LayerKind::kNormal: return planes == 2;
+    case LayerKind::kColour: return planes == 3 || planes == 4;
+    case LayerKind::kNumber: return planes == 1;
+  }
+  return false;
+}
+
 json conventions() {
   return {
       {"texel",
@@ -175,7 +206,14 @@ json conventions() {
       {"weights",
        "where the header has \"weights\": per bone the channel of its weights in smooth poses, at least 0; their sum "
        "does not matter"},
-      {"units", "lengths in the units of the input mesh, angles in turns"},
+      {"layers",
+       "where the header has \"layers\": quantities of the surface at the texels' places, in channels of their own. "
+       "Kind "
+       "\"normal\": the unit normal (a, c, n) along, around and out as p = (a, c) / (|a| + |c| + |n|), and where n < 0 "
+       "as ((1 - |p2|) sign(p1), (1 - |p1|) sign(p2)); \"colour\": linear light; \"number\": any number"},
+      {"units",
+       "lengths and places in the unit frame, in which the input has a diagonal of 1: in the user's units a place p is "
+       "frame.offset + frame.scale p; angles in turns"},
   };
 }
 
@@ -204,6 +242,54 @@ std::vector<std::string> weight_channels(const json& header, std::size_t bones, 
       throw IoError(fmt::format("{}: \"weights\": \"{}\" is named twice", where, names.back()));
   }
   return names;
+}
+
+std::vector<std::vector<std::string>> layer_channels(const std::vector<Layer>& layers) {
+  constexpr std::array kParts{"R", "G", "B", "A"};
+  std::vector<std::string> words;
+  std::vector<std::vector<std::string>> channels;
+  for (const Layer& layer : layers) {
+    std::string word = layer_word(layer.name);
+    if (word == "weights" || std::find(words.begin(), words.end(), word) != words.end())
+      word += fmt::format("_{}", words.size());
+    words.push_back(word);
+    std::vector<std::string>& names = channels.emplace_back();
+    for (std::size_t i = 0; i < layer.planes.size(); ++i)
+      names.push_back(fmt::format("{}.{}", word, layer.kind == LayerKind::kNumber ? "Y" : kParts.at(i)));
+  }
+  return channels;
+}
+
+NamedLayers layers_from_json(const json& root, const std::string& where) {
+  NamedLayers named;
+  const Entry header(root, where, true);
+  if (!header.has("layers")) return named;
+  std::vector<std::string> all;
+  for (const Entry& entry : header.items("layers")) {
+    Layer layer;
+    const Entry name = entry.member("name"), kind = entry.member("kind");
+    if (!name.value().is_string() || name.value().get<std::string>().empty()) name.fail("a name is expected");
+    layer.name = name.value().get<std::string>();
+    const auto known = std::find_if(kLayerKinds.begin(), kLayerKinds.end(),
+                                    [&](LayerKind of) { return kind.value() == to_string(of); });
+    if (known == kLayerKinds.end()) continue;  // of a newer program; all else can be used without it
+    layer.kind = *known;
+    const Entry channels = entry.member("channels");
+    std::vector<std::string> names;
+    for (const Entry& channel : entry.items("channels")) {
+      if (!channel.value().is_string()) channel.fail("the name of a channel is expected");
+      names.push_back(channel.value().get<std::string>());
+      if (std::find(all.begin(), all.end(), names.back()) != all.end()) channel.fail("the channel is named twice");
+      all.push_back(names.back());
+    }
+    if (!has_planes_of(layer.kind, names.size())) channels.fail("a layer of this kind has another number of channels");
+    if (std::any_of(named.layers.begin(), named.layers.end(), [&](const Layer& l) { return l.name == layer.name; }))
+      name.fail("the layer is named twice");
+    layer.planes.resize(names.size());
+    named.layers.push_back(std::move(layer));
+    named.channels.push_back(std::move(names));
+  }
+  return named;
 }
 
 json model_to_json(const SkeletexModel& model, const std::string& where) {
@@ -236,10 +322,12 @@ json model_to_json(const SkeletexModel& model, const std::string& where) {
   for (const SeamCorner& corner : model.corners)
     corners.push_back(
         {{"node", corner.node}, {"bones", corner.bones}, {"sample", {corner.sample.turn, corner.sample.distance}}});
+  const UnitFrame& frame = model.skeleton.frame;
   json result = {{"format", "skeletex"},
                  {"version", kModelFileVersion},
                  {"conventions", conventions()},
                  {"skeleton", skeleton_to_json(model.skeleton)},
+                 {"frame", {{"offset", {frame.offset[0], frame.offset[1], frame.offset[2]}}, {"scale", frame.scale}}},
                  {"origin", {model.origin[0], model.origin[1], model.origin[2]}},
                  {"diagonal", model.diagonal},
                  {"genus", model.genus},
@@ -252,6 +340,16 @@ json model_to_json(const SkeletexModel& model, const std::string& where) {
                         {"fitted", model.sampling.is_fitted}};
   if (model.diagonals == DiagonalRule::kSmooth) result["diagonals"] = "smooth";
   if (!model.bone_weights.empty()) result["weights"] = weight_channels(model.skeleton);
+  const std::vector<std::vector<std::string>> channels = layer_channels(model.layers);
+  for (std::size_t i = 0; i < model.layers.size(); ++i) {
+    const Layer& layer = model.layers[i];
+    if (layer.name.empty() || !has_planes_of(layer.kind, layer.planes.size()) ||
+        std::count_if(model.layers.begin(), model.layers.end(), [&](const Layer& l) { return l.name == layer.name; }) >
+            1)
+      throw IoError(fmt::format("{}: layer \"{}\" of kind {} has {} planes, or the name of another one", where,
+                                layer.name, to_string(layer.kind), layer.planes.size()));
+    result["layers"].push_back({{"name", layer.name}, {"kind", to_string(layer.kind)}, {"channels", channels[i]}});
+  }
   if (!model.encoder_settings.empty()) {
     result["encoder"] = parse_json(model.encoder_settings, where + ": encoder settings");
     if (!result["encoder"].is_object()) throw IoError(where + ": the encoder's settings must be a JSON object");
@@ -271,9 +369,8 @@ SkeletexModel model_from_json(const json& root, const std::string& where) {
 
   SkeletexModel model;
   model.skeleton = skeleton_from_json(header.member("skeleton").value(), where + ": skeleton");
-  const std::vector<double> origin = header.member("origin").numbers();
-  if (origin.size() != 3) header.member("origin").fail("three numbers are expected");
-  model.origin = {origin[0], origin[1], origin[2]};
+  model.skeleton.frame = frame_from(header);
+  model.origin = vector_from(header.member("origin"));
   model.diagonal = header.member("diagonal").number();
   model.genus = header.member("genus").integer(0, kMaxInt);
   model.diagonals = diagonals_from(header);

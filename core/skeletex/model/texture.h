@@ -76,16 +76,31 @@ struct TexelSampling {
   bool is_fitted = false;  ///< those of VSM patches were moved so that the triangles between lie nearer to the mesh
 };
 
-/// Lengths, in the units of the mesh, whose squares single precision holds with room to spare: diagonals of models lie
+/// Lengths, in the frame of the model, whose squares single precision holds with room to spare: diagonals of models lie
 /// between them.
 inline constexpr double kSmallestDiagonal = 1e-15, kLargestDiagonal = 1e15;
 /// How many diagonals a model's nodes, seams and texels may lie away from its origin.
 inline constexpr double kMostDiagonals = 100;
 
-/// A model: one texture and what is needed to turn it back into a mesh.
+/// What the planes of a layer hold.
+enum class LayerKind {
+  kNormal,  ///< two planes: the surface's unit normal in the frame (along, around, out) of the texel, octahedral
+  kColour,  ///< three planes red, green, blue of linear light, or four with opacity; 0 to 1 for the most part
+  kNumber,  ///< one plane
+};
+
+/// A quantity of the surface beside its place: per texel its value where the texel reads.
+struct Layer {
+  std::string name;  ///< different for each layer of a model; shading normals are "normal", the colour is "colour"
+  LayerKind kind = LayerKind::kNumber;
+  std::vector<std::vector<float>> planes;  ///< as those of the texture
+};
+
+/// A model: one texture and what is needed to turn it back into a mesh. Its lengths and places are in the frame of its
+/// skeleton; reconstruct_mesh gives the user's units.
 struct SkeletexModel {
   Skeleton skeleton;           ///< bind pose, every bone with its s
-  Vec3 origin = Vec3::Zero();  ///< world position that device coordinates are relative to (the input's box centre)
+  Vec3 origin = Vec3::Zero();  ///< place that device coordinates are relative to (the input's box centre)
   double diagonal = 0;         ///< of the input mesh's bounding box
   int genus = 0;
   DiagonalRule diagonals = DiagonalRule::kNearest;
@@ -98,7 +113,12 @@ struct SkeletexModel {
   /// How much each bone moves each texel in a smooth pose, where that is painted or imported: per bone a plane as the
   /// texture's, values of at least 0 whose sum does not matter. Empty: weights in closed form (weight_walk.h).
   std::vector<std::vector<float>> bone_weights;
+  std::vector<Layer> layers;
   std::string encoder_settings;  ///< JSON object: how the model was made, for the record; nothing depends on it
 };
+
+/// The same model in another frame. Of scales that differ, texels are rounded once more.
+/// \throw InputError when its diagonal would not be between kSmallestDiagonal and kLargestDiagonal there
+SkeletexModel in_frame(SkeletexModel model, const UnitFrame& frame);
 
 }  // namespace skeletex

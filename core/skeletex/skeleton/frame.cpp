@@ -119,4 +119,21 @@ FrameTables frame_tables(const Skeleton& skeleton, const SeparationPlanes& separ
   return tables;
 }
 
+Eigen::Matrix3f texel_axes(const FrameTables& tables, int patch, int row, int column) {
+  const PatchRecord& p = tables.patches[patch];
+  const RowRecord& r = tables.rows[p.row_begin + row];
+  const ColumnRecord& c = tables.columns[p.column_begin + column];
+  const Eigen::Vector3f s = Eigen::Map<const Eigen::Vector3f>(p.s), b = Eigen::Map<const Eigen::Vector3f>(p.b),
+                        o = Eigen::Map<const Eigen::Vector3f>(p.axis);
+  const Eigen::Vector3f radial = c.cosine * s + c.sine * b;
+  const float across = r.cap_cos,
+              along = r.cap_cos * (c.slope_head + r.axial * (c.slope_tail - c.slope_head)) + r.cap_sin;
+  const float inverse = 1 / std::sqrt(across * across + along * along);
+  Eigen::Matrix3f axes;
+  axes.col(0) = inverse * (across * o - along * radial);
+  axes.col(1) = c.cosine * b - c.sine * s;
+  axes.col(2) = inverse * (across * radial + along * o);
+  return axes;
+}
+
 }  // namespace skeletex

@@ -47,5 +47,7 @@ struct FrameTables {
 /// \param origin  world position that device coordinates are relative to
 FrameTables frame_tables(const Skeleton& skeleton, const SeparationPlanes& separation,
                          const std::vector<Patch>& patches, const Vec3& origin);
+/// The axes along, around, out of a texel's frame as columns, from the tables.
+Eigen::Matrix3f texel_axes(const FrameTables& tables, int patch, int row, int column);
 
 }  // namespace skeletex

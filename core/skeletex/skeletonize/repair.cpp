@@ -38,6 +38,7 @@ Vec3 RandomNumbers::in_ball(double radius) {
 }
 
 Repair::Repair(const Surface& surface, Skeleton skeleton) : surface_(surface), skeleton_(std::move(skeleton)) {
+  skeleton_.frame = surface.frame;
   for (const Node& node : skeleton_.nodes) radii_.push_back(surface.radius(node.position));
   prepare();
 }

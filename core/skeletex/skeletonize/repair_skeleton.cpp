@@ -224,7 +224,7 @@ void drop_bad_angles(Skeleton& skeleton) {
 }
 
 /// What became of the nodes and bones that the user knows.
-void describe(const Skeleton& before, const Skeleton& after, double diagonal, std::vector<std::string>& changes) {
+void describe(const Skeleton& before, const Skeleton& after, std::vector<std::string>& changes) {
   std::map<std::string, Vec3> places;
   std::set<std::string> bones;
   for (const Node& node : after.nodes) places[node.name] = node.position;
@@ -235,10 +235,10 @@ void describe(const Skeleton& before, const Skeleton& after, double diagonal, st
       changes.push_back(fmt::format("node \"{}\" taken away", node.name));
       continue;
     }
-    const double distance = (now->second - node.position).norm();
-    if (distance > 1e-9 * diagonal)
-      changes.push_back(fmt::format("node \"{}\" moved by {} to {}", node.name, text_of_distance(distance, diagonal),
-                                    text_of(now->second)));
+    const double distance = (now->second - node.position).norm(), scale = after.frame.scale;
+    if (distance > 1e-9)
+      changes.push_back(fmt::format("node \"{}\" moved by {} to {}", node.name,
+                                    text_of_distance(distance * scale, scale), text_of(after, now->second)));
   }
   for (const Bone& bone : before.bones)
     if (!bones.contains(bone.name)) changes.push_back(fmt::format("bone \"{}\" taken away", bone.name));
@@ -248,14 +248,16 @@ void describe(const Skeleton& before, const Skeleton& after, double diagonal, st
 
 RepairResult repair_skeleton(ClContext& context, const TriangleMesh& mesh, const TriangleTree& tree,
                              const Skeleton& skeleton) {
-  const Surface surface(mesh, tree);
+  const UnitMesh unit(mesh, tree);
+  Surface surface(unit.mesh, unit.tree);
+  surface.frame = unit.frame;
   std::vector<Finding> findings;
-  if (!find_in_skeleton(skeleton, surface.diagonal, findings)) {
+  if (!find_in_skeleton(skeleton, unit.frame.scale, findings)) {
     const auto error =
         std::find_if(findings.begin(), findings.end(), [](const Finding& f) { return f.severity == Severity::kError; });
     throw InputError(fmt::format("{}; {}", error->message, error->remedy));
   }
-  Skeleton named = skeleton;
+  Skeleton named = in_frame(skeleton, unit.frame);
   complete_names(named);
   const int genus = genus_of(mesh);
   const VoxelBody body = make_fitting_body(surface, genus);
@@ -274,7 +276,12 @@ RepairResult repair_skeleton(ClContext& context, const TriangleMesh& mesh, const
   if (!refusal.empty()) throw TopologyError(refusal);
   RepairResult result{repair.skeleton(), std::move(draft.changes())};
   drop_bad_angles(result.skeleton);
-  describe(named, result.skeleton, surface.diagonal, result.changes);
+  describe(named, result.skeleton, result.changes);
+  result.skeleton = in_frame(std::move(result.skeleton), skeleton.frame);
+  for (Node& node : result.skeleton.nodes)  // what did not move stays as it was, to the last bit
+    for (const Node& before : skeleton.nodes)
+      if (before.name == node.name && (before.position - node.position).norm() < 1e-9 * unit.frame.scale)
+        node.position = before.position;
   return result;
 }
 

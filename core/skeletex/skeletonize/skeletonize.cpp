@@ -166,7 +166,9 @@ SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, cons
   const auto report = [&](const std::string& stage, double done) {
     if (options.progress && !options.progress(stage, done)) throw Error("cancelled");
   };
-  const Surface surface(mesh, tree);
+  const UnitMesh unit(mesh, tree);
+  Surface surface(unit.mesh, unit.tree);
+  surface.frame = unit.frame;
   SkeletonizeResult result;
   result.genus = genus_of(mesh);
   report("filling the body", 0);
@@ -206,6 +208,7 @@ SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, cons
                                     result.candidates[0].name, result.candidates[0].refusal));
   result.skeleton = std::move(levels[result.chosen].skeleton);
   name_by_place(surface, plane, result.skeleton);
+  result.skeleton = in_frame(std::move(result.skeleton), {});
   report("done", 1);
   return result;
 }

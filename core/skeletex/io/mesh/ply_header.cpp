@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <initializer_list>
+#include <utility>
 
 #include "skeletex/model/error.h"
 
@@ -47,6 +49,8 @@ void add_property(const std::vector<std::string_view>& words, PlyElement& elemen
 /// \return false at its end
 bool read_header_line(TextReader& text, PlyHeader& header) {
   const auto& words = text.split(text.next_line(), '\0');
+  if (!words.empty() && words[0] == "comment" && words.size() >= 3 && words[1] == "TextureFile")
+    header.image_file = words[2];
   if (words.empty() || words[0] == "comment" || words[0] == "obj_info") return true;
   if (words[0] == "end_header") return false;
   if (words[0] == "format" && words.size() >= 2)
@@ -77,6 +81,53 @@ void find_coordinates(PlyElement& vertex, bool is_text, const TextReader& text) 
   }
 }
 
+/// What a vertex has beside its coordinates. A property whose name comes twice counts once.
+void find_attributes(PlyElement& vertex) {
+  using Use = PlyProperty::Use;
+  constexpr std::pair<std::string_view, Use> kNames[] = {{"nx", Use::kNormalX},
+                                                         {"ny", Use::kNormalY},
+                                                         {"nz", Use::kNormalZ},
+                                                         {"red", Use::kRed},
+                                                         {"green", Use::kGreen},
+                                                         {"blue", Use::kBlue},
+                                                         {"alpha", Use::kAlpha},
+                                                         {"diffuse_red", Use::kRed},
+                                                         {"r", Use::kRed},
+                                                         {"g", Use::kGreen},
+                                                         {"b", Use::kBlue},
+                                                         {"a", Use::kAlpha},
+                                                         {"diffuse_green", Use::kGreen},
+                                                         {"diffuse_blue", Use::kBlue},
+                                                         {"s", Use::kTextureU},
+                                                         {"t", Use::kTextureV},
+                                                         {"u", Use::kTextureU},
+                                                         {"v", Use::kTextureV},
+                                                         {"texture_u", Use::kTextureU},
+                                                         {"texture_v", Use::kTextureV}};
+  const auto has = [&](std::initializer_list<Use> uses) {
+    return std::all_of(uses.begin(), uses.end(), [&](Use use) {
+      return std::any_of(vertex.properties.begin(), vertex.properties.end(),
+                         [use](const PlyProperty& p) { return p.use == use; });
+    });
+  };
+  for (PlyProperty& property : vertex.properties) {
+    if (property.use || property.count_type != nullptr) continue;
+    const auto named = std::find_if(std::begin(kNames), std::end(kNames),
+                                    [&](const auto& known) { return known.first == property.name; });
+    property.use = named == std::end(kNames) || has({named->second}) ? Use::kNumber : named->second;
+  }
+  // A part of a colour or of a normal is a number like others.
+  const auto drop_unless_whole = [&](std::initializer_list<Use> whole, std::initializer_list<Use> with) {
+    if (has(whole)) return;
+    for (PlyProperty& property : vertex.properties)
+      for (const Use use : with)
+        if (property.use == use) property.use = Use::kNumber;
+  };
+  drop_unless_whole({Use::kNormalX, Use::kNormalY, Use::kNormalZ}, {Use::kNormalX, Use::kNormalY, Use::kNormalZ});
+  drop_unless_whole({Use::kRed, Use::kGreen, Use::kBlue}, {Use::kRed, Use::kGreen, Use::kBlue, Use::kAlpha});
+  drop_unless_whole({Use::kTextureU, Use::kTextureV}, {Use::kTextureU, Use::kTextureV});
+}
+
 void find_corners(PlyElement& face, const TextReader& text) {
   int found = 0;
   for (PlyProperty& property : face.properties) {
@@ -86,6 +137,10 @@ void find_corners(PlyElement& face, const TextReader& text) {
     property.use = PlyProperty::Use::kCorners;
   }
   if (found == 0) text.fail("faces must have a list \"vertex_indices\"");
+  const auto texture = std::find_if(face.properties.begin(), face.properties.end(), [](const PlyProperty& p) {
+    return p.name == "texcoord" && p.count_type != nullptr && p.type->is_float;
+  });
+  if (texture != face.properties.end()) texture->use = PlyProperty::Use::kTextureCoordinates;
 }
 
 }  // namespace
@@ -109,6 +164,7 @@ PlyHeader read_ply_header(TextReader& text, const std::string& where) {
     text.fail("the file has no element \"vertex\" or no element \"face\"");
   if (face < vertex) text.fail("faces before vertices are not read");
   find_coordinates(*vertex, header.format == PlyFormat::kText, text);
+  find_attributes(*vertex);
   find_corners(*face, text);
   header.vertices = vertex->count;
   return header;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,11 +15,28 @@ struct PlyType {
 };
 
 struct PlyProperty {
-  enum class Use { kNone, kX, kY, kZ, kCorners };
+  /// Up to kAlpha the uses are numbers of a vertex, each at most once.
+  enum class Use {
+    kX,
+    kY,
+    kZ,
+    kNormalX,
+    kNormalY,
+    kNormalZ,
+    kTextureU,
+    kTextureV,
+    kRed,
+    kGreen,
+    kBlue,
+    kAlpha,
+    kNumber,             ///< any other number of a vertex
+    kCorners,            ///< the list of a face's vertices
+    kTextureCoordinates  ///< the list u, v, u, v, .. of a face's corners
+  };
   std::string name;
   const PlyType* type = nullptr;
   const PlyType* count_type = nullptr;  ///< of a list; else none
-  Use use = Use::kNone;
+  std::optional<Use> use = std::nullopt;
 };
 
 struct PlyElement {
@@ -33,6 +51,7 @@ struct PlyHeader {
   PlyFormat format = PlyFormat::kNone;
   std::vector<PlyElement> elements;  ///< a "vertex" with x, y and z, and after it a "face" with its corners
   std::size_t vertices = 0;
+  std::string image_file;  ///< that a comment names
 };
 
 /// Reads the lines up to "end_header".

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <utility>
+
 #include "skeletex/geometry/mesh.h"
 #include "skeletex/geometry/triangle_tree.h"
 
@@ -10,6 +12,7 @@ struct Surface {
   const TriangleMesh& mesh;
   const TriangleTree& tree;
   double diagonal;
+  UnitFrame frame{};  ///< of the mesh
 
   Surface(const TriangleMesh& mesh_, const TriangleTree& tree_)
       : mesh(mesh_), tree(tree_), diagonal(bounding_box(mesh_).diagonal()) {}
@@ -21,6 +24,19 @@ struct Surface {
   }
   /// Whether the way from one point straight to another meets the surface.
   bool is_between(const Vec3& from, const Vec3& to) const { return find_first_hit(tree, from, to - from, 1) <= 1; }
+};
+
+/// A mesh of the user with its tree in its unit frame, where tolerances hold at every scale.
+struct UnitMesh {
+  UnitFrame frame;
+  TriangleMesh mesh;
+  TriangleTree tree;
+
+  UnitMesh(const TriangleMesh& user, TriangleTree user_tree)
+      : frame(unit_frame(user)), mesh(in_unit_frame(user, frame)), tree(std::move(user_tree)) {
+    tree.origin = Vec3::Zero();  // what a tree holds is in this frame already
+    tree.scale = 1;
+  }
 };
 
 }  // namespace skeletex

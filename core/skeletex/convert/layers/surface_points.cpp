@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/convert/layers/surface_points.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "skeletex/geometry/nearest_search.h"
+#include "skeletex/geometry/parallel.h"
+#include "skeletex/geometry/point_triangle.h"
+#include "skeletex/reconstruct/displace.h"
+
+namespace skeletex {
+namespace {
+
+/// The points of all rows of a model, and where each patch begins among them.
+struct RowPoints {
+  std::vector<Vec3> points;
+  std::vector<int> first;
+
+  /// Half the cross product of the lattice's steps along and around: against the outward normal, with the area of a
+  /// cell. Zero at poles.
+  Vec3 inward(const Patch& patch, int bone, int row, int column) const {
+    const Rectangle& r = patch.rectangle;
+    const auto at = [&](int i, int j) { return points[first[bone] + i * r.width + (j + r.width) % r.width]; };
+    const int before = std::max(row - 1, 0), after = std::min(row + 1, r.height - 1);
+    return (at(after, column) - at(before, column)).cross(at(row, column + 1) - at(row, column - 1)) / 2;
+  }
+};
+
+RowPoints points_of_rows(ClContext& context, const PreparedModel& prepared) {
+  RowPoints rows;
+  const DevicePlanes planes = row_points(context, prepared, RowChoice::kAll);
+  rows.points.resize(planes.count);
+  download_points(context, planes, prepared.model.origin, rows.points);
+  int count = 0;
+  for (const Patch& patch : prepared.model.patches) {
+    rows.first.push_back(count);
+    count += patch.rectangle.width * patch.rectangle.height;
+  }
+  return rows;
+}
+
+}  // namespace
+
+SurfacePoint nearest_in_triangle(const TriangleMesh& mesh, int triangle, const Vec3& p) {
+  const Triangle& t = mesh.triangles[triangle];
+  const Vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
+  const Vec3 nearest = p - offset_from_triangle(p, a, b, c);
+  const Vec3 normal = (b - a).cross(c - a);
+  const double squared = normal.squaredNorm();
+  if (!(squared > 0)) return {triangle, {1, 0, 0}};
+  Vec3 weights;
+  weights[1] = (nearest - a).cross(c - a).dot(normal) / squared;
+  weights[2] = (b - a).cross(nearest - a).dot(normal) / squared;
+  weights[0] = 1 - weights[1] - weights[2];
+  weights = weights.cwiseMax(0);
+  return {triangle, (weights / weights.sum()).cast<float>()};
+}
+
+std::vector<SurfacePoint> surface_points(ClContext& context, const PreparedModel& prepared, const TriangleMesh& mesh,
+                                         const TriangleTree& tree) {
+  const SkeletexModel& model = prepared.model;
+  const RowPoints rows = points_of_rows(context, prepared);
+  std::vector<int> nearest(rows.points.size());
+  NearestSearch(context, tree).find(rows.points, nearest);
+  std::vector<SurfacePoint> result(static_cast<std::size_t>(model.texture.width) * model.texture.height);
+  for_each_block(prepared.all_rows.size(), 8, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      const auto [bone, row, vertex, quad] = prepared.all_rows[k];
+      const Rectangle& r = model.patches[bone].rectangle;
+      for (int j = 0; j < r.width; ++j) {
+        const Vec3& p = rows.points[vertex + j];
+        int triangle = nearest[vertex + j];
+        const Vec3 inward = rows.inward(model.patches[bone], bone, row, j);
+        const auto looks_away = [&](int t) { return area_vector(mesh, mesh.triangles[t]).dot(inward) > 0; };
+        if (looks_away(triangle)) {
+          const double cell = std::sqrt(inward.norm());
+          const NearestTriangle other =
+              find_nearest_triangle(mesh, tree, p, cell, [&](int t) { return !looks_away(t); });
+          if (other.triangle >= 0) triangle = other.triangle;
+        }
+        result[static_cast<std::size_t>(r.y + row) * model.texture.width + r.x + j] =
+            nearest_in_triangle(mesh, triangle, p);
+      }
+    }
+  });
+  return result;
+}
+
+}  // namespace skeletex

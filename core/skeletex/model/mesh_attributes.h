@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "skeletex/geometry/mesh.h"
+
+namespace skeletex {
+
+/// Red, green, blue of linear light and opacity, 0 to 1.
+using Colour = Eigen::Vector4f;
+
+/// Pictures and files of meshes hold colours in sRGB.
+float linear_from_srgb(float value);
+float srgb_from_linear(float value);
+
+/// A picture with 8 bits per channel: red, green, blue in sRGB and opacity; rows from the top.
+struct ColourImage {
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> rgba;
+
+  bool empty() const { return rgba.empty(); }
+};
+
+struct Material {
+  std::string name;
+  Colour base = Colour::Ones();      ///< multiplies the picture and the vertex colours
+  std::filesystem::path image_file;  ///< of a picture that is not read yet
+  ColourImage image;
+};
+
+/// A number per vertex, under the name that it has in its file.
+struct VertexNumbers {
+  std::string name;
+  std::vector<float> values;
+};
+
+/// What a mesh has beside its geometry. All of it can be empty.
+struct MeshAttributes {
+  CornerValues<Vec3> normals;  ///< unit
+  CornerValues<Colour> colours;
+  /// Of pictures: (0, 0) is the lower left corner, (1, 1) the upper right one; beyond, the picture repeats.
+  CornerValues<Eigen::Vector2f> texture_coordinates;
+  std::vector<Material> materials;
+  std::vector<int> triangle_materials;  ///< per triangle; -1: none
+  std::vector<VertexNumbers> numbers;
+};
+
+/// Whether there is a colour other than the materials' plain white.
+bool has_colour(const MeshAttributes& attributes);
+/// Follows a mesh whose triangles are turned over: swaps the corners 1 and 2 of each. Normals stay as they are.
+void turn_over(MeshAttributes& attributes);
+
+}  // namespace skeletex
