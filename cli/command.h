@@ -21,6 +21,7 @@ namespace skeletex::cli {
 using Json = nlohmann::ordered_json;
 
 void add_encode_command(CLI::App& program);
+void add_skeletonize_command(CLI::App& program);
 void add_reconstruct_command(CLI::App& program);
 void add_correspond_command(CLI::App& program);
 void add_morph_command(CLI::App& program);
@@ -71,6 +72,9 @@ TriangleMesh load_mesh(const std::filesystem::path& path);
 /// every finding to standard error.
 /// \throw CLI::RuntimeError(kExitBad) when one is an error
 void require_valid(TriangleMesh& mesh, const Skeleton& skeleton, std::optional<TriangleTree>* tree = nullptr);
+/// The same for a mesh alone, which has to be closed and in one piece.
+/// \return the tree of its triangles
+TriangleTree require_closed(TriangleMesh& mesh);
 
 /// Time on the device by kernel, for the JSON.
 Json profile_json(ClContext& context);

@@ -6,6 +6,7 @@ namespace skeletex::cli {
 
 void add_commands(CLI::App& program) {
   add_encode_command(program);
+  add_skeletonize_command(program);
   add_reconstruct_command(program);
   add_render_command(program);
   add_view_command(program);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <spdlog/spdlog.h>
 
 #include <charconv>
 #include <filesystem>
@@ -19,6 +20,7 @@
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/io/suggestion.h"
 #include "skeletex/model/error.h"
+#include "skeletex/skeletonize/skeletonize.h"
 
 namespace skeletex::cli {
 namespace {
@@ -123,8 +125,9 @@ void check_bone_names(const Arguments& arguments, const EncodeOptions& options, 
   for (const Bone& bone : skeleton.bones) names.push_back(bone.name);
   for (const auto& [name, method] : options.hybrid_overrides)
     if (std::find(names.begin(), names.end(), name) == names.end())
-      throw InputError(
-          fmt::format("--bone-method: {} has no bone \"{}\"{}", arguments.skeleton, name, did_you_mean(name, names)));
+      throw InputError(fmt::format("--bone-method: {} has no bone \"{}\"{}",
+                                   arguments.skeleton.empty() ? "the made skeleton" : arguments.skeleton, name,
+                                   did_you_mean(name, names)));
 }
 
 /// Mesh and skeleton in the unit frame of the mesh.
@@ -142,23 +145,24 @@ Input read_input(const Arguments& arguments, const EncodeOptions& options) {
     RigFile file = load_rig(arguments.mesh, arguments.close);
     if (arguments.skeleton.empty()) {
       ImportedRig rig = import_rig(file);
-      if (rig.skeleton.bones.empty())
-        throw InputError(arguments.mesh + ": no mesh of the file has a skin; give a SKELETON");
       input.skeleton = std::move(rig.skeleton);
       input.weights = std::move(rig.weights);
     }
     input.mesh = std::move(file.surface.mesh);
     input.attributes = std::move(file.surface.attributes);
   } else {
-    if (arguments.skeleton.empty()) throw CLI::RequiredError("SKELETON");
     MeshParts parts{load_mesh(arguments.mesh), {}, {}};
     if (arguments.close.is_on) close_mesh(parts, arguments.close);
     input.mesh = std::move(parts.mesh);
     input.attributes = std::move(parts.attributes);
   }
   if (!arguments.skeleton.empty()) input.skeleton = read_skeleton(arguments.skeleton);
-  check_bone_names(arguments, options, input.skeleton);
-  require_valid(input.mesh, input.skeleton, &input.tree);
+  if (arguments.skeleton.empty() && input.skeleton.bones.empty()) {
+    input.tree = require_closed(input.mesh);
+  } else {
+    check_bone_names(arguments, options, input.skeleton);
+    require_valid(input.mesh, input.skeleton, &input.tree);
+  }
   const UnitFrame frame = unit_frame(input.mesh);
   input.mesh = in_unit_frame(std::move(input.mesh), frame);
   input.skeleton = in_unit_frame(std::move(input.skeleton), frame);
@@ -167,6 +171,21 @@ Input read_input(const Arguments& arguments, const EncodeOptions& options) {
     input.tree->scale = 1;
   }
   return input;
+}
+
+/// A skeleton for a mesh without one, and says so.
+Skeleton make_skeleton(ClContext& context, const Input& input, ProgressBar& bar) {
+  SkeletonizeOptions options;
+  options.progress = [&](const std::string& stage, double done) {
+    bar.show(stage, done);
+    return true;
+  };
+  SkeletonizeResult result = skeletonize(context, input.mesh, *input.tree, options);
+  bar.show("reading and checking the input", 0);
+  spdlog::info("no skeleton was given: made one of {} bones (skeletex skeletonize has options for it)",
+               result.skeleton.bones.size());
+  result.skeleton.frame = input.skeleton.frame;  // of the mesh that it was made for
+  return std::move(result.skeleton);
 }
 
 ExrCompression compression_of(const std::string& name) {
@@ -201,7 +220,11 @@ void run(const Arguments& arguments, const CLI::App& command) {
   // Loading the kernels takes as long as reading the input: a tenth of the command each.
   std::future<Input> reading = std::async(std::launch::async, [&] { return read_input(arguments, options); });
   context.prepare({"encode.cl", "read_surface"});
-  const Input input = reading.get();
+  Input input = reading.get();
+  if (input.skeleton.bones.empty()) {
+    input.skeleton = make_skeleton(context, input, *bar);
+    check_bone_names(arguments, options, input.skeleton);
+  }
   options.tree = input.tree ? &*input.tree : nullptr;
   options.progress = [&](const std::string& stage, double done) {
     bar->show(stage, done);
@@ -317,8 +340,8 @@ void add_encode_command(CLI::App& program) {
                               "closed triangle mesh: .obj, .ply, .off, .stl; or a rigged character: .glb, .gltf, .vrm"))
       ->required();
   declare_input(command, &add(command, "Positionals", "SKELETON", a.skeleton,
-                              "skeleton: JSON with nodes and bones, in the mesh's coordinates; that of a rig is in its "
-                              "file"));
+                              "skeleton: JSON with nodes and bones, in the mesh's coordinates; without, that of a rig, "
+                              "or one is made (see skeletonize)"));
   declare_output(command, &add(command, "Options", "-o,--output", a.output, "the model: .skx.exr"), {".exr"})
       ->required()
       ->type_name("FILE");
@@ -340,6 +363,7 @@ void add_encode_command(CLI::App& program) {
   command.footer(
       "Examples:\n"
       "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr\n"
+      "  skeletex encode bear.off -o bear.skx.exr\n"
       "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr --method hybrid --bone-method head=vsm --size "
       "1024\n"
       "  skeletex encode robot.glb -o robot.skx.exr\n"
