@@ -122,7 +122,7 @@ SkeletexModel start_model(const TriangleMesh& mesh, const Skeleton& skeleton) {
   if (!(model.diagonal >= kSmallestDiagonal && model.diagonal <= kLargestDiagonal))
     throw InputError(
         fmt::format("the mesh's bounding box has a diagonal of {:.3g}; the device computes in single precision, which "
-                    "needs {:g} to {:g}: scale mesh and skeleton",
+                    "needs {:g} to {:g}: give mesh and skeleton in the unit frame of the mesh",
                     model.diagonal, kSmallestDiagonal, kLargestDiagonal));
   // Euler's formula for a closed triangle mesh: edges are 3/2 of the triangles.
   model.genus = (2 - (static_cast<int>(mesh.positions.size()) - static_cast<int>(mesh.triangles.size()) / 2)) / 2;
@@ -268,6 +268,7 @@ void report_result(const SkeletexModel& model, const TriangleMesh& mesh, const M
   report.triangles = static_cast<int>(mesh.triangles.size());
   report.genus = model.genus;
   report.diagonal = model.diagonal;
+  report.scale = model.skeleton.frame.scale;
   report.unfold = texels.unfold;
   report.snap = texels.snap;
   report.fit = texels.fit;
@@ -279,7 +280,7 @@ void report_result(const SkeletexModel& model, const TriangleMesh& mesh, const M
     entry.name = model.skeleton.bones[bone].name;
     entry.method = surface.methods[bone];
     entry.topology = segment.topology;
-    entry.area = surface_area(segment.mesh);
+    entry.area = surface_area(segment.mesh) * model.skeleton.frame.scale * model.skeleton.frame.scale;
     entry.vertices = static_cast<int>(segment.mesh.positions.size());
     entry.triangles = static_cast<int>(segment.mesh.triangles.size());
     entry.rectangle = model.patches[bone].rectangle;

@@ -54,7 +54,7 @@ struct BoneReport {
   std::string name;
   Method method = Method::kVsm;
   SegmentTopology topology = SegmentTopology::kAnnulus;
-  double area = 0;  ///< world units squared
+  double area = 0;  ///< in the user's units, squared
   int vertices = 0, triangles = 0;
   Rectangle rectangle;
   double unseen_area_fraction = 0;
@@ -66,7 +66,8 @@ struct BoneReport {
 
 struct EncodeReport {
   int vertices = 0, triangles = 0, genus = 0;
-  double diagonal = 0;
+  double diagonal = 0;  ///< of the mesh in the frame of the model, as are the lengths of the reports below
+  double scale = 1;     ///< of that frame
   std::vector<BoneReport> bones;
   double used_fraction = 0;
   std::optional<UnfoldReport> unfold;      ///< when it was on
@@ -83,8 +84,10 @@ struct EncodeResult {
   EncodeReport report;
 };
 
-/// Turns a closed mesh and its skeleton into a model (paper 3.1-3.4): half edges, segments, maps, atlas, texels.
-/// \pre validate_before_segmentation reports no error      \throw TopologyError, InputError, DeviceError
+/// Turns a closed mesh and its skeleton into a model (paper 3.1-3.4): half edges, segments, maps, atlas, texels. Both
+/// are in the frame of the skeleton, which becomes that of the model; unit_frame (geometry/mesh.h) is the frame in
+/// which all scales and places give the same texels. \pre validate_before_segmentation reports no error      \throw
+/// TopologyError, InputError, DeviceError
 EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& skeleton,
                           const EncodeOptions& options = {});
 

@@ -141,7 +141,7 @@ TriangleMesh reconstruct_mesh(ClContext& context, const PreparedModel& model, co
       break;
     case Deformation::kPaper: pose_by_paper(context, model, posed, rule.distance, mesh.positions); break;
   }
-  return std::move(mesh);
+  return in_user_units(std::move(mesh), posed.frame);
 }
 
 TriangleMesh constant_offset_mesh(ClContext& context, const PreparedModel& prepared, const Skeleton& posed,
@@ -175,7 +175,7 @@ TriangleMesh constant_offset_mesh(ClContext& context, const PreparedModel& prepa
         mesh.triangles.push_back({v00, v11, v10});
       }
   }
-  return mesh;
+  return in_user_units(std::move(mesh), posed.frame);
 }
 
 }  // namespace skeletex

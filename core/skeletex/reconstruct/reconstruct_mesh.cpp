@@ -133,7 +133,7 @@ BindMesh reconstruct_bind_mesh(ClContext& context, const PreparedModel& model) {
 }
 
 TriangleMesh reconstruct_mesh(ClContext& context, const PreparedModel& model) {
-  return reconstruct_bind_mesh(context, model).mesh;
+  return in_user_units(reconstruct_bind_mesh(context, model).mesh, model.model.skeleton.frame);
 }
 
 }  // namespace skeletex

@@ -16,11 +16,12 @@ namespace skeletex {
 
 /// The mesh of a model in its bind pose, at the model's own resolution (paper 3.6). It is closed, oriented, 2-manifold
 /// and of the input's genus by construction: inner rows are vertices of their own, seams and corners are polylines that
-/// the patches on both sides share, and poles are single vertices. Quads take diagonals by the model's rule.
+/// the patches on both sides share, and poles are single vertices. Quads take diagonals by the model's rule. Positions
+/// are in the user's units.
 /// \throw DeviceError
 TriangleMesh reconstruct_mesh(ClContext& context, const PreparedModel& model);
 
-/// That mesh, and its inner vertices as they are on the device, relative to the model's origin.
+/// That mesh in the model's frame, and its inner vertices as they are on the device, relative to the model's origin.
 struct BindMesh {
   TriangleMesh mesh;
   DevicePlanes inner;

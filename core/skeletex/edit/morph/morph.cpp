@@ -145,7 +145,9 @@ Morph::Morph(ClContext& context, std::vector<SkeletexModel> models, std::span<co
     if (options.size == 0) size = std::max({size, models_[m].texture.width, models_[m].texture.height});
   }
   DisplacementTexture all;
+  const UnitFrame frame = models_[0].skeleton.frame;
   for (SkeletexModel& model : models_) {
+    model = in_frame(std::move(model), frame);
     model = resample_model(context, regular_grid(context, model), size);
     traced_seams_.push_back(trace_seams(model));
     texel_begins_.push_back(static_cast<int>(all.out.size()));
