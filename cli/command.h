@@ -26,6 +26,8 @@ void add_correspond_command(CLI::App& program);
 void add_morph_command(CLI::App& program);
 void add_filter_command(CLI::App& program);
 void add_lod_command(CLI::App& program);
+void add_export_command(CLI::App& program);
+void add_import_command(CLI::App& program);
 void add_pose_random_command(CLI::App& program);
 void add_weights_command(CLI::App& program);
 void add_transfer_command(CLI::App& program);

@@ -13,6 +13,8 @@ void add_commands(CLI::App& program) {
   add_morph_command(program);
   add_filter_command(program);
   add_lod_command(program);
+  add_export_command(program);
+  add_import_command(program);
   add_transfer_command(program);
   add_pose_random_command(program);
   add_weights_command(program);

@@ -363,7 +363,7 @@ TEST_F(Program, RefusesOptionsThatAreAnotherFiltersAndBonesThatAreNone) {
   expect_refused(2, {"filter", "y.skx.exr", "smoth", "-o", "no.ply"}, {"smoth", "smooth"});
   expect_refused(1, {"filter", "y.skx.exr", "smooth", "-o", "no.ply", "--bones", "nose"}, {"nose"});
   expect_refused(2, {"filter", "y.skx.exr", "curvature", "-o", "no.skx.exr"}, {".ply"});
-  expect_refused(2, {"filter", "y.skx.exr", "noise", "-o", "no.stl"}, {".stl", ".ply"});
+  expect_refused(2, {"filter", "y.skx.exr", "noise", "-o", "no.off"}, {".off", ".ply"});
 }
 
 TEST_F(Program, TransfersBonesAndSaysHow) {

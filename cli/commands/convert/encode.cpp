@@ -8,10 +8,12 @@
 #include <memory>
 #include <optional>
 
+#include "close_mesh.h"
 #include "command.h"
 #include "encode_report.h"
 #include "files.h"
 #include "progress_bar.h"
+#include "rig_file.h"
 #include "skeletex/convert/encode_model.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/skeleton_file.h"
@@ -31,6 +33,7 @@ struct Arguments {
   bool has_no_prefilter = false, has_no_unfold = false, is_snapped = false, is_fitted = false, is_paper_recipe = false,
        is_half = false, is_verbose = false;
   std::vector<std::string> bone_methods;
+  CloseOptions close;
 };
 
 /// "512" or "1024x512".
@@ -126,12 +129,33 @@ void check_bone_names(const Arguments& arguments, const EncodeOptions& options, 
 /// Mesh and skeleton in the unit frame of the mesh.
 struct Input {
   TriangleMesh mesh;
+  MeshAttributes attributes;
+  VertexBoneWeights weights;  ///< of a rig
   std::optional<TriangleTree> tree;
   Skeleton skeleton;
 };
 
 Input read_input(const Arguments& arguments, const EncodeOptions& options) {
-  Input input{load_mesh(arguments.mesh), {}, read_skeleton(arguments.skeleton)};
+  Input input;
+  if (is_gltf_file(arguments.mesh)) {
+    RigFile file = load_rig(arguments.mesh, arguments.close);
+    if (arguments.skeleton.empty()) {
+      ImportedRig rig = import_rig(file);
+      if (rig.skeleton.bones.empty())
+        throw InputError(arguments.mesh + ": no mesh of the file has a skin; give a SKELETON");
+      input.skeleton = std::move(rig.skeleton);
+      input.weights = std::move(rig.weights);
+    }
+    input.mesh = std::move(file.surface.mesh);
+    input.attributes = std::move(file.surface.attributes);
+  } else {
+    if (arguments.skeleton.empty()) throw CLI::RequiredError("SKELETON");
+    MeshParts parts{load_mesh(arguments.mesh), {}, {}};
+    if (arguments.close.is_on) close_mesh(parts, arguments.close);
+    input.mesh = std::move(parts.mesh);
+    input.attributes = std::move(parts.attributes);
+  }
+  if (!arguments.skeleton.empty()) input.skeleton = read_skeleton(arguments.skeleton);
   check_bone_names(arguments, options, input.skeleton);
   require_valid(input.mesh, input.skeleton, &input.tree);
   const UnitFrame frame = unit_frame(input.mesh);
@@ -176,7 +200,10 @@ void run(const Arguments& arguments, const CLI::App& command) {
     bar->show(stage, done);
     return true;
   };
-  const EncodeResult result = encode_model(context, input.mesh, input.skeleton, options);
+  EncodeResult result = encode_model(context, input.mesh, input.skeleton, options);
+  if (!input.weights.empty())
+    result.model.bone_weights = weight_planes(
+        context, result.model, input.mesh, input.tree ? *input.tree : build_triangle_tree(input.mesh), input.weights);
   bar->show("writing", 1);
   write_model(arguments.output, result.model,
               {.format = arguments.is_half ? TexelFormat::kHalf : TexelFormat::kFloat,
@@ -278,11 +305,12 @@ void add_encode_command(CLI::App& program) {
       "encode", "Turn a closed mesh and its skeleton into a model: one texture in an OpenEXR file");
   command.option_defaults()->always_capture_default();
   Arguments& a = *arguments;
-  declare_input(command, &add(command, "Positionals", "MESH", a.mesh, "closed triangle mesh: .obj, .ply, .off or .stl"))
+  declare_input(command, &add(command, "Positionals", "MESH", a.mesh,
+                              "closed triangle mesh: .obj, .ply, .off, .stl; or a rigged character: .glb, .gltf, .vrm"))
       ->required();
   declare_input(command, &add(command, "Positionals", "SKELETON", a.skeleton,
-                              "skeleton: JSON with nodes and bones, in the mesh's coordinates"))
-      ->required();
+                              "skeleton: JSON with nodes and bones, in the mesh's coordinates; that of a rig is in its "
+                              "file"));
   declare_output(command, &add(command, "Options", "-o,--output", a.output, "the model: .skx.exr"), {".exr"})
       ->required()
       ->type_name("FILE");
@@ -297,6 +325,7 @@ void add_encode_command(CLI::App& program) {
   add_map_options(command, a);
   add_texel_options(command, a);
   add_file_options(command, a);
+  add_close_options(command, a.close);
   command.add_flag("--verbose", a.is_verbose, "print what was done for each bone and how long each stage took, too");
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
@@ -305,6 +334,7 @@ void add_encode_command(CLI::App& program) {
       "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr\n"
       "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr --method hybrid --bone-method head=vsm --size "
       "1024\n"
+      "  skeletex encode robot.glb -o robot.skx.exr\n"
       "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr --json - | jq .times_ms\n"
       "Areas are in the mesh's units squared, times in milliseconds.");
   command.callback([arguments, &command] { run(*arguments, command); });

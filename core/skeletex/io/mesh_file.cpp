@@ -4,10 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 
 #include "skeletex/io/atomic_file.h"
+#include "skeletex/io/gltf/gltf_surface.h"
+#include "skeletex/io/gltf/read_gltf.h"
+#include "skeletex/io/gltf/write_gltf.h"
 #include "skeletex/io/mesh/mesh_builder.h"
 #include "skeletex/io/read_file.h"
 #include "skeletex/model/error.h"
@@ -110,9 +114,38 @@ void write_obj(OutputFile& file, const TriangleMesh& mesh) {
   });
 }
 
+void write_stl(OutputFile& file, const TriangleMesh& mesh) {
+  std::string header(80, ' ');
+  header.replace(0, 8, "Skeletex");  // anything but "solid", which begins files in ASCII
+  append(header, static_cast<std::uint32_t>(mesh.triangles.size()));
+  file.write(header);
+  write_blocks(file, mesh.triangles.size(), [&](std::size_t i, std::string& out) {
+    for (const double x : area_vector(mesh, mesh.triangles[i]).stableNormalized()) append(out, static_cast<float>(x));
+    for (const int corner : mesh.triangles[i])
+      for (const double x : mesh.positions[corner]) append(out, static_cast<float>(x));
+    append(out, std::uint16_t{0});
+  });
+}
+
+/// One mesh without a skin.
+GltfScene scene_of(const TriangleMesh& mesh, const PlyAttributes& attributes, const std::string& name) {
+  GltfPrimitive primitive;
+  primitive.positions = mesh.positions;
+  primitive.normals = attributes.vertex_normals.empty()
+                          ? vertex_normals(mesh)
+                          : std::vector<Vec3>(attributes.vertex_normals.begin(), attributes.vertex_normals.end());
+  primitive.triangles = mesh.triangles;
+  GltfScene scene;
+  scene.meshes.push_back({name, {std::move(primitive)}});
+  scene.nodes.emplace_back().name = name;
+  scene.nodes[0].mesh = 0;
+  return scene;
+}
+
 }  // namespace
 
 MeshFile read_mesh(const std::filesystem::path& path) {
+  if (is_gltf_file(path)) return read_gltf_mesh(path);
   const std::string where = path.string(), extension = lower_extension(path);
   const std::string bytes = read_file(path);
   if (bytes.empty()) throw IoError(where + ": the file is empty");
@@ -121,13 +154,16 @@ MeshFile read_mesh(const std::filesystem::path& path) {
   if (extension == ".ply") return read_ply(bytes, where);
   if (extension == ".stl") return read_stl(bytes, where);
   throw IoError(
-      fmt::format("{}: meshes are read from .obj, .off, .ply and .stl files, not from \"{}\"", where, extension));
+      fmt::format("{}: meshes are read from .obj, .off, .ply, .stl, .glb, .gltf and .vrm files, not from \"{}\"", where,
+                  extension));
 }
 
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, const PlyAttributes& attributes) {
   const std::string extension = lower_extension(path);
-  if (extension != ".ply" && extension != ".obj")
-    throw IoError(fmt::format("{}: meshes are written as .ply or .obj, not as \"{}\"", path.string(), extension));
+  constexpr std::array kEndings{".ply", ".obj", ".stl", ".glb"};
+  if (std::find(kEndings.begin(), kEndings.end(), extension) == kEndings.end())
+    throw IoError(
+        fmt::format("{}: meshes are written as .ply, .obj, .stl or .glb, not as \"{}\"", path.string(), extension));
   const auto fits = [](std::size_t size, std::size_t count) { return size == 0 || size == count; };
   if (!fits(attributes.vertex_colours.size(), mesh.positions.size()) ||
       !fits(attributes.vertex_normals.size(), mesh.positions.size()) ||
@@ -138,10 +174,13 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, con
   if (!attributes.vertex_property.empty() && attributes.vertex_property_name.empty())
     throw IoError(fmt::format("{}: the vertex property needs a name", path.string()));
   check_finite(mesh, attributes, path.string());
+  if (extension == ".glb") return write_gltf(path, scene_of(mesh, attributes, path.stem().string()));
   write_atomically(path, [&](const std::filesystem::path& temporary) {
     OutputFile file(temporary, path);
     if (extension == ".ply")
       write_ply(file, mesh, attributes);
+    else if (extension == ".stl")
+      write_stl(file, mesh);
     else
       write_obj(file, mesh);
     file.close();
