@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/geometry/triangle_tree.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
