@@ -506,7 +506,7 @@ TEST_F(Program, MakesSkeletonsAndEncodesMeshesWithoutOne) {
   const Outcome encoded = run({"encode", "y.ply", "-o", "made.skx.exr", "--size", "64"});
   EXPECT_EQ(encoded.code, 0) << encoded.err;
   EXPECT_NE(encoded.err.find("no skeleton was given"), std::string::npos) << encoded.err;
-  EXPECT_EQ(json_of({"inspect", "made.skx.exr"})["bones"].size(), made.bones.size());
+  EXPECT_EQ(json_of({"inspect", "made.skx.exr"})["skeleton"]["bones"].size(), made.bones.size());
   for (const char* file : {"made.skeleton.json", "made.skx.exr"}) fs::remove(folder_ / file);
 }
 
