@@ -16,7 +16,6 @@
 #include "skeletex/device/kernel_source.h"
 #include "skeletex/device/workarounds.h"
 #include "skeletex/model/error.h"
-#include "skeletex/model/memory.h"
 
 namespace skeletex {
 
@@ -96,6 +95,7 @@ std::string text_of(const ::cl::Device& device, cl_device_info what) {
 }
 
 std::vector<std::pair<ClDeviceInfo, ::cl::Device>> enumerate() {
+  workarounds::require_addresses_to_start();
   std::vector<std::pair<ClDeviceInfo, ::cl::Device>> found;
   std::vector<::cl::Platform> platforms;
   if (::cl::Platform::get(&platforms) != CL_SUCCESS) return found;
@@ -124,12 +124,6 @@ std::vector<std::pair<ClDeviceInfo, ::cl::Device>> enumerate() {
 }
 
 std::string why_no_device() {
-  constexpr std::uint64_t kLeast = std::uint64_t{1} << 30;  // what OpenCL on the CPU takes of addresses, most unused
-  if (const std::uint64_t free = free_addresses(); free < kLeast)
-    return fmt::format(
-        "no OpenCL device found: the limit of this shell (ulimit -v) leaves {} MiB of addresses, and "
-        "OpenCL on the CPU takes {}; raise it",
-        free >> 20, kLeast >> 20);
   std::vector<::cl::Platform> platforms;
   if (::cl::Platform::get(&platforms) == CL_SUCCESS && !platforms.empty())
     if (const std::string fault = workarounds::fault_of_kernel_cache(); !fault.empty())

@@ -76,6 +76,15 @@ std::string fault_of_kernel_cache() {
       folder.string(), reason);
 }
 
+void require_addresses_to_start() {
+  constexpr std::uint64_t kLeast = std::uint64_t{768} << 20;
+  if (const std::uint64_t free = free_addresses(); free < kLeast)
+    throw DeviceError(
+        fmt::format("the limit of this shell (ulimit -v) leaves {} MiB of addresses, and OpenCL on the CPU "
+                    "takes {}; raise it",
+                    free >> 20, kLeast >> 20));
+}
+
 bool has_limited_addresses(const ClDeviceInfo& device) {
   return device.type == "cpu" && free_addresses() != std::numeric_limits<std::uint64_t>::max();
 }

@@ -32,6 +32,9 @@ FillPattern longest_pattern(const void* pattern, std::size_t pattern_bytes, std:
 /// something else. Empty where the folder can be written, and tried with a few files.
 std::string fault_of_kernel_cache();
 
+/// PoCL ends the program, or says that there is no device, where it cannot start its threads or its compiler.
+/// \throw DeviceError where addresses are limited (ulimit -v) to less than that takes
+void require_addresses_to_start();
 /// PoCL takes the memory of a buffer at its first use and ends the program where there is none. Where addresses are
 /// limited (ulimit -v), buffers of CPU devices are therefore refused before that.
 /// \throw DeviceError
