@@ -31,6 +31,7 @@ SkeletexModel encoded(const std::string& name, int size) {
   const TestModel source = load_standard_model(name);
   EncodeOptions options;
   options.width = options.height = size;
+  options.has_snap = options.has_fit = false;
   return encode_model(device(), source.mesh, source.skeleton, options).model;
 }
 

@@ -33,6 +33,7 @@ ClContext& device() {
 SkeletexModel encoded(const TriangleMesh& mesh, const Skeleton& skeleton, std::optional<Method> method, int size) {
   EncodeOptions options;
   options.width = options.height = size;
+  options.has_snap = options.has_fit = false;
   options.method = method;
   return encode_model(device(), mesh, skeleton, options).model;
 }

@@ -67,7 +67,7 @@ TEST(Skeletonize, RaysMeetTheFirstTriangle) {
   const BoundingBox box = bounding_box(mesh);
   RandomNumbers random(5);
   int hits = 0;
-  for (int i = 0; i < 300; ++i) {
+  for (int i = 0; i < 1500; ++i) {
     const Vec3 origin = box.centre() + random.in_ball(box.diagonal()), direction = random.in_ball(2);
     const double expected = first_hit_of_all(mesh, origin, direction),
                  found = find_first_hit(mesh, tree, origin, direction);

@@ -34,6 +34,7 @@ const SkeletexModel& standard(const std::string& name) {
     const TestModel source = load_standard_model(name);
     EncodeOptions options;
     options.width = options.height = 96;
+    options.has_snap = options.has_fit = false;
     it->second = encode_model(device(), source.mesh, source.skeleton, options).model;
   }
   return it->second;
