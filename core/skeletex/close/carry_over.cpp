@@ -72,6 +72,8 @@ VertexDistances vertex_distances(const TriangleMesh& mesh, const TriangleMesh& t
   return result;
 }
 
+// One rule for each kind of attribute, in a row.
+// NOLINTNEXTLINE(readability-function-cognitive-complexity)
 MeshAttributes with_triangles(const MeshAttributes& attributes, std::span<const Triangle> before,
                               std::span<const Triangle> after, std::span<const int> origins) {
   MeshAttributes result = attributes;

@@ -43,7 +43,7 @@ std::filesystem::path kernel_cache() {
     const char* value = std::getenv(name);
     return value ? value : "";
   };
-  if (const auto own = variable("POCL_CACHE_DIR"); !own.empty()) return own;
+  if (auto own = variable("POCL_CACHE_DIR"); !own.empty()) return own;
   if (const auto caches = variable("XDG_CACHE_HOME"); !caches.empty()) return caches / "pocl" / "kcache";
   return variable("HOME") / ".cache" / "pocl" / "kcache";
 }

@@ -24,7 +24,8 @@ UnfoldReport unfold_lattice(ClContext& context, const DeviceLayout& layout, std:
   }
   const auto quad_count = static_cast<int>(all.size()), size = static_cast<int>(layout.size());
   auto lists = context.allocate<int>(4 * layout.size()), counts = context.allocate<int>(FOLD_COUNTS);
-  context.fill(lists, 0), context.write(lists, all);  // see FoldLists of unfold.cl
+  all.resize(4 * layout.size(), 0);
+  context.write(lists, all);  // see FoldLists of unfold.cl
   MapParameters parameters{maps.sizes, layout.width, size, 0, 2 * size, 0, 0};
   // What is counted from here on, but for the quads.
   const auto start_count = [&](int quads) { context.write(counts, std::vector{quads, 0, 0, 0}); };
