@@ -278,7 +278,7 @@ struct BothDistances {
 };
 BothDistances measure_both(const EncodeJob& job, const SkeletexModel& model, const MappedSurface& surface) {
   const PreparedModel prepared(model);
-  const TriangleMesh mesh = reconstruct_mesh(job.context, prepared);
+  const TriangleMesh mesh = reconstruct_bind_mesh(job.context, prepared).mesh;
   BothDistances both{distances_from_bones(job.context, surface.charts, mesh, build_triangle_tree(mesh), 0),
                      distances_to_surface(job.context, model, prepared.lattice, mesh, job.mesh, job.tree)};
   double total = 0;
@@ -339,7 +339,7 @@ void report_result(const EncodeJob& job, const Encoding& encoding, const MappedS
   if (texels.revert) {
     distances = texels.revert->distances;
   } else {
-    const TriangleMesh decoded = reconstruct_mesh(job.context, model);
+    const TriangleMesh decoded = reconstruct_bind_mesh(job.context, PreparedModel(model)).mesh;
     distances = distances_from_bones(job.context, surface.charts, decoded, build_triangle_tree(decoded),
                                      kNearEnough * model.diagonal);
   }
