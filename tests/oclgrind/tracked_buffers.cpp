@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Loaded before Oclgrind 21.10, whose check for uninitialised values does not see fills and copies of buffers, and
-// keeps the size of an old buffer for the new one in its place. So fills and copies become writes, and no buffer is
-// given back.
+// keeps the size of an old buffer for the new one in its place; what kernels write behind a first write that is shorter
+// than its buffer counts as never written. So fills and copies become writes of whole buffers, and no buffer is given
+// back.
 #include <CL/cl.h>
 
 #include <cstring>
@@ -16,11 +17,15 @@ cl_int clEnqueueFillBuffer(cl_command_queue queue, cl_mem buffer, const void* pa
 
 cl_int clEnqueueCopyBuffer(cl_command_queue queue, cl_mem from, cl_mem to, size_t from_offset, size_t to_offset,
                            size_t size, cl_uint wait_count, const cl_event* waits, cl_event* event) {
-  std::vector<char> bytes(size);
-  const cl_int code =
-      clEnqueueReadBuffer(queue, from, CL_TRUE, from_offset, size, bytes.data(), wait_count, waits, nullptr);
-  return code == CL_SUCCESS ? clEnqueueWriteBuffer(queue, to, CL_TRUE, to_offset, size, bytes.data(), 0, nullptr, event)
-                            : code;
+  size_t whole = 0;
+  cl_int code = clGetMemObjectInfo(to, CL_MEM_SIZE, sizeof(whole), &whole, nullptr);
+  std::vector<char> bytes(whole);
+  if (code == CL_SUCCESS)
+    code = clEnqueueReadBuffer(queue, to, CL_TRUE, 0, whole, bytes.data(), wait_count, waits, nullptr);
+  if (code == CL_SUCCESS)
+    code = clEnqueueReadBuffer(queue, from, CL_TRUE, from_offset, size, bytes.data() + to_offset, 0, nullptr, nullptr);
+  if (code != CL_SUCCESS) return code;
+  return clEnqueueWriteBuffer(queue, to, CL_TRUE, 0, whole, bytes.data(), 0, nullptr, event);
 }
 
 cl_int clReleaseMemObject(cl_mem) { return CL_SUCCESS; }

@@ -99,30 +99,34 @@ ExrSurvey read_header(Reader& in) {
   return survey;
 }
 
+void check_preview(const Reader& in, const std::string& value) {
+  std::uint32_t size[2] = {0, 0};
+  if (value.size() >= 8) std::memcpy(size, value.data(), 8);
+  if (size[0] > 4096 || size[1] > 4096 || value.size() != 8 + std::size_t{4} * size[0] * size[1])
+    in.fail("the header is damaged (preview image)");
+}
+
+void check_channels(const Reader& in, const std::string& value) {
+  int channels = 0;
+  for (std::size_t at = 0; at < value.size() && value[at] != '\0'; ++channels) {
+    const std::size_t end = value.find('\0', at);
+    if (end == std::string::npos || value.size() - end < 17) in.fail("the header is damaged (channels)");
+    std::int32_t numbers[4];  // type, two of no meaning here, steps in x and y
+    std::memcpy(numbers, value.data() + end + 1, sizeof numbers);
+    if (numbers[0] < 0 || numbers[0] > 2 || numbers[2] != 1 || numbers[3] != 1)
+      in.fail(fmt::format("channel \"{}\" is not in full resolution, or of an unknown type",
+                          printable(value.substr(at, end - at))));
+    at = end + 17;
+  }
+  if (channels > kMaxChannels)
+    in.fail(fmt::format("an image of {} channels; a model has at most {}", channels, kMaxChannels));
+}
+
 /// OpenEXR allocates by these two kinds of attribute before it looks at what follows.
 void check_allocations(const Reader& in, const ExrSurvey& survey) {
   for (const auto& [name, attribute] : survey.attributes) {
-    const std::string& value = attribute.value;
-    if (attribute.type == "preview") {
-      std::uint32_t size[2] = {0, 0};
-      if (value.size() >= 8) std::memcpy(size, value.data(), 8);
-      if (size[0] > 4096 || size[1] > 4096 || value.size() != 8 + std::size_t{4} * size[0] * size[1])
-        in.fail("the header is damaged (preview image)");
-    } else if (attribute.type == "chlist") {
-      int channels = 0;
-      for (std::size_t at = 0; at < value.size() && value[at] != '\0'; ++channels) {
-        const std::size_t end = value.find('\0', at);
-        if (end == std::string::npos || value.size() - end < 17) in.fail("the header is damaged (channels)");
-        std::int32_t numbers[4];  // type, two of no meaning here, steps in x and y
-        std::memcpy(numbers, value.data() + end + 1, sizeof numbers);
-        if (numbers[0] < 0 || numbers[0] > 2 || numbers[2] != 1 || numbers[3] != 1)
-          in.fail(fmt::format("channel \"{}\" is not in full resolution, or of an unknown type",
-                              printable(value.substr(at, end - at))));
-        at = end + 17;
-      }
-      if (channels > kMaxChannels)
-        in.fail(fmt::format("an image of {} channels; a model has at most {}", channels, kMaxChannels));
-    }
+    if (attribute.type == "preview") check_preview(in, attribute.value);
+    if (attribute.type == "chlist") check_channels(in, attribute.value);
   }
 }
 

@@ -328,9 +328,12 @@ struct ReadModel {
   SkeletexModel model;
 };
 
+/// A channel's name in the file, and its texels.
+using NamedPlane = std::pair<std::string, std::vector<float>*>;
+
 /// That header and texels are those that were written. Files of version 1 have no checksum.
-/// \param planes  the texels of all channels, in the order of the checksum
-void check_sum(std::string json, const nlohmann::json& header, std::span<const std::vector<float>* const> planes,
+/// \param planes  all channels, in the order of the checksum
+void check_sum(std::string json, const nlohmann::json& header, const std::vector<NamedPlane>& planes,
                const std::string& where) {
   const std::size_t at = Checksum::find_digits(json);
   if (at == std::string::npos) {
@@ -339,12 +342,43 @@ void check_sum(std::string json, const nlohmann::json& header, std::span<const s
   }
   const std::string written = json.substr(at, Checksum::kZeros.size());
   Checksum checksum(json.replace(at, Checksum::kZeros.size(), Checksum::kZeros));
-  for (const std::vector<float>* plane : planes) checksum.add(*plane);
+  for (const auto& [name, values] : planes) checksum.add(*values);
   if (checksum.digits() != written)
     throw IoError(fmt::format(
         "{}: the file is damaged, or was changed by another program: its checksum is {} instead of {}. Copy it again; "
         "if you have edited it, take it over with `skeletex weights {} --edited -o FILE`",
         where, checksum.digits(), written, where));
+}
+
+/// Reads channels of a level, each into its plane.
+void read_planes(const std::filesystem::path& path, int level, int width, int height,
+                 const std::vector<NamedPlane>& planes) {
+  const std::string where = path.string();
+  const std::size_t size = static_cast<std::size_t>(width) * height;
+  require_memory(static_cast<double>(planes.size() * size * sizeof(float)),
+                 fmt::format("reading {} ({} x {} texels)", where, width, height));
+  use_threads();
+  with_openexr(where, "cannot read, the file is damaged", [&] {
+    Imf::MultiPartInputFile file(path.c_str());
+    Imf::InputPart exr(file, level);
+    Imf::FrameBuffer frame;
+    for (const auto& [name, values] : planes) {
+      const Imf::Channel* channel = exr.header().channels().findChannel(name);
+      if (channel == nullptr || channel->xSampling != 1 || channel->ySampling != 1 || channel->type == Imf::UINT)
+        throw IoError(
+            fmt::format("{}: a model has the channels R, G, B and those of its weights and layers in full resolution, "
+                        "float or half; {} is not like that",
+                        where, name));
+      values->resize(size);
+      frame.insert(
+          name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values->data()), sizeof(float), sizeof(float) * width));
+    }
+    const Imath::Box2i window = exr.header().dataWindow();
+    if (window.min != Imath::V2i(0, 0) || window.max != Imath::V2i(width - 1, height - 1))
+      throw IoError(where + ": the file changed while it was read");
+    exr.setFrameBuffer(frame);
+    exr.readPixels(0, height - 1);
+  });
 }
 
 ReadModel read_level(const std::filesystem::path& path, int level, ChecksumRule rule) {
@@ -371,47 +405,16 @@ ReadModel read_level(const std::filesystem::path& path, int level, ChecksumRule 
           "{}: the image has {} x {} texels, but the model in its header {} x {}; it was resized by another program",
           where, survey.width, survey.height, model.texture.width, model.texture.height));
   }
-  const auto width = static_cast<std::size_t>(model.texture.width),
-             height = static_cast<std::size_t>(model.texture.height);
-  std::size_t plane_count = 3 + model.bone_weights.size();
-  for (const std::vector<std::string>& names : layer_names) plane_count += names.size();
-  require_memory(static_cast<double>(plane_count * width * height * sizeof(float)),
-                 fmt::format("reading {} ({} x {} texels)", where, width, height));
-  use_threads();
-  with_openexr(where, "cannot read, the file is damaged", [&] {
-    Imf::MultiPartInputFile file(path.c_str());
-    Imf::InputPart exr(file, level);
-    Imf::FrameBuffer frame;
-    const auto add_channel = [&](const std::string& name, std::vector<float>& values) {
-      const Imf::Channel* channel = exr.header().channels().findChannel(name);
-      if (channel == nullptr || channel->xSampling != 1 || channel->ySampling != 1 || channel->type == Imf::UINT)
-        throw IoError(
-            fmt::format("{}: a model has the channels R, G, B and those of its weights and layers in full resolution, "
-                        "float or half; {} is not like that",
-                        where, name));
-      values.resize(width * height);
-      frame.insert(
-          name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()), sizeof(float), sizeof(float) * width));
-    };
-    for (int i = 0; i < 3; ++i) add_channel(kChannels[i], plane(model.texture, i));
-    for (std::size_t bone = 0; bone < weight_names.size(); ++bone)
-      add_channel(weight_names[bone], model.bone_weights[bone]);
-    for (std::size_t i = 0; i < layer_names.size(); ++i)
-      for (std::size_t k = 0; k < layer_names[i].size(); ++k) add_channel(layer_names[i][k], model.layers[i].planes[k]);
-    const Imath::Box2i window = exr.header().dataWindow();
-    if (window.min != Imath::V2i(0, 0) || window.max != Imath::V2i(model.texture.width - 1, model.texture.height - 1))
-      throw IoError(where + ": the file changed while it was read");
-    exr.setFrameBuffer(frame);
-    exr.readPixels(0, model.texture.height - 1);
-  });
+  std::vector<NamedPlane> planes;
+  for (int i = 0; i < 3; ++i) planes.emplace_back(kChannels[i], &plane(model.texture, i));
+  for (std::size_t bone = 0; bone < weight_names.size(); ++bone)
+    planes.emplace_back(weight_names[bone], &model.bone_weights[bone]);
+  for (std::size_t i = 0; i < layer_names.size(); ++i)
+    for (std::size_t k = 0; k < layer_names[i].size(); ++k)
+      planes.emplace_back(layer_names[i][k], &model.layers[i].planes[k]);
+  read_planes(path, level, model.texture.width, model.texture.height, planes);
   check_texels(model, where);
-  if (rule == ChecksumRule::kVerify) {
-    std::vector<const std::vector<float>*> planes{&model.texture.along, &model.texture.around, &model.texture.out};
-    for (const std::vector<float>& weights : model.bone_weights) planes.push_back(&weights);
-    for (const Layer& layer : model.layers)
-      for (const std::vector<float>& plane : layer.planes) planes.push_back(&plane);
-    check_sum(std::move(json), header, planes, where);
-  }
+  if (rule == ChecksumRule::kVerify) check_sum(std::move(json), header, planes, where);
   return result;
 }
 

@@ -289,7 +289,7 @@ class SkeletonBuilder {
   /// The farthest place on the way to a tip that lies in the body, and not just below the surface.
   Vec3 pulled_inside(const Vec3& from, const Vec3& tip) const {
     for (double share = 1; share > 0.25; share -= 0.05) {
-      const Vec3 place = from + share * (tip - from);
+      Vec3 place = from + share * (tip - from);
       const std::array<Vec3, 1> places{place};
       if (probe_.winding_numbers(places, false)[0] < 0.5) continue;
       if (probe_.nearest(place).distance >= 0.1 * (tip - from).norm() * share ||
@@ -304,7 +304,7 @@ class SkeletonBuilder {
     const Joint& joint = joints_[j];
     if (const int end = end_joint(j); end >= 0) return joints_[end].position;
     if (joint.vertices.empty()) return joint.position;
-    const Vec3 tip = tip_from_vertices(j);
+    Vec3 tip = tip_from_vertices(j);
     // Of joints in one place, one that moves the surface around another one's bone is a helper of that.
     for (int other = 0; other < count(); ++other) {
       if (other == j || joints_[other].group != joint.group) continue;
@@ -381,6 +381,29 @@ class SkeletonBuilder {
   JointSkeleton result_;
 };
 
+Vec3 middle_of(const Skeleton& skeleton, std::size_t bone) {
+  return 0.5 *
+         (skeleton.nodes[skeleton.bones[bone].head].position + skeleton.nodes[skeleton.bones[bone].tail].position);
+}
+
+int nearest_bone(const Skeleton& skeleton, const Vec3& point) {
+  int best = 0;
+  double least = INFINITY;
+  for (int bone = 0; bone < static_cast<int>(skeleton.bones.size()); ++bone) {
+    const double distance = distance_to_bone(point, end_position(skeleton, bone, BoneEnd::kHead),
+                                             end_position(skeleton, bone, BoneEnd::kTail));
+    if (distance < least) least = distance, best = bone;
+  }
+  return best;
+}
+
+/// \return the number of what has that name; -1: nothing has
+template <class T>
+int named(const std::vector<T>& list, const std::string& name) {
+  const auto found = std::find_if(list.begin(), list.end(), [&](const T& item) { return item.name == name; });
+  return found == list.end() ? -1 : static_cast<int>(found - list.begin());
+}
+
 }  // namespace
 
 JointSkeleton make_joint_skeleton(const GltfScene& scene, const GltfSurface& surface) {
@@ -389,33 +412,16 @@ JointSkeleton make_joint_skeleton(const GltfScene& scene, const GltfSurface& sur
 
 JointSkeleton with_skeleton(const JointSkeleton& joints, const Skeleton& skeleton) {
   const Skeleton& before = joints.skeleton;
-  const auto middle = [](const Skeleton& of, std::size_t bone) {
-    return Vec3(0.5 * (of.nodes[of.bones[bone].head].position + of.nodes[of.bones[bone].tail].position));
-  };
-  const auto nearest = [](const Skeleton& in, const Vec3& point) {
-    int best = 0;
-    double least = INFINITY;
-    for (int bone = 0; bone < static_cast<int>(in.bones.size()); ++bone) {
-      const double distance =
-          distance_to_bone(point, end_position(in, bone, BoneEnd::kHead), end_position(in, bone, BoneEnd::kTail));
-      if (distance < least) least = distance, best = bone;
-    }
-    return best;
-  };
-  const auto named = [](const auto& list, const std::string& name) {
-    const auto found = std::find_if(list.begin(), list.end(), [&](const auto& item) { return item.name == name; });
-    return found == list.end() ? -1 : static_cast<int>(found - list.begin());
-  };
   JointSkeleton result{skeleton, {}, {}, std::vector<std::vector<int>>(joints.bones_of_joint.size()), joints.notes};
   std::vector<std::vector<int>> became(before.bones.size());  // per bone before, the bones that stand for it
   for (std::size_t bone = 0; bone < skeleton.bones.size(); ++bone) {
     int from = named(before.bones, skeleton.bones[bone].name);
-    if (from < 0) from = nearest(before, middle(skeleton, bone));
+    if (from < 0) from = nearest_bone(before, middle_of(skeleton, bone));
     result.bone_joint.push_back(joints.bone_joint[from]);
     became[from].push_back(static_cast<int>(bone));
   }
   for (std::size_t bone = 0; bone < became.size(); ++bone)
-    if (became[bone].empty()) became[bone].push_back(nearest(skeleton, middle(before, bone)));
+    if (became[bone].empty()) became[bone].push_back(nearest_bone(skeleton, middle_of(before, bone)));
   for (std::size_t joint = 0; joint < joints.bones_of_joint.size(); ++joint) {
     std::set<int> bones;
     for (const int bone : joints.bones_of_joint[joint]) bones.insert(became[bone].begin(), became[bone].end());

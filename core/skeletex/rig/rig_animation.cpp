@@ -136,7 +136,7 @@ class AnimationReader {
       Eigen::Matrix3d u = svd.matrixU();
       if ((u * svd.matrixV().transpose()).determinant() < 0) u.col(2) = -u.col(2);
       moment.rotations.push_back(Quaterniond(u * svd.matrixV().transpose()).normalized());
-      const Vec3 scales = svd.singularValues();
+      const Vec3& scales = svd.singularValues();
       largest_scale_ = std::max({largest_scale_, scales[0], 1 / std::max(scales[2], 1e-9)});
     }
     return moment;

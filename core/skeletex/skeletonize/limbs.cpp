@@ -72,6 +72,25 @@ bool is_inside(const Surface& surface, const Skeleton& skeleton) {
   });
 }
 
+/// Makes what is not on a limb symmetric: pairs of nodes, and nodes in the plane.
+/// \return false where it has no symmetric counterpart
+bool symmetrize_trunk(const Skeleton& skeleton, const std::vector<char>& is_on_limb,
+                      const std::vector<int>& node_partner, const MirrorPlane& plane, Skeleton& result) {
+  if (node_partner.empty()) return false;
+  for (std::size_t n = 0; n < node_partner.size(); ++n) {
+    if (is_on_limb[n]) continue;
+    if (node_partner[n] < 0) return false;
+    result.nodes[n].position =
+        0.5 * (skeleton.nodes[n].position + plane.mirrored(skeleton.nodes[node_partner[n]].position));
+  }
+  std::set<std::pair<int, int>> trunk;
+  for (const Bone& bone : skeleton.bones)
+    if (!is_on_limb[bone.head] && !is_on_limb[bone.tail]) trunk.insert(std::minmax(bone.head, bone.tail));
+  return std::all_of(trunk.begin(), trunk.end(), [&](const std::pair<int, int>& bone) {
+    return trunk.contains(std::minmax(node_partner[bone.first], node_partner[bone.second]));
+  });
+}
+
 }  // namespace
 
 std::vector<SkeletonLimb> find_limbs(const Skeleton& skeleton) {
@@ -120,20 +139,8 @@ std::optional<Skeleton> symmetrized(const Surface& surface, const MirrorPlane& p
   std::vector<char> is_on_limb(skeleton.nodes.size(), 0);
   for (const SkeletonLimb& limb : limbs)
     for (std::size_t i = 1; i < limb.nodes.size(); ++i) is_on_limb[limb.nodes[i]] = 1;
-  // What is not on a limb: pairs of nodes and nodes in the plane.
   const std::vector<int> node_partner = pair_nodes(skeleton, is_on_limb, plane, apart);
-  if (node_partner.empty()) return std::nullopt;
-  for (std::size_t n = 0; n < node_partner.size(); ++n) {
-    if (is_on_limb[n]) continue;
-    if (node_partner[n] < 0) return std::nullopt;
-    result.nodes[n].position =
-        0.5 * (skeleton.nodes[n].position + plane.mirrored(skeleton.nodes[node_partner[n]].position));
-  }
-  std::set<std::pair<int, int>> trunk;
-  for (const Bone& bone : skeleton.bones)
-    if (!is_on_limb[bone.head] && !is_on_limb[bone.tail]) trunk.insert(std::minmax(bone.head, bone.tail));
-  for (const auto& [a, b] : trunk)
-    if (!trunk.contains(std::minmax(node_partner[a], node_partner[b]))) return std::nullopt;
+  if (!symmetrize_trunk(skeleton, is_on_limb, node_partner, plane, result)) return std::nullopt;
   std::set<int> gone;
   for (std::size_t i = 0; i < limbs.size(); ++i) {
     if (partner[i] < 0) return std::nullopt;

@@ -58,6 +58,41 @@ std::string find_block(const tinygltf::Model& model, int view_index, std::size_t
   return {};
 }
 
+/// Where the numbers of an accessor go.
+struct Elements {
+  std::vector<double> values;
+  int components = 1, type = 0;
+  bool is_normalized = false;
+
+  void read(const unsigned char* bytes, std::size_t to) {
+    const int size = tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(type));
+    for (int c = 0; c < components; ++c) values[to * components + c] = number_at(bytes + c * size, type, is_normalized);
+  }
+};
+
+/// Replaces the elements that the accessor's sparse part names.
+/// \return what is wrong instead, in words
+std::string read_sparse(const tinygltf::Model& model, const tinygltf::Accessor& accessor, std::size_t element,
+                        Elements& elements) {
+  const auto& sparse = accessor.sparse;
+  const int index_size = tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(sparse.indices.componentType));
+  if (sparse.count < 0 || index_size <= 0 || index_size > 4 || sparse.indices.byteOffset < 0 ||
+      sparse.values.byteOffset < 0)
+    return "its sparse part is damaged";
+  Block indices, replaced;
+  for (const std::string& wrong :
+       {find_block(model, sparse.indices.bufferView, sparse.indices.byteOffset, sparse.count, index_size, false,
+                   indices),
+        find_block(model, sparse.values.bufferView, sparse.values.byteOffset, sparse.count, element, false, replaced)})
+    if (!wrong.empty()) return "sparse: " + wrong;
+  for (int i = 0; i < sparse.count; ++i) {
+    const double to = number_at(indices.bytes + i * indices.stride, sparse.indices.componentType, false);
+    if (!(to >= 0 && to < static_cast<double>(accessor.count))) return "a sparse index is out of range";
+    elements.read(replaced.bytes + i * replaced.stride, static_cast<std::size_t>(to));
+  }
+  return {};
+}
+
 }  // namespace
 
 std::vector<double> GltfAccessors::read(int index, int wanted) const {
@@ -73,37 +108,16 @@ std::vector<double> GltfAccessors::read(int index, int wanted) const {
   if (wanted > 0 && own != wanted) fail(fmt::format("{} numbers per element are expected, not {}", wanted, own));
   if (accessor.count > kMostElements) fail("too large");
   const std::size_t element = static_cast<std::size_t>(size) * own;
-  std::vector<double> values(accessor.count * own, 0.0);
-  const auto read_element = [&](const unsigned char* bytes, std::size_t to) {
-    for (int c = 0; c < own; ++c) values[to * own + c] = number_at(bytes + c * size, type, accessor.normalized);
-  };
+  Elements elements{std::vector<double>(accessor.count * own, 0.0), own, type, accessor.normalized};
+  std::string wrong;
   if (accessor.bufferView >= 0) {
     Block block;
-    if (const std::string wrong =
-            find_block(model_, accessor.bufferView, accessor.byteOffset, accessor.count, element, true, block);
-        !wrong.empty())
-      fail(wrong);
-    for (std::size_t i = 0; i < accessor.count; ++i) read_element(block.bytes + i * block.stride, i);
+    wrong = find_block(model_, accessor.bufferView, accessor.byteOffset, accessor.count, element, true, block);
+    for (std::size_t i = 0; i < accessor.count && wrong.empty(); ++i) elements.read(block.bytes + i * block.stride, i);
   }
-  if (accessor.sparse.isSparse) {
-    const auto& sparse = accessor.sparse;
-    const int index_size = tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(sparse.indices.componentType));
-    if (sparse.count < 0 || index_size <= 0 || index_size > 4 || sparse.indices.byteOffset < 0 ||
-        sparse.values.byteOffset < 0)
-      fail("its sparse part is damaged");
-    Block indices, replaced;
-    for (const std::string& wrong : {find_block(model_, sparse.indices.bufferView, sparse.indices.byteOffset,
-                                                sparse.count, index_size, false, indices),
-                                     find_block(model_, sparse.values.bufferView, sparse.values.byteOffset,
-                                                sparse.count, element, false, replaced)})
-      if (!wrong.empty()) fail("sparse: " + wrong);
-    for (int i = 0; i < sparse.count; ++i) {
-      const double to = number_at(indices.bytes + i * indices.stride, sparse.indices.componentType, false);
-      if (!(to >= 0 && to < static_cast<double>(accessor.count))) fail("a sparse index is out of range");
-      read_element(replaced.bytes + i * replaced.stride, static_cast<std::size_t>(to));
-    }
-  }
-  return values;
+  if (wrong.empty() && accessor.sparse.isSparse) wrong = read_sparse(model_, accessor, element, elements);
+  if (!wrong.empty()) fail(wrong);
+  return std::move(elements.values);
 }
 
 int GltfAccessors::components(int index) const {

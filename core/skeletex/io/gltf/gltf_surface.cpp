@@ -96,7 +96,7 @@ class SurfaceBuilder {
     }
     const std::size_t root = std::min_element(depths.begin(), depths.end()) - depths.begin();
     const auto shown = [&](std::size_t j) { return shown_[skin.joints[j]] * affine(skin.inverse_binds[j]); };
-    const Affine3d first = shown(root);
+    Affine3d first = shown(root);
     const double size = extent * std::cbrt(std::abs(first.linear().determinant()));
     double difference = 0;
     for (std::size_t j = 0; j < skin.joints.size(); ++j) {
