@@ -4,6 +4,10 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "skeletex/analysis/validate_input.h"
+#include "skeletex/model/error.h"
+#include "skeletex/skeletonize/repair_skeleton.h"
+
 namespace skeletex::cli {
 namespace {
 
@@ -43,8 +47,22 @@ RigFile load_rig(const std::filesystem::path& path, const CloseOptions& close) {
   return file;
 }
 
-ImportedRig import_rig(const RigFile& file) {
-  ImportedRig rig = skeletex::import_rig(file.scene, file.surface);
+ImportedRig import_rig(ClContext& context, const RigFile& file) {
+  const auto repair = [&](const Skeleton& skeleton) {
+    TriangleMesh mesh = file.surface.mesh;
+    std::optional<TriangleTree> tree;
+    if (has_errors(validate_mesh(mesh, &tree))) return skeleton;
+    try {
+      RepairResult repaired = repair_skeleton(context, mesh, *tree, skeleton);
+      for (const std::string& change : repaired.changes) spdlog::info("{}: {}", file.path, change);
+      return std::move(repaired.skeleton);
+    } catch (const DeviceError&) {
+      throw;
+    } catch (const Error&) {  // Whoever validates this skeleton says what is wrong with it.
+      return skeleton;
+    }
+  };
+  ImportedRig rig = skeletex::import_rig(file.scene, file.surface, repair);
   for (const std::string& note : rig.notes) spdlog::info("{}: {}", file.path, note);
   return rig;
 }

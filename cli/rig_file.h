@@ -4,6 +4,7 @@
 
 #include "close_mesh.h"
 #include "command.h"
+#include "skeletex/device/context.h"
 #include "skeletex/io/gltf/read_gltf.h"
 #include "skeletex/rig/import_rig.h"
 
@@ -18,7 +19,8 @@ struct RigFile {
 };
 /// Reads a glTF file, closes its surface where that is asked for, and says on standard error what was done to it.
 RigFile load_rig(const std::filesystem::path& path, const CloseOptions& close);
-/// Skeleton, weights and animations; says on standard error what became of the joints.
-ImportedRig import_rig(const RigFile& file);
+/// Skeleton, weights and animations. A skeleton that does not suit a closed surface is repaired. Says on standard error
+/// what became of the joints, and what was repaired.
+ImportedRig import_rig(ClContext& context, const RigFile& file);
 
 }  // namespace skeletex::cli

@@ -139,12 +139,12 @@ struct Input {
   Skeleton skeleton;
 };
 
-Input read_input(const Arguments& arguments, const EncodeOptions& options) {
+Input read_input(ClContext& context, const Arguments& arguments, const EncodeOptions& options) {
   Input input;
   if (is_gltf_file(arguments.mesh)) {
     RigFile file = load_rig(arguments.mesh, arguments.close);
     if (arguments.skeleton.empty()) {
-      ImportedRig rig = import_rig(file);
+      ImportedRig rig = import_rig(context, file);
       input.skeleton = std::move(rig.skeleton);
       input.weights = std::move(rig.weights);
     }
@@ -217,9 +217,10 @@ void run(const Arguments& arguments, const CLI::App& command) {
   ClContext context(arguments.device);
   std::optional<ProgressBar> bar(std::in_place, context);
   bar->show("reading and checking the input", 0);
-  // Loading the kernels takes as long as reading the input: a tenth of the command each.
-  std::future<Input> reading = std::async(std::launch::async, [&] { return read_input(arguments, options); });
-  context.prepare({"encode.cl", "read_surface"});
+  // Loading the kernels takes as long as reading the input: a tenth of the command each. A rig's skeleton may need
+  // repair, which takes the context itself.
+  std::future<Input> reading = std::async(std::launch::async, [&] { return read_input(context, arguments, options); });
+  if (!is_gltf_file(arguments.mesh)) context.prepare({"encode.cl", "read_surface"});
   Input input = reading.get();
   if (input.skeleton.bones.empty()) {
     input.skeleton = make_skeleton(context, input, *bar);

@@ -23,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Arguments {
-  std::string rig, output, json;
+  std::string rig, output, device, json;
   CloseOptions close;
 };
 
@@ -74,7 +74,8 @@ std::pair<std::string, Json> findings_of(TriangleMesh mesh, const Skeleton& skel
 
 void run(const Arguments& arguments) {
   const RigFile file = load_rig(arguments.rig, arguments.close);
-  const ImportedRig rig = import_rig(file);
+  ClContext context(arguments.device);
+  const ImportedRig rig = import_rig(context, file);
   const TriangleMesh& mesh = file.surface.mesh;
   const fs::path folder = arguments.output;
   make_folder(folder);
@@ -133,6 +134,7 @@ void add_import_command(CLI::App& program) {
       ->required()
       ->type_name("FOLDER");
   add_close_options(command, arguments->close);
+  add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(
       "Examples:\n"

@@ -92,6 +92,19 @@ void hit_columns(const TriangleMesh& mesh, const Triangle& triangle, const Colum
   }
 }
 
+/// Appends the voxels of a column from `entered` to `left`; runs that touch are one.
+/// \param begin  the column's first run
+void append_run(const Columns& columns, int column, int begin, double entered, double left, std::vector<Run>& runs) {
+  const int first = std::max(0, static_cast<int>(std::ceil((entered - columns.origin.z()) / columns.side))),
+            last =
+                std::min(columns.z_count - 1, static_cast<int>(std::floor((left - columns.origin.z()) / columns.side)));
+  if (first > last) return;
+  if (static_cast<int>(runs.size()) > begin && runs.back().last >= first - 1)
+    runs.back().last = std::max(runs.back().last, last);
+  else
+    runs.push_back({column, first, last});
+}
+
 /// The voxels whose centres the mesh winds around.
 Runs inside_runs(const TriangleMesh& mesh, const Columns& columns) {
   std::vector<ColumnHit> hits;
@@ -109,15 +122,7 @@ Runs inside_runs(const TriangleMesh& mesh, const Columns& columns) {
       const int before = winding;
       winding -= hits[at].sign;  // a top face ends what is below it
       if (before <= 0 && winding > 0) entered = hits[at].z;
-      if (before <= 0 || winding > 0) continue;
-      const int first = std::max(0, static_cast<int>(std::ceil((entered - columns.origin.z()) / columns.side))),
-                last = std::min(columns.z_count - 1,
-                                static_cast<int>(std::floor((hits[at].z - columns.origin.z()) / columns.side)));
-      if (first > last) continue;
-      if (static_cast<int>(runs.runs.size()) > runs.begin.back() && runs.runs.back().last >= first - 1)
-        runs.runs.back().last = std::max(runs.runs.back().last, last);
-      else
-        runs.runs.push_back({column, first, last});
+      if (before > 0 && winding <= 0) append_run(columns, column, runs.begin.back(), entered, hits[at].z, runs.runs);
     }
   }
   runs.begin.push_back(static_cast<int>(runs.runs.size()));
@@ -242,9 +247,8 @@ void link_voxels(const Columns& columns, const Runs& runs, VoxelBody& body) {
   });
 }
 
-/// Voxels to leave out so that no two are neighbours across the surface.
-std::vector<char> find_false_links(const Surface& surface, const VoxelBody& body) {
-  // Bit p: the way to the neighbour at place p meets the surface.
+/// Per voxel, bit p: the way to the neighbour at place p meets the surface.
+std::vector<unsigned> find_crossed_links(const Surface& surface, const VoxelBody& body) {
   std::vector<unsigned> crossed(body.size(), 0);
   for_each_block(crossed.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) {
@@ -259,19 +263,31 @@ std::vector<char> find_false_links(const Surface& surface, const VoxelBody& body
       }
     }
   });
+  return crossed;
+}
+
+/// Whether a third voxel is a neighbour of both on the same side of the surface.
+bool has_clean_detour(const VoxelBody& body, const std::vector<unsigned>& crossed, const std::vector<char>& is_out,
+                      int v, int other) {
+  for (int third = 0; third < kVoxelPlaces; ++third) {
+    const int w = body.neighbours[v][third];
+    if (w < 0 || w == v || w == other || is_out[w] || (crossed[v] >> third & 1)) continue;
+    for (int back = 0; back < kVoxelPlaces; ++back)
+      if (body.neighbours[w][back] == other && !(crossed[w] >> back & 1)) return true;
+  }
+  return false;
+}
+
+/// Voxels to leave out so that no two are neighbours across the surface.
+std::vector<char> find_false_links(const Surface& surface, const VoxelBody& body) {
+  const std::vector<unsigned> crossed = find_crossed_links(surface, body);
   std::vector<char> is_out(body.size(), 0);
   for (int v = 0; v < body.size(); ++v) {
     for (int place = 0; place < kVoxelPlaces; ++place) {
       const int other = body.neighbours[v][place];
       if (!(crossed[v] >> place & 1) || other < v || is_out[v] || is_out[other]) continue;
-      bool is_joined = false;  // by a third voxel that is a clean neighbour of both
-      for (int third = 0; third < kVoxelPlaces && !is_joined; ++third) {
-        const int w = body.neighbours[v][third];
-        if (w < 0 || w == v || w == other || is_out[w] || (crossed[v] >> third & 1)) continue;
-        for (int back = 0; back < kVoxelPlaces && !is_joined; ++back)
-          is_joined = body.neighbours[w][back] == other && !(crossed[w] >> back & 1);
-      }
-      if (!is_joined) is_out[body.radii[v] <= body.radii[other] ? v : other] = 1;
+      if (!has_clean_detour(body, crossed, is_out, v, other))
+        is_out[body.radii[v] <= body.radii[other] ? v : other] = 1;
     }
   }
   return is_out;
