@@ -11,7 +11,6 @@
 #include "files.h"
 #include "skeletex/analysis/validate_input.h"
 #include "skeletex/io/atomic_file.h"
-#include "skeletex/io/mesh_file.h"
 #include "skeletex/io/suggestion.h"
 #include "skeletex/model/error.h"
 
@@ -70,14 +69,27 @@ void check_output(const std::filesystem::path& path) {
     throw IoError(fmt::format("{}: the folder {} is not writable", path.string(), folder.string()));
 }
 
-TriangleMesh load_mesh(const std::filesystem::path& path) {
+namespace {
+
+MeshFile read_and_tell(const std::filesystem::path& path) {
   MeshFile file = read_mesh(path);
   if (file.triangles != file.faces_in_file)
     spdlog::info("{}: {} polygons became {} triangles", path.string(), file.faces_in_file, file.triangles);
   if (file.merged_vertices > 0)
     spdlog::info("{}: {} of {} vertices lay on others and were welded", path.string(), file.merged_vertices,
                  file.vertices_in_file);
-  return std::move(file.mesh);
+  return file;
+}
+
+}  // namespace
+
+TriangleMesh load_mesh(const std::filesystem::path& path) { return read_and_tell(path).mesh; }
+
+MeshFile load_mesh_file(const std::filesystem::path& path, bool has_materials) {
+  MeshFile file = read_and_tell(path);
+  if (!has_materials) return file;
+  for (const std::string& sentence : read_materials(path, file)) warn(sentence);
+  return file;
 }
 
 void require_valid(TriangleMesh& mesh, const Skeleton& skeleton, std::optional<TriangleTree>* tree) {

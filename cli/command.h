@@ -12,6 +12,7 @@
 #include "skeletex/device/stopwatch.h"
 #include "skeletex/geometry/mesh.h"
 #include "skeletex/geometry/triangle_tree.h"
+#include "skeletex/io/mesh_file.h"
 #include "skeletex/skeleton/skeleton.h"
 
 /// The program `skeletex`: one file per command, each adds itself to the program and runs as its callback. Results go
@@ -64,6 +65,9 @@ void check_output(const std::filesystem::path& path);
 
 /// Reads a mesh, and says on standard error what the reader did to it (polygons split, vertices welded).
 TriangleMesh load_mesh(const std::filesystem::path& path);
+/// The same with its attributes and, unless they are not of interest, its materials and their pictures; says which of
+/// these are missing.
+MeshFile load_mesh_file(const std::filesystem::path& path, bool has_materials = true);
 /// Checks that mesh and skeleton fit (validate_before_segmentation, which turns a mesh that is inside out) and prints
 /// every finding to standard error.
 /// \throw CLI::RuntimeError(kExitBad) when one is an error

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <future>
 #include <memory>
+#include <numbers>
 #include <optional>
 
 #include "command.h"
@@ -29,7 +30,8 @@ struct Arguments {
   double alpha = 0.5, stop_spread = 0, hybrid_threshold = EncodeOptions{}.hybrid_unseen_threshold;
   std::string rows = "surface", spd_hit = "last", share, diagonals, compression = "auto", rounding = "surface";
   bool has_no_prefilter = false, has_no_unfold = false, is_snapped = false, is_fitted = false, is_paper_recipe = false,
-       is_half = false, is_verbose = false;
+       is_half = false, is_verbose = false, has_no_normals = false, has_no_colours = false, has_no_numbers = false;
+  std::optional<double> crease;
   std::vector<std::string> bone_methods;
 };
 
@@ -97,6 +99,10 @@ void set_texel_options(const Arguments& arguments, const CLI::App& command, Enco
   if (is_given("--rounding") && !arguments.is_half) throw CLI::ValidationError("--rounding", "needs --half");
   options.has_half_texels = arguments.is_half && arguments.rounding == "surface";
   if (is_given("--share")) options.texel_share = share_of(arguments.share);
+  options.layers.has_normals = !arguments.has_no_normals;
+  options.layers.has_colours = !arguments.has_no_colours;
+  options.layers.has_numbers = !arguments.has_no_numbers;
+  if (arguments.crease) options.layers.crease_angle = *arguments.crease * std::numbers::pi / 180;
 }
 
 EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command) {
@@ -125,14 +131,18 @@ void check_bone_names(const Arguments& arguments, const EncodeOptions& options, 
 
 struct Input {
   TriangleMesh mesh;
+  MeshAttributes attributes;
   std::optional<TriangleTree> tree;
   Skeleton skeleton;
 };
 
 Input read_input(const Arguments& arguments, const EncodeOptions& options) {
-  Input input{load_mesh(arguments.mesh), {}, read_skeleton(arguments.skeleton)};
+  MeshFile file = load_mesh_file(arguments.mesh);
+  Input input{std::move(file.mesh), std::move(file.attributes), {}, read_skeleton(arguments.skeleton)};
   check_bone_names(arguments, options, input.skeleton);
+  const std::vector<Triangle> triangles = input.mesh.triangles;
   require_valid(input.mesh, input.skeleton, &input.tree);
+  if (input.mesh.triangles != triangles) turn_over(input.attributes);
   return input;
 }
 
@@ -143,7 +153,8 @@ ExrCompression compression_of(const std::string& name) {
                          : ExrCompression::kAuto;
 }
 
-void warn_of_bones(const EncodeReport& report) {
+void warn_of_result(const EncodeReport& report) {
+  for (const std::string& note : report.layer_notes) warn(note);
   for (const BoneReport& bone : report.bones) {
     if (bone.flipped_triangles > 0)
       warn(fmt::format("bone \"{}\": {} triangles are flipped in its map", bone.name, bone.flipped_triangles));
@@ -163,6 +174,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
   std::future<Input> reading = std::async(std::launch::async, [&] { return read_input(arguments, options); });
   context.prepare({"encode.cl", "read_surface"});
   const Input input = reading.get();
+  options.attributes = &input.attributes;
   options.tree = input.tree ? &*input.tree : nullptr;
   options.progress = [&](const std::string& stage, double done) {
     bar->show(stage, done);
@@ -174,7 +186,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
               {.format = arguments.is_half ? TexelFormat::kHalf : TexelFormat::kFloat,
                .compression = compression_of(arguments.compression)});
   bar.reset();
-  warn_of_bones(result.report);
+  warn_of_result(result.report);
   const EncodedFile file{arguments.output, options.width, options.height, watch.lap_ms() / 1000};
   Json json = encode_report_json(result.report, file);
   json["kernels"] = profile_json(context);
@@ -262,6 +274,18 @@ void add_file_options(CLI::App& command, Arguments& a) {
               {"auto", "none", "zip", "piz"});
 }
 
+void add_layer_options(CLI::App& command, Arguments& a) {
+  CLI::Option* none = command.add_flag("--no-normals", a.has_no_normals, "store no shading normals")->group("Layers");
+  add(command, "Layers", "--crease", a.crease,
+      "degrees: edges that turn more are sharp; of meshes whose file has no normals (default: none is)")
+      .type_name("DEG")
+      ->check(number_in(0.0, 180.0))
+      ->excludes(none);
+  command.add_flag("--no-colours", a.has_no_colours, "store no colours: vertex colours, materials and their pictures")
+      ->group("Layers");
+  command.add_flag("--no-numbers", a.has_no_numbers, "store no other numbers of the vertices (PLY)")->group("Layers");
+}
+
 }  // namespace
 
 void add_encode_command(CLI::App& program) {
@@ -288,6 +312,7 @@ void add_encode_command(CLI::App& program) {
               methods);
   add_map_options(command, a);
   add_texel_options(command, a);
+  add_layer_options(command, a);
   add_file_options(command, a);
   command.add_flag("--verbose", a.is_verbose, "print what was done for each bone and how long each stage took, too");
   add_device_option(command, arguments->device);

@@ -16,9 +16,11 @@
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/pose_file.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/layer_values.h"
 #include "skeletex/reconstruct/polish.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/reconstruct/turn_normals.h"
 
 namespace skeletex::cli {
 namespace {
@@ -101,9 +103,16 @@ void run(const Arguments& arguments) {
       bar.show("polishing", 0.5);
       polish_report = polish_pose(reconstruct_mesh(context, prepared), mesh.positions);
     }
+    MeshAttributes attributes;
+    if (!arguments.constant_offset) {
+      attributes = vertex_attributes(prepared);
+      if (posed && !attributes.normals.empty())
+        attributes.normals.values =
+            turn_normals(reconstruct_mesh(context, prepared), attributes.normals.values, mesh.positions);
+    }
     reconstruct_ms = watch.lap_ms();
     bar.show("writing", 0.7);
-    write_mesh(arguments.output, mesh);
+    write_mesh(arguments.output, mesh, attributes);
     write_ms = watch.lap_ms();
     if (posed && !arguments.constant_offset && !arguments.has_no_report) {
       bar.show("measuring the pose", 0.8);

@@ -79,11 +79,10 @@ void run_curvature(const Arguments& arguments) {
   std::vector<VertexColour> colours;
   for (const float value : result.mean_curvature)
     colours.push_back(viridis(colour_scale > 0 ? 0.5 + 0.5 * value / colour_scale : 0.5));
-  PlyAttributes attributes;
+  WrittenAttributes attributes;
   attributes.vertex_normals = normals;
   attributes.vertex_colours = colours;
-  attributes.vertex_property_name = "mean_curvature";
-  attributes.vertex_property = result.mean_curvature;
+  attributes.vertex_numbers = {{"mean_curvature", result.mean_curvature}};
   write_mesh(arguments.output, reconstruct_mesh(context, model), attributes);
   print(arguments.json, fmt::format("mean curvature at {} vertices, averaged over {:.3g} diagonals; colours from "
                                     "{:.4g} to {:.4g}\n{:.0f} ms on {}\n{}\n",

@@ -20,10 +20,12 @@
 #include "skeletex/io/read_file.h"
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/layer_values.h"
 #include "skeletex/reconstruct/polish.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/skin.h"
+#include "skeletex/reconstruct/turn_normals.h"
 #include "skeletex/render/colours.h"
 #include "skeletex/render/draw.h"
 #include "skeletex/render/gpu_model.h"
@@ -42,7 +44,8 @@ struct Arguments {
   std::optional<double> time, azimuth, elevation, fov, zoom;
   double error_max = 0;
   int lattice = 0, views = 1, samples = 2;
-  bool is_flat = false, has_wires = false, shows_skeleton = false, is_distance_dropped = false, is_polished = false;
+  bool is_flat = false, has_wires = false, shows_skeleton = false, is_distance_dropped = false, is_polished = false,
+       is_smoothed = false;
 };
 
 bool is_model(const std::string& path) { return has_ending(path, ".exr"); }
@@ -114,7 +117,8 @@ View view_of(const Arguments& arguments, const nlohmann::json& own_view) {
 /// What is drawn, from either kind of input.
 struct Subject {
   TriangleMesh mesh;
-  std::vector<int> bones;  ///< per triangle, where the mode asks for it
+  MeshAttributes attributes;  ///< by vertex
+  std::vector<int> bones;     ///< per triangle, where the mode asks for it
   std::optional<SkeletexModel> model;
   std::optional<Skeleton> skeleton;  ///< as posed
 };
@@ -123,8 +127,15 @@ Subject load_subject(const Arguments& arguments, ClContext& context) {
   Subject subject;
   if (!arguments.skeleton.empty()) subject.skeleton = read_skeleton(arguments.skeleton);
   if (!is_model(arguments.input)) {
-    subject.mesh = load_mesh(arguments.input);
-    if (arguments.mode == "segments") {
+    if (arguments.mode != "segments") {
+      MeshFile file = load_mesh_file(arguments.input);
+      if (file.attributes.normals.empty() || arguments.is_smoothed)
+        file.attributes.normals = {vertex_normals(file.mesh), {}};
+      SplitMesh split = split_vertices(file.mesh, file.attributes);
+      subject.mesh = std::move(split.mesh);
+      subject.attributes = std::move(split.attributes);
+    } else {
+      subject.mesh = load_mesh(arguments.input);
       require_valid(subject.mesh, *subject.skeleton);
       Segmentation segmentation = segment_mesh(context, subject.mesh, *subject.skeleton);
       subject.mesh = std::move(segmentation.cut_mesh);
@@ -142,7 +153,10 @@ Subject load_subject(const Arguments& arguments, ClContext& context) {
     subject.skeleton = apply_pose(*subject.skeleton, pose_at(*subject.skeleton, animation,
                                                              arguments.time.value_or(animation.frames.front().time)));
   }
-  subject.mesh = reconstruct_mesh(context, *subject.model);
+  const PreparedModel prepared(*subject.model);
+  subject.mesh = reconstruct_mesh(context, prepared);
+  subject.attributes = vertex_attributes(prepared);
+  if (arguments.is_smoothed) subject.attributes.normals = {};
   if (arguments.mode == "segments")
     subject.bones = triangle_bones(number_lattice(*subject.model), subject.mesh.triangles);
   return subject;
@@ -311,11 +325,17 @@ void run(Arguments arguments, const CLI::App& command) {
   const SurfacePaint paint = paint_of(arguments, subject, context, scale);
   GpuSurface surface = upload_surface(gl, subject.mesh);
   double displace_ms = 0;
+  const bool has_own_normals = !subject.attributes.normals.empty();
+  if (has_own_normals) write_normals(surface, subject.attributes.normals.values);
   std::vector<Vec3> points = subject.mesh.positions;
   if (subject.model) {
     watch.lap_ms();
     pose_surface(gl, context, arguments, subject, surface);
     points = download_positions(surface);
+    if (has_own_normals)
+      write_normals(surface, arguments.pose.empty()
+                                 ? subject.attributes.normals.values
+                                 : turn_normals(subject.mesh, subject.attributes.normals.values, points));
     displace_ms = watch.lap_ms();
   }
   DrawOptions options{.width = width, .height = height, .samples = arguments.samples, .is_flat = arguments.is_flat};
@@ -413,7 +433,11 @@ void add_render_command(CLI::App& program) {
                                   "what is shown: shaded, segments, normals, checker, error, weights, map or layout"),
               modes);
   command.add_option("--bone", arguments->bone, "--mode weights: the bone, by its name")->type_name("NAME");
-  command.add_flag("--flat", arguments->is_flat, "a normal per triangle");
+  CLI::Option* flat = command.add_flag("--flat", arguments->is_flat, "a normal per triangle");
+  command
+      .add_flag("--geometry-normals", arguments->is_smoothed,
+                "normals of the triangles around each vertex instead of those that the model or file has")
+      ->excludes(flat);
   command.add_flag("--wireframe", arguments->has_wires, "draw the triangles' edges");
   declare_input(command, command.add_option("--skeleton", arguments->skeleton,
                                             "skeleton of a mesh: .json; drawn inside, or used by --mode segments"))

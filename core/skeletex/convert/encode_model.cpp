@@ -236,9 +236,10 @@ std::vector<std::array<std::vector<Vec3>, 2>> find_end_points(const SkeletexMode
 }
 
 /// Reads the texels of a model that is laid out.
+/// \param tree  of the mesh, with snapping or fit
 TexelResult read_model_texels(ClContext& context, const SkeletexModel& model, const SeparationPlanes& separation,
-                              const TriangleMesh& mesh, const MappedSurface& surface, const TexelPlacing& placing,
-                              const EncodeOptions& options) {
+                              const TriangleMesh& mesh, const TriangleTree* tree, const MappedSurface& surface,
+                              const TexelPlacing& placing, const EncodeOptions& options) {
   std::optional<DeviceSnapTables> features;
   if (placing.has_snap)
     features =
@@ -247,12 +248,8 @@ TexelResult read_model_texels(ClContext& context, const SkeletexModel& model, co
                                          model.patches));
   const std::vector<SpdHits> hits = cast_rays(context, model, separation, surface.charts, options.spd_hit);
   const auto end_points = find_end_points(model, separation, surface);
-  std::optional<TriangleTree> own_tree;
   std::optional<RevertSources> revert;
-  if (placing.has_snap || placing.has_fit) {
-    if (!options.tree) own_tree = build_triangle_tree(mesh);
-    revert.emplace(RevertSources{model, mesh, own_tree ? *own_tree : *options.tree, surface.charts});
-  }
+  if (placing.has_snap || placing.has_fit) revert.emplace(RevertSources{model, mesh, *tree, surface.charts});
   TexelOptions texel_options{
       .has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_fit = placing.has_fit};
   if (options.has_half_texels) texel_options.half_rule = model.diagonals;
@@ -329,7 +326,12 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   add_seams(surface.segmentation, separation, placing.has_snap ? SeamSampling::kSnapped : SeamSampling::kEven, model);
 
   progress("encoding", 0.7);
-  TexelResult texels = read_model_texels(context, model, separation, mesh, surface, placing, options);
+  const MeshAttributes none;
+  const MeshAttributes& attributes = options.attributes ? *options.attributes : none;
+  std::optional<TriangleTree> own_tree;
+  if (!options.tree && (is_placed || has_layers(attributes, options.layers))) own_tree = build_triangle_tree(mesh);
+  const TriangleTree* const tree = own_tree ? &*own_tree : options.tree;
+  TexelResult texels = read_model_texels(context, model, separation, mesh, tree, surface, placing, options);
   model.texture = std::move(texels.texture);
   model.sampling = {options.has_prefilter, placing.has_snap, placing.has_fit};
   nlohmann::json settings = settings_json(options, placing, surface.unseen);
@@ -337,6 +339,13 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   model.encoder_settings = settings.dump();
   report.encoding_ms = watch.lap_ms();
 
+  if (has_layers(attributes, options.layers)) {
+    progress("layers", 0.95);
+    ReadLayers layers = read_layers(context, model, mesh, *tree, attributes, options.layers);
+    model.layers = std::move(layers.layers);
+    report.layer_notes = std::move(layers.notes);
+    report.layers_ms = watch.lap_ms();
+  }
   report.device = context.device().name;
   report_result(model, mesh, surface, texels.report, report);
   progress("done", 1);

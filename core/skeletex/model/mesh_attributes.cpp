@@ -2,7 +2,10 @@
 #include "skeletex/model/mesh_attributes.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
+#include <type_traits>
 
 namespace skeletex {
 
@@ -23,6 +26,36 @@ void turn_over(MeshAttributes& attributes) {
   turn(attributes.normals.corners);
   turn(attributes.colours.corners);
   turn(attributes.texture_coordinates.corners);
+}
+
+SplitMesh split_vertices(const TriangleMesh& mesh, const MeshAttributes& attributes) {
+  SplitMesh split;
+  split.mesh.triangles.resize(mesh.triangles.size());
+  split.attributes.materials = attributes.materials;
+  split.attributes.triangle_materials = attributes.triangle_materials;
+  for (const VertexNumbers& numbers : attributes.numbers) split.attributes.numbers.push_back({numbers.name, {}});
+  std::map<std::array<int, 4>, int> made;  // of a vertex, a normal, a colour and texture coordinates
+  const auto take = [](const auto& from, int index, auto& to) {
+    using Value = typename std::decay_t<decltype(from.values)>::value_type;
+    if (!from.empty()) to.values.push_back(index < 0 ? Value(Value::Zero()) : from.values[index]);
+  };
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      const auto index = [&](const auto& values) { return values.empty() ? -1 : values.of(mesh, t)[k]; };
+      const int vertex = mesh.triangles[t][k], normal = index(attributes.normals), colour = index(attributes.colours),
+                texture = index(attributes.texture_coordinates);
+      const auto [found, is_new] =
+          made.try_emplace({vertex, normal, colour, texture}, static_cast<int>(split.mesh.positions.size()));
+      split.mesh.triangles[t][k] = found->second;
+      if (!is_new) continue;
+      split.mesh.positions.push_back(mesh.positions[vertex]);
+      take(attributes.normals, normal, split.attributes.normals);
+      take(attributes.colours, colour, split.attributes.colours);
+      take(attributes.texture_coordinates, texture, split.attributes.texture_coordinates);
+      for (std::size_t i = 0; i < attributes.numbers.size(); ++i)
+        split.attributes.numbers[i].values.push_back(attributes.numbers[i].values[vertex]);
+    }
+  return split;
 }
 
 }  // namespace skeletex

@@ -246,7 +246,7 @@ Image resolve(GlContext& context, const GeometryBuffers& buffers, const DrawOpti
 GlBuffer upload_colours(std::span<const VertexColour> colours) {
   std::vector<std::array<unsigned char, 4>> bytes;
   bytes.reserve(colours.size());
-  for (const auto& [r, g, b] : colours) bytes.push_back({r, g, b, 255});
+  for (const VertexColour& c : colours) bytes.push_back({c.r, c.g, c.b, 255});
   return gl_buffer(bytes);
 }
 

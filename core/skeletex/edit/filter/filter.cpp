@@ -9,6 +9,7 @@
 #include "skeletex/edit/filter/move_surface.h"
 #include "skeletex/edit/regular_grid.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/layer_values.h"
 
 namespace skeletex {
 namespace {
@@ -106,6 +107,10 @@ void keep_outside(const FilterJob& job, SkeletexModel& model) {
         model.texture.along[texel] = job.given.texture.along[texel];
         model.texture.around[texel] = job.given.texture.around[texel];
         model.texture.out[texel] = job.given.texture.out[texel];
+        for (Layer& layer : model.layers)
+          if (const Layer* const given = find_layer(job.given, layer.name))
+            for (std::size_t k = 0; k < std::min(layer.planes.size(), given->planes.size()); ++k)
+              layer.planes[k][texel] = given->planes[k][texel];
       }
   }
   if (!has_outside) return;

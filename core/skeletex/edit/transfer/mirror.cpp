@@ -34,6 +34,12 @@ SkeletexModel mirrored(const SkeletexModel& model) {
         result.texture.along[to] = model.texture.along[from];
         result.texture.around[to] = -model.texture.around[from];
         result.texture.out[to] = model.texture.out[from];
+        for (std::size_t l = 0; l < model.layers.size(); ++l) {
+          const Layer& layer = model.layers[l];
+          for (std::size_t k = 0; k < layer.planes.size(); ++k)
+            result.layers[l].planes[k][to] =
+                layer.kind == LayerKind::kNormal && k == 1 ? -layer.planes[k][from] : layer.planes[k][from];
+        }
       }
   }
   for (SeamArc& arc : result.arcs) {
