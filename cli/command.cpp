@@ -6,6 +6,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <cstdio>
 
 #include "files.h"
@@ -104,6 +106,26 @@ void require_valid(TriangleMesh& mesh, const Skeleton& skeleton, std::optional<T
     }
   }
   if (errors > 0) throw CLI::RuntimeError(kExitBad);
+}
+
+Vec3 parse_direction(const char* option, const std::string& text) {
+  const bool is_negative = text.starts_with('-');
+  const std::string word = text.substr(is_negative || text.starts_with('+') ? 1 : 0);
+  for (int axis = 0; axis < 3; ++axis)
+    if (word == std::string(1, "xyz"[axis]) || word == std::string(1, "XYZ"[axis]))
+      return (is_negative ? -1 : 1) * Vec3::Unit(axis);
+  Vec3 v;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto [rest, code] = std::from_chars(at, end, v[axis]);
+    const bool is_last = axis == 2;
+    if (code != std::errc() || !(std::abs(v[axis]) <= 1e15) || (is_last ? rest != end : rest == end || *rest != ','))
+      throw CLI::ValidationError(
+          option, "\"" + text + "\" is no direction; give an axis such as y or -z, or three numbers such as 0,1,0");
+    at = rest + 1;
+  }
+  return v;
 }
 
 Json profile_json(ClContext& context) {

@@ -73,6 +73,10 @@ MeshFile load_mesh_file(const std::filesystem::path& path, bool has_materials = 
 /// \throw CLI::RuntimeError(kExitBad) when one is an error
 void require_valid(TriangleMesh& mesh, const Skeleton& skeleton, std::optional<TriangleTree>* tree = nullptr);
 
+/// A direction as an option gives it: x, -y, .. or three numbers with commas between them.
+/// \throw CLI::ValidationError
+Vec3 parse_direction(const char* option, const std::string& text);
+
 /// Time on the device by kernel, for the JSON.
 Json profile_json(ClContext& context);
 

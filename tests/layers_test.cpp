@@ -7,14 +7,17 @@
 #include <random>
 
 #include "skeletex/convert/encode_model.h"
+#include "skeletex/convert/guess_stance.h"
 #include "skeletex/edit/filter/filter.h"
 #include "skeletex/edit/morph/morph.h"
 #include "skeletex/edit/transfer/mirror.h"
 #include "skeletex/edit/transfer/transfer.h"
+#include "skeletex/model/error.h"
 #include "skeletex/model/octahedral.h"
 #include "skeletex/reconstruct/layer_values.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/reconstruct/texture/bake_texture.h"
 #include "skeletex/reconstruct/turn_normals.h"
 #include "support/shapes.h"
 
@@ -249,6 +252,84 @@ TEST(Layers, NormalsOfAFilteredModelFollowItsSurface) {
   noise.amplitude = 0;
   const SkeletexModel same = add_noise(device(), model, noise).model;
   EXPECT_LT(linear_error(same), 0.1 * 0.02 * model.diagonal);
+}
+
+TEST(Layers, AFilteredLayerIsSmootherAndTheSurfaceStays) {
+  SkeletexModel model = encode(creature_shape(), 96);
+  Layer& numbers = model.layers.back();
+  ASSERT_EQ(numbers.kind, LayerKind::kNumber);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> noise(-1, 1);
+  for (float& x : numbers.planes[0]) x = 5 + noise(random);
+  const SkeletexModel smooth = filter_layer(device(), model, {.layer = numbers.name, .scale = 0.03});
+  EXPECT_EQ(smooth.texture.out, model.texture.out);
+  EXPECT_EQ(smooth.layers[0].planes, model.layers[0].planes);
+  const auto spread = [](const SkeletexModel& of) {
+    const std::vector<float> values = vertex_attributes(of).numbers[0].values;
+    double sum = 0, squares = 0;
+    for (const float x : values) sum += x, squares += static_cast<double>(x) * x;
+    const auto n = static_cast<double>(values.size());
+    return std::array{sum / n, std::sqrt(squares / n - sum * sum / n / n)};
+  };
+  EXPECT_NEAR(spread(smooth)[0], spread(model)[0], 0.05);
+  EXPECT_LT(spread(smooth)[1], 0.3 * spread(model)[1]);
+  EXPECT_EQ(filter_layer(device(), model, {.layer = kColourLayer, .gain = 0}).layers[1].planes, model.layers[1].planes);
+  EXPECT_THROW(filter_layer(device(), model, {.layer = "none"}), InputError);
+}
+
+/// The picture's colour at a place, between pixels, in the bytes of its sRGB.
+Vec3 picture_at(const ColourImage& image, const Eigen::Vector2f& uv) {
+  const double x = uv.x() * image.width - 0.5, y = (1 - uv.y()) * image.height - 0.5;
+  const int column = static_cast<int>(std::floor(x)), row = static_cast<int>(std::floor(y));
+  Vec3 sum = Vec3::Zero();
+  for (int i = 0; i < 2; ++i)
+    for (int j = 0; j < 2; ++j) {
+      const double weight = (i == 0 ? 1 - (y - row) : y - row) * (j == 0 ? 1 - (x - column) : x - column);
+      const std::uint8_t* const p =
+          image.rgba.data() + 4 * (static_cast<std::size_t>(row + i) * image.width + (column + j));
+      for (int k = 0; k < 3; ++k) sum[k] += weight * static_cast<double>(linear_from_srgb(p[k] / 255.f));
+    }
+  return sum;
+}
+
+TEST(Layers, ABakedPictureHasTheColoursOfTheSurfaceAlsoAcrossSeams) {
+  const SkeletexModel model = encode(creature_shape(), 128);
+  const TriangleMesh mesh = reconstruct_mesh(device(), model);
+  const BakedTexture baked = bake_texture(model, mesh);
+  double largest = 0;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    Eigen::Vector2f uv = Eigen::Vector2f::Zero();
+    Vec3 middle = Vec3::Zero();
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector2f& corner = baked.coordinates.values[baked.coordinates.corners[t][k]];
+      EXPECT_TRUE(corner.minCoeff() > 0 && corner.maxCoeff() < 1);
+      uv += corner / 3;
+      middle += mesh.positions[mesh.triangles[t][k]] / 3;
+    }
+    const Vec3 expected = colour_at(middle).head<3>().cast<double>();
+    largest = std::max(largest, (picture_at(baked.image, uv) - expected).cwiseAbs().maxCoeff());
+  }
+  EXPECT_LT(largest, 0.1 * 0.03 * model.diagonal + 0.01);  // 8 bits
+  SkeletexModel bare = model;
+  bare.layers.clear();
+  EXPECT_THROW(bake_texture(bare, mesh), InputError);
+}
+
+TEST(Stance, IsGuessedFromTheWayABodyStands) {
+  const Shape shape = creature_shape();
+  EXPECT_EQ(guess_stance(shape.mesh, shape.skeleton).up, Vec3(Vec3::UnitY()));
+  // A walker: long along z, with two feet at the lower end.
+  Skeleton walker;
+  for (const Vec3& p : {Vec3(0, 0, 1), Vec3(0, 0, 2), Vec3(-0.3, 0, 0), Vec3(0.3, 0, 0)})
+    walker.nodes.push_back({"", p});
+  walker.bones = {{"spine", 0, 1, {}}, {"left", 0, 2, {}}, {"right", 0, 3, {}}};
+  TriangleMesh box;
+  box.positions = {Vec3(-0.5, -0.2, -0.1), Vec3(0.5, 0.2, 2.2)};
+  EXPECT_EQ(guess_stance(box, walker).up, Vec3(Vec3::UnitZ()));
+  EXPECT_EQ(guess_stance(box, walker).front, Vec3(-Vec3::UnitY()));
+  EXPECT_EQ(make_stance({0, 0, 2}, std::nullopt).front, Vec3(-Vec3::UnitY()));
+  EXPECT_LT((make_stance({0, 1, 0}, Vec3(1, 1, 0)).front - Vec3::UnitX()).norm(), 1e-12);
+  EXPECT_THROW(make_stance({0, 1, 0}, Vec3(0, 2, 0)), InputError);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <future>
 #include <memory>
@@ -14,6 +15,7 @@
 #include "files.h"
 #include "progress_bar.h"
 #include "skeletex/convert/encode_model.h"
+#include "skeletex/convert/guess_stance.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/io/suggestion.h"
@@ -32,6 +34,7 @@ struct Arguments {
   bool has_no_prefilter = false, has_no_unfold = false, is_snapped = false, is_fitted = false, is_paper_recipe = false,
        is_half = false, is_verbose = false, has_no_normals = false, has_no_colours = false, has_no_numbers = false;
   std::optional<double> crease;
+  std::string up, front;
   std::vector<std::string> bone_methods;
 };
 
@@ -146,6 +149,23 @@ Input read_input(const Arguments& arguments, const EncodeOptions& options) {
   return input;
 }
 
+/// As given, else guessed.
+Stance stance_of(const Arguments& arguments, const Input& input) {
+  const Stance guess = guess_stance(input.mesh, input.skeleton);
+  if (arguments.up.empty() && arguments.front.empty()) return guess;
+  std::optional<Vec3> front;
+  if (!arguments.front.empty()) front = parse_direction("--front", arguments.front);
+  return make_stance(arguments.up.empty() ? guess.up : parse_direction("--up", arguments.up), front);
+}
+
+/// "y", "-z" or "0.6,0.8,0".
+std::string name_of(const Vec3& direction) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (std::abs(std::abs(direction[axis]) - 1) < 1e-9)
+      return std::string(direction[axis] < 0 ? "-" : "") + "xyz"[axis];
+  return fmt::format("{:.3g},{:.3g},{:.3g}", direction.x(), direction.y(), direction.z());
+}
+
 ExrCompression compression_of(const std::string& name) {
   return name == "none"  ? ExrCompression::kNone
          : name == "zip" ? ExrCompression::kZip
@@ -175,6 +195,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
   context.prepare({"encode.cl", "read_surface"});
   const Input input = reading.get();
   options.attributes = &input.attributes;
+  options.stance = stance_of(arguments, input);
   options.tree = input.tree ? &*input.tree : nullptr;
   options.progress = [&](const std::string& stage, double done) {
     bar->show(stage, done);
@@ -192,6 +213,10 @@ void run(const Arguments& arguments, const CLI::App& command) {
   json["kernels"] = profile_json(context);
   print(arguments.json, arguments.is_verbose ? encode_details_text(result.report) : "");
   print(arguments.json, encode_report_text(result.report, file));
+  const bool is_guess = arguments.up.empty() && arguments.front.empty();
+  print(arguments.json,
+        fmt::format("up is {}, front is {}{}\n", name_of(result.model.stance->up), name_of(result.model.stance->front),
+                    is_guess ? " (a guess; --up and --front say otherwise)" : ""));
   write_json(arguments.json, json);
 }
 
@@ -310,6 +335,10 @@ void add_encode_command(CLI::App& program) {
                   "the texels, hybrid takes spd "
                   "where it sees the surface and vsm elsewhere"),
               methods);
+  add(command, "Options", "--up", a.up, "where the mesh's up is (default: a guess, which is told)")
+      .type_name("x|-y|..|X,Y,Z");
+  add(command, "Options", "--front", a.front, "where it looks (default: a guess, which is told)")
+      .type_name("x|-y|..|X,Y,Z");
   add_map_options(command, a);
   add_texel_options(command, a);
   add_layer_options(command, a);

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,6 +13,7 @@
 #include "files.h"
 #include "progress_bar.h"
 #include "skeletex/analysis/deformation.h"
+#include "skeletex/io/image_file.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/pose_file.h"
@@ -20,13 +22,14 @@
 #include "skeletex/reconstruct/polish.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/reconstruct/texture/bake_texture.h"
 #include "skeletex/reconstruct/turn_normals.h"
 
 namespace skeletex::cli {
 namespace {
 
 struct Arguments {
-  std::string model, output, pose, device, json, deform = "smooth";
+  std::string model, output, pose, device, json, texture, deform = "smooth";
   int size = 0, level = 0;
   std::optional<double> time, constant_offset;  ///< the offset in diagonals
   std::vector<std::string> bones;
@@ -70,7 +73,17 @@ TriangleMesh surface_of(ClContext& context, const PreparedModel& prepared, const
   return reconstruct_mesh(context, prepared);
 }
 
+/// The path of a picture as a mesh file names it: from its own folder, where that is possible.
+std::filesystem::path relative_to(const std::string& picture, const std::string& mesh) {
+  const std::filesystem::path path = std::filesystem::absolute(picture).lexically_normal(),
+                              folder = std::filesystem::absolute(mesh).lexically_normal().parent_path();
+  const std::filesystem::path relative = path.lexically_relative(folder);
+  return relative.empty() ? path : relative;
+}
+
 void run(const Arguments& arguments) {
+  if (arguments.constant_offset && !arguments.texture.empty())
+    throw CLI::ValidationError("--texture", "--constant-offset writes no surface that has colours");
   if (arguments.constant_offset && arguments.is_polished)
     throw CLI::ValidationError("--polish", "--constant-offset writes no surface that could be polished");
   if (!arguments.constant_offset) check_distance_option(arguments.is_distance_dropped, arguments.deform);
@@ -109,6 +122,13 @@ void run(const Arguments& arguments) {
       if (posed && !attributes.normals.empty())
         attributes.normals.values =
             turn_normals(reconstruct_mesh(context, prepared), attributes.normals.values, mesh.positions);
+    }
+    if (!arguments.texture.empty()) {
+      BakedTexture baked = bake_texture(prepared, posed ? reconstruct_mesh(context, prepared) : mesh);
+      attributes.colours = {};
+      attributes.texture_coordinates = std::move(baked.coordinates);
+      attributes.materials.emplace_back().image_file = relative_to(arguments.texture, arguments.output);
+      write_image(arguments.texture, baked.image);
     }
     reconstruct_ms = watch.lap_ms();
     bar.show("writing", 0.7);
@@ -187,6 +207,12 @@ void add_reconstruct_command(CLI::App& program) {
                 "with --deform paper or coordinates: do not restore the distances to the bones")
       ->needs(pose);
   add_polish_option(command, arguments->is_polished, pose);
+  declare_output(command,
+                 command.add_option("--texture", arguments->texture,
+                                    "write the model's colours as a picture, and texture coordinates instead of vertex "
+                                    "colours; an OBJ comes with a material file"),
+                 {".png"})
+      ->type_name("PNG");
   command.add_flag("--no-report", arguments->has_no_report, "do not measure what the pose does to the surface")
       ->needs(pose);
   CLI::Option* offset =

@@ -45,7 +45,7 @@ struct Arguments {
   double error_max = 0;
   int lattice = 0, views = 1, samples = 2;
   bool is_flat = false, has_wires = false, shows_skeleton = false, is_distance_dropped = false, is_polished = false,
-       is_smoothed = false;
+       is_smoothed = false, is_plain = false;
 };
 
 bool is_model(const std::string& path) { return has_ending(path, ".exr"); }
@@ -63,20 +63,6 @@ std::array<int, 2> parse_picture_size(const std::string& text) {
     throw CLI::ValidationError(
         "--size", "\"" + text + "\" is no picture size; give WIDTHxHEIGHT, 16 to 8192 pixels, e.g. 1200x900");
   return size;
-}
-
-Vec3 parse_direction(const char* option, const std::string& text) {
-  Vec3 v;
-  const char* at = text.data();
-  const char* const end = at + text.size();
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto [rest, code] = std::from_chars(at, end, v[axis]);
-    const bool is_last = axis == 2;
-    if (code != std::errc() || !(std::abs(v[axis]) <= 1e15) || (is_last ? rest != end : rest == end || *rest != ','))
-      throw CLI::ValidationError(option, "\"" + text + "\" is no direction; give x,y,z, e.g. 0,1,0");
-    at = rest + 1;
-  }
-  return v;
 }
 
 /// Linear colour, or nothing for "transparent".
@@ -97,8 +83,10 @@ std::optional<LinearRgb> parse_background(const std::string& text) {
                              "\"" + text + "\" is no background; give white, black, transparent or #rrggbb");
 }
 
-View view_of(const Arguments& arguments, const nlohmann::json& own_view) {
+/// \param stance  of the model; a view that the user names comes before it
+View view_of(const Arguments& arguments, const nlohmann::json& own_view, const std::optional<Stance>& stance) {
   View view;
+  if (stance) view.up = stance->up, view.front = stance->front;
   if (!own_view.is_null()) view = parse_view(own_view, arguments.input);
   if (!arguments.camera.empty())
     view = parse_view(parse_json(read_file(arguments.camera), arguments.camera), arguments.camera);
@@ -173,6 +161,8 @@ Skin skin_of(ClContext& context, const PreparedModel& model) {
 
 SurfacePaint paint_of(const Arguments& arguments, const Subject& subject, ClContext& context, ErrorScale& scale) {
   SurfacePaint paint;
+  if (arguments.mode == "shaded" && !arguments.is_plain && has_colour(subject.attributes))
+    return colour_paint(subject.mesh, subject.attributes);
   if (arguments.mode == "segments") {
     paint.paint = Paint::kFace;
     std::vector<VertexColour> colours;
@@ -308,7 +298,6 @@ void run(Arguments arguments, const CLI::App& command) {
   check_arguments(arguments);
   const auto [width, height] = parse_picture_size(arguments.size);
   const std::optional<LinearRgb> background = parse_background(arguments.background);
-  const View view = view_of(arguments, own_view);
   Stopwatch watch;
   if (arguments.mode == "map" || arguments.mode == "layout") {
     run_texture(arguments, std::max(width, height));
@@ -318,6 +307,7 @@ void run(Arguments arguments, const CLI::App& command) {
   ProgressBar bar(context);
   bar.show("reading", 0.05);
   Subject subject = load_subject(arguments, context);
+  const View view = view_of(arguments, own_view, subject.model ? subject.model->stance : std::nullopt);
   ErrorScale scale;
   GlContext gl(arguments.gl_device);
   const double prepare_ms = watch.lap_ms();
@@ -410,8 +400,10 @@ void add_camera_options(CLI::App& command, Arguments& arguments) {
   command.add_option("--zoom", arguments.zoom, "1: the model fills the picture")
       ->check(number_in(0.01, 1000.0))
       ->type_name("X");
-  command.add_option("--up", arguments.up, "the model's up direction (default: 0,1,0)")->type_name("X,Y,Z");
-  command.add_option("--front", arguments.front, "where the model looks (default: 0,0,1)")->type_name("X,Y,Z");
+  command.add_option("--up", arguments.up, "the model's up direction (default: its own, else y)")
+      ->type_name("x|-y|..|X,Y,Z");
+  command.add_option("--front", arguments.front, "where the model looks (default: its own, else z)")
+      ->type_name("x|-y|..|X,Y,Z");
 }
 
 }  // namespace
@@ -439,6 +431,7 @@ void add_render_command(CLI::App& program) {
                 "normals of the triangles around each vertex instead of those that the model or file has")
       ->excludes(flat);
   command.add_flag("--wireframe", arguments->has_wires, "draw the triangles' edges");
+  command.add_flag("--no-colours", arguments->is_plain, "grey, whatever colours the model or mesh has");
   declare_input(command, command.add_option("--skeleton", arguments->skeleton,
                                             "skeleton of a mesh: .json; drawn inside, or used by --mode segments"))
       ->type_name("FILE");

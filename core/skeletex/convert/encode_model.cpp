@@ -303,6 +303,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   EncodeResult result{start_model(mesh, skeleton), {}};
   EncodeReport& report = result.report;
   SkeletexModel& model = result.model;
+  model.stance = options.stance;
   const SeparationPlanes separation(model.skeleton);
   Stopwatch watch;
 

@@ -48,6 +48,7 @@ struct EncodeOptions {
   /// of its triangles.
   const MeshAttributes* attributes = nullptr;
   LayerOptions layers;
+  std::optional<Stance> stance;  ///< of the mesh, for the record
   /// Of the mesh, as validate_before_segmentation has built it; without, it is built where it is needed. Another mesh's
   /// is an error.
   const TriangleTree* tree = nullptr;

@@ -107,6 +107,20 @@ TexelSampling sampling_from(const Entry& header) {
   return {is_true("prefilter"), is_true("snap"), is_true("fit")};
 }
 
+std::optional<Stance> stance_from(const Entry& header) {
+  if (!header.has("stance")) return std::nullopt;
+  const auto direction = [&](const char* key) {
+    const Entry entry = header.member("stance").member(key);
+    const std::vector<double> x = entry.numbers();
+    if (x.size() != 3 || !(std::abs(Vec3(x[0], x[1], x[2]).norm() - 1) < 1e-6))
+      entry.fail("a direction of length 1 is expected");
+    return Vec3(x[0], x[1], x[2]);
+  };
+  const Stance stance{direction("up"), direction("front")};
+  if (std::abs(stance.up.dot(stance.front)) > 1e-6) header.member("stance").fail("up and front must be orthogonal");
+  return stance;
+}
+
 SeamCorner corner_from(const Entry& entry, const Skeleton& skeleton) {
   SeamCorner corner;
   corner.node = entry.member("node").index_into(skeleton.nodes.size());
@@ -333,6 +347,10 @@ json model_to_json(const SkeletexModel& model, const std::string& where) {
                                 layer.name, to_string(layer.kind), layer.planes.size()));
     result["layers"].push_back({{"name", layer.name}, {"kind", to_string(layer.kind)}, {"channels", channels[i]}});
   }
+  if (model.stance) {
+    const auto list = [](const Vec3& v) { return json{v.x(), v.y(), v.z()}; };
+    result["stance"] = {{"up", list(model.stance->up)}, {"front", list(model.stance->front)}};
+  }
   if (!model.encoder_settings.empty()) {
     result["encoder"] = parse_json(model.encoder_settings, where + ": encoder settings");
     if (!result["encoder"].is_object()) throw IoError(where + ": the encoder's settings must be a JSON object");
@@ -359,6 +377,7 @@ SkeletexModel model_from_json(const json& root, const std::string& where) {
   model.genus = header.member("genus").integer(0, kMaxInt);
   model.diagonals = diagonals_from(header);
   model.sampling = sampling_from(header);
+  model.stance = stance_from(header);
   model.texture.width = header.member("texture").member("width").integer(1, kMaxTextureSize);
   model.texture.height = header.member("texture").member("height").integer(1, kMaxTextureSize);
   for (const Entry& corner : header.items("corners")) model.corners.push_back(corner_from(corner, model.skeleton));

@@ -13,10 +13,11 @@ float linear_from_srgb(float x) { return x <= 0.04045f ? x / 12.92f : std::pow((
 float srgb_from_linear(float x) { return x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1 / 2.4f) - 0.055f; }
 
 bool has_colour(const MeshAttributes& attributes) {
-  return !attributes.colours.empty() ||
-         std::any_of(attributes.materials.begin(), attributes.materials.end(), [](const Material& material) {
-           return material.base != Colour::Ones() || !material.image.empty() || !material.image_file.empty();
-         });
+  // Many files give every mesh one plain material, which says nothing of its surface.
+  const std::vector<Material>& materials = attributes.materials;
+  return !attributes.colours.empty() || std::any_of(materials.begin(), materials.end(), [&](const Material& material) {
+    return !material.image.empty() || material.base != materials[0].base;
+  });
 }
 
 void turn_over(MeshAttributes& attributes) {

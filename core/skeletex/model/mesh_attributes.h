@@ -49,7 +49,7 @@ struct MeshAttributes {
   std::vector<VertexNumbers> numbers;
 };
 
-/// Whether there is a colour other than the materials' plain white.
+/// Whether there are colours: of vertices, of pictures that are read, or of materials that differ.
 bool has_colour(const MeshAttributes& attributes);
 /// Follows a mesh whose triangles are turned over: swaps the corners 1 and 2 of each. Normals stay as they are.
 void turn_over(MeshAttributes& attributes);

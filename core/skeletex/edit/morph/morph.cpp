@@ -177,6 +177,7 @@ void Morph::set_mean_skeleton(int layout, Between& between) const {
   result.genus = models_[layout].genus;
   result.diagonals = models_[layout].diagonals;
   result.sampling = models_[layout].sampling;
+  result.stance = models_[layout].stance;
   result.encoder_settings = models_[layout].encoder_settings;
   std::vector<const Skeleton*> skeletons;
   std::vector<Correspondence> from_layout;

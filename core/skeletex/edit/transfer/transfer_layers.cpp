@@ -30,8 +30,12 @@ PartTexels part_texels(ClContext& context, const TransferInput& input, const Pla
     const double fade = std::max(1.0, owner.pair->width_in_rows(owner.index));
     for (int j = 0; j < r.width; ++j) {
       const TransferColumn& column = placement.tables.columns[placement.tables.patches[row.patch].column_begin + j];
-      const double inside =
-          std::min(row.row - static_cast<double>(column.first_row), static_cast<double>(column.last_row) - row.row);
+      // Only where the target keeps a seam is there a boundary.
+      const double before = column.first_row < 0 ? fade : row.row - static_cast<double>(column.first_row),
+                   after = static_cast<int>(column.last_row) >= r.height
+                               ? fade
+                               : static_cast<double>(column.last_row) - row.row,
+                   inside = std::min(before, after);
       const std::size_t texel = static_cast<std::size_t>(r.y + row.row) * target.texture.width + r.x + j;
       texels.places[texel] = input.source.origin + source.at(static_cast<std::size_t>(row.vertex) + j);
       const double share = std::clamp(inside / fade, 0.0, 1.0);
