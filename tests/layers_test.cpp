@@ -279,7 +279,8 @@ TEST(Layers, AFilteredLayerIsSmootherAndTheSurfaceStays) {
 
 /// The picture's colour at a place, between pixels, in the bytes of its sRGB.
 Vec3 picture_at(const ColourImage& image, const Eigen::Vector2f& uv) {
-  const double x = uv.x() * image.width - 0.5, y = (1 - uv.y()) * image.height - 0.5;
+  const double x = static_cast<double>(uv.x()) * image.width - 0.5,
+               y = (1 - static_cast<double>(uv.y())) * image.height - 0.5;
   const int column = static_cast<int>(std::floor(x)), row = static_cast<int>(std::floor(y));
   Vec3 sum = Vec3::Zero();
   for (int i = 0; i < 2; ++i)

@@ -151,7 +151,7 @@ Input read_input(const Arguments& arguments, const EncodeOptions& options) {
 
 /// As given, else guessed.
 Stance stance_of(const Arguments& arguments, const Input& input) {
-  const Stance guess = guess_stance(input.mesh, input.skeleton);
+  Stance guess = guess_stance(input.mesh, input.skeleton);
   if (arguments.up.empty() && arguments.front.empty()) return guess;
   std::optional<Vec3> front;
   if (!arguments.front.empty()) front = parse_direction("--front", arguments.front);

@@ -81,6 +81,24 @@ std::filesystem::path relative_to(const std::string& picture, const std::string&
   return relative.empty() ? path : relative;
 }
 
+/// What is written beside the surface; writes the picture, where one is asked for.
+MeshAttributes attributes_of(ClContext& context, const PreparedModel& prepared, bool is_posed, const TriangleMesh& mesh,
+                             const Arguments& arguments) {
+  MeshAttributes attributes = vertex_attributes(prepared);
+  const bool has_texture = !arguments.texture.empty();
+  if (!is_posed && !has_texture) return attributes;
+  const TriangleMesh bind = is_posed ? reconstruct_mesh(context, prepared) : mesh;
+  if (is_posed && !attributes.normals.empty())
+    attributes.normals.values = turn_normals(bind, attributes.normals.values, mesh.positions);
+  if (!has_texture) return attributes;
+  BakedTexture baked = bake_texture(prepared, bind);
+  attributes.colours = {};
+  attributes.texture_coordinates = std::move(baked.coordinates);
+  attributes.materials.emplace_back().image_file = relative_to(arguments.texture, arguments.output);
+  write_image(arguments.texture, baked.image);
+  return attributes;
+}
+
 void run(const Arguments& arguments) {
   if (arguments.constant_offset && !arguments.texture.empty())
     throw CLI::ValidationError("--texture", "--constant-offset writes no surface that has colours");
@@ -116,20 +134,9 @@ void run(const Arguments& arguments) {
       bar.show("polishing", 0.5);
       polish_report = polish_pose(reconstruct_mesh(context, prepared), mesh.positions);
     }
-    MeshAttributes attributes;
-    if (!arguments.constant_offset) {
-      attributes = vertex_attributes(prepared);
-      if (posed && !attributes.normals.empty())
-        attributes.normals.values =
-            turn_normals(reconstruct_mesh(context, prepared), attributes.normals.values, mesh.positions);
-    }
-    if (!arguments.texture.empty()) {
-      BakedTexture baked = bake_texture(prepared, posed ? reconstruct_mesh(context, prepared) : mesh);
-      attributes.colours = {};
-      attributes.texture_coordinates = std::move(baked.coordinates);
-      attributes.materials.emplace_back().image_file = relative_to(arguments.texture, arguments.output);
-      write_image(arguments.texture, baked.image);
-    }
+    const MeshAttributes attributes = arguments.constant_offset
+                                          ? MeshAttributes()
+                                          : attributes_of(context, prepared, posed.has_value(), mesh, arguments);
     reconstruct_ms = watch.lap_ms();
     bar.show("writing", 0.7);
     write_mesh(arguments.output, mesh, attributes);

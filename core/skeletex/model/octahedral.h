@@ -11,7 +11,7 @@ namespace skeletex {
 inline Eigen::Vector2f octahedral_of(const Eigen::Vector3f& direction) {
   const float sum = direction.cwiseAbs().sum();
   if (!(sum > 0)) return Eigen::Vector2f::Zero();
-  const Eigen::Vector2f p = direction.head<2>() / sum;
+  Eigen::Vector2f p = direction.head<2>() / sum;
   if (direction.z() >= 0) return p;
   return {std::copysign(1 - std::abs(p.y()), p.x()), std::copysign(1 - std::abs(p.x()), p.y())};
 }

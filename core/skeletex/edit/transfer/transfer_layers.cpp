@@ -51,50 +51,74 @@ void mix_into(const std::vector<T>& source, std::span<const float> shares, std::
     if (shares[i] > 0) target[i] = (1 - shares[i]) * target[i] + shares[i] * source[i];
 }
 
+/// The parts of the result's mesh on the source.
+struct PartSurface {
+  TriangleMesh mesh;          ///< the result's vertices, in the parts at their places on the source; triangles there
+  std::vector<float> shares;  ///< of the source, per vertex
+};
+PartSurface part_surface(const PreparedModel& result, const TriangleMesh& mesh, const PartTexels& texels) {
+  PartSurface part{{mesh.positions, {}}, {}};
+  for (const VertexTexels& at : texels_of_vertices(result)) {
+    const bool is_inside = texels.shares[at.first] > 0 && texels.shares[at.second] > 0;
+    if (is_inside)
+      part.mesh.positions[part.shares.size()] = static_cast<double>(1 - at.share) * texels.places[at.first] +
+                                                static_cast<double>(at.share) * texels.places[at.second];
+    part.shares.push_back(is_inside ? (1 - at.share) * texels.shares[at.first] + at.share * texels.shares[at.second]
+                                    : 0.f);
+  }
+  for (const Triangle& t : mesh.triangles)
+    if (std::all_of(t.begin(), t.end(), [&](int v) { return part.shares[v] > 0; })) part.mesh.triangles.push_back(t);
+  return part;
+}
+
+/// The source's attributes there.
+MeshAttributes read_source_attributes(ClContext& context, const SkeletexModel& source, const TriangleMesh& part) {
+  const PreparedModel prepared(source);
+  const TriangleMesh mesh = reconstruct_mesh(context, prepared);
+  const std::vector<Vec3> outward = vertex_normals(part);
+  std::vector<Probe> probes;
+  for (std::size_t i = 0; i < outward.size(); ++i)
+    probes.push_back({part.positions[i], outward[i], kReach * source.diagonal});
+  return attributes_at(mesh, vertex_attributes(prepared),
+                       find_surface_points(context, mesh, build_triangle_tree(mesh), probes));
+}
+
+/// \param positions  of the result's vertices
+void mix_attributes(const MeshAttributes& own, const PartSurface& part, std::span<const Vec3> positions,
+                    MeshAttributes& blended) {
+  if (!blended.normals.empty()) {
+    const std::vector<Vec3> turned = turn_normals(part.mesh, own.normals.values, positions);
+    for (std::size_t i = 0; i < turned.size(); ++i)
+      if (part.shares[i] > 0) blended.normals.values[i] = turned[i];
+  }
+  if (!own.colours.empty() && !blended.colours.empty())
+    mix_into(own.colours.values, part.shares, blended.colours.values);
+  for (VertexNumbers& numbers : blended.numbers)
+    for (const VertexNumbers& from : own.numbers)
+      if (from.name == numbers.name) mix_into(from.values, part.shares, numbers.values);
+}
+
+/// Sets the texels outside the parts to those of the target.
+void keep_outside(const Layer& kept, const PartTexels& texels, Layer& layer) {
+  for (std::size_t k = 0; k < std::min(layer.planes.size(), kept.planes.size()); ++k)
+    for (std::size_t i = 0; i < texels.shares.size(); ++i)
+      if (texels.shares[i] == 0) layer.planes[k][i] = kept.planes[k][i];
+}
+
 }  // namespace
 
 std::vector<Layer> transfer_layers(ClContext& context, const TransferInput& input, const Placement& placement,
                                    const SkeletexModel& result) {
   if (result.layers.empty()) return {};
   const PartTexels texels = part_texels(context, input, placement);
-  const PreparedModel prepared(result), source(input.source);
-  const TriangleMesh mesh = reconstruct_mesh(context, prepared), source_mesh = reconstruct_mesh(context, source);
-  std::vector<float> shares;
-  TriangleMesh part{mesh.positions, {}};  // the result's vertices on the source, where they are in a part
-  for (const VertexTexels& at : texels_of_vertices(prepared)) {
-    const bool is_inside = texels.shares[at.first] > 0 && texels.shares[at.second] > 0;
-    if (is_inside)
-      part.positions[shares.size()] =
-          (1 - at.share) * texels.places[at.first] + static_cast<double>(at.share) * texels.places[at.second];
-    shares.push_back(is_inside ? (1 - at.share) * texels.shares[at.first] + at.share * texels.shares[at.second] : 0.f);
-  }
-  for (const Triangle& t : mesh.triangles)
-    if (std::all_of(t.begin(), t.end(), [&](int v) { return shares[v] > 0; })) part.triangles.push_back(t);
-  const std::vector<Vec3> outward = vertex_normals(part);
-  std::vector<Probe> probes;
-  for (std::size_t i = 0; i < outward.size(); ++i)
-    probes.push_back({part.positions[i], outward[i], kReach * input.source.diagonal});
-  const MeshAttributes own =
-      attributes_at(source_mesh, vertex_attributes(source),
-                    find_surface_points(context, source_mesh, build_triangle_tree(source_mesh), probes));
-
+  const PreparedModel prepared(result);
+  const TriangleMesh mesh = reconstruct_mesh(context, prepared);
+  const PartSurface part = part_surface(prepared, mesh, texels);
   MeshAttributes blended = vertex_attributes(prepared);
-  if (!blended.normals.empty()) {
-    const std::vector<Vec3> turned = turn_normals(part, own.normals.values, mesh.positions);
-    for (std::size_t i = 0; i < turned.size(); ++i)
-      if (shares[i] > 0) blended.normals.values[i] = turned[i];
-  }
-  if (!own.colours.empty() && !blended.colours.empty()) mix_into(own.colours.values, shares, blended.colours.values);
-  for (VertexNumbers& numbers : blended.numbers)
-    for (const VertexNumbers& from : own.numbers)
-      if (from.name == numbers.name) mix_into(from.values, shares, numbers.values);
-
+  mix_attributes(read_source_attributes(context, input.source, part.mesh), part, mesh.positions, blended);
   std::vector<Layer> layers = layers_of_vertices(prepared, blended);
   for (Layer& layer : layers)
-    if (const Layer* const kept = find_layer(input.target, layer.name))
-      for (std::size_t k = 0; k < std::min(layer.planes.size(), kept->planes.size()); ++k)
-        for (std::size_t i = 0; i < texels.shares.size(); ++i)
-          if (texels.shares[i] == 0) layer.planes[k][i] = kept->planes[k][i];
+    if (const Layer* const kept = find_layer(input.target, layer.name)) keep_outside(*kept, texels, layer);
   return layers;
 }
 
