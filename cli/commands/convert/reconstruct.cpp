@@ -99,12 +99,16 @@ MeshAttributes attributes_of(ClContext& context, const PreparedModel& prepared, 
   return attributes;
 }
 
-void run(const Arguments& arguments) {
+void check_arguments(const Arguments& arguments) {
   if (arguments.constant_offset && !arguments.texture.empty())
     throw CLI::ValidationError("--texture", "--constant-offset writes no surface that has colours");
   if (arguments.constant_offset && arguments.is_polished)
     throw CLI::ValidationError("--polish", "--constant-offset writes no surface that could be polished");
   if (!arguments.constant_offset) check_distance_option(arguments.is_distance_dropped, arguments.deform);
+}
+
+void run(const Arguments& arguments) {
+  check_arguments(arguments);
   Stopwatch total, watch;
   SkeletexModel model = read_model(arguments.model, arguments.level);
   std::optional<Skeleton> posed;
