@@ -11,6 +11,7 @@
 #include <cstdio>
 
 #include "files.h"
+#include "skeletex/analysis/manifold.h"
 #include "skeletex/analysis/validate_input.h"
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/suggestion.h"
@@ -80,6 +81,9 @@ MeshFile read_and_tell(const std::filesystem::path& path) {
   if (file.merged_vertices > 0)
     spdlog::info("{}: {} of {} vertices lay on others and were welded", path.string(), file.merged_vertices,
                  file.vertices_in_file);
+  if (file.ends_in_face && !measure_manifold(file.mesh).is_closed_manifold())
+    warn(fmt::format("{}: the file ends within a line, and its surface is not closed; it may have been cut on its way",
+                     path.string()));
   return file;
 }
 

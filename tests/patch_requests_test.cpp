@@ -93,13 +93,13 @@ TEST(PatchRequests, GiveAnotherModelTheSameWhateverItsSize) {
   const Chart thin = tube(20, 30, 4, [](double u) { return 0.2 + 0.05 * std::sin(9 * u); }),
               wide = tube(20, 30, 1, [](double u) { return 0.8 - 0.1 * u; });
   const auto requests_at = [&](double scale, bool has_map) {
-    static Chart charts[2];
-    charts[0] = thin, charts[1] = wide;
+    Chart charts[2]{thin, wide};
     for (Chart& chart : charts)
       for (Vec3& p : chart.positions) p *= scale;
-    const std::vector<PatchSource> sources{{charts, 1140, 5.0 * scale * scale, 4 * scale},
-                                           {has_map ? charts + 1 : nullptr, 1140, 4.7 * scale * scale, scale}};
-    return patch_requests(sources, {}, TexelShare::kError);
+    const ExpectedError errors[2]{expected_error(charts[0], nullptr), expected_error(charts[1], nullptr)};
+    const std::vector<PatchSource> sources{{errors, 1140, 5.0 * scale * scale, 4 * scale},
+                                           {has_map ? errors + 1 : nullptr, 1140, 4.7 * scale * scale, scale}};
+    return patch_requests(sources, TexelShare::kError);
   };
   for (const bool has_map : {true, false}) {
     const std::vector<PatchRequest> one = requests_at(1, has_map), other = requests_at(20, has_map);
@@ -113,8 +113,9 @@ TEST(PatchRequests, GiveAnotherModelTheSameWhateverItsSize) {
 
 TEST(PatchRequests, OfWhatBendsAroundTheBoneAloneStayNearGirthToLength) {
   const Chart cylinder = tube(20, 64, 4, [](double) { return 0.2; });
+  const ExpectedError error = expected_error(cylinder, nullptr);
   const std::vector<PatchRequest> requests =
-      patch_requests(std::vector<PatchSource>{{&cylinder, 2432, 5, 4}}, {}, TexelShare::kError);
+      patch_requests(std::vector<PatchSource>{{&error, 2432, 5, 4}}, TexelShare::kError);
   EXPECT_DOUBLE_EQ(requests[0].columns_per_row, 2 * 5.0 / 16);
   EXPECT_TRUE(std::isfinite(requests[0].share) && requests[0].share > 0);
 }

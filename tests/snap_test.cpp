@@ -11,6 +11,7 @@
 
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/analysis/metro.h"
+#include "skeletex/convert/choose_placing.h"
 #include "skeletex/convert/encode_model.h"
 #include "skeletex/convert/layout/row_profile.h"
 #include "skeletex/convert/snap/revert_texels.h"
@@ -71,17 +72,6 @@ Rectangle random_rectangle(std::mt19937& random) {
           static_cast<int>(random() % (kTextureHeight - height + 1)), width, height};
 }
 
-/// A plane that has its even columns first, then its odd ones.
-template <class T>
-std::vector<T> by_columns(const OnePatch& patch, const std::vector<T>& by_colour) {
-  std::vector<T> plane = by_colour;
-  for (int row = 1; row + 1 < patch.rectangle().height; ++row)
-    for (int column = 0; column < patch.rectangle().width; ++column)
-      plane[patch.texel(column, row)] =
-          by_colour[patch.texel(column / 2 + column % 2 * ((patch.rectangle().width + 1) / 2), row)];
-  return plane;
-}
-
 struct HostPositions {
   std::vector<float> x, y, parameters;
   std::vector<int> anchors;
@@ -90,12 +80,13 @@ struct HostPositions {
 HostPositions snapped(const OnePatch& patch, const SnapFeatures& features, const std::vector<float>& home_x = {},
                       const std::vector<float>& home_y = {}) {
   ReadingPositions positions = even_positions(device(), patch.layout);
-  device().write(positions.home_x, home_x), device().write(positions.home_y, home_y);
-  const SnappedPositions snapped =
+  std::vector<float> home = home_x;
+  home.insert(home.end(), home_y.begin(), home_y.end());
+  device().write(positions.home, home);
+  const ReadingPositions snapped =
       snap_positions(device(), patch.layout, upload_tables(device(), tables_of(features, patch.patches)), positions);
-  return {by_columns(patch, device().download(snapped.x)), by_columns(patch, device().download(snapped.y)),
-          by_columns(patch, device().download(snapped.parameters)),
-          by_columns(patch, device().download(snapped.anchors))};
+  auto [x, y, parameters] = download_planes(device(), {snapped.offsets, patch.layout.size()});
+  return {x, y, parameters, device().download(snapped.anchors)};
 }
 
 /// A box of a tube, square across, with a vertex on every edge and in the middle of every side.
@@ -449,29 +440,56 @@ TEST(Snap, BringsABearToAThirdOfTheErrorWithoutFoldingIt) {
   EXPECT_EQ(encoded.model.texture.around, again.model.texture.around);
 }
 
-TEST(Snap, AndFitAreOnWhereTheyPayUnlessToldOtherwise) {
+TEST(Placing, IsWhatIsExpectedToBeNearestButForTheFitsTime) {
+  const auto chosen = [](std::size_t texels, std::size_t vertices, std::optional<bool> snap = {},
+                         std::optional<bool> fit = {}) {
+    const TexelPlacing placing = choose_placing(texels, vertices, snap, fit);
+    return std::pair{placing.has_snap, placing.fit_steps};
+  };
+  EXPECT_EQ(chosen(128 * 128, 40000), std::pair(false, 4));
+  EXPECT_EQ(chosen(128 * 128, 20000), std::pair(true, 4));
+  EXPECT_EQ(chosen(256 * 256, 1000), std::pair(true, 4));
+  EXPECT_EQ(chosen(512 * 512, 14000), std::pair(true, 0));
+  EXPECT_EQ(chosen(512 * 512, 150000), std::pair(true, 4));
+  EXPECT_EQ(chosen(512 * 512, 44000), std::pair(true, 2));
+  EXPECT_EQ(chosen(2048 * 2048, 4000000), std::pair(true, 0));
+  EXPECT_EQ(chosen(512 * 512, 300000, {}, false), std::pair(false, 0));
+  EXPECT_EQ(chosen(512 * 512, 14000, {}, true), std::pair(true, 4));
+  EXPECT_EQ(chosen(512 * 512, 14000, false, {}), std::pair(false, 0));
+}
+
+TEST(Placing, IsReportedAndCanBeChosen) {
   const TestModel model = load_standard_model("bear");
-  const auto reported = [&](int width, int height, const auto& change) {
+  const auto reported = [&](const auto& change) {
     EncodeOptions options;
-    options.width = width, options.height = height;
+    options.width = options.height = 96;
     change(options);
     const EncodeReport report = encode_model(device(), model.mesh, model.skeleton, options).report;
+    EXPECT_EQ(report.snap.has_value(), report.placing.has_snap);
+    EXPECT_EQ(report.fit.has_value(), report.placing.is_fitted());
     return std::pair{report.snap.has_value(), report.fit.has_value()};
   };
-  const auto nothing = [](EncodeOptions&) {};
-  const int vertices = static_cast<int>(model.mesh.positions.size());
-  const int few = (3 * vertices - 1) / 256, some = (3 * vertices + 255) / 256, less = (2 * vertices - 1) / 128,
-            enough = (2 * vertices + 127) / 128;
-  EXPECT_EQ(reported(128, few, nothing), std::pair(false, true));
-  EXPECT_EQ(reported(128, some, nothing), std::pair(true, true));
-  EXPECT_EQ(reported(128, less, [](EncodeOptions& o) { o.has_fit = false; }), std::pair(false, false));
-  EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.has_fit = false; }), std::pair(true, false));
-  EXPECT_EQ(reported(256, 257, nothing), std::pair(true, false));
-  EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.has_snap = false; }), std::pair(false, true));
-  EXPECT_EQ(reported(128, few, [](EncodeOptions& o) { o.has_snap = true, o.has_fit = false; }), std::pair(true, false));
-  EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.has_prefilter = false; }),
+  EXPECT_EQ(reported([](EncodeOptions&) {}), std::pair(true, true));
+  EXPECT_EQ(reported([](EncodeOptions& o) { o.has_fit = false; }), std::pair(false, false));
+  EXPECT_EQ(reported([](EncodeOptions& o) { o.has_snap = true, o.has_fit = false; }), std::pair(true, false));
+  EXPECT_EQ(reported([](EncodeOptions& o) { o.has_snap = false; }), std::pair(false, true));
+  EXPECT_EQ(reported([](EncodeOptions& o) { o.has_prefilter = false, o.width = 256; }),
             std::pair(true, false));  // texels on the mesh were asked for
-  EXPECT_EQ(reported(128, enough, [](EncodeOptions& o) { o.method = Method::kSpd; }), std::pair(false, false));
+  EXPECT_EQ(reported([](EncodeOptions& o) { o.method = Method::kSpd; }), std::pair(false, false));
+}
+
+TEST(Placing, LeavesNoSizeAtWhichTheErrorGrows) {
+  const TestModel model = load_standard_model("bunny00");
+  double last = 1;
+  for (const int size : {128, 160, 192, 224, 256, 288, 320}) {
+    EncodeOptions options;
+    options.width = options.height = size;
+    const double mean = symmetric_mean(
+        measure_metro(device(), model.mesh,
+                      reconstruct_mesh(device(), encode_model(device(), model.mesh, model.skeleton, options).model)));
+    EXPECT_LT(mean, last) << size;
+    last = mean;
+  }
 }
 
 TEST(Snap, LeavesNoWideGapsBetweenSeamSamples) {

@@ -76,6 +76,7 @@ TexelShare share_of(const std::string& name) {
 
 void take_paper_recipe(EncodeOptions& options) {
   options.vsm = {.iterations = 1, .alpha = 0};
+  options.reweights_squeezed = false;
   options.row_spacing = RowSpacing::kUniform;
   options.has_prefilter = false;
   options.has_unfold = false;
@@ -87,7 +88,7 @@ void take_paper_recipe(EncodeOptions& options) {
 /// What is given beats the paper's recipe.
 void set_texel_options(const Arguments& arguments, const CLI::App& command, EncodeOptions& options) {
   const auto is_given = [&](const char* name) { return command.count(name) > 0; };
-  if (is_given("--iterations")) options.vsm.iterations = arguments.iterations;
+  if (is_given("--iterations")) options.vsm.iterations = arguments.iterations, options.reweights_squeezed = false;
   if (is_given("--alpha")) options.vsm.alpha = arguments.alpha;
   options.vsm.stop_spread_change = arguments.stop_spread;
   if (is_given("--rows"))
@@ -132,6 +133,7 @@ void check_bone_names(const Arguments& arguments, const EncodeOptions& options, 
           fmt::format("--bone-method: {} has no bone \"{}\"{}", arguments.skeleton, name, did_you_mean(name, names)));
 }
 
+/// Mesh and skeleton in the unit frame of the mesh.
 struct Input {
   TriangleMesh mesh;
   MeshAttributes attributes;
@@ -146,6 +148,13 @@ Input read_input(const Arguments& arguments, const EncodeOptions& options) {
   const std::vector<Triangle> triangles = input.mesh.triangles;
   require_valid(input.mesh, input.skeleton, &input.tree);
   if (input.mesh.triangles != triangles) turn_over(input.attributes);
+  const UnitFrame frame = unit_frame(input.mesh);
+  input.mesh = in_unit_frame(std::move(input.mesh), frame);
+  input.skeleton = in_unit_frame(std::move(input.skeleton), frame);
+  if (input.tree) {  // what it holds is in this frame already
+    input.tree->origin = Vec3::Zero();
+    input.tree->scale = 1;
+  }
   return input;
 }
 
@@ -176,6 +185,12 @@ ExrCompression compression_of(const std::string& name) {
 void warn_of_result(const EncodeReport& report) {
   for (const std::string& note : report.layer_notes) warn(note);
   for (const BoneReport& bone : report.bones) {
+    if (lacks_part(bone, report.diagonal))
+      warn(fmt::format(
+          "bone \"{}\": a part of its surface is {:.1f} % of the diagonal away from the model, at ({:g}, {:g}, "
+          "{:g})\n  remedy: more texels, or a bone of its own for that part",
+          bone.name, 100 * bone.distance.furthest / report.diagonal, bone.distance.place[0], bone.distance.place[1],
+          bone.distance.place[2]));
     if (bone.flipped_triangles > 0)
       warn(fmt::format("bone \"{}\": {} triangles are flipped in its map", bone.name, bone.flipped_triangles));
     if (is_height_field(bone.method) && bone.unseen_area_fraction > EncodeOptions{}.hybrid_unseen_threshold)
@@ -226,7 +241,8 @@ CLI::Option& add(CLI::App& command, const char* group, const char* name, auto& v
 
 void add_map_options(CLI::App& command, Arguments& a) {
   add(command, "VSM", "--iterations", a.iterations,
-      "reweightings after the first solve, 0 to 100; 0 is the plain barycentric map")
+      "reweightings after the first solve, 0 to 100; 0 is the plain barycentric map; unless given, bones with squeezed "
+      "parts get more")
       .type_name("N")
       ->check(number_in(0, 100));
   add(command, "VSM", "--alpha", a.alpha,
@@ -241,7 +257,7 @@ void add_map_options(CLI::App& command, Arguments& a) {
   take_one_of(add(command, "SPD", "--spd-hit", a.spd_hit, "which hit of a ray counts where there are several"),
               {"first", "last"});
   add(command, "Hybrid", "--hybrid-threshold", a.hybrid_threshold,
-      "bones take vsm where spd does not see more than this share of their area, 0 to 1")
+      "bones take vsm where spd does not see more than this share of their area, 0 to 1, or is further from the mesh")
       .type_name("X")
       ->check(number_in(0.0, 1.0));
   add(command, "Hybrid", "--bone-method", a.bone_methods, "method of a bone by its name; repeat for more bones")
@@ -266,12 +282,12 @@ void add_texel_options(CLI::App& command, Arguments& a) {
   command
       .add_flag("--snap,!--no-snap", a.is_snapped,
                 "texels of VSM patches sit on the mesh's own vertices and edges where they can; instead of the "
-                "prefilter (default: from 2 texels per vertex on, with the fit from 1.5)")
+                "prefilter (default: where it is expected to lower the error, from about 0.6 texels per vertex on)")
       ->group("Texels");
   command
       .add_flag("--fit,!--no-fit", a.is_fitted,
                 "their points move so that the triangles between them are nearer to the mesh; instead of the prefilter "
-                "(default: up to 256 x 256 texels)")
+                "(default: up to 256 x 256 texels, and below 7 texels per vertex)")
       ->group("Texels");
   take_one_of(add(command, "Texels", "--diagonals", a.diagonals,
                   "how the decoder cuts quads: nearest to the surface that texels around foretell, or smooth, going on "
@@ -333,7 +349,7 @@ void add_encode_command(CLI::App& program) {
   take_one_of(add(command, "Options", "--method", a.method,
                   "how bones are mapped: spd casts rays from the bone (a height field), vsm spreads the triangles over "
                   "the texels, hybrid takes spd "
-                  "where it sees the surface and vsm elsewhere"),
+                  "where it is as near to the mesh as vsm"),
               methods);
   add(command, "Options", "--up", a.up, "where the mesh's up is (default: a guess, which is told)")
       .type_name("x|-y|..|X,Y,Z");

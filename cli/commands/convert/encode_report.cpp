@@ -10,7 +10,7 @@
 namespace skeletex::cli {
 namespace {
 
-Json bone_json(const BoneReport& bone) {
+Json bone_json(const BoneReport& bone, double diagonal) {
   const Rectangle& r = bone.rectangle;
   Json json{{"name", bone.name},
             {"method", to_string(bone.method)},
@@ -22,7 +22,11 @@ Json bone_json(const BoneReport& bone) {
             {"unseen_area_fraction", bone.unseen_area_fraction},
             {"flipped_triangles", bone.flipped_triangles},
             {"sampled_triangle_fraction", bone.sampled_triangle_fraction},
-            {"missed_texels", bone.missed_texels}};
+            {"missed_texels", bone.missed_texels},
+            {"distance",
+             {{"mean", bone.distance.mean / diagonal},
+              {"furthest", bone.distance.furthest / diagonal},
+              {"place", {bone.distance.place[0], bone.distance.place[1], bone.distance.place[2]}}}}};
   if (!is_height_field(bone.method))
     json[to_string(bone.method)] = {{"iterations", bone.map.iterations},
                                     {"spread", bone.map.spread},
@@ -44,17 +48,32 @@ double read_percent(const EncodeReport& report) {
   return all > 0 ? 100 * read / all : 100;
 }
 
+/// What was chosen for the texels, and why.
+std::string placing_text(const TexelPlacing& placing) {
+  if (placing.texels_per_vertex == 0) return "texels: where the rays from the bones meet the mesh\n";
+  const char* const what = placing.has_snap      ? placing.is_fitted() ? "snapped and fitted" : "snapped"
+                           : placing.is_fitted() ? "fitted"
+                                                 : "on a regular grid";
+  return fmt::format("texels: {}, as there are {:.2g} per vertex; expected error {:.2g} of a regular grid's\n", what,
+                     placing.texels_per_vertex, placing.expected_error);
+}
+
 }  // namespace
 
 Json encode_report_json(const EncodeReport& report, const EncodedFile& file) {
   Json bones = Json::array();
-  for (const BoneReport& bone : report.bones) bones.push_back(bone_json(bone));
+  for (const BoneReport& bone : report.bones) bones.push_back(bone_json(bone, report.diagonal));
   Json json{{"mesh",
              {{"vertices", report.vertices},
               {"triangles", report.triangles},
-              {"diagonal", report.diagonal},
+              {"diagonal", report.scale * report.diagonal},
               {"genus", report.genus}}},
             {"bones", std::move(bones)},
+            {"placing",
+             {{"snapped", report.placing.has_snap},
+              {"fit_steps", report.placing.fit_steps},
+              {"texels_per_vertex", report.placing.texels_per_vertex},
+              {"expected_error", report.placing.expected_error}}},
             {"atlas", {{"size", {file.width, file.height}}, {"used_fraction", report.used_fraction}}},
             {"times_ms",
              {{"half_edge", report.half_edge_ms},
@@ -96,7 +115,7 @@ std::string encode_report_text(const EncodeReport& report, const EncodedFile& fi
   if (report.snap)
     text +=
         fmt::format(" and on {:.1f} % of the vertices", percent(report.snap->snapped_vertices, report.snap->vertices));
-  text += '\n';
+  text += '\n' + placing_text(report.placing);
   if (report.fit && !report.fit->residuals.empty())
     text +=
         fmt::format("mean distance to the mesh: {:.1e} diagonals\n", report.fit->residuals.back() / report.diagonal);

@@ -87,7 +87,7 @@ MeshAttributes attributes_of(ClContext& context, const PreparedModel& prepared, 
   MeshAttributes attributes = vertex_attributes(prepared);
   const bool has_texture = !arguments.texture.empty();
   if (!is_posed && !has_texture) return attributes;
-  const TriangleMesh bind = is_posed ? reconstruct_mesh(context, prepared) : mesh;
+  const TriangleMesh bind = reconstruct_bind_mesh(context, prepared).mesh;
   if (is_posed && !attributes.normals.empty())
     attributes.normals.values = turn_normals(bind, attributes.normals.values, mesh.positions);
   if (!has_texture) return attributes;

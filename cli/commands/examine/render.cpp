@@ -102,9 +102,10 @@ View view_of(const Arguments& arguments, const nlohmann::json& own_view, const s
   return view;
 }
 
-/// What is drawn, from either kind of input.
+/// What is drawn, from either kind of input, in the model's frame or the unit frame of the mesh.
 struct Subject {
   TriangleMesh mesh;
+  UnitFrame frame;
   MeshAttributes attributes;  ///< by vertex
   std::vector<int> bones;     ///< per triangle, where the mode asks for it
   std::optional<SkeletexModel> model;
@@ -125,6 +126,11 @@ Subject load_subject(const Arguments& arguments, ClContext& context) {
     } else {
       subject.mesh = load_mesh(arguments.input);
       require_valid(subject.mesh, *subject.skeleton);
+    }
+    subject.frame = unit_frame(subject.mesh);
+    subject.mesh = in_frame(std::move(subject.mesh), subject.frame);
+    if (subject.skeleton) subject.skeleton = in_frame(std::move(*subject.skeleton), subject.frame);
+    if (arguments.mode == "segments") {
       Segmentation segmentation = segment_mesh(context, subject.mesh, *subject.skeleton);
       subject.mesh = std::move(segmentation.cut_mesh);
       subject.bones = std::move(segmentation.triangle_bones);
@@ -136,13 +142,14 @@ Subject load_subject(const Arguments& arguments, ClContext& context) {
       arguments.lattice != std::max(subject.model->texture.width, subject.model->texture.height))
     subject.model = resample_model(context, *subject.model, arguments.lattice);
   subject.skeleton = subject.model->skeleton;
+  subject.frame = subject.skeleton->frame;
   if (!arguments.pose.empty()) {
     const PoseAnimation animation = read_animation(arguments.pose, *subject.skeleton);
     subject.skeleton = apply_pose(*subject.skeleton, pose_at(*subject.skeleton, animation,
                                                              arguments.time.value_or(animation.frames.front().time)));
   }
   const PreparedModel prepared(*subject.model);
-  subject.mesh = reconstruct_mesh(context, prepared);
+  subject.mesh = reconstruct_bind_mesh(context, prepared).mesh;
   subject.attributes = vertex_attributes(prepared);
   if (arguments.is_smoothed) subject.attributes.normals = {};
   if (arguments.mode == "segments")
@@ -181,7 +188,7 @@ SurfacePaint paint_of(const Arguments& arguments, const Subject& subject, ClCont
     paint.paint = Paint::kVertex;
     paint.colours = upload_colours(colours);
   } else if (arguments.mode == "error") {
-    const TriangleMesh other = load_mesh(arguments.against);
+    const TriangleMesh other = in_frame(load_mesh(arguments.against), subject.frame);
     const double diagonal = bounding_box(other).diagonal();
     std::vector<float> distances = closest_distances(context, other, subject.mesh.positions);
     scale.highest = arguments.error_max;
@@ -236,8 +243,11 @@ void pose_surface(GlContext& gl, ClContext& context, const Arguments& arguments,
   const PreparedModel model(*subject.model);
   const Deformation deformation = deformation_of(arguments.deform);
   const DistanceRule distance = arguments.is_distance_dropped ? DistanceRule::kFromFoot : DistanceRule::kFromBone;
+  const auto posed_mesh = [&] {
+    return in_frame(reconstruct_mesh(context, model, *subject.skeleton, {deformation, distance}), subject.frame);
+  };
   if (arguments.is_polished) {
-    TriangleMesh posed = reconstruct_mesh(context, model, *subject.skeleton, {deformation, distance});
+    TriangleMesh posed = posed_mesh();
     polish_pose(subject.mesh, posed.positions);
     surface = upload_surface(gl, posed);
     return;
@@ -247,7 +257,7 @@ void pose_surface(GlContext& gl, ClContext& context, const Arguments& arguments,
     return;
   }
   if (deformation == Deformation::kCoordinates) {
-    surface = upload_surface(gl, reconstruct_mesh(context, model, *subject.skeleton, {deformation, distance}));
+    surface = upload_surface(gl, posed_mesh());
     return;
   }
   const Skin skin = skin_of(context, model);
@@ -307,7 +317,9 @@ void run(Arguments arguments, const CLI::App& command) {
   ProgressBar bar(context);
   bar.show("reading", 0.05);
   Subject subject = load_subject(arguments, context);
-  const View view = view_of(arguments, own_view, subject.model ? subject.model->stance : std::nullopt);
+  View view = view_of(arguments, own_view, subject.model ? subject.model->stance : std::nullopt);
+  for (std::optional<Vec3>* point : {&view.target, &view.eye})
+    if (*point) *point = subject.frame.from_user(**point);
   ErrorScale scale;
   GlContext gl(arguments.gl_device);
   const double prepare_ms = watch.lap_ms();

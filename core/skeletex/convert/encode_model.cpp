@@ -13,17 +13,19 @@
 #include "skeletex/convert/layout/pack_atlas.h"
 #include "skeletex/convert/layout/ray_profile.h"
 #include "skeletex/convert/layout/row_profile.h"
+#include "skeletex/convert/map_surface.h"
 #include "skeletex/convert/sample/sample_seams.h"
 #include "skeletex/convert/segment/segment_mesh.h"
 #include "skeletex/device/stopwatch.h"
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/prepared_model.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
 
 namespace skeletex {
 namespace {
 
-// With fewer, vertices pull texels about without making edges between them; the fit makes up for some of that.
-constexpr double kSnapTexelsPerVertex = 2, kFittedSnapTexelsPerVertex = 1.5;
+constexpr double kHardlyWorse = 1.1;      // hybrid: of a distance, for SPD
 constexpr double kLeastDihedral = 0.004;  // radians: flatter edges are no creases to snap to
 
 void check_options(const EncodeOptions& options, const Skeleton& skeleton) {
@@ -40,30 +42,13 @@ void check_options(const EncodeOptions& options, const Skeleton& skeleton) {
           fmt::format("a method is given for bone \"{}\", which the skeleton does not have", override.first));
 }
 
-std::vector<Method> choose_methods(const EncodeOptions& options, const Skeleton& skeleton,
-                                   std::span<const double> unseen) {
-  std::vector<Method> methods(skeleton.bones.size(), options.method.value_or(Method::kVsm));
-  if (options.method) return methods;
-  for (std::size_t bone = 0; bone < methods.size(); ++bone)
-    methods[bone] = unseen[bone] > options.hybrid_unseen_threshold ? Method::kVsm : Method::kSpd;
-  for (const auto& [name, method] : options.hybrid_overrides)
-    for (std::size_t bone = 0; bone < methods.size(); ++bone)
-      if (skeleton.bones[bone].name == name) methods[bone] = method;
-  return methods;
-}
-
-/// Where texels read, and where their points lie.
-struct TexelPlacing {
-  bool has_snap = false, has_fit = false;
-};
-/// SPD patches are neither snapped nor fitted.
-TexelPlacing choose_placing(const EncodeOptions& options, const TriangleMesh& mesh, bool is_all_spd) {
+/// SPD patches are neither snapped nor fitted; without the prefilter texels stay on the mesh unless the fit is asked
+/// for.
+TexelPlacing placing_of(const EncodeOptions& options, const TriangleMesh& mesh, bool is_all_spd) {
   if (is_all_spd) return {};
-  const auto texels = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
-  const bool has_fit = options.has_fit.value_or(options.has_prefilter && texels <= kMostFittedTexels);
-  const double least_texels =
-      (has_fit ? kFittedSnapTexelsPerVertex : kSnapTexelsPerVertex) * static_cast<double>(mesh.positions.size());
-  return {options.has_snap.value_or(static_cast<double>(texels) >= least_texels), has_fit};
+  const std::optional<bool> has_fit = options.has_fit || options.has_prefilter ? options.has_fit : std::optional(false);
+  return choose_placing(static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height),
+                        mesh.positions.size(), options.has_snap, has_fit);
 }
 
 nlohmann::json settings_json(const EncodeOptions& options, const TexelPlacing& placing,
@@ -78,7 +63,8 @@ nlohmann::json settings_json(const EncodeOptions& options, const TexelPlacing& p
                       {"prefilter", options.has_prefilter},
                       {"unfold", options.has_unfold},
                       {"snap", placing.has_snap},
-                      {"fit", placing.has_fit},
+                      {"fit", placing.is_fitted()},
+                      {"fit_steps", placing.fit_steps},
                       {"spd_hit", options.spd_hit == SpdHit::kFirst ? "first" : "last"}};
   if (!options.method) json["hybrid_unseen_threshold"] = options.hybrid_unseen_threshold;
   if (!unseen.empty()) json["unseen_area_fractions"] = unseen;
@@ -122,43 +108,20 @@ SkeletexModel start_model(const TriangleMesh& mesh, const Skeleton& skeleton) {
   if (!(model.diagonal >= kSmallestDiagonal && model.diagonal <= kLargestDiagonal))
     throw InputError(
         fmt::format("the mesh's bounding box has a diagonal of {:.3g}; the device computes in single precision, which "
-                    "needs {:g} to {:g}: scale mesh and skeleton",
+                    "needs {:g} to {:g}: give mesh and skeleton in the unit frame of the mesh",
                     model.diagonal, kSmallestDiagonal, kLargestDiagonal));
   // Euler's formula for a closed triangle mesh: edges are 3/2 of the triangles.
   model.genus = (2 - (static_cast<int>(mesh.positions.size()) - static_cast<int>(mesh.triangles.size()) / 2)) / 2;
   return model;
 }
 
-/// The surface by bones, and its maps.
-struct MappedSurface {
-  Segmentation segmentation;
-  std::vector<Chart> charts;
-  std::vector<double> unseen;  ///< share of each bone's area that its rays do not see
-  std::vector<Method> methods;
-  std::vector<MapReport> reports;
-};
-
-MappedSurface map_surface(ClContext& context, Segmentation segmentation, const Skeleton& skeleton,
-                          const SeparationPlanes& separation, const EncodeOptions& options) {
-  MappedSurface surface{std::move(segmentation), {}, {}, {}, {}};
-  surface.charts.resize(skeleton.bones.size());
-  for_each_block(surface.charts.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-    surface.charts[i] = make_chart(surface.segmentation.segments[i], skeleton, separation);
-  });
-  surface.unseen = unseen_area_fractions(context, skeleton, separation, surface.charts);
-  surface.methods = choose_methods(options, skeleton, surface.unseen);
-  surface.reports = map_charts(context, surface.methods, surface.charts, {options.vsm});
-  return surface;
-}
-
+/// Of mapped bones their own, of the others those of their rays.
 std::vector<RowProfile> row_profiles(ClContext& context, const Skeleton& skeleton, const SeparationPlanes& separation,
                                      const MappedSurface& surface, SpdHit hit) {
-  std::vector<RowProfile> profiles(surface.charts.size());
-  if (std::any_of(surface.methods.begin(), surface.methods.end(), is_height_field))
-    profiles = ray_profiles(context, skeleton, separation, surface.charts, hit);
-  for_each_block(profiles.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-    if (!is_height_field(surface.methods[i])) profiles[i] = row_profile(surface.charts[i]);
-  });
+  if (std::none_of(surface.methods.begin(), surface.methods.end(), is_height_field)) return surface.profiles;
+  std::vector<RowProfile> profiles = ray_profiles(context, skeleton, separation, surface.charts, hit);
+  for (std::size_t i = 0; i < profiles.size(); ++i)
+    if (!is_height_field(surface.methods[i])) profiles[i] = surface.profiles[i];
   return profiles;
 }
 
@@ -169,15 +132,14 @@ double lay_out_patches(const MappedSurface& surface, std::span<const RowProfile>
   const std::vector<Segment>& segments = surface.segmentation.segments;
   std::vector<PatchSource> sources;
   for (std::size_t bone = 0; bone < segments.size(); ++bone)
-    sources.push_back({is_height_field(surface.methods[bone]) ? nullptr : &surface.charts[bone],
+    sources.push_back({is_height_field(surface.methods[bone]) ? nullptr : &surface.errors[bone],
                        static_cast<double>(segments[bone].mesh.triangles.size()), surface_area(segments[bone].mesh),
                        std::max(profiles[bone].length, 1e-9 * model.diagonal)});
   const bool has_uniform_rows = options.row_spacing == RowSpacing::kUniform;
   const bool has_maps = !std::all_of(surface.methods.begin(), surface.methods.end(), is_height_field);
-  const AtlasLayout layout =
-      pack_atlas(patch_requests(sources, has_uniform_rows ? std::span<const RowProfile>() : profiles,
-                                options.texel_share.value_or(has_maps ? TexelShare::kError : TexelShare::kArea)),
-                 options.width, options.height);
+  const AtlasLayout layout = pack_atlas(
+      patch_requests(sources, options.texel_share.value_or(has_maps ? TexelShare::kError : TexelShare::kArea)),
+      options.width, options.height);
   for (std::size_t bone = 0; bone < segments.size(); ++bone) {
     Patch patch{layout.rectangles[bone], surface.methods[bone], segments[bone].topology, {}};
     patch.row_u = has_uniform_rows ? spread_rows_uniformly(patch.rectangle.height)
@@ -235,48 +197,150 @@ std::vector<std::array<std::vector<Vec3>, 2>> find_end_points(const SkeletexMode
   return end_points;
 }
 
+/// The input, and what is made of it once, whatever the methods.
+struct EncodeJob {
+  ClContext& context;
+  const TriangleMesh& mesh;
+  const TriangleTree& tree;  ///< of the mesh
+  const SeparationPlanes& separation;
+  const EncodeOptions& options;
+};
+
 /// Reads the texels of a model that is laid out.
-/// \param tree  of the mesh, with snapping or fit
-TexelResult read_model_texels(ClContext& context, const SkeletexModel& model, const SeparationPlanes& separation,
-                              const TriangleMesh& mesh, const TriangleTree* tree, const MappedSurface& surface,
-                              const TexelPlacing& placing, const EncodeOptions& options) {
+TexelResult read_model_texels(const EncodeJob& job, const SkeletexModel& model, const MappedSurface& surface,
+                              const TexelPlacing& placing) {
+  ClContext& context = job.context;
+  const EncodeOptions& options = job.options;
   std::optional<DeviceSnapTables> features;
   if (placing.has_snap)
     features =
         upload_tables(context, tables_of(place_features(find_features(surface.charts, surface.methods, kLeastDihedral),
                                                         surface.charts, model.patches),
                                          model.patches));
-  const std::vector<SpdHits> hits = cast_rays(context, model, separation, surface.charts, options.spd_hit);
-  const auto end_points = find_end_points(model, separation, surface);
+  const std::vector<SpdHits> hits = cast_rays(context, model, job.separation, surface.charts, options.spd_hit);
+  const auto end_points = find_end_points(model, job.separation, surface);
   std::optional<RevertSources> revert;
-  if (placing.has_snap || placing.has_fit) revert.emplace(RevertSources{model, mesh, *tree, surface.charts});
+  if (!placing.is_regular_grid()) revert.emplace(RevertSources{model, job.mesh, job.tree, surface.charts});
   TexelOptions texel_options{
-      .has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .has_fit = placing.has_fit};
+      .has_prefilter = options.has_prefilter, .has_unfold = options.has_unfold, .fit_steps = placing.fit_steps};
   if (options.has_half_texels) texel_options.half_rule = model.diagonals;
   return read_texels(
-      context, model.skeleton, separation,
+      context, model.skeleton, job.separation,
       {surface.charts, model.patches, hits, end_points, revert ? &*revert : nullptr, features ? &*features : nullptr},
       options.width, options.height, model.origin, texel_options);
 }
 
-void report_result(const SkeletexModel& model, const TriangleMesh& mesh, const MappedSurface& surface,
-                   const TexelReport& texels, EncodeReport& report) {
-  report.vertices = static_cast<int>(mesh.positions.size());
-  report.triangles = static_cast<int>(mesh.triangles.size());
+/// A model whose surface is mapped, encoded with the methods of its bones.
+struct Encoding {
+  SkeletexModel model;
+  TexelReport texels;
+  TexelPlacing placing;
+  std::vector<Method> methods;
+  double used_fraction = 0;
+};
+/// \param model  see start_model
+Encoding encode_surface(const EncodeJob& job, SkeletexModel model, const MappedSurface& surface) {
+  const EncodeOptions& options = job.options;
+  Encoding encoding{std::move(model), {}, {}, surface.methods, 0};
+  encoding.placing =
+      placing_of(options, job.mesh, std::all_of(surface.methods.begin(), surface.methods.end(), is_height_field));
+  const TexelPlacing& placing = encoding.placing;
+  encoding.used_fraction = lay_out_patches(
+      surface, row_profiles(job.context, encoding.model.skeleton, job.separation, surface, options.spd_hit), options,
+      encoding.model);
+  encoding.model.diagonals =
+      options.diagonals.value_or(placing.is_regular_grid() ? DiagonalRule::kNearest : DiagonalRule::kSmooth);
+  add_seams(surface.segmentation, job.separation, placing.has_snap ? SeamSampling::kSnapped : SeamSampling::kEven,
+            encoding.model);
+  TexelResult texels = read_model_texels(job, encoding.model, surface, placing);
+  encoding.model.texture = std::move(texels.texture);
+  encoding.model.sampling = {options.has_prefilter, placing.has_snap, placing.is_fitted()};
+  encoding.texels = std::move(texels.report);
+  return encoding;
+}
+
+/// How far the model is from the input and the input from the model, per bone.
+struct BothDistances {
+  std::vector<BoneDistance> from, to;
+  double mean = 0, furthest = 0;  ///< of all bones; the mean by area
+
+  double mean_of(std::size_t bone) const { return from[bone].mean + to[bone].mean; }
+  double furthest_of(std::size_t bone) const { return std::max(from[bone].furthest, to[bone].furthest); }
+};
+BothDistances measure_both(const EncodeJob& job, const SkeletexModel& model, const MappedSurface& surface) {
+  const PreparedModel prepared(model);
+  const TriangleMesh mesh = reconstruct_mesh(job.context, prepared);
+  BothDistances both{distances_from_bones(job.context, surface.charts, mesh, build_triangle_tree(mesh), 0),
+                     distances_to_surface(job.context, model, prepared.lattice, mesh, job.mesh, job.tree)};
+  double total = 0;
+  for (std::size_t bone = 0; bone < both.from.size(); ++bone) {
+    const double area = surface_area(surface.segmentation.segments[bone].mesh);
+    both.mean += area * both.mean_of(bone), total += area;
+    both.furthest = std::max(both.furthest, both.furthest_of(bone));
+  }
+  both.mean /= total;
+  return both;
+}
+
+/// Each bone takes SPD where its rays see enough, and the result is hardly further from the input than that of VSM,
+/// which is measured with models of either. If the mixed model is worse than the better of these, that is taken.
+/// \param surface  mapped by VSM; the methods are those of the result then
+Encoding encode_hybrid(const EncodeJob& job, const SkeletexModel& start, MappedSurface& surface) {
+  const EncodeOptions& options = job.options;
+  const std::size_t count = surface.methods.size();
+  Encoding by_vsm = encode_surface(job, start, surface);
+  surface.methods.assign(count, Method::kSpd);
+  Encoding by_spd = encode_surface(job, start, surface);
+  const BothDistances vsm = measure_both(job, by_vsm.model, surface), spd = measure_both(job, by_spd.model, surface);
+  for (std::size_t bone = 0; bone < count; ++bone)
+    surface.methods[bone] = surface.unseen[bone] <= options.hybrid_unseen_threshold &&
+                                    spd.mean_of(bone) <= kHardlyWorse * vsm.mean_of(bone) &&
+                                    spd.furthest_of(bone) <= kHardlyWorse * vsm.furthest_of(bone)
+                                ? Method::kSpd
+                                : Method::kVsm;
+  for (const auto& [name, method] : options.hybrid_overrides)
+    for (std::size_t bone = 0; bone < count; ++bone)
+      if (start.skeleton.bones[bone].name == name) surface.methods[bone] = method;
+  if (surface.methods == by_vsm.methods && spd.mean >= vsm.mean) return by_vsm;
+  Encoding mixed = encode_surface(job, start, surface);
+  if (!options.hybrid_overrides.empty()) return mixed;
+  const bool is_spd_better = spd.mean < vsm.mean;
+  Encoding& pure = is_spd_better ? by_spd : by_vsm;
+  if (measure_both(job, mixed.model, surface).mean <= kHardlyWorse * (is_spd_better ? spd : vsm).mean) return mixed;
+  surface.methods = pure.methods;
+  return std::move(pure);
+}
+
+void report_result(const EncodeJob& job, const Encoding& encoding, const MappedSurface& surface, EncodeReport& report) {
+  const SkeletexModel& model = encoding.model;
+  const TexelReport& texels = encoding.texels;
+  report.vertices = static_cast<int>(job.mesh.positions.size());
+  report.triangles = static_cast<int>(job.mesh.triangles.size());
   report.genus = model.genus;
   report.diagonal = model.diagonal;
+  report.scale = model.skeleton.frame.scale;
+  report.used_fraction = encoding.used_fraction;
+  report.placing = encoding.placing;
   report.unfold = texels.unfold;
   report.snap = texels.snap;
   report.fit = texels.fit;
   report.rounding = texels.rounding;
   report.revert = texels.revert;
+  std::vector<BoneDistance> distances;
+  if (texels.revert) {
+    distances = texels.revert->distances;
+  } else {
+    const TriangleMesh decoded = reconstruct_mesh(job.context, model);
+    distances = distances_from_bones(job.context, surface.charts, decoded, build_triangle_tree(decoded),
+                                     kNearEnough * model.diagonal);
+  }
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
     const Segment& segment = surface.segmentation.segments[bone];
     BoneReport entry;
     entry.name = model.skeleton.bones[bone].name;
-    entry.method = surface.methods[bone];
+    entry.method = encoding.methods[bone];
     entry.topology = segment.topology;
-    entry.area = surface_area(segment.mesh);
+    entry.area = surface_area(segment.mesh) * model.skeleton.frame.scale * model.skeleton.frame.scale;
     entry.vertices = static_cast<int>(segment.mesh.positions.size());
     entry.triangles = static_cast<int>(segment.mesh.triangles.size());
     entry.rectangle = model.patches[bone].rectangle;
@@ -284,6 +348,8 @@ void report_result(const SkeletexModel& model, const TriangleMesh& mesh, const M
     entry.flipped_triangles = surface.reports[bone].flipped_triangles;
     entry.sampled_triangle_fraction = texels.sampled_triangle_fractions[bone];
     entry.missed_texels = texels.missed_texels[bone];
+    entry.distance = distances[bone];
+    entry.distance.place = model.skeleton.frame.to_user(distances[bone].place);
     entry.map = surface.reports[bone];
     report.bones.push_back(std::move(entry));
   }
@@ -300,11 +366,9 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   const auto progress = [&](const char* stage, double done) {
     if (options.progress && !options.progress(stage, done)) throw Error("cancelled");
   };
-  EncodeResult result{start_model(mesh, skeleton), {}};
-  EncodeReport& report = result.report;
-  SkeletexModel& model = result.model;
-  model.stance = options.stance;
-  const SeparationPlanes separation(model.skeleton);
+  EncodeReport report;
+  const SkeletexModel model = start_model(mesh, skeleton);
+  const SeparationPlanes separation(model.skeleton);  // refers to it
   Stopwatch watch;
 
   progress("half edges", 0);
@@ -314,43 +378,36 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   Segmentation segmentation = segment_mesh(context, std::move(half_edges), model.skeleton);
   report.segmentation_ms = watch.lap_ms();
   progress("parameterization", 0.2);
-  const MappedSurface surface = map_surface(context, std::move(segmentation), model.skeleton, separation, options);
+  MappedSurface surface =
+      map_surface(context, std::move(segmentation),
+                  std::vector<Method>(skeleton.bones.size(), options.method.value_or(Method::kVsm)), model.skeleton,
+                  separation, {options.vsm, options.reweights_squeezed, options.row_spacing == RowSpacing::kUniform});
   report.parameterization_ms = watch.lap_ms();
 
-  progress("layout", 0.6);
-  const TexelPlacing placing =
-      choose_placing(options, mesh, std::all_of(surface.methods.begin(), surface.methods.end(), is_height_field));
-  const bool is_placed = placing.has_snap || placing.has_fit;
-  report.used_fraction = lay_out_patches(
-      surface, row_profiles(context, model.skeleton, separation, surface, options.spd_hit), options, model);
-  model.diagonals = options.diagonals.value_or(is_placed ? DiagonalRule::kSmooth : DiagonalRule::kNearest);
-  add_seams(surface.segmentation, separation, placing.has_snap ? SeamSampling::kSnapped : SeamSampling::kEven, model);
-
-  progress("encoding", 0.7);
-  const MeshAttributes none;
-  const MeshAttributes& attributes = options.attributes ? *options.attributes : none;
+  progress("encoding", 0.6);
   std::optional<TriangleTree> own_tree;
-  if (!options.tree && (is_placed || has_layers(attributes, options.layers))) own_tree = build_triangle_tree(mesh);
-  const TriangleTree* const tree = own_tree ? &*own_tree : options.tree;
-  TexelResult texels = read_model_texels(context, model, separation, mesh, tree, surface, placing, options);
-  model.texture = std::move(texels.texture);
-  model.sampling = {options.has_prefilter, placing.has_snap, placing.has_fit};
-  nlohmann::json settings = settings_json(options, placing, surface.unseen);
-  add_results(texels.report, model.diagonal, settings);
-  model.encoder_settings = settings.dump();
+  if (!options.tree) own_tree = build_triangle_tree(mesh);
+  const EncodeJob job{context, mesh, own_tree ? *own_tree : *options.tree, separation, options};
+  Encoding encoding = options.method ? encode_surface(job, model, surface) : encode_hybrid(job, model, surface);
+  nlohmann::json settings = settings_json(options, encoding.placing, surface.unseen);
+  add_results(encoding.texels, encoding.model.diagonal, settings);
+  encoding.model.encoder_settings = settings.dump();
   report.encoding_ms = watch.lap_ms();
 
+  encoding.model.stance = options.stance;
+  const MeshAttributes none;
+  const MeshAttributes& attributes = options.attributes ? *options.attributes : none;
   if (has_layers(attributes, options.layers)) {
     progress("layers", 0.95);
-    ReadLayers layers = read_layers(context, model, mesh, *tree, attributes, options.layers);
-    model.layers = std::move(layers.layers);
+    ReadLayers layers = read_layers(context, encoding.model, mesh, job.tree, attributes, options.layers);
+    encoding.model.layers = std::move(layers.layers);
     report.layer_notes = std::move(layers.notes);
     report.layers_ms = watch.lap_ms();
   }
   report.device = context.device().name;
-  report_result(model, mesh, surface, texels.report, report);
+  report_result(job, encoding, surface, report);
   progress("done", 1);
-  return result;
+  return {std::move(encoding.model), std::move(report)};
 }
 
 }  // namespace skeletex

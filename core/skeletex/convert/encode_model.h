@@ -5,8 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "skeletex/convert/choose_placing.h"
 #include "skeletex/convert/layers/read_layers.h"
 #include "skeletex/convert/layout/patch_requests.h"
+#include "skeletex/convert/measure/bone_distances.h"
 #include "skeletex/convert/parameterize/spd.h"
 #include "skeletex/convert/parameterize/vsm.h"
 #include "skeletex/convert/sample/read_texels.h"
@@ -18,27 +20,26 @@ namespace skeletex {
 
 /// How rows are spread along a bone: evenly in surface length (the default), or evenly in the map's u (the paper).
 enum class RowSpacing { kSurfaceLength, kUniform };
-/// Up to here the fit is the default: beyond it gains little, and takes longest.
-inline constexpr std::size_t kMostFittedTexels = 256 * 256;
-
 struct EncodeOptions {
   int width = 512, height = 512;
   /// Of all bones; without, each bone takes SPD or VSM (hybrid).
   std::optional<Method> method = Method::kVsm;
-  /// Hybrid: bones whose unseen share of area is above this take VSM, the others SPD (docs/steps/spd.md).
+  /// Hybrid: bones whose unseen share of area is above this take VSM; the others SPD, where it is hardly further from
+  /// the mesh than VSM (docs/steps/spd.md).
   double hybrid_unseen_threshold = 0.01;
   /// Hybrid: bones by name whose method the user chose.
   std::vector<std::pair<std::string, Method>> hybrid_overrides;
   VsmOptions vsm;
+  bool reweights_squeezed = true;  ///< bones of which VSM squeezes a part are reweighted further (docs/steps/vsm.md)
   SpdHit spd_hit = SpdHit::kLast;
   RowSpacing row_spacing = RowSpacing::kSurfaceLength;
   bool has_prefilter = true;
   bool has_unfold = true;  ///< see unfold_lattice; snapping and fit start from the lattice that it leaves
   /// Texels of VSM patches sit on the mesh's own vertices and edges where they can (docs/steps/snap.md). Takes the
-  /// prefilter's place. Default: from 2 texels per vertex on, with the fit from 1.5 on.
+  /// prefilter's place. Default: see choose_placing.
   std::optional<bool> has_snap;
   /// Their points move so that the flat triangles between them are nearer to the mesh (docs/steps/snap.md). Takes the
-  /// prefilter's place. Default: with the prefilter, up to 256 x 256 texels.
+  /// prefilter's place. Default: with the prefilter, see choose_placing.
   std::optional<bool> has_fit;
   std::optional<DiagonalRule> diagonals;  ///< default: smooth with snapping or fit, else nearest
   /// Texels come as half floats hold them (docs/steps/sample.md): write_model stores them as such without loss.
@@ -60,21 +61,31 @@ struct BoneReport {
   std::string name;
   Method method = Method::kVsm;
   SegmentTopology topology = SegmentTopology::kAnnulus;
-  double area = 0;  ///< world units squared
+  double area = 0;  ///< in the user's units, squared
   int vertices = 0, triangles = 0;
   Rectangle rectangle;
   double unseen_area_fraction = 0;
   int flipped_triangles = 0;             ///< of the map
   double sampled_triangle_fraction = 0;  ///< share of the segment's triangles that a texel reads
   int missed_texels = 0;                 ///< SPD rays that hit nothing, filled from their neighbours
+  BoneDistance
+      distance;  ///< of its surface to the mesh that the decoder makes, in the unit frame; its place is the user's
   MapReport map;
 };
 
+/// Whether a part of a bone's surface is missing from the model: it is further away than ten times the bone's mean and
+/// half a percent of the diagonal.
+inline bool lacks_part(const BoneReport& bone, double diagonal) {
+  return bone.distance.furthest > 10 * bone.distance.mean && bone.distance.furthest > 0.005 * diagonal;
+}
+
 struct EncodeReport {
   int vertices = 0, triangles = 0, genus = 0;
-  double diagonal = 0;
+  double diagonal = 0;  ///< of the mesh in the frame of the model, as are the lengths of the reports below
+  double scale = 1;     ///< of that frame
   std::vector<BoneReport> bones;
   double used_fraction = 0;
+  TexelPlacing placing;                    ///< what was chosen for VSM patches; of SPD models 0 texels per vertex
   std::optional<UnfoldReport> unfold;      ///< when it was on
   std::optional<SnapReport> snap;          ///< when it was on
   std::optional<FitReport> fit;            ///< when it was on
@@ -90,8 +101,10 @@ struct EncodeResult {
   EncodeReport report;
 };
 
-/// Turns a closed mesh and its skeleton into a model (paper 3.1-3.4): half edges, segments, maps, atlas, texels.
-/// \pre validate_before_segmentation reports no error      \throw TopologyError, InputError, DeviceError
+/// Turns a closed mesh and its skeleton into a model (paper 3.1-3.4): half edges, segments, maps, atlas, texels. Both
+/// are in the frame of the skeleton, which becomes that of the model; unit_frame (geometry/mesh.h) is the frame in
+/// which all scales and places give the same texels. \pre validate_before_segmentation reports no error      \throw
+/// TopologyError, InputError, DeviceError
 EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& skeleton,
                           const EncodeOptions& options = {});
 

@@ -123,7 +123,8 @@ SkeletexModel store_positions(ClContext& context, const PreparedModel& prepared,
   const std::vector<Vec3> before = lattice_positions(context, prepared);
   SkeletexModel result = model;
   store_texels(context, prepared, before, positions, result.texture);
-  if (!model.layers.empty()) turn_normal_layer(prepared, reconstruct_mesh(context, prepared), positions, result);
+  if (!model.layers.empty())
+    turn_normal_layer(prepared, reconstruct_bind_mesh(context, prepared).mesh, positions, result);
   for (std::size_t a = 0; a < model.arcs.size(); ++a) {
     const SeamArc& arc = model.arcs[a];
     const int bone = arc.bones[0];

@@ -204,7 +204,7 @@ ReadLayers read_layers(ClContext& context, const PreparedModel& model, const Tri
 
 std::vector<Layer> read_layers_of(ClContext& context, const PreparedModel& from, const PreparedModel& to) {
   if (from.model.layers.empty()) return {};
-  const TriangleMesh mesh = reconstruct_mesh(context, from);
+  const TriangleMesh mesh = reconstruct_bind_mesh(context, from).mesh;
   const MeshAttributes attributes = vertex_attributes(from);
   LayerOptions options;
   options.has_normals = !attributes.normals.empty();

@@ -71,7 +71,7 @@ std::vector<SurfacePoint> find_surface_points(ClContext& context, const Triangle
   points.reserve(probes.size());
   for (const Probe& probe : probes) points.push_back(probe.point);
   std::vector<int> nearest(points.size());
-  NearestSearch(context, tree).find(points, nearest);
+  NearestSearch(context, mesh, tree).find(points, nearest);
   std::vector<SurfacePoint> found(points.size());
   for_each_block(points.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {

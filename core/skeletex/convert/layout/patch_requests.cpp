@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "skeletex/geometry/parallel.h"
-
 namespace skeletex {
 namespace {
 
@@ -23,6 +21,8 @@ struct MappedTriangle {
 }  // namespace
 
 double ExpectedError::best_ratio() const { return std::sqrt(around / along); }
+
+double ExpectedError::least() const { return 2 * (std::sqrt(around * along) + both); }
 
 double ExpectedError::with_ratio(double columns_per_row) const {
   return around / columns_per_row + along * columns_per_row + 2 * both;
@@ -45,6 +45,8 @@ ExpectedError expected_error(const Chart& chart, const RowProfile* profile) {
                     is_pole(chart.kinds[a]) || is_pole(chart.kinds[b]) || is_pole(chart.kinds[c])};
   }
   ExpectedError error;
+  double surface = 0;
+  for (const MappedTriangle& triangle : triangles) surface += triangle.area / 2;
   for (int h = 0; h < static_cast<int>(chart.half_edges.twins.size()); ++h) {
     const int twin = chart.half_edges.twins[h];
     if (twin < h) continue;  // boundaries, and the other half of an edge
@@ -56,6 +58,7 @@ ExpectedError expected_error(const Chart& chart, const RowProfile* profile) {
     // Of the dihedral angle the chord: the same for small ones, and no function to call.
     const double stretch = (one.area + other.area) / map_area,
                  weight = (one.normal - other.normal).norm() * stretch * stretch / length;
+    error.even += (one.normal - other.normal).norm() * length * surface;
     const double columns = std::abs(column_of(t, to) - column_of(t, from)), along = std::abs(rows[b] - rows[a]);
     error.around += weight * along * along, error.along += weight * columns * columns,
         error.both += weight * columns * along;
@@ -63,8 +66,7 @@ ExpectedError expected_error(const Chart& chart, const RowProfile* profile) {
   return error;
 }
 
-std::vector<PatchRequest> patch_requests(std::span<const PatchSource> sources, std::span<const RowProfile> profiles,
-                                         TexelShare share) {
+std::vector<PatchRequest> patch_requests(std::span<const PatchSource> sources, TexelShare share) {
   std::vector<PatchRequest> requests(sources.size());
   for (std::size_t i = 0; i < sources.size(); ++i)
     requests[i] = {share == TexelShare::kArea ? sources[i].area : sources[i].triangles,
@@ -72,14 +74,15 @@ std::vector<PatchRequest> patch_requests(std::span<const PatchSource> sources, s
   if (share != TexelShare::kError) return requests;
 
   std::vector<double> roots(sources.size(), 0);  // of errors
-  for_each_block(sources.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-    if (!sources[i].chart) return;
-    const ExpectedError error = expected_error(*sources[i].chart, profiles.empty() ? nullptr : &profiles[i]);
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    if (!sources[i].error) continue;
+    const ExpectedError& error = *sources[i].error;
     const double usual = requests[i].columns_per_row;
     if (error.around > 0 || error.along > 0)
       requests[i].columns_per_row = std::clamp(error.best_ratio(), usual / kMostOff, usual * kMostOff);
-    roots[i] = std::sqrt(error.with_ratio(requests[i].columns_per_row));
-  });
+    const double root = std::sqrt(error.with_ratio(requests[i].columns_per_row));
+    if (std::isfinite(root)) roots[i] = root;
+  }
   double triangles = 0, root = 0;  // of patches that have both
   for (std::size_t i = 0; i < sources.size(); ++i)
     if (roots[i] > 0) triangles += sources[i].triangles, root += roots[i];

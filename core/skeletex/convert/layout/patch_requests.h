@@ -18,10 +18,14 @@ enum class TexelShare { kError, kTriangles, kArea };
 /// cubed.
 struct ExpectedError {
   double around = 0, along = 0, both = 0;
+  /// The same, error times texels, of a map that would spread texels evenly over the surface.
+  double even = 0;
 
   /// columns / rows with the least error for a number of texels; infinite or not a number where the surface bends in
   /// one direction or none
   double best_ratio() const;
+  /// The error times the number of texels, with that ratio.
+  double least() const;
   /// The error times the number of texels.
   double with_ratio(double columns_per_row) const;
 };
@@ -34,7 +38,7 @@ ExpectedError expected_error(const Chart& chart, const RowProfile* profile);
 
 /// One bone's part of the surface.
 struct PatchSource {
-  const Chart* chart = nullptr;                ///< null for a height field, which has no map
+  const ExpectedError* error = nullptr;        ///< null for a height field, which has no map
   double triangles = 0, area = 0, length = 0;  ///< world units; length: of the meridians, their mean
 };
 /// The shares and side ratios of patches. By triangles or area their sides have the ratio of girth to length. By error
@@ -42,8 +46,6 @@ struct PatchSource {
 /// that error: shares by the root have the least error all in all, where errors fall as cells get smaller; but where
 /// texels sit on vertices and edges, what counts is how many there are for each. Height fields keep the ratio of girth
 /// to length, and their share is by triangles.
-/// \param profiles  of rows, of mapped patches; empty: rows are even in u
-std::vector<PatchRequest> patch_requests(std::span<const PatchSource> sources, std::span<const RowProfile> profiles,
-                                         TexelShare share);
+std::vector<PatchRequest> patch_requests(std::span<const PatchSource> sources, TexelShare share);
 
 }  // namespace skeletex

@@ -2,6 +2,7 @@
 #pragma once
 #include <span>
 
+#include "skeletex/convert/measure/bone_distances.h"
 #include "skeletex/convert/parameterize/chart.h"
 #include "skeletex/convert/snap/revert_texels.h"
 #include "skeletex/geometry/triangle_tree.h"
@@ -20,6 +21,7 @@ struct RevertReport {
   int reverted_texels = 0;
   /// Triangles that look against the original: of the lattice, and of the regular grid but for its strips and fans.
   int inverted_triangles = 0, regular_inverted_triangles = 0;
+  std::vector<BoneDistance> distances;  ///< of what is left, see distances_from_bones; per chart
 };
 
 /// Looks at the mesh that the decoder will make of the texels. Texels revert to the regular grid

@@ -9,7 +9,6 @@
 #include <deque>
 #include <numbers>
 
-#include "skeletex/edit/morph/blend.h"
 #include "skeletex/edit/morph/morph_layers.h"
 #include "skeletex/edit/morph/orientation.h"
 #include "skeletex/edit/morph/seam_mean.h"
@@ -147,7 +146,9 @@ Morph::Morph(ClContext& context, std::vector<SkeletexModel> models, std::span<co
     if (options.size == 0) size = std::max({size, models_[m].texture.width, models_[m].texture.height});
   }
   DisplacementTexture all;
+  const UnitFrame frame = models_[0].skeleton.frame;
   for (SkeletexModel& model : models_) {
+    model = in_frame(std::move(model), frame);
     model = resample_model(context, regular_grid(context, model), size);
     traced_seams_.push_back(trace_seams(model));
     texel_begins_.push_back(static_cast<int>(all.out.size()));
@@ -222,10 +223,11 @@ SkeletexModel Morph::without_texels(std::span<const double> weights) const {
   return std::move(between(weights, false)->model);
 }
 
-SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) const {
+MorphPlan Morph::plan(std::span<const double> given) const {
   const std::unique_ptr<Between> between = this->between(given, true);
-  const auto& [weights, result, maps, separation] = *between;
-  BlendTables tables;
+  auto& [weights, result, maps, separation] = *between;
+  MorphPlan plan;
+  BlendTables& tables = plan.tables;
   const std::vector<LatticeRow> rows = lattice_rows(result.patches, RowChoice::kAll);
   for (std::size_t m = 0; m < models_.size(); ++m) {
     if (weights[m] == 0) continue;
@@ -241,15 +243,25 @@ SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) 
     }
     append_rows(maps[m], rows, result.patches, weights[m], tables);
   }
+  plan.moves = end_moves(result, *separation, maps, weights);
+  plan.model = std::move(result);
+  return plan;
+}
+
+SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) const {
+  MorphPlan plan = this->plan(given);
+  const SkeletexModel& result = plan.model;
+  const std::vector<LatticeRow> rows = lattice_rows(result.patches, RowChoice::kAll);
   const std::size_t area = static_cast<std::size_t>(result.texture.width) * result.texture.height;
   if (texels.count != area) {
     texels = allocate_planes(*context_, area);
     context_->fill(texels.values, 0);
   }
-  const FrameTables frames = frame_tables(result.skeleton, *separation, result.patches, result.origin);
-  blend_texels(*context_, tables, rows, frames, result.texture.width, texels_, texels);
-  move_ends(*context_, end_moves(result, *separation, maps, weights), rows, frames, result.texture.width, texels);
-  return std::move(between->model);
+  const FrameTables frames =
+      frame_tables(result.skeleton, SeparationPlanes(result.skeleton), result.patches, result.origin);
+  blend_texels(*context_, plan.tables, rows, frames, result.texture.width, texels_, texels);
+  move_ends(*context_, plan.moves, rows, frames, result.texture.width, texels);
+  return std::move(plan.model);
 }
 
 int Morph::layout_index(std::span<const double> weights) const {

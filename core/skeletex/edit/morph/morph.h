@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "skeletex/edit/morph/blend.h"
 #include "skeletex/edit/morph/seam_map.h"
 #include "skeletex/model/texture.h"
 #include "skeletex/reconstruct/displace.h"
@@ -18,6 +19,14 @@ struct MorphOptions {
   std::optional<int> layout;
   int size = 0;           ///< longer side of the result's texture; 0: the largest of the models'
   bool is_smooth = true;  ///< at() removes creases where bones of different rotations meet (orientation.h)
+};
+
+/// An in-between model before its texels are blended: the model without texels, where they are read, and what moves the
+/// rows at the ends onto the seams.
+struct MorphPlan {
+  SkeletexModel model;
+  BlendTables tables;  ///< of the models with a weight above 0
+  EndMoves moves;
 };
 
 /// In-between models of two or more models (paper 5). Texels, the distances of seams and corners, and the positions of
@@ -43,6 +52,8 @@ class Morph {
   /// Queues the same on the device, with creases. The texels stay there, in planes of the result's size; the texture of
   /// the returned model has a size and no texels. For animations see LiveMorph (live.h).
   SkeletexModel queue(std::span<const double> weights, DevicePlanes& texels) const;
+  /// What queue does to the texels.
+  MorphPlan plan(std::span<const double> weights) const;
   /// The model that queue returns, without any work per texel.
   SkeletexModel without_texels(std::span<const double> weights) const;
 

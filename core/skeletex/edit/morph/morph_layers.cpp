@@ -19,7 +19,7 @@ constexpr double kReach = 0.01;  // diagonals; corresponding places lie on the s
 MeshAttributes attributes_of(ClContext& context, const LayerSource& source, const std::vector<Triangle>& triangles,
                              bool has_normals) {
   const PreparedModel prepared(source.model);
-  const TriangleMesh mesh = reconstruct_mesh(context, prepared);
+  const TriangleMesh mesh = reconstruct_bind_mesh(context, prepared).mesh;
   const std::vector<Vec3> outward = vertex_normals({source.positions, triangles});
   std::vector<Probe> probes;
   for (std::size_t i = 0; i < outward.size(); ++i)
@@ -66,7 +66,7 @@ std::vector<Layer> blend_layers(ClContext& context, const SkeletexModel& result,
   if (std::all_of(sources.begin(), sources.end(), [](const LayerSource& s) { return s.model.layers.empty(); }))
     return {};
   const PreparedModel prepared(result);
-  const TriangleMesh mesh = reconstruct_mesh(context, prepared);
+  const TriangleMesh mesh = reconstruct_bind_mesh(context, prepared).mesh;
   MeshAttributes mean;
   double colour_weight = 0;
   std::vector<double> number_weights;

@@ -38,6 +38,7 @@ SkeletexModel mirrored(const SkeletexModel& model) {
   for (Node& node : result.skeleton.nodes) mirror_x(node.position);
   mirror_x(result.origin);
   if (result.stance) mirror_x(result.stance->up), mirror_x(result.stance->front);
+  mirror_x(result.skeleton.frame.offset);
   // b = o x s comes out opposite to its mirror image: angles run the other way, and so does `around`.
   mirror_plane(model, 1, result.texture.along);
   mirror_plane(model, -1, result.texture.around);

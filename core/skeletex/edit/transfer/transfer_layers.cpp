@@ -74,7 +74,7 @@ PartSurface part_surface(const PreparedModel& result, const TriangleMesh& mesh, 
 /// The source's attributes there.
 MeshAttributes read_source_attributes(ClContext& context, const SkeletexModel& source, const TriangleMesh& part) {
   const PreparedModel prepared(source);
-  const TriangleMesh mesh = reconstruct_mesh(context, prepared);
+  const TriangleMesh mesh = reconstruct_bind_mesh(context, prepared).mesh;
   const std::vector<Vec3> outward = vertex_normals(part);
   std::vector<Probe> probes;
   for (std::size_t i = 0; i < outward.size(); ++i)
@@ -112,7 +112,7 @@ std::vector<Layer> transfer_layers(ClContext& context, const TransferInput& inpu
   if (result.layers.empty()) return {};
   const PartTexels texels = part_texels(context, input, placement);
   const PreparedModel prepared(result);
-  const TriangleMesh mesh = reconstruct_mesh(context, prepared);
+  const TriangleMesh mesh = reconstruct_bind_mesh(context, prepared).mesh;
   const PartSurface part = part_surface(prepared, mesh, texels);
   MeshAttributes blended = vertex_attributes(prepared);
   mix_attributes(read_source_attributes(context, input.source, part.mesh), part, mesh.positions, blended);

@@ -43,12 +43,19 @@ void append(std::string& out, VertexColour colour, bool has_alpha) {
   if (has_alpha) append(out, colour.a);
 }
 
-/// What is written as single precision must stay a number in it.
+/// Whether positions take double precision: far from the origin, or where single precision ends.
+bool needs_double(const TriangleMesh& mesh) {
+  constexpr double kMostDiagonals = 8, kSmallest = 1e-30, kLargest = 1e37;  // a rounding of 2^-22 diagonals
+  const BoundingBox box = bounding_box(mesh);
+  const double farthest = std::max(box.lower.cwiseAbs().maxCoeff(), box.upper.cwiseAbs().maxCoeff());
+  return box.diagonal() < kSmallest || farthest > kLargest || farthest > kMostDiagonals * box.diagonal();
+}
+
+/// What is written must be a number.
 void check_finite(const TriangleMesh& mesh, const WrittenAttributes& attributes, const std::string& where) {
-  const auto is_good = [](double x) { return std::isfinite(static_cast<float>(x)); };
   for (std::size_t i = 0; i < mesh.positions.size(); ++i)
     for (int axis = 0; axis < 3; ++axis)
-      if (!is_good(mesh.positions[i][axis]))
+      if (!std::isfinite(mesh.positions[i][axis]))
         throw IoError(fmt::format("{}: {} of vertex {} is {}, which the file cannot hold; nothing was written", where,
                                   "xyz"[axis], i, mesh.positions[i][axis]));
   for (std::size_t i = 0; i < attributes.vertex_normals.size(); ++i)
@@ -89,9 +96,10 @@ std::string ply_header(const TriangleMesh& mesh, const WrittenAttributes& attrib
 void write_ply(OutputFile& file, const TriangleMesh& mesh, const WrittenAttributes& attributes) {
   const bool has_vertex_alpha = has_opacity(attributes.vertex_colours),
              has_face_alpha = has_opacity(attributes.face_colours);
+  const bool has_doubles = needs_double(mesh);
   file.write(ply_header(mesh, attributes));
   write_blocks(file, mesh.positions.size(), [&](std::size_t i, std::string& out) {
-    for (const double x : mesh.positions[i]) append(out, static_cast<float>(x));
+    for (const double x : mesh.positions[i]) has_doubles ? append(out, x) : append(out, static_cast<float>(x));
     for (int axis = 0; axis < 3 && !attributes.vertex_normals.empty(); ++axis)
       append(out, static_cast<float>(attributes.vertex_normals[i][axis]));
     if (!attributes.vertex_colours.empty()) append(out, attributes.vertex_colours[i], has_vertex_alpha);
@@ -114,10 +122,11 @@ constexpr const char* kMaterial = "surface";
 void write_obj(OutputFile& file, const TriangleMesh& mesh, const WrittenAttributes& attributes,
                const std::string& material_file) {
   const auto* const texture = attributes.texture_coordinates;
+  const int digits = needs_double(mesh) ? 17 : 9;
   if (!material_file.empty()) file.write(fmt::format("mtllib {}\nusemtl {}\n", material_file, kMaterial));
   write_blocks(file, mesh.positions.size(), [&](std::size_t i, std::string& out) {
     const Vec3& p = mesh.positions[i];
-    fmt::format_to(std::back_inserter(out), "v {:.9g} {:.9g} {:.9g}", p[0], p[1], p[2]);
+    fmt::format_to(std::back_inserter(out), "v {:.{}g} {:.{}g} {:.{}g}", p[0], digits, p[1], digits, p[2], digits);
     if (!attributes.vertex_colours.empty()) {
       const VertexColour& c = attributes.vertex_colours[i];
       fmt::format_to(std::back_inserter(out), " {:.4f} {:.4f} {:.4f}", c.r / 255.0, c.g / 255.0, c.b / 255.0);
