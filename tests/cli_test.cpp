@@ -354,7 +354,7 @@ TEST_F(Program, ReconstructsInPosesAndAnimations) {
 TEST_F(Program, ReconstructsAPlaneOfTangentSpace) {
   const Skeleton skeleton = read_skeleton(folder_ / "y.skeleton.json");
   const nlohmann::json whole = json_of({"inspect", "y.skx.exr"});
-  const double diagonal = whole["diagonal"];
+  const double diagonal = whole["diagonal"].get<double>() * whole["frame"]["scale"].get<double>();
   ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "plane.ply", "--constant-offset", "0.05"}).code, 0);
   for (const Vec3& p : read_mesh(folder_ / "plane.ply").mesh.positions) {
     double nearest = 1e300;
