@@ -44,18 +44,38 @@ void take_one_of(CLI::Option& option, const std::vector<std::string>& words) {
       "");
 }
 
+namespace {
+
+void write_to_terminal(const std::string& text) { std::fwrite(text.data(), 1, text.size(), stdout); }
+
+/// JSON in which the control characters that its writer leaves, U+007F to U+009F, are escaped too.
+std::string json_printable(const std::string& json) {
+  std::string result;
+  for (std::size_t i = 0; i < json.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(json[i]);
+    const bool is_pair = byte == 0xc2 && i + 1 < json.size() && static_cast<unsigned char>(json[i + 1]) < 0xa0;
+    if (is_pair || byte == 0x7f)
+      result += fmt::format("\\u{:04x}", is_pair ? static_cast<unsigned char>(json[++i]) : byte);
+    else
+      result += json[i];
+  }
+  return result;
+}
+
+}  // namespace
+
 void write_json(const std::string& target, const Json& json) {
   if (target.empty()) return;
   const std::string text = json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
   if (target == "-")
-    std::fwrite(text.data(), 1, text.size(), stdout);
+    write_to_terminal(json_printable(text));
   else
     write_text_atomically(target, text);
 }
 
 void print(const std::string& json_target, const std::string& text) {
   if (json_target == "-") return;
-  std::fwrite(text.data(), 1, text.size(), stdout);
+  write_to_terminal(printable(text));
   std::fflush(stdout);  // long runs are watched through pipes and files
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <fmt/format.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -12,6 +13,7 @@
 #include "help_formatter.h"
 #include "skeletex/io/suggestion.h"
 #include "skeletex/model/error.h"
+#include "skeletex/model/memory.h"
 
 namespace skeletex::cli {
 namespace {
@@ -45,6 +47,16 @@ void check_names(const CLI::App& program, int argc, char** argv, std::string& ch
   }
 }
 
+/// The text of a message, printable: names in it come from files.
+class PrintableText : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm&, spdlog::memory_buf_t& out) override {
+    const std::string text = printable({message.payload.data(), message.payload.size()});
+    out.append(text.data(), text.data() + text.size());
+  }
+  std::unique_ptr<custom_flag_formatter> clone() const override { return std::make_unique<PrintableText>(); }
+};
+
 int run(int argc, char** argv) {
   CLI::App program("A closed triangle mesh and its skeleton as one displacement texture, and back.", "skeletex");
   program.set_version_flag("--version", std::string("skeletex ") + SKELETEX_VERSION);
@@ -71,7 +83,9 @@ int run(int argc, char** argv) {
     spdlog::error("{}", error.what());
     return kExitBad;
   } catch (const std::bad_alloc&) {
-    spdlog::error("out of memory; ask for a smaller --size");
+    const AvailableMemory left = available_memory();
+    spdlog::error("out of memory: {} leaves {} MiB; give it more, or ask for a smaller size", left.limit,
+                  left.bytes >> 20);
     return kExitBad;
   } catch (const std::exception& error) {
     spdlog::error("unexpected: {}", error.what());
@@ -89,7 +103,9 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   auto log = spdlog::stderr_color_mt("skeletex");
-  log->set_pattern("%^%l:%$ %v");
+  auto pattern = std::make_unique<spdlog::pattern_formatter>();
+  pattern->add_flag<skeletex::cli::PrintableText>('*').set_pattern("%^%l:%$ %*");
+  log->set_formatter(std::move(pattern));
   spdlog::set_default_logger(log);
   return skeletex::cli::run(argc, argv);
 }

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "skeletex/model/error.h"
+
 namespace skeletex::cli {
 
 ProgressBar::ProgressBar() : is_terminal_(::isatty(STDERR_FILENO) != 0) {}
@@ -39,7 +41,7 @@ void ProgressBar::draw(const std::string& text) {
   constexpr int kWidth = 32;
   const int filled = static_cast<int>(done_ * kWidth);
   fmt::print(stderr, "\r\033[K[{}{}] {:3.0f} % {}", std::string(filled, '#'), std::string(kWidth - filled, '.'),
-             100 * done_, text);
+             100 * done_, printable(text));
   std::fflush(stderr);
   is_drawn_ = true;
 }

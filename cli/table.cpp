@@ -7,6 +7,13 @@
 
 namespace skeletex::cli {
 
+void Table::add(std::vector<std::string> row) {
+  for (std::string& cell : row)
+    for (char& c : cell)
+      if (c == '\n' || c == '\t') c = ' ';  // of names; a cell is one line
+  rows_.push_back(std::move(row));
+}
+
 std::string Table::text() const {
   std::vector<std::size_t> widths(rows_[0].size(), 0);
   for (const auto& row : rows_)

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <pty.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -21,6 +22,7 @@
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/skeleton_file.h"
+#include "skeletex/model/memory.h"
 #include "support/shapes.h"
 
 namespace skeletex {
@@ -1010,6 +1012,110 @@ TEST_F(Program, PosesNodesInTheUsersUnitsAndMorphsBetweenScales) {
   EXPECT_LT(json_of({"metro", "moved.off", "between_000.ply"})["forward"]["mean"], 1e-3);
   write_moved(folder_, 1000, 1e5);
   EXPECT_LT(json_of({"metro", "moved.off", "between_001.ply"})["forward"]["mean"], 1e-3);
+}
+
+/// An environment variable while it lives.
+class Variable {
+ public:
+  Variable(const char* name, const std::string& value) : name_(name) {
+    if (const char* before = std::getenv(name)) before_ = before;
+    ::setenv(name, value.c_str(), 1);
+  }
+  ~Variable() { before_ ? ::setenv(name_, before_->c_str(), 1) : ::unsetenv(name_); }
+  Variable(const Variable&) = delete;
+  Variable& operator=(const Variable&) = delete;
+
+ private:
+  const char* name_;
+  std::optional<std::string> before_;
+};
+
+TEST_F(Program, SaysThatCompiledKernelsCannotBeWritten) {
+  const std::string device = json_of({"devices"}).dump();
+  if (device.find("Portable Computing Language") == std::string::npos) GTEST_SKIP() << "the device is none of PoCL's";
+  std::ofstream(folder_ / "file") << "no folder";
+  for (const std::string& cache : {(folder_ / "file").string(), std::string("/proc/cache")}) {
+    const Variable variable("POCL_CACHE_DIR", cache);
+    expect_refused(1, {"metro", "y.ply", "y.ply"}, {"PoCL cannot write its compiled kernels to " + cache});
+  }
+  fs::remove(folder_ / "file");
+}
+
+#ifndef __SANITIZE_ADDRESS__
+TEST_F(Program, SaysThatAddressesAreLimited) {
+  for (const rlim_t mebibytes : {300u, 500u, 900u}) {
+    rlimit before{};
+    ::getrlimit(RLIMIT_AS, &before);
+    const rlimit limit{mebibytes << 20, before.rlim_max};
+    ::setrlimit(RLIMIT_AS, &limit);
+    const Outcome outcome = run({"encode", "y.ply", "y.skeleton.json", "-o", "limited.skx.exr", "--size", "2048"});
+    ::setrlimit(RLIMIT_AS, &before);
+    EXPECT_EQ(outcome.code, 1) << mebibytes << ": " << outcome.err;
+    EXPECT_NE(outcome.err.find("ulimit -v"), std::string::npos) << mebibytes << ": " << outcome.err;
+    EXPECT_FALSE(fs::exists(folder_ / "limited.skx.exr"));
+  }
+}
+#endif
+
+TEST_F(Program, RefusesSizesThatNoMachineHasTheMemoryFor) {
+  if (available_memory().bytes > std::uint64_t{90} << 30) GTEST_SKIP() << "a large machine";
+  expect_refused(1, {"encode", "y.ply", "y.skeleton.json", "-o", "huge.skx.exr", "--size", "16384"},
+                 {"GiB of memory", "leaves"});
+}
+
+TEST_F(Program, NamesInFilesCannotSteerTheTerminal) {
+  nlohmann::json skeleton = nlohmann::json::parse(std::ifstream(folder_ / "y.skeleton.json"));
+  for (auto& bone : skeleton["bones"])
+    bone["name"] = "\x1b[31m\xc2\x9b" + bone["name"].get<std::string>() + "\x07\x7f\n";
+  std::ofstream(folder_ / "steer.json") << skeleton;
+  skeleton["nodes"][0]["position"] = {90, 90, 90};
+  std::ofstream(folder_ / "outside.json") << skeleton;
+  const std::string is_control = "\x1b\x07\x7f";
+  for (const std::vector<std::string>& command :
+       {std::vector<std::string>{"encode", "y.ply", "steer.json", "-o", "steer.skx.exr", "--size", "64", "--verbose"},
+        {"inspect", "steer.skx.exr"},
+        {"inspect", "steer.skx.exr", "--json", "-"},
+        {"weights", "steer.skx.exr", "-o", "steered.skx.exr"},
+        {"correspond", "steer.skx.exr", "steer.json"},
+        {"segment", "y.ply", "steer.json", "-o", "steer.ply"},
+        {"validate", "y.ply", "outside.json"},
+        {"encode", "y.ply", "outside.json", "-o", "steer.skx.exr"},
+        {"transfer", "steer.skx.exr", "steer.skx.exr", "-o", "steer.ply", "--bones", "no=no"},
+        {"metro", "\x1b[31m.ply", "y.ply"}}) {
+    const Outcome outcome = run(command);
+    const std::string text = outcome.out + outcome.err;
+    EXPECT_FALSE(text.empty());
+    EXPECT_EQ(text.find_first_of(is_control), std::string::npos) << command[0] << ": " << text;
+    EXPECT_EQ(text.find("\xc2\x9b"), std::string::npos) << command[0] << ": " << text;
+  }
+  for (const char* name : {"steer.json", "outside.json", "steer.skx.exr", "steered.skx.exr", "steer.ply"})
+    fs::remove(folder_ / name);
+}
+
+TEST_F(Program, TakesOverWhatAnotherProgramHasChanged) {
+  ASSERT_EQ(
+      run({"encode", "y.ply", "y.skeleton.json", "-o", "edited.skx.exr", "--size", "64", "--compression", "none"}).code,
+      0);
+  std::string bytes = text_of(folder_ / "edited.skx.exr");
+  bytes[bytes.size() - 2] ^= 1;
+  std::ofstream(folder_ / "edited.skx.exr", std::ios::binary) << bytes;
+  for (const std::vector<std::string>& command :
+       {std::vector<std::string>{"inspect", "edited.skx.exr"}, {"reconstruct", "edited.skx.exr", "-o", "edited.ply"}})
+    expect_refused(1, command, {"edited.skx.exr", "checksum", "weights edited.skx.exr --edited"});
+  EXPECT_EQ(run({"weights", "edited.skx.exr", "--edited", "-o", "taken.skx.exr"}).code, 0);
+  EXPECT_EQ(run({"inspect", "taken.skx.exr"}).code, 0);
+  for (const char* name : {"edited.skx.exr", "taken.skx.exr"}) fs::remove(folder_ / name);
+}
+
+TEST_F(Program, WarnsOfAMeshThatWasCut) {
+  json_of({"reconstruct", "y.skx.exr", "-o", "cut.obj"});
+  std::string text = text_of(folder_ / "cut.obj");
+  std::ofstream(folder_ / "cut.obj", std::ios::binary) << text.substr(0, text.size() - 1);
+  EXPECT_EQ(run({"validate", "cut.obj", "y.skeleton.json"}).err.find("cut"), std::string::npos);
+  text.resize(text.rfind("\nf ", text.size() / 8 * 7));
+  std::ofstream(folder_ / "cut.obj", std::ios::binary) << text;
+  EXPECT_NE(run({"validate", "cut.obj", "y.skeleton.json"}).err.find("may have been cut"), std::string::npos);
+  fs::remove(folder_ / "cut.obj");
 }
 
 TEST_F(Program, SaysWhenStandardOutputIsFull) {

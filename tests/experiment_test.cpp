@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <csignal>
 #include <fstream>
 #include <set>
+#include <string>
 
+#include "runner/process.h"
 #include "runner/run_experiment.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/read_file.h"
@@ -145,6 +150,42 @@ TEST_F(Runner, ComparesNumbersByToleranceAndLeavesTimesOut) {
   EXPECT_EQ(compare_results(results(1, 5, "done"), results(1.1, 5, "done"), 0.02).size(), 1u);
   EXPECT_EQ(compare_results(results(1, 5, "done"), results(1, 5, "failed"), 0.02).size(), 1u);
   EXPECT_EQ(compare_results(results(1, 5, "done"), OrderedJson{{"rows", OrderedJson::array()}}, 0.02).size(), 1u);
+}
+
+TEST(Processes, EndWithTheOneThatStartedThem) {
+  const ScratchFolder folder;
+  const std::string file = folder / "pid";
+  const ::pid_t runner = ::fork();
+  if (runner == 0) {
+    run_process("/bin/sh", {"-c", "echo $$ > " + file + "; exec sleep 100"}, {}, folder / "errors.txt");
+    ::_exit(0);
+  }
+  ::pid_t program = 0;
+  for (int i = 0; i < 500 && program == 0; ++i) {
+    std::ifstream(file) >> program;
+    ::usleep(10000);
+  }
+  ASSERT_GT(program, 0);
+  ::kill(runner, SIGKILL);
+  ::waitpid(runner, nullptr, 0);
+  const auto is_running = [&] {  // one that nobody has waited for yet is none
+    std::ifstream stat("/proc/" + std::to_string(program) + "/stat");
+    std::string number, name, state;
+    return (stat >> number >> name >> state) && state != "Z" && state != "X";
+  };
+  for (int i = 0; i < 500 && is_running(); ++i) ::usleep(10000);
+  EXPECT_FALSE(is_running());
+}
+
+TEST(Processes, ThatCannotBeStartedSayWhy) {
+  const ScratchFolder folder;
+  try {
+    run_process("/no/such/program", {}, {}, folder / "errors.txt");
+    FAIL();
+  } catch (const IoError& error) {
+    EXPECT_EQ(std::string(error.what()), "/no/such/program cannot be started: No such file or directory");
+  }
+  EXPECT_EQ(run_process("false", {}, {}, folder / "errors.txt").exit_code, 1);
 }
 
 TEST(ExperimentFiles, EveryCommittedExperimentCanBePlannedAndHasKnownCommands) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <cmath>
@@ -462,6 +464,24 @@ TEST(AtomicFiles, AreWhollyWrittenOrNotAtAll) {
   EXPECT_EQ(folder.file_count(), 1);
   write_text_atomically(path, "after");
   EXPECT_EQ(read_bytes(path), "after");
+}
+
+TEST(AtomicFiles, RemoveWhatKilledProcessesLeft) {
+  const ScratchFolder folder;
+  const std::string left = ".a.txt.4711-0.part", others = ".b.txt.4711-0.part", plain = ".a.txt.notes.part";
+  for (const std::string& name : {left, others, plain}) write_bytes(folder / name, "half");
+  // One that a living process writes is locked.
+  const std::string locked = ".a.txt.4712-1.part";
+  write_bytes(folder / locked, "half");
+  const int descriptor = ::open((folder / locked).c_str(), O_WRONLY);
+  ASSERT_EQ(::flock(descriptor, LOCK_EX), 0);
+  write_text_atomically(folder / "a.txt", "whole");
+  EXPECT_EQ(read_bytes(folder / "a.txt"), "whole");
+  EXPECT_FALSE(std::filesystem::exists(folder / left));
+  for (const std::string& name : {others, plain, locked}) EXPECT_TRUE(std::filesystem::exists(folder / name)) << name;
+  ::close(descriptor);
+  write_text_atomically(folder / "a.txt", "whole");
+  EXPECT_FALSE(std::filesystem::exists(folder / locked));
 }
 
 TEST(AtomicFiles, SayWhatIsWrongWithTheFolderOrTheName) {

@@ -516,6 +516,79 @@ TEST(ModelFile, SaysWhatIsWrongWithForeignTruncatedAndNewerFiles) {
   EXPECT_TRUE(contains(error_of([&] { read_model(folder.path()); }), "folder"));
 }
 
+TEST(ModelFile, NoFlippedByteIsReadAsSomethingElse) {
+  const ScratchFolder folder;
+  const auto path = folder / "m.skx.exr";
+  SkeletexModel model = branch_model();
+  model.bone_weights.assign(model.skeleton.bones.size(), std::vector<float>(model.texture.along.size(), 0.25f));
+  for (const ExrCompression compression : {ExrCompression::kNone, ExrCompression::kZip, ExrCompression::kPiz})
+    for (const TexelFormat format : {TexelFormat::kFloat, TexelFormat::kHalf}) {
+      write_model(path, model, {format, compression});
+      const SkeletexModel good = read_model(path);
+      const std::string bytes = read_bytes(path);
+      std::mt19937_64 random(kSeed);
+      for (int i = 0; i < 400; ++i) {
+        std::string damaged = bytes;
+        damaged[random() % bytes.size()] ^= static_cast<char>(1 << (random() % 8));
+        write_bytes(path, damaged);
+        try {
+          expect_same(read_model(path), good);  // bytes without a meaning, such as in the display window
+        } catch (const IoError& error) {
+          EXPECT_NE(std::string(error.what()).find("m.skx.exr"), std::string::npos) << error.what();
+        }
+      }
+    }
+}
+
+TEST(ModelFile, EditedFilesAreRefusedUnlessTheyAreMeant) {
+  const ScratchFolder folder;
+  const auto path = folder / "m.skx.exr";
+  const SkeletexModel model = branch_model();
+  write_model(path, model, {TexelFormat::kFloat, ExrCompression::kNone});
+  std::string bytes = read_bytes(path);
+  bytes[bytes.size() - 2] ^= 1;  // of the last texel
+  write_bytes(path, bytes);
+  EXPECT_TRUE(contains(error_of([&] { read_model(path); }), "--edited"));
+  EXPECT_TRUE(contains(error_of([&] { read_model_header(path); }), "checksum"));
+  const SkeletexModel edited = read_model(path, 0, ChecksumRule::kIgnore);
+  write_model(path, edited);
+  expect_same(read_model(path), edited);
+}
+
+TEST(ModelFile, OlderFilesWithoutAChecksumAreRead) {
+  const ScratchFolder folder;
+  const auto path = folder / "m.skx.exr";
+  write_model(path, branch_model());
+  std::string bytes = read_bytes(path);
+  const std::string key = "\"checksum\":\"", version = "\"version\":2";
+  const std::size_t at = bytes.find(key);
+  ASSERT_NE(at, std::string::npos);
+  bytes.replace(at, key.size(), "\"cheskcum\":\"");
+  write_bytes(path, bytes);
+  EXPECT_TRUE(contains(error_of([&] { read_model(path); }), "no checksum"));
+  bytes.replace(bytes.find(version), version.size(), "\"version\":1");
+  write_bytes(path, bytes);
+  expect_same(read_model(path), branch_model());
+}
+
+TEST(ModelFile, TheGenusOfTheHeaderIsThatOfTheSurface) {
+  SkeletexModel model = branch_model();
+  EXPECT_NO_THROW(check_model(model, "model"));
+  model.genus += 1;
+  EXPECT_TRUE(contains(error_of([&] { check_model(model, "model"); }), "genus"));
+}
+
+TEST(ModelFile, TruncatedFilesAreRefusedByTheHeadersReaderToo) {
+  const ScratchFolder folder;
+  const auto path = folder / "m.skx.exr";
+  write_model(path, branch_model());
+  const std::string good = read_bytes(path);
+  for (std::size_t size = 0; size < good.size(); size += 53) {
+    write_bytes(path, good.substr(0, size));
+    EXPECT_TRUE(contains(error_of([&] { read_model_header(path); }), "m.skx.exr")) << size;
+  }
+}
+
 TEST(ModelFile, ReadsOrRefusesDamagedFilesButNeverCrashes) {
   const ScratchFolder folder;
   const auto path = folder / "m.skx.exr";

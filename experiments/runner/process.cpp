@@ -3,13 +3,14 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <spawn.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <chrono>
+#include <csignal>
 #include <cstring>
 
 #include "skeletex/io/read_file.h"
@@ -19,6 +20,39 @@ namespace skeletex {
 namespace {
 
 constexpr std::size_t kErrorBytes = 4000;
+
+/// What a child does between fork and exec, where only calls that are safe in signal handlers may be made. It ends with
+/// its parent, also where that was killed.
+/// \param failure  receives errno where the program cannot be started
+[[noreturn]] void become(char* const* argv, char* const* variables, const char* error_file, ::pid_t parent,
+                         int failure) {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) ::_exit(127);
+  const int in = ::open("/dev/null", O_RDONLY), out = ::open("/dev/null", O_WRONLY),
+            errors = ::open(error_file, O_WRONLY | O_CREAT | O_TRUNC, 0644);
+  if (in >= 0 && out >= 0 && errors >= 0 && ::dup2(in, STDIN_FILENO) >= 0 && ::dup2(out, STDOUT_FILENO) >= 0 &&
+      ::dup2(errors, STDERR_FILENO) >= 0)
+    ::execvpe(argv[0], argv, variables);
+  const int code = errno;
+  [[maybe_unused]] const ::ssize_t written = ::write(failure, &code, sizeof code);
+  ::_exit(127);
+}
+
+/// Starts a program.
+/// \throw IoError when it cannot be started
+::pid_t start(char* const* argv, char* const* variables, const std::string& error_file) {
+  int channel[2];  // closed by exec, or the errno of what failed before
+  if (::pipe2(channel, O_CLOEXEC) != 0)
+    throw IoError(fmt::format("{} cannot be started: {}", argv[0], std::strerror(errno)));
+  const ::pid_t parent = ::getpid(), child = ::fork();
+  if (child == 0) become(argv, variables, error_file.c_str(), parent, channel[1]);
+  int code = child < 0 ? errno : 0;
+  ::close(channel[1]);
+  if (child > 0 && ::read(channel[0], &code, sizeof code) == sizeof code) ::waitpid(child, nullptr, 0);
+  ::close(channel[0]);
+  if (code != 0) throw IoError(fmt::format("{} cannot be started: {}", argv[0], std::strerror(code)));
+  return child;
+}
 
 }  // namespace
 
@@ -37,16 +71,8 @@ ProcessResult run_process(const std::string& program, const std::vector<std::str
   variables.push_back(nullptr);
   argv.push_back(nullptr);
 
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, error_file.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
   const auto begin = std::chrono::steady_clock::now();
-  ::pid_t child = 0;
-  const int code = ::posix_spawnp(&child, program.c_str(), &actions, nullptr, argv.data(), variables.data());
-  posix_spawn_file_actions_destroy(&actions);
-  if (code != 0) throw IoError(fmt::format("{} cannot be started: {}", program, std::strerror(code)));
+  const ::pid_t child = start(argv.data(), variables.data(), error_file.string());
   int status = 0;
   rusage usage{};
   while (::wait4(child, &status, 0, &usage) < 0 && errno == EINTR) {

@@ -15,15 +15,16 @@ namespace {
 
 struct Arguments {
   std::string model, output, device, json;
-  bool is_removed = false;
+  bool is_removed = false, is_edited = false;
 };
 
 void run(const Arguments& arguments) {
   Stopwatch watch;
-  SkeletexModel model = read_model(arguments.model);
+  SkeletexModel model =
+      read_model(arguments.model, 0, arguments.is_edited ? ChecksumRule::kIgnore : ChecksumRule::kVerify);
   if (arguments.is_removed) {
     model.bone_weights.clear();
-  } else {
+  } else if (!arguments.is_edited) {
     ClContext context(arguments.device);
     ProgressBar bar(context);
     bar.show("weights", 0.2);
@@ -31,13 +32,15 @@ void run(const Arguments& arguments) {
   }
   write_model(arguments.output, model);
   Json channels = Json::array();
-  if (!arguments.is_removed)
+  if (!model.bone_weights.empty())
     for (const std::string& name : weight_channels(model.skeleton)) channels.push_back(name);
   const double ms = watch.lap_ms();
-  print(arguments.json, arguments.is_removed ? fmt::format("weights removed: {}\n", arguments.output)
-                                             : fmt::format("{} layers, {} to {}: {}\n", channels.size(),
-                                                           channels.front().get<std::string>(),
-                                                           channels.back().get<std::string>(), arguments.output));
+  print(arguments.json,
+        arguments.is_removed ? fmt::format("weights removed: {}\n", arguments.output)
+        : arguments.is_edited
+            ? fmt::format("taken over, {} layers of weights: {}\n", channels.size(), arguments.output)
+            : fmt::format("{} layers, {} to {}: {}\n", channels.size(), channels.front().get<std::string>(),
+                          channels.back().get<std::string>(), arguments.output));
   write_json(arguments.json,
              {{"output", arguments.output}, {"channels", std::move(channels)}, {"times_ms", {{"total", ms}}}});
 }
@@ -55,13 +58,19 @@ void add_weights_command(CLI::App& program) {
                  {".exr"})
       ->required()
       ->type_name("FILE");
-  command.add_flag("--remove", arguments->is_removed, "take such layers away: weights in closed form again");
+  CLI::Option* remove =
+      command.add_flag("--remove", arguments->is_removed, "take such layers away: weights in closed form again");
+  command
+      .add_flag("--edited", arguments->is_edited,
+                "compute nothing: take the model over as another program has changed it, with a new checksum")
+      ->excludes(remove);
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(
       "Examples:\n"
       "  skeletex weights bear.skx.exr -o painted.skx.exr\n"
-      "  skeletex reconstruct painted.skx.exr -o bear.ply --pose wave.json\n"
+      "  skeletex weights painted.skx.exr --edited -o checked.skx.exr      # painted on in another program\n"
+      "  skeletex reconstruct checked.skx.exr -o bear.ply --pose wave.json\n"
       "Weights are at least 0; where they do not sum to 1 they are scaled. Seams take those of the rows next to them.");
   command.callback([arguments] { run(*arguments); });
 }

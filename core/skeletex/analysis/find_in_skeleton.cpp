@@ -6,9 +6,11 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <numeric>
 
 #include "skeletex/analysis/findings.h"
+#include "skeletex/geometry/union_find.h"
+#include "skeletex/model/error.h"
+#include "skeletex/skeleton/check_skeleton.h"
 
 namespace skeletex {
 namespace {
@@ -19,19 +21,10 @@ constexpr double kSmallAngleDegrees = 5;
 
 /// The component of each node; nodes without bones are their own.
 std::vector<int> components_of(const Skeleton& skeleton) {
-  std::vector<int> component(skeleton.nodes.size());
-  std::iota(component.begin(), component.end(), 0);
-  bool is_changed = true;
-  while (is_changed) {
-    is_changed = false;
-    for (const Bone& bone : skeleton.bones) {
-      const int least = std::min(component[bone.head], component[bone.tail]);
-      for (const int n : {bone.head, bone.tail}) {
-        is_changed = is_changed || component[n] != least;
-        component[n] = least;
-      }
-    }
-  }
+  UnionFind sets(static_cast<int>(skeleton.nodes.size()));
+  for (const Bone& bone : skeleton.bones) sets.unite(bone.head, bone.tail);
+  std::vector<int> component;
+  for (int n = 0; n < static_cast<int>(skeleton.nodes.size()); ++n) component.push_back(sets.find(n));
   return component;
 }
 
@@ -255,6 +248,12 @@ int count_cycles(const Skeleton& skeleton) {
 bool find_in_skeleton(const Skeleton& skeleton, double diagonal, std::vector<Finding>& findings) {
   if (skeleton.bones.empty()) {
     findings.push_back({Severity::kError, "empty", "the skeleton has no bones", "give it at least one"});
+    return false;
+  }
+  try {
+    check_size(skeleton.nodes.size(), skeleton.bones.size());
+  } catch (const InputError& error) {
+    findings.push_back({Severity::kError, "size", error.what(), "take a coarser skeleton"});
     return false;
   }
   if (!find_unusable(skeleton, findings)) return false;

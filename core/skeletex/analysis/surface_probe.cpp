@@ -30,9 +30,12 @@ std::vector<double> SurfaceProbe::winding_numbers(std::span<const Vec3> points, 
   const std::size_t count = mesh_.triangles.size();
   std::vector<double> windings(points.size(), 0);
   if (is_closed) {
-    static_assert(sizeof(Triangle) == 3 * sizeof(int));
-    const std::span corners(mesh_.triangles.data()->data(), 3 * count);
     for_each_block(points.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+      std::vector<int> corners;  // of the triangles that the ray along z may meet
+      const Vec3 end(points[i].x(), points[i].y(), std::numeric_limits<double>::infinity());
+      for_each_triangle_near(tree_, points[i], end, [&](int t) {
+        corners.insert(corners.end(), mesh_.triangles[t].begin(), mesh_.triangles[t].end());
+      });
       windings[i] = winding_number(mesh_.positions, corners, points[i]);
     });
     return windings;
@@ -52,56 +55,33 @@ std::vector<double> SurfaceProbe::winding_numbers(std::span<const Vec3> points, 
 }
 
 NearestPoint SurfaceProbe::nearest(const Vec3& point) const {
-  const std::size_t count = mesh_.triangles.size();
-  struct Best {
-    double squared = std::numeric_limits<double>::infinity();
-    Vec3 offset = Vec3::Zero();
-    std::size_t triangle = 0;
-  };
-  std::vector<Best> best(block_count(count, kBlock));
-  for_each_block(count, kBlock, [&](std::size_t block, std::size_t begin, std::size_t end) {
-    Best& nearest = best[block];
-    for (std::size_t t = begin; t < end; ++t) {
-      const auto& [i, j, k] = mesh_.triangles[t];
-      const Vec3 &a = mesh_.positions[i], &b = mesh_.positions[j], &c = mesh_.positions[k];
-      // No point of a triangle is further from one of its corners than the longer edge there; most triangles end here.
-      const double extent = 1.000001 * std::sqrt(std::max((b - a).squaredNorm(), (c - a).squaredNorm())),
-                   limit = extent + std::sqrt(nearest.squared);
-      if ((a - point).squaredNorm() > limit * limit) continue;
-      const Vec3 offset = offset_from_triangle(point, a, b, c);
-      if (offset.squaredNorm() < nearest.squared) nearest = {offset.squaredNorm(), offset, t};
-    }
-  });
-  const Best& winner =
-      *std::min_element(best.begin(), best.end(), [](const Best& a, const Best& b) { return a.squared < b.squared; });
-  return {std::sqrt(winner.squared), point - winner.offset,
-          area_vector(mesh_, mesh_.triangles[winner.triangle]).normalized()};
+  const Triangle& t = mesh_.triangles[find_nearest_triangle(mesh_, tree_, point).triangle];
+  const Vec3 offset = offset_from_triangle(point, mesh_.positions[t[0]], mesh_.positions[t[1]], mesh_.positions[t[2]]);
+  return {offset.norm(), point - offset, area_vector(mesh_, t).normalized()};
 }
 
 std::vector<Crossing> SurfaceProbe::crossings(const Vec3& begin, const Vec3& end) const {
   const Vec3 way = end - begin;
-  const std::size_t count = mesh_.triangles.size();
-  std::vector<std::vector<Crossing>> found(block_count(count, kBlock));
   const Vec3 lower = begin.cwiseMin(end), upper = begin.cwiseMax(end);
-  for_each_block(count, kBlock, [&](std::size_t block, std::size_t first, std::size_t last) {
-    for (std::size_t t = first; t < last; ++t) {
-      const auto& [i, j, k] = mesh_.triangles[t];
-      const Vec3 &p = mesh_.positions[i], &q = mesh_.positions[j], &r = mesh_.positions[k];
-      if ((p.cwiseMin(q).cwiseMin(r).array() > upper.array()).any() ||
-          (p.cwiseMax(q).cwiseMax(r).array() < lower.array()).any())
-        continue;
-      const Vec3 a = p - begin, b = q - begin, c = r - begin;
-      const double ab = way.dot(a.cross(b)), bc = way.dot(b.cross(c)), ca = way.dot(c.cross(a));
-      if (!((ab >= 0 && bc >= 0 && ca >= 0) || (ab <= 0 && bc <= 0 && ca <= 0))) continue;
-      const Vec3 normal = (q - p).cross(r - p);
-      const double along = way.dot(normal);
-      if (along == 0) continue;
-      const double share = a.dot(normal) / along;
-      if (share >= 0 && share <= 1) found[block].push_back({share, begin + share * way, along > 0});
-    }
-  });
+  std::vector<int> near;
+  for_each_triangle_near(tree_, lower, upper, [&](int t) { near.push_back(t); });
+  std::sort(near.begin(), near.end());
   std::vector<Crossing> crossings;
-  for (const auto& some : found) crossings.insert(crossings.end(), some.begin(), some.end());
+  for (const int triangle : near) {
+    const auto& [i, j, k] = mesh_.triangles[triangle];
+    const Vec3 &p = mesh_.positions[i], &q = mesh_.positions[j], &r = mesh_.positions[k];
+    if ((p.cwiseMin(q).cwiseMin(r).array() > upper.array()).any() ||
+        (p.cwiseMax(q).cwiseMax(r).array() < lower.array()).any())
+      continue;
+    const Vec3 a = p - begin, b = q - begin, c = r - begin;
+    const double ab = way.dot(a.cross(b)), bc = way.dot(b.cross(c)), ca = way.dot(c.cross(a));
+    if (!((ab >= 0 && bc >= 0 && ca >= 0) || (ab <= 0 && bc <= 0 && ca <= 0))) continue;
+    const Vec3 normal = (q - p).cross(r - p);
+    const double along = way.dot(normal);
+    if (along == 0) continue;
+    const double share = a.dot(normal) / along;
+    if (share >= 0 && share <= 1) crossings.push_back({share, begin + share * way, along > 0});
+  }
   std::sort(crossings.begin(), crossings.end(), [](const Crossing& a, const Crossing& b) { return a.share < b.share; });
   // Through an edge or a vertex, all the triangles there are met in one place.
   const double same = 1e-9 * diagonal_;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "skeletex/geometry/mesh.h"
+#include "skeletex/geometry/triangle_tree.h"
 
 namespace skeletex {
 
@@ -20,11 +21,13 @@ struct NearestPoint {
   Vec3 normal = Vec3::Zero();  ///< outward, unit; zero at a triangle without area
 };
 
-/// Questions to a surface about a few points, answered by looking at every triangle, on all processors.
-/// The mesh must outlive the probe; it need not be closed.
+/// Questions to a surface about points and segments. The mesh must outlive the probe; it need not be closed.
+/// Cost: that of a tree of the mesh once, and then for a closed surface little more than that of the triangles near by.
 class SurfaceProbe {
  public:
-  explicit SurfaceProbe(const TriangleMesh& mesh) : mesh_(mesh), diagonal_(bounding_box(mesh).diagonal()) {}
+  /// \pre the mesh has triangles
+  explicit SurfaceProbe(const TriangleMesh& mesh)
+      : mesh_(mesh), diagonal_(bounding_box(mesh).diagonal()), tree_(build_triangle_tree(mesh)) {}
 
   double diagonal() const { return diagonal_; }
   /// How often the surface winds around each point: a whole number for a closed surface, found by rays; something in
@@ -39,6 +42,7 @@ class SurfaceProbe {
  private:
   const TriangleMesh& mesh_;
   double diagonal_;
+  TriangleTree tree_;
 };
 
 }  // namespace skeletex

@@ -19,8 +19,10 @@
 #include "skeletex/device/stopwatch.h"
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/model/error.h"
+#include "skeletex/model/memory.h"
 #include "skeletex/reconstruct/prepared_model.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/skeleton/check_skeleton.h"
 
 namespace skeletex {
 namespace {
@@ -40,6 +42,14 @@ void check_options(const EncodeOptions& options, const Skeleton& skeleton) {
                      [&](const Bone& bone) { return bone.name == override.first; }))
       throw InputError(
           fmt::format("a method is given for bone \"{}\", which the skeleton does not have", override.first));
+}
+
+/// What encoding takes at its peak, as measured, less a tenth.
+double estimated_bytes(const EncodeOptions& options, const TriangleMesh& mesh) {
+  constexpr double kPerTexel = 380, kPerRay = 80, kPerTriangle = 600;
+  const bool has_maps = !options.method || !is_height_field(*options.method);
+  return (has_maps ? kPerTexel : kPerRay) * options.width * options.height +
+         kPerTriangle * static_cast<double>(mesh.triangles.size());
 }
 
 /// SPD patches are neither snapped nor fitted; without the prefilter texels stay on the mesh unless the fit is asked
@@ -96,7 +106,7 @@ int pole_of(const Chart& chart, ChartVertex kind) {
   return static_cast<int>(std::find(chart.kinds.begin(), chart.kinds.end(), kind) - chart.kinds.begin());
 }
 
-/// The model as it is before its surface is mapped: frame, genus, and the skeleton with its angles of 0.
+/// The model as it is before its surface is mapped: frame, and the skeleton with its angles of 0.
 SkeletexModel start_model(const TriangleMesh& mesh, const Skeleton& skeleton) {
   SkeletexModel model;
   model.skeleton = skeleton;
@@ -110,8 +120,6 @@ SkeletexModel start_model(const TriangleMesh& mesh, const Skeleton& skeleton) {
         fmt::format("the mesh's bounding box has a diagonal of {:.3g}; the device computes in single precision, which "
                     "needs {:g} to {:g}: give mesh and skeleton in the unit frame of the mesh",
                     model.diagonal, kSmallestDiagonal, kLargestDiagonal));
-  // Euler's formula for a closed triangle mesh: edges are 3/2 of the triangles.
-  model.genus = (2 - (static_cast<int>(mesh.positions.size()) - static_cast<int>(mesh.triangles.size()) / 2)) / 2;
   return model;
 }
 
@@ -158,6 +166,7 @@ void add_seams(const Segmentation& segmentation, const SeparationPlanes& separat
   model.arcs = std::move(seams.arcs);
   model.corners = std::move(seams.corners);
   model.ends = std::move(seams.ends);
+  model.genus = genus_of(model);
 }
 
 /// Per bone what the rays of its texels hit; nothing for a bone with a map.
@@ -360,9 +369,12 @@ void report_result(const EncodeJob& job, const Encoding& encoding, const MappedS
 EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& skeleton,
                           const EncodeOptions& options) {
   check_options(options, skeleton);
+  check_size(skeleton.nodes.size(), skeleton.bones.size());
   if (options.tree && options.tree->order.size() != mesh.triangles.size())
     throw InputError(fmt::format("the tree is of {} triangles, the mesh has {}; give the mesh's own, or none",
                                  options.tree->order.size(), mesh.triangles.size()));
+  require_memory(estimated_bytes(options, mesh), fmt::format("encoding {} triangles to {} x {} texels",
+                                                             mesh.triangles.size(), options.width, options.height));
   const auto progress = [&](const char* stage, double done) {
     if (options.progress && !options.progress(stage, done)) throw Error("cancelled");
   };

@@ -16,6 +16,7 @@
 #include "skeletex/device/kernel_source.h"
 #include "skeletex/device/workarounds.h"
 #include "skeletex/model/error.h"
+#include "skeletex/model/memory.h"
 
 namespace skeletex {
 
@@ -122,13 +123,25 @@ std::vector<std::pair<ClDeviceInfo, ::cl::Device>> enumerate() {
   return found;
 }
 
+std::string why_no_device() {
+  constexpr std::uint64_t kLeast = std::uint64_t{1} << 30;  // what OpenCL on the CPU takes of addresses, most unused
+  if (const std::uint64_t free = free_addresses(); free < kLeast)
+    return fmt::format(
+        "no OpenCL device found: the limit of this shell (ulimit -v) leaves {} MiB of addresses, and "
+        "OpenCL on the CPU takes {}; raise it",
+        free >> 20, kLeast >> 20);
+  std::vector<::cl::Platform> platforms;
+  if (::cl::Platform::get(&platforms) == CL_SUCCESS && !platforms.empty())
+    if (const std::string fault = workarounds::fault_of_kernel_cache(); !fault.empty())
+      return "no OpenCL device found: " + fault;
+  return "no OpenCL device found; install a driver (Debian: apt-get install pocl-opencl-icd runs OpenCL on the CPU)";
+}
+
 /// Position in `devices` of the one that the selector names.
 /// \throw DeviceError
 std::size_t choose_device(const std::vector<std::pair<ClDeviceInfo, ::cl::Device>>& devices,
                           const std::string& selector) {
-  if (devices.empty())
-    throw DeviceError(
-        "no OpenCL device found; install a driver (Debian: apt-get install pocl-opencl-icd runs OpenCL on the CPU)");
+  if (devices.empty()) throw DeviceError(why_no_device());
   std::string wanted = selector;
   if (wanted.empty())
     if (const char* variable = std::getenv("SKELETEX_DEVICE")) wanted = variable;
@@ -248,6 +261,9 @@ ClContext::Driver::Driver(const ClDeviceInfo& info_given, ::cl::Device device_gi
   if (code != CL_SUCCESS) {
     std::string log;
     built.getBuildInfo(device, CL_PROGRAM_BUILD_LOG, &log);
+    if (log.find("error:") == std::string::npos)  // not the source is at fault
+      if (const std::string fault = workarounds::fault_of_kernel_cache(); !fault.empty())
+        throw DeviceError(fmt::format("{}: not compiled on {}: {}", name.file, info.name, fault));
     throw DeviceError(fmt::format("{}: {} on {}\n{}", name.file, describe(code), info.name, quote_kernel_lines(log)));
   }
   return programs.emplace(key_of(files), built).first->second;
@@ -302,6 +318,7 @@ std::shared_ptr<ClMemory> ClContext::allocate_bytes(std::size_t bytes, const voi
         fmt::format("{:.0f} MiB in one buffer are more than {} allows ({:.0f} MiB); ask for a smaller texture, or "
                     "choose another device",
                     mebibytes(bytes), info_.name, mebibytes(info_.max_allocation_bytes)));
+  workarounds::require_addresses(info_, bytes);
   cl_int code = CL_SUCCESS;
   constexpr std::size_t kLeast = 16;  // OpenCL has no empty buffers
   std::array<std::byte, kLeast> few{};
@@ -312,6 +329,8 @@ std::shared_ptr<ClMemory> ClContext::allocate_bytes(std::size_t bytes, const voi
   const cl_mem_flags flags = values ? CL_MEM_READ_WRITE | CL_MEM_COPY_HOST_PTR : CL_MEM_READ_WRITE;
   ::cl::Buffer buffer(driver_->context, flags, std::max(bytes, kLeast), const_cast<void*>(values), &code);
   check(code, fmt::format("allocating {:.1f} MiB on {}", mebibytes(bytes), info_.name));
+  if (!values && workarounds::has_limited_addresses(info_))
+    check(driver_->queue.enqueueFillBuffer(buffer, cl_uint{0}, 0, kLeast), "writing to the device");
   return std::make_shared<ClMemory>(ClMemory{std::move(buffer)});
 }
 

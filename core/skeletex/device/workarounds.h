@@ -28,4 +28,15 @@ struct FillPattern {
 };
 FillPattern longest_pattern(const void* pattern, std::size_t pattern_bytes, std::size_t buffer_bytes);
 
+/// Why PoCL finds no device or compiles nothing, where that is its folder of compiled kernels: PoCL itself says
+/// something else. Empty where the folder can be written, and tried with a few files.
+std::string fault_of_kernel_cache();
+
+/// PoCL takes the memory of a buffer at its first use and ends the program where there is none. Where addresses are
+/// limited (ulimit -v), buffers of CPU devices are therefore refused before that.
+/// \throw DeviceError
+void require_addresses(const ClDeviceInfo& device, std::size_t bytes);
+/// Whether they are limited, so that a buffer should be used as soon as it is made.
+bool has_limited_addresses(const ClDeviceInfo& device);
+
 }  // namespace skeletex::workarounds

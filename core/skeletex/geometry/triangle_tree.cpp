@@ -202,4 +202,28 @@ NearestTriangle find_nearest_triangle(const TriangleMesh& mesh, const TriangleTr
   return nearest;
 }
 
+void for_each_triangle_near(const TriangleTree& tree, const Vec3& lower, const Vec3& upper,
+                            const std::function<void(int triangle)>& visit) {
+  constexpr double kRounding = 1e-6;  // of the tree's units, as above
+  const Eigen::Vector3f least = ((lower - tree.origin) / tree.scale - Vec3::Constant(kRounding)).cast<float>(),
+                        greatest = ((upper - tree.origin) / tree.scale + Vec3::Constant(kRounding)).cast<float>();
+  std::vector<std::pair<int, std::size_t>> open{{tree.top_level(), 0}};
+  while (!open.empty()) {
+    const auto [level, index] = open.back();
+    open.pop_back();
+    if (level == 0) {
+      const std::size_t begin = index * kWidth, end = std::min(begin + kWidth, tree.order.size());
+      for (std::size_t at = begin; at < end; ++at) visit(tree.order[at]);
+      continue;
+    }
+    const float* planes = tree.boxes.data() + (tree.level_begin[level] + index) * 6 * kWidth;
+    for (int k = 0; k < kWidth; ++k) {
+      bool is_met = true;
+      for (int d = 0; d < 3; ++d)
+        is_met = is_met && planes[d * kWidth + k] <= greatest[d] && planes[(3 + d) * kWidth + k] >= least[d];
+      if (is_met) open.emplace_back(level - 1, kWidth * index + k);
+    }
+  }
+}
+
 }  // namespace skeletex

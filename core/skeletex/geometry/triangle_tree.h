@@ -53,4 +53,9 @@ NearestTriangle find_nearest_triangle(const TriangleMesh& mesh, const TriangleTr
                                       double bound = std::numeric_limits<double>::infinity(),
                                       const std::function<bool(int triangle)>& counts = nullptr);
 
+/// Calls visit with every triangle whose box meets a box, and with some others near by.
+/// \param lower, upper  of the box, in the mesh's coordinates; may be infinite
+void for_each_triangle_near(const TriangleTree& tree, const Vec3& lower, const Vec3& upper,
+                            const std::function<void(int triangle)>& visit);
+
 }  // namespace skeletex

@@ -3,11 +3,15 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <ctime>
+#include <utility>
 
 #include "skeletex/model/error.h"
 
@@ -17,6 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kBuffer = 1 << 20;  // bytes
+constexpr std::string_view kEnding = ".part";
 
 void flush_to_disk(const fs::path& path, const fs::path& target, int flags) {
   const int descriptor = ::open(path.c_str(), flags | O_CLOEXEC);
@@ -29,14 +34,60 @@ void flush_to_disk(const fs::path& path, const fs::path& target, int flags) {
     throw IoError(fmt::format("{}: cannot write: {}", target.string(), std::strerror(code)));
 }
 
-/// Removes the temporary file unless it has been renamed.
-struct Remover {
-  fs::path path;
-  ~Remover() {
-    std::error_code ignored;
-    if (!path.empty()) fs::remove(path, ignored);
+/// A temporary file beside its target, locked while it lives, and removed unless it has been renamed.
+class Temporary {
+ public:
+  explicit Temporary(fs::path path)
+      : path_(std::move(path)), descriptor_(::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666)) {
+    if (descriptor_ < 0)
+      path_.clear();
+    else
+      ::flock(descriptor_, LOCK_EX | LOCK_NB);
   }
+  ~Temporary() {
+    std::error_code ignored;
+    if (!path_.empty()) fs::remove(path_, ignored);
+    if (descriptor_ >= 0) ::close(descriptor_);
+  }
+  Temporary(const Temporary&) = delete;
+  Temporary& operator=(const Temporary&) = delete;
+
+  bool exists() const { return descriptor_ >= 0; }
+  const fs::path& path() const { return path_; }
+  void rename_to(const fs::path& target, std::error_code& error) {
+    fs::rename(path_, target, error);
+    if (!error) path_.clear();
+  }
+
+ private:
+  fs::path path_;
+  int descriptor_;
 };
+
+/// Removes a temporary file that nobody has locked: its process was killed.
+void remove_if_left(const fs::path& path) {
+  const int descriptor = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  // Somebody else may be between making the file and locking it.
+  struct ::stat status {};
+  const bool is_new =
+      ::fstat(descriptor, &status) != 0 || (status.st_size == 0 && std::time(nullptr) - status.st_mtime < 2);
+  std::error_code ignored;
+  if (!is_new && ::flock(descriptor, LOCK_EX | LOCK_NB) == 0) fs::remove(path, ignored);
+  ::close(descriptor);
+}
+
+/// Removes what killed processes left of earlier attempts at a file.
+void remove_leftovers(const fs::path& folder, const std::string& prefix) {
+  std::error_code ignored;
+  for (fs::directory_iterator at(folder, ignored), end; at != end; at.increment(ignored)) {
+    const std::string name = at->path().filename().string();
+    if (name.starts_with(prefix) && name.ends_with(kEnding) &&
+        name.find_first_not_of("0123456789-", prefix.size()) == name.size() - kEnding.size())
+      remove_if_left(at->path());
+    if (ignored) return;
+  }
+}
 
 }  // namespace
 
@@ -58,21 +109,17 @@ void write_atomically(const fs::path& path, const std::function<void(const fs::p
   if (!fs::is_directory(folder, error))
     throw IoError(fmt::format("{}: the folder {} does not exist; create it first", path.string(), folder.string()));
 
+  const std::string prefix = fmt::format(".{}.", target.filename().string());
+  remove_leftovers(folder, prefix);
   static std::atomic<unsigned> counter{0};
-  Remover temporary{folder / fmt::format(".{}.{}-{}.part", target.filename().string(), ::getpid(), counter++)};
-  // Claim the name here, so that an unwritable folder is reported the same way whoever writes.
-  const int claimed = ::open(temporary.path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  if (claimed < 0) {
-    const int code = errno;
-    temporary.path.clear();
-    throw IoError(fmt::format("{}: cannot write in {}: {}", path.string(), folder.string(), std::strerror(code)));
-  }
-  ::close(claimed);
-  write(temporary.path);
-  flush_to_disk(temporary.path, path, O_RDWR);
-  fs::rename(temporary.path, target, error);
+  // The name is claimed here, so that an unwritable folder is reported the same way whoever writes.
+  Temporary temporary(folder / fmt::format("{}{}-{}{}", prefix, ::getpid(), counter++, kEnding));
+  if (!temporary.exists())
+    throw IoError(fmt::format("{}: cannot write in {}: {}", path.string(), folder.string(), std::strerror(errno)));
+  write(temporary.path());
+  flush_to_disk(temporary.path(), path, O_RDWR);
+  temporary.rename_to(target, error);
   if (error) throw IoError(fmt::format("{}: cannot write: {}", path.string(), error.message()));
-  temporary.path.clear();
   flush_to_disk(folder, path, O_RDONLY | O_DIRECTORY);
 }
 

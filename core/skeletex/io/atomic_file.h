@@ -10,7 +10,8 @@
 namespace skeletex {
 
 /// Calls `write` with a temporary path beside `path`, flushes to disk and renames it to `path`. When anything throws
-/// the temporary file is removed and `path` is as it was. A symbolic link is followed; a device or a pipe is written
+/// the temporary file is removed and `path` is as it was. Where the process is killed it stays, and the next call for
+/// `path` removes it. A symbolic link is followed; a device or a pipe is written
 /// in place.
 /// \throw IoError when the folder is missing or not writable, or the disk is full
 void write_atomically(const std::filesystem::path& path,

@@ -38,6 +38,8 @@ class ModelCheck {
     check_corners();
     check_arcs();
     check_ends();
+    require(m_.genus == genus_of(m_), "genus",
+            fmt::format("it is {}, and patches and seams make a surface of genus {}", m_.genus, genus_of(m_)));
   }
 
  private:

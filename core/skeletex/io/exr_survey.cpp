@@ -110,8 +110,16 @@ void check_allocations(const Reader& in, const ExrSurvey& survey) {
         in.fail("the header is damaged (preview image)");
     } else if (attribute.type == "chlist") {
       int channels = 0;
-      for (std::size_t at = 0; at < value.size() && value[at] != '\0'; ++channels)
-        at = value.find('\0', at) == std::string::npos ? value.size() : value.find('\0', at) + 17;
+      for (std::size_t at = 0; at < value.size() && value[at] != '\0'; ++channels) {
+        const std::size_t end = value.find('\0', at);
+        if (end == std::string::npos || value.size() - end < 17) in.fail("the header is damaged (channels)");
+        std::int32_t numbers[4];  // type, two of no meaning here, steps in x and y
+        std::memcpy(numbers, value.data() + end + 1, sizeof numbers);
+        if (numbers[0] < 0 || numbers[0] > 2 || numbers[2] != 1 || numbers[3] != 1)
+          in.fail(fmt::format("channel \"{}\" is not in full resolution, or of an unknown type",
+                              printable(value.substr(at, end - at))));
+        at = end + 17;
+      }
       if (channels > kMaxChannels)
         in.fail(fmt::format("an image of {} channels; a model has at most {}", channels, kMaxChannels));
     }
@@ -170,7 +178,7 @@ void check_chunk(Reader& in, std::uint64_t offset, std::uint64_t begin, std::siz
 
 }  // namespace
 
-std::vector<ExrSurvey> survey_exr(const std::filesystem::path& path, int max_size, bool is_header_only) {
+std::vector<ExrSurvey> survey_exr(const std::filesystem::path& path, int max_size) {
   constexpr std::uint32_t kLongNames = 0x400, kSeveralParts = 0x1000;
   Reader in(path);
   constexpr std::string_view kMagic("\x76\x2f\x31\x01", 4);
@@ -190,7 +198,6 @@ std::vector<ExrSurvey> survey_exr(const std::filesystem::path& path, int max_siz
     parts.push_back(std::move(part));
   } while (has_several);
   if (parts.empty()) in.fail("the header is damaged (no parts)");
-  if (is_header_only) return parts;
 
   std::vector<std::string> tables;
   for (std::size_t part = 0; part < parts.size(); ++part)

@@ -20,11 +20,9 @@ struct ExrSurvey {
 /// Walks through a scanline OpenEXR file of one or several parts: headers, line offset tables and the heads of all
 /// chunks. OpenEXR itself would allocate whatever a damaged header asks for, and fills in for a missing end of the
 /// file.
-/// \param max_size        largest width and height accepted
-/// \param is_header_only  read no further than the
-/// headers
+/// \param max_size  largest width and height accepted
 /// \return one per part
 /// \throw IoError: not OpenEXR, tiled or deep, lossy compression, absurd sizes, truncated
-std::vector<ExrSurvey> survey_exr(const std::filesystem::path& path, int max_size, bool is_header_only);
+std::vector<ExrSurvey> survey_exr(const std::filesystem::path& path, int max_size);
 
 }  // namespace skeletex

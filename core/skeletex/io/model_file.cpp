@@ -15,8 +15,12 @@
 #include <OpenEXR/ImfThreading.h>
 #include <fmt/format.h>
 
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <mutex>
 #include <thread>
 
@@ -26,12 +30,39 @@
 #include "skeletex/io/json_file.h"
 #include "skeletex/io/model_json.h"
 #include "skeletex/model/error.h"
+#include "skeletex/model/memory.h"
 
 namespace skeletex {
 namespace {
 
 constexpr const char* kAttribute = "skeletex";
 constexpr const char* kChannels[3] = {"R", "G", "B"};
+
+/// XXH64 over the header's JSON, in which the digits of the checksum itself are zeros, and over the texels of all
+/// channels as floats, in the order R, G, B, weights, layers.
+class Checksum {
+ public:
+  static constexpr std::string_view kKey = "\"checksum\":\"", kZeros = "0000000000000000";
+
+  explicit Checksum(std::string_view json_with_zeros) : state_(XXH64_createState(), XXH64_freeState) {
+    XXH64_reset(state_.get(), 0);
+    XXH64_update(state_.get(), json_with_zeros.data(), json_with_zeros.size());
+  }
+  void add(const std::vector<float>& texels) {
+    XXH64_update(state_.get(), texels.data(), texels.size() * sizeof(float));
+  }
+  std::string digits() const { return fmt::format("{:016x}", XXH64_digest(state_.get())); }
+
+  /// Where the digits are in a header's JSON; npos: it has none.
+  static std::size_t find_digits(std::string_view json) {
+    const std::size_t at = json.find(kKey);
+    return at == std::string_view::npos || json.size() - at < kKey.size() + kZeros.size() ? std::string_view::npos
+                                                                                          : at + kKey.size();
+  }
+
+ private:
+  std::unique_ptr<XXH64_state_t, XXH_errorcode (*)(XXH64_state_t*)> state_;
+};
 
 /// OpenEXR's own streams lose write errors of their last bytes; this one keeps them (see OutputFile::close).
 class ExrStream : public Imf::OStream {
@@ -186,12 +217,14 @@ ExrPart make_part(const SkeletexModel& model, const ModelFileOptions& options, c
   const int width = model.texture.width, height = model.texture.height;
   std::string json;
   try {
-    json = model_to_json(model, where).dump();
+    nlohmann::json root = model_to_json(model, where);
+    root["checksum"] = Checksum::kZeros;
+    json = root.dump();
   } catch (const nlohmann::json::exception& error) {
     throw IoError(fmt::format("{}: a name in the skeleton is not UTF-8 text: {}", where, error.what()));
   }
   ExrPart part{Imf::Header(width, height), {}, {}};
-  part.header.insert(kAttribute, Imf::StringAttribute(json));
+  Checksum checksum(json);
   const auto add_channel = [&](const std::string& name, const std::vector<float>& texels, bool is_half) {
     const void* data = texels.data();
     if (is_half) {
@@ -201,7 +234,11 @@ ExrPart make_part(const SkeletexModel& model, const ModelFileOptions& options, c
         throw IoError(fmt::format(
             "{}: channel {} has {}, beyond half precision's range of +-65504; store float, or scale the mesh", where,
             name, *largest));
-      data = part.halves.emplace_back(texels.begin(), texels.end()).data();
+      const std::vector<half>& halves = part.halves.emplace_back(texels.begin(), texels.end());
+      data = halves.data();
+      checksum.add({halves.begin(), halves.end()});
+    } else {
+      checksum.add(texels);
     }
     const Imf::PixelType type = is_half ? Imf::HALF : Imf::FLOAT;
     const std::size_t bytes = is_half ? sizeof(half) : sizeof(float);
@@ -221,6 +258,8 @@ ExrPart make_part(const SkeletexModel& model, const ModelFileOptions& options, c
   for (std::size_t i = 0; i < names.size(); ++i)
     for (std::size_t k = 0; k < names[i].size(); ++k)
       add_channel(names[i][k], model.layers[i].planes[k], model.layers[i].kind != LayerKind::kNumber);
+  json.replace(Checksum::find_digits(json), Checksum::kZeros.size(), checksum.digits());
+  part.header.insert(kAttribute, Imf::StringAttribute(json));
   const bool has_zip = options.compression == ExrCompression::kZip ||
                        (options.compression == ExrCompression::kAuto && pays_zip(part, width, height));
   part.header.compression() = has_zip                                       ? Imf::ZIP_COMPRESSION
@@ -283,28 +322,44 @@ const ExrSurvey& part_of(const std::vector<ExrSurvey>& parts, int level, const s
   return parts[level];
 }
 
-}  // namespace
-
-nlohmann::json read_model_header(const std::filesystem::path& path, int level) {
-  const std::vector<ExrSurvey> parts = survey_exr(path, kMaxTextureSize, true);
-  return header_json(part_of(parts, level, path.string()), path.string());
-}
-
-std::vector<std::array<int, 2>> read_model_levels(const std::filesystem::path& path) {
-  std::vector<std::array<int, 2>> sizes;
-  for (const ExrSurvey& part : survey_exr(path, kMaxTextureSize, true)) sizes.push_back({part.width, part.height});
-  return sizes;
-}
-
-SkeletexModel read_model(const std::filesystem::path& path, int level) {
-  const std::string where = path.string();
+/// A level of a file as it is, with the JSON of its header.
+struct ReadModel {
+  nlohmann::json header;
   SkeletexModel model;
+};
+
+/// That header and texels are those that were written. Files of version 1 have no checksum.
+/// \param planes  the texels of all channels, in the order of the checksum
+void check_sum(std::string json, const nlohmann::json& header, std::span<const std::vector<float>* const> planes,
+               const std::string& where) {
+  const std::size_t at = Checksum::find_digits(json);
+  if (at == std::string::npos) {
+    if (header.value("version", 0) > 1) throw IoError(where + ": the header is damaged (no checksum)");
+    return;
+  }
+  const std::string written = json.substr(at, Checksum::kZeros.size());
+  Checksum checksum(json.replace(at, Checksum::kZeros.size(), Checksum::kZeros));
+  for (const std::vector<float>* plane : planes) checksum.add(*plane);
+  if (checksum.digits() != written)
+    throw IoError(fmt::format(
+        "{}: the file is damaged, or was changed by another program: its checksum is {} instead of {}. Copy it again; "
+        "if you have edited it, take it over with `skeletex weights {} --edited -o FILE`",
+        where, checksum.digits(), written, where));
+}
+
+ReadModel read_level(const std::filesystem::path& path, int level, ChecksumRule rule) {
+  const std::string where = path.string();
+  ReadModel result;
+  SkeletexModel& model = result.model;
+  const nlohmann::json& header = result.header;
+  std::string json;
   std::vector<std::string> weight_names;
   std::vector<std::vector<std::string>> layer_names;
   {
-    const std::vector<ExrSurvey> parts = survey_exr(path, kMaxTextureSize, false);
+    const std::vector<ExrSurvey> parts = survey_exr(path, kMaxTextureSize);
     const ExrSurvey& survey = part_of(parts, level, where);
-    const nlohmann::json header = header_json(survey, where);
+    result.header = header_json(survey, where);
+    json = survey.attributes.at(kAttribute).value;
     model = model_from_json(header, where);
     weight_names = weight_channels(header, model.skeleton.bones.size(), where);
     model.bone_weights.resize(weight_names.size());
@@ -318,6 +373,10 @@ SkeletexModel read_model(const std::filesystem::path& path, int level) {
   }
   const auto width = static_cast<std::size_t>(model.texture.width),
              height = static_cast<std::size_t>(model.texture.height);
+  std::size_t plane_count = 3 + model.bone_weights.size();
+  for (const std::vector<std::string>& names : layer_names) plane_count += names.size();
+  require_memory(static_cast<double>(plane_count * width * height * sizeof(float)),
+                 fmt::format("reading {} ({} x {} texels)", where, width, height));
   use_threads();
   with_openexr(where, "cannot read, the file is damaged", [&] {
     Imf::MultiPartInputFile file(path.c_str());
@@ -346,7 +405,30 @@ SkeletexModel read_model(const std::filesystem::path& path, int level) {
     exr.readPixels(0, model.texture.height - 1);
   });
   check_texels(model, where);
-  return model;
+  if (rule == ChecksumRule::kVerify) {
+    std::vector<const std::vector<float>*> planes{&model.texture.along, &model.texture.around, &model.texture.out};
+    for (const std::vector<float>& weights : model.bone_weights) planes.push_back(&weights);
+    for (const Layer& layer : model.layers)
+      for (const std::vector<float>& plane : layer.planes) planes.push_back(&plane);
+    check_sum(std::move(json), header, planes, where);
+  }
+  return result;
+}
+
+}  // namespace
+
+SkeletexModel read_model(const std::filesystem::path& path, int level, ChecksumRule rule) {
+  return read_level(path, level, rule).model;
+}
+
+nlohmann::json read_model_header(const std::filesystem::path& path, int level) {
+  return read_level(path, level, ChecksumRule::kVerify).header;
+}
+
+std::vector<std::array<int, 2>> read_model_levels(const std::filesystem::path& path) {
+  std::vector<std::array<int, 2>> sizes;
+  for (const ExrSurvey& part : survey_exr(path, kMaxTextureSize)) sizes.push_back({part.width, part.height});
+  return sizes;
 }
 
 }  // namespace skeletex

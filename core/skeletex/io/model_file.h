@@ -32,15 +32,19 @@ void write_model(const std::filesystem::path& path, const SkeletexModel& model, 
 void write_model_levels(const std::filesystem::path& path, std::span<const SkeletexModel> levels,
                         const ModelFileOptions& options = {});
 
+/// kVerify: header and texels must be those that were written (docs/file-formats.md). kIgnore: for files that another
+/// program was meant to change.
+enum class ChecksumRule { kVerify, kIgnore };
+
 /// \param level  part of the file: 0, the finest, is what files of one part have
 /// \throw IoError: there is no such level; not an EXR, truncated, no skeletex attribute, a newer version, or contents
 /// that do not fit together (every index, size and number is checked before use)
-SkeletexModel read_model(const std::filesystem::path& path, int level = 0);
+SkeletexModel read_model(const std::filesystem::path& path, int level = 0, ChecksumRule rule = ChecksumRule::kVerify);
 
-/// The header's JSON alone, without reading texels, for `skeletex inspect`.
+/// The header's JSON of a model that is read and checked as by read_model.
 nlohmann::json read_model_header(const std::filesystem::path& path, int level = 0);
 
-/// Width and height of every level in a file, without reading texels.
+/// Width and height of every level in a file.
 /// \throw IoError
 std::vector<std::array<int, 2>> read_model_levels(const std::filesystem::path& path);
 

@@ -8,6 +8,7 @@
 #include "skeletex/io/json_file.h"
 #include "skeletex/io/read_file.h"
 #include "skeletex/model/error.h"
+#include "skeletex/skeleton/check_skeleton.h"
 
 namespace skeletex {
 namespace {
@@ -52,6 +53,11 @@ Skeleton skeleton_from_json(const nlohmann::json& json, const std::string& where
   std::unordered_map<std::string, int> node_names, bone_names;
   const nlohmann::json& nodes = json_array(json_member(json, "nodes", where), where + ": \"nodes\"");
   const nlohmann::json& bones = json_array(json_member(json, "bones", where), where + ": \"bones\"");
+  try {
+    check_size(nodes.size(), bones.size());
+  } catch (const InputError& error) {
+    throw IoError(fmt::format("{}: {}", where, error.what()));
+  }
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     Node node;
     node.name = name_of(nodes[i], "node", i, entry(where, "nodes", i));

@@ -2,6 +2,7 @@
 #pragma once
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 namespace skeletex {
 
@@ -30,5 +31,9 @@ class DeviceError : public Error {
  public:
   using Error::Error;
 };
+
+/// Text as a terminal may show it: control characters but line ends and tabs become \xNN, so that a name in a file
+/// cannot steer the terminal. The program prints nothing else.
+std::string printable(std::string_view text);
 
 }  // namespace skeletex

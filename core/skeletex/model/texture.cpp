@@ -19,6 +19,15 @@ const char* to_string(SegmentTopology topology) {
   return "";
 }
 
+int genus_of(const SkeletexModel& model) {
+  // Without their boundaries, a disk counts 1, a sphere 2, an annulus or a closed arc 0, an open arc -1, a corner 1.
+  int euler = static_cast<int>(model.corners.size());
+  for (const Patch& patch : model.patches)
+    euler += patch.topology == SegmentTopology::kDisk ? 1 : patch.topology == SegmentTopology::kSphere ? 2 : 0;
+  for (const SeamArc& arc : model.arcs) euler -= arc.is_closed() ? 0 : 1;
+  return (2 - euler) / 2;
+}
+
 SkeletexModel in_frame(SkeletexModel model, const UnitFrame& frame) {
   const UnitFrame& own = model.skeleton.frame;
   if (frame == own) return model;

@@ -124,6 +124,10 @@ struct SkeletexModel {
   std::string encoder_settings;  ///< JSON object: how the model was made, for the record; nothing depends on it
 };
 
+/// The genus of the surface that a model's patches and seams make, by Euler's formula.
+/// \pre the model is in one piece
+int genus_of(const SkeletexModel& model);
+
 /// The same model in another frame. Of scales that differ, texels are rounded once more.
 /// \throw InputError when its diagonal would not be between kSmallestDiagonal and kLargestDiagonal there
 SkeletexModel in_frame(SkeletexModel model, const UnitFrame& frame);

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "reconstruct_structs.h"
+#include "skeletex/model/memory.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/reconstruct/seam_strip.h"
@@ -117,6 +120,10 @@ std::vector<Triangle> end_triangles(const PreparedModel& model, const std::vecto
 }
 
 BindMesh reconstruct_bind_mesh(ClContext& context, const PreparedModel& model) {
+  constexpr double kBytesPerTexel = 75;
+  const DisplacementTexture& texture = model.model.texture;
+  require_memory(kBytesPerTexel * texture.width * texture.height,
+                 fmt::format("a mesh of {} x {} texels", texture.width, texture.height));
   BindMesh bind;
   bind.inner = row_points(context, model, RowChoice::kInner);
   bind.mesh.positions = place_vertices(context, model, bind.inner);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/reconstruct/resample.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -8,6 +10,7 @@
 #include "reconstruct_structs.h"
 #include "skeletex/convert/layout/pack_atlas.h"
 #include "skeletex/model/encoder_settings.h"
+#include "skeletex/model/memory.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/layer_values.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
@@ -436,6 +439,8 @@ SkeletexModel resample_model(ClContext& context, const PreparedModel& prepared, 
   const int width = side(model.texture.width), height = side(model.texture.height);
   if (width == model.texture.width && height == model.texture.height) return model;
 
+  constexpr double kBytesPerTexel = 75;
+  require_memory(kBytesPerTexel * width * height, fmt::format("a model of {} x {} texels", width, height));
   SkeletexModel result = model;
   result.texture = {};
   result.texture.width = width;

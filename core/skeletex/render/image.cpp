@@ -5,6 +5,7 @@
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfStdIO.h>
 #include <cairo.h>
 #include <fmt/format.h>
 
@@ -154,6 +155,8 @@ void write_png(const std::filesystem::path& path, const Image& image) {
 }
 
 void write_exr_image(const std::filesystem::path& path, const Image& image) {
+  // By way of memory: OpenEXR's own files lose write errors of their last bytes.
+  Imf::StdOSStream stream;
   write_atomically(path, [&](const std::filesystem::path& temporary) {
     try {
       Imf::Header header(image.width, image.height);
@@ -166,12 +169,15 @@ void write_exr_image(const std::filesystem::path& path, const Image& image) {
                      Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(image.rgba.data() + c)),
                                 4 * sizeof(float), 4 * sizeof(float) * static_cast<std::size_t>(image.width)));
       }
-      Imf::OutputFile file(temporary.c_str(), header);
-      file.setFrameBuffer(frame);
-      file.writePixels(image.height);
+      Imf::OutputFile exr(stream, header);
+      exr.setFrameBuffer(frame);
+      exr.writePixels(image.height);
     } catch (const std::exception& error) {
       throw IoError(fmt::format("{}: {}", path.string(), error.what()));
     }
+    OutputFile file(temporary, path);
+    file.write(stream.str());
+    file.close();
   });
 }
 

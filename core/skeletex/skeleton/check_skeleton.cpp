@@ -9,9 +9,21 @@
 #include <limits>
 
 #include "skeletex/geometry/parallel.h"
+#include "skeletex/geometry/union_find.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
+
+void check_size(std::size_t nodes, std::size_t bones) {
+  if (bones > kMostBones)
+    throw InputError(
+        fmt::format("the skeleton has {} bones; at most {} are taken, leave out those that move nothing of "
+                    "their own",
+                    bones, kMostBones));
+  if (nodes > 2 * kMostBones)
+    throw InputError(fmt::format("the skeleton has {} nodes; {} bones, the most that are taken, have no more than {}",
+                                 nodes, kMostBones, 2 * kMostBones));
+}
 
 /// Crossings of the ray from the point along +z, with sign. Sides of edges are found from the lower vertex, and
 /// vertices at the ray's y count as above it, so neighbouring triangles never both or neither count the ray.
@@ -74,17 +86,10 @@ double first_crossing(const CutMesh& mesh, const Vec3& head, const Vec3& tail) {
 }
 
 void check_connected(const Skeleton& skeleton) {
-  // Spread from the first bone over shared nodes.
-  std::vector<bool> is_reached(skeleton.nodes.size(), false);
-  is_reached[skeleton.bones[0].head] = true;
-  for (bool is_changed = true; is_changed;) {
-    is_changed = false;
-    for (const Bone& bone : skeleton.bones)
-      if (is_reached[bone.head] != is_reached[bone.tail])
-        is_reached[bone.head] = is_reached[bone.tail] = is_changed = true;
-  }
+  UnionFind sets(static_cast<int>(skeleton.nodes.size()));
+  for (const Bone& bone : skeleton.bones) sets.unite(bone.head, bone.tail);
   for (const Bone& bone : skeleton.bones)
-    if (!is_reached[bone.head])
+    if (sets.find(bone.head) != sets.find(skeleton.bones[0].head))
       throw TopologyError(fmt::format(
           "bone \"{}\" at {} is not connected with bone \"{}\"; let them share a node, or join them by further bones",
           bone.name, text_of(skeleton, skeleton.nodes[bone.head].position), skeleton.bones[0].name));
@@ -107,32 +112,40 @@ void check_connected(const Skeleton& skeleton) {
       node.name, bones, text_of(skeleton, node.position), text_of(skeleton, vertex)));
 }
 
-void check_nodes(const CutMesh& mesh, const Skeleton& skeleton) {
-  std::vector<bool> is_used(skeleton.nodes.size(), false);
-  for (const Bone& bone : skeleton.bones) is_used[bone.head] = is_used[bone.tail] = true;
-  std::vector<int> windings(skeleton.nodes.size(), 1);
-  for_each_block(windings.size(), 1, [&](std::size_t n, std::size_t, std::size_t) {
-    if (is_used[n]) windings[n] = winding_number(mesh.positions, mesh.origins, skeleton.nodes[n].position);
+/// \param count  how many of the nodes with bones are looked at
+void check_nodes(const CutMesh& mesh, const Skeleton& skeleton, std::size_t count) {
+  std::vector<int> nodes;
+  for (const Bone& bone : skeleton.bones) nodes.insert(nodes.end(), {bone.head, bone.tail});
+  std::sort(nodes.begin(), nodes.end());
+  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+  nodes.resize(std::min(count, nodes.size()));
+  std::vector<int> windings(nodes.size());
+  for_each_block(nodes.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+    windings[i] = winding_number(mesh.positions, mesh.origins, skeleton.nodes[nodes[i]].position);
   });
-  for (std::size_t n = 0; n < skeleton.nodes.size(); ++n) {
-    const Node& node = skeleton.nodes[n];
-    const int winding = windings[n];
-    if (winding > 0) continue;
-    if (winding < 0)
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const Node& node = skeleton.nodes[nodes[i]];
+    if (windings[i] > 0) continue;
+    if (windings[i] < 0)
       throw TopologyError(fmt::format(
           "the mesh is turned inside out around node \"{}\" at {}; reverse the order of every triangle's vertices",
           node.name, text_of(skeleton, node.position)));
-    refuse_outside_node(mesh, skeleton, static_cast<int>(n));
+    refuse_outside_node(mesh, skeleton, nodes[i]);
   }
 }
 
-void check_bones(const CutMesh& mesh, const Skeleton& skeleton) {
+/// Per bone where it first meets the surface.
+std::vector<double> first_crossings(const CutMesh& mesh, const Skeleton& skeleton) {
   std::vector<double> crossings(skeleton.bones.size());
   for_each_block(crossings.size(), 1, [&](std::size_t b, std::size_t, std::size_t) {
     const int bone = static_cast<int>(b);
     crossings[b] = first_crossing(mesh, end_position(skeleton, bone, BoneEnd::kHead),
                                   end_position(skeleton, bone, BoneEnd::kTail));
   });
+  return crossings;
+}
+
+void check_bones(const Skeleton& skeleton, std::span<const double> crossings) {
   for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b) {
     const Vec3 &head = end_position(skeleton, b, BoneEnd::kHead), &tail = end_position(skeleton, b, BoneEnd::kTail);
     const double t = crossings[b];
@@ -150,8 +163,11 @@ void check_bones(const CutMesh& mesh, const Skeleton& skeleton) {
 
 void check_skeleton_inside(const CutMesh& mesh, const Skeleton& skeleton) {
   check_connected(skeleton);
-  check_nodes(mesh, skeleton);
-  check_bones(mesh, skeleton);
+  const std::vector<double> crossings = first_crossings(mesh, skeleton);
+  // What hangs together and meets no surface lies on one side of it.
+  const bool has_crossing = std::any_of(crossings.begin(), crossings.end(), [](double t) { return t <= 1; });
+  check_nodes(mesh, skeleton, has_crossing ? skeleton.nodes.size() : 1);
+  check_bones(skeleton, crossings);
 }
 
 }  // namespace skeletex

@@ -1,11 +1,18 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <cstddef>
 #include <span>
 
 #include "skeletex/geometry/cut_mesh.h"
 #include "skeletex/skeleton/skeleton.h"
 
 namespace skeletex {
+
+/// More bones than any body has; what is quadratic in their number still takes less than a second.
+inline constexpr std::size_t kMostBones = 2000;
+/// That a skeleton is not too large for the program, to be asked before anything else is done with it.
+/// \throw InputError
+void check_size(std::size_t nodes, std::size_t bones);
 
 /// That the skeleton is in one piece and lies inside the closed mesh.
 /// \throw TopologyError naming node or bone, the point, and what to move

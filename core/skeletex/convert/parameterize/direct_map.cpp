@@ -58,7 +58,7 @@ void solve(const Chart& chart, const std::vector<int>& unknown, int rows, const 
 
 }  // namespace
 
-void map_directly(Chart& chart, int iterations, double alpha) {
+int map_directly(Chart& chart, int iterations, double alpha) {
   const HalfEdgeTable& table = chart.half_edges;
   const std::vector<double> surface = relative_surface_areas(chart);
   std::vector<int> unknown(chart.positions.size(), -1);
@@ -67,9 +67,18 @@ void map_directly(Chart& chart, int iterations, double alpha) {
     if (chart.kinds[i] == ChartVertex::kInner) unknown[i] = rows++;
   std::vector<double> weights(table.twins.size(), 1);
   for (int iteration = 0;; ++iteration) {
+    const std::vector<double> u = chart.u, v = chart.v;
     solve(chart, unknown, rows, weights, true, chart.u);
     solve(chart, unknown, rows, weights, false, chart.v);
-    if (iteration == iterations) return;
+    const auto is_finite = [](double x) { return std::isfinite(x); };
+    if (iteration > 0 && !(std::all_of(chart.u.begin(), chart.u.end(), is_finite) &&
+                           std::all_of(chart.v.begin(), chart.v.end(), is_finite))) {
+      // Triangles so small in the map that the weights have no digits left: the step before is the best there is.
+      chart.u = u;
+      chart.v = v;
+      return iteration - 1;
+    }
+    if (iteration == iterations) return iteration;
     const std::vector<double> areas = texture_areas(chart);
     double largest = 0;
     for (int h = 0; h < static_cast<int>(table.twins.size()); ++h) {

@@ -168,7 +168,7 @@ class VsmSolver {
       report.residual = final_ratios_[k];
       report.flipped_triangles = count_flipped(chart);
       if (report.flipped_triangles > 0) {
-        map_directly(chart, iterations_[k], options_.alpha);
+        report.iterations = map_directly(chart, iterations_[k], options_.alpha);
         report.used_direct_solver = true;
         report.flipped_triangles = count_flipped(chart);
       }

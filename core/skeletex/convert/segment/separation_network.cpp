@@ -9,7 +9,7 @@ namespace skeletex {
 
 SeparationNetwork::SeparationNetwork(const CutMesh& mesh, const NodeCells& node,
                                      const std::vector<std::uint8_t>& labels)
-    : mesh_(mesh), node_(node), labels_(labels), edge_of_(mesh.origins.size(), -1) {
+    : mesh_(mesh), node_(node), labels_(labels) {
   for (auto& values : corner_values_) values.resize(node_.cells.size());
   for (int t = 0; t < mesh.triangle_count(); ++t) {
     const std::uint8_t a = labels_[mesh_.origins[3 * t]];
@@ -23,12 +23,9 @@ SeparationNetwork::SeparationNetwork(const CutMesh& mesh, const NodeCells& node,
 
 int SeparationNetwork::edge_slot(int half_edge) {
   const int canonical = std::min(half_edge, mesh_.opposites[half_edge]);
-  int& slot = edge_of_[canonical];
-  if (slot < 0) {
-    slot = static_cast<int>(edges.size());
-    edges.push_back({canonical, mesh_.opposites[canonical], static_cast<int>(points.size()), 0, {-1, -1}});
-  }
-  return slot;
+  const auto [found, is_new] = edge_of_.try_emplace(canonical, static_cast<int>(edges.size()));
+  if (is_new) edges.push_back({canonical, mesh_.opposites[canonical], static_cast<int>(points.size()), 0, {-1, -1}});
+  return found->second;
 }
 
 DividedEdge& SeparationNetwork::edge(int half_edge) { return edges[edge_slot(half_edge)]; }
@@ -74,9 +71,9 @@ Barycentric SeparationNetwork::weights_in(int point, int triangle) const {
   if (p.triangle >= 0) return p.weights;
   for (int c = 0; c < 3; ++c) {
     const int h = 3 * triangle + c;
-    const int slot = edge_of_[std::min(h, mesh_.opposites[h])];
-    if (slot < 0) continue;
-    const DividedEdge& divided = edges[slot];
+    const auto found = edge_of_.find(std::min(h, mesh_.opposites[h]));
+    if (found == edge_of_.end()) continue;
+    const DividedEdge& divided = edges[found->second];
     if (point < divided.first_point || point >= divided.first_point + divided.point_count) continue;
     const double t = h == divided.half_edge ? p.weights[0] : 1 - p.weights[0];
     Barycentric w{};

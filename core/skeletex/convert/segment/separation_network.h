@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <unordered_map>
 #include <vector>
 
 #include "skeletex/convert/segment/cells.h"
@@ -84,7 +85,7 @@ class SeparationNetwork {
   const CutMesh& mesh_;
   const NodeCells& node_;
   const std::vector<std::uint8_t>& labels_;
-  std::vector<int> edge_of_;  ///< half-edge -> edge, -1
+  std::unordered_map<int, int> edge_of_;  ///< half-edge -> edge
   UnionFind components_;
   std::array<std::vector<double>, 3> corner_values_;  ///< of the triangle under division: per corner, per cell
 };

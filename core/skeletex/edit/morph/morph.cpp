@@ -17,6 +17,7 @@
 #include "skeletex/geometry/best_rotation.h"
 #include "skeletex/model/encoder_settings.h"
 #include "skeletex/model/error.h"
+#include "skeletex/model/memory.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 
 namespace skeletex {
@@ -145,6 +146,9 @@ Morph::Morph(ClContext& context, std::vector<SkeletexModel> models, std::span<co
                                    models_[m].genus, models_[0].genus));
     if (options.size == 0) size = std::max({size, models_[m].texture.width, models_[m].texture.height});
   }
+  constexpr double kBytesPerTexel = 280;
+  require_memory(kBytesPerTexel * size * size * static_cast<double>(models_.size()),
+                 fmt::format("a morph of {} models at {} x {} texels", models_.size(), size, size));
   DisplacementTexture all;
   const UnitFrame frame = models_[0].skeleton.frame;
   for (SkeletexModel& model : models_) {
