@@ -118,8 +118,11 @@ MeshFile load_mesh_file(const std::filesystem::path& path, bool has_materials) {
   return file;
 }
 
-void require_valid(TriangleMesh& mesh, const Skeleton& skeleton, std::optional<TriangleTree>* tree) {
-  const std::vector<Finding> findings = validate_before_segmentation(mesh, skeleton, tree);
+namespace {
+
+/// Prints every finding to standard error.
+/// \throw CLI::RuntimeError(kExitBad) when one is an error
+void report_findings(const std::vector<Finding>& findings) {
   int errors = 0;
   for (const Finding& finding : findings) {
     const std::string text = finding.message + (finding.remedy.empty() ? "" : "\n  remedy: " + finding.remedy);
@@ -130,6 +133,18 @@ void require_valid(TriangleMesh& mesh, const Skeleton& skeleton, std::optional<T
     }
   }
   if (errors > 0) throw CLI::RuntimeError(kExitBad);
+}
+
+}  // namespace
+
+void require_valid(TriangleMesh& mesh, const Skeleton& skeleton, std::optional<TriangleTree>* tree) {
+  report_findings(validate_before_segmentation(mesh, skeleton, tree));
+}
+
+TriangleTree require_closed(TriangleMesh& mesh) {
+  std::optional<TriangleTree> tree;
+  report_findings(validate_mesh(mesh, &tree));
+  return std::move(*tree);
 }
 
 Vec3 parse_direction(const char* option, const std::string& text) {

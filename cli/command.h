@@ -22,11 +22,14 @@ namespace skeletex::cli {
 using Json = nlohmann::ordered_json;
 
 void add_encode_command(CLI::App& program);
+void add_skeletonize_command(CLI::App& program);
 void add_reconstruct_command(CLI::App& program);
 void add_correspond_command(CLI::App& program);
 void add_morph_command(CLI::App& program);
 void add_filter_command(CLI::App& program);
 void add_lod_command(CLI::App& program);
+void add_export_command(CLI::App& program);
+void add_import_command(CLI::App& program);
 void add_pose_random_command(CLI::App& program);
 void add_weights_command(CLI::App& program);
 void add_transfer_command(CLI::App& program);
@@ -73,6 +76,9 @@ MeshFile load_mesh_file(const std::filesystem::path& path, bool has_materials = 
 /// every finding to standard error.
 /// \throw CLI::RuntimeError(kExitBad) when one is an error
 void require_valid(TriangleMesh& mesh, const Skeleton& skeleton, std::optional<TriangleTree>* tree = nullptr);
+/// The same for a mesh alone, which has to be closed and in one piece.
+/// \return the tree of its triangles
+TriangleTree require_closed(TriangleMesh& mesh);
 
 /// A direction as an option gives it: x, -y, .. or three numbers with commas between them.
 /// \throw CLI::ValidationError

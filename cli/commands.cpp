@@ -6,6 +6,7 @@ namespace skeletex::cli {
 
 void add_commands(CLI::App& program) {
   add_encode_command(program);
+  add_skeletonize_command(program);
   add_reconstruct_command(program);
   add_render_command(program);
   add_view_command(program);
@@ -13,6 +14,8 @@ void add_commands(CLI::App& program) {
   add_morph_command(program);
   add_filter_command(program);
   add_lod_command(program);
+  add_export_command(program);
+  add_import_command(program);
   add_transfer_command(program);
   add_pose_random_command(program);
   add_weights_command(program);

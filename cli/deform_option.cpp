@@ -11,16 +11,18 @@
 namespace skeletex::cli {
 namespace {
 
-constexpr std::array kDeformations{Deformation::kSmooth, Deformation::kCoordinates, Deformation::kPaper};
+constexpr std::array kDeformations{Deformation::kSmooth, Deformation::kCoordinates, Deformation::kPaper,
+                                   Deformation::kLinear};
 
 }  // namespace
 
 CLI::Option* add_deform_option(CLI::App& command, std::string& value) {
-  CLI::Option* option =
-      command.add_option("--deform", value,
-                         "how a pose moves the surface: smooth blends the motions of the bones near by, coordinates "
-                         "keeps each point's place along "
-                         "and about its bone, paper moves texels by the paper's rules (default: smooth)");
+  CLI::Option* option = command.add_option(
+      "--deform", value,
+      "how a pose moves the surface: smooth blends the motions of the bones near by, coordinates "
+      "keeps each point's place along "
+      "and about its bone, paper moves texels by the paper's rules, linear moves them as exported rigs move in "
+      "other programs (default: smooth)");
   std::vector<std::string> words;
   for (const Deformation deformation : kDeformations) words.push_back(to_string(deformation));
   take_one_of(*option, words);
@@ -32,9 +34,11 @@ void add_polish_option(CLI::App& command, bool& value, CLI::Option* pose) {
 }
 
 void check_distance_option(bool is_distance_dropped, const std::string& word) {
-  if (is_distance_dropped && deformation_of(word) == Deformation::kSmooth)
+  if (is_distance_dropped && deformation_of(word) != Deformation::kPaper &&
+      deformation_of(word) != Deformation::kCoordinates)
     throw CLI::ValidationError(
-        "--no-distance", "smooth poses restore no distances to the bones; add --deform paper or --deform coordinates");
+        "--no-distance",
+        fmt::format("{} poses restore no distances to the bones; add --deform paper or --deform coordinates", word));
 }
 
 int bone_by_name(const Skeleton& skeleton, const std::string& name) {

@@ -7,11 +7,11 @@
 
 namespace skeletex::cli {
 
-/// --deform smooth, coordinates or paper.
+/// --deform smooth, coordinates, paper or linear.
 CLI::Option* add_deform_option(CLI::App& command, std::string& value);
 /// --polish.
 void add_polish_option(CLI::App& command, bool& value, CLI::Option* pose);
-/// Refuses --no-distance with the smooth rule, which restores no distances.
+/// Refuses --no-distance with the rules that restore no distances.
 /// \throw CLI::ValidationError
 void check_distance_option(bool is_distance_dropped, const std::string& word);
 /// \pre one of the option's words

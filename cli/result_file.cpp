@@ -17,8 +17,8 @@ bool is_model(const std::string& path) { return has_ending(path, ".exr"); }
 }  // namespace
 
 void add_result_option(CLI::App& command, std::string& path) {
-  declare_output(command, command.add_option("-o,--output", path, "model (.skx.exr) or mesh (.ply, .obj)"),
-                 {".exr", ".ply", ".obj"})
+  declare_output(command, command.add_option("-o,--output", path, "model (.skx.exr) or mesh (.ply, .obj, .stl, .glb)"),
+                 {".exr", ".ply", ".obj", ".stl", ".glb"})
       ->required()
       ->type_name("FILE");
 }

@@ -7,8 +7,8 @@
 
 namespace skeletex::cli {
 
-/// The -o option of commands whose result is a model (.skx.exr) or the mesh that it reconstructs to (.ply, .obj): its
-/// ending decides.
+/// The -o option of commands whose result is a model (.skx.exr) or the mesh that it reconstructs to (.ply, .obj, .stl,
+/// .glb): its ending decides.
 void add_result_option(CLI::App& command, std::string& path);
 /// Writes the model, or reconstructs it in its bind pose and writes the mesh.
 /// \throw IoError, DeviceError

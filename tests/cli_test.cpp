@@ -133,8 +133,8 @@ class Program : public ::testing::Test {
   static inline fs::path folder_;
 };
 
-const std::vector<std::string> kCommands{"encode", "reconstruct", "filter",   "transfer", "lod",
-                                         "metro",  "segment",     "validate", "inspect",  "devices"};
+const std::vector<std::string> kCommands{"encode",  "reconstruct", "filter",  "transfer", "lod",        "metro",
+                                         "segment", "validate",    "inspect", "devices",  "skeletonize"};
 
 }  // namespace
 
@@ -164,7 +164,7 @@ TEST_F(Program, EndsWithTwoOnWrongUsageAndGivesTheNearestName) {
   expect_refused(2, {"metro", "y.ply", "y.ply", "--jsno", "-"}, {"did you mean --json?"});
   expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "y.ply", "-q"}, {"-q"});
   expect_refused(2, {"encode", "y.ply", "y.skeleton.json"}, {"--output"});
-  expect_refused(2, {"encode", "y.ply", "-o", "a.skx.exr"}, {"SKELETON"});
+  expect_refused(2, {"encode", "-o", "a.skx.exr"}, {"MESH"});
   expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--method", "hybird"},
                  {"hybird", "did you mean hybrid?"});
   expect_refused(2, {"encode", "y.ply", "y.skeleton.json", "-o", "a.skx.exr", "--bone-method", "trunk"},
@@ -405,7 +405,7 @@ TEST_F(Program, RefusesOptionsThatAreAnotherFiltersAndBonesThatAreNone) {
   expect_refused(2, {"filter", "y.skx.exr", "smoth", "-o", "no.ply"}, {"smoth", "smooth"});
   expect_refused(1, {"filter", "y.skx.exr", "smooth", "-o", "no.ply", "--bones", "nose"}, {"nose"});
   expect_refused(2, {"filter", "y.skx.exr", "curvature", "-o", "no.skx.exr"}, {".ply"});
-  expect_refused(2, {"filter", "y.skx.exr", "noise", "-o", "no.stl"}, {".stl", ".ply"});
+  expect_refused(2, {"filter", "y.skx.exr", "noise", "-o", "no.off"}, {".off", ".ply"});
 }
 
 TEST_F(Program, TransfersBonesAndSaysHow) {
@@ -538,6 +538,50 @@ TEST_F(Program, ValidatesWithExitCodesAndFindings) {
   for (const auto& finding : json["findings"]) expect_keys(finding, {"severity", "rule", "message", "remedy"});
   expect_refused(1, {"encode", "open.ply", "y.skeleton.json", "-o", "a.skx.exr"}, {"error:", "remedy:"});
   fs::remove(folder_ / "open.ply");
+}
+
+TEST_F(Program, MakesSkeletonsAndEncodesMeshesWithoutOne) {
+  const nlohmann::json json = json_of({"skeletonize", "y.ply", "-o", "made.skeleton.json"});
+  expect_keys(json, {"bones", "nodes", "genus", "limbs", "chosen", "candidates", "seconds"});
+  const Skeleton made = read_skeleton(folder_ / "made.skeleton.json");
+  EXPECT_EQ(made.bones.size(), json["bones"].get<std::size_t>());
+  EXPECT_EQ(json_of({"validate", "y.ply", "made.skeleton.json"})["valid"], true);
+  const Outcome encoded = run({"encode", "y.ply", "-o", "made.skx.exr", "--size", "64"});
+  EXPECT_EQ(encoded.code, 0) << encoded.err;
+  EXPECT_NE(encoded.err.find("no skeleton was given"), std::string::npos) << encoded.err;
+  EXPECT_EQ(json_of({"inspect", "made.skx.exr"})["skeleton"]["bones"].size(), made.bones.size());
+  for (const char* file : {"made.skeleton.json", "made.skx.exr"}) fs::remove(folder_ / file);
+}
+
+TEST_F(Program, RepairsASkeletonAndSuggestsTheSameAsData) {
+  Skeleton skeleton = read_skeleton(folder_ / "y.skeleton.json");
+  const auto at_nodes = bones_at_nodes(skeleton);
+  int end = 0;
+  while (at_nodes[end].size() > 1) ++end;
+  skeleton.nodes[end].position *= 3;  // outside
+  std::ofstream(folder_ / "wrong.skeleton.json") << skeleton_to_json(skeleton);
+  const Outcome outcome =
+      run({"validate", "y.ply", "wrong.skeleton.json", "--repair", "fixed.skeleton.json", "--json", "-"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json["valid"], false);
+  EXPECT_FALSE(json["changes"].empty());
+  EXPECT_EQ(json_of({"validate", "y.ply", "fixed.skeleton.json"})["valid"], true);
+  // The suggestion of the finding about the node, applied literally, takes the finding away.
+  bool is_told = false;
+  for (const auto& finding : json["findings"]) {
+    if (finding["rule"] != "node-inside") continue;
+    EXPECT_EQ(finding["node"], skeleton.nodes[end].name);
+    const auto& moved = finding.at("suggestion").at("nodes").at(0);
+    EXPECT_EQ(moved["node"], skeleton.nodes[end].name);
+    for (int d = 0; d < 3; ++d) skeleton.nodes[end].position[d] = moved["position"][d];
+    is_told = true;
+  }
+  EXPECT_TRUE(is_told) << outcome.out;
+  std::ofstream(folder_ / "wrong.skeleton.json") << skeleton_to_json(skeleton);
+  const Outcome after = run({"validate", "y.ply", "wrong.skeleton.json", "--json", "-"});
+  EXPECT_EQ(after.out.find("node-inside"), std::string::npos) << after.out;
+  for (const char* file : {"wrong.skeleton.json", "fixed.skeleton.json"}) fs::remove(folder_ / file);
 }
 
 TEST_F(Program, InspectsAModelForPeopleAndForPrograms) {

@@ -341,7 +341,7 @@ TEST(MeshFiles, ErrorsNameFileLineAndReason) {
       {".stl", replaced(stl_ascii(), "endsolid\n", ""), {"without \"endsolid\""}},
       {".stl", stl_binary().substr(0, 200), {"after 2 of 4 triangles"}},
       {".stl", "short", {"not an STL file"}},
-      {".xyz", "0 0 0\n", {".obj, .off, .ply and .stl"}},
+      {".xyz", "0 0 0\n", {".obj, .off, .ply, .stl, .glb, .gltf and .vrm"}},
       {".obj", "", {"the file is empty"}},
   };
   for (const Case& c : cases) {
@@ -400,7 +400,7 @@ TEST(MeshFiles, WrittenMeshesComeBackAsTheyWere) {
       EXPECT_EQ(file.mesh.positions[i].cast<float>(), mesh.positions[i].cast<float>()) << name << " " << i;
   }
   EXPECT_EQ(folder.file_count(), 3);
-  EXPECT_TRUE(contains(error_of([&] { write_mesh(folder / "a.stl", mesh); }), ".ply or .obj"));
+  EXPECT_TRUE(contains(error_of([&] { write_mesh(folder / "a.off", mesh); }), ".ply, .obj, .stl or .glb"));
 }
 
 TEST(MeshFiles, PlyCarriesColoursAndAProperty) {

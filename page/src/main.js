@@ -46,7 +46,6 @@ class Page {
     document.title = model.second ? `${model.name} and ${model.second} · Skeletex` : `${model.name} · Skeletex`;
     element('title').textContent = model.second ? `${model.name} → ${model.second}` : model.name;
     this.makeControls();
-    this.setTheme();
     this.resize();
     this.orbit.up = this.shown.up;
     element('up').textContent = `Up: ${this.shown.up}`;
@@ -56,7 +55,7 @@ class Page {
     this.setMode(this.shown.mode);
     new Gestures(this);
     bindKeys(this);
-    this.isDark.addEventListener('change', () => this.setTheme());
+    this.isDark.addEventListener('change', () => this.render());
     new ResizeObserver(() => this.resize()).observe(element('stage'));
     addEventListener('hashchange', () => this.follow(location.hash));
     this.picture.gl.canvas.addEventListener('webglcontextlost', () => this.say('The browser has taken the graphics context back. Reload the page.'));
@@ -385,11 +384,6 @@ class Page {
 
   // Drawing
 
-  setTheme() {
-    this.picture.setTheme(this.isDark.matches);
-    this.render();
-  }
-
   resize() {
     const {clientWidth, clientHeight} = element('overlay');
     this.picture.resize(Math.max(1, clientWidth), Math.max(1, clientHeight));
@@ -407,6 +401,7 @@ class Page {
     if (this.frame) cancelAnimationFrame(this.frame);
     this.frame = 0;
     if (!this.surface.pose) return;
+    this.picture.setTheme(this.isDark.matches);
     this.picture.render();
     this.overlay.draw({
       bones: this.model.skeleton.bones, nodes: this.surface.pose.nodes, names: this.model.skeleton.nodes, movable: this.movable,

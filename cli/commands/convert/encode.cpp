@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <spdlog/spdlog.h>
 
 #include <charconv>
 #include <cmath>
@@ -10,16 +11,19 @@
 #include <numbers>
 #include <optional>
 
+#include "close_mesh.h"
 #include "command.h"
 #include "encode_report.h"
 #include "files.h"
 #include "progress_bar.h"
+#include "rig_file.h"
 #include "skeletex/convert/encode_model.h"
 #include "skeletex/convert/guess_stance.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/io/suggestion.h"
 #include "skeletex/model/error.h"
+#include "skeletex/skeletonize/skeletonize.h"
 
 namespace skeletex::cli {
 namespace {
@@ -36,6 +40,7 @@ struct Arguments {
   std::optional<double> crease;
   std::string up, front;
   std::vector<std::string> bone_methods;
+  CloseOptions close;
 };
 
 /// "512" or "1024x512".
@@ -129,24 +134,46 @@ void check_bone_names(const Arguments& arguments, const EncodeOptions& options, 
   for (const Bone& bone : skeleton.bones) names.push_back(bone.name);
   for (const auto& [name, method] : options.hybrid_overrides)
     if (std::find(names.begin(), names.end(), name) == names.end())
-      throw InputError(
-          fmt::format("--bone-method: {} has no bone \"{}\"{}", arguments.skeleton, name, did_you_mean(name, names)));
+      throw InputError(fmt::format("--bone-method: {} has no bone \"{}\"{}",
+                                   arguments.skeleton.empty() ? "the made skeleton" : arguments.skeleton, name,
+                                   did_you_mean(name, names)));
 }
 
 /// Mesh and skeleton in the unit frame of the mesh.
 struct Input {
   TriangleMesh mesh;
   MeshAttributes attributes;
+  VertexBoneWeights weights;  ///< of a rig
   std::optional<TriangleTree> tree;
   Skeleton skeleton;
 };
 
 Input read_input(const Arguments& arguments, const EncodeOptions& options) {
-  MeshFile file = load_mesh_file(arguments.mesh);
-  Input input{std::move(file.mesh), std::move(file.attributes), {}, read_skeleton(arguments.skeleton)};
-  check_bone_names(arguments, options, input.skeleton);
+  Input input;
+  if (is_gltf_file(arguments.mesh)) {
+    RigFile file = load_rig(arguments.mesh, arguments.close);
+    if (arguments.skeleton.empty()) {
+      ImportedRig rig = import_rig(file);
+      input.skeleton = std::move(rig.skeleton);
+      input.weights = std::move(rig.weights);
+    }
+    input.mesh = std::move(file.surface.mesh);
+    input.attributes = std::move(file.surface.attributes);
+  } else {
+    MeshFile file = load_mesh_file(arguments.mesh);
+    MeshParts parts{std::move(file.mesh), std::move(file.attributes), {}};
+    if (arguments.close.is_on) close_mesh(parts, arguments.close);
+    input.mesh = std::move(parts.mesh);
+    input.attributes = std::move(parts.attributes);
+  }
+  if (!arguments.skeleton.empty()) input.skeleton = read_skeleton(arguments.skeleton);
   const std::vector<Triangle> triangles = input.mesh.triangles;
-  require_valid(input.mesh, input.skeleton, &input.tree);
+  if (arguments.skeleton.empty() && input.skeleton.bones.empty()) {
+    input.tree = require_closed(input.mesh);
+  } else {
+    check_bone_names(arguments, options, input.skeleton);
+    require_valid(input.mesh, input.skeleton, &input.tree);
+  }
   if (input.mesh.triangles != triangles) turn_over(input.attributes);
   const UnitFrame frame = unit_frame(input.mesh);
   input.mesh = in_unit_frame(std::move(input.mesh), frame);
@@ -173,6 +200,21 @@ std::string name_of(const Vec3& direction) {
     if (std::abs(std::abs(direction[axis]) - 1) < 1e-9)
       return std::string(direction[axis] < 0 ? "-" : "") + "xyz"[axis];
   return fmt::format("{:.3g},{:.3g},{:.3g}", direction.x(), direction.y(), direction.z());
+}
+
+/// A skeleton for a mesh without one, and says so.
+Skeleton make_skeleton(ClContext& context, const Input& input, ProgressBar& bar) {
+  SkeletonizeOptions options;
+  options.progress = [&](const std::string& stage, double done) {
+    bar.show(stage, done);
+    return true;
+  };
+  SkeletonizeResult result = skeletonize(context, input.mesh, *input.tree, options);
+  bar.show("reading and checking the input", 0);
+  spdlog::info("no skeleton was given: made one of {} bones (skeletex skeletonize has options for it)",
+               result.skeleton.bones.size());
+  result.skeleton.frame = input.skeleton.frame;  // of the mesh that it was made for
+  return std::move(result.skeleton);
 }
 
 ExrCompression compression_of(const std::string& name) {
@@ -208,7 +250,11 @@ void run(const Arguments& arguments, const CLI::App& command) {
   // Loading the kernels takes as long as reading the input: a tenth of the command each.
   std::future<Input> reading = std::async(std::launch::async, [&] { return read_input(arguments, options); });
   context.prepare({"encode.cl", "read_surface"});
-  const Input input = reading.get();
+  Input input = reading.get();
+  if (input.skeleton.bones.empty()) {
+    input.skeleton = make_skeleton(context, input, *bar);
+    check_bone_names(arguments, options, input.skeleton);
+  }
   options.attributes = &input.attributes;
   options.stance = stance_of(arguments, input);
   options.tree = input.tree ? &*input.tree : nullptr;
@@ -216,7 +262,10 @@ void run(const Arguments& arguments, const CLI::App& command) {
     bar->show(stage, done);
     return true;
   };
-  const EncodeResult result = encode_model(context, input.mesh, input.skeleton, options);
+  EncodeResult result = encode_model(context, input.mesh, input.skeleton, options);
+  if (!input.weights.empty())
+    result.model.bone_weights = weight_planes(
+        context, result.model, input.mesh, input.tree ? *input.tree : build_triangle_tree(input.mesh), input.weights);
   bar->show("writing", 1);
   write_model(arguments.output, result.model,
               {.format = arguments.is_half ? TexelFormat::kHalf : TexelFormat::kFloat,
@@ -335,11 +384,12 @@ void add_encode_command(CLI::App& program) {
       "encode", "Turn a closed mesh and its skeleton into a model: one texture in an OpenEXR file");
   command.option_defaults()->always_capture_default();
   Arguments& a = *arguments;
-  declare_input(command, &add(command, "Positionals", "MESH", a.mesh, "closed triangle mesh: .obj, .ply, .off or .stl"))
+  declare_input(command, &add(command, "Positionals", "MESH", a.mesh,
+                              "closed triangle mesh: .obj, .ply, .off, .stl; or a rigged character: .glb, .gltf, .vrm"))
       ->required();
   declare_input(command, &add(command, "Positionals", "SKELETON", a.skeleton,
-                              "skeleton: JSON with nodes and bones, in the mesh's coordinates"))
-      ->required();
+                              "skeleton: JSON with nodes and bones, in the mesh's coordinates; without, that of a rig, "
+                              "or one is made (see skeletonize)"));
   declare_output(command, &add(command, "Options", "-o,--output", a.output, "the model: .skx.exr"), {".exr"})
       ->required()
       ->type_name("FILE");
@@ -359,14 +409,17 @@ void add_encode_command(CLI::App& program) {
   add_texel_options(command, a);
   add_layer_options(command, a);
   add_file_options(command, a);
+  add_close_options(command, a.close);
   command.add_flag("--verbose", a.is_verbose, "print what was done for each bone and how long each stage took, too");
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(
       "Examples:\n"
       "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr\n"
+      "  skeletex encode bear.off -o bear.skx.exr\n"
       "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr --method hybrid --bone-method head=vsm --size "
       "1024\n"
+      "  skeletex encode robot.glb -o robot.skx.exr\n"
       "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr --json - | jq .times_ms\n"
       "Areas are in the mesh's units squared, times in milliseconds.");
   command.callback([arguments, &command] { run(*arguments, command); });

@@ -102,6 +102,9 @@ MeshAttributes attributes_of(ClContext& context, const PreparedModel& prepared, 
 void check_arguments(const Arguments& arguments) {
   if (arguments.constant_offset && !arguments.texture.empty())
     throw CLI::ValidationError("--texture", "--constant-offset writes no surface that has colours");
+  if (!arguments.texture.empty() && !has_ending(arguments.output, ".obj") && !has_ending(arguments.output, ".ply"))
+    throw CLI::ValidationError("--texture",
+                               "\"" + arguments.output + "\" must end in .obj or .ply, which take texture coordinates");
   if (arguments.constant_offset && arguments.is_polished)
     throw CLI::ValidationError("--polish", "--constant-offset writes no surface that could be polished");
   if (!arguments.constant_offset) check_distance_option(arguments.is_distance_dropped, arguments.deform);
@@ -193,8 +196,9 @@ void add_reconstruct_command(CLI::App& program) {
   CLI::App& command =
       *program.add_subcommand("reconstruct", "Turn a model back into a closed mesh, at any resolution and in any pose");
   declare_input(command, command.add_option("MODEL", arguments->model, "model: .skx.exr"))->required();
-  declare_output(command, command.add_option("-o,--output", arguments->output, "mesh: .ply (binary) or .obj"),
-                 {".ply", ".obj"})
+  declare_output(command,
+                 command.add_option("-o,--output", arguments->output, "mesh: .ply, .stl (binary), .obj or .glb"),
+                 {".ply", ".obj", ".stl", ".glb"})
       ->required()
       ->type_name("FILE");
   command

@@ -26,7 +26,7 @@ bool is_mesh_file(const std::filesystem::path& path) {
   std::string ending = path.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  constexpr std::array<std::string_view, 4> kEndings{".obj", ".ply", ".off", ".stl"};
+  constexpr std::array<std::string_view, 7> kEndings{".obj", ".ply", ".off", ".stl", ".glb", ".gltf", ".vrm"};
   return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
 }
 

@@ -256,7 +256,7 @@ void pose_surface(GlContext& gl, ClContext& context, const Arguments& arguments,
     displace(gl, upload_model(model), model, *subject.skeleton, distance, surface);
     return;
   }
-  if (deformation == Deformation::kCoordinates) {
+  if (deformation != Deformation::kSmooth) {
     surface = upload_surface(gl, posed_mesh());
     return;
   }

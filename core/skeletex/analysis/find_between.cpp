@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "skeletex/analysis/findings.h"
 
@@ -55,9 +56,10 @@ Finding finding_of_frame(const SurfaceProbe& surface, const std::vector<Vec3>& p
       "check that mesh and skeleton share units, axes and origin"};
 }
 
-/// \return per node whether it lies outside or on the surface
-std::vector<bool> find_outside_nodes(const SurfaceProbe& surface, bool is_closed, const Skeleton& skeleton,
-                                     std::vector<Finding>& findings) {
+/// \return per node whether it lies outside or on the surface; nothing where the whole skeleton lies elsewhere, which
+/// is told once
+std::optional<std::vector<bool>> find_outside_nodes(const SurfaceProbe& surface, bool is_closed,
+                                                    const Skeleton& skeleton, std::vector<Finding>& findings) {
   const auto [nodes, points] = used_nodes_of(skeleton);
   const std::vector<double> windings = surface.winding_numbers(points, is_closed);
   const char* doubt = is_closed ? "" : " (as far as a surface that is not closed has an inside)";
@@ -72,8 +74,13 @@ std::vector<bool> find_outside_nodes(const SurfaceProbe& surface, bool is_closed
     outside += !is_on_surface;
     node_findings.push_back(
         finding_of_node(surface, name_of_node(skeleton, nodes[i]), points[i], nearest, is_on_surface, doubt));
+    node_findings.back().node = nodes[i];
+    node_findings.back().position = points[i];
   }
-  if (outside == nodes.size() && nodes.size() > 1) findings.push_back(finding_of_frame(surface, points));
+  if (outside == nodes.size() && nodes.size() > 1) {
+    findings.push_back(finding_of_frame(surface, points));
+    return std::nullopt;
+  }
   findings.insert(findings.end(), node_findings.begin(), node_findings.end());
   return is_outside;
 }
@@ -130,7 +137,8 @@ std::string remedy_of(const SurfaceProbe& surface, const Skeleton& skeleton, con
 
 void find_between(const SurfaceProbe& surface, bool is_closed, const Skeleton& skeleton,
                   std::vector<Finding>& findings) {
-  const std::vector<bool> is_outside = find_outside_nodes(surface, is_closed, skeleton, findings);
+  const std::optional<std::vector<bool>> is_outside = find_outside_nodes(surface, is_closed, skeleton, findings);
+  if (!is_outside) return;
   for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b) {
     const Bone& bone = skeleton.bones[b];
     const Vec3 &head = skeleton.nodes[bone.head].position, &tail = skeleton.nodes[bone.tail].position;
@@ -141,7 +149,9 @@ void find_between(const SurfaceProbe& surface, bool is_closed, const Skeleton& s
         {Severity::kError, "bone-crossing",
          fmt::format("{} from {} to {} goes through the surface: {}", name_of_bone(skeleton, b),
                      name_of_node(skeleton, bone.head), name_of_node(skeleton, bone.tail), list_of(crossings)),
-         remedy_of(surface, skeleton, bone, crossings, is_outside)});
+         remedy_of(surface, skeleton, bone, crossings, *is_outside)});
+    findings.back().bone = b;
+    findings.back().position = crossings.front().point;
   }
 }
 

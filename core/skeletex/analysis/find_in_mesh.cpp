@@ -54,10 +54,12 @@ void find_holes(const TriangleMesh& mesh, const ManifoldReport& report, std::vec
   std::size_t doubled = 0;
   for (const auto& [place, vertices] : at)
     if (vertices.size() > 1) doubled += vertices.size();
-  std::string remedy = "fill the holes";
+  std::string remedy = "fill the holes, or let `encode --close` do it";
   if (doubled > 0)
     remedy = fmt::format(
-        "merge vertices that lie in the same place ({} of those at the boundary do), then fill what is left", doubled);
+        "merge vertices that lie in the same place ({} of those at the boundary do), then fill what is left; `encode "
+        "--close` does both",
+        doubled);
   findings.push_back({Severity::kError, "closed",
                       fmt::format("the mesh is not closed: {} edge{} with only one triangle, in {} boundary loop{}: {}",
                                   edges.size(), plural(edges.size()), loops.size(), plural(loops.size()), places),
@@ -94,7 +96,9 @@ void find_components(const TriangleMesh& mesh, const ManifoldReport& report, std
   if (components.size() > 5) list += ", ...";
   findings.push_back({Severity::kError, "components",
                       fmt::format("the mesh has {} components: {}", components.size(), list),
-                      "join them to one body, or keep the one that the skeleton lies in and remove the others"});
+                      "join them to one body (`encode --close` wraps them in one), or keep the one that the skeleton "
+                      "lies in and remove the "
+                      "others"});
 }
 
 struct EdgeUse {

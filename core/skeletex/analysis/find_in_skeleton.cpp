@@ -76,6 +76,8 @@ void find_equal_places(const Skeleton& skeleton, double diagonal, std::vector<Fi
                                       name_of_node(skeleton, j), text_of(skeleton.nodes[i].position)),
                           fmt::format("let the bones of {} end at {} and remove it, or move them apart",
                                       name_of_node(skeleton, j), name_of_node(skeleton, i))});
+      findings.back().node = j;
+      findings.back().position = skeleton.nodes[j].position;
     }
 }
 
@@ -114,6 +116,9 @@ void find_equal_directions(const Skeleton& skeleton, BoneAtNode a, BoneAtNode b,
                    is_error ? ", so that no separation plane separates them" : ""),
        fmt::format("move the far end of {} sideways by {:.3g} or more, or let it branch off further along",
                    name_of_bone(skeleton, b.bone), shift)});
+  findings.back().bone = b.bone;
+  findings.back().node = node;
+  findings.back().position = skeleton.nodes[node].position;
 }
 
 /// Two bones without a common node that touch.
@@ -130,6 +135,8 @@ void find_contact(const Skeleton& skeleton, int i, int j, double diagonal, std::
                       fmt::format("{} and {} meet at {} without a node there", name_of_bone(skeleton, i),
                                   name_of_bone(skeleton, j), text_of(head + near.first * (tail - head))),
                       "split the bones there, so that they share a node, or move them apart"});
+  findings.back().bone = j;
+  findings.back().position = head + near.first * (tail - head);
 }
 
 void find_between_bones(const Skeleton& skeleton, const std::vector<bool>& has_length, double diagonal,
@@ -145,6 +152,7 @@ void find_between_bones(const Skeleton& skeleton, const std::vector<bool>& has_l
              fmt::format("{} and {} both run between {} and {}, on the same straight line", name_of_bone(skeleton, i),
                          name_of_bone(skeleton, j), name_of_node(skeleton, a.head), name_of_node(skeleton, a.tail)),
              "remove one of them; for a ring of bones give one a node on its way, around the hole"});
+        findings.back().bone = j;
         continue;
       }
       bool has_common_node = false;
@@ -165,17 +173,21 @@ bool find_unusable(const Skeleton& skeleton, std::vector<Finding>& findings) {
   const std::size_t before = findings.size();
   for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b)
     for (const int n : {skeleton.bones[b].head, skeleton.bones[b].tail})
-      if (n < 0 || n >= node_count)
+      if (n < 0 || n >= node_count) {
         findings.push_back(
             {Severity::kError, "bone-node",
              fmt::format("{} ends at node {}, and there are {} nodes", name_of_bone(skeleton, b), n, node_count),
              "let it end at a node that exists"});
+        findings.back().bone = b;
+      }
   for (int n = 0; n < node_count; ++n)
-    if (!skeleton.nodes[n].position.allFinite())
+    if (!skeleton.nodes[n].position.allFinite()) {
       findings.push_back(
           {Severity::kError, "finite",
            fmt::format("{} has no finite position: {}", name_of_node(skeleton, n), text_of(skeleton.nodes[n].position)),
            "give it three finite numbers"});
+      findings.back().node = n;
+    }
   return findings.size() == before;
 }
 
@@ -195,15 +207,19 @@ std::vector<bool> find_in_bones(const Skeleton& skeleton, double diagonal, std::
                             text_of(skeleton.nodes[bone.head].position));
       findings.push_back({Severity::kError, "bone-length", what,
                           "move one of its ends, or remove the bone and let its neighbours share a node"});
+      findings.back().bone = b;
+      findings.back().position = skeleton.nodes[bone.head].position;
       continue;
     }
     if (!bone.s) continue;
     const Vec3 o = direction_from(skeleton, {b, BoneEnd::kHead}), s = *bone.s;
-    if (!s.allFinite() || !((s - o.dot(s) * o).norm() > 1e-6 * s.norm()))
+    if (!s.allFinite() || !((s - o.dot(s) * o).norm() > 1e-6 * s.norm())) {
       findings.push_back(
           {Severity::kError, "bone-angle",
            fmt::format("{}: its \"s\" {} gives no direction across the bone", name_of_bone(skeleton, b), text_of(s)),
            "give a direction across the bone, or leave \"s\" out"});
+      findings.back().bone = b;
+    }
   }
   return has_length;
 }
@@ -211,11 +227,14 @@ std::vector<bool> find_in_bones(const Skeleton& skeleton, double diagonal, std::
 void find_unused_nodes(const Skeleton& skeleton, std::vector<Finding>& findings) {
   const std::vector<bool> is_used = used_nodes(skeleton);
   for (int n = 0; n < static_cast<int>(skeleton.nodes.size()); ++n)
-    if (!is_used[n])
+    if (!is_used[n]) {
       findings.push_back({Severity::kWarning, "node-unused",
                           fmt::format("{} at {} is the end of no bone", name_of_node(skeleton, n),
                                       text_of(skeleton.nodes[n].position)),
                           "remove it, or give it a bone; it is ignored"});
+      findings.back().node = n;
+      findings.back().position = skeleton.nodes[n].position;
+    }
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The parts of validate_input. Each appends its findings, with place and remedy.
 #pragma once
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,11 @@ bool find_in_skeleton(const Skeleton& skeleton, double diagonal, std::vector<Fin
 /// \param is_closed  whether the surface has an inside without doubt
 void find_between(const SurfaceProbe& surface, bool is_closed, const Skeleton& skeleton,
                   std::vector<Finding>& findings);
+
+/// Bones whose separation planes cross inside the body, the worst first.
+/// \param tree  of the mesh
+void find_crossing_planes(const Skeleton& skeleton, const TriangleMesh& mesh, const TriangleTree& tree,
+                          std::vector<Finding>& findings);
 
 /// Bones that can be taken away without the skeleton falling apart: its independent cycles.
 int count_cycles(const Skeleton& skeleton);

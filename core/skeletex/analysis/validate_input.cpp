@@ -68,37 +68,65 @@ void check_genus(const Skeleton& skeleton, int genus, std::vector<Finding>& find
 
 }  // namespace
 
-std::vector<Finding> validate_before_segmentation(TriangleMesh& mesh, const Skeleton& skeleton,
-                                                  std::optional<TriangleTree>* tree) {
-  std::vector<Finding> findings;
-  const ManifoldReport report = measure_manifold(mesh);
-  find_in_mesh(mesh, report, findings);
-  const bool is_closed = report.is_closed_manifold();
-  const bool is_good_mesh = is_closed && report.non_finite_vertices.empty();
-  const double diagonal = report.non_finite_vertices.empty() ? bounding_box(mesh).diagonal() : 0;
-  if (is_good_mesh) {
-    check_volume(diagonal, mesh, findings);
+namespace {
+
+struct MeshFindings {
+  ManifoldReport report;
+  double diagonal = 0;
+  bool is_good = false;  ///< closed and finite
+};
+
+MeshFindings check_mesh(TriangleMesh& mesh, std::optional<TriangleTree>* tree, std::vector<Finding>& findings) {
+  MeshFindings found{measure_manifold(mesh)};
+  find_in_mesh(mesh, found.report, findings);
+  const bool is_finite = found.report.non_finite_vertices.empty();
+  found.is_good = found.report.is_closed_manifold() && is_finite;
+  found.diagonal = is_finite ? bounding_box(mesh).diagonal() : 0;
+  if (found.is_good) {
+    check_volume(found.diagonal, mesh, findings);
     TriangleTree own = build_triangle_tree(mesh);
     check_self_intersections(mesh, own, findings);
     if (tree) *tree = std::move(own);
   }
+  return found;
+}
 
-  const TriangleMesh surface = usable_surface(mesh, report);
-  const double unit = surface.triangles.empty() ? diagonal : bounding_box(surface).diagonal();
+}  // namespace
+
+std::vector<Finding> validate_mesh(TriangleMesh& mesh, std::optional<TriangleTree>* tree) {
+  std::vector<Finding> findings;
+  check_mesh(mesh, tree, findings);
+  return findings;
+}
+
+std::vector<Finding> validate_before_segmentation(TriangleMesh& mesh, const Skeleton& skeleton,
+                                                  std::optional<TriangleTree>* tree) {
+  std::vector<Finding> findings;
+  const MeshFindings found = check_mesh(mesh, tree, findings);
+  const TriangleMesh surface = usable_surface(mesh, found.report);
+  const double unit = surface.triangles.empty() ? found.diagonal : bounding_box(surface).diagonal();
   if (!find_in_skeleton(skeleton, unit, findings)) return findings;
-  if (!surface.triangles.empty()) find_between(SurfaceProbe(surface), is_good_mesh, skeleton, findings);
-  if (is_closed && report.components == 1) check_genus(skeleton, report.genus, findings);
+  if (!surface.triangles.empty()) find_between(SurfaceProbe(surface), found.is_good, skeleton, findings);
+  if (found.report.is_closed_manifold() && found.report.components == 1)
+    check_genus(skeleton, found.report.genus, findings);
   return findings;
 }
 
 std::vector<Finding> validate_input(ClContext& context, TriangleMesh& mesh, const Skeleton& skeleton) {
-  std::vector<Finding> findings = validate_before_segmentation(mesh, skeleton);
+  std::optional<TriangleTree> tree;
+  std::vector<Finding> findings = validate_before_segmentation(mesh, skeleton, &tree);
   if (has_errors(findings)) return findings;
   try {
     const UnitFrame frame = unit_frame(mesh);
     segment_mesh(context, in_unit_frame(mesh, frame), in_unit_frame(skeleton, frame));
   } catch (const TopologyError& error) {
-    findings.push_back(finding_of(error));
+    find_crossing_planes(skeleton, mesh, *tree, findings);
+    const auto is_told = [&](const Finding& f) { return f.rule == "separation-planes" && f.bone == error.bone(); };
+    if (std::none_of(findings.begin(), findings.end(), is_told)) {
+      findings.push_back(finding_of(error));
+      findings.back().bone = error.bone();
+      findings.back().node = error.node();
+    }
   } catch (const InputError& error) {
     findings.push_back(finding_of(error));
   }

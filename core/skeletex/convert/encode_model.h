@@ -68,15 +68,14 @@ struct BoneReport {
   int flipped_triangles = 0;             ///< of the map
   double sampled_triangle_fraction = 0;  ///< share of the segment's triangles that a texel reads
   int missed_texels = 0;                 ///< SPD rays that hit nothing, filled from their neighbours
-  BoneDistance
-      distance;  ///< of its surface to the mesh that the decoder makes, in the unit frame; its place is the user's
+  BoneDistance distance;  ///< of its surface to the decoded mesh, in the unit frame; its place is the user's
   MapReport map;
 };
 
-/// Whether a part of a bone's surface is missing from the model: it is further away than ten times the bone's mean and
-/// half a percent of the diagonal.
+/// Whether a part of a bone's surface is missing from the model: it is further away than ten times the bone's median
+/// and half a percent of the diagonal.
 inline bool lacks_part(const BoneReport& bone, double diagonal) {
-  return bone.distance.furthest > 10 * bone.distance.mean && bone.distance.furthest > 0.005 * diagonal;
+  return bone.distance.furthest > 10 * bone.distance.median && bone.distance.furthest > 0.005 * diagonal;
 }
 
 struct EncodeReport {

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/geometry/triangle_tree.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <utility>
 
@@ -224,6 +227,89 @@ void for_each_triangle_near(const TriangleTree& tree, const Vec3& lower, const V
       if (is_met) open.emplace_back(level - 1, kWidth * index + k);
     }
   }
+}
+
+namespace {
+
+/// A ray in the tree's units.
+struct TreeRay {
+  std::array<float, 3> origin, direction, inverse;
+};
+
+/// Shares at which a ray enters the children of a node; past `limit` where it does not meet them.
+std::array<float, kWidth> enter_children(const TriangleTree& tree, int level, std::size_t index, const TreeRay& ray,
+                                         float limit) {
+  const float* planes = tree.boxes.data() + (tree.level_begin[level] + index) * 6 * kWidth;
+  std::array<float, kWidth> enter{}, leave;
+  leave.fill(limit);
+  for (int d = 0; d < 3; ++d)
+    for (int k = 0; k < kWidth; ++k) {
+      const float a = (planes[d * kWidth + k] - ray.origin[d]) * ray.inverse[d],
+                  b = (planes[(3 + d) * kWidth + k] - ray.origin[d]) * ray.inverse[d];
+      enter[k] = std::max(enter[k], std::min(a, b));
+      leave[k] = std::min(leave[k], std::max(a, b));
+    }
+  for (int k = 0; k < kWidth; ++k)
+    if (enter[k] > leave[k]) enter[k] = 2 * kFarAway;
+  return enter;
+}
+
+/// The least share at which a ray meets a triangle of a block (Moeller and Trumbore 1997); `limit` without any.
+/// Triangles are a little larger than they are, so that no ray slips between two.
+float hit_block(const TriangleMesh& mesh, const TriangleTree& tree, std::size_t block, const TreeRay& ray,
+                float limit) {
+  constexpr float kOver = 1e-6f;
+  const Eigen::Map<const Eigen::Vector3f> from(ray.origin.data()), along(ray.direction.data());
+  const std::size_t end = std::min((block + 1) * kWidth, tree.order.size());
+  for (std::size_t at = block * kWidth; at < end; ++at) {
+    const Triangle& t = mesh.triangles[tree.order[at]];
+    const Eigen::Vector3f corner = tree.points[t[0]], a = tree.points[t[1]] - corner, b = tree.points[t[2]] - corner;
+    const Eigen::Vector3f p = along.cross(b), s = from - corner, q = s.cross(a);
+    const float inverse = 1 / a.dot(p);
+    const float u = s.dot(p) * inverse, v = along.dot(q) * inverse, share = b.dot(q) * inverse;
+    // A determinant of 0 makes u infinite or no number, which fails.
+    if (u >= -kOver && v >= -kOver && u + v <= 1 + kOver && share >= 0) limit = std::min(limit, share);
+  }
+  return limit;
+}
+
+}  // namespace
+
+double find_first_hit(const TriangleMesh& mesh, const TriangleTree& tree, const Vec3& origin, const Vec3& direction,
+                      double limit) {
+  TreeRay ray;
+  for (int d = 0; d < 3; ++d) {
+    ray.origin[d] = static_cast<float>((origin[d] - tree.origin[d]) / tree.scale);
+    ray.direction[d] = static_cast<float>(direction[d] / tree.scale);
+    ray.inverse[d] = 1 / (std::abs(ray.direction[d]) < 1e-20f ? 1e-20f : ray.direction[d]);
+  }
+  float least = static_cast<float>(std::min(limit, static_cast<double>(kFarAway)));
+  const float bound = least;
+  struct Open {
+    int level;
+    std::size_t index;
+    float enter;
+  };
+  std::array<Open, 128> open;  // at most 7 more a level than are taken
+  int count = 0;
+  open[count++] = {tree.top_level(), 0, 0};
+  while (count > 0) {
+    const Open node = open[--count];
+    if (node.enter >= least) continue;
+    if (node.level == 0) {
+      least = hit_block(mesh, tree, node.index, ray, least);
+      continue;
+    }
+    const std::array<float, kWidth> enter = enter_children(tree, node.level, node.index, ray, least);
+    const int begin = count;
+    for (int k = 0; k < kWidth; ++k) {
+      if (enter[k] >= least) continue;
+      int at = count++;
+      for (; at > begin && open[at - 1].enter < enter[k]; --at) open[at] = open[at - 1];
+      open[at] = {node.level - 1, kWidth * node.index + k, enter[k]};
+    }
+  }
+  return least < bound ? least : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace skeletex

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "skeletex/io/gltf/gltf_surface.h"
+#include "skeletex/io/gltf/read_gltf.h"
 #include "skeletex/io/mesh/mesh_builder.h"
 #include "skeletex/io/read_file.h"
 #include "skeletex/model/error.h"
@@ -22,6 +24,7 @@ std::string lower_extension(const std::filesystem::path& path) {
 }  // namespace
 
 MeshFile read_mesh(const std::filesystem::path& path) {
+  if (is_gltf_file(path)) return read_gltf_mesh(path);
   const std::string where = path.string(), extension = lower_extension(path);
   const std::string bytes = read_file(path);
   if (bytes.empty()) throw IoError(where + ": the file is empty");
@@ -30,7 +33,8 @@ MeshFile read_mesh(const std::filesystem::path& path) {
   if (extension == ".ply") return read_ply(bytes, where);
   if (extension == ".stl") return read_stl(bytes, where);
   throw IoError(
-      fmt::format("{}: meshes are read from .obj, .off, .ply and .stl files, not from \"{}\"", where, extension));
+      fmt::format("{}: meshes are read from .obj, .off, .ply, .stl, .glb, .gltf and .vrm files, not from \"{}\"", where,
+                  extension));
 }
 
 }  // namespace skeletex

@@ -23,10 +23,10 @@ struct MeshFile {
   std::vector<std::string> material_files;  ///< that an OBJ names, as it names them
 };
 
-/// Reads OBJ, PLY (ascii, binary), OFF or STL by the ending, in double precision. Faces are counted in and out, so that
-/// nothing is dropped silently: faces in file = triangles - (corners beyond three of kept polygons) + degenerate faces.
-/// NaN and infinity are kept (not in STL) for validation to report. An UTF-8 byte order mark is skipped.
-/// \throw IoError naming the file, what is wrong and, where the format allows, the line
+/// Reads OBJ, PLY (ascii, binary), OFF, STL or glTF (gltf_surface.h) by the ending, in double precision. Faces are
+/// counted in and out, so that nothing is dropped silently: faces in file = triangles - (corners beyond three of kept
+/// polygons) + degenerate faces. NaN and infinity are kept (not in STL) for validation to report. An UTF-8 byte order
+/// mark is skipped. \throw IoError naming the file, what is wrong and, where the format allows, the line
 MeshFile read_mesh(const std::filesystem::path& path);
 /// Reads the pictures of a mesh's materials, and first the files that an OBJ names for its materials.
 /// \param path  of the mesh; names are relative to its folder
@@ -55,9 +55,11 @@ struct WrittenAttributes {
   std::string image_file = {};  ///< the picture that they belong to, as the file names it
 };
 
-/// Writes binary PLY (little endian) or OBJ by the ending, under a temporary name that is renamed when complete.
-/// Positions have single precision, or double where that is needed: far from the origin, and for very small or large
-/// meshes. An OBJ with a picture comes with a file of its material, of the same name with the ending .mtl.
+/// Writes PLY (binary, little endian), OBJ, STL (binary) or glTF (.glb) by the ending, under a temporary name that is
+/// renamed when complete. Positions have single precision; in PLY and OBJ double where that is needed: far from the
+/// origin, and for very small or large meshes. STL takes no attributes, glTF normals alone; there they are those of the
+/// triangles where none are given. An OBJ with a picture comes with a file of its material, of the same name with the
+/// ending .mtl.
 /// \throw IoError (unknown ending, folder not writable, disk full, attributes that do not fit the mesh, a number that
 /// is not finite): no file is left behind
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, const WrittenAttributes& attributes = {});

@@ -84,7 +84,7 @@ const nlohmann::json& object_member(const nlohmann::json& json, const char* key,
 }
 
 Pose pose_from_json(const nlohmann::json& json, const Skeleton& skeleton, const std::string& where) {
-  check_keys(json, {"rotations", "nodes", "roll"}, where);
+  check_keys(json, {"rotations", "nodes", "roll", "translation"}, where);
   if (json.contains("rotations") && json.contains("nodes"))
     throw IoError(where + ": \"rotations\" and \"nodes\" do not go together; a pose either turns bones or moves nodes");
   Pose pose;
@@ -100,6 +100,13 @@ Pose pose_from_json(const nlohmann::json& json, const Skeleton& skeleton, const 
       pose.nodes[index_of(skeleton.nodes, name, "node", where + ", \"nodes\"")] =
           skeleton.frame.from_user(numbers_from_json<3>(
               value, "three numbers [x, y, z]", fmt::format("{}, \"nodes\", \"{}\"", where, name), unit_of(skeleton)));
+  }
+  if (json.contains("translation")) {
+    if (json.contains("nodes"))
+      throw IoError(where + ": \"translation\" and \"nodes\" do not go together; places of nodes say it all");
+    pose.translation = Vec3(numbers_from_json<3>(json["translation"], "three numbers [x, y, z]",
+                                                 where + ", \"translation\"", unit_of(skeleton))) /
+                       skeleton.frame.scale;
   }
   if (json.contains("roll")) {
     pose.rolls.assign(skeleton.bones.size(), 0);
@@ -150,9 +157,22 @@ nlohmann::json pose_to_json(const Pose& pose, const Skeleton& skeleton) {
       const Vec3 node = skeleton.frame.to_user(pose.nodes[i]);
       json["nodes"][skeleton.nodes[i].name] = {node[0], node[1], node[2]};
     }
+  if (pose.translation != Vec3::Zero()) {
+    const Vec3 way = skeleton.frame.scale * pose.translation;
+    json["translation"] = {way.x(), way.y(), way.z()};
+  }
   for (std::size_t i = 0; i < pose.rolls.size(); ++i)
     if (pose.rolls[i] != 0) json["roll"][skeleton.bones[i].name] = pose.rolls[i] * 180 / std::numbers::pi;
   return json;
+}
+
+nlohmann::json animation_to_json(const PoseAnimation& animation, const Skeleton& skeleton) {
+  nlohmann::json frames = nlohmann::json::array();
+  for (const PoseFrame& frame : animation.frames) {
+    frames.push_back({{"time", frame.time}, {"pose", pose_to_json(frame.pose, skeleton)}});
+    if (!frame.name.empty()) frames.back()["name"] = frame.name;
+  }
+  return {{"frames", std::move(frames)}};
 }
 
 }  // namespace skeletex

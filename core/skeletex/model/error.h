@@ -25,6 +25,14 @@ class InputError : public Error {
 class TopologyError : public Error {
  public:
   using Error::Error;
+  /// \param bone  of the skeleton, where one stands in the way; -1: none
+  /// \param node  the one to move; -1: none
+  TopologyError(const std::string& message, int bone, int node) : Error(message), bone_(bone), node_(node) {}
+  int bone() const { return bone_; }
+  int node() const { return node_; }
+
+ private:
+  int bone_ = -1, node_ = -1;
 };
 /// An OpenCL call failed.
 class DeviceError : public Error {

@@ -78,8 +78,9 @@ Json skeleton_json(std::span<const PageKey> keys, const PageOptions& options) {
     json["bones"].push_back({{"name", bone.name}, {"head", bone.head}, {"tail", bone.tail}});
   if (options.second) {
     json["second"] = Json::array();
+    const Skeleton other = in_frame(options.second->model.skeleton, skeleton.frame);
     for (const int node : options.second->correspondence.nodes) {
-      second.push_back(options.second->model.skeleton.nodes[node].position);
+      second.push_back(other.nodes[node].position);
       json["second"].push_back(to_json(second.back()));
     }
     for (std::vector<Vec3>* nodes : {&first, &second}) {
@@ -222,6 +223,8 @@ std::string make_page(ClContext& context, const SkeletexModel& model, const Page
   json["up"] = options.is_z_up ? "z" : "y";
   json["diagonal"] = model.diagonal;
   json["origin"] = to_json(model.origin);
+  const UnitFrame& frame = model.skeleton.frame;
+  json["frame"] = {{"offset", to_json(frame.offset)}, {"scale", frame.scale}};
   json["roots"] = root_nodes(model.skeleton);
   if (options.second) {
     Json skeleton;

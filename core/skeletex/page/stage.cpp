@@ -138,7 +138,7 @@ bool has_same_seams(const SkeletexModel& a, const SkeletexModel& b) {
 
 Json add_stage(ClContext& context, PageArrays& arrays, std::span<const PageKey> keys) {
   const PreparedModel prepared(keys.front().model);
-  const TriangleMesh mesh = reconstruct_mesh(context, prepared);
+  const TriangleMesh mesh = reconstruct_bind_mesh(context, prepared).mesh;  // in the model's frame
   const EndCopies copies = end_copies(prepared, mesh.positions);
   Json stage = network_of(prepared.model);
   stage["copies"] = copies.counts;

@@ -9,6 +9,7 @@
 #include "reconstruct_structs.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/lattice.h"
+#include "skeletex/reconstruct/linear_skin.h"
 #include "skeletex/reconstruct/pose_by_coordinates.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/skin.h"
@@ -81,6 +82,12 @@ void pose_smoothly(ClContext& context, const PreparedModel& model, const Skeleto
   pose_shared_vertices(skin, motions, positions);
 }
 
+void pose_linearly(ClContext& context, const PreparedModel& model, const Skeleton& posed, const DevicePlanes& bind,
+                   std::vector<Vec3>& positions) {
+  const VertexInfluences influences = strongest_influences(make_skin(context, model, bind));
+  positions = skin_linearly(positions, influences, bone_motions(model.model.skeleton, posed));
+}
+
 void pose_by_own_coordinates(ClContext& context, const PreparedModel& model, const Skeleton& posed,
                              const DevicePlanes& bind, DistanceRule rule, std::vector<Vec3>& positions) {
   const PosedPlanes separation(model.model, posed);
@@ -119,6 +126,7 @@ const char* to_string(Deformation deformation) {
     case Deformation::kSmooth: return "smooth";
     case Deformation::kCoordinates: return "coordinates";
     case Deformation::kPaper: return "paper";
+    case Deformation::kLinear: return "linear";
   }
   return "?";
 }
@@ -131,6 +139,7 @@ TriangleMesh reconstruct_mesh(ClContext& context, const PreparedModel& model, co
     case Deformation::kCoordinates:
       pose_by_own_coordinates(context, model, posed, bind, rule.distance, mesh.positions);
       break;
+    case Deformation::kLinear: pose_linearly(context, model, posed, bind, mesh.positions); break;
     case Deformation::kPaper: pose_by_paper(context, model, posed, rule.distance, mesh.positions); break;
   }
   return in_user_units(std::move(mesh), posed.frame);

@@ -13,6 +13,7 @@ enum class Deformation {
   kSmooth,       ///< bind points by blended dual quaternions, with weights of all bones near by (skin.h)
   kCoordinates,  ///< each bind point by the paper's rules at its own coordinates along and about its bone
   kPaper,        ///< texels by the paper's rules at their own (u, v) (paper 3.4, 3.6.1)
+  kLinear,       ///< bind points by linear blend skinning with four weights, as exported rigs move (linear_skin.h)
 };
 const char* to_string(Deformation deformation);
 

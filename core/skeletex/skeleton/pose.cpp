@@ -227,6 +227,8 @@ Skeleton apply_pose(const Skeleton& bind, const Pose& pose) {
   check_size(pose.rolls, bind.bones.size(), "rolls");
   if (!pose.rotations.empty() && !pose.nodes.empty())
     throw InputError("a pose either turns bones or moves nodes, not both");
+  if (pose.translation != Vec3::Zero() && !pose.nodes.empty())
+    throw InputError("a pose either moves the whole skeleton or places its nodes, not both");
 
   Skeleton posed = bind;
   std::vector<Quaterniond> rotations(bind.bones.size(), Quaterniond::Identity());
@@ -244,6 +246,7 @@ Skeleton apply_pose(const Skeleton& bind, const Pose& pose) {
   } else if (!pose.rotations.empty()) {
     for (const int root : root_nodes(bind)) turn_bones(bind, pose, walk_from(bind, at, root), posed, rotations);
   }
+  for (Node& node : posed.nodes) node.position += pose.translation;
   const std::vector<BoneBasis> bases = bone_bases(bind);
   for (std::size_t i = 0; i < bind.bones.size(); ++i) {
     Vec3 s = rotations[i] * bases[i].s;
@@ -282,10 +285,12 @@ Pose pose_at(const Skeleton& bind, const PoseAnimation& animation, double time) 
   if (after == animation.frames.end()) return animation.frames.back().pose;
   const PoseFrame &a = *(after - 1), &b = *after;
   const double t = (time - a.time) / (b.time - a.time);
-  if ((!a.pose.rotations.empty() && !b.pose.nodes.empty()) || (!a.pose.nodes.empty() && !b.pose.rotations.empty()))
+  const auto turns = [](const Pose& pose) { return !pose.rotations.empty() || pose.translation != Vec3::Zero(); };
+  if ((turns(a.pose) && !b.pose.nodes.empty()) || (!a.pose.nodes.empty() && turns(b.pose)))
     throw InputError(
         fmt::format("the frames at {} and {} do not mix: one turns bones, the other moves nodes", a.time, b.time));
   Pose pose;
+  pose.translation = (1 - t) * a.pose.translation + t * b.pose.translation;
   const auto blend = [&](const auto& from, const auto& to, auto& result, const auto& bound, const auto& between) {
     if (from.empty() && to.empty()) return;
     for (std::size_t i = 0; i < std::max(from.size(), to.size()); ++i)

@@ -18,6 +18,8 @@ struct Pose {
   std::vector<Vec3> nodes;
   /// Per bone, radians about its posed direction from head to tail: turns s, moves no node and no other bone.
   std::vector<double> rolls;
+  /// Of the whole skeleton, world units. Not together with nodes.
+  Vec3 translation = Vec3::Zero();
 };
 
 /// Poses over time.

@@ -137,7 +137,8 @@ Stage pose_stage(ClContext& context, TextureInputPointer input, const std::optio
   switch (deformation) {
     case Deformation::kSmooth: return smooth_pose_stage(context, std::move(input), pose);
     case Deformation::kPaper: return paper_pose_stage(context, std::move(input), pose);
-    case Deformation::kCoordinates: break;
+    case Deformation::kCoordinates:
+    case Deformation::kLinear: break;
   }
   throw InputError("the pose stage measures --deform smooth and paper");
 }

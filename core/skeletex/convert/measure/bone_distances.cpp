@@ -2,6 +2,7 @@
 #include "skeletex/convert/measure/bone_distances.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <numeric>
 
 #include "skeletex/geometry/nearest_search.h"
@@ -34,6 +35,12 @@ std::vector<BoneDistance> measure(ClContext& context, const Samples& samples, co
       if (distance > found[bone].furthest) found[bone].furthest = distance, found[bone].place = samples.points[i];
     }
     if (weight > 0) found[bone].mean = sum / weight;
+    const auto begin = distances.begin() + static_cast<std::ptrdiff_t>(samples.begins[bone]),
+               end = distances.begin() + static_cast<std::ptrdiff_t>(samples.begins[bone + 1]),
+               middle = begin + (end - begin) / 2;
+    if (begin == end) continue;
+    std::nth_element(begin, middle, end);
+    found[bone].median = static_cast<double>(*middle);
   }
   return found;
 }

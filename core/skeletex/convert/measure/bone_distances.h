@@ -13,6 +13,7 @@ namespace skeletex {
 /// How far one bone's part of a surface is from another surface. World units.
 struct BoneDistance {
   double mean = 0;            ///< over its area, from the middles of its triangles; or over its vertices
+  double median = 0;          ///< of the points measured
   double furthest = 0;        ///< of its vertices and of those middles
   Vec3 place = Vec3::Zero();  ///< where that is
 };

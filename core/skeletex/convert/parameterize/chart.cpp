@@ -53,7 +53,8 @@ Row make_row(const BoundaryLoop& loop, const Segment& segment, const Skeleton& s
                     "once; move the node "
                     "to the middle of the body",
                     skeleton.bones[segment.bone].name, skeleton.nodes[end_node(skeleton, segment.bone, end)].name,
-                    count < 3 ? 0.0 : lift - turns[0]));
+                    count < 3 ? 0.0 : lift - turns[0]),
+        segment.bone, end_node(skeleton, segment.bone, end));
   row.lifted = std::move(*lifted);
   return row;
 }
@@ -117,7 +118,8 @@ void insert_pole(Chart& chart, const Skeleton& skeleton, const SeparationPlanes&
         fmt::format("bone \"{}\": the ray from its free end \"{}\" along the bone misses the bone's own surface; turn "
                     "the bone or move "
                     "the node so that it points at the tip",
-                    skeleton.bones[chart.bone].name, skeleton.nodes[end_node(skeleton, chart.bone, end)].name));
+                    skeleton.bones[chart.bone].name, skeleton.nodes[end_node(skeleton, chart.bone, end)].name),
+        chart.bone, end_node(skeleton, chart.bone, end));
 
   const Triangle tri = chart.triangles[hit];
   const int nearest = static_cast<int>(std::max_element(weights.begin(), weights.end()) - weights.begin());

@@ -110,10 +110,11 @@ void Segmenter::throw_crossing(int node, const CutOutcome& outcome) const {
       between = b;
   const int bone = between >= 0 ? between : side(outcome.crossed_half_edge).bone.bone;
   throw TopologyError(
-      fmt::format("bone \"{}\": the separation planes at node \"{}\" and at node \"{}\" cross inside the body, at {} "
-                  "on the surface; move the "
-                  "nodes apart, or turn the bones there so that their separation planes stand more nearly parallel",
-                  bone_name(bone), node_name(other), node_name(node), text_of(skeleton_, outcome.point)));
+      fmt::format("bone \"{}\": the separation planes at node \"{}\" and at node \"{}\" cross inside "
+                  "the body, at {} on the surface; move the nodes apart, or turn the bones there so "
+                  "that their separation planes stand more nearly parallel",
+                  bone_name(bone), node_name(other), node_name(node), text_of(skeleton_, outcome.point)),
+      bone, node);
 }
 
 void Segmenter::cut() {
@@ -135,9 +136,11 @@ void Segmenter::cut() {
     const CutOutcome outcome = cut_along_separation(mesh_, nodes[n], labels, static_cast<int>(sides_.size()));
     if (outcome.status == CutStatus::kCrossesSeam) throw_crossing(nodes[n].node, outcome);
     if (outcome.status == CutStatus::kNoSurface)
-      throw TopologyError(fmt::format(
-          "bone \"{}\": no separation plane of node \"{}\" at {} meets the surface; move the node into the body",
-          bone_name(nodes[n].cells[0].bone.bone), node_name(nodes[n].node), text_of(skeleton_, nodes[n].position)));
+      throw TopologyError(
+          fmt::format(
+              "bone \"{}\": no separation plane of node \"{}\" at {} meets the surface; move the node into the body",
+              bone_name(nodes[n].cells[0].bone.bone), node_name(nodes[n].node), text_of(skeleton_, nodes[n].position)),
+          nodes[n].cells[0].bone.bone, nodes[n].node);
     for (const Cell& cell : nodes[n].cells) sides_.push_back({nodes[n].node, cell.bone});
   }
   split_short_arcs();
@@ -181,7 +184,8 @@ void Segmenter::throw_run_over(int first, int second) const {
       fmt::format("bone \"{}\": its surface runs over into that of bone \"{}\", from {} at node \"{}\" to {} at node "
                   "\"{}\" without a separation plane between; {}",
                   bone_name(a.bone.bone), bone_name(b.bone.bone), text_of(skeleton_, position(mesh_.origins[first])),
-                  node_name(a.node), text_of(skeleton_, position(mesh_.origins[second])), node_name(b.node), remedy));
+                  node_name(a.node), text_of(skeleton_, position(mesh_.origins[second])), node_name(b.node), remedy),
+      a.bone.bone, a.node);
 }
 
 /// Marks the triangles of a component from one of them on.
@@ -226,23 +230,24 @@ void Segmenter::assign_components() {
                       text_of(skeleton_, position(mesh_.origins[3 * component.first]))));
     const int bone = component.seam < 0 ? 0 : side(component.seam).bone.bone;
     if (component_of_bone[bone] >= 0)
-      throw TopologyError(
-          fmt::format("bone \"{}\": its separation planes at node \"{}\" cut off a second piece of surface at {}; move "
-                      "the node so that they meet "
-                      "only the body around it",
-                      bone_name(bone), node_name(side(component.seam).node),
-                      text_of(skeleton_, position(mesh_.origins[component.seam]))));
+      throw TopologyError(fmt::format("bone \"{}\": its separation planes at node \"{}\" cut off a second piece of "
+                                      "surface at {}; move the node so that they meet only the body around it",
+                                      bone_name(bone), node_name(side(component.seam).node),
+                                      text_of(skeleton_, position(mesh_.origins[component.seam]))),
+                          bone, side(component.seam).node);
     component_of_bone[bone] = c;
     bone_of.push_back(bone);
   }
   for (int b = 0; b < bone_count; ++b)
     if (component_of_bone[b] < 0)
-      throw TopologyError(fmt::format(
-          "bone \"{}\" gets no surface: the separation planes at its nodes \"{}\" {} and \"{}\" {} leave it none; move "
-          "its nodes apart",
-          bone_name(b), node_name(skeleton_.bones[b].head),
-          text_of(skeleton_, end_position(skeleton_, b, BoneEnd::kHead)), node_name(skeleton_.bones[b].tail),
-          text_of(skeleton_, end_position(skeleton_, b, BoneEnd::kTail))));
+      throw TopologyError(
+          fmt::format("bone \"{}\" gets no surface: the separation planes at its nodes \"{}\" {} and \"{}\" {} leave "
+                      "it none; move its nodes apart",
+                      bone_name(b), node_name(skeleton_.bones[b].head),
+                      text_of(skeleton_, end_position(skeleton_, b, BoneEnd::kHead)),
+                      node_name(skeleton_.bones[b].tail),
+                      text_of(skeleton_, end_position(skeleton_, b, BoneEnd::kTail))),
+          b, skeleton_.bones[b].head);
   triangle_counts_.assign(bone_count, 0);
   for (const int component : component_of_) {
     result_.triangle_bones.push_back(bone_of[component]);
@@ -258,11 +263,11 @@ HalfEdgeLoop Segmenter::trace_loop(int start) {
   int h = start;
   do {
     if (side(h).node != first.node)
-      throw TopologyError(fmt::format(
-          "bone \"{}\": the separation planes at nodes \"{}\" and \"{}\" meet at {} on the surface; move the nodes "
-          "apart",
-          bone_name(bone), node_name(first.node), node_name(side(h).node),
-          text_of(skeleton_, position(mesh_.origins[h]))));
+      throw TopologyError(fmt::format("bone \"{}\": the separation planes at nodes \"{}\" and \"{}\" meet at {} on the "
+                                      "surface; move the nodes apart",
+                                      bone_name(bone), node_name(first.node), node_name(side(h).node),
+                                      text_of(skeleton_, position(mesh_.origins[h]))),
+                          bone, first.node);
     loop.half_edges.push_back(h);
     h = CutMesh::next(h);
     while (mesh_.seams[h] < 0) h = CutMesh::next(mesh_.opposites[h]);
@@ -283,29 +288,29 @@ void Segmenter::check_loops(int bone, BoneEnd end, bool is_wanted) const {
   const auto& loops = loops_[bone][static_cast<int>(end)];
   const int node = end_node(skeleton_, bone, end);
   if (is_wanted && loops.empty())
-    throw TopologyError(
-        fmt::format("bone \"{}\": its surface does not reach the separation planes of its node \"{}\" at {}; move "
-                    "the node, or lengthen the bone",
-                    bone_name(bone), node_name(node), text_of(skeleton_, skeleton_.nodes[node].position)));
+    throw TopologyError(fmt::format("bone \"{}\": its surface does not reach the separation planes of its node \"{}\" "
+                                    "at {}; move the node, or lengthen the bone",
+                                    bone_name(bone), node_name(node), text_of(skeleton_.nodes[node].position)),
+                        bone, node);
   if (loops.size() > (is_wanted ? 1 : 0)) {
     // The one that winds around the bone is right; name another.
     const auto wrong = std::find_if(loops.begin(), loops.end(), [](const HalfEdgeLoop& l) { return l.turning == 0; });
     const HalfEdgeLoop& loop = wrong == loops.end() ? loops.back() : *wrong;
-    throw TopologyError(fmt::format(
-        "bone \"{}\": its surface has {} boundaries at node \"{}\" instead of one, another at {}: the separation "
-        "planes there "
-        "reach a second part of the body; move the node or turn the bones so that they meet only the body around "
-        "it",
-        bone_name(bone), loops.size(), node_name(node),
-        text_of(skeleton_, position(mesh_.origins[loop.half_edges[0]]))));
+    throw TopologyError(fmt::format("bone \"{}\": its surface has {} boundaries at node \"{}\" instead of one, another "
+                                    "at {}: the separation planes there reach a second part of the body; move the node "
+                                    "or turn the bones so that they meet only the body around it",
+                                    bone_name(bone), loops.size(), node_name(node),
+                                    text_of(skeleton_, position(mesh_.origins[loop.half_edges[0]]))),
+                        bone, node);
   }
   // With the surface on the left, a boundary at the head runs with growing v, one at the tail against it.
   if (is_wanted && loops[0].turning != (end == BoneEnd::kHead ? 1 : -1))
-    throw TopologyError(fmt::format(
-        "bone \"{}\": its boundary at node \"{}\", through {}, does not run once around the bone; move "
-        "the node to the "
-        "middle of the body",
-        bone_name(bone), node_name(node), text_of(skeleton_, position(mesh_.origins[loops[0].half_edges[0]]))));
+    throw TopologyError(
+        fmt::format("bone \"{}\": its boundary at node \"{}\", through {}, does not run once around the bone; move the "
+                    "node to the middle of the body",
+                    bone_name(bone), node_name(node),
+                    text_of(skeleton_, position(mesh_.origins[loops[0].half_edges[0]]))),
+        bone, node);
 }
 
 /// All boundaries of all segments, checked.
@@ -352,11 +357,11 @@ void Segmenter::add_arc(int bone, BoneEnd end, bool has_corners, std::span<const
   const int node = end_node(skeleton_, bone, end), other = side(mesh_.opposites[half_edges[0]]).bone.bone;
   for (const int h : half_edges)
     if (const int changed = side(mesh_.opposites[h]).bone.bone; changed != other)
-      throw TopologyError(fmt::format(
-          "bone \"{}\": its neighbour at node \"{}\" changes from \"{}\" to \"{}\" at {} without a corner; move "
-          "the node",
-          bone_name(bone), node_name(node), bone_name(other), bone_name(changed),
-          text_of(skeleton_, position(mesh_.origins[h]))));
+      throw TopologyError(fmt::format("bone \"{}\": its neighbour at node \"{}\" changes from \"{}\" to \"{}\" at {} "
+                                      "without a corner; move the node",
+                                      bone_name(bone), node_name(node), bone_name(other), bone_name(changed),
+                                      text_of(skeleton_, position(mesh_.origins[h]))),
+                          bone, node);
   if (bone > other) return;
   Arc arc;
   arc.node = node;
@@ -446,12 +451,11 @@ void Segmenter::check_topology(const Segment& segment) const {
   if (euler == wanted) return;
   const Vec3 centre = 0.5 * (end_position(skeleton_, segment.bone, BoneEnd::kHead) +
                              end_position(skeleton_, segment.bone, BoneEnd::kTail));
-  throw TopologyError(
-      fmt::format("bone \"{}\" around {}: its surface is no {} but has {} handle{} (Euler number {} instead of "
-                  "{}); lay a ring of "
-                  "bones through every handle of the body",
-                  bone_name(segment.bone), text_of(skeleton_, centre), to_string(segment.topology),
-                  (wanted - euler) / 2, wanted - euler == 2 ? "" : "s", euler, wanted));
+  throw TopologyError(fmt::format("bone \"{}\" around {}: its surface is no {} but has {} handle{} (Euler number {} "
+                                  "instead of {}); lay a ring of bones through every handle of the body",
+                                  bone_name(segment.bone), text_of(skeleton_, centre), to_string(segment.topology),
+                                  (wanted - euler) / 2, wanted - euler == 2 ? "" : "s", euler, wanted),
+                      segment.bone, -1);
 }
 
 void Segmenter::build_segments() {

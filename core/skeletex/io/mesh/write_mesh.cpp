@@ -2,10 +2,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 
 #include "skeletex/io/atomic_file.h"
+#include "skeletex/io/gltf/write_gltf.h"
 #include "skeletex/io/mesh/text_reader.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/model/error.h"
@@ -153,6 +155,34 @@ void write_obj(OutputFile& file, const TriangleMesh& mesh, const WrittenAttribut
   });
 }
 
+void write_stl(OutputFile& file, const TriangleMesh& mesh) {
+  std::string header(80, ' ');
+  header.replace(0, 8, "Skeletex");  // anything but "solid", which begins files in ASCII
+  append(header, static_cast<std::uint32_t>(mesh.triangles.size()));
+  file.write(header);
+  write_blocks(file, mesh.triangles.size(), [&](std::size_t i, std::string& out) {
+    for (const double x : area_vector(mesh, mesh.triangles[i]).stableNormalized()) append(out, static_cast<float>(x));
+    for (const int corner : mesh.triangles[i])
+      for (const double x : mesh.positions[corner]) append(out, static_cast<float>(x));
+    append(out, std::uint16_t{0});
+  });
+}
+
+/// One mesh without a skin.
+GltfScene scene_of(const TriangleMesh& mesh, const WrittenAttributes& attributes, const std::string& name) {
+  GltfPrimitive primitive;
+  primitive.positions = mesh.positions;
+  primitive.normals = attributes.vertex_normals.empty()
+                          ? vertex_normals(mesh)
+                          : std::vector<Vec3>(attributes.vertex_normals.begin(), attributes.vertex_normals.end());
+  primitive.triangles = mesh.triangles;
+  GltfScene scene;
+  scene.meshes.push_back({name, {std::move(primitive)}});
+  scene.nodes.emplace_back().name = name;
+  scene.nodes[0].mesh = 0;
+  return scene;
+}
+
 void check_attributes(const TriangleMesh& mesh, const WrittenAttributes& attributes, const std::string& where) {
   const auto fits = [](std::size_t size, std::size_t count) { return size == 0 || size == count; };
   const std::size_t vertices = mesh.positions.size();
@@ -178,20 +208,24 @@ VertexColour bytes_of(const Colour& colour) {
 
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, const WrittenAttributes& attributes) {
   const std::string extension = lower_case(path.extension().string());
-  if (extension != ".ply" && extension != ".obj")
-    throw IoError(fmt::format("{}: meshes are written as .ply or .obj, not as \"{}\"", path.string(), extension));
+  constexpr std::array kEndings{".ply", ".obj", ".stl", ".glb"};
+  if (std::find(kEndings.begin(), kEndings.end(), extension) == kEndings.end())
+    throw IoError(
+        fmt::format("{}: meshes are written as .ply, .obj, .stl or .glb, not as \"{}\"", path.string(), extension));
   check_attributes(mesh, attributes, path.string());
-  const bool is_ply = extension == ".ply";
+  if (extension == ".glb") return write_gltf(path, scene_of(mesh, attributes, path.stem().string()));
   std::string material_file;
-  if (!is_ply && attributes.texture_coordinates && !attributes.image_file.empty()) {
+  if (extension == ".obj" && attributes.texture_coordinates && !attributes.image_file.empty()) {
     const std::filesystem::path material = std::filesystem::path(path).replace_extension(".mtl");
     material_file = material.filename().string();
     write_text_atomically(material, fmt::format("newmtl {}\nKd 1 1 1\nmap_Kd {}\n", kMaterial, attributes.image_file));
   }
   write_atomically(path, [&](const std::filesystem::path& temporary) {
     OutputFile file(temporary, path);
-    if (is_ply)
+    if (extension == ".ply")
       write_ply(file, mesh, attributes);
+    else if (extension == ".stl")
+      write_stl(file, mesh);
     else
       write_obj(file, mesh, attributes, material_file);
     file.close();

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <optional>
+#include <string>
+
+#include "command.h"
+#include "skeletex/close/carry_over.h"
+
+namespace skeletex::cli {
+
+/// --close and --close-detail.
+struct CloseOptions {
+  bool is_on = false;
+  double detail = 0.008;  ///< diagonals
+};
+void add_close_options(CLI::App& command, CloseOptions& options);
+
+/// A mesh with what belongs to it.
+struct MeshParts {
+  TriangleMesh mesh;
+  MeshAttributes attributes;
+  VertexBoneWeights weights;
+};
+/// Makes a mesh closed and of one part: fills small holes, else wraps it by the program skeletex_wrap, which is beside
+/// this one or on the PATH. Says what it did, and how far the wrap is from the mesh.
+/// \throw InputError when that program is not there, or could not wrap it
+/// \return for the JSON
+Json close_mesh(MeshParts& open, const CloseOptions& options);
+
+}  // namespace skeletex::cli

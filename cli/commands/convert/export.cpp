@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: MIT
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "command.h"
+#include "files.h"
+#include "progress_bar.h"
+#include "skeletex/io/gltf/write_gltf.h"
+#include "skeletex/io/model_file.h"
+#include "skeletex/io/pose_file.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/rig/export_rig.h"
+
+namespace skeletex::cli {
+namespace {
+
+struct Arguments {
+  std::string model, output, device, json, up = "y";
+  std::vector<std::string> animations;
+  int size = 0, level = 0;
+};
+
+/// Animations are named as their files, each name once.
+std::vector<NamedAnimation> read_animations(const std::vector<std::string>& paths, const Skeleton& skeleton) {
+  std::vector<NamedAnimation> animations;
+  std::set<std::string> taken;
+  for (const std::string& path : paths) {
+    const std::string stem = std::filesystem::path(path).stem().string();
+    std::string name = stem;
+    for (int i = 2; !taken.insert(name).second; ++i) name = fmt::format("{}_{}", stem, i);
+    animations.push_back({name, read_animation(path, skeleton)});
+  }
+  return animations;
+}
+
+/// Turns the axis that is up in the model to the y axis. What looks along -y of a z axis that is up then looks along z,
+/// as glTF has it.
+Eigen::Quaterniond placement_of(const std::string& up) {
+  Vec3 axis = Vec3::Zero();
+  axis[up.back() - 'x'] = up.front() == '-' ? -1 : 1;
+  if (axis == -Vec3::UnitY()) return Eigen::Quaterniond(0, 1, 0, 0);  // half a turn about x
+  return Eigen::Quaterniond::FromTwoVectors(axis, Vec3::UnitY());
+}
+
+std::string model_name(const std::string& path) {
+  std::string name = std::filesystem::path(path).filename().string();
+  for (const char* ending : {".exr", ".skx"})
+    if (has_ending(name, ending)) name.resize(name.size() - 4);
+  return name;
+}
+
+void run(const Arguments& arguments) {
+  Stopwatch watch;
+  SkeletexModel model = read_model(arguments.model, arguments.level);
+  const std::vector<NamedAnimation> animations = read_animations(arguments.animations, model.skeleton);
+  ClContext context(arguments.device);
+  ProgressBar bar(context);
+  if (arguments.size > 0 && arguments.size != std::max(model.texture.width, model.texture.height)) {
+    bar.show("resampling", 0.1);
+    model = resample_model(context, model, arguments.size);
+  }
+  bar.show("reconstructing", 0.3);
+  const GltfScene scene = export_rig(
+      context, model,
+      {.name = model_name(arguments.model), .placement = placement_of(arguments.up), .animations = animations});
+  bar.show("writing", 0.7);
+  write_gltf(arguments.output, scene);
+  const double ms = watch.lap_ms();
+  const GltfPrimitive& surface = scene.meshes[0].primitives[0];
+  Json clips = Json::array();
+  std::string clips_text;
+  for (const GltfAnimation& animation : scene.animations) {
+    std::size_t frames = 0;
+    for (const GltfTrack& track : animation.tracks) frames = std::max(frames, track.times.size());
+    clips.push_back({{"name", animation.name}, {"frames", frames}, {"tracks", animation.tracks.size()}});
+    clips_text += fmt::format("animation {}: {} frames, {} tracks\n", animation.name, frames, animation.tracks.size());
+  }
+  print(arguments.json,
+        fmt::format("{} vertices, {} triangles, {} joints\n{}{}\n", surface.positions.size(), surface.triangles.size(),
+                    scene.skins[0].joints.size(), clips_text, arguments.output));
+  write_json(arguments.json, {{"output", arguments.output},
+                              {"vertices", surface.positions.size()},
+                              {"triangles", surface.triangles.size()},
+                              {"joints", scene.skins[0].joints.size()},
+                              {"animations", std::move(clips)},
+                              {"times_ms", {{"total", ms}}},
+                              {"device", context.device().name},
+                              {"kernels", profile_json(context)}});
+}
+
+}  // namespace
+
+void add_export_command(CLI::App& program) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand(
+      "export", "Write a model as a rigged character for other programs: mesh, skeleton, skin and animations as glTF");
+  declare_input(command, command.add_option("MODEL", arguments->model, "model: .skx.exr"))->required();
+  declare_output(command, command.add_option("-o,--output", arguments->output, "glTF 2.0, binary: .glb"), {".glb"})
+      ->required()
+      ->type_name("FILE");
+  declare_input(command, command.add_option("--animation", arguments->animations,
+                                            "pose or animation that the rig brings along: .json; repeat for more"))
+      ->type_name("FILE")
+      ->expected(1)
+      ->take_all();
+  command
+      .add_option("--lod", arguments->size,
+                  "mesh of fewer or more texels, along the longer side, 4 to 16384 (default: the model's own size)")
+      ->check(number_in(4, 16384))
+      ->type_name("N");
+  command
+      .add_option("--level", arguments->level,
+                  "level of a file that `skeletex lod --levels` has written (default: 0, the finest)")
+      ->check(number_from(0))
+      ->type_name("K");
+  take_one_of(*command.add_option("--up", arguments->up, "axis of the model that is up; y is in glTF (default: y)"),
+              {"x", "y", "z", "-x", "-y", "-z"});
+  add_device_option(command, arguments->device);
+  add_json_option(command, arguments->json);
+  command.footer(
+      "Examples:\n"
+      "  skeletex export bear.skx.exr -o bear.glb --lod 128\n"
+      "  skeletex export man.skx.exr -o man.glb --up z --animation walk.json --animation sit.json\n"
+      "Other programs move the surface by linear blend skinning with the four strongest weights of smooth poses; "
+      "`reconstruct --deform linear` shows the same. Each bone is a joint of its own name.");
+  command.callback([arguments] { run(*arguments); });
+}
+
+}  // namespace skeletex::cli

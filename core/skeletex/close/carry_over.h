@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <span>
+#include <vector>
+
+#include "skeletex/geometry/triangle_tree.h"
+#include "skeletex/model/mesh_attributes.h"
+#include "skeletex/skeleton/bone_motion.h"
+
+namespace skeletex {
+
+using VertexBoneWeights = std::vector<std::vector<BoneWeight>>;
+
+/// A mesh in place of another one near by.
+struct CarriedOver {
+  MeshAttributes attributes;  ///< per vertex: colours (of pictures too) and numbers; no normals
+  VertexBoneWeights weights;  ///< per vertex, where the other mesh has some
+};
+/// Per vertex of a mesh what another mesh has at its nearest point.
+/// \param tree  of `from`
+CarriedOver carry_over(const TriangleMesh& from, const TriangleTree& tree, const MeshAttributes& attributes,
+                       const VertexBoneWeights& weights, const TriangleMesh& to);
+
+/// Distances of the vertices of a mesh from another one, world units; of 20 000 vertices at most.
+struct VertexDistances {
+  double mean = 0, largest = 0;
+};
+VertexDistances vertex_distances(const TriangleMesh& mesh, const TriangleMesh& to);
+
+/// The attributes of a mesh whose triangles have changed: those of new triangles are what other triangles have at the
+/// same vertices.
+/// \param before   the triangles that the attributes are of
+/// \param after    those of now, with the same vertices
+/// \param origins  per triangle of now the one before; -1: a new one
+MeshAttributes with_triangles(const MeshAttributes& attributes, std::span<const Triangle> before,
+                              std::span<const Triangle> after, std::span<const int> origins);
+
+}  // namespace skeletex

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <span>
+#include <string>
+
+#include "skeletex/device/context.h"
+#include "skeletex/io/gltf/gltf_scene.h"
+#include "skeletex/reconstruct/prepared_model.h"
+#include "skeletex/rig/joints.h"
+
+namespace skeletex {
+
+struct RigExportOptions {
+  std::string name = "model";                                     ///< of the mesh
+  Eigen::Quaterniond placement = Eigen::Quaterniond::Identity();  ///< turns the model to the scene's y up
+  std::span<const NamedAnimation> animations;
+};
+
+/// A model as other programs animate it: its mesh in the bind pose with normals, a skin with four weights per vertex
+/// (those of smooth poses), a joint per bone, and animations. Posed by linear blend skinning: `Deformation::kLinear`.
+/// \throw InputError when a pose does not fit the skeleton; DeviceError
+GltfScene export_rig(ClContext& context, const PreparedModel& model, const RigExportOptions& options = {});
+
+}  // namespace skeletex

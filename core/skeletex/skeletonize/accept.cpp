@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/skeletonize/accept.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "skeletex/analysis/metro.h"
+#include "skeletex/convert/segment/segment_mesh.h"
+#include "skeletex/model/error.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+
+namespace skeletex {
+namespace {
+
+constexpr int kTrialSize = 128;
+constexpr long kTrialSamples = 40'000;
+constexpr int kMovesPerBone = 8;  // before a bone is contracted
+constexpr int kMoves = 30;        // in all, of meshes up to 30 000 triangles
+
+}  // namespace
+
+void give_numbers(Skeleton& skeleton) {
+  for (std::size_t n = 0; n < skeleton.nodes.size(); ++n) skeleton.nodes[n].name = fmt::format("node_{}", n);
+  for (std::size_t b = 0; b < skeleton.bones.size(); ++b) skeleton.bones[b].name = fmt::format("bone_{}", b);
+}
+
+std::string Acceptance::segment(Repair& repair) const {
+  // Large meshes take long to cut: fewer moves there, and contraction sooner.
+  const int moves = std::clamp(
+      static_cast<int>(kMoves * 30'000 / std::max<std::size_t>(surface_.mesh.triangles.size(), 1)), 6, kMoves);
+  std::string refusal = "its separation planes cross inside the body, wherever its nodes go";
+  int moved = 0, moved_for_this = 0;
+  for (;;) {
+    if (!repair.run()) return refusal;
+    Skeleton skeleton = repair.skeleton();
+    give_numbers(skeleton);
+    int node = -1, bone = -1;
+    try {
+      segment_mesh(context_, cut_, skeleton);
+      return {};
+    } catch (const TopologyError& error) {
+      refusal = error.what();
+      node = error.node();
+      bone = error.bone();
+    }
+    if (node >= 0 && moved < moves && moved_for_this < kMovesPerBone) {
+      ++moved;
+      ++moved_for_this;
+      repair.shake(node);
+      continue;
+    }
+    moved_for_this = 0;
+    if (!repair.contract(std::max(bone, 0))) return refusal;
+  }
+}
+
+bool Acceptance::is_accepted(const Skeleton& skeleton) const {
+  Skeleton named = skeleton;
+  give_numbers(named);
+  try {
+    segment_mesh(context_, cut_, named);
+    return true;
+  } catch (const TopologyError&) {
+    return false;
+  }
+}
+
+Acceptance::Trial Acceptance::encode(const Skeleton& skeleton) const {
+  try {
+    Skeleton named = skeleton;
+    give_numbers(named);
+    EncodeOptions options;
+    options.width = options.height = kTrialSize;
+    options.tree = &surface_.tree;
+    const EncodeResult result = encode_model(context_, surface_.mesh, named, options);
+    const TriangleMesh mesh = reconstruct_mesh(context_, result.model);
+    return {symmetric_mean(measure_metro(context_, surface_.mesh, mesh, {.samples = kTrialSamples})), {}};
+  } catch (const DeviceError&) {
+    throw;
+  } catch (const Error& error) {
+    return {0, error.what()};
+  }
+}
+
+}  // namespace skeletex

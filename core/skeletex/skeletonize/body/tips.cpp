@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/skeletonize/body/tips.h"
+
+#include <algorithm>
+
+namespace skeletex {
+
+std::vector<int> find_tips(const VoxelBody& body, const BodyPaths& paths, const TipRule& rule, double diagonal) {
+  std::vector<int> order(body.size());
+  for (int v = 0; v < body.size(); ++v) order[v] = v;
+  std::sort(order.begin(), order.end(), [&](int a, int b) {
+    return paths.distances[a] != paths.distances[b] ? paths.distances[a] > paths.distances[b] : a < b;
+  });
+  std::vector<char> is_covered(body.size(), 0), is_on_path(body.size(), 0);
+  for (const int root : paths.roots) is_on_path[root] = 1;
+  std::vector<int> tips, path = paths.roots;
+  const auto cover = [&] {
+    std::vector<PathSource> sources;
+    for (const int v : path)
+      sources.push_back(
+          {v, -(std::max(rule.covered_radii * body.radii[v], rule.least_covered * diagonal) + 2 * body.side)});
+    const std::vector<double> reached = distances_through(body, sources, {}, 0);
+    for (int v = 0; v < body.size(); ++v) is_covered[v] |= reached[v] <= 0;
+  };
+  cover();
+  for (const int tip : order) {
+    if (is_covered[tip]) continue;
+    path.clear();
+    double length = 0;
+    int at = tip;
+    for (; !is_on_path[at]; at = paths.parents[at]) {
+      path.push_back(at);
+      length += (body.centres[at] - body.centres[paths.parents[at]]).norm();
+    }
+    const double radius = body.radii[at];
+    if (length > rule.longer_than_wide * radius + 2 * body.side && length - radius > rule.least_length * diagonal) {
+      tips.push_back(tip);
+      for (const int v : path) is_on_path[v] = 1;
+    }
+    if (static_cast<int>(tips.size()) == kMostTips) break;
+    cover();
+  }
+  return tips;
+}
+
+std::vector<int> find_ends(const VoxelBody& body) {
+  const auto farthest_from = [&](int voxel) {
+    const PathSource source{voxel, 0};
+    const std::vector<double> distances = distances_through(body, {&source, 1});
+    return static_cast<int>(std::max_element(distances.begin(), distances.end()) - distances.begin());
+  };
+  const int first = farthest_from(0);
+  return {first, farthest_from(first)};
+}
+
+}  // namespace skeletex

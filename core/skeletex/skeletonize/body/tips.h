@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <vector>
+
+#include "skeletex/skeletonize/body/body_paths.h"
+
+namespace skeletex {
+
+/// Which ends of a body count as tips of limbs. A path from a tip to what there is of the skeleton has the length L and
+/// ends where the ball in the body has the radius r.
+struct TipRule {
+  double longer_than_wide = 1.6;  ///< L must be above this times r
+  double least_length = 0.07;     ///< and L - r above this; diagonals
+  double covered_radii = 1.4;     ///< a path covers what is within so many times its balls' radii,
+  double least_covered = 0.06;    ///< but at least this far; diagonals
+};
+
+inline constexpr int kMostTips = 24;
+
+/// Voxels at the tips of limbs, the farthest from the roots first.
+std::vector<int> find_tips(const VoxelBody& body, const BodyPaths& paths, const TipRule& rule, double diagonal);
+
+/// The two ends of the longest way through a body, about.
+std::vector<int> find_ends(const VoxelBody& body);
+
+}  // namespace skeletex

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <vector>
+
+#include "skeletex/skeleton/skeleton.h"
+#include "skeletex/skeletonize/body/curve_graph.h"
+
+namespace skeletex {
+
+/// Replaces the branches of a graph by straight bones inside the body, with nodes where they bend by more than a share
+/// of the body's radius there. Branches with a free end stop a ball before the tip. A cycle has three bones or more.
+/// Names are empty.
+Skeleton make_bones(const Surface& surface, double voxel_side, const CurveGraph& graph);
+
+/// Where a curve inside the body is split so that straight pieces between these points do for it, ascending, its ends
+/// included.
+/// \param pieces  at least so many
+std::vector<int> straighten(const Surface& surface, double voxel_side, const std::vector<Vec3>& points, int pieces);
+
+}  // namespace skeletex

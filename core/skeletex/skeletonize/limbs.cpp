@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/skeletonize/limbs.h"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+namespace skeletex {
+namespace {
+
+constexpr double kApart = 0.06;  // diagonals, between a node and the image of its partner
+
+/// Per node the one at its image, itself in the plane; -1: none. Of nodes that are not marked only.
+std::vector<int> pair_nodes(const Skeleton& skeleton, const std::vector<char>& is_left_out, const MirrorPlane& plane,
+                            double apart) {
+  const int count = static_cast<int>(skeleton.nodes.size());
+  std::vector<int> partner(count, -1);
+  for (int n = 0; n < count; ++n) {
+    if (is_left_out[n]) continue;
+    const Vec3 image = plane.mirrored(skeleton.nodes[n].position);
+    double least = apart;
+    for (int m = 0; m < count; ++m) {
+      const double distance = (skeleton.nodes[m].position - image).norm();
+      if (!is_left_out[m] && distance < least) least = distance, partner[n] = m;
+    }
+  }
+  for (int n = 0; n < count; ++n)
+    if (partner[n] >= 0 && partner[partner[n]] != n) return {};
+  return partner;
+}
+
+/// Replaces a limb by the image of another one.
+void mirror_limb(const SkeletonLimb& from, const SkeletonLimb& to, const MirrorPlane& plane, Skeleton& skeleton,
+                 std::set<int>& gone_bones) {
+  int before = to.nodes[0];
+  for (std::size_t i = 1; i < from.nodes.size(); ++i) {
+    const Vec3 place = plane.mirrored(skeleton.nodes[from.nodes[i]].position);
+    int node = i < to.nodes.size() ? to.nodes[i] : -1;
+    if (node < 0) {
+      node = static_cast<int>(skeleton.nodes.size());
+      skeleton.nodes.push_back({"", place});
+    }
+    skeleton.nodes[node].position = place;
+    if (i - 1 < to.bones.size())
+      skeleton.bones[to.bones[i - 1]] = {"", before, node, {}};
+    else
+      skeleton.bones.push_back({"", before, node, {}});
+    before = node;
+  }
+  for (std::size_t i = from.bones.size(); i < to.bones.size(); ++i) gone_bones.insert(to.bones[i]);
+}
+
+void drop_bones(const std::set<int>& gone, Skeleton& skeleton) {
+  std::vector<Bone> bones;
+  for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b)
+    if (!gone.contains(b)) bones.push_back(skeleton.bones[b]);
+  skeleton.bones = std::move(bones);
+  std::vector<int> number(skeleton.nodes.size(), -1);
+  for (const Bone& bone : skeleton.bones) number[bone.head] = number[bone.tail] = 0;
+  std::vector<Node> nodes;
+  for (std::size_t n = 0; n < number.size(); ++n)
+    if (number[n] == 0) number[n] = static_cast<int>(nodes.size()), nodes.push_back(skeleton.nodes[n]);
+  for (Bone& bone : skeleton.bones) bone.head = number[bone.head], bone.tail = number[bone.tail];
+  skeleton.nodes = std::move(nodes);
+}
+
+bool is_inside(const Surface& surface, const Skeleton& skeleton) {
+  return std::all_of(skeleton.bones.begin(), skeleton.bones.end(), [&](const Bone& bone) {
+    const Vec3 &p = skeleton.nodes[bone.head].position, &q = skeleton.nodes[bone.tail].position;
+    return (q - p).norm() > 1e-4 * surface.diagonal && !surface.is_between(p, q) &&
+           surface.radius(p) > 1e-4 * surface.diagonal;
+  });
+}
+
+}  // namespace
+
+std::vector<SkeletonLimb> find_limbs(const Skeleton& skeleton) {
+  const auto at_nodes = bones_at_nodes(skeleton);
+  std::vector<SkeletonLimb> limbs;
+  for (int n = 0; n < static_cast<int>(skeleton.nodes.size()); ++n) {
+    if (at_nodes[n].size() != 1) continue;
+    SkeletonLimb limb{{}, {n}};
+    BoneAtNode at = at_nodes[n][0];
+    for (;;) {
+      limb.bones.push_back(at.bone);
+      const int next = end_node(skeleton, at.bone, opposite(at.end));
+      limb.nodes.push_back(next);
+      if (at_nodes[next].size() == 1) return {};  // from free end to free end
+      if (at_nodes[next].size() > 2) break;
+      at = at_nodes[next][at_nodes[next][0].bone == at.bone ? 1 : 0];
+    }
+    std::reverse(limb.bones.begin(), limb.bones.end());
+    std::reverse(limb.nodes.begin(), limb.nodes.end());
+    limbs.push_back(std::move(limb));
+  }
+  return limbs;
+}
+
+std::vector<int> pair_limbs(const Skeleton& skeleton, const std::vector<SkeletonLimb>& limbs, const MirrorPlane& plane,
+                            double apart) {
+  std::vector<int> partner(limbs.size(), -1);
+  const auto tip = [&](std::size_t limb) { return skeleton.nodes[limbs[limb].nodes.back()].position; };
+  for (std::size_t i = 0; i < limbs.size(); ++i) {
+    double least = apart;
+    for (std::size_t j = 0; j < limbs.size(); ++j) {
+      const double distance = (tip(j) - plane.mirrored(tip(i))).norm();
+      if (distance < least) least = distance, partner[i] = static_cast<int>(j);
+    }
+  }
+  for (std::size_t i = 0; i < limbs.size(); ++i)
+    if (partner[i] >= 0 && partner[partner[i]] != static_cast<int>(i)) partner[i] = -1;
+  return partner;
+}
+
+std::optional<Skeleton> symmetrized(const Surface& surface, const MirrorPlane& plane, const Skeleton& skeleton) {
+  const double apart = kApart * surface.diagonal;
+  const std::vector<SkeletonLimb> limbs = find_limbs(skeleton);
+  const std::vector<int> partner = pair_limbs(skeleton, limbs, plane, apart);
+  Skeleton result = skeleton;
+  std::vector<char> is_on_limb(skeleton.nodes.size(), 0);
+  for (const SkeletonLimb& limb : limbs)
+    for (std::size_t i = 1; i < limb.nodes.size(); ++i) is_on_limb[limb.nodes[i]] = 1;
+  // What is not on a limb: pairs of nodes and nodes in the plane.
+  const std::vector<int> node_partner = pair_nodes(skeleton, is_on_limb, plane, apart);
+  if (node_partner.empty()) return std::nullopt;
+  for (std::size_t n = 0; n < node_partner.size(); ++n) {
+    if (is_on_limb[n]) continue;
+    if (node_partner[n] < 0) return std::nullopt;
+    result.nodes[n].position =
+        0.5 * (skeleton.nodes[n].position + plane.mirrored(skeleton.nodes[node_partner[n]].position));
+  }
+  std::set<std::pair<int, int>> trunk;
+  for (const Bone& bone : skeleton.bones)
+    if (!is_on_limb[bone.head] && !is_on_limb[bone.tail]) trunk.insert(std::minmax(bone.head, bone.tail));
+  for (const auto& [a, b] : trunk)
+    if (!trunk.contains(std::minmax(node_partner[a], node_partner[b]))) return std::nullopt;
+  std::set<int> gone;
+  for (std::size_t i = 0; i < limbs.size(); ++i) {
+    if (partner[i] < 0) return std::nullopt;
+    const SkeletonLimb &limb = limbs[i], &other = limbs[partner[i]];
+    if (node_partner[limb.nodes[0]] != other.nodes[0]) return std::nullopt;
+    if (partner[i] == static_cast<int>(i)) {
+      for (std::size_t k = 1; k < limb.nodes.size(); ++k) {
+        Vec3& p = result.nodes[limb.nodes[k]].position;
+        p -= plane.height(p) * plane.normal;
+      }
+      continue;
+    }
+    // The one with more bones is kept; else the one on the left.
+    const double left = plane.height(skeleton.nodes[limb.nodes.back()].position);
+    if (std::make_pair(limb.bones.size(), left) > std::make_pair(other.bones.size(), -left))
+      mirror_limb(limb, other, plane, result, gone);
+  }
+  drop_bones(gone, result);
+  return is_inside(surface, result) ? std::optional(std::move(result)) : std::nullopt;
+}
+
+}  // namespace skeletex

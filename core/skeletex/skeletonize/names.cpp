@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/skeletonize/names.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "skeletex/skeletonize/limbs.h"
+
+namespace skeletex {
+namespace {
+
+constexpr double kApart = 0.05;  // diagonals, between a tip and the image of its partner
+
+class Namer {
+ public:
+  Namer(const Surface& surface, const std::optional<MirrorPlane>& plane, Skeleton& skeleton)
+      : surface_(surface), plane_(plane), skeleton_(skeleton), at_nodes_(bones_at_nodes(skeleton)) {}
+
+  void run() {
+    is_limb_.assign(skeleton_.bones.size(), false);
+    sort_limbs();
+    turn_away_from(root());
+    name_limbs();
+    name_trunk();
+    name_nodes();
+  }
+
+ private:
+  /// From the top.
+  void sort_limbs() {
+    limbs_ = find_limbs(skeleton_);
+    for (const SkeletonLimb& limb : limbs_)
+      for (const int b : limb.bones) is_limb_[b] = true;
+    const auto rank = [&](const SkeletonLimb& limb) {
+      const Vec3& tip = skeleton_.nodes[limb.nodes.back()].position;
+      return std::array{-tip.y(), -tip.z(), -tip.x()};
+    };
+    std::sort(limbs_.begin(), limbs_.end(),
+              [&](const SkeletonLimb& a, const SkeletonLimb& b) { return rank(a) < rank(b); });
+  }
+
+  int root() const {
+    int best = -1;
+    double largest = -1;
+    for (int n = 0; n < static_cast<int>(skeleton_.nodes.size()); ++n) {
+      if (std::all_of(at_nodes_[n].begin(), at_nodes_[n].end(),
+                      [&](const BoneAtNode& at) { return is_limb_[at.bone]; }) &&
+          at_nodes_[n].size() < 3)
+        continue;
+      const double radius = surface_.radius(skeleton_.nodes[n].position);
+      if (radius > largest) largest = radius, best = n;
+    }
+    return best;
+  }
+
+  void turn_away_from(int root) {
+    root_ = root;
+    std::vector<char> is_reached(skeleton_.nodes.size(), 0), is_done(skeleton_.bones.size(), 0);
+    std::vector<int> queue{root};
+    is_reached[root] = 1;
+    for (std::size_t i = 0; i < queue.size(); ++i)
+      for (const BoneAtNode& at : at_nodes_[queue[i]]) {
+        if (is_done[at.bone]) continue;
+        is_done[at.bone] = 1;
+        Bone& bone = skeleton_.bones[at.bone];
+        if (bone.head != queue[i]) std::swap(bone.head, bone.tail);
+        order_.push_back(at.bone);
+        if (is_reached[bone.tail]) continue;
+        is_reached[bone.tail] = 1;
+        queue.push_back(bone.tail);
+      }
+    at_nodes_ = bones_at_nodes(skeleton_);
+  }
+
+  void name_limbs() {
+    int number = 0;
+    std::vector<char> is_named(limbs_.size(), 0);
+    const auto name = [&](std::size_t limb, const std::string& side) {
+      is_named[limb] = 1;
+      for (std::size_t i = 0; i < limbs_[limb].bones.size(); ++i)
+        skeleton_.bones[limbs_[limb].bones[i]].name = fmt::format("{}limb_{}_{}", side, number, i + 1);
+    };
+    const std::vector<int> partner =
+        plane_ ? pair_limbs(skeleton_, limbs_, *plane_, kApart * surface_.diagonal) : std::vector<int>();
+    for (std::size_t limb = 0; limb < limbs_.size(); ++limb) {
+      if (is_named[limb]) continue;
+      ++number;
+      const int other = partner.empty() ? -1 : partner[limb];
+      if (other < 0 || other == static_cast<int>(limb)) {
+        name(limb, "");
+        continue;
+      }
+      const bool is_left = plane_->height(skeleton_.nodes[limbs_[limb].nodes.back()].position) > 0;
+      name(limb, is_left ? "left_" : "right_");
+      name(other, is_left ? "right_" : "left_");
+    }
+  }
+
+  /// Whether a bone lies on a cycle: its ends hang together without it.
+  bool is_on_ring(int bone) const {
+    std::vector<char> is_reached(skeleton_.nodes.size(), 0);
+    std::vector<int> queue{skeleton_.bones[bone].head};
+    is_reached[queue[0]] = 1;
+    for (std::size_t i = 0; i < queue.size(); ++i)
+      for (const BoneAtNode& at : at_nodes_[queue[i]]) {
+        const int other = end_node(skeleton_, at.bone, opposite(at.end));
+        if (at.bone == bone || is_reached[other]) continue;
+        is_reached[other] = 1;
+        queue.push_back(other);
+      }
+    return is_reached[skeleton_.bones[bone].tail];
+  }
+
+  void name_trunk() {
+    int spine = 0, ring = 0;
+    for (const int bone : order_)
+      if (!is_limb_[bone])
+        skeleton_.bones[bone].name =
+            is_on_ring(bone) ? fmt::format("ring_{}", ++ring) : fmt::format("spine_{}", ++spine);
+  }
+
+  /// A node has the name of the bone that arrives there.
+  void name_nodes() {
+    for (Node& node : skeleton_.nodes) node.name.clear();
+    skeleton_.nodes[root_].name = "root";
+    for (const int bone : order_) {
+      Node& tail = skeleton_.nodes[skeleton_.bones[bone].tail];
+      if (tail.name.empty()) tail.name = skeleton_.bones[bone].name + "_end";
+    }
+  }
+
+  const Surface& surface_;
+  const std::optional<MirrorPlane>& plane_;
+  Skeleton& skeleton_;
+  std::vector<std::vector<BoneAtNode>> at_nodes_;
+  std::vector<bool> is_limb_;
+  std::vector<SkeletonLimb> limbs_;
+  std::vector<int> order_;  // of bones, from the root outwards
+  int root_ = 0;
+};
+
+}  // namespace
+
+void name_by_place(const Surface& surface, const std::optional<MirrorPlane>& plane, Skeleton& skeleton) {
+  Namer(surface, plane, skeleton).run();
+}
+
+}  // namespace skeletex

@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/skeletonize/repair.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <utility>
+
+namespace skeletex {
+namespace {
+
+constexpr double kGoodMargin = 0.25;  // more earns nothing
+constexpr double kReachWeight = 0.05;
+constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+constexpr int kAngles = 16;       // of rays while nodes are moved
+constexpr int kFinalAngles = 32;  // to accept
+constexpr int kTrials = 20;
+constexpr int kPatience = 10;            // failed attempts before a bone is contracted
+constexpr double kHopeless = -30;        // margins that moves have not cured
+constexpr long kMostMeasured = 150'000;  // bones, a few seconds; then patience ends
+
+}  // namespace
+
+double RandomNumbers::uniform() {
+  std::uint64_t z = state_ += 0x9e3779b97f4a7c15ULL;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+  return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1.0p-53;
+}
+
+Vec3 RandomNumbers::in_ball(double radius) {
+  for (;;) {
+    Vec3 p;
+    for (int d = 0; d < 3; ++d) p[d] = 2 * uniform() - 1;
+    if (p.squaredNorm() <= 1) return radius * p;
+  }
+}
+
+Repair::Repair(const Surface& surface, Skeleton skeleton) : surface_(surface), skeleton_(std::move(skeleton)) {
+  skeleton_.frame = surface.frame;
+  for (const Node& node : skeleton_.nodes) radii_.push_back(surface.radius(node.position));
+  prepare();
+}
+
+void Repair::prepare() {
+  at_nodes_ = bones_at_nodes(skeleton_);
+  failures_.assign(skeleton_.bones.size(), 0);
+  margins_ = bone_margins(surface_.mesh, surface_.tree, skeleton_, kFinalAngles);
+}
+
+/// Bones whose margins depend on the places of these nodes.
+std::vector<int> Repair::bones_around(const std::vector<int>& nodes) const {
+  std::set<int> bones;
+  for (const int node : nodes)
+    for (const BoneAtNode& at : at_nodes_[node])
+      for (const BoneAtNode& next : at_nodes_[end_node(skeleton_, at.bone, opposite(at.end))]) bones.insert(next.bone);
+  for (const int node : nodes)
+    for (const BoneAtNode& at : at_nodes_[node]) bones.insert(at.bone);
+  return {bones.begin(), bones.end()};
+}
+
+/// What bones lack in margin, and for planes that are long. Not exact above the limit.
+double Repair::cost(const Skeleton& skeleton, const std::vector<std::vector<BoneAtNode>>& at_nodes,
+                    const std::vector<int>& bones, double limit) const {
+  double sum = 0;
+  for (const int bone : bones) {
+    const BoneMargin margin = margin_of_bone(surface_.mesh, surface_.tree, skeleton, at_nodes, bone, kAngles);
+    const double lack = std::max(0.0, kGoodMargin - margin.margin);
+    const double radius = radii_[skeleton.bones[bone].head] + radii_[skeleton.bones[bone].tail];
+    sum += lack * lack + kReachWeight * margin.lean * radius / surface_.diagonal;
+    if (sum > limit) break;
+  }
+  return sum;
+}
+
+/// Whether a node and its bones keep clear of the surface.
+bool Repair::is_placed_well(const Skeleton& skeleton, int node, double least_radius) const {
+  const Vec3& p = skeleton.nodes[node].position;
+  if (surface_.is_near(p, least_radius)) return false;
+  for (const Bone& bone : skeleton.bones) {
+    if (bone.head != node && bone.tail != node) continue;
+    const int other = bone.head == node ? bone.tail : bone.head;
+    const Vec3& q = skeleton.nodes[other].position;
+    const double length = (q - p).norm(), room = 0.2 * std::min(radii_[other], 2 * least_radius);
+    if (length < 1e-4 * surface_.diagonal || surface_.is_between(p, q)) return false;
+    for (const double share : {0.25, 0.5, 0.75})
+      if (surface_.is_near(p + share * (q - p), room)) return false;
+  }
+  return true;
+}
+
+bool Repair::move_node(int node, double step, int trials) {
+  std::vector<int> bones = bones_around({node});
+  // The worst first: most moves are ruled out by it.
+  std::stable_sort(bones.begin(), bones.end(), [&](int a, int b) { return margins_[a].margin < margins_[b].margin; });
+  const double before = cost(skeleton_, at_nodes_, bones, kNoLimit);
+  double least = before;
+  const Vec3 start = skeleton_.nodes[node].position;
+  Vec3 best = start;
+  for (int trial = 0; trial < trials; ++trial) {
+    const Vec3 place = start + random_.in_ball(step);
+    if (surface_.is_between(start, place)) continue;
+    skeleton_.nodes[node].position = place;
+    if (is_placed_well(skeleton_, node, 0.5 * radii_[node])) {
+      measured_ += static_cast<long>(bones.size());
+      const double there = cost(skeleton_, at_nodes_, bones, least);
+      if (there < least) least = there, best = place;
+    }
+  }
+  skeleton_.nodes[node].position = best;
+  return least < before;
+}
+
+/// \return whether its cost or that of the bones around has fallen noticeably
+bool Repair::improve(int bone) {
+  const int head = skeleton_.bones[bone].head, tail = skeleton_.bones[bone].tail;
+  std::vector<int> nodes{head, tail};
+  if (margins_[bone].margin > -0.7)
+    for (const int node : {head, tail})
+      for (const BoneAtNode& at : at_nodes_[node]) {
+        const int other = end_node(skeleton_, at.bone, opposite(at.end));
+        if (std::find(nodes.begin(), nodes.end(), other) == nodes.end()) nodes.push_back(other);
+      }
+  const std::vector<int> bones = bones_around(nodes);
+  const double before = cost(skeleton_, at_nodes_, bones, kNoLimit);
+  for (int scale = 0; scale < 3; ++scale)
+    for (const int node : nodes) {
+      double length = 0;
+      for (const BoneAtNode& at : at_nodes_[node]) length += bone_length(skeleton_, at.bone);
+      length /= static_cast<double>(at_nodes_[node].size());
+      const double step = scale == 0 ? 0.16 * radii_[node] : scale == 1 ? 0.4 * radii_[node] : 0.4 * length;
+      move_node(node, step, kTrials);
+    }
+  const double after = cost(skeleton_, at_nodes_, bones, kNoLimit);
+  for (const int b : bones)
+    margins_[b] = margin_of_bone(surface_.mesh, surface_.tree, skeleton_, at_nodes_, b, kFinalAngles);
+  return after < 0.93 * before;
+}
+
+int Repair::worst_bone() const {
+  int worst = -1;
+  for (int b = 0; b < static_cast<int>(margins_.size()); ++b)
+    if (margins_[b].margin < kEnoughMargin && (worst < 0 || margins_[b].margin < margins_[worst].margin)) worst = b;
+  return worst;
+}
+
+bool Repair::run() {
+  for (;;) {
+    const int bone = worst_bone();
+    if (bone < 0) return true;
+    if (!improve(bone)) ++failures_[bone];
+    if (margins_[bone].margin >= kEnoughMargin) continue;
+    const bool is_patient = measured_ < kMostMeasured && margins_[bone].margin > kHopeless;
+    if (failures_[bone] < (is_patient ? kPatience : 1)) continue;
+    if (!contract(bone)) return false;
+  }
+}
+
+void Repair::shake(int node) {
+  const Vec3 start = skeleton_.nodes[node].position;
+  const std::vector<int> bones = bones_around({node});
+  double least = std::numeric_limits<double>::infinity();
+  Vec3 best = start;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const Vec3 place = start + random_.in_ball(0.5 * radii_[node]);
+    skeleton_.nodes[node].position = place;
+    if (surface_.is_between(start, place) || (place - start).norm() < 0.1 * radii_[node] ||
+        !is_placed_well(skeleton_, node, 0.4 * radii_[node]))
+      continue;
+    const double there = cost(skeleton_, at_nodes_, bones, least);
+    if (there < least) least = there, best = place;
+  }
+  skeleton_.nodes[node].position = best;
+  for (const int b : bones)
+    margins_[b] = margin_of_bone(surface_.mesh, surface_.tree, skeleton_, at_nodes_, b, kFinalAngles);
+}
+
+/// Whether every cycle keeps three bones when a bone is contracted.
+bool Repair::is_ring_kept(int bone) const {
+  const Bone& gone = skeleton_.bones[bone];
+  std::set<int> neighbours;
+  for (const BoneAtNode& at : at_nodes_[gone.head])
+    if (at.bone != bone) neighbours.insert(end_node(skeleton_, at.bone, opposite(at.end)));
+  for (const BoneAtNode& at : at_nodes_[gone.tail])
+    if (at.bone != bone && neighbours.contains(end_node(skeleton_, at.bone, opposite(at.end)))) return false;
+  return true;
+}
+
+/// The tail goes, the head moves. Numbers of later bones fall by one; the tail's node is left without a bone.
+Skeleton Repair::merged(int bone, const Vec3& place) const {
+  Skeleton result = skeleton_;
+  const Bone gone = result.bones[bone];
+  result.bones.erase(result.bones.begin() + bone);
+  for (Bone& b : result.bones) {
+    if (b.head == gone.tail) b.head = gone.head;
+    if (b.tail == gone.tail) b.tail = gone.head;
+  }
+  result.nodes[gone.head].position = place;
+  return result;
+}
+
+std::vector<Vec3> Repair::merge_places(int bone) {
+  const Vec3 &head = end_position(skeleton_, bone, BoneEnd::kHead),
+             &tail = end_position(skeleton_, bone, BoneEnd::kTail);
+  const Vec3 middle = 0.5 * (head + tail);
+  const double radius = 0.5 * std::max(radii_[skeleton_.bones[bone].head], radii_[skeleton_.bones[bone].tail]);
+  std::vector<Vec3> places{head, tail, middle};
+  for (int i = 0; i < 5; ++i) {
+    const Vec3 place = middle + random_.in_ball(std::max(radius, 0.5 * (tail - head).norm()));
+    if (!surface_.is_between(middle, place)) places.push_back(place);
+  }
+  return places;
+}
+
+bool Repair::try_merge(int bone, const Vec3& place, Merge& best) const {
+  const Bone& gone = skeleton_.bones[bone];
+  const Skeleton candidate = merged(bone, place);
+  if (!is_placed_well(candidate, gone.head, 0.3 * std::min(radii_[gone.head], radii_[gone.tail]))) return false;
+  const std::vector<int> before = bones_around({gone.head, gone.tail});
+  const auto at_nodes = bones_at_nodes(candidate);
+  std::vector<int> after;
+  for (const int b : before)
+    if (b != bone) after.push_back(b > bone ? b - 1 : b);
+  const double change = cost(candidate, at_nodes, after, kNoLimit) - cost(skeleton_, at_nodes_, before, kNoLimit);
+  if (best.bone < 0 || change < best.cost) best = {bone, place, change};
+  return true;
+}
+
+void Repair::merge_at(const Merge& merge) {
+  const Bone gone = skeleton_.bones[merge.bone];
+  // The node with more bones, or the deeper one, keeps its name.
+  const auto rank = [&](int node) { return std::make_pair(at_nodes_[node].size(), radii_[node]); };
+  const bool is_tail_kept = rank(gone.tail) > rank(gone.head);
+  skeleton_ = merged(merge.bone, merge.place);
+  if (is_tail_kept) std::swap(skeleton_.nodes[gone.head].name, skeleton_.nodes[gone.tail].name);
+  skeleton_.nodes.erase(skeleton_.nodes.begin() + gone.tail);
+  radii_[gone.head] = surface_.radius(merge.place);
+  radii_.erase(radii_.begin() + gone.tail);
+  for (Bone& bone : skeleton_.bones) {
+    bone.head -= bone.head > gone.tail;
+    bone.tail -= bone.tail > gone.tail;
+  }
+  prepare();
+}
+
+/// Takes away a bone with a free end, and its end: one at the bone if there is, else the shortest.
+bool Repair::drop_free_end(int bone) {
+  if (skeleton_.bones.size() < 2) return false;
+  int shortest = -1;
+  bool is_near = false;
+  for (int b = 0; b < static_cast<int>(skeleton_.bones.size()); ++b) {
+    const Bone &other = skeleton_.bones[b], &given = skeleton_.bones[bone];
+    if (at_nodes_[other.head].size() > 1 && at_nodes_[other.tail].size() > 1) continue;
+    const bool is_here =
+        other.head == given.head || other.head == given.tail || other.tail == given.head || other.tail == given.tail;
+    if (shortest >= 0 && (is_near != is_here ? is_near : bone_length(skeleton_, b) >= bone_length(skeleton_, shortest)))
+      continue;
+    shortest = b, is_near = is_here;
+  }
+  if (shortest < 0) return false;
+  const Bone gone = skeleton_.bones[shortest];
+  const int node = at_nodes_[gone.head].size() == 1 ? gone.head : gone.tail;
+  skeleton_.bones.erase(skeleton_.bones.begin() + shortest);
+  skeleton_.nodes.erase(skeleton_.nodes.begin() + node);
+  radii_.erase(radii_.begin() + node);
+  for (Bone& b : skeleton_.bones) {
+    b.head -= b.head > node;
+    b.tail -= b.tail > node;
+  }
+  prepare();
+  return true;
+}
+
+bool Repair::contract(int bone) {
+  Merge best;
+  const auto try_bone = [&](int b) {
+    const bool is_end =
+        at_nodes_[skeleton_.bones[b].head].size() == 1 || at_nodes_[skeleton_.bones[b].tail].size() == 1;
+    if (is_end || !is_ring_kept(b)) return;
+    for (const Vec3& place : merge_places(b)) try_merge(b, place, best);
+  };
+  if (skeleton_.bones.size() > 1) try_bone(bone);
+  if (best.bone < 0)
+    for (const int node : {skeleton_.bones[bone].head, skeleton_.bones[bone].tail})
+      for (const BoneAtNode& at : at_nodes_[node])
+        if (at.bone != bone) try_bone(at.bone);
+  if (best.bone < 0) return drop_free_end(bone);
+  merge_at(best);
+  return true;
+}
+
+bool Repair::contract_cheapest() {
+  Merge best;
+  for (int b = 0; b < static_cast<int>(skeleton_.bones.size()); ++b) {
+    const bool is_end =
+        at_nodes_[skeleton_.bones[b].head].size() == 1 || at_nodes_[skeleton_.bones[b].tail].size() == 1;
+    if (is_end || !is_ring_kept(b)) continue;
+    for (const Vec3& place : merge_places(b)) try_merge(b, place, best);
+  }
+  if (best.bone < 0) return drop_free_end(0);
+  merge_at(best);
+  return true;
+}
+
+}  // namespace skeletex

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "skeletex/analysis/bone_margin.h"
+#include "skeletex/skeletonize/body/surface.h"
+
+namespace skeletex {
+
+/// Numbers that look random and are the same on every machine (splitmix64, Steele et al. 2014).
+class RandomNumbers {
+ public:
+  explicit RandomNumbers(std::uint64_t seed) : state_(seed) {}
+  double uniform();  ///< in [0, 1)
+  Vec3 in_ball(double radius);
+
+ private:
+  std::uint64_t state_;
+};
+
+/// A skeleton that is being changed so that no separation planes cross inside the body. Its nodes and bones are inside
+/// at the beginning and stay so. Bones and nodes keep their names.
+class Repair {
+ public:
+  Repair(const Surface& surface, Skeleton skeleton);
+
+  /// Moves the nodes around the bone of the least margin, over and over; contracts it where that does not help.
+  /// \return whether all margins are enough now
+  bool run();
+  /// Moves a node to a place near by that costs little, whatever the margins are: for what the margins do not see.
+  void shake(int node);
+  /// Takes a bone away: its ends become one node, or an end between two bones is left out. Where that is not possible,
+  /// a bone next to it, else a free end.
+  /// \return whether a bone went
+  bool contract(int bone);
+  /// The bone whose loss does the least to margins and shape.
+  bool contract_cheapest();
+
+  const Skeleton& skeleton() const { return skeleton_; }
+  const std::vector<BoneMargin>& margins() const { return margins_; }
+
+ private:
+  struct Merge {
+    int bone = -1;
+    Vec3 place = Vec3::Zero();
+    double cost = 0;
+  };
+  void prepare();
+  std::vector<int> bones_around(const std::vector<int>& nodes) const;
+  double cost(const Skeleton& skeleton, const std::vector<std::vector<BoneAtNode>>& at_nodes,
+              const std::vector<int>& bones, double limit) const;
+  bool is_placed_well(const Skeleton& skeleton, int node, double least_radius) const;
+  bool move_node(int node, double step, int trials);
+  bool improve(int bone);
+  int worst_bone() const;
+  std::vector<Vec3> merge_places(int bone);
+  bool try_merge(int bone, const Vec3& place, Merge& best) const;
+  Skeleton merged(int bone, const Vec3& place) const;
+  bool is_ring_kept(int bone) const;
+  void merge_at(const Merge& merge);
+  bool drop_free_end(int bone);
+
+  const Surface& surface_;
+  Skeleton skeleton_;
+  std::vector<std::vector<BoneAtNode>> at_nodes_;
+  std::vector<double> radii_;  ///< per node, of the ball there before it was moved
+  std::vector<BoneMargin> margins_;
+  std::vector<int> failures_;  ///< per bone, how often moves did not help
+  RandomNumbers random_{1};
+  long measured_ = 0;  ///< bones
+};
+
+}  // namespace skeletex

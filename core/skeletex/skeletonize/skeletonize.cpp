@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/skeletonize/skeletonize.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <utility>
+
+#include "skeletex/geometry/parallel.h"
+#include "skeletex/model/error.h"
+#include "skeletex/skeletonize/accept.h"
+#include "skeletex/skeletonize/body/curve_graph.h"
+#include "skeletex/skeletonize/body/fitting_body.h"
+#include "skeletex/skeletonize/body/thinning.h"
+#include "skeletex/skeletonize/body/tips.h"
+#include "skeletex/skeletonize/body/voxel_body.h"
+#include "skeletex/skeletonize/bones.h"
+#include "skeletex/skeletonize/limbs.h"
+#include "skeletex/skeletonize/names.h"
+#include "skeletex/skeletonize/repair.h"
+
+namespace skeletex {
+namespace {
+
+constexpr double kLimbReach = 0.1;  // a node so near to a tip reaches it; diagonals
+/// Of the least error: more than so many times that is too much for a limb. Corners and rims look like limbs too.
+constexpr double kLimbsMayCost = 3;
+constexpr std::array<double, 4> kDetails{0, 1.0 / 3, 2.0 / 3, 1};
+
+/// The rule of tips at a level of detail from 0 to 1.
+TipRule rule_of(double detail) {
+  constexpr std::array<TipRule, 4> kRules{
+      {{3.0, 0.20, 2.0, 0.20}, {2.0, 0.12, 1.6, 0.10}, {1.7, 0.07, 1.4, 0.06}, {1.5, 0.035, 1.3, 0.03}}};
+  const double at = std::clamp(detail, 0.0, 1.0) * (kRules.size() - 1);
+  const std::size_t below = std::min<std::size_t>(static_cast<std::size_t>(at), kRules.size() - 2);
+  const double t = at - static_cast<double>(below);
+  const auto mix = [t](double a, double b) { return a > 0 && b > 0 ? std::pow(a, 1 - t) * std::pow(b, t) : a; };
+  const TipRule &a = kRules[below], &b = kRules[below + 1];
+  return {mix(a.longer_than_wide, b.longer_than_wide), mix(a.least_length, b.least_length),
+          mix(a.covered_radii, b.covered_radii), mix(a.least_covered, b.least_covered)};
+}
+
+/// A single bone in the largest ball, along the body.
+Skeleton single_bone(const VoxelBody& body) {
+  const int deepest = deepest_voxel(body);
+  const Vec3 centre = body.centres[deepest];
+  Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
+  for (const Vec3& p : body.centres) moments += (p - centre) * (p - centre).transpose();
+  Vec3 axis = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(moments).eigenvectors().col(2);
+  int largest = 0;
+  axis.cwiseAbs().maxCoeff(&largest);
+  if (axis[largest] < 0) axis = -axis;
+  const Vec3 half = 0.3 * body.radii[deepest] * axis;
+  Skeleton skeleton;
+  skeleton.nodes = {{"", centre - half}, {"", centre + half}};
+  skeleton.bones = {{"", 0, 1, {}}};
+  return skeleton;
+}
+
+/// A level of detail on its way to a skeleton.
+struct Level {
+  std::string name;
+  std::vector<int> tips;
+  std::unique_ptr<Repair> repair;
+  Skeleton skeleton;  ///< the repaired one
+};
+
+Skeleton first_skeleton(const Surface& surface, const VoxelBody& body, const std::vector<int>& tips, int genus) {
+  CurveGraph graph = make_curve_graph(body, thin_body(body, tips));
+  limit_cycles(surface, genus, graph);
+  smooth_branches(surface, body.side, graph);
+  merge_hubs(surface, graph);
+  return make_bones(surface, body.side, graph);
+}
+
+/// Where limbs begin: at the deepest voxel, or on the curves around the handles.
+std::vector<int> roots_of(const VoxelBody& body, int genus) {
+  if (genus == 0) return {deepest_voxel(body)};
+  const std::vector<char> is_left = thin_body(body, {});
+  std::vector<int> roots;
+  for (int v = 0; v < body.size(); ++v)
+    if (is_left[v]) roots.push_back(v);
+  return roots;
+}
+
+/// Tips of a level; the ends of the body where it has no limb and no handle.
+std::vector<int> tips_of(const VoxelBody& body, const BodyPaths& paths, double detail, double diagonal, int genus) {
+  std::vector<int> tips = find_tips(body, paths, rule_of(detail), diagonal);
+  if (genus == 0 && tips.size() < 2) tips = find_ends(body);
+  return tips;
+}
+
+std::vector<Level> make_levels(const Surface& surface, const VoxelBody& body, const BodyPaths& paths, int genus,
+                               const SkeletonizeOptions& options) {
+  std::vector<Level> levels;
+  const auto add = [&](std::string name, std::vector<int> tips) {
+    std::sort(tips.begin(), tips.end());
+    if (std::none_of(levels.begin(), levels.end(), [&](const Level& level) { return level.tips == tips; }))
+      levels.push_back({std::move(name), std::move(tips), nullptr, {}});
+  };
+  if (genus == 0)
+    add("from end to end", find_ends(body));
+  else
+    add("handles", {});
+  std::vector<double> details(kDetails.begin(), kDetails.end());
+  if (options.detail) details = {*options.detail};
+  for (const double detail : details)
+    add(fmt::format("detail {:.2g}", detail), tips_of(body, paths, detail, surface.diagonal, genus));
+  for_each_block(levels.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+    levels[i].repair = std::make_unique<Repair>(surface, first_skeleton(surface, body, levels[i].tips, genus));
+    levels[i].repair->run();
+  });
+  if (genus == 0) {
+    levels.push_back({"single bone", {}, nullptr, {}});
+    levels.back().repair = std::make_unique<Repair>(surface, single_bone(body));
+  }
+  return levels;
+}
+
+/// Limbs that a skeleton reaches.
+int count_limbs(const VoxelBody& body, const std::vector<int>& tips, const Skeleton& skeleton, double reach) {
+  return static_cast<int>(std::count_if(tips.begin(), tips.end(), [&](int tip) {
+    return std::any_of(skeleton.nodes.begin(), skeleton.nodes.end(), [&](const Node& node) {
+      return (node.position - body.centres[tip]).norm() < reach + body.radii[tip];
+    });
+  }));
+}
+
+/// Takes the symmetric skeleton next to one where the body has a mirror plane and that one is accepted as well.
+void make_symmetric(const Surface& surface, const std::optional<MirrorPlane>& plane, const Acceptance& acceptance,
+                    Skeleton& skeleton) {
+  if (!plane) return;
+  std::optional<Skeleton> image = symmetrized(surface, *plane, skeleton);
+  if (!image) return;
+  for (const BoneMargin& margin : bone_margins(surface.mesh, surface.tree, *image))
+    if (margin.margin < 0) return;
+  if (acceptance.is_accepted(*image)) skeleton = std::move(*image);
+}
+
+/// Which of the accepted candidates is best; -1: none.
+int choose(const std::vector<SkeletonCandidate>& candidates, const SkeletonizeOptions& options) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const SkeletonCandidate& candidate : candidates)
+    if (candidate.refusal.empty()) least = std::min(least, candidate.error);
+  const auto rank = [&](const SkeletonCandidate& candidate) {
+    const bool is_fine = candidate.error <= kLimbsMayCost * least;
+    const int first = options.most_bones                                     ? candidate.bones
+                      : options.purpose == SkeletonPurpose::kPose && is_fine ? candidate.limbs + 1
+                                                                             : 0;
+    return std::make_pair(-first, candidate.error);
+  };
+  int best = -1;
+  for (int c = 0; c < static_cast<int>(candidates.size()); ++c)
+    if (candidates[c].refusal.empty() && (best < 0 || rank(candidates[c]) < rank(candidates[best]))) best = c;
+  return best;
+}
+
+}  // namespace
+
+SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, const TriangleTree& tree,
+                              const SkeletonizeOptions& options) {
+  const auto report = [&](const std::string& stage, double done) {
+    if (options.progress && !options.progress(stage, done)) throw Error("cancelled");
+  };
+  const UnitMesh unit(mesh, tree);
+  Surface surface(unit.mesh, unit.tree);
+  surface.frame = unit.frame;
+  SkeletonizeResult result;
+  result.genus = genus_of(mesh);
+  report("filling the body", 0);
+  const VoxelBody body = make_fitting_body(surface, result.genus);
+  if (body.size() == 0)
+    throw TopologyError(
+        "the body is too thin for a skeleton: no point was found that is well inside; give the mesh some thickness");
+  report("finding limbs", 0.15);
+  const BodyPaths paths = find_paths(body, roots_of(body, result.genus));
+  const std::vector<int> limbs = find_tips(body, paths, rule_of(kDetails[1]), surface.diagonal);
+  result.limbs = static_cast<int>(limbs.size());
+  std::vector<Level> levels = make_levels(surface, body, paths, result.genus, options);
+  const Acceptance acceptance(context, surface);
+  const std::optional<MirrorPlane> plane = find_mirror_plane(surface, body);
+  for (std::size_t l = 0; l < levels.size(); ++l) {
+    report("trying skeletons", 0.4 + 0.6 * static_cast<double>(l) / static_cast<double>(levels.size()));
+    Repair& repair = *levels[l].repair;
+    SkeletonCandidate candidate{levels[l].name, 0, 0, 0, {}};
+    while (options.most_bones && static_cast<int>(repair.skeleton().bones.size()) > std::max(1, *options.most_bones) &&
+           repair.contract_cheapest()) {
+    }
+    candidate.refusal = acceptance.segment(repair);
+    levels[l].skeleton = repair.skeleton();
+    if (candidate.refusal.empty()) make_symmetric(surface, plane, acceptance, levels[l].skeleton);
+    candidate.bones = static_cast<int>(levels[l].skeleton.bones.size());
+    candidate.limbs = count_limbs(body, limbs, levels[l].skeleton, kLimbReach * surface.diagonal);
+    if (candidate.refusal.empty()) {
+      const Acceptance::Trial trial = acceptance.encode(levels[l].skeleton);
+      candidate.error = trial.error;
+      candidate.refusal = trial.refusal;
+    }
+    result.candidates.push_back(std::move(candidate));
+  }
+  result.chosen = choose(result.candidates, options);
+  if (result.chosen < 0)
+    throw TopologyError(fmt::format("none of {} skeletons works; for \"{}\": {}", levels.size(),
+                                    result.candidates[0].name, result.candidates[0].refusal));
+  result.skeleton = std::move(levels[result.chosen].skeleton);
+  name_by_place(surface, plane, result.skeleton);
+  result.skeleton = in_frame(std::move(result.skeleton), {});
+  report("done", 1);
+  return result;
+}
+
+}  // namespace skeletex

@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: MIT
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <numbers>
+#include <random>
+
+#include "skeletex/analysis/manifold.h"
+#include "skeletex/io/gltf/read_gltf.h"
+#include "skeletex/io/gltf/write_gltf.h"
+#include "skeletex/io/mesh_file.h"
+#include "skeletex/model/error.h"
+#include "skeletex/reconstruct/linear_skin.h"
+#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/rig/export_rig.h"
+#include "support/scratch.h"
+#include "support/shapes.h"
+#include "support/synthetic_model.h"
+
+namespace skeletex {
+namespace {
+
+ClContext& device() {
+  static ClContext context;
+  return context;
+}
+
+SkeletexModel model_of(const Skeleton& skeleton, double radius) {
+  return SyntheticSurface(skeleton, radius).model(std::vector<std::pair<int, int>>(skeleton.bones.size(), {24, 11}));
+}
+
+/// A viewer in a few lines: where the file's own skin takes its vertices at the frame of an animation.
+std::vector<Vec3> play(const GltfScene& scene, const GltfAnimation* animation, std::size_t frame) {
+  std::vector<GltfNode> nodes = scene.nodes;
+  if (animation)
+    for (const GltfTrack& track : animation->tracks) {
+      const Eigen::Vector4d& value = track.values.at(frame);
+      if (track.path == GltfPath::kTranslation) nodes[track.node].translation = value.head<3>();
+      if (track.path == GltfPath::kScale) nodes[track.node].scale = value.head<3>();
+      if (track.path == GltfPath::kRotation) nodes[track.node].rotation = Eigen::Quaterniond(value);
+    }
+  const auto world = [&](int node) {
+    Eigen::Affine3d transform = Eigen::Affine3d::Identity();
+    for (; node >= 0; node = nodes[node].parent)
+      transform = Eigen::Translation3d(nodes[node].translation) * nodes[node].rotation.normalized() *
+                  Eigen::Scaling(nodes[node].scale) * transform;
+    return transform;
+  };
+  std::vector<Eigen::Matrix4d> matrices;
+  for (std::size_t j = 0; j < scene.skins[0].joints.size(); ++j)
+    matrices.push_back(world(scene.skins[0].joints[j]).matrix() * scene.skins[0].inverse_binds[j]);
+  const GltfPrimitive& primitive = scene.meshes[0].primitives[0];
+  std::vector<Vec3> moved;
+  for (std::size_t v = 0; v < primitive.positions.size(); ++v) {
+    Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+    for (int i = 0; i < primitive.influences; ++i)
+      sum +=
+          primitive.weights[4 * v + i] * matrices[primitive.joints[4 * v + i]] * primitive.positions[v].homogeneous();
+    moved.push_back(sum.head<3>());
+  }
+  return moved;
+}
+
+double largest_distance(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  EXPECT_EQ(a.size(), b.size());
+  double largest = 0;
+  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) largest = std::max(largest, (a[i] - b[i]).norm());
+  return largest;
+}
+
+GltfScene written_and_read(const GltfScene& scene) {
+  const ScratchFolder folder;
+  write_gltf(folder / "rig.glb", scene);
+  return read_gltf(folder / "rig.glb");
+}
+
+Pose turned(const Skeleton& skeleton, unsigned seed, double largest) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  Pose pose;
+  for (std::size_t i = 0; i < skeleton.bones.size(); ++i)
+    pose.rotations.emplace_back(
+        Eigen::AngleAxisd(largest * unit(random), Vec3(unit(random), unit(random), unit(random)).normalized()));
+  return pose;
+}
+
+Pose moved(const Skeleton& skeleton, unsigned seed, double largest) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> unit(-largest, largest);
+  Pose pose;
+  for (const Node& node : skeleton.nodes)
+    pose.nodes.push_back(node.position + Vec3(unit(random), unit(random), unit(random)));
+  for (std::size_t i = 0; i < skeleton.bones.size(); ++i) pose.rolls.push_back(unit(random));
+  return pose;
+}
+
+TEST(RigExport, AnExportedRigMovesAsLinearPosesDo) {
+  struct Case {
+    const char* name;
+    Skeleton skeleton;
+    bool is_turned;
+  };
+  for (const auto& [name, skeleton, is_turned] : std::vector<Case>{{"lone bone", lone_bone(), true},
+                                                                   {"chain, turned", chain(4), true},
+                                                                   {"tree, turned", random_tree(12, 3), true},
+                                                                   {"tree, nodes moved", random_tree(12, 3), false},
+                                                                   {"cross, nodes moved", cross(6), false},
+                                                                   {"ring, nodes moved", ring_with_arm(6), false}}) {
+    SCOPED_TRACE(name);
+    const SkeletexModel model = model_of(skeleton, 0.15);
+    PoseAnimation animation;
+    animation.frames.push_back({2, Pose{}});
+    for (unsigned i = 0; i < 3; ++i)
+      animation.frames.push_back({2.5 + i, is_turned ? turned(model.skeleton, i, 1.2) : moved(model.skeleton, i, 0.2)});
+    const std::vector<NamedAnimation> named{{"dance", animation}};
+    const GltfScene scene = written_and_read(export_rig(device(), model, {.animations = named}));
+    EXPECT_LT(largest_distance(play(scene, nullptr, 0), reconstruct_mesh(device(), model).positions),
+              1e-6 * model.diagonal);
+    ASSERT_EQ(scene.animations.size(), 1u);
+    EXPECT_EQ(scene.animations[0].name, "dance");
+    const std::vector<double>& times = scene.animations[0].tracks.at(0).times;
+    EXPECT_EQ(times.front(), 0);
+    EXPECT_NEAR(times.back(), 2.5, 1e-6);
+    for (std::size_t frame = 0; frame < times.size(); frame += 3) {
+      const Skeleton posed = apply_pose(model.skeleton, pose_at(model.skeleton, animation, 2 + times[frame]));
+      const TriangleMesh expected = reconstruct_mesh(device(), model, posed, {Deformation::kLinear});
+      EXPECT_LT(largest_distance(play(scene, &scene.animations[0], frame), expected.positions), 2e-6 * model.diagonal)
+          << frame;
+    }
+  }
+}
+
+TEST(RigExport, TheMeshIsClosedAndItsNormalsPointOutwards) {
+  const SkeletexModel model = model_of(random_tree(12, 3), 0.15);
+  const GltfScene scene = written_and_read(export_rig(device(), model));
+  const GltfPrimitive& primitive = scene.meshes.at(0).primitives.at(0);
+  const TriangleMesh mesh{primitive.positions, primitive.triangles};
+  EXPECT_TRUE(measure_manifold(mesh).is_closed_manifold());
+  ASSERT_EQ(primitive.normals.size(), primitive.positions.size());
+  for (std::size_t v = 0; v < primitive.normals.size(); ++v) EXPECT_NEAR(primitive.normals[v].norm(), 1, 1e-6);
+  std::size_t against = 0;
+  for (const Triangle& t : mesh.triangles)
+    for (const int corner : t) against += area_vector(mesh, t).dot(primitive.normals[corner]) < 0;
+  EXPECT_LT(against, mesh.triangles.size() / 100);
+}
+
+TEST(RigExport, WeightsAreTheFourStrongestAndSumToOne) {
+  const SkeletexModel model = model_of(cross(6), 0.3);
+  const PreparedModel prepared(model);
+  const BindMesh bind = reconstruct_bind_mesh(device(), prepared);
+  const Skin skin = make_skin(device(), prepared, bind.inner);
+  const VertexInfluences four = strongest_influences(skin);
+  std::vector<std::vector<float>> all;
+  for (std::size_t bone = 0; bone < model.skeleton.bones.size(); ++bone)
+    all.push_back(vertex_weights(skin, static_cast<int>(bone)));
+  int cut = 0;
+  for (std::size_t v = 0; v < four.bones.size(); ++v) {
+    double sum = 0, kept = 0;
+    float weakest = 1;
+    for (int i = 0; i < 4; ++i) {
+      sum += four.weights[v][i];
+      if (four.weights[v][i] == 0) continue;
+      kept += all[four.bones[v][i]][v];
+      weakest = std::min(weakest, all[four.bones[v][i]][v]);
+    }
+    EXPECT_NEAR(sum, 1, 1e-7);
+    for (std::size_t bone = 0; bone < all.size(); ++bone) {
+      if (all[bone][v] <= weakest) continue;
+      EXPECT_NE(std::find(four.bones[v].begin(), four.bones[v].end(), static_cast<int>(bone)), four.bones[v].end());
+    }
+    for (int i = 0; i < 4; ++i) {
+      if (four.weights[v][i] == 0) continue;
+      EXPECT_NEAR(four.weights[v][i], all[four.bones[v][i]][v] / kept, 1e-5);
+    }
+    cut += kept < 0.9999;
+  }
+  EXPECT_GT(cut, 0);  // a hub of six bones: else the test says nothing
+}
+
+TEST(RigExport, PlacementTurnsTheWholeRig) {
+  const SkeletexModel model = model_of(chain(3), 0.2);
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(-std::numbers::pi / 2, Vec3::UnitX()));
+  const GltfScene scene = written_and_read(export_rig(device(), model, {.placement = turn, .animations = {}}));
+  std::vector<Vec3> expected = reconstruct_mesh(device(), model).positions;
+  for (Vec3& p : expected) p = turn * p;
+  EXPECT_LT(largest_distance(play(scene, nullptr, 0), expected), 1e-6 * model.diagonal);
+}
+
+TEST(MeshFile, StlAndGltfHoldTheMesh) {
+  const ScratchFolder folder;
+  const TriangleMesh mesh = torus_shape().mesh;
+  write_mesh(folder / "torus.stl", mesh);
+  const MeshFile stl = read_mesh(folder / "torus.stl");
+  EXPECT_EQ(stl.mesh.triangles.size(), mesh.triangles.size());
+  EXPECT_TRUE(measure_manifold(stl.mesh).is_closed_manifold());
+  EXPECT_NEAR(signed_volume(stl.mesh), signed_volume(mesh), 1e-5 * signed_volume(mesh));
+  write_mesh(folder / "torus.glb", mesh);
+  const GltfScene scene = read_gltf(folder / "torus.glb");
+  EXPECT_EQ(scene.meshes.at(0).primitives.at(0).triangles, mesh.triangles);
+  EXPECT_LT(largest_distance(scene.meshes[0].primitives[0].positions, mesh.positions), 1e-6);
+}
+
+TEST(GltfFile, DamagedFilesAreRefusedWithAReason) {
+  const ScratchFolder folder;
+  const SkeletexModel model = model_of(chain(3), 0.2);
+  write_gltf(folder / "rig.glb", export_rig(device(), model));
+  std::string bytes;
+  {
+    std::ifstream in(folder / "rig.glb", std::ios::binary);
+    bytes.assign(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
+  }
+  const auto message_of = [&](std::string changed) {
+    std::ofstream(folder / "changed.glb", std::ios::binary) << changed;
+    try {
+      read_gltf(folder / "changed.glb");
+      return std::string();
+    } catch (const IoError& error) {
+      return std::string(error.what());
+    }
+  };
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string changed = bytes;
+    const std::size_t at = changed.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    EXPECT_EQ(from.size(), to.size());
+    if (at != std::string::npos) changed.replace(at, from.size(), to);
+    return changed;
+  };
+  EXPECT_EQ(message_of(bytes), "");
+  EXPECT_NE(message_of(bytes.substr(0, bytes.size() / 2)), "");
+  EXPECT_NE(message_of("no glTF"), "");
+  EXPECT_NE(message_of(with("\"skin\":0", "\"skin\":7")).find("skin"), std::string::npos);
+  EXPECT_NE(message_of(with("\"joints\":[2", "\"joints\":[9")).find("there is no node 9"), std::string::npos);
+  // Whatever a byte is changed to, there is an answer.
+  std::mt19937 random(1);
+  for (int i = 0; i < 300; ++i) {
+    std::string changed = bytes;
+    changed[20 + random() % 3000] = static_cast<char>(random() % 256);
+    message_of(changed);
+  }
+}
+
+}  // namespace
+}  // namespace skeletex

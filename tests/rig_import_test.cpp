@@ -1,0 +1,357 @@
+// SPDX-License-Identifier: MIT
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <numbers>
+#include <random>
+
+#include "skeletex/analysis/manifold.h"
+#include "skeletex/convert/encode_model.h"
+#include "skeletex/io/gltf/read_gltf.h"
+#include "skeletex/io/gltf/write_gltf.h"
+#include "skeletex/model/error.h"
+#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/reconstruct/skin.h"
+#include "skeletex/rig/export_rig.h"
+#include "skeletex/rig/import_rig.h"
+#include "support/scratch.h"
+#include "support/shapes.h"
+#include "support/synthetic_model.h"
+
+namespace skeletex {
+namespace {
+
+ClContext& device() {
+  static ClContext context;
+  return context;
+}
+
+SkeletexModel model_of(const Skeleton& skeleton, double radius) {
+  return SyntheticSurface(skeleton, radius).model(std::vector<std::pair<int, int>>(skeleton.bones.size(), {24, 11}));
+}
+
+int bone_named(const Skeleton& skeleton, const std::string& name) {
+  for (int i = 0; i < static_cast<int>(skeleton.bones.size()); ++i)
+    if (skeleton.bones[i].name == name) return i;
+  return -1;
+}
+
+ImportedRig imported(const GltfScene& scene) { return import_rig(scene, gltf_surface(scene, "test")); }
+
+Pose turned(const Skeleton& skeleton, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  Pose pose;
+  for (std::size_t i = 0; i < skeleton.bones.size(); ++i)
+    pose.rotations.emplace_back(
+        Eigen::AngleAxisd(0.8 * unit(random), Vec3(unit(random), unit(random), unit(random)).normalized()));
+  pose.translation = Vec3(unit(random), unit(random), unit(random));
+  return pose;
+}
+
+GltfScene exported(const SkeletexModel& model, const std::vector<NamedAnimation>& animations = {},
+                   const Eigen::Quaterniond& placement = Eigen::Quaterniond::Identity()) {
+  return export_rig(device(), model, {.name = "rig", .placement = placement, .animations = animations});
+}
+
+/// A rig without leaves of its own that a user may have: the same nodes by name in both skeletons.
+void expect_same_skeleton(const Skeleton& expected, const Skeleton& actual, const Similarity& map, double tolerance) {
+  ASSERT_EQ(actual.bones.size(), expected.bones.size());
+  ASSERT_EQ(actual.nodes.size(), expected.nodes.size());
+  for (int bone = 0; bone < static_cast<int>(expected.bones.size()); ++bone) {
+    const int same = bone_named(actual, expected.bones[bone].name);
+    ASSERT_GE(same, 0) << expected.bones[bone].name;
+    const Vec3 a = map(end_position(expected, bone, BoneEnd::kHead)),
+               b = map(end_position(expected, bone, BoneEnd::kTail));
+    const Vec3 c = end_position(actual, same, BoneEnd::kHead), d = end_position(actual, same, BoneEnd::kTail);
+    EXPECT_LT(std::min((a - c).norm() + (b - d).norm(), (a - d).norm() + (b - c).norm()), tolerance)
+        << expected.bones[bone].name;
+  }
+}
+
+TEST(RigImport, AnExportedModelComesBackWithSkeletonWeightsAndPoses) {
+  for (const auto& [name, skeleton] :
+       std::vector<std::pair<const char*, Skeleton>>{{"chain", chain(4)}, {"tree", random_tree(9, 3)}}) {
+    SCOPED_TRACE(name);
+    const SkeletexModel model = model_of(skeleton, 0.15);
+    PoseAnimation animation;
+    for (unsigned i = 0; i < 3; ++i) animation.frames.push_back({0.5 * i, turned(model.skeleton, i)});
+    const ScratchFolder folder;
+    write_gltf(folder / "rig.glb", exported(model, {{"dance", animation}}));
+    const GltfScene scene = read_gltf(folder / "rig.glb");
+    const GltfSurface surface = gltf_surface(scene, "rig.glb");
+    const TriangleMesh bind = reconstruct_mesh(device(), model);
+    EXPECT_TRUE(measure_manifold(surface.mesh).is_closed_manifold());
+    EXPECT_EQ(surface.mesh.positions.size(), bind.positions.size());
+    const ImportedRig rig = import_rig(scene, surface);
+    expect_same_skeleton(model.skeleton, rig.skeleton, {}, 1e-5 * model.diagonal);
+    ASSERT_EQ(rig.animations.size(), 1u);
+    EXPECT_EQ(rig.animations[0].name, "dance");
+    for (const double time : {0.0, 0.3, 0.5, 1.0}) {
+      const Skeleton posed = apply_pose(model.skeleton, pose_at(model.skeleton, animation, time));
+      const Skeleton again = apply_pose(rig.skeleton, pose_at(rig.skeleton, rig.animations[0].animation, time));
+      expect_same_skeleton(posed, again, {}, 1e-4 * model.diagonal);
+      // The rig's own weights move its mesh as the model's do.
+      const TriangleMesh expected = reconstruct_mesh(device(), model, posed, {Deformation::kLinear});
+      const std::vector<BoneMotion> motions = bone_motions(rig.skeleton, again);
+      double largest = 0;
+      for (std::size_t v = 0; v < expected.positions.size(); ++v) {
+        Vec3 place = Vec3::Zero();
+        for (const auto& [bone, weight] : rig.weights[v])
+          place += weight * (motions[bone].rotation * surface.mesh.positions[v] + motions[bone].translation);
+        largest = std::max(largest, (place - expected.positions[v]).norm());
+      }
+      EXPECT_LT(largest, 2e-4 * model.diagonal);
+    }
+  }
+}
+
+/// A file as a program writes it whose armature is turned by a quarter and scaled by a hundredth.
+GltfScene in_armature(GltfScene scene, const Eigen::Affine3d& armature) {
+  // Bound in the armature's coordinates: those of the file's vertices are larger by its inverse.
+  GltfNode node;
+  node.name = "armature";
+  node.matrix = armature.matrix();
+  scene.nodes.push_back(node);
+  for (GltfNode& other : scene.nodes)
+    if (other.name == "rig_rig") other.parent = static_cast<int>(scene.nodes.size()) - 1;
+  return scene;
+}
+
+TEST(RigImport, ScaledAndTurnedArmaturesStandWhereTheFileShowsThem) {
+  const SkeletexModel model = model_of(random_tree(9, 3), 0.15);
+  PoseAnimation animation;
+  for (unsigned i = 0; i < 2; ++i) animation.frames.push_back({1.0 * i, turned(model.skeleton, i)});
+  Similarity map;
+  map.scale = 0.01;
+  map.rotation = Eigen::AngleAxisd(-std::numbers::pi / 2, Vec3::UnitX()).toRotationMatrix();
+  map.translation = Vec3(3, 4, 5);
+  Eigen::Affine3d armature = Eigen::Affine3d::Identity();
+  armature.linear() = map.scale * map.rotation;
+  armature.translation() = map.translation;
+  const GltfScene scene = in_armature(exported(model, {{"dance", animation}}), armature);
+  const GltfSurface surface = gltf_surface(scene, "test");
+  const TriangleMesh bind = reconstruct_mesh(device(), model);
+  for (std::size_t v = 0; v < bind.positions.size(); ++v)
+    EXPECT_LT((surface.mesh.positions[v] - map(bind.positions[v])).norm(), 1e-6);
+  const ImportedRig rig = import_rig(scene, surface);
+  expect_same_skeleton(model.skeleton, rig.skeleton, map, 1e-5 * map.scale * model.diagonal);
+  expect_same_skeleton(apply_pose(model.skeleton, animation.frames[1].pose),
+                       apply_pose(rig.skeleton, rig.animations.at(0).animation.frames.back().pose), map,
+                       1e-4 * map.scale * model.diagonal);
+}
+
+TEST(RigImport, MirroredAndUnevenlyScaledArmaturesGiveTheMeshThatIsShown) {
+  const SkeletexModel model = model_of(random_tree(9, 3), 0.15);
+  for (const Vec3& scale : {Vec3(-1, 1, 1), Vec3(1, 2, 0.5), Vec3(-1, -1, -3)}) {
+    SCOPED_TRACE(scale.transpose());
+    Eigen::Affine3d armature = Eigen::Affine3d::Identity();
+    armature.linear() = scale.asDiagonal();
+    const GltfSurface surface = gltf_surface(in_armature(exported(model), armature), "test");
+    EXPECT_TRUE(measure_manifold(surface.mesh).is_closed_manifold());
+    const double volume = signed_volume(reconstruct_mesh(device(), model));
+    EXPECT_NEAR(signed_volume(surface.mesh), volume * std::abs(scale.prod()), 1e-4 * volume * std::abs(scale.prod()));
+  }
+}
+
+TEST(RigImport, TheBindPoseComesFromTheInverseBindMatricesWhateverPoseIsShown) {
+  const SkeletexModel model = model_of(random_tree(9, 3), 0.15);
+  GltfScene scene = exported(model);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (GltfNode& node : scene.nodes)
+    if (node.mesh < 0 && node.name != "root" && node.name != "rig_rig")
+      node.rotation = node.rotation * Eigen::Quaterniond(Eigen::AngleAxisd(0.7 * unit(random), Vec3::UnitX()));
+  const GltfSurface surface = gltf_surface(scene, "test");
+  const TriangleMesh bind = reconstruct_mesh(device(), model);
+  double largest = 0;
+  for (std::size_t v = 0; v < bind.positions.size(); ++v)
+    largest = std::max(largest, (surface.mesh.positions[v] - bind.positions[v]).norm());
+  EXPECT_LT(largest, 1e-5 * model.diagonal);
+  expect_same_skeleton(model.skeleton, import_rig(scene, surface).skeleton, {}, 1e-5 * model.diagonal);
+}
+
+TEST(RigImport, ASkinWithoutInverseBindMatricesIsBoundAsShown) {
+  const SkeletexModel model = model_of(chain(4), 0.2);
+  GltfScene scene = exported(model);
+  // Without these matrices vertices are in the coordinates of their joint: here of one that moves all of them.
+  GltfPrimitive& primitive = scene.meshes[0].primitives[0];
+  for (std::size_t v = 0; v < primitive.positions.size(); ++v)
+    for (int i = 0; i < 4; ++i) {
+      primitive.joints[4 * v + i] = 0;
+      primitive.weights[4 * v + i] = i == 0;
+    }
+  scene.skins[0].inverse_binds.clear();
+  const ScratchFolder folder;
+  write_gltf(folder / "rig.glb", scene);
+  const GltfScene read = read_gltf(folder / "rig.glb");
+  const GltfSurface surface = gltf_surface(read, "rig.glb");
+  const Vec3 root = read.nodes[read.skins[0].joints[0]].translation;
+  const TriangleMesh bind = reconstruct_mesh(device(), model);
+  for (std::size_t v = 0; v < bind.positions.size(); ++v)
+    EXPECT_LT((surface.mesh.positions[v] - bind.positions[v] - root).norm(), 1e-5 * model.diagonal);
+}
+
+TEST(RigImport, BordersOfPrimitivesAreWelded) {
+  const SkeletexModel model = model_of(random_tree(9, 3), 0.15);
+  GltfScene scene = exported(model);
+  // Every triangle has vertices of its own, in three primitives, moved by less than the tolerance.
+  const GltfPrimitive whole = scene.meshes[0].primitives[0];
+  std::vector<GltfPrimitive> parts(3);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (std::size_t t = 0; t < whole.triangles.size(); ++t) {
+    GltfPrimitive& part = parts[t % 3];
+    part.influences = 4;
+    const int first = static_cast<int>(part.positions.size());
+    for (const int v : whole.triangles[t]) {
+      part.positions.push_back(whole.positions[v] +
+                               2e-6 * model.diagonal * Vec3(unit(random), unit(random), unit(random)));
+      for (int i = 0; i < 4; ++i) {
+        part.joints.push_back(whole.joints[4 * v + i]);
+        part.weights.push_back(whole.weights[4 * v + i]);
+      }
+    }
+    part.triangles.push_back({first, first + 1, first + 2});
+  }
+  scene.meshes[0].primitives = parts;
+  const GltfSurface surface = gltf_surface(scene, "test");
+  EXPECT_EQ(surface.mesh.positions.size(), whole.positions.size());
+  EXPECT_EQ(surface.vertices_in_file, static_cast<int>(3 * whole.triangles.size()));
+  EXPECT_TRUE(measure_manifold(surface.mesh).is_closed_manifold());
+}
+
+TEST(RigImport, SeveralSkinsOfOneSkeletonAreOneBody) {
+  const SkeletexModel model = model_of(random_tree(9, 3), 0.15);
+  GltfScene scene = exported(model);
+  const GltfScene whole = scene;
+  // The second half of the triangles in a mesh and skin of their own, whose vertices are in other units.
+  GltfPrimitive& first = scene.meshes[0].primitives[0];
+  GltfPrimitive second = first;
+  const std::size_t half = first.triangles.size() / 2;
+  second.triangles.erase(second.triangles.begin(), second.triangles.begin() + static_cast<std::ptrdiff_t>(half));
+  first.triangles.resize(half);
+  for (Vec3& p : second.positions) p = 100 * p;
+  GltfSkin skin = scene.skins[0];
+  for (Eigen::Matrix4d& matrix : skin.inverse_binds)
+    matrix = matrix * Eigen::Vector4d(0.01, 0.01, 0.01, 1).asDiagonal();
+  scene.skins.push_back(skin);
+  scene.meshes.push_back({"second", {second}});
+  GltfNode node;
+  node.mesh = node.skin = 1;
+  scene.nodes.push_back(node);
+  const GltfSurface surface = gltf_surface(scene, "test");
+  EXPECT_TRUE(measure_manifold(surface.mesh).is_closed_manifold());
+  expect_same_skeleton(model.skeleton, import_rig(scene, surface).skeleton, {}, 1e-5 * model.diagonal);
+}
+
+TEST(RigImport, JointsThatMoveNothingAndTwistJointsAreNoBones) {
+  const SkeletexModel model = model_of(chain(4), 0.2);
+  GltfScene scene = exported(model);
+  const auto add = [&](const std::string& name, int parent, const Vec3& place) {
+    GltfNode node;
+    node.name = name;
+    node.parent = parent;
+    node.translation = place;
+    scene.skins[0].joints.push_back(static_cast<int>(scene.nodes.size()));
+    Eigen::Matrix4d bind = scene.skins[0].inverse_binds[parent - 2];
+    bind.topRightCorner<3, 1>() -= place;
+    scene.skins[0].inverse_binds.push_back(bind);
+    scene.nodes.push_back(node);
+    return static_cast<int>(scene.skins[0].joints.size()) - 1;
+  };
+  const auto joint = [&](const std::string& name) {
+    for (int i = 0; i < static_cast<int>(scene.nodes.size()); ++i)
+      if (scene.nodes[i].name == name) return i;
+    return -1;
+  };
+  const std::string second = model.skeleton.bones[1].name;
+  add("weapon", joint(second), Vec3(0.1, 0.1, 0));
+  const int twist = add("twist", joint(second), Vec3(0, 0.5 * bone_length(model.skeleton, 1), 0));
+  GltfPrimitive& primitive = scene.meshes[0].primitives[0];
+  int given = 0;
+  for (std::size_t i = 0; i < primitive.joints.size(); i += 4)
+    if (scene.nodes[scene.skins[0].joints[primitive.joints[i]]].name == second && i % 8 == 0)
+      primitive.joints[i] = twist, ++given;
+  ASSERT_GT(given, 0);
+  const ImportedRig rig = imported(scene);
+  expect_same_skeleton(model.skeleton, rig.skeleton, {}, 1e-5 * model.diagonal);
+  ASSERT_EQ(rig.notes.size(), 2u);
+  EXPECT_NE(rig.notes[0].find("weapon"), std::string::npos);
+  EXPECT_NE(rig.notes[1].find("twist"), std::string::npos);
+}
+
+TEST(RigImport, LeafBonesEndInsideTheSurfaceThatTheyMove) {
+  // Without the joints that show where bones end.
+  const SkeletexModel model = model_of(random_tree(9, 3), 0.15);
+  GltfScene scene = exported(model);
+  for (GltfNode& node : scene.nodes)
+    if (node.name.ends_with("_end")) node.name = "";
+  GltfSkin& skin = scene.skins[0];
+  for (std::size_t j = skin.joints.size(); j-- > 0;)
+    if (scene.nodes[skin.joints[j]].name.empty()) {
+      skin.joints.erase(skin.joints.begin() + static_cast<std::ptrdiff_t>(j));
+      skin.inverse_binds.erase(skin.inverse_binds.begin() + static_cast<std::ptrdiff_t>(j));
+    }
+  const GltfSurface surface = gltf_surface(scene, "test");
+  const ImportedRig rig = import_rig(scene, surface);
+  ASSERT_EQ(rig.skeleton.bones.size(), model.skeleton.bones.size());
+  for (int bone = 0; bone < static_cast<int>(model.skeleton.bones.size()); ++bone) {
+    const int same = bone_named(rig.skeleton, model.skeleton.bones[bone].name);
+    ASSERT_GE(same, 0);
+    const Vec3 a = direction_from(model.skeleton, {bone, BoneEnd::kHead}),
+               b = direction_from(rig.skeleton, {same, BoneEnd::kHead});
+    EXPECT_GT(std::abs(a.dot(b)), 0.95) << rig.skeleton.bones[same].name;
+    EXPECT_GT(bone_length(rig.skeleton, same), 0.4 * bone_length(model.skeleton, bone));
+    EXPECT_LT(bone_length(rig.skeleton, same), 1.4 * bone_length(model.skeleton, bone));
+  }
+}
+
+TEST(RigImport, WeightsOfTheRigBecomeThoseOfTheModel) {
+  const Shape shape = chain_shape(3, 0.4);
+  EncodeOptions options;
+  options.width = options.height = 64;
+  SkeletexModel model = encode_model(device(), shape.mesh, shape.skeleton, options).model;
+  // Weights that no closed form has: linear in the height.
+  std::vector<std::vector<BoneWeight>> weights;
+  const BoundingBox box = bounding_box(shape.mesh);
+  const auto share_at = [&](const Vec3& p) { return (p.x() - box.lower.x()) / (box.upper.x() - box.lower.x()); };
+  for (const Vec3& p : shape.mesh.positions) weights.push_back({{0, 1 - share_at(p)}, {2, share_at(p)}});
+  model.bone_weights = weight_planes(device(), model, shape.mesh, build_triangle_tree(shape.mesh), weights);
+  const PreparedModel prepared(model);
+  const BindMesh bind = reconstruct_bind_mesh(device(), prepared);
+  const Skin skin = make_skin(device(), prepared, bind.inner);
+  const std::vector<float> last = vertex_weights(skin, 2);
+  for (std::size_t v = 0; v < last.size(); ++v) EXPECT_NEAR(last[v], share_at(bind.mesh.positions[v]), 0.02);
+}
+
+TEST(RigImport, JointsThatMoveAwayFromEachOtherBecomePosesOfNodes) {
+  const SkeletexModel model = model_of(chain(4), 0.2);
+  GltfScene scene = exported(model);
+  const std::string moved = model.skeleton.bones[2].name;
+  int joint = 0;
+  while (scene.nodes[joint].name != moved) ++joint;
+  const Vec3 way(0, 0.3, 0.05);
+  GltfTrack track{joint, GltfPath::kTranslation, GltfInterpolation::kLinear, {0, 2}, {}};
+  for (const Vec3& place : {scene.nodes[joint].translation, Vec3(scene.nodes[joint].translation + way)})
+    track.values.emplace_back(place.x(), place.y(), place.z(), 0);
+  scene.animations.push_back({"stretch", {track}});
+  const ImportedRig rig = imported(scene);
+  ASSERT_EQ(rig.animations.size(), 1u);
+  const Skeleton posed = apply_pose(rig.skeleton, pose_at(rig.skeleton, rig.animations[0].animation, 1));
+  const int bone = bone_named(rig.skeleton, moved);
+  int still = 0;
+  for (std::size_t node = 0; node < posed.nodes.size(); ++node) {
+    const double distance = (posed.nodes[node].position - rig.skeleton.nodes[node].position).norm();
+    EXPECT_LT(std::min(distance, std::abs(distance - 0.5 * way.norm())), 1e-5 * model.diagonal);
+    still += distance < 1e-5 * model.diagonal;
+  }
+  EXPECT_GT((end_position(posed, bone, BoneEnd::kHead) - end_position(rig.skeleton, bone, BoneEnd::kHead)).norm(), 0.1);
+  EXPECT_EQ(still, 2);
+}
+
+}  // namespace
+}  // namespace skeletex

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/skeletonize/skeletonize.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "skeletex/analysis/bone_margin.h"
+#include "skeletex/analysis/findings.h"
+#include "skeletex/analysis/validate_input.h"
+#include "skeletex/io/skeleton_file.h"
+#include "skeletex/model/error.h"
+#include "skeletex/skeleton/separation_planes.h"
+#include "skeletex/skeletonize/body/curve_graph.h"
+#include "skeletex/skeletonize/body/fitting_body.h"
+#include "skeletex/skeletonize/body/thinning.h"
+#include "skeletex/skeletonize/repair.h"
+#include "skeletex/skeletonize/repair_skeleton.h"
+#include "support/load_model.h"
+#include "support/shapes.h"
+
+namespace skeletex {
+namespace {
+
+ClContext& context() {
+  static ClContext instance;
+  return instance;
+}
+
+SkeletonizeResult skeletonized(const TriangleMesh& mesh, const SkeletonizeOptions& options = {}) {
+  return skeletonize(context(), mesh, build_triangle_tree(mesh), options);
+}
+
+std::string errors_of(TriangleMesh mesh, const Skeleton& skeleton) {
+  std::string text;
+  for (const Finding& f : validate_input(context(), mesh, skeleton))
+    if (f.severity == Severity::kError) text += f.message + '\n';
+  return text;
+}
+
+/// Share of the way at which a ray first meets a mesh, by looking at every triangle in double precision.
+double first_hit_of_all(const TriangleMesh& mesh, const Vec3& origin, const Vec3& direction) {
+  double first = std::numeric_limits<double>::infinity();
+  for (const Triangle& t : mesh.triangles) {
+    Eigen::Matrix3d edges;
+    edges << mesh.positions[t[1]] - mesh.positions[t[0]], mesh.positions[t[2]] - mesh.positions[t[0]], -direction;
+    const Vec3 x = edges.inverse() * (origin - mesh.positions[t[0]]);
+    if (x.allFinite() && x[0] >= 0 && x[1] >= 0 && x[0] + x[1] <= 1 && x[2] >= 0) first = std::min(first, x[2]);
+  }
+  return first;
+}
+
+Skeleton spoilt(Skeleton skeleton, double distance, RandomNumbers& random) {
+  for (Node& node : skeleton.nodes) node.position += random.in_ball(distance);
+  return skeleton;
+}
+
+}  // namespace
+
+TEST(Skeletonize, RaysMeetTheFirstTriangle) {
+  const TriangleMesh mesh = creature_shape().mesh;
+  const TriangleTree tree = build_triangle_tree(mesh);
+  const BoundingBox box = bounding_box(mesh);
+  RandomNumbers random(5);
+  int hits = 0;
+  for (int i = 0; i < 300; ++i) {
+    const Vec3 origin = box.centre() + random.in_ball(box.diagonal()), direction = random.in_ball(2);
+    const double expected = first_hit_of_all(mesh, origin, direction),
+                 found = find_first_hit(mesh, tree, origin, direction);
+    ASSERT_EQ(std::isinf(expected), std::isinf(found)) << i;
+    if (std::isinf(expected)) continue;
+    ++hits;
+    EXPECT_NEAR(found, expected, 1e-5 * box.diagonal() / direction.norm()) << i;
+    EXPECT_TRUE(std::isinf(find_first_hit(mesh, tree, origin, direction, 0.999 * expected)));
+  }
+  EXPECT_GT(hits, 20);
+}
+
+TEST(Skeletonize, TheMarginIsThatOfTheSeparationPlanesAndTheSurface) {
+  const Shape shape = creature_shape();
+  const TriangleTree tree = build_triangle_tree(shape.mesh);
+  const std::vector<BoneMargin> margins = bone_margins(shape.mesh, tree, shape.skeleton, 48);
+  const SeparationPlanes planes(shape.skeleton);
+  int inner = 0;
+  for (int b = 0; b < static_cast<int>(shape.skeleton.bones.size()); ++b) {
+    if (planes.is_free(b, BoneEnd::kHead) || planes.is_free(b, BoneEnd::kTail)) {
+      EXPECT_EQ(margins[b].margin, 1) << "a bone with a free end";
+      continue;
+    }
+    ++inner;
+    double least = 1;
+    for (int i = 0; i < 480; ++i) {
+      const double turn = i / 480.0, head = planes.slope(b, BoneEnd::kHead, turn),
+                   tail = planes.slope(b, BoneEnd::kTail, turn);
+      const Vec3 o = planes.bases()[b].o, s = planes.radial(b, turn);
+      const double rho =
+          std::max(first_hit_of_all(shape.mesh, end_position(shape.skeleton, b, BoneEnd::kHead), s + head * o),
+                   first_hit_of_all(shape.mesh, end_position(shape.skeleton, b, BoneEnd::kTail), s + tail * o));
+      if (head > tail) least = std::min(least, 1 - rho * (head - tail) / bone_length(shape.skeleton, b));
+    }
+    EXPECT_NEAR(margins[b].margin, least, 0.03) << shape.skeleton.bones[b].name;
+  }
+  EXPECT_GT(inner, 1);
+}
+
+TEST(Skeletonize, ThinnedBodiesHaveTheCyclesOfTheMeshAndEndAtTheAnchorsOnly) {
+  for (const NamedShape& shape : all_shapes()) {
+    const TriangleTree tree = build_triangle_tree(shape.shape.mesh);
+    const Surface surface(shape.shape.mesh, tree);
+    const VoxelBody body = make_fitting_body(surface, shape.genus);
+    const std::vector<int> anchors{0, body.size() - 1};
+    const CurveGraph graph = make_curve_graph(body, thin_body(body, anchors));
+    EXPECT_EQ(graph.cycles(), shape.genus) << shape.name;
+    const std::vector<int> degrees = graph.degrees();
+    for (std::size_t n = 0; n < degrees.size(); ++n) {
+      if (degrees[n] != 1) continue;
+      EXPECT_TRUE(graph.nodes[n] == body.centres[anchors[0]] || graph.nodes[n] == body.centres[anchors[1]])
+          << shape.name;
+    }
+  }
+}
+
+TEST(Skeletonize, MadeShapesGetSkeletonsThatCanBeEncoded) {
+  for (const NamedShape& shape : all_shapes()) {
+    const SkeletonizeResult result = skeletonized(shape.shape.mesh);
+    EXPECT_EQ(result.genus, shape.genus) << shape.name;
+    EXPECT_EQ(count_cycles(result.skeleton), shape.genus) << shape.name;
+    EXPECT_EQ(errors_of(shape.shape.mesh, result.skeleton), "") << shape.name;
+    std::set<std::string> names;
+    for (const Bone& bone : result.skeleton.bones) names.insert(bone.name);
+    EXPECT_EQ(names.size(), result.skeleton.bones.size()) << shape.name;
+  }
+}
+
+TEST(Skeletonize, EveryLimbOfACreatureHasABoneAndTheSameBytesComeAgain) {
+  const Shape shape = creature_shape();
+  const SkeletonizeResult result = skeletonized(shape.mesh);
+  // Every free end of the skeleton that the mesh was made from has a bone near by.
+  const auto at_nodes = bones_at_nodes(shape.skeleton);
+  const double diagonal = bounding_box(shape.mesh).diagonal();
+  for (std::size_t n = 0; n < at_nodes.size(); ++n) {
+    if (at_nodes[n].size() != 1) continue;
+    double least = diagonal;
+    for (const Node& node : result.skeleton.nodes)
+      least = std::min(least, (node.position - shape.skeleton.nodes[n].position).norm());
+    EXPECT_LT(least, 0.08 * diagonal) << shape.skeleton.nodes[n].name;
+  }
+  EXPECT_EQ(skeleton_to_json(result.skeleton), skeleton_to_json(skeletonized(shape.mesh).skeleton));
+}
+
+TEST(Skeletonize, ScaleAndPlaceOfTheMeshDoNotMatter) {
+  Shape shape = creature_shape();
+  const std::size_t bones = skeletonized(shape.mesh).skeleton.bones.size();
+  for (Vec3& p : shape.mesh.positions) p = 1e-3 * p + Vec3(3, -2, 1);
+  const SkeletonizeResult result = skeletonized(shape.mesh);
+  EXPECT_NEAR(static_cast<double>(result.skeleton.bones.size()), static_cast<double>(bones), 2);
+  EXPECT_EQ(errors_of(shape.mesh, result.skeleton), "");
+}
+
+TEST(Skeletonize, TheNumberOfBonesIsALimit) {
+  const Shape shape = creature_shape();
+  for (const int most : {1, 5}) {
+    SkeletonizeOptions options;
+    options.most_bones = most;
+    const SkeletonizeResult result = skeletonized(shape.mesh, options);
+    EXPECT_LE(static_cast<int>(result.skeleton.bones.size()), most);
+    EXPECT_GE(static_cast<int>(result.skeleton.bones.size()), most - 2);
+    EXPECT_EQ(errors_of(shape.mesh, result.skeleton), "");
+  }
+}
+
+TEST(Skeletonize, SpoiltSkeletonsAreRepaired) {
+  RandomNumbers random(7);
+  for (const char* name : {"bear", "cactus"}) {
+    const TestModel model = load_standard_model(name);
+    const TriangleTree tree = build_triangle_tree(model.mesh);
+    const double diagonal = bounding_box(model.mesh).diagonal();
+    int wrong = 0;
+    for (int i = 0; i < 4; ++i) {
+      const Skeleton skeleton = spoilt(model.skeleton, 0.05 * diagonal, random);
+      wrong += !errors_of(model.mesh, skeleton).empty();
+      const RepairResult repaired = repair_skeleton(context(), model.mesh, tree, skeleton);
+      EXPECT_EQ(errors_of(model.mesh, repaired.skeleton), "") << name << " " << i;
+      EXPECT_FALSE(repaired.changes.empty());
+    }
+    EXPECT_GT(wrong, 0) << name << ": nothing was spoilt";
+  }
+}
+
+TEST(Skeletonize, AGoodSkeletonIsNotChangedByRepair) {
+  const Shape shape = y_shape();
+  const RepairResult repaired = repair_skeleton(context(), shape.mesh, build_triangle_tree(shape.mesh), shape.skeleton);
+  EXPECT_TRUE(repaired.changes.empty()) << repaired.changes.front();
+  EXPECT_EQ(skeleton_to_json(repaired.skeleton), skeleton_to_json(shape.skeleton));
+}
+
+TEST(Skeletonize, RepairRefusesWhatNoMoveMends) {
+  const Shape torus = torus_shape();
+  const TriangleTree tree = build_triangle_tree(torus.mesh);
+  Skeleton open = torus.skeleton;
+  open.bones.pop_back();
+  EXPECT_THROW(repair_skeleton(context(), torus.mesh, tree, open), TopologyError);
+  Skeleton far = torus.skeleton;
+  for (Node& node : far.nodes) node.position *= 1000;
+  EXPECT_THROW(repair_skeleton(context(), torus.mesh, tree, far), InputError);
+}
+
+}  // namespace skeletex
