@@ -6,7 +6,7 @@
 #include "files.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/model/error.h"
-#include "skeletex/reconstruct/layer_values.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 
 namespace skeletex::cli {

@@ -14,11 +14,11 @@
 #include "skeletex/edit/transfer/transfer.h"
 #include "skeletex/model/error.h"
 #include "skeletex/model/octahedral.h"
-#include "skeletex/reconstruct/layer_values.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/texture/bake_texture.h"
-#include "skeletex/reconstruct/turn_normals.h"
+#include "skeletex/reconstruct/layers/turn_normals.h"
 #include "support/shapes.h"
 
 namespace skeletex {

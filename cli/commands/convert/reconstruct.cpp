@@ -18,12 +18,12 @@
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/pose_file.h"
 #include "skeletex/model/error.h"
-#include "skeletex/reconstruct/layer_values.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
+#include "skeletex/reconstruct/layers/turn_normals.h"
 #include "skeletex/reconstruct/polish.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/texture/bake_texture.h"
-#include "skeletex/reconstruct/turn_normals.h"
 
 namespace skeletex::cli {
 namespace {

@@ -18,7 +18,7 @@
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/model/error.h"
-#include "skeletex/reconstruct/layer_values.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/render/colours.h"
 

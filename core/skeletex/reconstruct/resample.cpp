@@ -12,7 +12,7 @@
 #include "skeletex/model/encoder_settings.h"
 #include "skeletex/model/memory.h"
 #include "skeletex/reconstruct/displace.h"
-#include "skeletex/reconstruct/layer_values.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/skeleton/frame.h"
 

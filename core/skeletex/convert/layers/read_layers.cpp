@@ -8,7 +8,7 @@
 
 #include "skeletex/geometry/half_edge_table.h"
 #include "skeletex/geometry/parallel.h"
-#include "skeletex/reconstruct/layer_values.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 
 namespace skeletex {

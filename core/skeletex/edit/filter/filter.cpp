@@ -10,7 +10,7 @@
 #include "skeletex/edit/filter/move_surface.h"
 #include "skeletex/edit/regular_grid.h"
 #include "skeletex/model/error.h"
-#include "skeletex/reconstruct/layer_values.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
 
 namespace skeletex {
 namespace {

@@ -5,9 +5,9 @@
 #include <type_traits>
 
 #include "skeletex/convert/layers/read_layers.h"
-#include "skeletex/reconstruct/layer_values.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
+#include "skeletex/reconstruct/layers/turn_normals.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
-#include "skeletex/reconstruct/turn_normals.h"
 
 namespace skeletex {
 namespace {

@@ -4,9 +4,9 @@
 #include <algorithm>
 
 #include "skeletex/convert/layers/read_layers.h"
-#include "skeletex/reconstruct/layer_values.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
+#include "skeletex/reconstruct/layers/turn_normals.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
-#include "skeletex/reconstruct/turn_normals.h"
 
 namespace skeletex {
 namespace {

@@ -10,7 +10,7 @@
 #include "skeletex/io/image_file.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/model/error.h"
-#include "skeletex/reconstruct/layer_values.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
 #include "skeletex/reconstruct/texture/corner_coordinates.h"
 
 namespace skeletex {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/reconstruct/turn_normals.h"
+#include "skeletex/reconstruct/layers/turn_normals.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>

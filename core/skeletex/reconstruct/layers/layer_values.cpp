@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/reconstruct/layer_values.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include "skeletex/model/octahedral.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/resample.h"
-#include "skeletex/reconstruct/turn_normals.h"
+#include "skeletex/reconstruct/layers/turn_normals.h"
 
 namespace skeletex {
 namespace {
