@@ -6,13 +6,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <cstdio>
 
 #include "files.h"
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/analysis/validate_input.h"
 #include "skeletex/io/atomic_file.h"
-#include "skeletex/io/mesh_file.h"
 #include "skeletex/io/suggestion.h"
 #include "skeletex/model/error.h"
 
@@ -91,7 +92,9 @@ void check_output(const std::filesystem::path& path) {
     throw IoError(fmt::format("{}: the folder {} is not writable", path.string(), folder.string()));
 }
 
-TriangleMesh load_mesh(const std::filesystem::path& path) {
+namespace {
+
+MeshFile read_and_tell(const std::filesystem::path& path) {
   MeshFile file = read_mesh(path);
   if (file.triangles != file.faces_in_file)
     spdlog::info("{}: {} polygons became {} triangles", path.string(), file.faces_in_file, file.triangles);
@@ -101,7 +104,18 @@ TriangleMesh load_mesh(const std::filesystem::path& path) {
   if (file.ends_in_face && !measure_manifold(file.mesh).is_closed_manifold())
     warn(fmt::format("{}: the file ends within a line, and its surface is not closed; it may have been cut on its way",
                      path.string()));
-  return std::move(file.mesh);
+  return file;
+}
+
+}  // namespace
+
+TriangleMesh load_mesh(const std::filesystem::path& path) { return read_and_tell(path).mesh; }
+
+MeshFile load_mesh_file(const std::filesystem::path& path, bool has_materials) {
+  MeshFile file = read_and_tell(path);
+  if (!has_materials) return file;
+  for (const std::string& sentence : read_materials(path, file)) warn(sentence);
+  return file;
 }
 
 namespace {
@@ -131,6 +145,26 @@ TriangleTree require_closed(TriangleMesh& mesh) {
   std::optional<TriangleTree> tree;
   report_findings(validate_mesh(mesh, &tree));
   return std::move(*tree);
+}
+
+Vec3 parse_direction(const char* option, const std::string& text) {
+  const bool is_negative = text.starts_with('-');
+  const std::string word = text.substr(is_negative || text.starts_with('+') ? 1 : 0);
+  for (int axis = 0; axis < 3; ++axis)
+    if (word == std::string(1, "xyz"[axis]) || word == std::string(1, "XYZ"[axis]))
+      return (is_negative ? -1 : 1) * Vec3::Unit(axis);
+  Vec3 v;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto [rest, code] = std::from_chars(at, end, v[axis]);
+    const bool is_last = axis == 2;
+    if (code != std::errc() || !(std::abs(v[axis]) <= 1e15) || (is_last ? rest != end : rest == end || *rest != ','))
+      throw CLI::ValidationError(
+          option, "\"" + text + "\" is no direction; give an axis such as y or -z, or three numbers such as 0,1,0");
+    at = rest + 1;
+  }
+  return v;
 }
 
 Json profile_json(ClContext& context) {

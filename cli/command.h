@@ -12,6 +12,7 @@
 #include "skeletex/device/stopwatch.h"
 #include "skeletex/geometry/mesh.h"
 #include "skeletex/geometry/triangle_tree.h"
+#include "skeletex/io/mesh_file.h"
 #include "skeletex/skeleton/skeleton.h"
 
 /// The program `skeletex`: one file per command, each adds itself to the program and runs as its callback. Results go
@@ -68,6 +69,9 @@ void check_output(const std::filesystem::path& path);
 
 /// Reads a mesh, and says on standard error what the reader did to it (polygons split, vertices welded).
 TriangleMesh load_mesh(const std::filesystem::path& path);
+/// The same with its attributes and, unless they are not of interest, its materials and their pictures; says which of
+/// these are missing.
+MeshFile load_mesh_file(const std::filesystem::path& path, bool has_materials = true);
 /// Checks that mesh and skeleton fit (validate_before_segmentation, which turns a mesh that is inside out) and prints
 /// every finding to standard error.
 /// \throw CLI::RuntimeError(kExitBad) when one is an error
@@ -75,6 +79,10 @@ void require_valid(TriangleMesh& mesh, const Skeleton& skeleton, std::optional<T
 /// The same for a mesh alone, which has to be closed and in one piece.
 /// \return the tree of its triangles
 TriangleTree require_closed(TriangleMesh& mesh);
+
+/// A direction as an option gives it: x, -y, .. or three numbers with commas between them.
+/// \throw CLI::ValidationError
+Vec3 parse_direction(const char* option, const std::string& text);
 
 /// Time on the device by kernel, for the JSON.
 Json profile_json(ClContext& context);

@@ -6,6 +6,7 @@
 #include "files.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 
 namespace skeletex::cli {
@@ -31,7 +32,7 @@ Json write_result(ClContext& context, const SkeletexModel& model, const std::str
     write_model(path, model, options);
   } else {
     const TriangleMesh mesh = reconstruct_mesh(context, model);
-    write_mesh(path, mesh);
+    write_mesh(path, mesh, vertex_attributes(model));
     json["vertices"] = mesh.positions.size();
     json["triangles"] = mesh.triangles.size();
   }

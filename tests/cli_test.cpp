@@ -191,7 +191,7 @@ TEST_F(Program, EncodesAndReportsWhatTheContractNames) {
   expect_keys(json, {"mesh", "bones", "atlas", "times_ms", "device"});
   expect_keys(json["mesh"], {"vertices", "triangles", "diagonal", "genus"});
   expect_keys(json["atlas"], {"size", "used_fraction"});
-  expect_keys(json["times_ms"], {"half_edge", "segmentation", "parameterization", "encoding"});
+  expect_keys(json["times_ms"], {"half_edge", "segmentation", "parameterization", "encoding", "layers"});
   ASSERT_EQ(json["bones"].size(), 3u);
   double area = 0;
   long texels = 0;
@@ -258,6 +258,46 @@ TEST_F(Program, ReconstructsAndReportsWhatTheContractNames) {
   EXPECT_TRUE(text_of(folder_ / "again.obj").find("\nf ") != std::string::npos);
   fs::remove(folder_ / "again.ply");
   fs::remove(folder_ / "again.obj");
+}
+
+TEST_F(Program, BringsNormalsColoursAndNumbersBack) {
+  const TriangleMesh mesh = read_mesh(folder_ / "y.ply").mesh;
+  MeshAttributes attributes;
+  attributes.numbers.push_back({"quality", {}});
+  for (const Vec3& p : mesh.positions) {
+    attributes.colours.values.emplace_back(p.x() > 0 ? 1.f : 0.f, 0.5f, 0.25f, 1.f);
+    attributes.numbers[0].values.push_back(static_cast<float>(p.z()));
+  }
+  write_mesh(folder_ / "coloured.ply", mesh, attributes);
+  EXPECT_EQ(
+      run({"encode", "coloured.ply", "y.skeleton.json", "-o", "coloured.skx.exr", "--size", "64", "--up", "z"}).code,
+      0);
+  const nlohmann::json header = json_of({"inspect", "coloured.skx.exr"});
+  ASSERT_EQ(header["layers"].size(), 3u);
+  EXPECT_EQ(header["layers"][2]["channels"], (std::vector<std::string>{"quality.Y"}));
+  EXPECT_EQ(header["stance"]["up"], (std::vector<double>{0, 0, 1}));
+  EXPECT_EQ(header["stance"]["front"], (std::vector<double>{0, -1, 0}));
+  EXPECT_EQ(run({"reconstruct", "coloured.skx.exr", "-o", "back.ply"}).code, 0);
+  const MeshFile back = read_mesh(folder_ / "back.ply");
+  EXPECT_EQ(back.attributes.normals.values.size(), back.mesh.positions.size());
+  EXPECT_EQ(back.attributes.colours.values.size(), back.mesh.positions.size());
+  ASSERT_EQ(back.attributes.numbers.size(), 1u);
+  EXPECT_EQ(back.attributes.numbers[0].name, "quality");
+  EXPECT_EQ(run({"reconstruct", "coloured.skx.exr", "-o", "back.obj", "--texture", "back.png"}).code, 0);
+  MeshFile textured = read_mesh(folder_ / "back.obj");
+  EXPECT_TRUE(read_materials(folder_ / "back.obj", textured).empty());
+  ASSERT_EQ(textured.attributes.materials.size(), 1u);
+  EXPECT_FALSE(textured.attributes.materials[0].image.empty());
+  EXPECT_EQ(textured.attributes.texture_coordinates.corners.size(), textured.mesh.triangles.size());
+  EXPECT_EQ(run({"filter", "coloured.skx.exr", "smooth", "--layer", "colour", "-o", "soft.skx.exr"}).code, 0);
+  expect_refused(1, {"filter", "coloured.skx.exr", "smooth", "--layer", "heat", "-o", "none.skx.exr"},
+                 {"heat", "normal, colour, quality"});
+  expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "none.obj", "--texture", "none.png"}, {"no colours"});
+  EXPECT_EQ(run({"encode", "coloured.ply", "y.skeleton.json", "-o", "bare.skx.exr", "--size", "64", "--no-normals",
+                 "--no-colours", "--no-numbers"})
+                .code,
+            0);
+  EXPECT_FALSE(json_of({"inspect", "bare.skx.exr"}).contains("layers"));
 }
 
 TEST_F(Program, ReconstructsInPosesAndAnimations) {
@@ -445,7 +485,10 @@ TEST_F(Program, MeasuresAndReportsWhatTheContractNames) {
   ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "again.ply"}).code, 0);
   const nlohmann::json json =
       json_of({"metro", "y.ply", "again.ply", "--samples", "20000", "--csv", "d.csv", "--ply", "d.ply"});
-  expect_keys(json, {"diagonal", "forward", "backward", "vertex", "seconds"});
+  expect_keys(json, {"diagonal", "forward", "backward", "vertex", "normals", "seconds"});
+  for (const char* direction : {"forward", "backward"})
+    for (const char* kind : {"surface", "shading"})
+      expect_keys(json["normals"][direction][kind], {"mean", "p95", "p99"});
   for (const char* part : {"forward", "backward", "vertex"}) {
     expect_keys(json[part], {"mean", "std", "rms", "max"});
     const double mean = json[part]["mean"], rms = json[part]["rms"], max = json[part]["max"], std = json[part]["std"];
@@ -621,7 +664,7 @@ TEST_F(Program, CompilesEachKernelOnceAndNothingInASecondProcess) {
     else
       EXPECT_TRUE(kernels.insert(path.parent_path().parent_path()).second) << path;
   }
-  EXPECT_LE(programs.size(), 2u);  // encoding, and the decoder's triangles
+  EXPECT_LE(programs.size(), 3u);  // encoding, the decoder's triangles, and nearest points
   EXPECT_GT(kernels.size(), 20u);
 }
 

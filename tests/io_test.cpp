@@ -409,7 +409,9 @@ TEST(MeshFiles, PlyCarriesColoursAndAProperty) {
   const std::vector<VertexColour> vertex_colours{{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {10, 11, 12}},
       face_colours{{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {9, 9, 9}};
   const std::vector<float> distances{0.25f, 0.5f, 1, 2};
-  write_mesh(folder / "m.ply", mesh, {vertex_colours, face_colours, "distance", distances, {}});
+  write_mesh(
+      folder / "m.ply", mesh,
+      {.vertex_colours = vertex_colours, .face_colours = face_colours, .vertex_numbers = {{"distance", distances}}});
   const std::string bytes = read_bytes(folder / "m.ply");
   const std::string header =
       "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float "
@@ -425,14 +427,14 @@ TEST(MeshFiles, PlyCarriesColoursAndAProperty) {
   EXPECT_EQ(bytes.substr(header.size() + 19, 19), second);
   EXPECT_EQ(bytes.substr(bytes.size() - 3), "\t\t\t");
   EXPECT_EQ(read_mesh(folder / "m.ply").mesh.positions, kTetrahedron);
-  EXPECT_TRUE(contains(error_of([&] {
-                         write_mesh(folder / "n.ply", mesh, {vertex_colours, {}, "", distances, {}});
-                       }),
-                       "name"));
-  EXPECT_TRUE(contains(error_of([&] {
-                         write_mesh(folder / "n.ply", mesh, {std::span(vertex_colours).first(3), {}, "", {}, {}});
-                       }),
-                       "as many"));
+  EXPECT_TRUE(contains(
+      error_of([&] {
+        write_mesh(folder / "n.ply", mesh, {.vertex_colours = vertex_colours, .vertex_numbers = {{"", distances}}});
+      }),
+      "name"));
+  EXPECT_TRUE(contains(
+      error_of([&] { write_mesh(folder / "n.ply", mesh, {.vertex_colours = std::span(vertex_colours).first(3)}); }),
+      "as many"));
   EXPECT_EQ(folder.file_count(), 1);
 }
 

@@ -171,6 +171,26 @@ TEST(Metro, AMeshIsAtNoDistanceFromItself) {
   EXPECT_EQ(report.vertex.max, 0);
 }
 
+TEST(Metro, NormalsOfTurnedPlanesDifferByTheirAngle) {
+  const TriangleMesh a{{{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}};
+  TriangleMesh b = a;
+  const Eigen::AngleAxisd turn(10 * std::numbers::pi / 180, Vec3::UnitX());
+  for (Vec3& p : b.positions) p = turn * p;
+  const MetroReport report = measure_metro(context(), a, b);
+  for (const NormalStatistics& normals : {report.forward_normals, report.backward_normals})
+    for (const AngleStatistics& angles : {normals.surface, normals.shading}) {
+      EXPECT_NEAR(angles.mean, 10, 1e-4);
+      EXPECT_NEAR(angles.percent95, 10, 0.02);
+      EXPECT_NEAR(angles.percent99, 10, 0.02);
+    }
+  // Normals of their own change the shading alone.
+  const CornerValues<Vec3> straight{{Vec3::UnitZ()}, {{0, 0, 0}, {0, 0, 0}}};
+  const MetroReport own = measure_metro(context(), a, b, {.normals_b = &straight});
+  EXPECT_NEAR(own.forward_normals.surface.mean, 10, 1e-4);
+  EXPECT_NEAR(own.forward_normals.shading.mean, 0, 1e-4);
+  EXPECT_NEAR(own.backward_normals.shading.mean, 0, 1e-4);
+}
+
 TEST(Metro, ForwardOfTheOneIsBackwardOfTheOther) {
   const TriangleMesh a = y_shape().mesh, b = creature_shape().mesh;
   const MetroReport there = measure_metro(context(), a, b), back = measure_metro(context(), b, a);

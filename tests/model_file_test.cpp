@@ -267,10 +267,14 @@ TEST(ModelFile, LayersComeBackUnderTheirNames) {
       layer_channels(model.layers),
       (Names{
           {"normal.R", "normal.G"}, {"colour.R", "colour.G", "colour.B"}, {"heat_of_today.Y"}, {"heat_of_today_3.Y"}}));
+  model.stance = Stance{Vec3::UnitZ(), -Vec3::UnitY()};
   const ScratchFolder scratch;
   write_model(scratch / "m.skx.exr", model);
   const SkeletexModel back = read_model(scratch / "m.skx.exr");
   expect_same(back, model);
+  ASSERT_TRUE(back.stance.has_value());
+  EXPECT_EQ(back.stance->up, model.stance->up);
+  EXPECT_EQ(back.stance->front, model.stance->front);
   ASSERT_EQ(back.layers.size(), model.layers.size());
   for (std::size_t i = 0; i < back.layers.size(); ++i) {
     EXPECT_EQ(back.layers[i].name, model.layers[i].name);

@@ -4,9 +4,11 @@
 #include <spdlog/spdlog.h>
 
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <future>
 #include <memory>
+#include <numbers>
 #include <optional>
 
 #include "close_mesh.h"
@@ -16,6 +18,7 @@
 #include "progress_bar.h"
 #include "rig_file.h"
 #include "skeletex/convert/encode_model.h"
+#include "skeletex/convert/guess_stance.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/io/suggestion.h"
@@ -33,7 +36,9 @@ struct Arguments {
   double alpha = 0.5, stop_spread = 0, hybrid_threshold = EncodeOptions{}.hybrid_unseen_threshold;
   std::string rows = "surface", spd_hit = "last", share, diagonals, compression = "auto", rounding = "surface";
   bool has_no_prefilter = false, has_no_unfold = false, is_snapped = false, is_fitted = false, is_paper_recipe = false,
-       is_half = false, is_verbose = false;
+       is_half = false, is_verbose = false, has_no_normals = false, has_no_colours = false, has_no_numbers = false;
+  std::optional<double> crease;
+  std::string up, front;
   std::vector<std::string> bone_methods;
   CloseOptions close;
 };
@@ -103,6 +108,10 @@ void set_texel_options(const Arguments& arguments, const CLI::App& command, Enco
   if (is_given("--rounding") && !arguments.is_half) throw CLI::ValidationError("--rounding", "needs --half");
   options.has_half_texels = arguments.is_half && arguments.rounding == "surface";
   if (is_given("--share")) options.texel_share = share_of(arguments.share);
+  options.layers.has_normals = !arguments.has_no_normals;
+  options.layers.has_colours = !arguments.has_no_colours;
+  options.layers.has_numbers = !arguments.has_no_numbers;
+  if (arguments.crease) options.layers.crease_angle = *arguments.crease * std::numbers::pi / 180;
 }
 
 EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command) {
@@ -151,18 +160,21 @@ Input read_input(ClContext& context, const Arguments& arguments, const EncodeOpt
     input.mesh = std::move(file.surface.mesh);
     input.attributes = std::move(file.surface.attributes);
   } else {
-    MeshParts parts{load_mesh(arguments.mesh), {}, {}};
+    MeshFile file = load_mesh_file(arguments.mesh);
+    MeshParts parts{std::move(file.mesh), std::move(file.attributes), {}};
     if (arguments.close.is_on) close_mesh(parts, arguments.close);
     input.mesh = std::move(parts.mesh);
     input.attributes = std::move(parts.attributes);
   }
   if (!arguments.skeleton.empty()) input.skeleton = read_skeleton(arguments.skeleton);
+  const std::vector<Triangle> triangles = input.mesh.triangles;
   if (arguments.skeleton.empty() && input.skeleton.bones.empty()) {
     input.tree = require_closed(input.mesh);
   } else {
     check_bone_names(arguments, options, input.skeleton);
     require_valid(input.mesh, input.skeleton, &input.tree);
   }
+  if (input.mesh.triangles != triangles) turn_over(input.attributes);
   const UnitFrame frame = unit_frame(input.mesh);
   input.mesh = in_unit_frame(std::move(input.mesh), frame);
   input.skeleton = in_unit_frame(std::move(input.skeleton), frame);
@@ -171,6 +183,23 @@ Input read_input(ClContext& context, const Arguments& arguments, const EncodeOpt
     input.tree->scale = 1;
   }
   return input;
+}
+
+/// As given, else guessed.
+Stance stance_of(const Arguments& arguments, const Input& input) {
+  Stance guess = guess_stance(input.mesh, input.skeleton);
+  if (arguments.up.empty() && arguments.front.empty()) return guess;
+  std::optional<Vec3> front;
+  if (!arguments.front.empty()) front = parse_direction("--front", arguments.front);
+  return make_stance(arguments.up.empty() ? guess.up : parse_direction("--up", arguments.up), front);
+}
+
+/// "y", "-z" or "0.6,0.8,0".
+std::string name_of(const Vec3& direction) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (std::abs(std::abs(direction[axis]) - 1) < 1e-9)
+      return std::string(direction[axis] < 0 ? "-" : "") + "xyz"[axis];
+  return fmt::format("{:.3g},{:.3g},{:.3g}", direction.x(), direction.y(), direction.z());
 }
 
 /// A skeleton for a mesh without one, and says so.
@@ -195,7 +224,8 @@ ExrCompression compression_of(const std::string& name) {
                          : ExrCompression::kAuto;
 }
 
-void warn_of_bones(const EncodeReport& report) {
+void warn_of_result(const EncodeReport& report) {
+  for (const std::string& note : report.layer_notes) warn(note);
   for (const BoneReport& bone : report.bones) {
     if (lacks_part(bone, report.diagonal))
       warn(fmt::format(
@@ -226,6 +256,8 @@ void run(const Arguments& arguments, const CLI::App& command) {
     input.skeleton = make_skeleton(context, input, *bar);
     check_bone_names(arguments, options, input.skeleton);
   }
+  options.attributes = &input.attributes;
+  options.stance = stance_of(arguments, input);
   options.tree = input.tree ? &*input.tree : nullptr;
   options.progress = [&](const std::string& stage, double done) {
     bar->show(stage, done);
@@ -240,12 +272,16 @@ void run(const Arguments& arguments, const CLI::App& command) {
               {.format = arguments.is_half ? TexelFormat::kHalf : TexelFormat::kFloat,
                .compression = compression_of(arguments.compression)});
   bar.reset();
-  warn_of_bones(result.report);
+  warn_of_result(result.report);
   const EncodedFile file{arguments.output, options.width, options.height, watch.lap_ms() / 1000};
   Json json = encode_report_json(result.report, file);
   json["kernels"] = profile_json(context);
   print(arguments.json, arguments.is_verbose ? encode_details_text(result.report) : "");
   print(arguments.json, encode_report_text(result.report, file));
+  const bool is_guess = arguments.up.empty() && arguments.front.empty();
+  print(arguments.json,
+        fmt::format("up is {}, front is {}{}\n", name_of(result.model.stance->up), name_of(result.model.stance->front),
+                    is_guess ? " (a guess; --up and --front say otherwise)" : ""));
   write_json(arguments.json, json);
 }
 
@@ -329,6 +365,18 @@ void add_file_options(CLI::App& command, Arguments& a) {
               {"auto", "none", "zip", "piz"});
 }
 
+void add_layer_options(CLI::App& command, Arguments& a) {
+  CLI::Option* none = command.add_flag("--no-normals", a.has_no_normals, "store no shading normals")->group("Layers");
+  add(command, "Layers", "--crease", a.crease,
+      "degrees: edges that turn more are sharp; of meshes whose file has no normals (default: none is)")
+      .type_name("DEG")
+      ->check(number_in(0.0, 180.0))
+      ->excludes(none);
+  command.add_flag("--no-colours", a.has_no_colours, "store no colours: vertex colours, materials and their pictures")
+      ->group("Layers");
+  command.add_flag("--no-numbers", a.has_no_numbers, "store no other numbers of the vertices (PLY)")->group("Layers");
+}
+
 }  // namespace
 
 void add_encode_command(CLI::App& program) {
@@ -354,8 +402,13 @@ void add_encode_command(CLI::App& program) {
                   "the texels, hybrid takes spd "
                   "where it is as near to the mesh as vsm"),
               methods);
+  add(command, "Options", "--up", a.up, "where the mesh's up is (default: a guess, which is told)")
+      .type_name("x|-y|..|X,Y,Z");
+  add(command, "Options", "--front", a.front, "where it looks (default: a guess, which is told)")
+      .type_name("x|-y|..|X,Y,Z");
   add_map_options(command, a);
   add_texel_options(command, a);
+  add_layer_options(command, a);
   add_file_options(command, a);
   add_close_options(command, a.close);
   command.add_flag("--verbose", a.is_verbose, "print what was done for each bone and how long each stage took, too");

@@ -79,7 +79,8 @@ Json encode_report_json(const EncodeReport& report, const EncodedFile& file) {
              {{"half_edge", report.half_edge_ms},
               {"segmentation", report.segmentation_ms},
               {"parameterization", report.parameterization_ms},
-              {"encoding", report.encoding_ms}}},
+              {"encoding", report.encoding_ms},
+              {"layers", report.layers_ms}}},
             {"seconds", file.seconds},
             {"device", report.device}};
   if (report.unfold) json["lattice"] = {{"folded_quads", report.unfold->folded_quads}, {"left", report.unfold->left}};
@@ -154,8 +155,11 @@ std::string encode_details_text(const EncodeReport& report) {
     text += fmt::format("{} inverted triangles, {} on the regular grid\n", report.revert->inverted_triangles,
                         report.revert->regular_inverted_triangles);
   return text +
-         fmt::format("half edges {:.0f} ms, segmentation {:.0f} ms, parameterization {:.0f} ms, encoding {:.0f} ms\n",
-                     report.half_edge_ms, report.segmentation_ms, report.parameterization_ms, report.encoding_ms);
+         fmt::format(
+             "half edges {:.0f} ms, segmentation {:.0f} ms, parameterization {:.0f} ms, encoding {:.0f} ms, layers "
+             "{:.0f} ms\n",
+             report.half_edge_ms, report.segmentation_ms, report.parameterization_ms, report.encoding_ms,
+             report.layers_ms);
 }
 
 }  // namespace skeletex::cli

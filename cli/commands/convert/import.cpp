@@ -81,7 +81,7 @@ void run(const Arguments& arguments) {
   make_folder(folder);
   std::vector<std::string> written{(folder / "mesh.ply").string()};
   const std::vector<VertexColour> colours = vertex_colours(mesh, file.surface.attributes);
-  PlyAttributes attributes;
+  WrittenAttributes attributes;
   attributes.vertex_colours = colours;
   write_mesh(written.back(), mesh, attributes);
   if (!rig.skeleton.bones.empty()) {

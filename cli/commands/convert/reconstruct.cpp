@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,19 +13,23 @@
 #include "files.h"
 #include "progress_bar.h"
 #include "skeletex/analysis/deformation.h"
+#include "skeletex/io/image_file.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/pose_file.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
+#include "skeletex/reconstruct/layers/turn_normals.h"
 #include "skeletex/reconstruct/polish.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/reconstruct/texture/bake_texture.h"
 
 namespace skeletex::cli {
 namespace {
 
 struct Arguments {
-  std::string model, output, pose, device, json, deform = "smooth";
+  std::string model, output, pose, device, json, texture, deform = "smooth";
   int size = 0, level = 0;
   std::optional<double> time, constant_offset;  ///< the offset in diagonals
   std::vector<std::string> bones;
@@ -68,10 +73,45 @@ TriangleMesh surface_of(ClContext& context, const PreparedModel& prepared, const
   return reconstruct_mesh(context, prepared);
 }
 
-void run(const Arguments& arguments) {
+/// The path of a picture as a mesh file names it: from its own folder, where that is possible.
+std::filesystem::path relative_to(const std::string& picture, const std::string& mesh) {
+  const std::filesystem::path path = std::filesystem::absolute(picture).lexically_normal(),
+                              folder = std::filesystem::absolute(mesh).lexically_normal().parent_path();
+  const std::filesystem::path relative = path.lexically_relative(folder);
+  return relative.empty() ? path : relative;
+}
+
+/// What is written beside the surface; writes the picture, where one is asked for.
+MeshAttributes attributes_of(ClContext& context, const PreparedModel& prepared, bool is_posed, const TriangleMesh& mesh,
+                             const Arguments& arguments) {
+  MeshAttributes attributes = vertex_attributes(prepared);
+  const bool has_texture = !arguments.texture.empty();
+  if (!is_posed && !has_texture) return attributes;
+  const TriangleMesh bind = reconstruct_bind_mesh(context, prepared).mesh;
+  if (is_posed && !attributes.normals.empty())
+    attributes.normals.values = turn_normals(bind, attributes.normals.values, mesh.positions);
+  if (!has_texture) return attributes;
+  BakedTexture baked = bake_texture(prepared, bind);
+  attributes.colours = {};
+  attributes.texture_coordinates = std::move(baked.coordinates);
+  attributes.materials.emplace_back().image_file = relative_to(arguments.texture, arguments.output);
+  write_image(arguments.texture, baked.image);
+  return attributes;
+}
+
+void check_arguments(const Arguments& arguments) {
+  if (arguments.constant_offset && !arguments.texture.empty())
+    throw CLI::ValidationError("--texture", "--constant-offset writes no surface that has colours");
+  if (!arguments.texture.empty() && !has_ending(arguments.output, ".obj") && !has_ending(arguments.output, ".ply"))
+    throw CLI::ValidationError("--texture",
+                               "\"" + arguments.output + "\" must end in .obj or .ply, which take texture coordinates");
   if (arguments.constant_offset && arguments.is_polished)
     throw CLI::ValidationError("--polish", "--constant-offset writes no surface that could be polished");
   if (!arguments.constant_offset) check_distance_option(arguments.is_distance_dropped, arguments.deform);
+}
+
+void run(const Arguments& arguments) {
+  check_arguments(arguments);
   Stopwatch total, watch;
   SkeletexModel model = read_model(arguments.model, arguments.level);
   std::optional<Skeleton> posed;
@@ -101,9 +141,12 @@ void run(const Arguments& arguments) {
       bar.show("polishing", 0.5);
       polish_report = polish_pose(reconstruct_mesh(context, prepared), mesh.positions);
     }
+    const MeshAttributes attributes = arguments.constant_offset
+                                          ? MeshAttributes()
+                                          : attributes_of(context, prepared, posed.has_value(), mesh, arguments);
     reconstruct_ms = watch.lap_ms();
     bar.show("writing", 0.7);
-    write_mesh(arguments.output, mesh);
+    write_mesh(arguments.output, mesh, attributes);
     write_ms = watch.lap_ms();
     if (posed && !arguments.constant_offset && !arguments.has_no_report) {
       bar.show("measuring the pose", 0.8);
@@ -179,6 +222,12 @@ void add_reconstruct_command(CLI::App& program) {
                 "with --deform paper or coordinates: do not restore the distances to the bones")
       ->needs(pose);
   add_polish_option(command, arguments->is_polished, pose);
+  declare_output(command,
+                 command.add_option("--texture", arguments->texture,
+                                    "write the model's colours as a picture, and texture coordinates instead of vertex "
+                                    "colours; an OBJ comes with a material file"),
+                 {".png"})
+      ->type_name("PNG");
   command.add_flag("--no-report", arguments->has_no_report, "do not measure what the pose does to the surface")
       ->needs(pose);
   CLI::Option* offset =

@@ -46,7 +46,7 @@ void run(const Arguments& arguments) {
     bar.show("writing", 0.9);
     std::vector<VertexColour> colours;
     for (const int bone : segmentation.triangle_bones) colours.push_back(bone_colour(bone));
-    PlyAttributes attributes;
+    WrittenAttributes attributes;
     attributes.face_colours = colours;
     write_mesh(arguments.output, in_user_units(segmentation.cut_mesh, frame), attributes);
   }

@@ -2,6 +2,7 @@
 #include "skeletex/edit/filter/filter.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -17,6 +18,7 @@
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/render/colours.h"
 
@@ -24,7 +26,7 @@ namespace skeletex::cli {
 namespace {
 
 struct Arguments {
-  std::string model, filter, output, device, json;
+  std::string model, filter, output, device, json, layer;
   FilterRegion region;
   SmoothOptions smooth;
   EnhanceOptions enhance;
@@ -36,6 +38,7 @@ struct Arguments {
 const std::map<std::string, std::set<std::string>> kFiltersOfOption{{"--bones", {"smooth", "enhance", "noise"}},
                                                                     {"--falloff", {"smooth", "enhance", "noise"}},
                                                                     {"--scale", {"smooth", "enhance", "curvature"}},
+                                                                    {"--layer", {"smooth", "enhance"}},
                                                                     {"--iterations", {"smooth"}},
                                                                     {"--keep-volume", {"smooth"}},
                                                                     {"--gain", {"enhance"}},
@@ -49,6 +52,10 @@ void check_options(const CLI::App& command, const Arguments& arguments) {
     if (command.get_option(option)->count() > 0 && !filters.count(arguments.filter))
       throw CLI::ValidationError(
           fmt::format("{} is for {}, not for {}", option, fmt::join(filters, ", "), arguments.filter));
+  if (arguments.layer.empty()) return;
+  for (const char* option : {"--iterations", "--keep-volume"})
+    if (command.get_option(option)->count() > 0)
+      throw CLI::ValidationError(fmt::format("{} is for the surface, not for --layer", option));
 }
 
 Json solver_json(const SolveReport& solver) { return {{"steps", solver.steps}, {"residual", solver.residual}}; }
@@ -79,11 +86,10 @@ void run_curvature(const Arguments& arguments) {
   std::vector<VertexColour> colours;
   for (const float value : result.mean_curvature)
     colours.push_back(viridis(colour_scale > 0 ? 0.5 + 0.5 * value / colour_scale : 0.5));
-  PlyAttributes attributes;
+  WrittenAttributes attributes;
   attributes.vertex_normals = normals;
   attributes.vertex_colours = colours;
-  attributes.vertex_property_name = "mean_curvature";
-  attributes.vertex_property = result.mean_curvature;
+  attributes.vertex_numbers = {{"mean_curvature", result.mean_curvature}};
   write_mesh(arguments.output, reconstruct_mesh(context, model), attributes);
   print(arguments.json, fmt::format("mean curvature at {} vertices, averaged over {:.3g} diagonals; colours from "
                                     "{:.4g} to {:.4g}\n{:.0f} ms on {}\n{}\n",
@@ -109,7 +115,38 @@ FilterResult apply_filter(ClContext& context, const SkeletexModel& model, Argume
   return smooth_model(context, model, arguments.smooth, arguments.region);
 }
 
+/// Filters a layer alone.
+void run_layer(const Arguments& arguments) {
+  const SkeletexModel model = read_model(arguments.model);
+  if (find_layer(model, arguments.layer) == nullptr) {
+    std::vector<std::string> names;
+    for (const Layer& layer : model.layers) names.push_back(layer.name);
+    throw InputError(fmt::format("--layer: {} has no layer \"{}\"; it has {}", arguments.model, arguments.layer,
+                                 names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
+  }
+  ClContext context(arguments.device);
+  Stopwatch watch;
+  LayerFilterOptions options{.layer = arguments.layer};
+  if (arguments.scale > 0) options.scale = arguments.scale;
+  if (arguments.filter == "enhance") options.gain = arguments.enhance.gain;
+  const SkeletexModel result = filter_layer(context, model, options, arguments.region);
+  const double filter_ms = watch.lap_ms();
+  const Json output = write_result(context, result, arguments.output);
+  print(arguments.json, fmt::format("{} of layer \"{}\": {:.0f} ms on {}\n{}\n", arguments.filter, arguments.layer,
+                                    filter_ms, context.device().name, arguments.output));
+  write_json(arguments.json, {{"filter", arguments.filter},
+                              {"layer", arguments.layer},
+                              {"output", output},
+                              {"times_ms", {{"filter", filter_ms}}},
+                              {"device", context.device().name},
+                              {"kernels", profile_json(context)}});
+}
+
 void run(const Arguments& arguments) {
+  if (!arguments.layer.empty()) {
+    run_layer(arguments);
+    return;
+  }
   if (arguments.filter == "curvature") {
     run_curvature(arguments);
     return;
@@ -166,6 +203,9 @@ void add_filter_command(CLI::App& program) {
       "size of detail, in diagonals (default: 0.01; curvature: three spacings of vertices)")
       .check(number_above(0))
       ->type_name("D");
+  add("Smooth, enhance, curvature", "--layer", a.layer,
+      "smooth, enhance: filter this layer (normal, colour, ..) and leave the surface")
+      .type_name("NAME");
   add("Smooth, enhance, curvature", "--iterations", a.smooth.iterations, "smooth: steps to divide the way into")
       .check(number_in(1, 1000))
       ->capture_default_str()

@@ -29,10 +29,28 @@ Json statistics_json(const DistanceStatistics& s) {
   return {{"mean", s.mean}, {"std", s.std}, {"rms", s.rms}, {"max", s.max}};
 }
 
-TriangleMesh load_surface(const std::string& path) {
-  TriangleMesh mesh = load_mesh(path);
-  if (mesh.triangles.empty()) throw InputError(path + ": no triangles, so there is no surface to measure from");
-  return mesh;
+MeshFile load_surface(const std::string& path) {
+  MeshFile file = load_mesh_file(path, false);
+  if (file.mesh.triangles.empty()) throw InputError(path + ": no triangles, so there is no surface to measure from");
+  return file;
+}
+
+Json angles_json(const AngleStatistics& s) { return {{"mean", s.mean}, {"p95", s.percent95}, {"p99", s.percent99}}; }
+Json normals_json(const NormalStatistics& s) {
+  return {{"surface", angles_json(s.surface)}, {"shading", angles_json(s.shading)}};
+}
+
+std::string normals_text(const MetroReport& report) {
+  Table table({"degrees between normals", "mean", "95 % below", "99 % below"});
+  const auto add = [&table](const char* name, const AngleStatistics& s) {
+    table.add(
+        {name, fmt::format("{:.3f}", s.mean), fmt::format("{:.2f}", s.percent95), fmt::format("{:.2f}", s.percent99)});
+  };
+  add("surface, A to B", report.forward_normals.surface);
+  add("surface, B to A", report.backward_normals.surface);
+  add("shading, A to B", report.forward_normals.shading);
+  add("shading, B to A", report.backward_normals.shading);
+  return table.text();
 }
 
 void write_csv(const std::string& path, const TriangleMesh& mesh, const std::vector<float>& distances) {
@@ -56,23 +74,28 @@ void write_coloured(const std::string& path, const TriangleMesh& mesh, const std
                     double scale) {
   std::vector<VertexColour> colours;
   for (const float distance : distances) colours.push_back(viridis(scale > 0 ? distance / scale : 0));
-  PlyAttributes attributes;
+  WrittenAttributes attributes;
   attributes.vertex_colours = colours;
-  attributes.vertex_property_name = "distance";
-  attributes.vertex_property = distances;
+  attributes.vertex_numbers = {{"distance", distances}};
   write_mesh(path, mesh, attributes);
 }
 
 void run(const Arguments& arguments) {
   if (!arguments.ply.empty() && !has_ending(arguments.ply, ".ply"))
     throw CLI::ValidationError("--ply", "\"" + arguments.ply + "\" does not end in .ply");
-  const TriangleMesh a = load_surface(arguments.a), b = load_surface(arguments.b);
+  const MeshFile file_a = load_surface(arguments.a), file_b = load_surface(arguments.b);
+  const TriangleMesh &a = file_a.mesh, &b = file_b.mesh;
+  const auto own_normals = [](const MeshFile& file) {
+    return file.attributes.normals.empty() ? nullptr : &file.attributes.normals;
+  };
   ClContext context(arguments.device);
   MetroReport report;
   {
     ProgressBar bar(context);
     bar.show("measuring", 0.2);
-    report = measure_metro(context, a, b, {.samples = arguments.samples});
+    report = measure_metro(
+        context, a, b,
+        {.samples = arguments.samples, .normals_a = own_normals(file_a), .normals_b = own_normals(file_b)});
   }
   if (!arguments.csv.empty()) write_csv(arguments.csv, a, report.vertex_distances);
   const double scale =
@@ -88,7 +111,7 @@ void run(const Arguments& arguments) {
   add("B's surface to A", report.backward);
   add("A's vertices to B", report.vertex);
   std::string text =
-      table.text() +
+      table.text() + normals_text(report) +
       fmt::format("symmetric surface mean {:.3e}, maximum {:.3e}; diagonal of A {:.6g}; {:.2f} s on {}\n",
                   symmetric_mean(report), std::max(report.forward.max, report.backward.max), report.diagonal,
                   report.seconds, context.device().name);
@@ -101,6 +124,8 @@ void run(const Arguments& arguments) {
             {"forward", statistics_json(report.forward)},
             {"backward", statistics_json(report.backward)},
             {"vertex", statistics_json(report.vertex)},
+            {"normals",
+             {{"forward", normals_json(report.forward_normals)}, {"backward", normals_json(report.backward_normals)}}},
             {"seconds", report.seconds},
             {"device", context.device().name},
             {"kernels", profile_json(context)}};
@@ -145,7 +170,9 @@ void add_metro_command(CLI::App& program) {
       "Means, RMS and maxima are divided by the diagonal of A's bounding box. \"Surface\" measures from points spread "
       "evenly over a surface (as the "
       "tool\n"
-      "metro does), \"vertices\" from A's vertices (as the paper does); the two differ, so say which one you quote.");
+      "metro does), \"vertices\" from A's vertices (as the paper does); the two differ, so say which one you quote.\n"
+      "Angles are those between normals of the triangles (surface), and between normals that the files give for the "
+      "vertices or that the triangles around them have (shading).");
   command.callback([arguments] { run(*arguments); });
 }
 

@@ -20,6 +20,8 @@
 #include "skeletex/io/read_file.h"
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
+#include "skeletex/reconstruct/layers/turn_normals.h"
 #include "skeletex/reconstruct/polish.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
@@ -42,7 +44,8 @@ struct Arguments {
   std::optional<double> time, azimuth, elevation, fov, zoom;
   double error_max = 0;
   int lattice = 0, views = 1, samples = 2;
-  bool is_flat = false, has_wires = false, shows_skeleton = false, is_distance_dropped = false, is_polished = false;
+  bool is_flat = false, has_wires = false, shows_skeleton = false, is_distance_dropped = false, is_polished = false,
+       is_smoothed = false, is_plain = false;
 };
 
 bool is_model(const std::string& path) { return has_ending(path, ".exr"); }
@@ -60,20 +63,6 @@ std::array<int, 2> parse_picture_size(const std::string& text) {
     throw CLI::ValidationError(
         "--size", "\"" + text + "\" is no picture size; give WIDTHxHEIGHT, 16 to 8192 pixels, e.g. 1200x900");
   return size;
-}
-
-Vec3 parse_direction(const char* option, const std::string& text) {
-  Vec3 v;
-  const char* at = text.data();
-  const char* const end = at + text.size();
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto [rest, code] = std::from_chars(at, end, v[axis]);
-    const bool is_last = axis == 2;
-    if (code != std::errc() || !(std::abs(v[axis]) <= 1e15) || (is_last ? rest != end : rest == end || *rest != ','))
-      throw CLI::ValidationError(option, "\"" + text + "\" is no direction; give x,y,z, e.g. 0,1,0");
-    at = rest + 1;
-  }
-  return v;
 }
 
 /// Linear colour, or nothing for "transparent".
@@ -94,8 +83,10 @@ std::optional<LinearRgb> parse_background(const std::string& text) {
                              "\"" + text + "\" is no background; give white, black, transparent or #rrggbb");
 }
 
-View view_of(const Arguments& arguments, const nlohmann::json& own_view) {
+/// \param stance  of the model; a view that the user names comes before it
+View view_of(const Arguments& arguments, const nlohmann::json& own_view, const std::optional<Stance>& stance) {
   View view;
+  if (stance) view.up = stance->up, view.front = stance->front;
   if (!own_view.is_null()) view = parse_view(own_view, arguments.input);
   if (!arguments.camera.empty())
     view = parse_view(parse_json(read_file(arguments.camera), arguments.camera), arguments.camera);
@@ -115,7 +106,8 @@ View view_of(const Arguments& arguments, const nlohmann::json& own_view) {
 struct Subject {
   TriangleMesh mesh;
   UnitFrame frame;
-  std::vector<int> bones;  ///< per triangle, where the mode asks for it
+  MeshAttributes attributes;  ///< by vertex
+  std::vector<int> bones;     ///< per triangle, where the mode asks for it
   std::optional<SkeletexModel> model;
   std::optional<Skeleton> skeleton;  ///< as posed
 };
@@ -124,8 +116,17 @@ Subject load_subject(const Arguments& arguments, ClContext& context) {
   Subject subject;
   if (!arguments.skeleton.empty()) subject.skeleton = read_skeleton(arguments.skeleton);
   if (!is_model(arguments.input)) {
-    subject.mesh = load_mesh(arguments.input);
-    if (arguments.mode == "segments") require_valid(subject.mesh, *subject.skeleton);
+    if (arguments.mode != "segments") {
+      MeshFile file = load_mesh_file(arguments.input);
+      if (file.attributes.normals.empty() || arguments.is_smoothed)
+        file.attributes.normals = {vertex_normals(file.mesh), {}};
+      SplitMesh split = split_vertices(file.mesh, file.attributes);
+      subject.mesh = std::move(split.mesh);
+      subject.attributes = std::move(split.attributes);
+    } else {
+      subject.mesh = load_mesh(arguments.input);
+      require_valid(subject.mesh, *subject.skeleton);
+    }
     subject.frame = unit_frame(subject.mesh);
     subject.mesh = in_frame(std::move(subject.mesh), subject.frame);
     if (subject.skeleton) subject.skeleton = in_frame(std::move(*subject.skeleton), subject.frame);
@@ -147,7 +148,10 @@ Subject load_subject(const Arguments& arguments, ClContext& context) {
     subject.skeleton = apply_pose(*subject.skeleton, pose_at(*subject.skeleton, animation,
                                                              arguments.time.value_or(animation.frames.front().time)));
   }
-  subject.mesh = reconstruct_bind_mesh(context, *subject.model).mesh;
+  const PreparedModel prepared(*subject.model);
+  subject.mesh = reconstruct_bind_mesh(context, prepared).mesh;
+  subject.attributes = vertex_attributes(prepared);
+  if (arguments.is_smoothed) subject.attributes.normals = {};
   if (arguments.mode == "segments")
     subject.bones = triangle_bones(number_lattice(*subject.model), subject.mesh.triangles);
   return subject;
@@ -164,6 +168,8 @@ Skin skin_of(ClContext& context, const PreparedModel& model) {
 
 SurfacePaint paint_of(const Arguments& arguments, const Subject& subject, ClContext& context, ErrorScale& scale) {
   SurfacePaint paint;
+  if (arguments.mode == "shaded" && !arguments.is_plain && has_colour(subject.attributes))
+    return colour_paint(subject.mesh, subject.attributes);
   if (arguments.mode == "segments") {
     paint.paint = Paint::kFace;
     std::vector<VertexColour> colours;
@@ -302,7 +308,6 @@ void run(Arguments arguments, const CLI::App& command) {
   check_arguments(arguments);
   const auto [width, height] = parse_picture_size(arguments.size);
   const std::optional<LinearRgb> background = parse_background(arguments.background);
-  View view = view_of(arguments, own_view);
   Stopwatch watch;
   if (arguments.mode == "map" || arguments.mode == "layout") {
     run_texture(arguments, std::max(width, height));
@@ -312,6 +317,7 @@ void run(Arguments arguments, const CLI::App& command) {
   ProgressBar bar(context);
   bar.show("reading", 0.05);
   Subject subject = load_subject(arguments, context);
+  View view = view_of(arguments, own_view, subject.model ? subject.model->stance : std::nullopt);
   for (std::optional<Vec3>* point : {&view.target, &view.eye})
     if (*point) *point = subject.frame.from_user(**point);
   ErrorScale scale;
@@ -321,11 +327,17 @@ void run(Arguments arguments, const CLI::App& command) {
   const SurfacePaint paint = paint_of(arguments, subject, context, scale);
   GpuSurface surface = upload_surface(gl, subject.mesh);
   double displace_ms = 0;
+  const bool has_own_normals = !subject.attributes.normals.empty();
+  if (has_own_normals) write_normals(surface, subject.attributes.normals.values);
   std::vector<Vec3> points = subject.mesh.positions;
   if (subject.model) {
     watch.lap_ms();
     pose_surface(gl, context, arguments, subject, surface);
     points = download_positions(surface);
+    if (has_own_normals)
+      write_normals(surface, arguments.pose.empty()
+                                 ? subject.attributes.normals.values
+                                 : turn_normals(subject.mesh, subject.attributes.normals.values, points));
     displace_ms = watch.lap_ms();
   }
   DrawOptions options{.width = width, .height = height, .samples = arguments.samples, .is_flat = arguments.is_flat};
@@ -400,8 +412,10 @@ void add_camera_options(CLI::App& command, Arguments& arguments) {
   command.add_option("--zoom", arguments.zoom, "1: the model fills the picture")
       ->check(number_in(0.01, 1000.0))
       ->type_name("X");
-  command.add_option("--up", arguments.up, "the model's up direction (default: 0,1,0)")->type_name("X,Y,Z");
-  command.add_option("--front", arguments.front, "where the model looks (default: 0,0,1)")->type_name("X,Y,Z");
+  command.add_option("--up", arguments.up, "the model's up direction (default: its own, else y)")
+      ->type_name("x|-y|..|X,Y,Z");
+  command.add_option("--front", arguments.front, "where the model looks (default: its own, else z)")
+      ->type_name("x|-y|..|X,Y,Z");
 }
 
 }  // namespace
@@ -423,8 +437,13 @@ void add_render_command(CLI::App& program) {
                                   "what is shown: shaded, segments, normals, checker, error, weights, map or layout"),
               modes);
   command.add_option("--bone", arguments->bone, "--mode weights: the bone, by its name")->type_name("NAME");
-  command.add_flag("--flat", arguments->is_flat, "a normal per triangle");
+  CLI::Option* flat = command.add_flag("--flat", arguments->is_flat, "a normal per triangle");
+  command
+      .add_flag("--geometry-normals", arguments->is_smoothed,
+                "normals of the triangles around each vertex instead of those that the model or file has")
+      ->excludes(flat);
   command.add_flag("--wireframe", arguments->has_wires, "draw the triangles' edges");
+  command.add_flag("--no-colours", arguments->is_plain, "grey, whatever colours the model or mesh has");
   declare_input(command, command.add_option("--skeleton", arguments->skeleton,
                                             "skeleton of a mesh: .json; drawn inside, or used by --mode segments"))
       ->type_name("FILE");

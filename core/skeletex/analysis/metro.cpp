@@ -3,12 +3,16 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 
+#include "skeletex/convert/layers/surface_points.h"
 #include "skeletex/geometry/hilbert_order.h"
 #include "skeletex/geometry/nearest_search.h"
 #include "skeletex/geometry/parallel.h"
@@ -42,14 +46,17 @@ class DistanceSearch {
   /// Places along the curve -> triangles.
   const std::vector<int>& order() const { return search_.order(); }
 
-  void find(std::span<const Vec3> points, std::span<double> distances) {
+  /// \param feet  when given, the nearest points
+  void find(std::span<const Vec3> points, std::span<double> distances, std::span<SurfacePoint> feet = {}) {
     nearest_.resize(points.size());
     search_.find(points, nearest_);
     for_each_block(points.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         const Triangle& t = mesh_.triangles[nearest_[i]];
-        distances[i] =
-            offset_from_triangle(points[i], mesh_.positions[t[0]], mesh_.positions[t[1]], mesh_.positions[t[2]]).norm();
+        const Vec3 offset =
+            offset_from_triangle(points[i], mesh_.positions[t[0]], mesh_.positions[t[1]], mesh_.positions[t[2]]);
+        distances[i] = offset.norm();
+        if (!feet.empty()) feet[i] = point_in_triangle(mesh_, nearest_[i], points[i] - offset);
       }
     });
   }
@@ -82,6 +89,65 @@ class Accumulator {
   std::size_t count_ = 0;
 };
 
+/// The normals of a mesh, by triangle and for shading.
+class MeshNormals {
+ public:
+  /// \param shading  without, those of vertex_normals
+  MeshNormals(const TriangleMesh& mesh, const CornerValues<Vec3>* shading)
+      : mesh_(mesh), shading_(shading ? *shading : CornerValues<Vec3>{vertex_normals(mesh), {}}) {}
+
+  Vec3 of_triangle(const SurfacePoint& p) const {
+    return area_vector(mesh_, mesh_.triangles[p.triangle]).stableNormalized();
+  }
+  Vec3 for_shading(const SurfacePoint& p) const {
+    const Triangle& corners = shading_.of(mesh_, p.triangle);
+    Vec3 sum = Vec3::Zero();
+    for (int k = 0; k < 3; ++k) sum += static_cast<double>(p.weights[k]) * shading_.values[corners[k]];
+    return sum;
+  }
+
+ private:
+  const TriangleMesh& mesh_;
+  CornerValues<Vec3> shading_;
+};
+
+/// Counts angles by hundredths of a degree.
+class AngleCounter {
+ public:
+  /// \param degrees  below 0: there is none
+  void add(double degrees) {
+    if (degrees < 0) return;
+    sum_ += degrees;
+    ++count_;
+    ++counts_[std::min(static_cast<std::size_t>(degrees * kPerDegree), counts_.size() - 1)];
+  }
+  AngleStatistics statistics() const {
+    if (count_ == 0) return {};
+    return {sum_ / static_cast<double>(count_), below(0.95), below(0.99)};
+  }
+
+ private:
+  static constexpr double kPerDegree = 100;
+
+  double below(double share) const {
+    std::size_t i = 0;
+    for (auto sum = static_cast<double>(counts_[0]);
+         i + 1 < counts_.size() && sum < share * static_cast<double>(count_);)
+      sum += static_cast<double>(counts_[++i]);
+    return static_cast<double>(i + 1) / kPerDegree;
+  }
+
+  double sum_ = 0;
+  std::size_t count_ = 0;
+  std::vector<std::size_t> counts_ = std::vector<std::size_t>(18000);
+};
+
+/// Degrees between two directions of any length; -1 where one has none.
+double angle_between(const Vec3& a, const Vec3& b) {
+  const double dot = a.dot(b), cross = a.cross(b).norm();
+  return dot == 0 && cross == 0 ? -1 : std::atan2(cross, dot) * 180 / std::numbers::pi;
+}
+
 /// Points spread evenly over a surface: triangle t of the order gets the whole numbers between the cumulated areas
 /// before and after it, so that no stretch of the curve has one point more or less than its share. Inside the triangles
 /// the points follow one plane-filling sequence (R2: multiples of the plastic number's powers, modulo 1).
@@ -100,7 +166,7 @@ class SurfaceSamples {
   }
   std::int64_t count() const { return begin_.back(); }
 
-  void write(std::int64_t first, std::span<Vec3> points) const {
+  void write(std::int64_t first, std::span<Vec3> points, std::span<SurfacePoint> places) const {
     for_each_block(points.size(), kBlock, [&](std::size_t, std::size_t block_begin, std::size_t block_end) {
       std::int64_t sample = first + static_cast<std::int64_t>(block_begin);
       auto place =
@@ -119,6 +185,7 @@ class SurfaceSamples {
         const Triangle& t = mesh_.triangles[order_[place]];
         const Vec3& a = mesh_.positions[t[0]];
         points[i] = a + x * (mesh_.positions[t[1]] - a) + y * (mesh_.positions[t[2]] - a);
+        places[i] = {order_[place], Vec3(1 - x - y, x, y).cast<float>()};
       }
     });
   }
@@ -129,18 +196,34 @@ class SurfaceSamples {
   std::vector<std::int64_t> begin_;  // first sample of each triangle of the order
 };
 
-DistanceStatistics measure_surface(DistanceSearch& search, const SurfaceSamples& samples, double unit) {
+struct SurfaceStatistics {
+  DistanceStatistics distances;
+  NormalStatistics normals;
+};
+/// \param own, other  of the surface that the samples lie on, and of the one that is searched
+SurfaceStatistics measure_surface(DistanceSearch& search, const SurfaceSamples& samples, const MeshNormals& own,
+                                  const MeshNormals& other, double unit) {
   Accumulator accumulator;
+  AngleCounter surface, shading;
   std::vector<Vec3> points;
   std::vector<double> distances;
+  std::vector<SurfacePoint> places, feet;
+  std::vector<std::array<float, 2>> angles;
   for (std::int64_t first = 0; first < samples.count(); first += static_cast<std::int64_t>(kPointsAtOnce)) {
     points.resize(std::min<std::size_t>(kPointsAtOnce, static_cast<std::size_t>(samples.count() - first)));
     distances.resize(points.size());
-    samples.write(first, points);
-    search.find(points, distances);
+    places.resize(points.size()), feet.resize(points.size()), angles.resize(points.size());
+    samples.write(first, points, places);
+    search.find(points, distances, feet);
     accumulator.add(distances);
+    for_each_block(points.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i)
+        angles[i] = {static_cast<float>(angle_between(own.of_triangle(places[i]), other.of_triangle(feet[i]))),
+                     static_cast<float>(angle_between(own.for_shading(places[i]), other.for_shading(feet[i])))};
+    });
+    for (const auto& [of_surface, of_shading] : angles) surface.add(of_surface), shading.add(of_shading);
   }
-  return accumulator.statistics(unit);
+  return {accumulator.statistics(unit), {surface.statistics(), shading.statistics()}};
 }
 
 /// Distances from points in any order; they are visited along a Hilbert curve.
@@ -179,10 +262,15 @@ MetroReport measure_metro(ClContext& context, const TriangleMesh& a, const Trian
 
   DistanceSearch search_a(context, a);
   DistanceSearch search_b(context, b);
-  report.forward =
-      measure_surface(search_b, SurfaceSamples(a, search_a.order(), count, "the first mesh"), report.diagonal);
-  report.backward =
-      measure_surface(search_a, SurfaceSamples(b, search_b.order(), count, "the second mesh"), report.diagonal);
+  const MeshNormals normals_a(a, options.normals_a), normals_b(b, options.normals_b);
+  const SurfaceStatistics forward =
+                              measure_surface(search_b, SurfaceSamples(a, search_a.order(), count, "the first mesh"),
+                                              normals_a, normals_b, report.diagonal),
+                          backward =
+                              measure_surface(search_a, SurfaceSamples(b, search_b.order(), count, "the second mesh"),
+                                              normals_b, normals_a, report.diagonal);
+  report.forward = forward.distances, report.forward_normals = forward.normals;
+  report.backward = backward.distances, report.backward_normals = backward.normals;
   const std::vector<double> distances = distances_in_order(search_b, a.positions);
   Accumulator accumulator;
   accumulator.add(distances);

@@ -14,16 +14,28 @@ struct DistanceStatistics {
   double mean = 0, std = 0, rms = 0, max = 0;
 };
 
+/// Angles between normals at points of a surface and at the points of the other one that are nearest to them, degrees.
+struct AngleStatistics {
+  double mean = 0, percent95 = 0, percent99 = 0;  ///< 95 and 99 percent lie below
+};
+struct NormalStatistics {
+  AngleStatistics surface;  ///< between the triangles' normals
+  AngleStatistics shading;  ///< between normals that are interpolated from corners
+};
+
 struct MetroOptions {
   /// Points spread evenly over each surface; 0: ten per vertex of the mesh with more vertices, at least 100 000.
   long samples = 0;
+  /// Shading normals of A and B; without, those of vertex_normals.
+  const CornerValues<Vec3>*normals_a = nullptr, *normals_b = nullptr;
 };
 
 struct MetroReport {
-  double diagonal = 0;                  ///< of A
-  DistanceStatistics forward;           ///< from points on A's surface to B
-  DistanceStatistics backward;          ///< from points on B's surface to A
-  DistanceStatistics vertex;            ///< from A's vertices to B: what the paper's Figure 14 shows
+  double diagonal = 0;          ///< of A
+  DistanceStatistics forward;   ///< from points on A's surface to B
+  DistanceStatistics backward;  ///< from points on B's surface to A
+  DistanceStatistics vertex;    ///< from A's vertices to B: what the paper's Figure 14 shows
+  NormalStatistics forward_normals, backward_normals;
   std::vector<float> vertex_distances;  ///< per vertex of A, world units
   double seconds = 0;
 };

@@ -406,6 +406,16 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   encoding.model.encoder_settings = settings.dump();
   report.encoding_ms = watch.lap_ms();
 
+  encoding.model.stance = options.stance;
+  const MeshAttributes none;
+  const MeshAttributes& attributes = options.attributes ? *options.attributes : none;
+  if (has_layers(attributes, options.layers)) {
+    progress("layers", 0.95);
+    ReadLayers layers = read_layers(context, encoding.model, mesh, job.tree, attributes, options.layers);
+    encoding.model.layers = std::move(layers.layers);
+    report.layer_notes = std::move(layers.notes);
+    report.layers_ms = watch.lap_ms();
+  }
   report.device = context.device().name;
   report_result(job, encoding, surface, report);
   progress("done", 1);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "skeletex/convert/choose_placing.h"
+#include "skeletex/convert/layers/read_layers.h"
 #include "skeletex/convert/layout/patch_requests.h"
 #include "skeletex/convert/measure/bone_distances.h"
 #include "skeletex/convert/parameterize/spd.h"
@@ -44,6 +45,11 @@ struct EncodeOptions {
   /// Texels come as half floats hold them (docs/steps/sample.md): write_model stores them as such without loss.
   bool has_half_texels = false;
   std::optional<TexelShare> texel_share;  ///< and of the side ratio; default: area for all-SPD models, error otherwise
+  /// What else the mesh has, of which the layers are read: its normals, colours and numbers. Without, normals are those
+  /// of its triangles.
+  const MeshAttributes* attributes = nullptr;
+  LayerOptions layers;
+  std::optional<Stance> stance;  ///< of the mesh, for the record
   /// Of the mesh, as validate_before_segmentation has built it; without, it is built where it is needed. Another mesh's
   /// is an error.
   const TriangleTree* tree = nullptr;
@@ -84,7 +90,8 @@ struct EncodeReport {
   std::optional<FitReport> fit;            ///< when it was on
   std::optional<RoundingReport> rounding;  ///< to half floats, when it was on
   std::optional<RevertReport> revert;      ///< with snapping or fit
-  double half_edge_ms = 0, segmentation_ms = 0, parameterization_ms = 0, encoding_ms = 0;
+  std::vector<std::string> layer_notes;    ///< see ReadLayers
+  double half_edge_ms = 0, segmentation_ms = 0, parameterization_ms = 0, encoding_ms = 0, layers_ms = 0;
   std::string device;
 };
 

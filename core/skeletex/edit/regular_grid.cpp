@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "regular_grid_structs.h"
+#include "skeletex/convert/layers/read_layers.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/skeleton/separation_planes.h"
@@ -69,6 +70,7 @@ SkeletexModel regular_grid(ClContext& context, const SkeletexModel& model) {
   }
   enter_tangent_space(context, lattice.tables, slid_rows, model.texture.width, points, lattice.texels);
   download_texels(context, lattice.texels, result.texture);
+  result.layers = read_layers_of(context, model, result);
   return result;
 }
 

@@ -34,24 +34,37 @@ MeshFile read_mesh(const std::filesystem::path& path);
 /// \throw IoError when a file is there but damaged
 std::vector<std::string> read_materials(const std::filesystem::path& path, MeshFile& file);
 
-/// Extra per-vertex data for PLY.
+/// 8 bits per channel, sRGB, and opacity.
 struct VertexColour {
-  unsigned char r, g, b;
+  unsigned char r, g, b, a = 255;
+  bool operator==(const VertexColour&) const = default;
 };
-struct PlyAttributes {
-  std::span<const VertexColour> vertex_colours;
-  std::span<const VertexColour> face_colours;
-  std::string vertex_property_name;  ///< with vertex_property: a float per vertex, e.g. "distance"
-  std::span<const float> vertex_property;
-  std::span<const Vec3> vertex_normals;  ///< nx, ny, nz
+VertexColour bytes_of(const Colour& colour);
+
+/// What a mesh file holds beside the mesh.
+struct WrittenAttributes {
+  std::span<const VertexColour> vertex_colours = {};
+  std::span<const VertexColour> face_colours = {};  ///< PLY alone
+  struct Numbers {
+    std::string name;
+    std::span<const float> values;  ///< per vertex
+  };
+  std::vector<Numbers> vertex_numbers = {};  ///< PLY alone
+  std::span<const Vec3> vertex_normals = {};
+  const CornerValues<Eigen::Vector2f>* texture_coordinates = nullptr;
+  std::string image_file = {};  ///< the picture that they belong to, as the file names it
 };
 
 /// Writes PLY (binary, little endian), OBJ, STL (binary) or glTF (.glb) by the ending, under a temporary name that is
-/// renamed when complete. Positions have single precision; in PLY double where that is needed: far from the origin, and
-/// for very small or large meshes. Attributes go into PLY only, normals into glTF as well; there they are those of the
-/// triangles where none are given.
+/// renamed when complete. Positions have single precision; in PLY and OBJ double where that is needed: far from the
+/// origin, and for very small or large meshes. STL takes no attributes, glTF normals alone; there they are those of the
+/// triangles where none are given. An OBJ with a picture comes with a file of its material, of the same name with the
+/// ending .mtl.
 /// \throw IoError (unknown ending, folder not writable, disk full, attributes that do not fit the mesh, a number that
 /// is not finite): no file is left behind
-void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, const PlyAttributes& attributes = {});
+void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, const WrittenAttributes& attributes = {});
+/// The same with normals, colours and numbers by vertex.
+/// \pre they have no corners of their own
+void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, const MeshAttributes& attributes);
 
 }  // namespace skeletex

@@ -113,6 +113,19 @@ Vec3 vector_from(const Entry& entry) {
   return {values[0], values[1], values[2]};
 }
 
+std::optional<Stance> stance_from(const Entry& header) {
+  if (!header.has("stance")) return std::nullopt;
+  const auto direction = [&](const char* key) {
+    const Entry entry = header.member("stance").member(key);
+    Vec3 vector = vector_from(entry);
+    if (!(std::abs(vector.norm() - 1) < 1e-6)) entry.fail("a direction of length 1 is expected");
+    return vector;
+  };
+  const Stance stance{direction("up"), direction("front")};
+  if (std::abs(stance.up.dot(stance.front)) > 1e-6) header.member("stance").fail("up and front must be orthogonal");
+  return stance;
+}
+
 /// Models of version 1 are in the user's units.
 UnitFrame frame_from(const Entry& header) {
   if (!header.has("frame")) return {};
@@ -350,6 +363,10 @@ json model_to_json(const SkeletexModel& model, const std::string& where) {
                                 layer.name, to_string(layer.kind), layer.planes.size()));
     result["layers"].push_back({{"name", layer.name}, {"kind", to_string(layer.kind)}, {"channels", channels[i]}});
   }
+  if (model.stance) {
+    const auto list = [](const Vec3& v) { return json{v.x(), v.y(), v.z()}; };
+    result["stance"] = {{"up", list(model.stance->up)}, {"front", list(model.stance->front)}};
+  }
   if (!model.encoder_settings.empty()) {
     result["encoder"] = parse_json(model.encoder_settings, where + ": encoder settings");
     if (!result["encoder"].is_object()) throw IoError(where + ": the encoder's settings must be a JSON object");
@@ -375,6 +392,7 @@ SkeletexModel model_from_json(const json& root, const std::string& where) {
   model.genus = header.member("genus").integer(0, kMaxInt);
   model.diagonals = diagonals_from(header);
   model.sampling = sampling_from(header);
+  model.stance = stance_from(header);
   model.texture.width = header.member("texture").member("width").integer(1, kMaxTextureSize);
   model.texture.height = header.member("texture").member("height").integer(1, kMaxTextureSize);
   for (const Entry& corner : header.items("corners")) model.corners.push_back(corner_from(corner, model.skeleton));

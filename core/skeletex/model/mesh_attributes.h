@@ -49,9 +49,17 @@ struct MeshAttributes {
   std::vector<VertexNumbers> numbers;
 };
 
-/// Whether there is a colour other than the materials' plain white.
+/// Whether there are colours: of vertices, of pictures that are read, or of materials that differ.
 bool has_colour(const MeshAttributes& attributes);
 /// Follows a mesh whose triangles are turned over: swaps the corners 1 and 2 of each. Normals stay as they are.
 void turn_over(MeshAttributes& attributes);
+
+/// The same surface with a vertex for each set of values, so that normals, colours and texture coordinates are by
+/// vertex.
+struct SplitMesh {
+  TriangleMesh mesh;
+  MeshAttributes attributes;
+};
+SplitMesh split_vertices(const TriangleMesh& mesh, const MeshAttributes& attributes);
 
 }  // namespace skeletex

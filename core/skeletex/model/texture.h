@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -96,6 +97,11 @@ struct Layer {
   std::vector<std::vector<float>> planes;  ///< as those of the texture
 };
 
+/// How a surface stands in the world: unit directions, orthogonal.
+struct Stance {
+  Vec3 up = Vec3::UnitY(), front = Vec3::UnitZ();
+};
+
 /// A model: one texture and what is needed to turn it back into a mesh. Its lengths and places are in the frame of its
 /// skeleton; reconstruct_mesh gives the user's units.
 struct SkeletexModel {
@@ -114,6 +120,7 @@ struct SkeletexModel {
   /// texture's, values of at least 0 whose sum does not matter. Empty: weights in closed form (weight_walk.h).
   std::vector<std::vector<float>> bone_weights;
   std::vector<Layer> layers;
+  std::optional<Stance> stance;  ///< none: not known
   std::string encoder_settings;  ///< JSON object: how the model was made, for the record; nothing depends on it
 };
 

@@ -12,6 +12,7 @@
 #include "skeletex/model/encoder_settings.h"
 #include "skeletex/model/memory.h"
 #include "skeletex/reconstruct/displace.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/skeleton/frame.h"
 
@@ -457,6 +458,7 @@ SkeletexModel resample_model(ClContext& context, const PreparedModel& prepared, 
     arc = resample_arc(model, prepared.separation, arc,
                        std::max(arc.is_closed() ? 3 : 2, static_cast<int>(std::lround(old_cells * ratio))));
   }
+  if (!result.layers.empty()) resample_layers(prepared, result);
   // The filter fits the surface between texels, which leaves them off it as the prefilter does.
   result.sampling = {.is_prefiltered = true, .is_snapped = false, .is_fitted = false};
   record_setting(result, "resampled_from", {model.texture.width, model.texture.height});

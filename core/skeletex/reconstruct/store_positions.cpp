@@ -11,6 +11,7 @@
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/lattice.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/seam_strip.h"
 
@@ -122,6 +123,8 @@ SkeletexModel store_positions(ClContext& context, const PreparedModel& prepared,
   const std::vector<Vec3> before = lattice_positions(context, prepared);
   SkeletexModel result = model;
   store_texels(context, prepared, before, positions, result.texture);
+  if (!model.layers.empty())
+    turn_normal_layer(prepared, reconstruct_bind_mesh(context, prepared).mesh, positions, result);
   for (std::size_t a = 0; a < model.arcs.size(); ++a) {
     const SeamArc& arc = model.arcs[a];
     const int bone = arc.bones[0];

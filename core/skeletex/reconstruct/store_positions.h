@@ -9,7 +9,8 @@
 namespace skeletex {
 
 /// The model whose bind pose has its vertices at the given places: positions become texels, poles and seam samples
-/// again (the inverse of lattice_positions). What has not moved stays bit by bit as it is.
+/// again (the inverse of lattice_positions). Shading normals turn with the surface. What has not moved stays bit by bit
+/// as it is.
 ///
 /// A seam lies in its separation planes, and a corner lies on the ray where separation planes meet. The model stores a
 /// seam vertex as its angle about the bone and its distance from it. So a vertex that lies in its separation plane

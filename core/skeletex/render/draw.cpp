@@ -134,6 +134,9 @@ void draw_geometry(GlContext& context, const GpuSurface& surface, const SurfaceP
   // Every binding that the shader names must hold a buffer, read or not.
   (paint.colours.id() != 0 ? paint.colours : surface.indices).bind(3);
   (paint.corner_uv.id() != 0 ? paint.corner_uv : surface.positions).bind(4);
+  (paint.triangle_pictures.id() != 0 ? paint.triangle_pictures : surface.indices).bind(5);
+  (paint.pictures.id() != 0 ? paint.pictures : surface.indices).bind(6);
+  (paint.pixels.id() != 0 ? paint.pixels : surface.indices).bind(7);
   set_matrix(0, view_projection(camera, surface.origin));
   glUniform1i(1, options.is_flat ? 1 : 0);
   glUniform1i(2, static_cast<int>(paint.paint));
@@ -246,8 +249,42 @@ Image resolve(GlContext& context, const GeometryBuffers& buffers, const DrawOpti
 GlBuffer upload_colours(std::span<const VertexColour> colours) {
   std::vector<std::array<unsigned char, 4>> bytes;
   bytes.reserve(colours.size());
-  for (const auto& [r, g, b] : colours) bytes.push_back({r, g, b, 255});
+  for (const VertexColour& c : colours) bytes.push_back({c.r, c.g, c.b, 255});
   return gl_buffer(bytes);
+}
+
+SurfacePaint colour_paint(const TriangleMesh& mesh, const MeshAttributes& attributes) {
+  SurfacePaint paint;
+  paint.paint = Paint::kCorner;
+  std::vector<std::array<int, 4>> pictures;
+  std::vector<std::uint8_t> pixels;
+  for (const Material& material : attributes.materials) {
+    pictures.push_back({static_cast<int>(pixels.size() / 4), material.image.width, material.image.height, 0});
+    pixels.insert(pixels.end(), material.image.rgba.begin(), material.image.rgba.end());
+  }
+  std::vector<VertexColour> colours;
+  std::vector<Eigen::Vector2f> coordinates;
+  std::vector<int> triangle_pictures;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const int material = attributes.triangle_materials.empty() ? -1 : attributes.triangle_materials[t];
+    const bool has_picture =
+        material >= 0 && !attributes.materials[material].image.empty() && !attributes.texture_coordinates.empty();
+    triangle_pictures.push_back(has_picture ? material : -1);
+    const Colour base = material < 0 ? Colour(Colour::Ones()) : attributes.materials[material].base;
+    for (const int v : mesh.triangles[t]) {
+      colours.push_back(
+          bytes_of(attributes.colours.empty() ? base : Colour(base.cwiseProduct(attributes.colours.values[v]))));
+      coordinates.push_back(has_picture ? attributes.texture_coordinates.values[v] : Eigen::Vector2f(0, 0));
+    }
+  }
+  paint.colours = upload_colours(colours);
+  paint.corner_uv = gl_buffer(coordinates);
+  paint.triangle_pictures = gl_buffer(triangle_pictures);
+  if (!pixels.empty()) {
+    paint.pictures = gl_buffer(pictures);
+    paint.pixels = gl_buffer(pixels);
+  }
+  return paint;
 }
 
 Image draw(GlContext& context, const GpuSurface& surface, const SurfacePaint& paint, const Camera& camera,

@@ -13,13 +13,17 @@
 namespace skeletex {
 
 /// What colours a surface.
-enum class Paint { kUniform = 0, kFace = 1, kVertex = 2, kChecker = 3, kNormal = 4 };
+enum class Paint { kUniform = 0, kFace = 1, kVertex = 2, kChecker = 3, kNormal = 4, kCorner = 5 };
 
 struct SurfacePaint {
   Paint paint = Paint::kUniform;
   LinearRgb base{0.52f, 0.495f, 0.465f};
-  GlBuffer colours;    ///< kFace, kVertex: sRGB bytes r, g, b, 255 per face or vertex
-  GlBuffer corner_uv;  ///< kChecker: (u, v) of each triangle corner in cells of the checker, two floats each
+  GlBuffer colours;    ///< kFace, kVertex, kCorner: sRGB bytes r, g, b, 255 per face, vertex or triangle corner
+  GlBuffer corner_uv;  ///< kChecker: (u, v) of each triangle corner in cells of the checker, two floats each; kCorner:
+                       ///< texture coordinates
+  /// kCorner: the picture of each triangle, which multiplies its colours, -1: none; per picture its first pixel, width
+  /// and height; pixels as those of ColourImage
+  GlBuffer triangle_pictures, pictures, pixels;
 };
 
 struct DrawOptions {
@@ -39,5 +43,8 @@ Image draw(GlContext& context, const GpuSurface& surface, const SurfacePaint& pa
 
 /// Bytes r, g, b, 255 as SurfacePaint takes them.
 GlBuffer upload_colours(std::span<const VertexColour> colours);
+/// Paint of a mesh's colours, materials and pictures.
+/// \pre all attributes are by vertex, see split_vertices
+SurfacePaint colour_paint(const TriangleMesh& mesh, const MeshAttributes& attributes);
 
 }  // namespace skeletex

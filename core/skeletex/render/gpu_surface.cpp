@@ -51,6 +51,13 @@ void update_normals(GlContext& context, GpuSurface& surface) {
   check_gl("normals");
 }
 
+void write_normals(GpuSurface& surface, std::span<const Vec3> normals) {
+  std::vector<Eigen::Vector3f> values;
+  values.reserve(normals.size());
+  for (const Vec3& normal : normals) values.push_back(normal.cast<float>());
+  surface.normals = gl_buffer(values);
+}
+
 std::vector<Vec3> download_positions(const GpuSurface& surface) {
   std::vector<float> values(3 * static_cast<std::size_t>(surface.vertex_count));
   surface.positions.read(values.size() * sizeof(float), values.data());

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <span>
 #include <vector>
 
 #include "skeletex/geometry/mesh.h"
@@ -21,6 +22,8 @@ struct GpuSurface {
 GpuSurface upload_surface(GlContext& context, const TriangleMesh& mesh);
 /// Normals from the positions as they are now.
 void update_normals(GlContext& context, GpuSurface& surface);
+/// Normals of its own, unit, per vertex.
+void write_normals(GpuSurface& surface, std::span<const Vec3> normals);
 /// World positions, as the device has them.
 std::vector<Vec3> download_positions(const GpuSurface& surface);
 

@@ -4,11 +4,9 @@
 #include <vector>
 
 #include "skeletex/reconstruct/prepared_model.h"
+#include "skeletex/reconstruct/texture/corner_coordinates.h"
 
 namespace skeletex {
-
-/// The bone of each triangle of a model's mesh (reconstruct_mesh).
-std::vector<int> triangle_bones(const Lattice& lattice, const std::vector<Triangle>& triangles);
 
 /// (u, v) of the corners of each triangle, three pairs each, in cells of a checker that is about as long as wide on
 /// every bone: `cells` around, and along by length over girth. v does not jump inside a triangle.

@@ -8,7 +8,8 @@
 
 #include "skeletex/geometry/half_edge_table.h"
 #include "skeletex/geometry/parallel.h"
-#include "skeletex/reconstruct/layer_values.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
 
 namespace skeletex {
 namespace {
@@ -28,7 +29,7 @@ class SurfaceNormals {
     for (Vec3& normal : vertex_normals_) normal.normalize();
   }
 
-  Eigen::Vector3f at(const SurfacePoint& point) const {
+  Vec3 at(const SurfacePoint& point) const {
     Vec3 normal = in_triangle(point.triangle, point.weights);
     if (!normals_.corners.empty()) {
       constexpr float kOnEdge = 1e-3f;
@@ -43,7 +44,7 @@ class SurfaceNormals {
       if (zeros == 2) normal = vertex_normals_[t[vertex]];
       if (zeros == 1) normal += across(point, (zero + 1) % 3);
     }
-    return normal.normalized().cast<float>();
+    return normal.normalized();
   }
 
  private:
@@ -95,42 +96,19 @@ void for_each_point(std::span<const SurfacePoint> points, const Act& act) {
   });
 }
 
-Layer read_normals(const PreparedModel& model, const TriangleMesh& mesh, const MeshAttributes& attributes,
-                   double crease_angle, std::span<const SurfacePoint> points) {
-  const SurfaceNormals surface(mesh, normals_of(mesh, attributes, crease_angle));
-  std::vector<Eigen::Vector3f> normals(points.size(), Eigen::Vector3f::Zero());
-  for_each_point(points, [&](std::size_t i, const SurfacePoint& point) { normals[i] = surface.at(point); });
-  return normal_layer(model, normals);
-}
-
-Layer read_colours(const TriangleMesh& mesh, const MeshAttributes& attributes, std::span<const SurfacePoint> points) {
-  const SurfaceColours surface(mesh, attributes);
-  Layer layer{kColourLayer, LayerKind::kColour, std::vector(4, std::vector<float>(points.size(), 0.f))};
-  for_each_point(points, [&](std::size_t i, const SurfacePoint& point) {
-    const Colour colour = surface.at(point);
-    for (int k = 0; k < 4; ++k) layer.planes[k][i] = colour[k];
-  });
-  bool is_opaque = true;
-  for (std::size_t i = 0; i < points.size(); ++i)
-    is_opaque = is_opaque && (points[i].triangle < 0 || layer.planes[3][i] == 1);
-  if (is_opaque) layer.planes.pop_back();
-  return layer;
-}
-
-Layer read_numbers(const TriangleMesh& mesh, const VertexNumbers& numbers, std::span<const SurfacePoint> points) {
-  Layer layer{numbers.name, LayerKind::kNumber, {std::vector<float>(points.size(), 0.f)}};
+std::vector<float> read_numbers(const TriangleMesh& mesh, const VertexNumbers& numbers,
+                                std::span<const SurfacePoint> points) {
+  std::vector<float> values(points.size(), 0.f);
   for_each_point(points, [&](std::size_t i, const SurfacePoint& point) {
     const Triangle& t = mesh.triangles[point.triangle];
-    float sum = 0;
-    for (int k = 0; k < 3; ++k) sum += point.weights[k] * numbers.values[t[k]];
-    layer.planes[0][i] = sum;
+    for (int k = 0; k < 3; ++k) values[i] += point.weights[k] * numbers.values[t[k]];
   });
-  return layer;
+  return values;
 }
 
-bool is_taken(const std::string& name, const std::vector<Layer>& layers) {
+bool is_taken(const std::string& name, const std::vector<VertexNumbers>& taken) {
   return name.empty() || name == kNormalLayer || name == kColourLayer ||
-         std::any_of(layers.begin(), layers.end(), [&](const Layer& layer) { return layer.name == name; });
+         std::any_of(taken.begin(), taken.end(), [&](const VertexNumbers& numbers) { return numbers.name == name; });
 }
 
 }  // namespace
@@ -178,27 +156,59 @@ Colour SurfaceColours::at(const SurfacePoint& point) const {
   return colour.cwiseProduct(picture);
 }
 
+bool has_layers(const MeshAttributes& attributes, const LayerOptions& options) {
+  return options.has_normals || (options.has_colours && has_colour(attributes)) ||
+         (options.has_numbers && !attributes.numbers.empty());
+}
+
+MeshAttributes attributes_at(const TriangleMesh& mesh, const MeshAttributes& attributes,
+                             std::span<const SurfacePoint> points, const LayerOptions& options) {
+  MeshAttributes at;
+  if (options.has_normals) {
+    const SurfaceNormals surface(mesh, normals_of(mesh, attributes, options.crease_angle));
+    at.normals.values.assign(points.size(), Vec3::Zero());
+    for_each_point(points, [&](std::size_t i, const SurfacePoint& point) { at.normals.values[i] = surface.at(point); });
+  }
+  if (options.has_colours && has_colour(attributes)) {
+    const SurfaceColours surface(mesh, attributes);
+    at.colours.values.assign(points.size(), Colour(0, 0, 0, 1));
+    for_each_point(points, [&](std::size_t i, const SurfacePoint& point) { at.colours.values[i] = surface.at(point); });
+  }
+  if (options.has_numbers)
+    for (const VertexNumbers& numbers : attributes.numbers)
+      at.numbers.push_back({numbers.name, read_numbers(mesh, numbers, points)});
+  return at;
+}
+
 ReadLayers read_layers(ClContext& context, const PreparedModel& model, const TriangleMesh& mesh,
-                       const TriangleTree& tree, const MeshAttributes& attributes, const LayerOptions& options) {
+                       const TriangleTree& tree, const MeshAttributes& given, const LayerOptions& options) {
   ReadLayers result;
-  const bool has_colours = options.has_colours && has_colour(attributes);
-  if (!options.has_normals && !has_colours && !(options.has_numbers && !attributes.numbers.empty())) return result;
-  const std::vector<SurfacePoint> points = surface_points(context, model, mesh, tree);
-  if (options.has_normals) result.layers.push_back(read_normals(model, mesh, attributes, options.crease_angle, points));
-  if (has_colours) result.layers.push_back(read_colours(mesh, attributes, points));
-  for (const VertexNumbers& numbers : attributes.numbers) {
-    if (!options.has_numbers) break;
+  if (!has_layers(given, options)) return result;
+  MeshAttributes attributes = given;
+  attributes.numbers.clear();
+  for (const VertexNumbers& numbers : given.numbers) {
     const auto bad =
         std::find_if(numbers.values.begin(), numbers.values.end(), [](float x) { return !std::isfinite(x); });
     if (bad != numbers.values.end())
       result.notes.push_back(fmt::format("the numbers \"{}\" are left out: that of vertex {} is not finite",
                                          numbers.name, bad - numbers.values.begin()));
-    else if (is_taken(numbers.name, result.layers))
-      result.notes.push_back(fmt::format("the numbers \"{}\" are left out: a layer has this name", numbers.name));
+    else if (is_taken(numbers.name, attributes.numbers))
+      result.notes.push_back(fmt::format("the numbers \"{}\" are left out: another layer has this name", numbers.name));
     else
-      result.layers.push_back(read_numbers(mesh, numbers, points));
+      attributes.numbers.push_back(numbers);
   }
+  const std::vector<SurfacePoint> points = surface_points(context, model, mesh, tree);
+  result.layers = layers_of_texels(model, attributes_at(mesh, attributes, points, options));
   return result;
+}
+
+std::vector<Layer> read_layers_of(ClContext& context, const PreparedModel& from, const PreparedModel& to) {
+  if (from.model.layers.empty()) return {};
+  const TriangleMesh mesh = reconstruct_bind_mesh(context, from).mesh;
+  const MeshAttributes attributes = vertex_attributes(from);
+  LayerOptions options;
+  options.has_normals = !attributes.normals.empty();
+  return read_layers(context, to, mesh, build_triangle_tree(mesh), attributes, options).layers;
 }
 
 }  // namespace skeletex

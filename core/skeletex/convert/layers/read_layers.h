@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <array>
 #include <numbers>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -17,6 +19,14 @@ struct LayerOptions {
   double crease_angle = std::numbers::pi;
 };
 
+/// Whether there will be a layer.
+bool has_layers(const MeshAttributes& attributes, const LayerOptions& options);
+
+/// The attributes of a mesh at points of it, numbered as the points: unit normals, colours and numbers.
+/// \param mesh  closed, outward    \param attributes  its pictures are read, see read_materials
+MeshAttributes attributes_at(const TriangleMesh& mesh, const MeshAttributes& attributes,
+                             std::span<const SurfacePoint> points, const LayerOptions& options = {});
+
 struct ReadLayers {
   std::vector<Layer> layers;
   std::vector<std::string> notes;  ///< sentences on what was left out
@@ -27,6 +37,9 @@ struct ReadLayers {
 /// \throw DeviceError
 ReadLayers read_layers(ClContext& context, const PreparedModel& model, const TriangleMesh& mesh,
                        const TriangleTree& tree, const MeshAttributes& attributes, const LayerOptions& options = {});
+
+/// The layers of a model at the texels of another one whose surface is nearly the same.
+std::vector<Layer> read_layers_of(ClContext& context, const PreparedModel& from, const PreparedModel& to);
 
 /// Colours of points of a mesh: vertex colour times the material's colour times its picture, which is linear between
 /// pixels.

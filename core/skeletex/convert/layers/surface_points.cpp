@@ -13,6 +13,8 @@
 namespace skeletex {
 namespace {
 
+constexpr std::size_t kBlock = 1 << 12;
+
 /// The points of all rows of a model, and where each patch begins among them.
 struct RowPoints {
   std::vector<Vec3> points;
@@ -45,8 +47,13 @@ RowPoints points_of_rows(ClContext& context, const PreparedModel& prepared) {
 
 SurfacePoint nearest_in_triangle(const TriangleMesh& mesh, int triangle, const Vec3& p) {
   const Triangle& t = mesh.triangles[triangle];
+  return point_in_triangle(
+      mesh, triangle, p - offset_from_triangle(p, mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]));
+}
+
+SurfacePoint point_in_triangle(const TriangleMesh& mesh, int triangle, const Vec3& nearest) {
+  const Triangle& t = mesh.triangles[triangle];
   const Vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
-  const Vec3 nearest = p - offset_from_triangle(p, a, b, c);
   const Vec3 normal = (b - a).cross(c - a);
   const double squared = normal.squaredNorm();
   if (!(squared > 0)) return {triangle, {1, 0, 0}};
@@ -58,33 +65,50 @@ SurfacePoint nearest_in_triangle(const TriangleMesh& mesh, int triangle, const V
   return {triangle, (weights / weights.sum()).cast<float>()};
 }
 
+std::vector<SurfacePoint> find_surface_points(ClContext& context, const TriangleMesh& mesh, const TriangleTree& tree,
+                                              std::span<const Probe> probes) {
+  std::vector<Vec3> points;
+  points.reserve(probes.size());
+  for (const Probe& probe : probes) points.push_back(probe.point);
+  std::vector<int> nearest(points.size());
+  NearestSearch(context, mesh, tree).find(points, nearest);
+  std::vector<SurfacePoint> found(points.size());
+  for_each_block(points.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto looks_away = [&](int t) { return area_vector(mesh, mesh.triangles[t]).dot(probes[i].outward) < 0; };
+      int triangle = nearest[i];
+      if (looks_away(triangle)) {
+        const NearestTriangle other =
+            find_nearest_triangle(mesh, tree, points[i], probes[i].reach, [&](int t) { return !looks_away(t); });
+        if (other.triangle >= 0) triangle = other.triangle;
+      }
+      found[i] = nearest_in_triangle(mesh, triangle, points[i]);
+    }
+  });
+  return found;
+}
+
 std::vector<SurfacePoint> surface_points(ClContext& context, const PreparedModel& prepared, const TriangleMesh& mesh,
                                          const TriangleTree& tree) {
   const SkeletexModel& model = prepared.model;
   const RowPoints rows = points_of_rows(context, prepared);
-  std::vector<int> nearest(rows.points.size());
-  NearestSearch(context, mesh, tree).find(rows.points, nearest);
-  std::vector<SurfacePoint> result(static_cast<std::size_t>(model.texture.width) * model.texture.height);
+  std::vector<Probe> probes(rows.points.size());
   for_each_block(prepared.all_rows.size(), 8, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       const auto [bone, row, vertex, quad] = prepared.all_rows[k];
-      const Rectangle& r = model.patches[bone].rectangle;
-      for (int j = 0; j < r.width; ++j) {
-        const Vec3& p = rows.points[vertex + j];
-        int triangle = nearest[vertex + j];
+      for (int j = 0; j < model.patches[bone].rectangle.width; ++j) {
         const Vec3 inward = rows.inward(model.patches[bone], bone, row, j);
-        const auto looks_away = [&](int t) { return area_vector(mesh, mesh.triangles[t]).dot(inward) > 0; };
-        if (looks_away(triangle)) {
-          const double cell = std::sqrt(inward.norm());
-          const NearestTriangle other =
-              find_nearest_triangle(mesh, tree, p, cell, [&](int t) { return !looks_away(t); });
-          if (other.triangle >= 0) triangle = other.triangle;
-        }
-        result[static_cast<std::size_t>(r.y + row) * model.texture.width + r.x + j] =
-            nearest_in_triangle(mesh, triangle, p);
+        probes[vertex + j] = {rows.points[vertex + j], -inward, std::sqrt(inward.norm())};
       }
     }
   });
+  const std::vector<SurfacePoint> found = find_surface_points(context, mesh, tree, probes);
+  std::vector<SurfacePoint> result(static_cast<std::size_t>(model.texture.width) * model.texture.height);
+  for (const auto& [bone, row, vertex, quad] : prepared.all_rows) {
+    const Rectangle& r = model.patches[bone].rectangle;
+    std::copy_n(found.begin() + vertex, r.width,
+                result.begin() + static_cast<std::ptrdiff_t>(r.y + row) * model.texture.width + r.x);
+  }
   return result;
 }
 

@@ -17,11 +17,21 @@ struct SurfacePoint {
 
 /// The point of a triangle that is nearest to p.
 SurfacePoint nearest_in_triangle(const TriangleMesh& mesh, int triangle, const Vec3& p);
+/// The weights of a point of a triangle.
+SurfacePoint point_in_triangle(const TriangleMesh& mesh, int triangle, const Vec3& point);
 
-/// Per texel of a model the point of the mesh that it stands for: the nearest one. Where the mesh looks the other way
-/// there than the texels around (a thin part, of which the other side is as near), the nearest one that looks the same
-/// way, if it is about as near.
-/// \param tree  of the mesh    \return of texels between rectangles none (triangle -1)
+/// Points to look for on a mesh, and what their surroundings are like.
+struct Probe {
+  Vec3 point = Vec3::Zero();
+  Vec3 outward = Vec3::Zero();  ///< where its surface looks; zero: anywhere
+  double reach = 0;             ///< how far away it may be found where it has to look that way, world units
+};
+/// The points of the mesh nearest to others. Where the mesh looks the other way there (a thin part, of which the other
+/// side is as near), the nearest one within reach that looks the same way.
+/// \param tree  of the mesh
+std::vector<SurfacePoint> find_surface_points(ClContext& context, const TriangleMesh& mesh, const TriangleTree& tree,
+                                              std::span<const Probe> probes);
+/// The same per texel of a model; of texels between rectangles none (triangle -1).
 std::vector<SurfacePoint> surface_points(ClContext& context, const PreparedModel& model, const TriangleMesh& mesh,
                                          const TriangleTree& tree);
 

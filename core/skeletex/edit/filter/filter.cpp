@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "skeletex/edit/filter/move_surface.h"
 #include "skeletex/edit/regular_grid.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
 
 namespace skeletex {
 namespace {
@@ -106,6 +108,10 @@ void keep_outside(const FilterJob& job, SkeletexModel& model) {
         model.texture.along[texel] = job.given.texture.along[texel];
         model.texture.around[texel] = job.given.texture.around[texel];
         model.texture.out[texel] = job.given.texture.out[texel];
+        for (Layer& layer : model.layers)
+          if (const Layer* const given = find_layer(job.given, layer.name))
+            for (std::size_t k = 0; k < std::min(layer.planes.size(), given->planes.size()); ++k)
+              layer.planes[k][texel] = given->planes[k][texel];
       }
   }
   if (!has_outside) return;
@@ -190,6 +196,71 @@ FilterResult add_noise(ClContext& context, const SkeletexModel& model, const Noi
   for (std::size_t i = 0; i < moves.size(); ++i)
     moves[i] = options.amplitude * job.unit() * static_cast<double>(noise[i]) * moves[i].normalized();
   return finish(job, moves);
+}
+
+namespace {
+
+/// The attributes that a layer makes, alone.
+MeshAttributes attributes_of_layer(const SkeletexModel& model, const Layer& layer) {
+  MeshAttributes all = vertex_attributes(model), one;
+  if (layer.kind == LayerKind::kNormal) one.normals = std::move(all.normals);
+  if (layer.kind == LayerKind::kColour) one.colours = std::move(all.colours);
+  for (VertexNumbers& numbers : all.numbers)
+    if (layer.kind == LayerKind::kNumber && numbers.name == layer.name) one.numbers.push_back(std::move(numbers));
+  return one;
+}
+
+/// Calls act(vertex, component, value) with the values of a layer, which it may change.
+template <class Act>
+void for_each_value(MeshAttributes& attributes, const Act& act) {
+  for (std::size_t i = 0; i < attributes.normals.values.size(); ++i)
+    for (int k = 0; k < 3; ++k) act(i, static_cast<std::size_t>(k), attributes.normals.values[i][k]);
+  for (std::size_t i = 0; i < attributes.colours.values.size(); ++i)
+    for (int k = 0; k < 4; ++k) act(i, static_cast<std::size_t>(k), attributes.colours.values[i][k]);
+  for (VertexNumbers& numbers : attributes.numbers)
+    for (std::size_t i = 0; i < numbers.values.size(); ++i) act(i, std::size_t{0}, numbers.values[i]);
+}
+
+}  // namespace
+
+SkeletexModel filter_layer(ClContext& context, const SkeletexModel& model, const LayerFilterOptions& options,
+                           const FilterRegion& region) {
+  check_length(options.scale, "the scale of detail", 0, 1);
+  if (!(options.gain >= -1 && options.gain <= 100))
+    throw InputError(fmt::format("a gain of {}; give -1 (no detail) to 100", options.gain));
+  const Layer* const layer = find_layer(model, options.layer);
+  if (layer == nullptr) throw InputError(fmt::format("the model has no layer \"{}\" to filter", options.layer));
+  SkeletexModel still = model;
+  still.sampling.is_snapped = false;  // the texels stay at their places
+  FilterJob job(context, still, region);
+  MeshAttributes attributes = attributes_of_layer(model, *layer);
+  const std::vector<Layer> before = layers_of_vertices(model, attributes);
+
+  const std::size_t count = job.weights.size();
+  const int components = layer->kind == LayerKind::kNormal ? 3 : layer->kind == LayerKind::kColour ? 4 : 1;
+  std::vector<float> values(static_cast<std::size_t>(components) * count);
+  for_each_value(attributes,
+                 [&](std::size_t i, std::size_t k, auto& value) { values[k * count + i] = static_cast<float>(value); });
+  const auto time = static_cast<float>(options.scale * options.scale);
+  const auto everywhere = context.upload(std::vector<float>(count, 1.f));
+  const DeviceField b =
+      apply_operator(context, job.laplace, 0, -time, everywhere, {components, context.upload(values)});
+  const std::vector<float> moves =
+      context.download(solve_diffusion(context, job.laplace, time, everywhere, b).x.values);
+  for_each_value(attributes, [&](std::size_t i, std::size_t k, auto& value) {
+    using Value = std::decay_t<decltype(value)>;
+    value -= static_cast<Value>(options.gain * static_cast<double>(job.weights[i]) *
+                                static_cast<double>(moves[k * count + i]));
+  });
+  for (Vec3& normal : attributes.normals.values) normal.normalize();
+
+  const std::vector<Layer> after = layers_of_vertices(model, attributes);
+  SkeletexModel result = model;
+  Layer& filtered = result.layers[static_cast<std::size_t>(layer - model.layers.data())];
+  for (std::size_t k = 0; k < std::min(filtered.planes.size(), after[0].planes.size()); ++k)
+    for (std::size_t i = 0; i < filtered.planes[k].size(); ++i)
+      if (before[0].planes[k][i] != after[0].planes[k][i]) filtered.planes[k][i] = after[0].planes[k][i];
+  return result;
 }
 
 }  // namespace skeletex

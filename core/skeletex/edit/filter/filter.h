@@ -56,6 +56,17 @@ struct NoiseOptions {
 FilterResult add_noise(ClContext& context, const SkeletexModel& model, const NoiseOptions& options = {},
                        const FilterRegion& region = {});
 
+struct LayerFilterOptions {
+  std::string layer;    ///< by name
+  double scale = 0.01;  ///< detail is what diffusion takes away, as of smooth_model
+  double gain = -1;     ///< how many times the detail is added; -1 takes it away
+};
+/// Smooths the values of a layer over the surface, or enhances their detail. The surface stays, and so do texels
+/// outside of the region.
+/// \throw InputError when the model has no such layer
+SkeletexModel filter_layer(ClContext& context, const SkeletexModel& model, const LayerFilterOptions& options,
+                           const FilterRegion& region = {});
+
 /// How strongly a region's filter acts at each vertex, 0 .. 1.
 /// \throw InputError naming a bone that the skeleton does not have
 std::vector<float> region_weights(ClContext& context, const SkeletexModel& model, const FilterRegion& region);

@@ -9,6 +9,7 @@
 #include <deque>
 #include <numbers>
 
+#include "skeletex/edit/morph/morph_layers.h"
 #include "skeletex/edit/morph/orientation.h"
 #include "skeletex/edit/morph/seam_mean.h"
 #include "skeletex/edit/morph/surface_map.h"
@@ -181,6 +182,7 @@ void Morph::set_mean_skeleton(int layout, Between& between) const {
   result.genus = models_[layout].genus;
   result.diagonals = models_[layout].diagonals;
   result.sampling = models_[layout].sampling;
+  result.stance = models_[layout].stance;
   result.encoder_settings = models_[layout].encoder_settings;
   std::vector<const Skeleton*> skeletons;
   std::vector<Correspondence> from_layout;
@@ -275,13 +277,27 @@ SkeletexModel Morph::at(std::span<const double> given) const {
   SkeletexModel model = queue(given, texels);
   download_texels(*context_, texels, model.texture);
   const std::vector<double> weights = checked_weights(given, models_.size());
-  if (!is_smooth_ || std::find(weights.begin(), weights.end(), 1.0) != weights.end()) return model;
   const int layout = layout_index(weights);
+  const bool is_model = std::find(weights.begin(), weights.end(), 1.0) != weights.end();
+  if (is_model && weights[layout] == 1) {  // its own texels
+    model.layers = models_[layout].layers;
+    return model;
+  }
+  const bool has_layers =
+      std::any_of(models_.begin(), models_.end(), [](const SkeletexModel& m) { return !m.layers.empty(); });
+  const bool is_smooth = is_smooth_ && !is_model;
+  if (!is_smooth && !has_layers) return model;
   std::vector<std::vector<Vec3>> sources(models_.size());
   for (std::size_t m = 0; m < models_.size(); ++m)
     if (weights[m] > 0)
       sources[m] = map_surface(*context_, model, models_[m], correspondence(layout, static_cast<int>(m)));
-  return blend_orientations(*context_, model, sources, weights).model;
+  if (is_smooth) model = blend_orientations(*context_, model, sources, weights).model;
+  if (!has_layers) return model;
+  std::vector<LayerSource> layer_sources;
+  for (std::size_t m = 0; m < models_.size(); ++m)
+    if (weights[m] > 0) layer_sources.push_back({models_[m], std::move(sources[m]), weights[m]});
+  model.layers = blend_layers(*context_, model, layer_sources);
+  return model;
 }
 
 }  // namespace skeletex

@@ -10,6 +10,7 @@
 #include "skeletex/analysis/folds.h"
 #include "skeletex/edit/transfer/join_surface.h"
 #include "skeletex/edit/transfer/placement.h"
+#include "skeletex/edit/transfer/transfer_layers.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 
@@ -147,6 +148,8 @@ SkeletexModel transfer(ClContext& context, const SkeletexModel& source, const Sk
   store_placement(context, input, placement, result);
   if (options.blend == TransferBlend::kCosine && options.is_smooth)
     join_parts(context, input, pairs, placement, result);
+
+  result.layers = transfer_layers(context, input, placement, result);
 
   if (report) {
     report->clear();

@@ -6,14 +6,16 @@ layout(std430, binding = 1) readonly buffer Indices { int indices[]; };
 layout(std430, binding = 2) readonly buffer Normals { float normals[]; };
 layout(std430, binding = 3) readonly buffer Colours { uint colours[]; };
 layout(std430, binding = 4) readonly buffer CornerUv { vec2 corner_uv[]; };
+layout(std430, binding = 5) readonly buffer TrianglePictures { int triangle_pictures[]; };
 layout(location = 0) uniform mat4 view_projection;
 layout(location = 1) uniform int is_flat;
-layout(location = 2) uniform int paint;  // 0 one colour, 1 per face, 2 per vertex, 3 checker, 4 normals
+layout(location = 2) uniform int paint;  // 0 one colour, 1 per face, 2 per vertex, 3 checker, 4 normals, 5 per corner and pictures
 layout(location = 3) uniform vec3 base;
 layout(location = 0) out vec3 normal;
 layout(location = 1) out vec3 colour;
 layout(location = 2) out vec3 corner_weights;
 layout(location = 3) out vec2 uv;
+layout(location = 4) flat out int picture;
 
 vec3 position_of(int vertex) { return vec3(positions[3 * vertex], positions[3 * vertex + 1], positions[3 * vertex + 2]); }
 vec3 linear_of(uint packed_srgb) {
@@ -33,7 +35,8 @@ void main() {
   } else {
     normal = vec3(normals[3 * vertex], normals[3 * vertex + 1], normals[3 * vertex + 2]);
   }
-  colour = paint == 1 ? linear_of(colours[triangle]) : paint == 2 ? linear_of(colours[vertex]) : base;
-  uv = paint == 3 ? corner_uv[gl_VertexID] : vec2(0.0);
+  colour = paint == 1 ? linear_of(colours[triangle]) : paint == 2 ? linear_of(colours[vertex]) : paint == 5 ? linear_of(colours[gl_VertexID]) : base;
+  uv = paint == 3 || paint == 5 ? corner_uv[gl_VertexID] : vec2(0.0);
+  picture = paint == 5 ? triangle_pictures[triangle] : -1;
   corner_weights = vec3(corner == 0, corner == 1, corner == 2);
 }

@@ -33,5 +33,20 @@ Layer normal_layer(const PreparedModel& model, std::span<const Eigen::Vector3f> 
 
 /// What a mesh of the model's vertices has: its normals, colours and numbers.
 MeshAttributes vertex_attributes(const PreparedModel& model);
+/// Layers from values per texel, which are numbered as those of the texture.
+std::vector<Layer> layers_of_texels(const PreparedModel& model, const MeshAttributes& texels);
+/// Layers from values per vertex: the inverse of vertex_attributes. Rows 0 and height-1 follow the seams and poles.
+std::vector<Layer> layers_of_vertices(const PreparedModel& model, const MeshAttributes& vertices);
+
+/// Sets the layers of a model that has another size: linear between texels where it gets finer, averaged where it gets
+/// coarser. Normals are averaged as directions in space.
+/// \param result  of the same patches; its layers are those of `model`
+void resample_layers(const PreparedModel& model, SkeletexModel& result);
+
+/// Turns the normals of a model whose vertices have moved, see turn_normals. The others stay bit by bit.
+/// \param mesh      of the model before    \param positions  of its vertices afterwards
+/// \param result    of the same layout; its layer of normals, where it has one, is set
+void turn_normal_layer(const PreparedModel& model, const TriangleMesh& mesh, std::span<const Vec3> positions,
+                       SkeletexModel& result);
 
 }  // namespace skeletex
