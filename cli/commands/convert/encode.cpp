@@ -13,6 +13,7 @@
 #include "files.h"
 #include "progress_bar.h"
 #include "skeletex/convert/encode_model.h"
+#include "skeletex/convert/subdivide/loop_surface.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/io/suggestion.h"
@@ -25,7 +26,7 @@ constexpr const char* kHybrid = "hybrid";  // each bone has a method of its own
 
 struct Arguments {
   std::string mesh, skeleton, output, device, json, size = "512", method = "vsm";
-  int iterations = 4;
+  int iterations = 4, subdivisions = 0;
   double alpha = 0.5, stop_spread = 0, hybrid_threshold = EncodeOptions{}.hybrid_unseen_threshold;
   std::string rows = "surface", spd_hit = "last", share, diagonals, compression = "auto", rounding = "surface";
   bool has_no_prefilter = false, has_no_unfold = false, is_snapped = false, is_fitted = false, is_paper_recipe = false,
@@ -133,6 +134,10 @@ struct Input {
 Input read_input(const Arguments& arguments, const EncodeOptions& options) {
   Input input{load_mesh(arguments.mesh), {}, read_skeleton(arguments.skeleton)};
   check_bone_names(arguments, options, input.skeleton);
+  require_valid(input.mesh, input.skeleton, &input.tree);
+  if (arguments.subdivisions == 0) return input;
+  // The surface lies inside of what is convex: bones and nodes may leave it.
+  input.mesh = loop_surface(input.mesh, {}, arguments.subdivisions).mesh;
   require_valid(input.mesh, input.skeleton, &input.tree);
   return input;
 }
@@ -287,6 +292,11 @@ void add_encode_command(CLI::App& program) {
       ->required()
       ->type_name("FILE");
   add(command, "Options", "--size", a.size, "texels: N for N x N, or WIDTHxHEIGHT").type_name("N|WxH");
+  add(command, "Options", "--subdivide", a.subdivisions,
+      "encode the smooth surface that Loop subdivision makes of the mesh, divided N times, 0 to 6: more texels make it "
+      "smoother. Distances are then to that surface")
+      .type_name("N")
+      ->check(number_in(0, 6));
   std::vector<std::string> methods = method_names();
   methods.push_back(kHybrid);
   take_one_of(add(command, "Options", "--method", a.method,
