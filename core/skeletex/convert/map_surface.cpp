@@ -13,8 +13,8 @@ namespace {
 /// Times the expected error of a map that spreads texels evenly: from here on a part is squeezed.
 constexpr double kSqueezed = 5;
 /// Reweighting goes on as long as the expected error falls to this, or lower.
-constexpr double kWorthReweighting = 0.96;
-constexpr int kMostIterations = 64;
+constexpr double kWorthReweighting = 0.88;
+constexpr int kMostIterations = 32;
 
 void judge_map(const MapSurfaceOptions& options, std::size_t bone, MappedSurface& surface) {
   surface.profiles[bone] = row_profile(surface.charts[bone]);
@@ -30,7 +30,8 @@ void reweight_squeezed(ClContext& context, const MapSurfaceOptions& options, Map
     if (surface.methods[bone] == Method::kVsm && surface.errors[bone].least() > kSqueezed * surface.errors[bone].even)
       bones.push_back(bone);
   VsmOptions vsm = options.vsm;
-  for (vsm.iterations = std::max(1, 2 * vsm.iterations); !bones.empty() && vsm.iterations <= kMostIterations; vsm.iterations *= 2) {
+  for (vsm.iterations = std::max(1, 2 * vsm.iterations); !bones.empty() && vsm.iterations <= kMostIterations;
+       vsm.iterations *= 2) {
     std::vector<Chart> charts;
     for (const std::size_t bone : bones) charts.push_back(surface.charts[bone]);
     std::vector<MapReport> reports = parameterization(Method::kVsm).map(context, charts, {vsm});

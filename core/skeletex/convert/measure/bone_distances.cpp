@@ -43,9 +43,10 @@ std::vector<BoneDistance> distances_from_bones(ClContext& context, std::span<con
                                                const TriangleTree& tree, double enough) {
   Samples samples;
   for (const Chart& chart : charts) {
-    for (const auto& [a, b, c] : chart.triangles)
-      samples.add_middle(chart.positions[a], chart.positions[b], chart.positions[c]);
-    for (const Vec3& position : chart.positions) samples.add(position, 0);
+    if (enough == 0)
+      for (const auto& [a, b, c] : chart.triangles)
+        samples.add_middle(chart.positions[a], chart.positions[b], chart.positions[c]);
+    for (const Vec3& position : chart.positions) samples.add(position, enough == 0 ? 0 : 1);
     samples.end_bone();
   }
   return measure(context, samples, tree, enough);

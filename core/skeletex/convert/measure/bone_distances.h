@@ -12,7 +12,7 @@ namespace skeletex {
 
 /// How far one bone's part of a surface is from another surface. World units.
 struct BoneDistance {
-  double mean = 0;            ///< over its area, from the middles of its triangles
+  double mean = 0;            ///< over its area, from the middles of its triangles; or over its vertices
   double furthest = 0;        ///< of its vertices and of those middles
   Vec3 place = Vec3::Zero();  ///< where that is
 };
@@ -22,7 +22,8 @@ inline constexpr double kNearEnough = 1e-4;
 
 /// From the parts of the input to the mesh that the decoder makes: what the model lacks.
 /// \param tree    of that mesh
-/// \param enough  distances up to it need not be exact: faster. They are never more than it then
+/// \param enough  above 0: distances up to it need not be exact (they are never more than it then), and vertices alone
+///                are measured: faster
 /// \return per chart
 std::vector<BoneDistance> distances_from_bones(ClContext& context, std::span<const Chart> charts,
                                                const TriangleTree& tree, double enough);
