@@ -9,6 +9,7 @@
 #include <cstdio>
 
 #include "files.h"
+#include "skeletex/analysis/manifold.h"
 #include "skeletex/analysis/validate_input.h"
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/mesh_file.h"
@@ -77,6 +78,9 @@ TriangleMesh load_mesh(const std::filesystem::path& path) {
   if (file.merged_vertices > 0)
     spdlog::info("{}: {} of {} vertices lay on others and were welded", path.string(), file.merged_vertices,
                  file.vertices_in_file);
+  if (file.ends_in_face && !measure_manifold(file.mesh).is_closed_manifold())
+    warn(fmt::format("{}: the file ends within a line, and its surface is not closed; it may have been cut on its way",
+                     path.string()));
   return std::move(file.mesh);
 }
 

@@ -35,6 +35,7 @@ void add_validate_command(CLI::App& program);
 void add_inspect_command(CLI::App& program);
 void add_devices_command(CLI::App& program);
 void add_render_command(CLI::App& program);
+void add_view_command(CLI::App& program);
 void add_bench_command(CLI::App& program);
 void add_run_command(CLI::App& program);
 void add_replay_command(CLI::App& program);

@@ -8,6 +8,7 @@ void add_commands(CLI::App& program) {
   add_encode_command(program);
   add_reconstruct_command(program);
   add_render_command(program);
+  add_view_command(program);
   add_correspond_command(program);
   add_morph_command(program);
   add_filter_command(program);

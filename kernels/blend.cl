@@ -17,6 +17,7 @@
 // the result for all sources, so sums need no barrier and have a fixed order. Reads are linear between the four texels
 // around. At a texel's own place the result is exactly weight * texel.
 #include "blend_structs.h"
+#include "planes.h"
 #include "pose_math.h"
 #include "skeletex_structs.h"
 
@@ -31,12 +32,8 @@ __kernel void blend_texels(const BlendParameters blend, __global const BlendRow*
                            __global float* restrict blended) {
   const int k = get_group_id(0);
   if (k >= blend.row_count) return;
-  __global const float* restrict in_along = texels;
-  __global const float* restrict in_around = in_along + blend.texel_count;
-  __global const float* restrict in_out = in_around + blend.texel_count;
-  __global float* restrict along = blended;
-  __global float* restrict around = along + blend.blended_count;
-  __global float* restrict out = around + blend.blended_count;
+  PLANES(global const float, in_along, in_around, in_out, texels, blend.texel_count);
+  PLANES(global float, along, around, out, blended, blend.blended_count);
   const int width = rows[k].width, texel = rows[k].texel;
   const float axial = rows[k].axial, eased = EASED(axial);
   const float near_head = fmax(0.0f, 1.0f - axial / END_RANGE),
@@ -110,9 +107,7 @@ __kernel void move_ends(const MoveEndsParameters ends, __global const BlendRow* 
                         __global const float* restrict moves, __global float* restrict texels) {
   const int k = get_group_id(0), column_count = ends.column_count;
   if (k >= ends.row_count) return;
-  __global float* restrict along = texels;
-  __global float* restrict around = along + ends.texel_count;
-  __global float* restrict out = around + ends.texel_count;
+  PLANES(global float, along, around, out, texels, ends.texel_count);
   const int texel = rows[k].texel, width = rows[k].width;
   const float u = rows[k].u;
   const float to_head = fmax(0.0f, 1.0f - u / END_RANGE), to_tail = fmax(0.0f, 1.0f - (1.0f - u) / END_RANGE);
@@ -138,15 +133,9 @@ __kernel void mix_texels(const MixParameters mix, __global const float* restrict
                          __global const float* restrict second, __global float* restrict texels) {
   const int row = get_group_id(0), count = mix.height * mix.width;
   if (row >= mix.height) return;
-  __global const float* restrict first_along = first;
-  __global const float* restrict first_around = first_along + count;
-  __global const float* restrict first_out = first_around + count;
-  __global const float* restrict second_along = second;
-  __global const float* restrict second_around = second_along + count;
-  __global const float* restrict second_out = second_around + count;
-  __global float* restrict along = texels;
-  __global float* restrict around = along + count;
-  __global float* restrict out = around + count;
+  PLANES(global const float, first_along, first_around, first_out, first, count);
+  PLANES(global const float, second_along, second_around, second_out, second, count);
+  PLANES(global float, along, around, out, texels, count);
   const int begin = row * mix.width, end = begin + mix.width, step = get_local_size(0);
   for (int i = begin + (int)get_local_id(0); i < end; i += step) {
     along[i] = mixed(first_along[i], second_along[i], mix.share);

@@ -10,6 +10,7 @@
 //                               the axis from the head
 //     slope_head, slope_tail    of the bind pose's separation planes at that angle
 #include "capsule.h"
+#include "planes.h"
 #include "pose_math.h"
 #include "reconstruct_structs.h"
 #include "skeletex_structs.h"
@@ -41,12 +42,8 @@ __kernel void bone_coordinates(const BlockParameters p, __global const SkinBlock
                                __global float* restrict coordinates, __local float* restrict loops) {
   const int group = get_group_id(0);
   if (group >= p.block_count) return;
-  __global const float* restrict x = points;
-  __global const float* restrict y = x + p.point_count;
-  __global const float* restrict z = y + p.point_count;
-  __global float* restrict angle = coordinates;
-  __global float* restrict distance = angle + p.point_count;
-  __global float* restrict height = distance + p.point_count;
+  PLANES(global const float, x, y, z, points, p.point_count);
+  PLANES(global float, angle, distance, height, coordinates, p.point_count);
   __global float* restrict slope_head = height + p.point_count;
   __global float* restrict slope_tail = slope_head + p.point_count;
   const int vertex = blocks[group].first_vertex, count = blocks[group].vertex_count, bone = blocks[group].bone;
@@ -88,14 +85,10 @@ __kernel void pose_by_coordinates(const BlockParameters p, __global const SkinBl
                                   __local float* restrict loops) {
   const int group = get_group_id(0);
   if (group >= p.block_count) return;
-  __global const float* restrict angle = coordinates;
-  __global const float* restrict distance = angle + p.point_count;
-  __global const float* restrict height = distance + p.point_count;
+  PLANES(global const float, angle, distance, height, coordinates, p.point_count);
   __global const float* restrict slope_head = height + p.point_count;
   __global const float* restrict slope_tail = slope_head + p.point_count;
-  __global float* restrict x = points;
-  __global float* restrict y = x + p.point_count;
-  __global float* restrict z = y + p.point_count;
+  PLANES(global float, x, y, z, points, p.point_count);
   const int vertex = blocks[group].first_vertex, count = blocks[group].vertex_count, bone = blocks[group].bone;
   __global const PatchRecord* restrict patch = patches + bone;
   const float head_x = patch->head[0], head_y = patch->head[1], head_z = patch->head[2];

@@ -5,8 +5,10 @@
 // along that. The mean of the squares over the planes, weighted by area, is a quadratic form of the point's move
 // (quadric error metrics: Garland and Heckbert 1997), and with its derivative one of the texel's.
 #include "bone_frame.h"
+#include "planes.h"
 #include "row_group.h"
 #include "skeletex_structs.h"
+#include "texel_structs.h"
 
 #define MOST_CHANGE \
   0.4f  // of the triangles around: the root of the sum of squares of how much their heights change, as shares
@@ -92,8 +94,7 @@ typedef struct Surroundings {
 // Of the lattice's triangles at a texel; next to the first and last row those of its neighbours.
 // in   column, row: of the patch
 Surroundings surroundings_of(const float point[3], float moves[3][3], global const PatchRecord* restrict p,
-                             int texture_width, int column, int row, global const float* restrict x,
-                             global const float* restrict y, global const float* restrict z,
+                             int texture_width, int column, int row, Planes points,
                              global const int* restrict diagonals) {
   const int first = (p->y + row) * texture_width + p->x, above = first + texture_width, below = first - texture_width;
   const int left = (column > 0 ? column : p->width) - 1, right = column + 1 < p->width ? column + 1 : 0;
@@ -107,8 +108,8 @@ Surroundings surroundings_of(const float point[3], float moves[3][3], global con
   float sides[9][3];
   int count = 0;
   for (int i = 0; i < 8; ++i) {
-    sides[count][0] = x[ring[i]] - point[0], sides[count][1] = y[ring[i]] - point[1],
-    sides[count][2] = z[ring[i]] - point[2];
+    const Point other = point_at(points, ring[i]);
+    sides[count][0] = other.x - point[0], sides[count][1] = other.y - point[1], sides[count][2] = other.z - point[2];
     count += is_joined[i];
   }
   for (int i = 0; i < 3; ++i) sides[count][i] = sides[0][i];
@@ -184,37 +185,38 @@ void choose_halves(const float texel[3], Surroundings* around, float moved[3]) {
 }
 
 // NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. Rounds the texels of inner rows.
-// in   lattice_rows: inner rows; x, y, z: the texels' points, of all rows; diagonals: see choose_diagonals
-// in and out  along, around, out_plane
-// out  nearest2, chosen2: per texel the mean of the squares of distances from the planes around, for the nearest half
-// floats and for these
-kernel void round_texels(const int row_count, const int texture_width, global const int* restrict lattice_rows,
+// in   lattice_rows: inner rows; points: of the texels of all rows; diagonals: see choose_diagonals
+// in and out  texels: along, around, out
+// out  squares: per texel the mean of the squares of distances from the planes around, a plane for the nearest half
+// floats and a plane for these
+kernel void round_texels(const TexelParameters p, global const int* restrict lattice_rows,
                          global const PatchRecord* restrict patches, global const RowRecord* restrict rows,
-                         global const ColumnRecord* restrict columns, global const float* restrict x,
-                         global const float* restrict y, global const float* restrict z,
-                         global const int* restrict diagonals, global float* restrict along,
-                         global float* restrict around, global float* restrict out_plane,
-                         global float* restrict nearest2, global float* restrict chosen2) {
+                         global const float* restrict columns, global const float* restrict points,
+                         global const int* restrict diagonals, global float* restrict texels,
+                         global float* restrict squares) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
-  global const PatchRecord* restrict p = patches + lattice_rows[4 * k];
-  const int row = lattice_rows[4 * k + 1], first = (p->y + row) * texture_width + p->x;
-  for (int j = get_local_id(0); j < p->width; j += ROW_ITEMS) {
+  if (k >= p.count) return;
+  const Planes from = planes_of(points, p.texel_count);
+  const MutablePlanes all = mutable_planes_of(texels, p.texel_count);
+  global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
+  const int row = lattice_rows[4 * k + 1], first = (patch->y + row) * p.texture_width + patch->x;
+  for (int j = get_local_id(0); j < patch->width; j += ROW_ITEMS) {
     const int i = first + j;
-    const float texel[3] = {along[i], around[i], out_plane[i]}, point[3] = {x[i], y[i], z[i]};
+    const float texel[3] = {all.x[i], all.y[i], all.z[i]}, point[3] = {from.x[i], from.y[i], from.z[i]};
     float moved[3] = {nearest_half(texel[0]) - texel[0], nearest_half(texel[1]) - texel[1],
                       nearest_half(texel[2]) - texel[2]};
-    nearest2[i] = chosen2[i] = 0.0f;
+    squares[i] = squares[p.texel_count + i] = 0.0f;
     float moves[3][3];
-    if (find_moves(texel, point, p, rows[p->row_begin + row], columns[p->column_begin + j], moves)) {
-      Surroundings triangles = surroundings_of(point, moves, p, texture_width, j, row, x, y, z, diagonals);
+    const ColumnRecord column = column_at(columns, p.column_count, patch->column_begin + j);
+    if (find_moves(texel, point, patch, rows[patch->row_begin + row], column, moves)) {
+      Surroundings triangles = surroundings_of(point, moves, patch, p.texture_width, j, row, from, diagonals);
       if (triangles.area > 0.0f) {
-        nearest2[i] = form_of(triangles.off, moved);
+        squares[i] = form_of(triangles.off, moved);
         choose_halves(texel, &triangles, moved);
-        chosen2[i] = form_of(triangles.off, moved);
+        squares[p.texel_count + i] = form_of(triangles.off, moved);
       }
     }
-    along[i] = nearest_half(texel[0] + moved[0]), around[i] = nearest_half(texel[1] + moved[1]),
-    out_plane[i] = nearest_half(texel[2] + moved[2]);
+    all.x[i] = nearest_half(texel[0] + moved[0]), all.y[i] = nearest_half(texel[1] + moved[1]),
+    all.z[i] = nearest_half(texel[2] + moved[2]);
   }
 }

@@ -5,7 +5,34 @@
 #ifndef MAP_TRIANGLE_H
 #define MAP_TRIANGLE_H
 
+#include "planes.h"
+#include "texel_structs.h"
+
 #define NO_TRIANGLE 0x7fffffff
+
+// The maps of all VSM patches. Vertices are relative to the model's origin; row_high, row_low: u of the rows of all
+// patches.
+typedef struct Maps {
+  int triangle_count;
+  global const int *corners, *turns, *across, *poles, *patches;
+  global const float *u_high, *u_low, *v_high, *v_low, *row_high, *row_low;
+  Planes vertices;
+} Maps;
+
+// in   triangles: see MAP_CORNERS; values: planes u_high, u_low, v_high, v_low, x, y, z, then row_high, row_low
+__attribute__((always_inline)) Maps maps_of(MapSizes sizes, global const int* triangles, global const float* values) {
+  const int count = sizes.triangle_count, vertices = sizes.vertex_count;
+  Maps maps;
+  maps.triangle_count = count;
+  maps.corners = triangles + MAP_CORNERS * count, maps.turns = triangles + MAP_TURNS * count;
+  maps.across = triangles + MAP_ACROSS * count;
+  maps.poles = triangles + MAP_POLES * count, maps.patches = triangles + MAP_PATCHES * count;
+  maps.u_high = values, maps.u_low = values + vertices;
+  maps.v_high = values + 2 * vertices, maps.v_low = values + 3 * vertices;
+  maps.vertices = planes_of(values + 4 * vertices, vertices);
+  maps.row_high = values + 7 * vertices, maps.row_low = maps.row_high + sizes.row_count;
+  return maps;
+}
 
 typedef struct MapTriangle {
   float du1, dv1, du2, dv2;  // corners 1 and 2 from corner 0
@@ -13,11 +40,10 @@ typedef struct MapTriangle {
   int pole;  // 0, -1: head's, +1: tail's at corner 2 (then du2 reaches the pole's row and dv2 is unused)
 } MapTriangle;
 
-__attribute__((always_inline)) MapTriangle load_triangle(int t, int triangle_count, global const int* corners,
-                                                         global const int* turns, global const int* poles,
-                                                         global const float* u_high, global const float* u_low,
-                                                         global const float* v_high, global const float* v_low) {
-  const int a = corners[t], b = corners[triangle_count + t], c = corners[2 * triangle_count + t];
+__attribute__((always_inline)) MapTriangle load_triangle(Maps maps, int t) {
+  global const int *corners = maps.corners, *turns = maps.turns;
+  global const float *u_high = maps.u_high, *u_low = maps.u_low, *v_high = maps.v_high, *v_low = maps.v_low;
+  const int count = maps.triangle_count, a = corners[t], b = corners[count + t], c = corners[2 * count + t];
   MapTriangle m;
   m.u_base_high = u_high[a];
   m.u_base_low = u_low[a];
@@ -26,9 +52,9 @@ __attribute__((always_inline)) MapTriangle load_triangle(int t, int triangle_cou
   m.v_base_low = v_low[a] + (v_high[a] - (m.v_base_high - (float)turns[t]));
   m.du1 = (u_high[b] - u_high[a]) + (u_low[b] - u_low[a]);
   m.du2 = (u_high[c] - u_high[a]) + (u_low[c] - u_low[a]);
-  m.dv1 = ((v_high[b] - v_high[a]) + (float)(turns[triangle_count + t] - turns[t])) + (v_low[b] - v_low[a]);
-  m.dv2 = ((v_high[c] - v_high[a]) + (float)(turns[2 * triangle_count + t] - turns[t])) + (v_low[c] - v_low[a]);
-  m.pole = poles[t];
+  m.dv1 = ((v_high[b] - v_high[a]) + (float)(turns[count + t] - turns[t])) + (v_low[b] - v_low[a]);
+  m.dv2 = ((v_high[c] - v_high[a]) + (float)(turns[2 * count + t] - turns[t])) + (v_low[c] - v_low[a]);
+  m.pole = maps.poles[t];
   return m;
 }
 
@@ -40,16 +66,16 @@ __attribute__((always_inline)) float column_offset(MapTriangle m, int column, in
 }
 
 // u from the triangle's base of a reading position: a row of the table, and the share of the way to the next one.
-__attribute__((always_inline)) float row_offset(MapTriangle m, global const float* row_high,
-                                                global const float* row_low, int row, float share) {
+__attribute__((always_inline)) float row_offset(MapTriangle m, Maps maps, int row, float share) {
+  global const float *row_high = maps.row_high, *row_low = maps.row_low;
   const int next = share < 0.0f ? row - 1 : share > 0.0f ? row + 1 : row;
   const float span = (row_high[next] - row_high[row]) + (row_low[next] - row_low[row]);
   return ((row_high[row] - m.u_base_high) + (row_low[row] - m.u_base_low)) + fabs(share) * span;
 }
 
 // The same of an inner row: where texels of one row look together, nothing of it is gathered.
-__attribute__((always_inline)) float inner_row_offset(MapTriangle m, global const float* row_high,
-                                                      global const float* row_low, int row, float share) {
+__attribute__((always_inline)) float inner_row_offset(MapTriangle m, Maps maps, int row, float share) {
+  global const float *row_high = maps.row_high, *row_low = maps.row_low;
   const float before = (row_high[row - 1] - row_high[row]) + (row_low[row - 1] - row_low[row]);
   const float after = (row_high[row + 1] - row_high[row]) + (row_low[row + 1] - row_low[row]);
   return ((row_high[row] - m.u_base_high) + (row_low[row] - m.u_base_low)) +

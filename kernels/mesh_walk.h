@@ -1,14 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Nearest points of triangles, and of a mesh near a triangle of it.
+#include "map_triangle.h"
 
-typedef struct Point {
-  float x, y, z;
-} Point;
-
-Point point_at(global const float* restrict x, global const float* restrict y, global const float* restrict z, int i) {
-  const Point p = {x[i], y[i], z[i]};
-  return p;
-}
 Point minus(Point a, Point b) {
   const Point d = {a.x - b.x, a.y - b.y, a.z - b.z};
   return d;
@@ -60,32 +53,29 @@ float nearest_of_triangle(Point p, Point a, Point b, Point c, float w[3]) {
 }
 
 // The same of a triangle of the mesh.
-float nearest_of_number(Point p, int t, int triangle_count, global const int* restrict corners,
-                        global const float* restrict vertex_x, global const float* restrict vertex_y,
-                        global const float* restrict vertex_z, float w[3]) {
-  return nearest_of_triangle(p, point_at(vertex_x, vertex_y, vertex_z, corners[t]),
-                             point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + t]),
-                             point_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + t]), w);
+float nearest_of_number(Point p, Maps maps, int t, float w[3]) {
+  global const int* corners = maps.corners + t;
+  return nearest_of_triangle(p, point_at(maps.vertices, corners[0]),
+                             point_at(maps.vertices, corners[maps.triangle_count]),
+                             point_at(maps.vertices, corners[2 * maps.triangle_count]), w);
 }
 
 // The point of the mesh near p: a walk from a triangle across sides that the nearest point lies on, as long as it comes
-// nearer and is further than the root of `enough2`. It does not leave the patch's map. Returns the squared distance.
+// nearer. It does not leave the patch's map. Returns the squared distance.
 // in/out  at: the triangle where the walk begins; where it ends
-float walk_over_mesh(Point p, float enough2, int triangle_count, global const int* restrict corners,
-                     global const int* restrict across, global const float* restrict vertex_x,
-                     global const float* restrict vertex_y, global const float* restrict vertex_z, int* at,
-                     Point* nearest, Point* normal, float w[3]) {
+float walk_over_mesh(Point p, Maps maps, int* at, Point* nearest, Point* normal, float w[3]) {
+  const int triangle_count = maps.triangle_count;
+  global const int* corners = maps.corners;
   int t = *at, last = -1;
-  float best = nearest_of_number(p, t, triangle_count, corners, vertex_x, vertex_y, vertex_z, w);
-  for (int steps = 1; steps < 40 && best > enough2; ++steps) {
+  float best = nearest_of_number(p, maps, t, w);
+  for (int steps = 1; steps < 40 && best > 0.0f; ++steps) {
     int next = -1;
     float nearer = best, other_w[3], next_w[3] = {0.0f, 0.0f, 0.0f};
     for (int k = 0; k < 3; ++k) {
       if (w[k] != 0.0f) continue;
-      const int other = across[k * triangle_count + t];
+      const int other = maps.across[k * triangle_count + t];
       if (other < 0 || other == last) continue;
-      const float distance2 =
-          nearest_of_number(p, other, triangle_count, corners, vertex_x, vertex_y, vertex_z, other_w);
+      const float distance2 = nearest_of_number(p, maps, other, other_w);
       if (distance2 < nearer) {
         nearer = distance2, next = other;
         next_w[0] = other_w[0], next_w[1] = other_w[1], next_w[2] = other_w[2];
@@ -95,22 +85,21 @@ float walk_over_mesh(Point p, float enough2, int triangle_count, global const in
     int k = w[0] == 1.0f ? 0 : w[1] == 1.0f ? 1 : w[2] == 1.0f ? 2 : -1;
     const int vertex = k < 0 ? -1 : corners[k * triangle_count + t];
     for (int turns = 0, turned = t; turns < 16 && next < 0 && k >= 0; ++turns) {
-      turned = across[(k == 2 ? 0 : k + 1) * triangle_count + turned];
+      turned = maps.across[(k == 2 ? 0 : k + 1) * triangle_count + turned];
       if (turned < 0 || turned == t) break;
       k = corners[turned] == vertex                        ? 0
           : corners[triangle_count + turned] == vertex     ? 1
           : corners[2 * triangle_count + turned] == vertex ? 2
                                                            : -1;
-      nearer = nearest_of_number(p, turned, triangle_count, corners, vertex_x, vertex_y, vertex_z, next_w);
+      nearer = nearest_of_number(p, maps, turned, next_w);
       if (nearer < best) next = turned;
     }
     if (next < 0) break;
     last = t, t = next, best = nearer;
     w[0] = next_w[0], w[1] = next_w[1], w[2] = next_w[2];
   }
-  const Point d = point_at(vertex_x, vertex_y, vertex_z, corners[t]),
-              e = point_at(vertex_x, vertex_y, vertex_z, corners[triangle_count + t]),
-              f = point_at(vertex_x, vertex_y, vertex_z, corners[2 * triangle_count + t]);
+  const Point d = point_at(maps.vertices, corners[t]), e = point_at(maps.vertices, corners[triangle_count + t]),
+              f = point_at(maps.vertices, corners[2 * triangle_count + t]);
   *at = t;
   *nearest = weighted(w, d, e, f);
   *normal = cross_of(minus(e, d), minus(f, d));

@@ -7,8 +7,6 @@
 //       blocks           nine vectors per block of eight triangles: first vertex, edge to the second, edge to the third
 //       level_begin      per level of the tree, its first node in `boxes`; level 0 are the blocks
 //                        (layout: core/skeletex/geometry/triangle_tree.h)
-//       bounds_squared   per point an upper bound of the squared distance to the nearest triangle, if has_bounds; a
-//                        point with no triangle within its bound is searched for again without
 // Out:  nearest          per point, the nearest triangle's place in the tree
 //       nearest_squared  per point, its squared distance, as exact as float32 allows
 // NDRange: one item per `run` consecutive points.
@@ -18,6 +16,7 @@
 // triangles).
 
 #include "metro_structs.h"
+#include "planes.h"
 
 #define STACK_SIZE 64
 #define BEYOND_ALL 1e30f  // less than to the places past the end
@@ -79,11 +78,9 @@ inline float8 squared_to_boxes(global const float8* restrict node, const float p
 
 kernel void find_nearest_triangles(const NearestParameters p, global const float* restrict points,
                                    global const float8* restrict boxes, global const float8* restrict blocks,
-                                   constant int* restrict level_begin, global const float* restrict bounds_squared,
-                                   global int* restrict nearest, global float* restrict nearest_squared) {
-  global const float* restrict px = points;
-  global const float* restrict py = px + p.count;
-  global const float* restrict pz = py + p.count;
+                                   constant int* restrict level_begin, global int* restrict nearest,
+                                   global float* restrict nearest_squared) {
+  PLANES(global const float, px, py, pz, points, p.count);
   const int begin = (int)get_global_id(0) * p.run;
   const int end = min(begin + p.run, p.count);
   int block = -1;  // the previous point's
@@ -92,62 +89,58 @@ kernel void find_nearest_triangles(const NearestParameters p, global const float
     const int first_block = block;
     float best = BEYOND_ALL;
     int best_place = -1;
-    // Again where there is nothing within the bound.
-    for (int round = p.has_bounds ? 0 : 1; round < 2 && best_place < 0; ++round) {
-      best = round == 0 ? bounds_squared[i] : BEYOND_ALL;
-      if (first_block >= 0) {
-        const float8 squared = squared_to_block(blocks + 9 * first_block, x, y, z);
+    if (first_block >= 0) {
+      const float8 squared = squared_to_block(blocks + 9 * first_block, x, y, z);
+      const float least = least_of(squared);
+      if (least < best) {
+        best = least;
+        best_place = 8 * first_block + (int)lowest_bit(bits_of(squared <= (float8)(best)));
+      }
+    }
+    int stack_node[STACK_SIZE];
+    float stack_squared[STACK_SIZE];
+    int size = 0;
+    int level = p.top_level, index = 0;
+    while (best > p.enough_squared) {
+      if (level > 0) {
+        const float8 squared = squared_to_boxes(boxes + 6 * (level_begin[level] + index), x, y, z);
+        uint lanes = bits_of(squared < (float8)(best));
+        if (lanes != 0u) {
+          // The nearest child next, the others later.
+          float lane_squared[8];
+          vstore8(squared, 0, lane_squared);
+          uint next = lowest_bit(lanes);
+          lanes &= lanes - 1u;
+          while (lanes != 0u) {
+            uint other = lowest_bit(lanes);
+            lanes &= lanes - 1u;
+            if (lane_squared[other] < lane_squared[next]) {
+              const uint swapped = next;
+              next = other;
+              other = swapped;
+            }
+            stack_node[size] = ((level - 1) << LEVEL_SHIFT) | (8 * index + (int)other);
+            stack_squared[size] = lane_squared[other];
+            ++size;
+          }
+          index = 8 * index + (int)next;
+          --level;
+          continue;
+        }
+      } else if (index != first_block) {
+        const float8 squared = squared_to_block(blocks + 9 * index, x, y, z);
         const float least = least_of(squared);
         if (least < best) {
           best = least;
-          best_place = 8 * first_block + (int)lowest_bit(bits_of(squared <= (float8)(best)));
+          block = index;
+          best_place = 8 * index + (int)lowest_bit(bits_of(squared <= (float8)(best)));
         }
       }
-      int stack_node[STACK_SIZE];
-      float stack_squared[STACK_SIZE];
-      int size = 0;
-      int level = p.top_level, index = 0;
-      while (best > p.enough_squared) {
-        if (level > 0) {
-          const float8 squared = squared_to_boxes(boxes + 6 * (level_begin[level] + index), x, y, z);
-          uint lanes = bits_of(squared < (float8)(best));
-          if (lanes != 0u) {
-            // The nearest child next, the others later.
-            float lane_squared[8];
-            vstore8(squared, 0, lane_squared);
-            uint next = lowest_bit(lanes);
-            lanes &= lanes - 1u;
-            while (lanes != 0u) {
-              uint other = lowest_bit(lanes);
-              lanes &= lanes - 1u;
-              if (lane_squared[other] < lane_squared[next]) {
-                const uint swapped = next;
-                next = other;
-                other = swapped;
-              }
-              stack_node[size] = ((level - 1) << LEVEL_SHIFT) | (8 * index + (int)other);
-              stack_squared[size] = lane_squared[other];
-              ++size;
-            }
-            index = 8 * index + (int)next;
-            --level;
-            continue;
-          }
-        } else if (index != first_block) {
-          const float8 squared = squared_to_block(blocks + 9 * index, x, y, z);
-          const float least = least_of(squared);
-          if (least < best) {
-            best = least;
-            block = index;
-            best_place = 8 * index + (int)lowest_bit(bits_of(squared <= (float8)(best)));
-          }
-        }
-        while (size > 0 && stack_squared[size - 1] >= best) --size;
-        if (size == 0) break;
-        --size;
-        level = stack_node[size] >> LEVEL_SHIFT;
-        index = stack_node[size] & INDEX_MASK;
-      }
+      while (size > 0 && stack_squared[size - 1] >= best) --size;
+      if (size == 0) break;
+      --size;
+      level = stack_node[size] >> LEVEL_SHIFT;
+      index = stack_node[size] & INDEX_MASK;
     }
     nearest[i] = max(best_place, 0);
     nearest_squared[i] = best;

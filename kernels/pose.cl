@@ -10,6 +10,7 @@
 //   slope_tail texels                          planes along, around, out points                          planes x, y,
 //   z, relative to the origin of the posed patch records
 #include "capsule.h"
+#include "planes.h"
 #include "pose_math.h"
 #include "reconstruct_structs.h"
 #include "skeletex_structs.h"
@@ -21,12 +22,8 @@ __kernel void displace_posed(const DisplaceParameters p, __global const int* res
                              __global const float* restrict texels, __global float* restrict points) {
   const int k = get_group_id(0);
   if (k >= p.row_count) return;
-  __global const float* restrict along = texels;
-  __global const float* restrict around = along + p.texel_count;
-  __global const float* restrict out = around + p.texel_count;
-  __global float* restrict x = points;
-  __global float* restrict y = x + p.point_count;
-  __global float* restrict z = y + p.point_count;
+  PLANES(global const float, along, around, out, texels, p.texel_count);
+  PLANES(global float, x, y, z, points, p.point_count);
   __global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
   const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
   const int width = patch->width;
@@ -39,13 +36,9 @@ __kernel void displace_posed(const DisplaceParameters p, __global const int* res
   const float axial = record->axial, cap_cos = record->cap_cos, cap_sin = record->cap_sin;
   const float eased = EASED(axial), ahead = axial - eased;
   const float foot = axial * patch->length, foot_to_tail = patch->length - foot;
-  __global const float* restrict cosines = bind_columns + patch->column_begin;
-  __global const float* restrict sines = cosines + p.column_count;
-  __global const float* restrict bind_head_slopes = sines + p.column_count;
+  PLANES(global const float, cosines, sines, bind_head_slopes, bind_columns + patch->column_begin, p.column_count);
   __global const float* restrict bind_tail_slopes = bind_head_slopes + p.column_count;
-  __global const float* restrict head_rolls = columns + patch->column_begin;
-  __global const float* restrict tail_rolls = head_rolls + p.column_count;
-  __global const float* restrict head_slopes = tail_rolls + p.column_count;
+  PLANES(global const float, head_rolls, tail_rolls, head_slopes, columns + patch->column_begin, p.column_count);
   __global const float* restrict tail_slopes = head_slopes + p.column_count;
 
   const int step = get_local_size(0);
@@ -93,12 +86,8 @@ __kernel void displace_posed_from_bind(const DisplaceParameters p, __global cons
                                        __global float* restrict points) {
   const int k = get_group_id(0);
   if (k >= p.row_count) return;
-  __global const float* restrict along = texels;
-  __global const float* restrict around = along + p.texel_count;
-  __global const float* restrict out = around + p.texel_count;
-  __global float* restrict x = points;
-  __global float* restrict y = x + p.point_count;
-  __global float* restrict z = y + p.point_count;
+  PLANES(global const float, along, around, out, texels, p.texel_count);
+  PLANES(global float, x, y, z, points, p.point_count);
   __global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
   const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
   const int width = patch->width;
@@ -117,13 +106,9 @@ __kernel void displace_posed_from_bind(const DisplaceParameters p, __global cons
   const float foot = axial * patch->length;
   const float foot_to_lower = foot + posed_row->extension_head,
               foot_to_upper = patch->length + posed_row->extension_tail - foot;
-  __global const float* restrict cosines = bind_columns + patch->column_begin;
-  __global const float* restrict sines = cosines + p.column_count;
-  __global const float* restrict bind_head_slopes = sines + p.column_count;
+  PLANES(global const float, cosines, sines, bind_head_slopes, bind_columns + patch->column_begin, p.column_count);
   __global const float* restrict bind_tail_slopes = bind_head_slopes + p.column_count;
-  __global const float* restrict head_rolls = columns + patch->column_begin;
-  __global const float* restrict tail_rolls = head_rolls + p.column_count;
-  __global const float* restrict head_slopes = tail_rolls + p.column_count;
+  PLANES(global const float, head_rolls, tail_rolls, head_slopes, columns + patch->column_begin, p.column_count);
   __global const float* restrict tail_slopes = head_slopes + p.column_count;
 
   const int step = get_local_size(0);

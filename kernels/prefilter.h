@@ -3,13 +3,11 @@
 // second differences in both lattice directions, along the lattice's normal. Planes of points; numbers of a point and
 // of its neighbours. (By value: through pointers PoCL's compiler no longer sees that the loops around it may become
 // vector instructions.)
-typedef struct FilteredPoint {
-  float x, y, z;
-} FilteredPoint;
+#include "planes.h"
 
-__attribute__((always_inline)) FilteredPoint prefilter_point(global const float* x, global const float* y,
-                                                             global const float* z, int own, int left, int right,
-                                                             int below, int above) {
+__attribute__((always_inline)) Point prefilter_point(Planes points, int own, int left, int right, int below,
+                                                     int above) {
+  global const float *x = points.x, *y = points.y, *z = points.z;
   const float ux = x[above] - x[below], uy = y[above] - y[below], uz = z[above] - z[below];
   const float vx = x[right] - x[left], vy = y[right] - y[left], vz = z[right] - z[left];
   const float nx = vy * uz - vz * uy, ny = vz * ux - vx * uz, nz = vx * uy - vy * ux;
@@ -18,6 +16,6 @@ __attribute__((always_inline)) FilteredPoint prefilter_point(global const float*
   const float dy = (y[above] - y[own]) + (y[below] - y[own]) + (y[right] - y[own]) + (y[left] - y[own]);
   const float dz = (z[above] - z[own]) + (z[below] - z[own]) + (z[right] - z[own]) + (z[left] - z[own]);
   const float move = length2 > 0.0f ? -0.0625f * (dx * nx + dy * ny + dz * nz) / length2 : 0.0f;
-  const FilteredPoint p = {x[own] + move * nx, y[own] + move * ny, z[own] + move * nz};
+  const Point p = {x[own] + move * nx, y[own] + move * ny, z[own] + move * nz};
   return p;
 }

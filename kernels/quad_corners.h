@@ -4,8 +4,7 @@
 #include "patch_texels.h"
 #include "skeletex_structs.h"
 
-#define FIT_SAMPLES 4  // of a quad, and where they are in its cell
-
+// Where the samples of a quad are in its cell.
 float sample_s(int i) { return i & 1 ? 0.75f : 0.25f; }
 float sample_t(int i) { return i & 2 ? 0.75f : 0.25f; }
 

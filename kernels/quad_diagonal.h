@@ -2,14 +2,15 @@
 // Which diagonal a quad takes. Vertices come as a table at[row][column] of the 4 x 4 around a quad, whose own corners
 // are at[1][1] to at[2][2]. Where the lattice has no row before or after (next to a seam or a pole) the table repeats
 // the quad's own. The first diagonal goes from at[1][1] to at[2][2], the second from at[1][2] to at[2][1].
+#include "planes.h"
 
 // The nearer diagonal: the one with the smaller d l^2, where l is its length and d the distance, along the quad's
 // normal, of its midpoint from where a cubic through the 4 x 4 vertices has the surface. (Against the shorter diagonal:
 // mean error -6 %, maximum up to -20 %.) Beyond the first and last row the lattice goes on straight. Where rounding
 // blurs d the shorter one is taken, and of two as good the first.
 __attribute__((always_inline)) int takes_second_if_nearer(const int at[4][4], int has_before, int has_after,
-                                                          __global const float* x, __global const float* y,
-                                                          __global const float* z) {
+                                                          Planes points) {
+  global const float *x = points.x, *y = points.y, *z = points.z;
   const float w_rows[4] = {
       has_before ? -0.0625f : 0.0f, 0.5625f - (has_before ? 0.0f : 0.125f) + (has_after ? 0.0f : 0.0625f),
       0.5625f - (has_after ? 0.0f : 0.125f) + (has_before ? 0.0f : 0.0625f), has_after ? -0.0625f : 0.0f};
@@ -42,8 +43,8 @@ typedef struct Normal {
   float x, y, z;
 } Normal;
 
-__attribute__((always_inline)) Normal normal_of(__global const float* x, __global const float* y,
-                                                __global const float* z, int a, int b, int c) {
+__attribute__((always_inline)) Normal normal_of(Planes points, int a, int b, int c) {
+  global const float *x = points.x, *y = points.y, *z = points.z;
   const float ux = x[b] - x[a], uy = y[b] - y[a], uz = z[b] - z[a];
   const float vx = x[c] - x[a], vy = y[c] - y[a], vz = z[c] - z[a];
   const float nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
@@ -77,10 +78,9 @@ typedef struct QuadNormals {
   Normal a, b, c, d;
 } QuadNormals;
 
-__attribute__((always_inline)) QuadNormals normals_of_quad(int v00, int v01, int v10, int v11, __global const float* x,
-                                                           __global const float* y, __global const float* z) {
-  const QuadNormals q = {normal_of(x, y, z, v00, v01, v11), normal_of(x, y, z, v00, v11, v10),
-                         normal_of(x, y, z, v00, v01, v10), normal_of(x, y, z, v01, v11, v10)};
+__attribute__((always_inline)) QuadNormals normals_of_quad(int v00, int v01, int v10, int v11, Planes points) {
+  const QuadNormals q = {normal_of(points, v00, v01, v11), normal_of(points, v00, v11, v10),
+                         normal_of(points, v00, v01, v10), normal_of(points, v01, v11, v10)};
   return q;
 }
 
@@ -89,8 +89,8 @@ __attribute__((always_inline)) QuadNormals normals_of_quad(int v00, int v01, int
 __attribute__((always_inline)) int smoother_of(QuadNormals q, Normal before_b, Normal before_d, Normal after_a,
                                                Normal after_c, Normal right_b, Normal right_c, Normal left_a,
                                                Normal left_d, int has_before, int has_after, int v00, int v11,
-                                               __global const float* x, __global const float* y,
-                                               __global const float* z) {
+                                               Planes points) {
+  global const float *x = points.x, *y = points.y, *z = points.z;
   const float w_before = has_before ? 1.0f : 0.0f, w_after = has_after ? 1.0f : 0.0f;
   float first = 0.0f, second = 0.0f;
   first += w_before * least_turn(q.a, before_b, before_d);
@@ -110,21 +110,18 @@ __attribute__((always_inline)) int smoother_of(QuadNormals q, Normal before_b, N
   return second < CLEARLY * first - blur ? 1 : first < CLEARLY * second - blur ? 0 : -1;
 }
 
-__attribute__((always_inline)) int smoother_diagonal(const int at[4][4], int has_before, int has_after,
-                                                     __global const float* x, __global const float* y,
-                                                     __global const float* z) {
+__attribute__((always_inline)) int smoother_diagonal(const int at[4][4], int has_before, int has_after, Planes points) {
   const int v00 = at[1][1], v01 = at[1][2], v10 = at[2][1], v11 = at[2][2];
-  return smoother_of(normals_of_quad(v00, v01, v10, v11, x, y, z), normal_of(x, y, z, at[0][1], v01, v00),
-                     normal_of(x, y, z, at[0][2], v01, v00), normal_of(x, y, z, v10, v11, at[3][2]),
-                     normal_of(x, y, z, v10, v11, at[3][1]), normal_of(x, y, z, v01, at[2][3], v11),
-                     normal_of(x, y, z, v01, at[1][3], v11), normal_of(x, y, z, at[1][0], v00, v10),
-                     normal_of(x, y, z, v00, v10, at[2][0]), has_before, has_after, v00, v11, x, y, z);
+  return smoother_of(normals_of_quad(v00, v01, v10, v11, points), normal_of(points, at[0][1], v01, v00),
+                     normal_of(points, at[0][2], v01, v00), normal_of(points, v10, v11, at[3][2]),
+                     normal_of(points, v10, v11, at[3][1]), normal_of(points, v01, at[2][3], v11),
+                     normal_of(points, v01, at[1][3], v11), normal_of(points, at[1][0], v00, v10),
+                     normal_of(points, v00, v10, at[2][0]), has_before, has_after, v00, v11, points);
 }
 
 __attribute__((always_inline)) int takes_second_if_smoother(const int at[4][4], int has_before, int has_after,
-                                                            __global const float* x, __global const float* y,
-                                                            __global const float* z) {
-  const int smoother = smoother_diagonal(at, has_before, has_after, x, y, z),
-            nearer = takes_second_if_nearer(at, has_before, has_after, x, y, z);
+                                                            Planes points) {
+  const int smoother = smoother_diagonal(at, has_before, has_after, points),
+            nearer = takes_second_if_nearer(at, has_before, has_after, points);
   return smoother < 0 ? nearer : smoother;
 }

@@ -11,6 +11,7 @@
 // (patch.y + row) * texture_width + patch.x + column of its plane. The column table is four planes of column_count
 // floats: cosine, sine, slope_head, slope_tail (see ColumnRecord).
 #include "capsule.h"
+#include "planes.h"
 #include "quad_diagonal.h"
 #include "reconstruct_structs.h"
 #include "skeletex_structs.h"
@@ -24,12 +25,8 @@ __kernel void displace(const DisplaceParameters p, __global const int* restrict 
                        __global float* restrict points) {
   const int k = get_group_id(0);
   if (k >= p.row_count) return;
-  __global const float* restrict along = texels;
-  __global const float* restrict around = along + p.texel_count;
-  __global const float* restrict out = around + p.texel_count;
-  __global float* restrict x = points;
-  __global float* restrict y = x + p.point_count;
-  __global float* restrict z = y + p.point_count;
+  PLANES(global const float, along, around, out, texels, p.texel_count);
+  PLANES(global float, x, y, z, points, p.point_count);
   __global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
   const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
   const int width = patch->width;
@@ -41,9 +38,7 @@ __kernel void displace(const DisplaceParameters p, __global const int* restrict 
   __global const RowRecord* restrict record = rows + patch->row_begin + row;
   const float axial = record->axial, cap_cos = record->cap_cos, cap_sin = record->cap_sin;
   const float foot = axial * patch->length, foot_to_tail = patch->length - foot;
-  __global const float* restrict cosines = columns + patch->column_begin;
-  __global const float* restrict sines = cosines + p.column_count;
-  __global const float* restrict head_slopes = sines + p.column_count;
+  PLANES(global const float, cosines, sines, head_slopes, columns + patch->column_begin, p.column_count);
   __global const float* restrict tail_slopes = head_slopes + p.column_count;
 
   const int step = get_local_size(0);
@@ -106,9 +101,7 @@ __kernel void triangulate(const TriangulateParameters p, __global const int* res
                           __global int* restrict triangles) {
   const int k = get_group_id(0);
   if (k >= p.row_count) return;
-  __global const float* restrict x = points;
-  __global const float* restrict y = x + p.point_count;
-  __global const float* restrict z = y + p.point_count;
+  const Planes inner = planes_of(points, p.point_count);
   const int width = patches[lattice_rows[4 * k]].width;
   const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2], quad = lattice_rows[4 * k + 3];
   const int has_before = row > 1, has_after = row + 2 < patches[lattice_rows[4 * k]].height - 1;
@@ -116,8 +109,8 @@ __kernel void triangulate(const TriangulateParameters p, __global const int* res
   for (int j = get_local_id(0); j < width; j += step) {
     int at[4][4];
     vertices_around(vertex, width, j, has_before, has_after, at);
-    const int is_second = p.is_smooth ? takes_second_if_smoother(at, has_before, has_after, x, y, z)
-                                      : takes_second_if_nearer(at, has_before, has_after, x, y, z);
+    const int is_second = p.is_smooth ? takes_second_if_smoother(at, has_before, has_after, inner)
+                                      : takes_second_if_nearer(at, has_before, has_after, inner);
     write_quad(triangles + 6 * (quad + j), is_second, at);
   }
 }
@@ -134,12 +127,8 @@ __kernel void filter_rows(const ResampleParameters p, __global const int* restri
                           __global float* restrict out) {
   const int k = get_group_id(0);
   if (k >= p.row_count) return;
-  __global const float* restrict in_x = in;
-  __global const float* restrict in_y = in_x + p.in_count;
-  __global const float* restrict in_z = in_y + p.in_count;
-  __global float* restrict out_x = out;
-  __global float* restrict out_y = out_x + p.out_count;
-  __global float* restrict out_z = out_y + p.out_count;
+  PLANES(global const float, in_x, in_y, in_z, in, p.in_count);
+  PLANES(global float, out_x, out_y, out_z, out, p.out_count);
   const int patch = lattice_rows[4 * k], vertex = lattice_rows[4 * k + 2];
   const int width = widths[patch];
   __global const int* restrict tap = taps + 4 * (patches[patch].row_begin + lattice_rows[4 * k + 1]);
@@ -176,12 +165,8 @@ __kernel void filter_columns(const ResampleParameters p, __global const int* res
                              __global float* restrict out) {
   const int k = get_group_id(0);
   if (k >= p.row_count) return;
-  __global const float* restrict in_x = in;
-  __global const float* restrict in_y = in_x + p.in_count;
-  __global const float* restrict in_z = in_y + p.in_count;
-  __global float* restrict out_x = out;
-  __global float* restrict out_y = out_x + p.out_count;
-  __global float* restrict out_z = out_y + p.out_count;
+  PLANES(global const float, in_x, in_y, in_z, in, p.in_count);
+  PLANES(global float, out_x, out_y, out_z, out, p.out_count);
   const int patch = lattice_rows[4 * k], vertex = lattice_rows[4 * k + 2];
   const int old_width = widths[patch], width = patches[patch].width;
   const int row = first_in[patch] + lattice_rows[4 * k + 1] * old_width;
@@ -216,12 +201,8 @@ __kernel void limit_fit(const ResampleParameters p, __global const int* restrict
                         __global float* restrict fitted) {
   const int k = get_group_id(0);
   if (k >= p.row_count) return;
-  __global const float* restrict sampled_x = sampled;
-  __global const float* restrict sampled_y = sampled_x + p.in_count;
-  __global const float* restrict sampled_z = sampled_y + p.in_count;
-  __global float* restrict x = fitted;
-  __global float* restrict y = x + p.out_count;
-  __global float* restrict z = y + p.out_count;
+  PLANES(global const float, sampled_x, sampled_y, sampled_z, sampled, p.in_count);
+  PLANES(global float, x, y, z, fitted, p.out_count);
   __global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
   const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
   const int width = patch->width;
@@ -258,12 +239,8 @@ __kernel void enter_tangent_space(const DisplaceParameters p, __global const int
                                   __global float* restrict texels) {
   const int k = get_group_id(0);
   if (k >= p.row_count) return;
-  __global const float* restrict x = points;
-  __global const float* restrict y = x + p.point_count;
-  __global const float* restrict z = y + p.point_count;
-  __global float* restrict along = texels;
-  __global float* restrict around = along + p.texel_count;
-  __global float* restrict out = around + p.texel_count;
+  PLANES(global const float, x, y, z, points, p.point_count);
+  PLANES(global float, along, around, out, texels, p.texel_count);
   __global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
   const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
   const int width = patch->width;
@@ -272,9 +249,7 @@ __kernel void enter_tangent_space(const DisplaceParameters p, __global const int
   __global const RowRecord* restrict record = rows + patch->row_begin + row;
   const float axial = record->axial, cap_cos = record->cap_cos, cap_sin = record->cap_sin;
   const float foot = axial * bone_length;
-  __global const float* restrict cosines = columns + patch->column_begin;
-  __global const float* restrict sines = cosines + p.column_count;
-  __global const float* restrict head_slopes = sines + p.column_count;
+  PLANES(global const float, cosines, sines, head_slopes, columns + patch->column_begin, p.column_count);
   __global const float* restrict tail_slopes = head_slopes + p.column_count;
 
   const int step = get_local_size(0);

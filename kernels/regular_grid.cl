@@ -3,6 +3,7 @@
 //   slide_points     one step
 //   prefilter_rows   the encoder's prefilter for regular grids
 // Both take the table of rows of reconstruct.cl: patch, row, first point. NDRange: one work-group of any size per row.
+#include "planes.h"
 #include "prefilter.h"
 #include "regular_grid_structs.h"
 #include "skeletex_structs.h"
@@ -50,15 +51,9 @@ kernel void slide_points(const SlideParameters slide, global const int* restrict
                          global float* restrict next) {
   const int k = get_group_id(0), count = slide.point_count;
   if (k >= slide.row_count) return;
-  global const float* restrict x = points;
-  global const float* restrict y = x + count;
-  global const float* restrict z = y + count;
-  global const float* restrict at_x = at;
-  global const float* restrict at_y = at_x + count;
-  global const float* restrict at_z = at_y + count;
-  global float* restrict next_x = next;
-  global float* restrict next_y = next_x + count;
-  global float* restrict next_z = next_y + count;
+  PLANES(global const float, x, y, z, points, count);
+  PLANES(global const float, at_x, at_y, at_z, at, count);
+  PLANES(global float, next_x, next_y, next_z, next, count);
   global const PatchRecord* restrict patch = patches + lattice_rows[4 * k];
   const int row = lattice_rows[4 * k + 1], vertex = lattice_rows[4 * k + 2];
   const int width = patch->width, height = patch->height;
@@ -98,17 +93,13 @@ kernel void prefilter_rows(const SlideParameters slide, global const int* restri
                            global float* restrict points) {
   const int k = get_group_id(0), count = slide.point_count;
   if (k >= slide.row_count) return;
-  global const float* restrict at_x = at;
-  global const float* restrict at_y = at_x + count;
-  global const float* restrict at_z = at_y + count;
-  global float* restrict x = points;
-  global float* restrict y = x + count;
-  global float* restrict z = y + count;
+  const Planes from = planes_of(at, count);
+  PLANES(global float, x, y, z, points, count);
   const int vertex = lattice_rows[4 * k + 2], width = patches[lattice_rows[4 * k]].width;
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
     const int own = vertex + j;
-    const FilteredPoint p = prefilter_point(at_x, at_y, at_z, own, j > 0 ? own - 1 : own + width - 1,
-                                            j + 1 < width ? own + 1 : vertex, own - width, own + width);
+    const Point p = prefilter_point(from, own, j > 0 ? own - 1 : own + width - 1, j + 1 < width ? own + 1 : vertex,
+                                    own - width, own + width);
     x[own] = p.x, y[own] = p.y, z[own] = p.z;
   }
 }

@@ -3,27 +3,23 @@
 #ifndef SKELETEX_STRUCTS_H
 #define SKELETEX_STRUCTS_H
 
-#ifdef __OPENCL_C_VERSION__
-#define SKELETEX_INT int
-#else
-#include <cstdint>
-#define SKELETEX_INT std::int32_t
+#ifndef __OPENCL_C_VERSION__
 namespace skeletex {
 #endif
 
 /// One bone's patch of the texture, as the kernels see it. Positions are relative to the model's origin.
 typedef struct PatchRecord {
-  float head[3];              ///< H
-  float length;               ///< L = |T - H|
-  float axis[3];              ///< o = (T - H) / L
-  float s[3];                 ///< s, unit, orthogonal to o; angle 0
-  float b[3];                 ///< b = o x s; angle pi/2
-  SKELETEX_INT x;             ///< left column of the rectangle in the texture
-  SKELETEX_INT y;             ///< first row of the rectangle in the texture
-  SKELETEX_INT width;         ///< columns, around the bone; v = column / width
-  SKELETEX_INT height;        ///< rows, along the bone; row 0 and row height-1 lie on seams or poles
-  SKELETEX_INT row_begin;     ///< first entry of this patch in the row table (RowRecord)
-  SKELETEX_INT column_begin;  ///< first entry of this patch in the column table (ColumnRecord)
+  float head[3];     ///< H
+  float length;      ///< L = |T - H|
+  float axis[3];     ///< o = (T - H) / L
+  float s[3];        ///< s, unit, orthogonal to o; angle 0
+  float b[3];        ///< b = o x s; angle pi/2
+  int x;             ///< left column of the rectangle in the texture
+  int y;             ///< first row of the rectangle in the texture
+  int width;         ///< columns, around the bone; v = column / width
+  int height;        ///< rows, along the bone; row 0 and row height-1 lie on seams or poles
+  int row_begin;     ///< first entry of this patch in the row table (RowRecord)
+  int column_begin;  ///< first entry of this patch in the column table (ColumnRecord)
 } PatchRecord;
 
 /// What the tangent frame needs along u: the foot W = H + axial parameter * L * o and the opening of the frame.
@@ -76,8 +72,8 @@ typedef struct PosedArcRecord {
 
 /// The arcs around a bone's head and tail in a pose; a free end has one, without roll and slope.
 typedef struct PosedEndsRecord {
-  SKELETEX_INT first_arc[2];  ///< in the table of PosedArcRecord
-  SKELETEX_INT arc_count[2];
+  int first_arc[2];  ///< in the table of PosedArcRecord
+  int arc_count[2];
   /// How far the capsule extends past the head at the tail's seam, and past the tail at the head's seam; world units.
   float bind_extension[2];
   float extension[2];  ///< the same in this pose
@@ -89,20 +85,20 @@ typedef struct WeightStep {
   float girth_inverse;  ///< 1 / girth, the median distance of the seams at the joint to their bones
   float joint[3];       ///< relative to the model's origin
   float seam_radius;    ///< the largest distance of those seams to the joint
-  SKELETEX_INT bone;    ///< that the step leads to
-  SKELETEX_INT before;  ///< the step before this one in the same walk; -1: it begins at the point's own bone
-  SKELETEX_INT same;    ///< an earlier step of the walk that leads to the same bone; -1: none
+  int bone;             ///< that the step leads to
+  int before;           ///< the step before this one in the same walk; -1: it begins at the point's own bone
+  int same;             ///< an earlier step of the walk that leads to the same bone; -1: none
 } WeightStep;
 
 /// Consecutive vertices of one patch, SKIN_BLOCK at most, and the bones that move them. The weights of bone k of the
 /// block stand behind each other from first_weight + k * SKIN_BLOCK on.
 typedef struct SkinBlock {
-  SKELETEX_INT first_vertex;
-  SKELETEX_INT vertex_count;
-  SKELETEX_INT bone;        ///< the patch's own
-  SKELETEX_INT first_bone;  ///< in the table of the blocks' bones
-  SKELETEX_INT bone_count;
-  SKELETEX_INT first_weight;
+  int first_vertex;
+  int vertex_count;
+  int bone;        ///< the patch's own
+  int first_bone;  ///< in the table of the blocks' bones
+  int bone_count;
+  int first_weight;
 } SkinBlock;
 #define SKIN_BLOCK 64
 
@@ -129,5 +125,4 @@ static_assert(sizeof(PosedArcRecord) == 4 * 5);
 static_assert(sizeof(PosedEndsRecord) == 4 * 8);
 }  // namespace skeletex
 #endif
-#undef SKELETEX_INT
 #endif

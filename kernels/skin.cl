@@ -4,6 +4,7 @@
 // One work-group per block of at most SKIN_BLOCK vertices of a patch (SkinBlock). Work-items take vertices in turn,
 // ROW_ITEMS apart, so that neighbours touch neighbouring vertices; on a CPU groups of one, where the inner loop becomes
 // vector instructions. Every work-item reads and writes only its own vertices, so no barriers are needed.
+#include "planes.h"
 #include "reconstruct_structs.h"
 #include "skeletex_structs.h"
 #include "skin_weight.h"
@@ -17,9 +18,7 @@ __kernel void bone_weights(const BlockParameters p, __global const SkinBlock* re
                            __global const float* restrict points, __global float* restrict weights) {
   const int group = get_group_id(0);
   if (group >= p.block_count) return;
-  __global const float* restrict x = points;
-  __global const float* restrict y = x + p.point_count;
-  __global const float* restrict z = y + p.point_count;
+  PLANES(global const float, x, y, z, points, p.point_count);
   __global const SkinBlock* restrict block = blocks + p.first_block + group;
   const int vertex = block->first_vertex, count = block->vertex_count;
   const int first_step = first_steps[block->bone], step_count = first_steps[block->bone + 1] - first_step;
@@ -111,12 +110,8 @@ __kernel void skin(const BlockParameters p, __global const SkinBlock* restrict b
   const int group = get_group_id(0);
   if (group >= p.block_count) return;
   const int is_stretched = p.is_stretched;
-  __global const float* restrict bind_x = bind_points;
-  __global const float* restrict bind_y = bind_x + p.point_count;
-  __global const float* restrict bind_z = bind_y + p.point_count;
-  __global float* restrict x = points;
-  __global float* restrict y = x + p.point_count;
-  __global float* restrict z = y + p.point_count;
+  PLANES(global const float, bind_x, bind_y, bind_z, bind_points, p.point_count);
+  PLANES(global float, x, y, z, points, p.point_count);
   __global const SkinBlock* restrict block = blocks + group;
   const int vertex = block->first_vertex, count = block->vertex_count, bone_count = block->bone_count;
   __global const int* restrict bones = block_bones + block->first_bone;

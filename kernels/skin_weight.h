@@ -16,6 +16,6 @@
 // itself the sum is linear, so that weights are smooth there. Where a bone's surface goes on behind the plane but away
 // from the seam, the square brings the potential up again.
 #define SKIN_CROSSING(height, excess) \
-  (SKIN_STEEPNESS * ((height) + ((height) < 0 ? (height) * (height) : 0) + SKIN_EXCESS * (excess) * (excess)))
+  (SKIN_STEEPNESS * ((height) + ((height) < 0.0f ? (height) * (height) : 0.0f) + SKIN_EXCESS * (excess) * (excess)))
 
 #endif

@@ -4,7 +4,7 @@
 //                               vertices, strongest first, take the nearest texel that is free
 //   place_on_edges              free texels follow their neighbours half way, then go to the nearest point of a creased
 //                               edge
-//   part_colours                rows by colour, see below; read_snapped in encode.cl has them the other way again
+//   part_colours, join_colours  rows by colour, see below, and the other way again
 // A reading position is an offset from the texel's own place in the lattice, in cells: two planes over the texture, x
 // around, y along. Rows 0 and height-1 stay. `anchors` says what holds a texel: 0 nothing, 1 + i vertex i of the list
 // of vertices, -1 - i edge i. Vertices and edges come with their patch and their place (x, y) in its cells, x
@@ -17,6 +17,7 @@
 #include "row_group.h"
 #include "skeletex_structs.h"
 #include "snap_map.h"
+#include "snap_structs.h"
 
 #define REACH 0.7f         // cells from where a texel is to where it goes
 #define FURTHEST 1.0f      // cells from a texel's own place, along each axis
@@ -25,7 +26,7 @@
 #define LEAST_MOVE 0.01f   // cells: shorter steps of free texels are not worth their test
 #define PLACED 5           // states of a vertex: 0 to 3 the candidate that it reserves, 4 none is left
 #define NONE -1            // of a bin's edges
-#define FLATTEST 5.0f      // of edges that texels look for again, see EdgeRecord: dihedral angles of 0.1 rad
+#define FLATTEST 5.0f      // of edges that texels look for again, see SnapEdge: dihedral angles of 0.1 rad
 
 // The candidate of a vertex: the k-th nearest corner of its cell, and the vertex' offset from it.
 void candidate_of(float x, float y, int k, int* column, int* row, float* dx, float* dy) {
@@ -41,19 +42,20 @@ void candidate_of(float x, float y, int k, int* column, int* row, float* dx, flo
 }
 
 // A vertex that is not placed reserves the first of its candidates that it can still have.
-// in   least: more than all reservations of rounds before; rank: its own by strength, from 1
-__attribute__((always_inline)) void reserve_texel(int v, int least, int rank, global const PatchRecord* restrict p,
-                                                  int texture_width, float x, float y, global const int* anchors,
-                                                  global int* states, volatile global int* reservations) {
+// in   least: more than all reservations of rounds before
+__attribute__((always_inline)) void reserve_texel(int v, int least, SnapVertex vertex,
+                                                  global const PatchRecord* restrict p, int texture_width,
+                                                  global const int* anchors, global int* states,
+                                                  volatile global int* reservations) {
   int state = states[v];
   for (; state < 4; ++state) {
     int column, row;
     float dx, dy;
-    candidate_of(x, y, state, &column, &row, &dx, &dy);
+    candidate_of(vertex.x, vertex.y, state, &column, &row, &dx, &dy);
     if (row < 1 || row > p->height - 2 || dx * dx + dy * dy > REACH * REACH) continue;
     const int texel = coloured_at(p, texture_width, (column % p->width + p->width) % p->width, row);
     if (anchors[texel] != 0) continue;
-    atomic_max(reservations + texel, least + rank);
+    atomic_max(reservations + texel, least + vertex.rank);
     break;
   }
   states[v] = state;
@@ -61,19 +63,20 @@ __attribute__((always_inline)) void reserve_texel(int v, int least, int rank, gl
 
 // A reservation that is the strongest on its texel and the eight around is decided: it stands when the map does not
 // fold, else the next candidate's turn has come.
-__attribute__((always_inline)) void decide_reservation(int v, int least, int rank, global const PatchRecord* restrict p,
-                                                       int texture_width, float x, float y,
+__attribute__((always_inline)) void decide_reservation(int v, int least, SnapVertex vertex,
+                                                       global const PatchRecord* restrict p, SnapParameters sizes,
                                                        volatile global const int* reservations, global int* states,
-                                                       global int* anchors, global float* offset_x,
-                                                       global float* offset_y) {
+                                                       global int* anchors, global float* offsets) {
+  const int texture_width = sizes.texture_width;
+  global float *offset_x = offsets, *offset_y = offsets + sizes.texel_count;
   int column, row;
   float dx, dy;
-  candidate_of(x, y, states[v], &column, &row, &dx, &dy);
+  candidate_of(vertex.x, vertex.y, states[v], &column, &row, &dx, &dy);
   column = (column % p->width + p->width) % p->width;
   int is_strongest = 1;
   for (int i = -1; i <= 1; ++i)
     for (int j = -1; j <= 1; ++j)
-      is_strongest &= reservations[coloured_at(p, texture_width, column + j, row + i)] <= least + rank;
+      is_strongest &= reservations[coloured_at(p, texture_width, column + j, row + i)] <= least + vertex.rank;
   if (!is_strongest) return;
   const Neighbours n = neighbours_of(p, texture_width, column, row);
   if (cross_around_one(n, p->height, texture_width, row, dx, dy, offset_x, offset_y) < LEAST_CROSS) {
@@ -87,72 +90,63 @@ __attribute__((always_inline)) void decide_reservation(int v, int least, int ran
 }
 
 // NDRange (vertices). One round: reservations.
-kernel void reserve_texels(const int vertex_count, const int texture_width, const int least,
-                           global const int* restrict vertex_patches, global const float* restrict vertex_x,
-                           global const float* restrict vertex_y, global const int* restrict ranks,
+kernel void reserve_texels(const SnapParameters p, global const SnapVertex* restrict vertices,
                            global const PatchRecord* restrict patches, global const int* restrict anchors,
                            global int* restrict states, global int* restrict reservations) {
   const int v = (int)get_global_id(0);
-  if (v < vertex_count)
-    reserve_texel(v, least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v], anchors,
-                  states, reservations);
+  if (v < p.count)
+    reserve_texel(v, p.least, vertices[v], patches + vertices[v].patch, p.texture_width, anchors, states, reservations);
 }
 
 // NDRange (vertices). One round: decisions.
-kernel void decide_reservations(const int vertex_count, const int texture_width, const int least,
-                                global const int* restrict vertex_patches, global const float* restrict vertex_x,
-                                global const float* restrict vertex_y, global const int* restrict ranks,
+kernel void decide_reservations(const SnapParameters p, global const SnapVertex* restrict vertices,
                                 global const PatchRecord* restrict patches, global const int* restrict reservations,
                                 global int* restrict states, global int* restrict anchors,
-                                global float* restrict offset_x, global float* restrict offset_y) {
+                                global float* restrict offsets) {
   const int v = (int)get_global_id(0);
-  if (v < vertex_count && states[v] < 4)
-    decide_reservation(v, least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v],
-                       reservations, states, anchors, offset_x, offset_y);
+  if (v < p.count && states[v] < 4)
+    decide_reservation(v, p.least, vertices[v], patches + vertices[v].patch, p, reservations, states, anchors, offsets);
 }
 
 // NDRange: one work-group of ROW_ITEMS. All further rounds, which are of few vertices. Every round decides at least the
-// strongest reservation that is open. in   least: of the first of them; step: from one round's to the next out  open:
-// what else the kernel needs, two numbers per vertex
-kernel void decide_the_rest(const int vertex_count, const int texture_width, const int texel_count, const int least,
-                            const int step, global const int* restrict vertex_patches,
-                            global const float* restrict vertex_x, global const float* restrict vertex_y,
-                            global const int* restrict ranks, global const PatchRecord* restrict patches,
-                            volatile global int* reservations, global int* states, global int* anchors,
-                            global float* offset_x, global float* offset_y, global int* open) {
+// strongest reservation that is open.
+// out  open: what else the kernel needs, two numbers per vertex
+kernel void decide_the_rest(const SnapParameters p, global const SnapVertex* restrict vertices,
+                            global const PatchRecord* restrict patches, volatile global int* reservations,
+                            global int* states, global int* anchors, global float* offsets, global int* open) {
   local int counts[2];
   const int own = (int)get_local_id(0);
   if (own == 0) counts[0] = counts[1] = 0;
   WAIT_FOR_GROUP(CLK_LOCAL_MEM_FENCE);
-  for (int v = own; v < vertex_count; v += ROW_ITEMS)
+  for (int v = own; v < p.count; v += ROW_ITEMS)
     if (states[v] < 4) open[atomic_inc(counts)] = v;
-  int round_least = least;
+  int round_least = p.least;
   for (int list = 0;; list = !list) {
     WAIT_FOR_GROUP(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
     const int count = counts[list];
     if (count == 0) break;
-    global const int* from = open + list * vertex_count;
-    global int* to = open + !list * vertex_count;
-    if (round_least > 0x7fffffff - 2 * step) {
-      for (int i = own; i < texel_count; i += ROW_ITEMS) reservations[i] = 0;
+    global const int* from = open + list * p.count;
+    global int* to = open + !list * p.count;
+    if (round_least > 0x7fffffff - 2 * p.step) {
+      for (int i = own; i < p.texel_count; i += ROW_ITEMS) reservations[i] = 0;
       round_least = 0;
       WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
     }
     for (int i = own; i < count; i += ROW_ITEMS) {
       const int v = from[i];
-      reserve_texel(v, round_least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v], vertex_y[v],
-                    anchors, states, reservations);
+      reserve_texel(v, round_least, vertices[v], patches + vertices[v].patch, p.texture_width, anchors, states,
+                    reservations);
     }
     WAIT_FOR_GROUP(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
     if (own == 0) counts[list] = 0;
     for (int i = own; i < count; i += ROW_ITEMS) {
       const int v = from[i];
       if (states[v] < 4)
-        decide_reservation(v, round_least, ranks[v], patches + vertex_patches[v], texture_width, vertex_x[v],
-                           vertex_y[v], reservations, states, anchors, offset_x, offset_y);
+        decide_reservation(v, round_least, vertices[v], patches + vertices[v].patch, p, reservations, states, anchors,
+                           offsets);
       if (states[v] < 4) to[atomic_inc(counts + !list)] = v;
     }
-    round_least += step;
+    round_least += p.step;
   }
 }
 
@@ -238,15 +232,6 @@ __attribute__((always_inline)) void relax_row(global const PatchRecord* restrict
   }
 }
 
-// An edge at one turn of v.
-typedef struct EdgeRecord {
-  float x, y;            // its first point
-  float ex, ey;          // from there to its last one
-  float over_x, over_y;  // that / -length squared
-  float flatness;        // 1 / the square of its weight
-  int number;
-} EdgeRecord;
-
 float8 gathered(const int8 at, global const float* from) {
   return (float8)(from[at.s0], from[at.s1], from[at.s2], from[at.s3], from[at.s4], from[at.s5], from[at.s6],
                   from[at.s7]);
@@ -275,12 +260,12 @@ void store_ints(const int8 values, global int* plane, const int at_even, const i
 // Of a bin's edges those that are nearest to eight texels, by distance / weight, and within reach; of two as near the
 // first one.
 int8 nearest_edges(const float8 x, const float8 y, const int begin, const int end, global const int* restrict bin_edges,
-                   global const EdgeRecord* restrict edges) {
+                   global const SnapEdge* restrict edges) {
   float8 least = (float8)(INFINITY);
   int8 nearest = (int8)(NONE);
   for (int i = begin; i < end; ++i) {
     const int e = bin_edges[i];
-    global const EdgeRecord* restrict edge = edges + e;
+    global const SnapEdge* restrict edge = edges + e;
     const float8 to_x = edge->x - x, to_y = edge->y - y;
     const float8 t = clamp(to_x * edge->over_x + to_y * edge->over_y, (float8)(0.0f), (float8)(1.0f));
     const float8 dx = to_x + t * edge->ex, dy = to_y + t * edge->ey, distance2 = dx * dx + dy * dy,
@@ -293,22 +278,22 @@ int8 nearest_edges(const float8 x, const float8 y, const int begin, const int en
 }
 
 // Records of eight edges, by field.
-typedef struct EdgeRecords {
+typedef struct SnapEdges {
   float8 x, y, ex, ey, over_x, over_y, flatness;
   int8 number;
-} EdgeRecords;
+} SnapEdges;
 
-EdgeRecords gathered_edges(const int8 at, global const EdgeRecord* restrict edges) {
+SnapEdges gathered_edges(const int8 at, global const SnapEdge* restrict edges) {
   global const float* from = (global const float*)edges;
   const int8 first = at * 8;
-  const EdgeRecords all = {gathered(first, from),     gathered(first, from + 1),         gathered(first, from + 2),
-                           gathered(first, from + 3), gathered(first, from + 4),         gathered(first, from + 5),
-                           gathered(first, from + 6), as_int8(gathered(first, from + 7))};
+  const SnapEdges all = {gathered(first, from),     gathered(first, from + 1),         gathered(first, from + 2),
+                         gathered(first, from + 3), gathered(first, from + 4),         gathered(first, from + 5),
+                         gathered(first, from + 6), as_int8(gathered(first, from + 7))};
   return all;
 }
 
 // The edge that a texel can go to: its number, and whether it is so sharp that another try is worth it. NONE: nothing.
-int8 candidates_of(const EdgeRecords edges) { return 2 * edges.number + ((edges.flatness <= FLATTEST) & 1); }
+int8 candidates_of(const SnapEdges edges) { return 2 * edges.number + ((edges.flatness <= FLATTEST) & 1); }
 int number_of_candidate(int candidate) { return candidate >> 1; }
 int is_sharp_candidate(int candidate) { return candidate & 1; }
 
@@ -368,25 +353,26 @@ __attribute__((always_inline)) void place_few(global const PatchRecord* restrict
 
 // NDRange: one work-group of ROW_ITEMS per row, as in reconstruct.cl. Free texels of a row relax, then go to the
 // nearest edge within reach, one colour of the row after the other. A row comes in bins of eight columns, which look
-// for their edges together; bins, of this row alone or of several, have lists of the edges near them. in   rows: patch,
-// row, number of the first bin, 0: inner ones, even or odd; bin_begins: into bin_edges, numbers of edges
-//      is_again: to edges only in bins where a texel could not go to one the time before that is sharp enough
-//      (FLATTEST)
-// out  parameters: where on its edge a texel is, 0 to 1; candidates, target_x, target_y: what else the kernel needs per
-// texel
-kernel void place_on_edges(const int row_count, const int texture_width, const int is_again,
-                           global const int* restrict rows, global const PatchRecord* restrict patches,
-                           global const int* restrict bin_begins, global const int* restrict bin_edges,
-                           global const EdgeRecord* restrict edges, global int* restrict anchors,
-                           global float* restrict parameters, global float* offset_x, global float* offset_y,
-                           global int* restrict candidates, global float* restrict target_x,
-                           global float* restrict target_y) {
+// for their edges together; bins, of this row alone or of several, have lists of the edges near them.
+// in   rows: patch, row, number of the first bin, 0: inner ones, even or odd; bins: where the list of each begins,
+//      bin_count and one more, then the lists: numbers of edges
+// in/out  offsets: planes x, y, and where on its edge a texel is, 0 to 1
+// out  candidates, targets (planes x, y): what else the kernel needs per texel
+kernel void place_on_edges(const SnapParameters p, global const int* restrict rows,
+                           global const PatchRecord* restrict patches, global const int* restrict bins,
+                           global const SnapEdge* restrict edges, global int* restrict anchors, global float* offsets,
+                           global int* restrict candidates, global float* restrict targets) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
-  global const PatchRecord* restrict p = patches + rows[4 * k];
-  const int row = rows[4 * k + 1], width = p->width, height = p->height, first = (p->y + row) * texture_width + p->x;
+  if (k >= p.count) return;
+  const int texture_width = p.texture_width;
+  global const int* bin_edges = bins + p.bin_count + 1;
+  global float *offset_x = offsets, *offset_y = offsets + p.texel_count, *parameters = offsets + 2 * p.texel_count;
+  global float *target_x = targets, *target_y = targets + p.texel_count;
+  global const PatchRecord* restrict patch = patches + rows[4 * k];
+  const int row = rows[4 * k + 1], width = patch->width, height = patch->height,
+            first = (patch->y + row) * texture_width + patch->x;
   const int odd = first + ((width + 1) >> 1);
-  relax_row(p, texture_width, row, anchors, offset_x, offset_y);
+  relax_row(patch, texture_width, row, anchors, offset_x, offset_y);
   for (int column = 8 * get_local_id(0), bin = rows[4 * k + 2] + get_local_id(0); column < width;
        column += 8 * ROW_ITEMS, bin += ROW_ITEMS) {
     // Even columns, then odd ones. The last texels of a row are fewer than eight: each lane beyond them looks at the
@@ -394,14 +380,14 @@ kernel void place_on_edges(const int row_count, const int texture_width, const i
     const int8 columns = min(column + (int8)(0, 2, 4, 6, 1, 3, 5, 7), (int8)(width - 1));
     const int8 texels = (columns >> 1) + ((columns & 1) == 0 ? (int8)(first) : (int8)(odd));
     const int is_whole = column + 8 <= width, at_even = first + column / 2, at_odd = odd + column / 2;
-    if (is_again && is_whole && !any(loaded_ints(candidates, at_even, at_odd) != NONE)) continue;
+    if (p.is_again && is_whole && !any(loaded_ints(candidates, at_even, at_odd) != NONE)) continue;
     const float8 x = is_whole ? loaded(offset_x, at_even, at_odd) : gathered(texels, offset_x);
     const float8 y = is_whole ? loaded(offset_y, at_even, at_odd) : gathered(texels, offset_y);
-    const int8 nearest = nearest_edges(convert_float8(columns) + x, (float)row + y, bin_begins[bin],
-                                       bin_begins[bin + 1], bin_edges, edges);
+    const int8 nearest =
+        nearest_edges(convert_float8(columns) + x, (float)row + y, bins[bin], bins[bin + 1], bin_edges, edges);
     const int8 are_held = (is_whole ? loaded_ints(anchors, at_even, at_odd) : gathered_ints(texels, anchors)) != 0;
     const int8 have_candidates = (nearest != NONE) & !are_held;
-    const EdgeRecords found = gathered_edges(have_candidates ? nearest : (int8)(0), edges);
+    const SnapEdges found = gathered_edges(have_candidates ? nearest : (int8)(0), edges);
     const float8 to_x = found.x - (convert_float8(columns) + x), to_y = found.y - ((float)row + y);
     const float8 t = clamp(to_x * found.over_x + to_y * found.over_y, (float8)(0.0f), (float8)(1.0f));
     const float8 to_offset_x = to_x + t * found.ex + x, to_offset_y = to_y + t * found.ey + y;
@@ -410,7 +396,7 @@ kernel void place_on_edges(const int row_count, const int texture_width, const i
       store_ints(new_candidates, candidates, at_even, at_odd);
       store(to_offset_x, target_x, at_even, at_odd), store(to_offset_y, target_y, at_even, at_odd);
       // The first time those of others are nothing yet.
-      const float8 before = is_again ? loaded(parameters, at_even, at_odd) : t;
+      const float8 before = p.is_again ? loaded(parameters, at_even, at_odd) : t;
       store(have_candidates ? t : before, parameters, at_even, at_odd);
     } else {
       int at[8], of_lanes[8];
@@ -427,35 +413,52 @@ kernel void place_on_edges(const int row_count, const int texture_width, const i
   WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
   for (int colour = 0; colour < 2 + (width & 1); ++colour) {
     const int at_end = end_of_colour(colour, width);
-    if (colour < 2 && is_again)
-      place_few(p, row_colour(colour, first, width), colour, texture_width, row, target_x, target_y, candidates,
+    if (colour < 2 && p.is_again)
+      place_few(patch, row_colour(colour, first, width), colour, texture_width, row, target_x, target_y, candidates,
                 anchors, offset_x, offset_y);
     else if (colour < 2)
       place_colour(row_colour(colour, first, width), height, texture_width, row, target_x, target_y, candidates,
                    anchors, offset_x, offset_y, offset_x, offset_y);
     if (get_local_id(0) == 0 && at_end >= 0)
-      place_one(p, texture_width, at_end, row, target_x, target_y, candidates, anchors, offset_x, offset_y);
+      place_one(patch, texture_width, at_end, row, target_x, target_y, candidates, anchors, offset_x, offset_y);
     WAIT_FOR_GROUP(CLK_GLOBAL_MEM_FENCE);
   }
 }
 
 // NDRange and rows as for place_on_edges. Offsets with their rows by colour, from `home`, where columns follow each
 // other. They are 0 before, and stay so in rows without any at home: nearly all.
-kernel void part_colours(const int row_count, const int texture_width, global const int* restrict rows,
-                         global const PatchRecord* restrict patches, global const float* restrict home_x,
-                         global const float* restrict home_y, global float* restrict offset_x,
-                         global float* restrict offset_y) {
+kernel void part_colours(const SnapParameters p, global const int* restrict rows,
+                         global const PatchRecord* restrict patches, global const float* restrict home,
+                         global float* restrict offsets) {
   const int k = get_group_id(0);
-  if (k >= row_count) return;
-  global const PatchRecord* restrict p = patches + rows[4 * k];
-  const int width = p->width, first = (p->y + rows[4 * k + 1]) * texture_width + p->x, odd = first + ((width + 1) >> 1);
+  if (k >= p.count) return;
+  global const PatchRecord* restrict patch = patches + rows[4 * k];
+  const int width = patch->width, first = (patch->y + rows[4 * k + 1]) * p.texture_width + patch->x;
+  global const float *home_x = home + first, *home_y = home_x + p.texel_count;
+  global float *offset_x = offsets + first, *offset_y = offset_x + p.texel_count;
   int has_any = 0;
-  for (int i = 0; i < width; ++i) has_any |= (home_x[first + i] != 0.0f) | (home_y[first + i] != 0.0f);
+  for (int i = 0; i < width; ++i) has_any |= (home_x[i] != 0.0f) | (home_y[i] != 0.0f);
   if (!has_any) return;
-  for (int i = get_local_id(0); i < width >> 1; i += ROW_ITEMS) {
-    offset_x[first + i] = home_x[first + 2 * i], offset_x[odd + i] = home_x[first + 2 * i + 1];
-    offset_y[first + i] = home_y[first + 2 * i], offset_y[odd + i] = home_y[first + 2 * i + 1];
+  for (int j = get_local_id(0); j < width; j += ROW_ITEMS) {
+    const int at = by_colour(j, width);
+    offset_x[at] = home_x[j], offset_y[at] = home_y[j];
   }
-  if (get_local_id(0) == 0 && (width & 1))
-    offset_x[odd - 1] = home_x[first + width - 1], offset_y[odd - 1] = home_y[first + width - 1];
+}
+
+// NDRange and rows as for place_on_edges. What has snapped by columns, from rows by colour.
+// in   snapped: planes x, y, place on the edge; held_by: anchors    out  offsets, anchors: the same
+kernel void join_colours(const SnapParameters p, global const int* restrict rows,
+                         global const PatchRecord* restrict patches, global const float* restrict snapped,
+                         global const int* restrict held_by, global float* restrict offsets,
+                         global int* restrict anchors) {
+  const int k = get_group_id(0);
+  if (k >= p.count) return;
+  global const PatchRecord* restrict patch = patches + rows[4 * k];
+  const int width = patch->width, first = (patch->y + rows[4 * k + 1]) * p.texture_width + patch->x;
+  for (int j = get_local_id(0); j < width; j += ROW_ITEMS) {
+    const int at = first + by_colour(j, width);
+    anchors[first + j] = held_by[at];
+    for (int plane = 0; plane < 3; ++plane)
+      offsets[plane * p.texel_count + first + j] = snapped[plane * p.texel_count + at];
+  }
 }

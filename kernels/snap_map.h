@@ -5,10 +5,13 @@
 
 #define MARGIN 0.6f  // cells that the rows next to a seam or pole keep from it
 
+// The place of a column in its row by colour.
+int by_colour(int column, int width) { return (column >> 1) + ((column & 1) ? (width + 1) >> 1 : 0); }
+
 // A texel among its row's by colour; columns one beyond either end wrap round.
 int coloured_at(global const PatchRecord* restrict p, int texture_width, int column, int row) {
   const int wrapped = column < 0 ? column + p->width : column < p->width ? column : column - p->width;
-  return (p->y + row) * texture_width + p->x + (wrapped >> 1) + ((wrapped & 1) ? (p->width + 1) >> 1 : 0);
+  return (p->y + row) * texture_width + p->x + by_colour(wrapped, p->width);
 }
 
 // A texel and its eight neighbours.

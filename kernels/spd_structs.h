@@ -3,11 +3,7 @@
 #ifndef SKELETEX_SPD_STRUCTS_H
 #define SKELETEX_SPD_STRUCTS_H
 
-#ifdef __OPENCL_VERSION__
-#define SKELETEX_INT int
-#else
-#include <cstdint>
-#define SKELETEX_INT std::int32_t
+#ifndef __OPENCL_C_VERSION__
 namespace skeletex {
 #endif
 
@@ -15,19 +11,19 @@ namespace skeletex {
 /// axial parameter in [0, 1] along the bone, 1 + sin / (sin + cos) of the latitude in the tail's cap, -sin / (sin +
 /// cos) in the head's.
 typedef struct SpdPatch {
-  float bone_length;          ///< L
-  float tolerance;            ///< rounding of a point's distance to a ray, world units
-  float head_tolerance;       ///< how far a point may miss the first row's ray and still count as on it; 0 at a pole
-  float tail_tolerance;       ///< the same for the last row
-  SKELETEX_INT width;         ///< columns
-  SKELETEX_INT height;        ///< rows
-  SKELETEX_INT row_begin;     ///< first entry in the row table (RowRecord)
-  SKELETEX_INT column_begin;  ///< first entry in the column table (ColumnRecord) and in the columns' lists of triangles
-  SKELETEX_INT texel_begin;   ///< first entry in the results
-  SKELETEX_INT is_head_free, is_tail_free;
-  SKELETEX_INT guess_begin;  ///< first entry in the table of guesses: entry i is the first row with a mark >= i /
-                             ///< guesses_per_mark - 1
-  SKELETEX_INT guess_count;
+  float bone_length;     ///< L
+  float tolerance;       ///< rounding of a point's distance to a ray, world units
+  float head_tolerance;  ///< how far a point may miss the first row's ray and still count as on it; 0 at a pole
+  float tail_tolerance;  ///< the same for the last row
+  int width;             ///< columns
+  int height;            ///< rows
+  int row_begin;         ///< first entry in the row table (RowRecord)
+  int column_begin;      ///< first entry in the column table (ColumnRecord) and in the columns' lists of triangles
+  int texel_begin;       ///< first entry in the results
+  int is_head_free, is_tail_free;
+  int guess_begin;  ///< first entry in the table of guesses: entry i is the first row with a mark >= i /
+                    ///< guesses_per_mark - 1
+  int guess_count;
   float guesses_per_mark;
 } SpdPatch;
 
@@ -37,26 +33,25 @@ typedef struct SpdSightLine {
   float foot;          ///< of W, along the bone from the head, world units
   float out, along;    ///< the ray's unit direction: along s', along o
   float distance;      ///< of the triangle's centre from W; negative: the centre has no ray, the triangle is unseen
-  SKELETEX_INT first_list, last_list;  ///< the lists of triangles at this angle, from the foot's height to the centre's
+  int first_list, last_list;  ///< the lists of triangles at this angle, from the foot's height to the centre's
 } SpdSightLine;
 
 typedef struct CastParameters {
-  SKELETEX_INT column_count;  ///< of all patches
-  SKELETEX_INT tile_rows;     ///< rows that a work-item takes
-  SKELETEX_INT wants_last;    ///< the last hit of a ray counts, not the first
-  SKELETEX_INT guesses;       ///< in `tables`, see SpdPatch; the columns' patches are at 0
-  SKELETEX_INT list_begins;   ///< in `tables`, per column and one more: its list of triangles
+  int column_count;  ///< of all patches
+  int tile_rows;     ///< rows that a work-item takes
+  int wants_last;    ///< the last hit of a ray counts, not the first
+  int guesses;       ///< in `tables`, see SpdPatch; the columns' patches are at 0
+  int list_begins;   ///< in `tables`, per column and one more: its list of triangles
 } CastParameters;
 
 typedef struct HideParameters {
-  SKELETEX_INT triangle_count;
+  int triangle_count;
 } HideParameters;
 
-#ifndef __OPENCL_VERSION__
+#ifndef __OPENCL_C_VERSION__
 static_assert(sizeof(CastParameters) == 20);
 static_assert(sizeof(SpdPatch) == 56);
 static_assert(sizeof(SpdSightLine) == 32);
 }  // namespace skeletex
 #endif
-#undef SKELETEX_INT
 #endif

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The surface of one model's bone around the bone of another (paper 5). NDRange of all kernels: one work-group of any
 // size per row, whose work-items take columns in turn.
+#include "planes.h"
 #include "transfer_structs.h"
 
 // 1 at an end of the part, 0 from `width` rows on.
@@ -62,15 +63,9 @@ __kernel void place_part(const TransferParameters transfer, __global const Trans
                          __global float* restrict points) {
   const int k = get_group_id(0);
   if (k >= transfer.row_count) return;
-  __global const float* restrict in_s = source;
-  __global const float* restrict in_b = in_s + transfer.source_count;
-  __global const float* restrict in_o = in_b + transfer.source_count;
-  __global const float* restrict target_s = target;
-  __global const float* restrict target_b = target_s + transfer.target_count;
-  __global const float* restrict target_o = target_b + transfer.target_count;
-  __global float* restrict s = points;
-  __global float* restrict b = s + transfer.point_count;
-  __global float* restrict o = b + transfer.point_count;
+  PLANES(global const float, in_s, in_b, in_o, source, transfer.source_count);
+  PLANES(global const float, target_s, target_b, target_o, target, transfer.target_count);
+  PLANES(global float, s, b, o, points, transfer.point_count);
   const int row = rows[k].row, vertex = rows[k].vertex, width = rows[k].width, column_count = transfer.column_count;
   __global const TransferPatch* restrict from = patches + rows[k].patch;
   const float sign = from->sign;
@@ -132,12 +127,8 @@ __kernel void read_source(const TransferParameters transfer, __global const Tran
                           __global float* restrict points) {
   const int k = get_group_id(0);
   if (k >= transfer.row_count) return;
-  __global const float* restrict in_x = source;
-  __global const float* restrict in_y = in_x + transfer.source_count;
-  __global const float* restrict in_z = in_y + transfer.source_count;
-  __global float* restrict x = points;
-  __global float* restrict y = x + transfer.point_count;
-  __global float* restrict z = y + transfer.point_count;
+  PLANES(global const float, in_x, in_y, in_z, source, transfer.source_count);
+  PLANES(global float, x, y, z, points, transfer.point_count);
   const int patch = rows[k].patch, row = rows[k].row, vertex = rows[k].vertex, width = rows[k].width;
   const float axial = rows[k].axial;
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {
@@ -158,12 +149,8 @@ __kernel void keep_target(const TransferParameters transfer, __global const Tran
                           __global float* restrict texels) {
   const int k = get_group_id(0);
   if (k >= transfer.row_count) return;
-  __global const float* restrict in_along = target;
-  __global const float* restrict in_around = in_along + transfer.target_count;
-  __global const float* restrict in_out = in_around + transfer.target_count;
-  __global float* restrict along = texels;
-  __global float* restrict around = along + transfer.target_count;
-  __global float* restrict out = around + transfer.target_count;
+  PLANES(global const float, in_along, in_around, in_out, target, transfer.target_count);
+  PLANES(global float, along, around, out, texels, transfer.target_count);
   const int row = rows[k].row, texel = rows[k].texel, width = rows[k].width;
   __global const TransferColumn* restrict here = columns + patches[rows[k].patch].column_begin;
   for (int j = get_local_id(0); j < width; j += get_local_size(0)) {

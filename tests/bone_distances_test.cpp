@@ -24,7 +24,8 @@ TEST(BoneDistances, AreTheHeightsOfPointsOverAPlane) {
   tent.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 3}}, tent.triangles = {{0, 2, 1}, {0, 1, 3}};
   tent.positions[2] = {0, 3, 0};
   const std::vector<Chart> charts{flat, tent};
-  const std::vector<BoneDistance> distances = distances_from_bones(device(), charts, build_triangle_tree(plane), 0);
+  const std::vector<BoneDistance> distances =
+      distances_from_bones(device(), charts, plane, build_triangle_tree(plane), 0);
   EXPECT_NEAR(distances[0].mean, 0.5, 1e-6);
   EXPECT_NEAR(distances[0].furthest, 0.5, 1e-6);
   EXPECT_NEAR(distances[1].mean, 0.5, 1e-6);

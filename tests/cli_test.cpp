@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The built program as a user drives it: arguments in, exit code, output and files out.
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <pty.h>
 #include <sys/wait.h>
@@ -18,6 +19,7 @@
 
 #include "skeletex/device/kernel_source.h"
 #include "skeletex/io/mesh_file.h"
+#include "skeletex/io/model_file.h"
 #include "skeletex/io/skeleton_file.h"
 #include "support/shapes.h"
 
@@ -878,23 +880,93 @@ TEST_F(Program, NeverWritesOverWhatItReads) {
   fs::remove(folder_ / "link.exr");
 }
 
-TEST_F(Program, MeshesThatSinglePrecisionCannotHoldAreRefused) {
-  const Skeleton skeleton = read_skeleton(folder_ / "y.skeleton.json");
-  const TriangleMesh mesh = read_mesh(folder_ / "y.ply").mesh;
-  for (const double scale : {1e-19, 1e17}) {
-    std::ofstream off(folder_ / "scaled.off");
-    off << "OFF\n" << mesh.positions.size() << ' ' << mesh.triangles.size() << " 0\n";
-    for (const Vec3& p : mesh.positions) off << scale * p.x() << ' ' << scale * p.y() << ' ' << scale * p.z() << '\n';
-    for (const Triangle& t : mesh.triangles) off << "3 " << t[0] << ' ' << t[1] << ' ' << t[2] << '\n';
-    off.close();
-    nlohmann::json json = nlohmann::json::parse(std::ifstream(folder_ / "y.skeleton.json"));
-    for (auto& node : json["nodes"])
-      for (auto& x : node["position"]) x = scale * x.get<double>();
-    std::ofstream(folder_ / "scaled.json") << json;
-    expect_refused(1, {"encode", "scaled.off", "scaled.json", "-o", "scaled.skx.exr"}, {"single precision"});
-    EXPECT_FALSE(fs::exists(folder_ / "scaled.skx.exr"));
+/// y.ply and y.skeleton.json as moved.off and moved.json, times a scale and moved along every axis.
+void write_moved(const fs::path& folder, double scale, double offset) {
+  const TriangleMesh mesh = read_mesh(folder / "y.ply").mesh;
+  std::ofstream off(folder / "moved.off");
+  off.precision(17);
+  off << "OFF\n" << mesh.positions.size() << ' ' << mesh.triangles.size() << " 0\n";
+  for (const Vec3& p : mesh.positions) {
+    const Vec3 q = scale * p + Vec3::Constant(offset);
+    off << q.x() << ' ' << q.y() << ' ' << q.z() << '\n';
   }
-  for (const char* name : {"scaled.off", "scaled.json"}) fs::remove(folder_ / name);
+  for (const Triangle& t : mesh.triangles) off << "3 " << t[0] << ' ' << t[1] << ' ' << t[2] << '\n';
+  nlohmann::json json = nlohmann::json::parse(std::ifstream(folder / "y.skeleton.json"));
+  for (auto& node : json["nodes"])
+    for (auto& x : node["position"]) x = scale * x.get<double>() + offset;
+  std::ofstream(folder / "moved.json") << json;
+}
+
+TEST_F(Program, GivesTheSameTexelsAtEveryScaleAndTheUsersUnitsBack) {
+  const DisplacementTexture own = read_model(folder_ / "y.skx.exr").texture;
+  const double diagonal = bounding_box(read_mesh(folder_ / "y.ply").mesh).diagonal();
+  std::ofstream(folder_ / "still.json") << R"({"rotations": {}})";
+  for (const double scale : {1e-30, 1e-19, 1e15, 1e30}) {
+    SCOPED_TRACE(scale);
+    write_moved(folder_, scale, 0);
+    const nlohmann::json report = json_of({"encode", "moved.off", "moved.json", "-o", "moved.skx.exr", "--size", "64"});
+    const SkeletexModel model = read_model(folder_ / "moved.skx.exr");
+    EXPECT_EQ(model.texture.along, own.along);
+    EXPECT_EQ(model.texture.around, own.around);
+    EXPECT_EQ(model.texture.out, own.out);
+    EXPECT_NEAR(model.skeleton.frame.scale / (scale * diagonal), 1, 1e-12);
+    for (const char* pose : {"", "still.json"}) {
+      std::vector<std::string> command{"reconstruct", "moved.skx.exr", "-o", "moved.ply"};
+      if (*pose) command.insert(command.end(), {"--pose", pose});
+      json_of(command);
+      const nlohmann::json metro = json_of({"metro", "moved.off", "moved.ply"});
+      EXPECT_LT(metro["forward"]["mean"], 1e-3);
+      EXPECT_NEAR(metro["diagonal"].get<double>() / (scale * diagonal), 1, 1e-12);
+    }
+    EXPECT_NEAR(report["mesh"]["diagonal"].get<double>() / (scale * diagonal), 1, 1e-9);
+    EXPECT_NE(run({"inspect", "moved.skx.exr"}).out.find(fmt::format("{:.3g}", scale * diagonal).substr(0, 4)),
+              std::string::npos);
+    EXPECT_EQ(run({"validate", "moved.off", "moved.json"}).code, 0);
+    json_of({"segment", "moved.off", "moved.json", "-o", "moved.ply"});
+    json_of({"morph", "moved.skx.exr", "moved.skx.exr", "--t", "0.5", "-o", "moved.ply"});
+    EXPECT_LT(json_of({"metro", "moved.off", "moved.ply"})["forward"]["mean"], 1e-3);
+  }
+}
+
+TEST_F(Program, FarFromTheOriginModelsAreAsGoodAsAtIt) {
+  const auto error_at = [&](double offset) {
+    write_moved(folder_, 1, offset);
+    json_of({"encode", "moved.off", "moved.json", "-o", "moved.skx.exr", "--size", "256"});
+    json_of({"reconstruct", "moved.skx.exr", "-o", "moved.ply"});
+    json_of({"reconstruct", "moved.skx.exr", "-o", "moved.obj"});
+    double error = 0;
+    for (const char* mesh : {"moved.ply", "moved.obj"}) {
+      error = std::max(error, json_of({"metro", "moved.off", mesh})["forward"]["mean"].get<double>());
+    }
+    return error;
+  };
+  const double own = error_at(0);
+  for (const double offset : {1e4, 1e6}) EXPECT_NEAR(error_at(offset) / own, 1, 0.02) << offset;
+}
+
+TEST_F(Program, PosesNodesInTheUsersUnitsAndMorphsBetweenScales) {
+  write_moved(folder_, 1000, 1e5);
+  json_of({"encode", "moved.off", "moved.json", "-o", "moved.skx.exr", "--size", "64"});
+  // All nodes move by one vector: so does the mesh.
+  nlohmann::json pose;
+  const nlohmann::json skeleton = nlohmann::json::parse(std::ifstream(folder_ / "moved.json"));
+  for (const auto& node : skeleton["nodes"]) {
+    const auto p = node["position"].get<std::array<double, 3>>();
+    pose["nodes"][node["name"].get<std::string>()] = {p[0] + 500, p[1], p[2]};
+  }
+  std::ofstream(folder_ / "pose.json") << pose;
+  json_of({"reconstruct", "moved.skx.exr", "-o", "a.ply"});
+  json_of({"reconstruct", "moved.skx.exr", "-o", "b.ply", "--pose", "pose.json"});
+  const TriangleMesh a = read_mesh(folder_ / "a.ply").mesh, b = read_mesh(folder_ / "b.ply").mesh;
+  ASSERT_EQ(a.positions.size(), b.positions.size());
+  for (std::size_t i = 0; i < a.positions.size(); ++i)
+    ASSERT_LT((b.positions[i] - a.positions[i] - Vec3(500, 0, 0)).norm(), 1e-2) << i;
+  // Half way between y and a thousand times y lies 500.5 times y.
+  json_of({"morph", "y.skx.exr", "moved.skx.exr", "--t", "0.5,1", "-o", "between.ply"});
+  write_moved(folder_, 500.5, 0.5e5);
+  EXPECT_LT(json_of({"metro", "moved.off", "between_000.ply"})["forward"]["mean"], 1e-3);
+  write_moved(folder_, 1000, 1e5);
+  EXPECT_LT(json_of({"metro", "moved.off", "between_001.ply"})["forward"]["mean"], 1e-3);
 }
 
 TEST_F(Program, SaysWhenStandardOutputIsFull) {

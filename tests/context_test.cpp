@@ -10,6 +10,7 @@
 #include <fstream>
 #include <memory>
 #include <numeric>
+#include <regex>
 #include <vector>
 
 #include "skeletex/device/kernel_source.h"
@@ -174,6 +175,28 @@ TEST(Context, BuildsEveryKernelFileOfTheLibraryAsItStands) {
     const std::string kernel = text.substr(name, text.find('(', name) - name);
     EXPECT_GT(context.work_group_size({file.name, kernel}, 64), 0u) << file.name;
   }
+}
+
+TEST(Context, KernelsOfTheLibraryTakeOneStructAndAtMostEightBuffers) {
+  const std::regex kernel(R"(kernel [A-Z_ ]*void (\w+)\(([^{]*)\) \{)"), buffer(R"(\b(?:__)?(global|constant) )"),
+      local(R"(\b(?:__)?local )");
+  const auto count_of = [](const std::string& text, const std::regex& what) {
+    return std::distance(std::sregex_iterator(text.begin(), text.end(), what), {});
+  };
+  std::ptrdiff_t kernels = 0;
+  for (const EmbeddedKernelFile& file : embedded_kernel_files()) {
+    const std::string text(file.text);
+    kernels += count_of(text, kernel);
+    for (auto match = std::sregex_iterator(text.begin(), text.end(), kernel); match != std::sregex_iterator();
+         ++match) {
+      const std::string arguments = (*match)[2];
+      const std::ptrdiff_t all = 1 + std::count(arguments.begin(), arguments.end(), ','),
+                           buffers = count_of(arguments, buffer);
+      EXPECT_LE(buffers, 8) << file.name << ": " << (*match)[1];
+      EXPECT_LE(all - buffers - count_of(arguments, local), 1) << file.name << ": " << (*match)[1];
+    }
+  }
+  EXPECT_GT(kernels, 60);
 }
 
 TEST(Context, BuildsFilesOfOneProgramTogetherAndEachHeaderOnce) {

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <random>
 
+#include "fit_structs.h"
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/analysis/metro.h"
 #include "skeletex/convert/encode_model.h"
@@ -83,37 +84,41 @@ struct RandomPatch {
 
 /// The kernels from matching to the solved moves, in work-groups of a size.
 struct Solved {
-  std::vector<int> diagonals, matches;
-  std::vector<float> weights, residuals, system;
+  std::vector<int> numbers;
+  std::vector<float> matched, system;
   std::array<std::vector<float>, 3> moves;
+  std::size_t size;
+
+  int diagonal(std::size_t texel) const { return numbers[FIT_DIAGONALS * size + texel]; }
+  int match(int sample, std::size_t texel) const { return numbers[(FIT_MATCHES + sample) * size + texel]; }
+  double weight(int sample, int corner, std::size_t texel) const {
+    return matched[(MATCH_PLANES * sample + corner - 1) * size + texel];
+  }
+  double residual(int sample, std::size_t texel) const { return matched[(MATCH_PLANES * sample + 2) * size + texel]; }
 };
 Solved solve(const RandomPatch& patch, int sweeps, std::size_t group, float damping, float springs,
              float least_residual) {
   ClContext& c = device();
   const DeviceLayout& layout = patch.layout;
   const std::size_t size = layout.size();
-  const ClRange range({kTextureWidth, kTextureHeight}, {group, 1});
-  const auto x = c.upload(patch.points[0]), y = c.upload(patch.points[1]), z = c.upload(patch.points[2]),
-             samples = c.upload(patch.samples);
-  auto diagonals = c.allocate<int>(size), matches = c.allocate<int>(4 * size);
-  auto weights = c.allocate<float>(8 * size), residuals = c.allocate<float>(4 * size), costs = c.allocate<float>(size),
-       areas = c.allocate<float>(size);
-  auto lattice = c.allocate<float>(10 * size), system = c.allocate<float>(36 * size);
-  c.fill(lattice, 0.f), c.fill(system, 0.f), c.fill(weights, 0.f), c.fill(residuals, 0.f);
-  c.launch({"fit.cl", "choose_fitted_diagonals"}, range, kTextureWidth, kTextureHeight, layout.texel_patches,
-           layout.patches, x, y, z, diagonals);
-  c.launch({"fit.cl", "match_samples"}, range, kTextureWidth, kTextureHeight, layout.texel_patches, layout.patches,
-           samples, diagonals, x, y, z, matches, weights, residuals, costs, areas);
-  c.launch({"fit.cl", "assemble"}, range, kTextureWidth, kTextureHeight, least_residual, layout.texel_patches,
-           layout.patches, samples, diagonals, matches, weights, residuals, lattice, system);
-  auto move_x = c.allocate<float>(size), move_y = c.allocate<float>(size), move_z = c.allocate<float>(size);
-  c.fill(move_x, 0.f), c.fill(move_y, 0.f), c.fill(move_z, 0.f);
+  const auto points = upload_planes(c, patch.points[0], patch.points[1], patch.points[2]);
+  const auto samples = c.upload(patch.samples);
+  auto numbers = c.allocate<int>(FIT_NUMBER_PLANES * size);
+  auto matched = c.allocate<float>(FIT_MATCHED_PLANES * size);
+  auto lattice = c.allocate<float>(2 * LATTICE_PLANES * size), system = c.allocate<float>(SYSTEM_STRIDE * size);
+  auto moves = allocate_planes(c, size);
+  c.fill(numbers, 0), c.fill(matched, 0.f), c.fill(lattice, 0.f), c.fill(system, 0.f), c.fill(moves.values, 0.f);
+  FitParameters parameters{{}, kTextureWidth, kTextureHeight, least_residual, 0, damping, springs};
+  const auto launch = [&](const char* kernel, const auto&... arguments) {
+    c.launch({"fit.cl", kernel}, ClRange({kTextureWidth, kTextureHeight}, {group, 1}), parameters, layout.texel_patches,
+             layout.tables.patches, arguments...);
+  };
+  launch("choose_fitted_diagonals", points.values, numbers);
+  launch("match_samples", samples, points.values, numbers, matched);
+  launch("assemble", samples, numbers, matched, lattice, system);
   for (int sweep = 0; sweep < sweeps; ++sweep)
-    for (int colour = 0; colour < 6; ++colour)
-      c.launch({"fit.cl", "relax_moves"}, range, kTextureWidth, kTextureHeight, colour, damping, springs,
-               layout.texel_patches, layout.patches, system, move_x, move_y, move_z);
-  return {c.download(diagonals), c.download(matches), c.download(weights),
-          c.download(residuals), c.download(system),  {c.download(move_x), c.download(move_y), c.download(move_z)}};
+    for (parameters.colour = 0; parameters.colour < 6; ++parameters.colour) launch("relax_moves", system, moves.values);
+  return {c.download(numbers), c.download(matched), c.download(system), download_planes(c, moves), size};
 }
 
 }  // namespace
@@ -131,25 +136,25 @@ TEST(FitKernels, ASampleIsMatchedWithAPointOfTheLatticeAsNearAsTheTwinFinds) {
         const std::size_t at = patch.texel(j, row);
         const auto value = [&](int k) { return static_cast<double>(patch.samples[(7 * i + k) * size + at]); };
         const Vec3 sample(value(0), value(1), value(2)), normal(value(3), value(4), value(5));
-        const int match = got.matches[i * size + at];
+        const int match = got.match(i, at);
         ASSERT_GE(match, 0);
         const int column = j + (match & 3) - 1, up = row + (match >> 2 & 3) - 1;
-        const auto corners = twin::triangle_corners(got.diagonals[patch.texel(column, up)] != 0, match >> 4);
-        const double w1 = got.weights[2 * i * size + at], w2 = got.weights[(2 * i + 1) * size + at];
+        const auto corners = twin::triangle_corners(got.diagonal(patch.texel(column, up)) != 0, match >> 4);
+        const double w1 = got.weight(i, 1, at), w2 = got.weight(i, 2, at);
         const double w[3] = {1 - w1 - w2, w1, w2};
         Vec3 matched = Vec3::Zero();
         for (int k = 0; k < 3; ++k) matched += w[k] * point(column + corners[k][0], up + corners[k][1]);
-        EXPECT_NEAR(got.residuals[i * size + at], normal.dot(matched - sample), 1e-5);
+        EXPECT_NEAR(got.residual(i, at), normal.dot(matched - sample), 1e-5);
         // Not further than anything in the sample's own quad; the quads beside it are only searched across the nearest
         // side.
-        const double own = twin::nearest_in_quad(point, j, row, got.diagonals[at] != 0, sample);
+        const double own = twin::nearest_in_quad(point, j, row, got.diagonal(at) != 0, sample);
         EXPECT_LE((matched - sample).norm(), own + 1e-5);
         double best = own;
         for (int dy = -1; dy <= 1; ++dy)
           for (int dx = -1; dx <= 1; ++dx)
             if (row + dy >= 0 && row + dy <= r.height - 2)
               best = std::min(best, twin::nearest_in_quad(point, j + dx, row + dy,
-                                                          got.diagonals[patch.texel(j + dx, row + dy)] != 0, sample));
+                                                          got.diagonal(patch.texel(j + dx, row + dy)) != 0, sample));
         nearest += (matched - sample).norm() < best + 1e-5;
       }
   EXPECT_GT(nearest, 0.9 * count);
@@ -166,11 +171,11 @@ TEST(FitKernels, TheSweepsEndAtTheSolutionOfTheTwinsDenseSystem) {
     for (int j = 0; j < r.width; ++j)
       for (int i = 0; i < 4; ++i) {
         const std::size_t at = patch.texel(j, row);
-        const int match = got.matches[i * size + at], column = j + (match & 3) - 1, up = row + (match >> 2 & 3) - 1;
-        const auto corners = twin::triangle_corners(got.diagonals[patch.texel(column, up)] != 0, match >> 4);
-        const double w1 = got.weights[2 * i * size + at], w2 = got.weights[(2 * i + 1) * size + at];
+        const int match = got.match(i, at), column = j + (match & 3) - 1, up = row + (match >> 2 & 3) - 1;
+        const auto corners = twin::triangle_corners(got.diagonal(patch.texel(column, up)) != 0, match >> 4);
+        const double w1 = got.weight(i, 1, at), w2 = got.weight(i, 2, at);
         const auto value = [&](int k) { return static_cast<double>(patch.samples[(7 * i + k) * size + at]); };
-        system.add({value(3), value(4), value(5)}, got.residuals[i * size + at], value(6), kLeast, column, up, corners,
+        system.add({value(3), value(4), value(5)}, got.residual(i, at), value(6), kLeast, column, up, corners,
                    {1 - w1 - w2, w1, w2});
       }
   const Eigen::VectorXd expected = system.solve(kDamping, kSprings);
@@ -186,7 +191,7 @@ TEST(FitKernels, TheSweepsEndAtTheSolutionOfTheTwinsDenseSystem) {
 TEST(FitKernels, TheSizeOfWorkGroupsDoesNotShow) {
   const RandomPatch patch({1, 0, 31, 30}, 3);
   const Solved first = solve(patch, 5, 64, 0.001f, 0.002f, 0.01f), second = solve(patch, 5, 8, 0.001f, 0.002f, 0.01f);
-  EXPECT_EQ(first.matches, second.matches);
+  EXPECT_EQ(first.numbers, second.numbers);
   EXPECT_EQ(first.system, second.system);
   EXPECT_EQ(first.moves, second.moves);
 }

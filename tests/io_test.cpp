@@ -177,6 +177,38 @@ TEST(MeshFiles, TextMayBeginWithAByteOrderMark) {
     EXPECT_EQ(read_as(folder, extension, "\xef\xbb\xbf" + text).mesh.triangles.size(), 4u) << extension;
 }
 
+TEST(MeshFiles, ObjMayHaveAByteOrderMarkBeforeItsFirstVertex) {
+  const ScratchFolder folder;
+  const auto& [extension, text] = small_files()[0];
+  ASSERT_EQ(extension, ".obj");
+  const MeshFile good = read_as(folder, extension, text);
+  std::string marked = text;
+  marked.insert(marked.find("v "), "\xef\xbb\xbf");
+  const MeshFile file = read_as(folder, extension, "# put together\n" + marked);
+  EXPECT_EQ(file.mesh.positions, good.mesh.positions);
+  EXPECT_EQ(file.mesh.triangles, good.mesh.triangles);
+  EXPECT_TRUE(contains(message_as(folder, extension, "v 0 0 0\n\xc2\xa0v 1 0 0\nv 0 1 0\nf 1 2 3\n"), "line 2"));
+}
+
+TEST(MeshFiles, ObjThatEndsInAFaceSaysSo) {
+  const ScratchFolder folder;
+  const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  EXPECT_TRUE(contains(message_as(folder, ".obj", vertices + "f 1 2 3\nf 1 2"), "line 5: the file ends within a face"));
+  EXPECT_TRUE(read_as(folder, ".obj", vertices + "f 1 2 3").ends_in_face);
+  EXPECT_FALSE(read_as(folder, ".obj", vertices + "f 1 2 3\n").ends_in_face);
+}
+
+TEST(MeshFiles, FarFromTheOriginAndBeyondSinglePrecisionTheyAreWrittenAsDoubles) {
+  const ScratchFolder folder;
+  for (const auto& [scale, offset] : {std::pair{1.0, 1e6}, {1e-40, 0.0}, {1e39, 0.0}})
+    for (const char* name : {"m.ply", "m.obj"}) {
+      TriangleMesh mesh{kTetrahedron, kTetrahedronFaces};
+      for (Vec3& p : mesh.positions) p = scale / 3 * p + Vec3::Constant(offset);
+      write_mesh(folder / name, mesh);
+      EXPECT_EQ(read_mesh(folder / name).mesh.positions, mesh.positions) << name << ' ' << scale;
+    }
+}
+
 TEST(MeshFiles, NumbersKeepDoublePrecision) {
   const ScratchFolder folder;
   const std::string numbers = "0.1234567890123456 -1e-50 100000.00000000001";

@@ -279,25 +279,16 @@ TEST(Metro, TheKernelFindsTheTwinsTriangles) {
           planes[axis * points.size() + expected.size() - 1] = static_cast<float>(local[axis]);
       }
       // Whatever the points an item follows one another with: the first has no block to start from, the others do.
-      // Bounds, as shares of the distance: none, wide and narrow ones, and one that nothing lies within.
       for (const int run : {1, 3, 1000})
-        for (const auto& [enough, bound] : {std::pair(0.0, 0.0),
-                                            {0.05 * tree.scale, 0.0},
-                                            {0.0, 3.0},
-                                            {0.0, 1.001},
-                                            {0.0, 0.5},
-                                            {0.05 * tree.scale, 1.001}}) {
+        for (const double enough : {0.0, 0.05 * tree.scale}) {
           const int count = static_cast<int>(points.size());
           const auto enough_squared = static_cast<float>(enough / tree.scale * enough / tree.scale);
           auto nearest = context().allocate<int>(count);
           auto squared = context().allocate<float>(count);
-          std::vector<float> bounds_squared;
-          for (const double distance : expected)
-            bounds_squared.push_back(static_cast<float>(std::pow(bound * distance / tree.scale + 1e-5, 2)));
           context().launch({"metro.cl", "find_nearest_triangles"}, ClRange(block_count(count, run)),
-                           NearestParameters{count, run, tree.top_level(), static_cast<int>(bound > 0), enough_squared},
-                           context().upload(planes), context().upload(tree.boxes), context().upload(tree.blocks),
-                           context().upload(tree.level_begin), context().upload(bounds_squared), nearest, squared);
+                           NearestParameters{count, run, tree.top_level(), enough_squared}, context().upload(planes),
+                           context().upload(tree.boxes), context().upload(triangles_of_blocks(mesh, tree)),
+                           context().upload(tree.level_begin), nearest, squared);
           const std::vector<int> places = context().download(nearest);
           const std::vector<float> squares = context().download(squared);
           for (int i = 0; i < count; ++i) {

@@ -463,7 +463,7 @@ TEST(ModelFile, EditedHeadersAreRefusedOrGiveFiniteMeshes) {
 
 TEST(ModelFile, MeshesWithoutFiniteNumbersAreNotWritten) {
   const ScratchFolder folder;
-  for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity(), 1e39})
+  for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity()})
     for (const char* name : {"a.ply", "a.obj"}) {
       const TriangleMesh mesh{{{0, 0, 0}, {1, bad, 0}, {0, 1, 0}}, {{0, 1, 2}}};
       try {
@@ -497,7 +497,7 @@ TEST(ModelFile, SaysWhatIsWrongWithForeignTruncatedAndNewerFiles) {
     EXPECT_NE(at, std::string::npos);
     return bytes.replace(at, from.size(), to);
   };
-  EXPECT_TRUE(contains(message_for(with("\"version\":1", "\"version\":2")), "newer"));
+  EXPECT_TRUE(contains(message_for(with("\"version\":2", "\"version\":3")), "newer"));
   EXPECT_TRUE(contains(message_for(with(std::string("skeletex\0string", 15), std::string("skeletix\0string", 15))),
                        "not a model"));
   EXPECT_TRUE(contains(message_for(with("\"width\":40", "\"width\":41")), "resized"));

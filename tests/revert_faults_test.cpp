@@ -20,6 +20,14 @@ ClContext& device() {
   return context;
 }
 
+TriangleMesh lattice_mesh(const LatticeFrame& frame, DiagonalRule rule, const TexelPlanes& points) {
+  TriangleMesh mesh;
+  build_lattice_mesh(device(), frame, rule, upload_planes(device(), points[0], points[1], points[2]), mesh);
+  return mesh;
+}
+
+DevicePlanes upload(const TexelPlanes& points) { return upload_planes(device(), points[0], points[1], points[2]); }
+
 /// An egg around one bone with poles at both ends, and a lattice of half its resolution whose texels sit on every other
 /// of its vertices.
 struct Egg {
@@ -82,10 +90,14 @@ struct Egg {
     texels.map_triangles[at] = find_nearest_triangle(mesh, tree, p).triangle;
   }
   RevertReport revert(PlacedTexels& texels) const {
-    return revert_faults(device(), {model, mesh, tree, charts}, {}, regular, texels);
+    PlacedTexels grid = regular;
+    grid.on_device = upload(grid.points), texels.on_device = upload(texels.points);
+    const RevertReport report = revert_faults(device(), {model, mesh, tree, charts}, {}, grid, texels);
+    EXPECT_EQ(download_planes(device(), texels.on_device), texels.points);
+    return report;
   }
   TriangleMesh lattice(const PlacedTexels& texels) const {
-    return build_lattice_mesh(device(), frame_lattice(device(), model), model.diagonals, texels.points);
+    return lattice_mesh(frame_lattice(device(), model), model.diagonals, texels.points);
   }
   /// The texels whose points are not the same.
   static std::vector<int> differing(const PlacedTexels& one, const PlacedTexels& other) {
@@ -153,15 +165,16 @@ TEST(RevertFaults, MovedTexelsMakeTheMeshOfTheirPoints) {
   const LatticeFrame frame = frame_lattice(device(), egg.model);
   for (const DiagonalRule rule : {DiagonalRule::kNearest, DiagonalRule::kSmooth}) {
     PlacedTexels texels = egg.regular;
-    TriangleMesh moved = build_lattice_mesh(device(), frame, rule, texels.points);
+    DevicePlanes on_device = upload(texels.points);
+    TriangleMesh moved = lattice_mesh(frame, rule, texels.points);
     const TriangleMesh before = moved;
     std::vector<int> listed;
     for (const auto& [row, column] : {std::pair(1, 3), std::pair(8, 0), std::pair(8, 23), std::pair(19, 7)}) {
       listed.push_back(Egg::texel(row, column));
       egg.place(listed.back(), Egg::point((row + 0.3) / (Egg::kHeight - 1), (column + 0.4) / Egg::kWidth), texels);
     }
-    const std::vector<int> changed = move_texels(device(), frame, rule, listed, texels.points, moved);
-    const TriangleMesh expected = build_lattice_mesh(device(), frame, rule, texels.points);
+    const std::vector<int> changed = move_texels(device(), frame, rule, listed, texels.points, on_device, moved);
+    const TriangleMesh expected = lattice_mesh(frame, rule, texels.points);
     EXPECT_EQ(moved.positions, expected.positions);
     EXPECT_EQ(moved.triangles, expected.triangles);
     std::vector<int> differing;
@@ -189,7 +202,7 @@ TEST(RevertFaults, TheLatticeIsTheDecodersMesh) {
       if (frame.texels[vertex] >= 0)
         points[axis][frame.texels[vertex]] =
             static_cast<float>(expected.positions[vertex][axis] - encoded.origin[axis]);
-  const TriangleMesh mesh = build_lattice_mesh(device(), frame, encoded.diagonals, points);
+  const TriangleMesh mesh = lattice_mesh(frame, encoded.diagonals, points);
   EXPECT_EQ(mesh.triangles, expected.triangles);
   for (std::size_t i = 0; i < expected.positions.size(); ++i)
     EXPECT_LT((mesh.positions[i] - expected.positions[i]).norm(), 1e-6 * encoded.diagonal);

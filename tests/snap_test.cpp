@@ -72,17 +72,6 @@ Rectangle random_rectangle(std::mt19937& random) {
           static_cast<int>(random() % (kTextureHeight - height + 1)), width, height};
 }
 
-/// A plane that has its even columns first, then its odd ones.
-template <class T>
-std::vector<T> by_columns(const OnePatch& patch, const std::vector<T>& by_colour) {
-  std::vector<T> plane = by_colour;
-  for (int row = 1; row + 1 < patch.rectangle().height; ++row)
-    for (int column = 0; column < patch.rectangle().width; ++column)
-      plane[patch.texel(column, row)] =
-          by_colour[patch.texel(column / 2 + column % 2 * ((patch.rectangle().width + 1) / 2), row)];
-  return plane;
-}
-
 struct HostPositions {
   std::vector<float> x, y, parameters;
   std::vector<int> anchors;
@@ -91,12 +80,13 @@ struct HostPositions {
 HostPositions snapped(const OnePatch& patch, const SnapFeatures& features, const std::vector<float>& home_x = {},
                       const std::vector<float>& home_y = {}) {
   ReadingPositions positions = even_positions(device(), patch.layout);
-  device().write(positions.home_x, home_x), device().write(positions.home_y, home_y);
-  const SnappedPositions snapped =
+  std::vector<float> home = home_x;
+  home.insert(home.end(), home_y.begin(), home_y.end());
+  device().write(positions.home, home);
+  const ReadingPositions snapped =
       snap_positions(device(), patch.layout, upload_tables(device(), tables_of(features, patch.patches)), positions);
-  return {by_columns(patch, device().download(snapped.x)), by_columns(patch, device().download(snapped.y)),
-          by_columns(patch, device().download(snapped.parameters)),
-          by_columns(patch, device().download(snapped.anchors))};
+  auto [x, y, parameters] = download_planes(device(), {snapped.offsets, patch.layout.size()});
+  return {x, y, parameters, device().download(snapped.anchors)};
 }
 
 /// A box of a tube, square across, with a vertex on every edge and in the middle of every side.

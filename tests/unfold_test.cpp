@@ -36,18 +36,19 @@ struct PlanePatch {
   ClBuffer<int> triangles = device().upload(std::vector<int>(kWidth * kHeight, 0));
 
   PlanePatch() {
-    maps.triangle_count = 1;
-    maps.corners = device().upload(std::vector<int>{0, 1, 2});
-    maps.x = device().upload(std::vector<float>{0, 1, 0}), maps.y = device().upload(std::vector<float>{0, 0, 1}),
-    maps.z = device().upload(std::vector<float>{0, 0, 0});
+    maps.sizes = {1, 3, 0};
+    maps.triangles = device().upload(std::vector<int>{0, 1, 2, 0, 0, 0, -1, -1, -1, 0, 0});
+    std::vector<float> values(4 * 3, 0);  // u and v are not read
+    for (const float value : {0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f}) values.push_back(value);
+    maps.values = device().upload(values);
   }
 };
 
-TexelPoints upload_points(const std::vector<Vec3>& points) {
+DevicePlanes upload_points(const std::vector<Vec3>& points) {
   std::array<std::vector<float>, 3> planes;
   for (const Vec3& p : points)
     for (int k = 0; k < 3; ++k) planes[k].push_back(static_cast<float>(p[k]));
-  return {device().upload(planes[0]), device().upload(planes[1]), device().upload(planes[2])};
+  return upload_planes(device(), planes[0], planes[1], planes[2]);
 }
 
 /// A plane that turns about (20, 15) by an angle that falls with the distance: as a map it is one to one, but turns by
@@ -75,43 +76,48 @@ TEST(Unfold, FindsAndMovesWhatItsTwinDoes) {
     const twin::Folds expected = twin::find_folds(points, kWidth, kHeight);
     if (expected.is_close) continue;
     ++compared;
-    const TexelPoints on_device = upload_points(points);
+    const DevicePlanes on_device = upload_points(points);
     const std::vector<int> none(points.size(), 0);
-    std::vector<int> all(points.size() - kWidth);
-    std::iota(all.begin(), all.end(), 0);
-    auto quads = device().upload(all), quad_count = device().upload(std::vector{static_cast<int>(all.size())}),
-         is_listed = device().upload(std::vector<int>(points.size(), 1));
-    auto marked = device().allocate<int>(points.size()), is_marked = device().upload(none),
-         found = device().upload(std::vector{0, 0});
-    device().launch({"unfold.cl", "find_folds"}, ClRange(all.size()), kWidth, 1, patch.layout.texel_patches,
-                    patch.layout.patches, patch.triangles, patch.maps.corners, patch.maps.x, patch.maps.y, patch.maps.z,
-                    on_device.x, on_device.y, on_device.z, quad_count, quads, is_listed, found, marked, is_marked);
-    EXPECT_EQ(device().download(found)[0], expected.count);
+    // The quads, whether they are listed, the marked texels, whether they are marked: see unfold.cl.
+    std::vector<int> all(4 * points.size(), 0);
+    const int quads = static_cast<int>(points.size()) - kWidth, size = static_cast<int>(points.size());
+    std::iota(all.begin(), all.begin() + quads, 0), std::fill_n(all.begin() + size, size, 1);
+    auto lists = device().upload(all), counts = device().upload(std::vector{quads, 0, 0, 0});
+    MapParameters parameters{patch.maps.sizes, kWidth, size, 0, 0, 0, 0};
+    const auto plane_of = [&](int plane) {
+      const std::vector<int> planes = device().download(lists);
+      return std::vector(planes.begin() + plane * size, planes.begin() + (plane + 1) * size);
+    };
+    device().launch({"unfold.cl", "find_folds"}, ClRange(quads), parameters, patch.layout.texel_patches,
+                    patch.layout.tables.patches, patch.triangles, patch.maps.triangles, patch.maps.values,
+                    on_device.values, counts, lists);
+    EXPECT_EQ(device().download(counts)[FOLD_FOUND], expected.count);
     EXPECT_GT(expected.count, 0);
-    EXPECT_EQ(device().download(is_marked), expected.marks);
-    const int marks = device().download(found)[1];
+    EXPECT_EQ(plane_of(3), expected.marks);
+    parameters.count = device().download(counts)[FOLD_MARKED];
     const auto flags_of = [&](std::vector<int> list, int count) {
       list.resize(count);
       std::vector<int> flags = none;
       for (const int texel : list) ++flags[texel];
       return flags;
     };
-    EXPECT_EQ(flags_of(device().download(marked), marks), expected.marks);
+    EXPECT_EQ(flags_of(plane_of(2), parameters.count), expected.marks);
 
     std::vector<float> x, y;
     for (std::size_t i = 0; i < points.size(); ++i)
       x.push_back(static_cast<float>(unit(random))), y.push_back(static_cast<float>(0.5 * unit(random)));
-    auto offset_x = device().upload(x), offset_y = device().upload(y);
+    std::vector<float> home = x;
+    home.insert(home.end(), y.begin(), y.end());
+    auto offsets = device().upload(home);
     // Flags are off again but for the last row, which has no quads.
-    std::vector<int> flags = device().download(is_listed);
+    const std::vector<int> flags = plane_of(1);
     EXPECT_EQ(std::accumulate(flags.begin(), flags.end(), 0), kWidth);
-    device().write(is_listed, none);
-    device().fill(quad_count, 0);
-    auto back_count = device().upload(std::vector{0});
-    device().launch({"unfold.cl", "relax_folds"}, ClRange(marks), kWidth, marks, 0, marked, patch.layout.texel_patches,
-                    patch.layout.patches, patch.triangles, on_device.x, on_device.y, on_device.z, is_marked, offset_x,
-                    offset_y, quad_count, quads, is_listed, back_count);
-    const std::vector<float> new_x = device().download(offset_x), new_y = device().download(offset_y);
+    all = device().download(lists);
+    std::fill_n(all.begin() + size, size, 0);
+    device().write(lists, all), device().write(counts, std::vector{0, 0, 0, 0});
+    device().launch({"unfold.cl", "relax_folds"}, ClRange(parameters.count), parameters, patch.layout.texel_patches,
+                    patch.layout.tables.patches, patch.triangles, on_device.values, offsets, counts, lists);
+    const std::vector<float> moved = device().download(offsets);
     std::vector<int> around = none;
     for (int r = 0; r < kHeight; ++r)
       for (int j = 0; j < kWidth; ++j) {
@@ -121,12 +127,12 @@ TEST(Unfold, FindsAndMovesWhatItsTwinDoes) {
             for (const int column : {(j + kWidth - 1) % kWidth, j}) around[row * kWidth + column] = 1;
         const Eigen::Vector2d before(x[i], y[i]),
             wanted = expected.marks[i] ? twin::relaxed(points, kWidth, kHeight, j, r, before) : before;
-        EXPECT_NEAR(new_x[i], wanted.x(), 2e-4);
-        EXPECT_NEAR(new_y[i], wanted.y(), 2e-4);
+        EXPECT_NEAR(moved[i], wanted.x(), 2e-4);
+        EXPECT_NEAR(moved[size + i], wanted.y(), 2e-4);
       }
-    EXPECT_EQ(device().download(is_marked), none);
-    EXPECT_EQ(device().download(is_listed), around);
-    EXPECT_EQ(flags_of(device().download(quads), device().download(quad_count)[0]), around);
+    EXPECT_EQ(plane_of(3), none);
+    EXPECT_EQ(plane_of(1), around);
+    EXPECT_EQ(flags_of(plane_of(0), device().download(counts)[FOLD_QUADS]), around);
   }
   EXPECT_GE(compared, 4);
 }
@@ -142,24 +148,25 @@ TEST(Unfold, TakesTheFoldsOutOfALatticeOverASwirlAndTouchesNothingElse) {
   std::vector<Vec3> even;
   for (int r = 0; r < kHeight; ++r)
     for (int j = 0; j < kWidth; ++j) even.push_back(swirl(j, r, kMost));
-  TexelPoints points = upload_points(even);
-  const auto read = [&](const ClBuffer<int>& texels, int count) {
-    std::vector<int> walking = device().download(texels);
-    walking.resize(count);
-    const std::vector<float> dx = device().download(positions.home_x), dy = device().download(positions.home_y);
-    std::vector<float> x = device().download(points.x), y = device().download(points.y);
-    for (const int i : walking) {
+  DevicePlanes points = upload_points(even);
+  const auto read = [&](const ClBuffer<int>& texels, int first, int count) {
+    const std::vector<int> listed = device().download(texels);
+    const std::vector<float> home = device().download(positions.home);
+    std::vector<float> moved = device().download(points.values);
+    for (int k = first; k < first + count; ++k) {
+      const int i = listed[k];
       if (triangles[i] == kNone) continue;
-      const Vec3 p = swirl(i % kWidth + static_cast<double>(dx[i]), i / kWidth + static_cast<double>(dy[i]), kMost);
-      x[i] = static_cast<float>(p.x()), y[i] = static_cast<float>(p.y());
+      const Vec3 p = swirl(i % kWidth + static_cast<double>(home[i]),
+                           i / kWidth + static_cast<double>(home[kWidth * kHeight + i]), kMost);
+      moved[i] = static_cast<float>(p.x()), moved[kWidth * kHeight + i] = static_cast<float>(p.y());
     }
-    device().write(points.x, x), device().write(points.y, y);
+    device().write(points.values, moved);
   };
   const UnfoldReport report = unfold_lattice(device(), patch.layout, patch.patches, patch.maps,
                                              device().upload(triangles), read, positions, points);
   EXPECT_GT(report.folded_quads, 0);
   EXPECT_EQ(report.left, 0);
-  const std::vector<float> x = device().download(points.x), y = device().download(points.y);
+  const auto [x, y, z] = download_planes(device(), points);
   std::vector<Vec3> after;
   for (std::size_t i = 0; i < even.size(); ++i) {
     after.emplace_back(x[i], y[i], 0);

@@ -129,7 +129,7 @@ TEST(Validate, TheTreeItHandsOverIsThatOfTheMeshAsItIsThen) {
   ASSERT_TRUE(tree);
   const TriangleTree expected = build_triangle_tree(shape.mesh);
   EXPECT_EQ(tree->order, expected.order);
-  EXPECT_EQ(tree->blocks, expected.blocks);
+  EXPECT_EQ(tree->points, expected.points);
   EXPECT_EQ(tree->boxes, expected.boxes);
 
   const TestModel bear = load_standard_model("bear");

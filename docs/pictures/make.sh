@@ -38,6 +38,14 @@ for name in smooth enhance noise; do
   "$skeletex" render "$work/$name.skx.exr" "${man[@]}" -o "$work/$name.png"
 done
 
+# The page, wide and on a phone.
+modules=build/release/core/page/node_modules
+"$skeletex" encode build/meshes/homer.off configs/skeletons/homer.skeleton.json -o "$work/homer.skx.exr"
+"$skeletex" view "$work/man.skx.exr" "$work/homer.skx.exr" --up z --size 256 -o "$work/morph.html"
+"$skeletex" view "$work/bear.skx.exr" --against build/meshes/bear.off -o "$work/bear.html"
+node docs/pictures/page.mjs "$modules" "$work/morph.html" '#t=0.3&mode=segments' 1100x720 light "$work/wide.png"
+node docs/pictures/page.mjs "$modules" "$work/bear.html" '#mode=checker' 380x720 dark "$work/phone.png"
+
 /usr/bin/python3 - "$work" "$target" <<'PYTHON'
 import pathlib
 import sys
@@ -62,5 +70,6 @@ side_by_side(["1", "2", "3"], "tutorial")
 side_by_side(["error"], "error")
 side_by_side(["bind", "sit", "walk", "weights"], "pose")
 side_by_side(["bind", "smooth", "enhance", "noise"], "filter")
+side_by_side(["wide", "phone"], "view")
 PYTHON
 ls -l "$target"

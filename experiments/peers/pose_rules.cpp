@@ -50,7 +50,8 @@ void measure(Rule& rule, const BindSurface& bind, const std::vector<bool>& is_se
              const Skeleton& posed, const std::string& folder) {
   const std::vector<Vec3> positions = rule.pose(posed);
   if (!folder.empty())
-    write_mesh(fmt::format("{}/{}.{}.ply", folder, frame.name, rule.name), {positions, bind.mesh.triangles});
+    write_mesh(fmt::format("{}/{}.{}.ply", folder, frame.name, rule.name),
+               in_user_units({positions, bind.mesh.triangles}, posed.frame));
   const DeformationReport report = measure_deformation(bind, positions);
   const double bend = added_bend(bind, positions, is_seam, 0.99);
   rule.poses.push_back({{"time", frame.time},
@@ -84,7 +85,7 @@ Json run(const std::string& model_path, const std::string& pose_path, const std:
   const PoseAnimation animation = read_animation(pose_path, model.skeleton);
   ClContext context(device);
   const PreparedModel prepared(model);
-  const BindSurface bind = make_bind_surface(reconstruct_mesh(context, prepared));
+  const BindSurface bind = make_bind_surface(reconstruct_bind_mesh(context, prepared).mesh);
   const Lattice& lattice = prepared.lattice;
   const int first_seam = lattice.first_sample.empty() ? lattice.first_corner : lattice.first_sample[0];
   std::vector<bool> is_seam;
@@ -92,11 +93,12 @@ Json run(const std::string& model_path, const std::string& pose_path, const std:
 
   std::vector<Rule> rules;
   for (const Deformation deformation : {Deformation::kSmooth, Deformation::kCoordinates, Deformation::kPaper})
-    rules.push_back({to_string(deformation), [&, deformation](const Skeleton& posed) {
-                       return reconstruct_mesh(context, prepared, posed, {deformation}).positions;
-                     }});
+    rules.push_back(
+        {to_string(deformation), [&, deformation](const Skeleton& posed) {
+           return in_frame(reconstruct_mesh(context, prepared, posed, {deformation}), posed.frame).positions;
+         }});
   rules.push_back({"polished", [&](const Skeleton& posed) {
-                     std::vector<Vec3> positions = reconstruct_mesh(context, prepared, posed).positions;
+                     std::vector<Vec3> positions = rules[0].pose(posed);
                      polish_pose(bind.mesh, positions);
                      return positions;
                    }});

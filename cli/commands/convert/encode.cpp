@@ -125,6 +125,7 @@ void check_bone_names(const Arguments& arguments, const EncodeOptions& options, 
           fmt::format("--bone-method: {} has no bone \"{}\"{}", arguments.skeleton, name, did_you_mean(name, names)));
 }
 
+/// Mesh and skeleton in the unit frame of the mesh.
 struct Input {
   TriangleMesh mesh;
   std::optional<TriangleTree> tree;
@@ -135,10 +136,18 @@ Input read_input(const Arguments& arguments, const EncodeOptions& options) {
   Input input{load_mesh(arguments.mesh), {}, read_skeleton(arguments.skeleton)};
   check_bone_names(arguments, options, input.skeleton);
   require_valid(input.mesh, input.skeleton, &input.tree);
-  if (arguments.subdivisions == 0) return input;
-  // The surface lies inside of what is convex: bones and nodes may leave it.
-  input.mesh = loop_surface(input.mesh, {}, arguments.subdivisions).mesh;
-  require_valid(input.mesh, input.skeleton, &input.tree);
+  if (arguments.subdivisions > 0) {
+    // The surface lies inside of what is convex: bones and nodes may leave it.
+    input.mesh = loop_surface(input.mesh, {}, arguments.subdivisions).mesh;
+    require_valid(input.mesh, input.skeleton, &input.tree);
+  }
+  const UnitFrame frame = unit_frame(input.mesh);
+  input.mesh = in_unit_frame(std::move(input.mesh), frame);
+  input.skeleton = in_unit_frame(std::move(input.skeleton), frame);
+  if (input.tree) {  // what it holds is in this frame already
+    input.tree->origin = Vec3::Zero();
+    input.tree->scale = 1;
+  }
   return input;
 }
 

@@ -66,7 +66,7 @@ Json encode_report_json(const EncodeReport& report, const EncodedFile& file) {
   Json json{{"mesh",
              {{"vertices", report.vertices},
               {"triangles", report.triangles},
-              {"diagonal", report.diagonal},
+              {"diagonal", report.scale * report.diagonal},
               {"genus", report.genus}}},
             {"bones", std::move(bones)},
             {"placing",

@@ -28,32 +28,34 @@ void run(const Arguments& arguments) {
   TriangleMesh mesh = load_mesh(arguments.mesh);
   const Skeleton skeleton = read_skeleton(arguments.skeleton);
   ClContext context(arguments.device);
+  UnitFrame frame;
   Segmentation segmentation;
   double half_edge_ms = 0, segmentation_ms = 0;
   {
     ProgressBar bar(context);
     bar.show("checking the input", 0);
     require_valid(mesh, skeleton);
+    frame = unit_frame(mesh);
     context.reset_profile();
     bar.show("segmenting", 0.5);
     Stopwatch watch;
-    CutMesh half_edges = cut_mesh_of(mesh);
+    CutMesh half_edges = cut_mesh_of(in_unit_frame(mesh, frame));
     half_edge_ms = watch.lap_ms();
-    segmentation = segment_mesh(context, std::move(half_edges), skeleton);
+    segmentation = segment_mesh(context, std::move(half_edges), in_unit_frame(skeleton, frame));
     segmentation_ms = watch.lap_ms();
     bar.show("writing", 0.9);
     std::vector<VertexColour> colours;
     for (const int bone : segmentation.triangle_bones) colours.push_back(bone_colour(bone));
     PlyAttributes attributes;
     attributes.face_colours = colours;
-    write_mesh(arguments.output, segmentation.cut_mesh, attributes);
+    write_mesh(arguments.output, in_user_units(segmentation.cut_mesh, frame), attributes);
   }
   Table table({"bone", "colour", "surface", "vertices", "triangles", "area"});
   Json bones = Json::array();
   for (const Segment& segment : segmentation.segments) {
     const std::string& name = skeleton.bones[segment.bone].name;
     const VertexColour colour = bone_colour(segment.bone);
-    const double area = surface_area(segment.mesh);
+    const double area = surface_area(segment.mesh) * frame.scale * frame.scale;
     table.add({name, hex(colour), to_string(segment.topology), fmt::format("{}", segment.mesh.positions.size()),
                fmt::format("{}", segment.mesh.triangles.size()), fmt::format("{:.6g}", area)});
     bones.push_back({{"name", name},

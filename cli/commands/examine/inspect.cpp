@@ -59,6 +59,8 @@ std::string model_text(const nlohmann::json& header, const std::string& path) {
   }
   std::size_t samples = 0;
   for (const auto& arc : header.at("arcs")) samples += arc.at("samples").size() / 2;
+  double diagonal = header.at("diagonal").get<double>();
+  if (header.contains("frame")) diagonal *= header.at("frame").at("scale").get<double>();
   const int width = header.at("texture").at("width").get<int>(), height = header.at("texture").at("height").get<int>();
   std::string text = fmt::format(
       "{}: model, format version {}\n{} x {} texels, {:.1f} % used; {} nodes, {} bones, genus {}; {} seams with {} "
@@ -67,7 +69,7 @@ std::string model_text(const nlohmann::json& header, const std::string& path) {
       "{:.6g}\n\n{}",
       path, header.at("version").dump(), width, height, 100.0 * static_cast<double>(texels) / width / height,
       skeleton.at("nodes").size(), skeleton.at("bones").size(), header.at("genus").get<int>(), header.at("arcs").size(),
-      samples, header.at("corners").size(), header.at("diagonal").get<double>(), table.text());
+      samples, header.at("corners").size(), diagonal, table.text());
   if (header.contains("encoder")) {
     text += "\nencoder\n";
     for (const auto& [key, value] : header.at("encoder").items())

@@ -111,9 +111,10 @@ View view_of(const Arguments& arguments, const nlohmann::json& own_view) {
   return view;
 }
 
-/// What is drawn, from either kind of input.
+/// What is drawn, from either kind of input, in the model's frame or the unit frame of the mesh.
 struct Subject {
   TriangleMesh mesh;
+  UnitFrame frame;
   std::vector<int> bones;  ///< per triangle, where the mode asks for it
   std::optional<SkeletexModel> model;
   std::optional<Skeleton> skeleton;  ///< as posed
@@ -124,8 +125,11 @@ Subject load_subject(const Arguments& arguments, ClContext& context) {
   if (!arguments.skeleton.empty()) subject.skeleton = read_skeleton(arguments.skeleton);
   if (!is_model(arguments.input)) {
     subject.mesh = load_mesh(arguments.input);
+    if (arguments.mode == "segments") require_valid(subject.mesh, *subject.skeleton);
+    subject.frame = unit_frame(subject.mesh);
+    subject.mesh = in_frame(std::move(subject.mesh), subject.frame);
+    if (subject.skeleton) subject.skeleton = in_frame(std::move(*subject.skeleton), subject.frame);
     if (arguments.mode == "segments") {
-      require_valid(subject.mesh, *subject.skeleton);
       Segmentation segmentation = segment_mesh(context, subject.mesh, *subject.skeleton);
       subject.mesh = std::move(segmentation.cut_mesh);
       subject.bones = std::move(segmentation.triangle_bones);
@@ -137,12 +141,13 @@ Subject load_subject(const Arguments& arguments, ClContext& context) {
       arguments.lattice != std::max(subject.model->texture.width, subject.model->texture.height))
     subject.model = resample_model(context, *subject.model, arguments.lattice);
   subject.skeleton = subject.model->skeleton;
+  subject.frame = subject.skeleton->frame;
   if (!arguments.pose.empty()) {
     const PoseAnimation animation = read_animation(arguments.pose, *subject.skeleton);
     subject.skeleton = apply_pose(*subject.skeleton, pose_at(*subject.skeleton, animation,
                                                              arguments.time.value_or(animation.frames.front().time)));
   }
-  subject.mesh = reconstruct_mesh(context, *subject.model);
+  subject.mesh = reconstruct_bind_mesh(context, *subject.model).mesh;
   if (arguments.mode == "segments")
     subject.bones = triangle_bones(number_lattice(*subject.model), subject.mesh.triangles);
   return subject;
@@ -177,7 +182,7 @@ SurfacePaint paint_of(const Arguments& arguments, const Subject& subject, ClCont
     paint.paint = Paint::kVertex;
     paint.colours = upload_colours(colours);
   } else if (arguments.mode == "error") {
-    const TriangleMesh other = load_mesh(arguments.against);
+    const TriangleMesh other = in_frame(load_mesh(arguments.against), subject.frame);
     const double diagonal = bounding_box(other).diagonal();
     std::vector<float> distances = closest_distances(context, other, subject.mesh.positions);
     scale.highest = arguments.error_max;
@@ -232,8 +237,11 @@ void pose_surface(GlContext& gl, ClContext& context, const Arguments& arguments,
   const PreparedModel model(*subject.model);
   const Deformation deformation = deformation_of(arguments.deform);
   const DistanceRule distance = arguments.is_distance_dropped ? DistanceRule::kFromFoot : DistanceRule::kFromBone;
+  const auto posed_mesh = [&] {
+    return in_frame(reconstruct_mesh(context, model, *subject.skeleton, {deformation, distance}), subject.frame);
+  };
   if (arguments.is_polished) {
-    TriangleMesh posed = reconstruct_mesh(context, model, *subject.skeleton, {deformation, distance});
+    TriangleMesh posed = posed_mesh();
     polish_pose(subject.mesh, posed.positions);
     surface = upload_surface(gl, posed);
     return;
@@ -243,7 +251,7 @@ void pose_surface(GlContext& gl, ClContext& context, const Arguments& arguments,
     return;
   }
   if (deformation == Deformation::kCoordinates) {
-    surface = upload_surface(gl, reconstruct_mesh(context, model, *subject.skeleton, {deformation, distance}));
+    surface = upload_surface(gl, posed_mesh());
     return;
   }
   const Skin skin = skin_of(context, model);
@@ -294,7 +302,7 @@ void run(Arguments arguments, const CLI::App& command) {
   check_arguments(arguments);
   const auto [width, height] = parse_picture_size(arguments.size);
   const std::optional<LinearRgb> background = parse_background(arguments.background);
-  const View view = view_of(arguments, own_view);
+  View view = view_of(arguments, own_view);
   Stopwatch watch;
   if (arguments.mode == "map" || arguments.mode == "layout") {
     run_texture(arguments, std::max(width, height));
@@ -304,6 +312,8 @@ void run(Arguments arguments, const CLI::App& command) {
   ProgressBar bar(context);
   bar.show("reading", 0.05);
   Subject subject = load_subject(arguments, context);
+  for (std::optional<Vec3>* point : {&view.target, &view.eye})
+    if (*point) *point = subject.frame.from_user(**point);
   ErrorScale scale;
   GlContext gl(arguments.gl_device);
   const double prepare_ms = watch.lap_ms();

@@ -6,32 +6,14 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <set>
 #include <tuple>
 
 #include "skeletex/analysis/findings.h"
+#include "skeletex/geometry/union_find.h"
 
 namespace skeletex {
 namespace {
-
-/// Parts of a graph over 0 .. size-1.
-class Parts {
- public:
-  explicit Parts(std::size_t size) : parent_(size) { std::iota(parent_.begin(), parent_.end(), 0); }
-  int find(int i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(int i, int j) {
-    i = find(i);
-    j = find(j);
-    parent_[std::max(i, j)] = std::min(i, j);
-  }
-
- private:
-  std::vector<int> parent_;
-};
 
 const char* plural(std::size_t count) { return count == 1 ? "" : "s"; }
 
@@ -43,8 +25,8 @@ Vec3 centre_of(const TriangleMesh& mesh, int triangle) {
 void find_holes(const TriangleMesh& mesh, const ManifoldReport& report, std::vector<Finding>& findings) {
   const auto& edges = report.boundary_edges;
   if (edges.empty()) return;
-  Parts parts(mesh.positions.size());
-  for (const auto& [a, b] : edges) parts.join(a, b);
+  UnionFind parts(static_cast<int>(mesh.positions.size()));
+  for (const auto& [a, b] : edges) parts.unite(a, b);
   struct Loop {
     int edges = 0;
     Vec3 centre = Vec3::Zero();
@@ -86,10 +68,10 @@ void find_components(const TriangleMesh& mesh, const ManifoldReport& report, std
   if (report.components <= 1) return;
   std::vector<bool> is_bad(mesh.triangles.size(), false);
   for (const int t : report.degenerate_triangles) is_bad[t] = true;
-  Parts parts(mesh.positions.size());
+  UnionFind parts(static_cast<int>(mesh.positions.size()));
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     if (!is_bad[t])
-      for (int k = 1; k < 3; ++k) parts.join(mesh.triangles[t][0], mesh.triangles[t][k]);
+      for (int k = 1; k < 3; ++k) parts.unite(mesh.triangles[t][0], mesh.triangles[t][k]);
   struct Component {
     int triangles = 0;
     Vec3 sum = Vec3::Zero();

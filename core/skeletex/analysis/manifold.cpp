@@ -7,26 +7,10 @@
 #include <numeric>
 #include <span>
 
+#include "skeletex/geometry/union_find.h"
+
 namespace skeletex {
 namespace {
-
-class DisjointSets {
- public:
-  explicit DisjointSets(std::size_t size) : parent_(size) { std::iota(parent_.begin(), parent_.end(), 0); }
-  int find(int i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(int i, int j) {
-    i = find(i);
-    j = find(j);
-    if (i != j) parent_[std::max(i, j)] = std::min(i, j);
-  }
-  bool is_root(int i) const { return parent_[i] == i; }
-
- private:
-  std::vector<int> parent_;
-};
 
 /// One side of an edge: the corner of a triangle that it starts at.
 struct Side {
@@ -91,14 +75,14 @@ int end_corner(int corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
 int vertex_of(const TriangleMesh& mesh, int corner) { return mesh.triangles[corner / 3][corner % 3]; }
 
 /// Files one edge under what it is, and joins the corners at its ends.
-void add_edge(const TriangleMesh& mesh, int vertex, std::span<const Side> uses, DisjointSets& fans,
+void add_edge(const TriangleMesh& mesh, int vertex, std::span<const Side> uses, UnionFind& fans,
               ManifoldReport& report) {
   const int corner = uses[0].corner;
   ++report.edges;
   for (const Side& side : uses.subspan(1)) {
     const bool is_same_way = vertex_of(mesh, side.corner) == vertex_of(mesh, corner);
-    fans.join(corner, is_same_way ? side.corner : end_corner(side.corner));
-    fans.join(end_corner(corner), is_same_way ? end_corner(side.corner) : side.corner);
+    fans.unite(corner, is_same_way ? side.corner : end_corner(side.corner));
+    fans.unite(end_corner(corner), is_same_way ? end_corner(side.corner) : side.corner);
   }
   if (uses.size() == 1)
     report.boundary_edges.push_back({vertex_of(mesh, corner), vertex_of(mesh, end_corner(corner))});
@@ -109,8 +93,8 @@ void add_edge(const TriangleMesh& mesh, int vertex, std::span<const Side> uses, 
 }
 
 /// Corners of one vertex that are joined through edges form a fan.
-DisjointSets join_fans(const TriangleMesh& mesh, const EdgeSides& edges, ManifoldReport& report) {
-  DisjointSets fans(3 * mesh.triangles.size());
+UnionFind join_fans(const TriangleMesh& mesh, const EdgeSides& edges, ManifoldReport& report) {
+  UnionFind fans(3 * static_cast<int>(mesh.triangles.size()));
   for (int v = 0; v < report.vertices; ++v)
     for (std::size_t first = edges.begin[v]; first < edges.begin[v + 1];) {
       std::size_t stop = first + 1;
@@ -129,22 +113,22 @@ ManifoldReport measure_manifold(const TriangleMesh& mesh) {
   report.vertices = static_cast<int>(mesh.positions.size());
   report.triangles = static_cast<int>(mesh.triangles.size());
   const std::vector<char> is_used = find_unusable(mesh, report);
-  DisjointSets fans = join_fans(mesh, sides_of_edges(mesh, is_used), report);
+  UnionFind fans = join_fans(mesh, sides_of_edges(mesh, is_used), report);
 
   std::vector<int> fan_counts(report.vertices, 0);
-  DisjointSets parts(report.vertices);
+  UnionFind parts(report.vertices);
   for (int t = 0; t < report.triangles; ++t) {
     if (!is_used[t]) continue;
-    for (int k = 0; k < 3; ++k) fan_counts[mesh.triangles[t][k]] += fans.is_root(3 * t + k);
-    parts.join(mesh.triangles[t][0], mesh.triangles[t][1]);
-    parts.join(mesh.triangles[t][0], mesh.triangles[t][2]);
+    for (int k = 0; k < 3; ++k) fan_counts[mesh.triangles[t][k]] += fans.find(3 * t + k) == 3 * t + k;
+    parts.unite(mesh.triangles[t][0], mesh.triangles[t][1]);
+    parts.unite(mesh.triangles[t][0], mesh.triangles[t][2]);
   }
   int used_vertices = 0;
   for (int v = 0; v < report.vertices; ++v) {
     if (fan_counts[v] == 0) continue;
     ++used_vertices;
     if (fan_counts[v] > 1) report.non_manifold_vertices.push_back(v);
-    report.components += parts.is_root(v);
+    report.components += parts.find(v) == v;
   }
   const int used_triangles = report.triangles - static_cast<int>(report.degenerate_triangles.size());
   report.genus = report.components - (used_vertices - report.edges + used_triangles) / 2;

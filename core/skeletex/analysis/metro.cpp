@@ -38,7 +38,7 @@ void check_mesh(const TriangleMesh& mesh, const char* which) {
 class DistanceSearch {
  public:
   DistanceSearch(ClContext& context, const TriangleMesh& mesh)
-      : mesh_(mesh), search_(context, build_triangle_tree(mesh)) {}
+      : mesh_(mesh), search_(context, mesh, build_triangle_tree(mesh)) {}
   /// Places along the curve -> triangles.
   const std::vector<int>& order() const { return search_.order(); }
 

@@ -95,7 +95,8 @@ std::vector<Finding> validate_input(ClContext& context, TriangleMesh& mesh, cons
   std::vector<Finding> findings = validate_before_segmentation(mesh, skeleton);
   if (has_errors(findings)) return findings;
   try {
-    segment_mesh(context, mesh, skeleton);
+    const UnitFrame frame = unit_frame(mesh);
+    segment_mesh(context, in_unit_frame(mesh, frame), in_unit_frame(skeleton, frame));
   } catch (const TopologyError& error) {
     findings.push_back(finding_of(error));
   } catch (const InputError& error) {

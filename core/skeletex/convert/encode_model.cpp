@@ -108,7 +108,7 @@ SkeletexModel start_model(const TriangleMesh& mesh, const Skeleton& skeleton) {
   if (!(model.diagonal >= kSmallestDiagonal && model.diagonal <= kLargestDiagonal))
     throw InputError(
         fmt::format("the mesh's bounding box has a diagonal of {:.3g}; the device computes in single precision, which "
-                    "needs {:g} to {:g}: scale mesh and skeleton",
+                    "needs {:g} to {:g}: give mesh and skeleton in the unit frame of the mesh",
                     model.diagonal, kSmallestDiagonal, kLargestDiagonal));
   // Euler's formula for a closed triangle mesh: edges are 3/2 of the triangles.
   model.genus = (2 - (static_cast<int>(mesh.positions.size()) - static_cast<int>(mesh.triangles.size()) / 2)) / 2;
@@ -270,8 +270,8 @@ struct BothDistances {
 BothDistances measure_both(const EncodeJob& job, const SkeletexModel& model, const MappedSurface& surface) {
   const PreparedModel prepared(model);
   const TriangleMesh mesh = reconstruct_mesh(job.context, prepared);
-  BothDistances both{distances_from_bones(job.context, surface.charts, build_triangle_tree(mesh), 0),
-                     distances_to_surface(job.context, model, prepared.lattice, mesh, job.tree)};
+  BothDistances both{distances_from_bones(job.context, surface.charts, mesh, build_triangle_tree(mesh), 0),
+                     distances_to_surface(job.context, model, prepared.lattice, mesh, job.mesh, job.tree)};
   double total = 0;
   for (std::size_t bone = 0; bone < both.from.size(); ++bone) {
     const double area = surface_area(surface.segmentation.segments[bone].mesh);
@@ -318,6 +318,7 @@ void report_result(const EncodeJob& job, const Encoding& encoding, const MappedS
   report.triangles = static_cast<int>(job.mesh.triangles.size());
   report.genus = model.genus;
   report.diagonal = model.diagonal;
+  report.scale = model.skeleton.frame.scale;
   report.used_fraction = encoding.used_fraction;
   report.placing = encoding.placing;
   report.unfold = texels.unfold;
@@ -325,18 +326,21 @@ void report_result(const EncodeJob& job, const Encoding& encoding, const MappedS
   report.fit = texels.fit;
   report.rounding = texels.rounding;
   report.revert = texels.revert;
-  const std::vector<BoneDistance> distances =
-      texels.revert
-          ? texels.revert->distances
-          : distances_from_bones(job.context, surface.charts, build_triangle_tree(reconstruct_mesh(job.context, model)),
-                                 kNearEnough * model.diagonal);
+  std::vector<BoneDistance> distances;
+  if (texels.revert) {
+    distances = texels.revert->distances;
+  } else {
+    const TriangleMesh decoded = reconstruct_mesh(job.context, model);
+    distances = distances_from_bones(job.context, surface.charts, decoded, build_triangle_tree(decoded),
+                                     kNearEnough * model.diagonal);
+  }
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
     const Segment& segment = surface.segmentation.segments[bone];
     BoneReport entry;
     entry.name = model.skeleton.bones[bone].name;
     entry.method = encoding.methods[bone];
     entry.topology = segment.topology;
-    entry.area = surface_area(segment.mesh);
+    entry.area = surface_area(segment.mesh) * model.skeleton.frame.scale * model.skeleton.frame.scale;
     entry.vertices = static_cast<int>(segment.mesh.positions.size());
     entry.triangles = static_cast<int>(segment.mesh.triangles.size());
     entry.rectangle = model.patches[bone].rectangle;
@@ -345,6 +349,7 @@ void report_result(const EncodeJob& job, const Encoding& encoding, const MappedS
     entry.sampled_triangle_fraction = texels.sampled_triangle_fractions[bone];
     entry.missed_texels = texels.missed_texels[bone];
     entry.distance = distances[bone];
+    entry.distance.place = model.skeleton.frame.to_user(distances[bone].place);
     entry.map = surface.reports[bone];
     report.bones.push_back(std::move(entry));
   }

@@ -55,14 +55,15 @@ struct BoneReport {
   std::string name;
   Method method = Method::kVsm;
   SegmentTopology topology = SegmentTopology::kAnnulus;
-  double area = 0;  ///< world units squared
+  double area = 0;  ///< in the user's units, squared
   int vertices = 0, triangles = 0;
   Rectangle rectangle;
   double unseen_area_fraction = 0;
   int flipped_triangles = 0;             ///< of the map
   double sampled_triangle_fraction = 0;  ///< share of the segment's triangles that a texel reads
   int missed_texels = 0;                 ///< SPD rays that hit nothing, filled from their neighbours
-  BoneDistance distance;                 ///< of its surface to the mesh that the decoder makes
+  BoneDistance
+      distance;  ///< of its surface to the mesh that the decoder makes, in the unit frame; its place is the user's
   MapReport map;
 };
 
@@ -74,7 +75,8 @@ inline bool lacks_part(const BoneReport& bone, double diagonal) {
 
 struct EncodeReport {
   int vertices = 0, triangles = 0, genus = 0;
-  double diagonal = 0;
+  double diagonal = 0;  ///< of the mesh in the frame of the model, as are the lengths of the reports below
+  double scale = 1;     ///< of that frame
   std::vector<BoneReport> bones;
   double used_fraction = 0;
   TexelPlacing placing;                    ///< what was chosen for VSM patches; of SPD models 0 texels per vertex
@@ -92,8 +94,10 @@ struct EncodeResult {
   EncodeReport report;
 };
 
-/// Turns a closed mesh and its skeleton into a model (paper 3.1-3.4): half edges, segments, maps, atlas, texels.
-/// \pre validate_before_segmentation reports no error      \throw TopologyError, InputError, DeviceError
+/// Turns a closed mesh and its skeleton into a model (paper 3.1-3.4): half edges, segments, maps, atlas, texels. Both
+/// are in the frame of the skeleton, which becomes that of the model; unit_frame (geometry/mesh.h) is the frame in
+/// which all scales and places give the same texels. \pre validate_before_segmentation reports no error      \throw
+/// TopologyError, InputError, DeviceError
 EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& skeleton,
                           const EncodeOptions& options = {});
 

@@ -35,7 +35,7 @@ const char* difference(const SkeletexModel& a, const SkeletexModel& b) {
   const auto same_corners = [](const SeamCorner& p, const SeamCorner& q) {
     return p.node == q.node && p.bones == q.bones;
   };
-  if (!std::ranges::equal(a.skeleton.nodes, b.skeleton.nodes, same_nodes) ||
+  if (a.skeleton.frame != b.skeleton.frame || !std::ranges::equal(a.skeleton.nodes, b.skeleton.nodes, same_nodes) ||
       !std::ranges::equal(a.skeleton.bones, b.skeleton.bones, same_bones))
     return "skeletons";
   if (a.texture.width != b.texture.width || a.texture.height != b.texture.height ||

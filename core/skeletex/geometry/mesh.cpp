@@ -5,9 +5,39 @@
 
 #include <Eigen/Geometry>
 
+#include "skeletex/model/error.h"
+
 namespace skeletex {
 
-std::string text_of(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x(), p.y(), p.z()); }
+UnitFrame unit_frame(const TriangleMesh& mesh) {
+  const BoundingBox box = bounding_box(mesh);
+  const double diagonal = box.diagonal();
+  if (!(diagonal >= kSmallestScale && diagonal <= kLargestScale))
+    throw InputError(fmt::format("the mesh's bounding box has a diagonal of {:.3g}; give a mesh of {:g} to {:g}",
+                                 diagonal, kSmallestScale, kLargestScale));
+  return {box.centre(), diagonal};
+}
+
+TriangleMesh in_unit_frame(TriangleMesh mesh, const UnitFrame& frame) {
+  for (Vec3& p : mesh.positions) p = frame.rounded_from_user(p);
+  return mesh;
+}
+
+TriangleMesh in_frame(TriangleMesh mesh, const UnitFrame& frame) {
+  for (Vec3& p : mesh.positions) p = frame.from_user(p);
+  return mesh;
+}
+
+TriangleMesh in_user_units(TriangleMesh mesh, const UnitFrame& frame) {
+  if (frame.is_identity()) return mesh;
+  for (Vec3& p : mesh.positions) p = frame.to_user(p);
+  return mesh;
+}
+
+std::string text_of(const Vec3& p) {
+  const int digits = p.cwiseAbs().maxCoeff() >= 1000 ? 10 : 6;  // far from the origin the first digits are all the same
+  return fmt::format("({:.{}g}, {:.{}g}, {:.{}g})", p.x(), digits, p.y(), digits, p.z(), digits);
+}
 
 BoundingBox bounding_box(const TriangleMesh& mesh) {
   if (mesh.positions.empty()) return {};

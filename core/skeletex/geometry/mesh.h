@@ -36,6 +36,30 @@ struct BoundingBox {
   double diagonal() const { return (upper - lower).norm(); }
 };
 
+/// Coordinates in which a body has a diagonal of 1 and lies around 0, so that single precision holds it: a point of the
+/// user is offset + scale * p. The default leaves points as they are.
+struct UnitFrame {
+  Vec3 offset = Vec3::Zero();
+  double scale = 1;
+  Vec3 from_user(const Vec3& p) const { return (p - offset) / scale; }
+  Vec3 to_user(const Vec3& p) const { return offset + scale * p; }
+  /// On a grid of 2^-30, a thousandth of what texels resolve: so one body gives the same numbers at every scale, in
+  /// spite of the rounding of its coordinates.
+  Vec3 rounded_from_user(const Vec3& p) const { return (from_user(p) * 0x1p30).array().rint() * 0x1p-30; }
+  bool is_identity() const { return offset == Vec3::Zero() && scale == 1; }
+  friend bool operator==(const UnitFrame&, const UnitFrame&) = default;
+};
+/// Diagonals of meshes, in the user's units, whose squares and cubes double precision holds with room to spare.
+inline constexpr double kSmallestScale = 1e-60, kLargestScale = 1e60;
+/// Offset and scale of a mesh: centre and diagonal of its bounding box.
+/// \throw InputError when it has no extent, or one beyond kSmallestScale and kLargestScale
+UnitFrame unit_frame(const TriangleMesh& mesh);
+/// A mesh of the user in its unit frame, rounded (UnitFrame::rounded_from_user).
+TriangleMesh in_unit_frame(TriangleMesh mesh, const UnitFrame& frame);
+/// A mesh of the user in a frame, and a mesh of a frame in the user's units.
+TriangleMesh in_frame(TriangleMesh mesh, const UnitFrame& frame);
+TriangleMesh in_user_units(TriangleMesh mesh, const UnitFrame& frame);
+
 /// A point for messages: "(0.12, 0.4, 0.03)".
 std::string text_of(const Vec3& point);
 /// Bounding box of all positions; zero for an empty mesh.

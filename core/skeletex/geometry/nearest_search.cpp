@@ -11,24 +11,22 @@ namespace skeletex {
 namespace {
 
 constexpr std::size_t kBlock = 1 << 13;
-constexpr float kMoreThanRounding = 1e-5f;  // of the mesh's extent, or of a distance
-constexpr float kBeyondAll = 1e30f;         // as in metro.cl
 constexpr ClKernelName kFindNearest{"metro.cl", "find_nearest_triangles"};
 
 }  // namespace
 
-NearestSearch::NearestSearch(ClContext& context, const TriangleTree& tree)
+NearestSearch::NearestSearch(ClContext& context, const TriangleMesh& mesh, const TriangleTree& tree)
     : context_(context),
       origin_(tree.origin),
       scale_(tree.scale),
       top_level_(tree.top_level()),
       order_(tree.order),
       boxes_(context.upload(tree.boxes)),
-      blocks_(context.upload(tree.blocks)),
+      blocks_(context.upload(triangles_of_blocks(mesh, tree))),
       level_begin_(context.upload(tree.level_begin)) {}
 
 void NearestSearch::find(std::span<const Vec3> points, std::span<int> triangles, std::span<float> distances,
-                         float enough, std::span<const float> bounds) {
+                         float enough) {
   const std::size_t count = points.size();
   if (count == 0) return;
   points_.resize(3 * count);
@@ -43,17 +41,9 @@ void NearestSearch::find(std::span<const Vec3> points, std::span<int> triangles,
   constexpr int kRun = 16;
   const std::size_t items = block_count(count, kRun);
   const float scaled_enough = enough / static_cast<float>(scale_);
-  std::vector<float> bounds_squared;
-  bounds_squared.reserve(bounds.size());
-  for (const float bound : bounds) {
-    const float scaled = kMoreThanRounding + (1 + kMoreThanRounding) * bound / static_cast<float>(scale_);
-    bounds_squared.push_back(std::min(kBeyondAll, scaled * scaled));
-  }
   context_.launch(kFindNearest, ClRange({items, 1}, {context_.work_group_size(kFindNearest, 32), 1}),
-                  NearestParameters{static_cast<int>(count), kRun, top_level_, static_cast<int>(!bounds.empty()),
-                                    scaled_enough * scaled_enough},
-                  context_.upload(points_), boxes_, blocks_, level_begin_, context_.upload(bounds_squared), nearest_,
-                  nearest_squared_);
+                  NearestParameters{static_cast<int>(count), kRun, top_level_, scaled_enough * scaled_enough},
+                  context_.upload(points_), boxes_, blocks_, level_begin_, nearest_, nearest_squared_);
   const auto [places, squared] = context_.download(nearest_, nearest_squared_);
   for (std::size_t i = 0; i < count; ++i) triangles[i] = order_[places[i]];
   if (distances.empty()) return;

@@ -12,7 +12,8 @@ namespace skeletex {
 /// The triangles of a mesh on the device, for nearest points. Of the tree it keeps what it needs.
 class NearestSearch {
  public:
-  NearestSearch(ClContext& context, const TriangleTree& tree);
+  /// \param tree  of the mesh
+  NearestSearch(ClContext& context, const TriangleMesh& mesh, const TriangleTree& tree);
   /// Places along the curve -> triangles.
   const std::vector<int>& order() const { return order_; }
 
@@ -20,11 +21,8 @@ class NearestSearch {
   /// fastest.
   /// \param distances  when given, those of the device: float32's resolution of the mesh's extent; world units
   /// \param enough     a triangle so near need not be the nearest: faster where only what is further matters; world
-  /// units
-  /// \param bounds     when given, per point how far the nearest triangle is at most: the nearer that is, the
-  /// faster; world units
-  void find(std::span<const Vec3> points, std::span<int> triangles, std::span<float> distances = {}, float enough = 0,
-            std::span<const float> bounds = {});
+  ///                   units
+  void find(std::span<const Vec3> points, std::span<int> triangles, std::span<float> distances = {}, float enough = 0);
 
  private:
   ClContext& context_;

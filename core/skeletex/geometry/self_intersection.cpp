@@ -247,18 +247,18 @@ constexpr int kWidth = TriangleTree::kWidth;
 using Box = std::array<float, 6>;  // least x, y, z, greatest x, y, z, in the tree's units
 using Pairs = std::vector<std::array<int, 2>>;
 
-/// Boxes of a block's triangles, as the tree has them for its blocks: six planes of eight.
-std::array<float, 6 * kWidth> boxes_of_block(const TriangleTree& tree, std::size_t block) {
-  constexpr float kMargin = 3e-7f;  // rounding of the corners and of the edges that lead to them
-  std::array<float, 6 * kWidth> boxes;
-  const float* from = tree.blocks.data() + block * 9 * kWidth;
-  for (int d = 0; d < 3; ++d)
-    for (int k = 0; k < kWidth; ++k) {
-      const float corner = from[d * kWidth + k], second = from[(3 + d) * kWidth + k],
-                  third = from[(6 + d) * kWidth + k];
-      boxes[d * kWidth + k] = corner + std::min(0.0f, std::min(second, third)) - kMargin;
-      boxes[(3 + d) * kWidth + k] = corner + std::max(0.0f, std::max(second, third)) + kMargin;
-    }
+/// Boxes of a block's triangles: six planes of eight.
+std::array<float, 6 * kWidth> boxes_of_block(const TriangleMesh& mesh, const TriangleTree& tree, std::size_t block) {
+  constexpr float kMargin = 3e-7f;  // rounding of the corners
+  std::array<float, 6 * kWidth> boxes{};
+  const std::size_t begin = block * kWidth, end = std::min(begin + kWidth, tree.order.size());
+  for (std::size_t place = begin; place < end; ++place) {
+    const auto [a, b, c] = mesh.triangles[tree.order[place]];
+    const Eigen::Array3f p = tree.points[a], q = tree.points[b], r = tree.points[c];
+    const Eigen::Array3f low = p.min(q).min(r) - kMargin, high = p.max(q).max(r) + kMargin;
+    for (int d = 0; d < 3; ++d)
+      boxes[d * kWidth + place - begin] = low[d], boxes[(3 + d) * kWidth + place - begin] = high[d];
+  }
   return boxes;
 }
 
@@ -336,22 +336,22 @@ struct PairSearch {
     std::array<Box, kWidth> boxes;
     std::array<std::size_t, kWidth> places;
     int count = 0;
-    const std::array<float, 6 * kWidth> planes = boxes_of_block(tree, block);
-    Box around{};
-    for (std::size_t place = begin; place < end; ++place) {
-      if (!is_in_query(tree.order[place])) continue;
-      Box& box = boxes[count];
-      for (int d = 0; d < 6; ++d) box[d] = planes[d * kWidth + (place - begin)];
-      for (int d = 0; d < 3; ++d) {
-        around[d] = count == 0 ? box[d] : std::min(around[d], box[d]);
-        around[3 + d] = count == 0 ? box[3 + d] : std::max(around[3 + d], box[3 + d]);
-      }
-      places[count++] = place;
-    }
+    for (std::size_t place = begin; place < end; ++place)
+      if (is_in_query(tree.order[place])) places[count++] = place;
     if (count == 0) return;
+    const std::array<float, 6 * kWidth> planes = boxes_of_block(mesh, tree, block);
+    Box around{};
+    for (int i = 0; i < count; ++i) {
+      Box& box = boxes[i];
+      for (int d = 0; d < 6; ++d) box[d] = planes[d * kWidth + (places[i] - begin)];
+      for (int d = 0; d < 3; ++d) {
+        around[d] = i == 0 ? box[d] : std::min(around[d], box[d]);
+        around[3 + d] = i == 0 ? box[3 + d] : std::max(around[3 + d], box[3 + d]);
+      }
+    }
     list_blocks(around, is_queried.empty() ? block : 0, listed);
     for (const std::size_t other : listed) {
-      const std::array<float, 6 * kWidth> others = boxes_of_block(tree, other);
+      const std::array<float, 6 * kWidth> others = boxes_of_block(mesh, tree, other);
       for (int i = 0; i < count; ++i) add_pairs(places[i], boxes[i], other, others.data(), found);
     }
   }

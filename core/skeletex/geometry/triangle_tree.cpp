@@ -29,31 +29,20 @@ Box joined(const Box& a, const Box& b) {
   return box;
 }
 
-/// Writes a block's triangles into the tree.
-/// \return their box
-Box fill_block(const TriangleMesh& mesh, std::size_t block, TriangleTree& tree) {
-  float* planes = tree.blocks.data() + block * 9 * kWidth;
+Eigen::Vector3f point_of(const TriangleTree& tree, const Vec3& position) {
+  return ((position - tree.origin) / tree.scale).cast<float>();
+}
+
+/// Around a block's triangles.
+Box box_of_block(const TriangleMesh& mesh, std::size_t block, const TriangleTree& tree) {
   Box around = kNoBox;
-  for (std::size_t k = 0; k < kWidth; ++k) {
-    const std::size_t place = block * kWidth + k;
-    if (place >= tree.order.size()) {
-      for (std::size_t plane = 0; plane < 9; ++plane) planes[plane * kWidth + k] = plane < 3 ? kFarAway : 0.0f;
-      continue;
+  const std::size_t end = std::min((block + 1) * kWidth, tree.order.size());
+  for (std::size_t place = block * kWidth; place < end; ++place)
+    for (const int vertex : mesh.triangles[tree.order[place]]) {
+      const Eigen::Vector3f& p = tree.points[vertex];
+      around = joined(around, {p[0] - kMargin, p[1] - kMargin, p[2] - kMargin,  //
+                               p[0] + kMargin, p[1] + kMargin, p[2] + kMargin});
     }
-    const Triangle& triangle = mesh.triangles[tree.order[place]];
-    std::array<Vec3, 3> p;
-    for (int v = 0; v < 3; ++v) {
-      p[v] = (mesh.positions[triangle[v]] - tree.origin) / tree.scale;
-      const Eigen::Vector3f rounded = p[v].cast<float>();
-      around = joined(around, {rounded[0] - kMargin, rounded[1] - kMargin, rounded[2] - kMargin,  //
-                               rounded[0] + kMargin, rounded[1] + kMargin, rounded[2] + kMargin});
-    }
-    for (int d = 0; d < 3; ++d) {
-      planes[d * kWidth + k] = static_cast<float>(p[0][d]);
-      planes[(3 + d) * kWidth + k] = static_cast<float>(p[1][d] - p[0][d]);
-      planes[(6 + d) * kWidth + k] = static_cast<float>(p[2][d] - p[0][d]);
-    }
-  }
   return around;
 }
 
@@ -104,24 +93,52 @@ TriangleTree build_triangle_tree(const TriangleMesh& mesh, std::vector<int> orde
     nodes += sizes.back();
   } while (sizes.back() > 1);
 
-  tree.blocks.resize(sizes[0] * 9 * kWidth);
+  tree.points.resize(mesh.positions.size());
+  for_each_block(tree.points.size(), 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) tree.points[v] = point_of(tree, mesh.positions[v]);
+  });
   tree.boxes.assign(nodes * 6 * kWidth, kFarAway);
   for_each_block(sizes[0], 1 << 12, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t block = begin; block < end; ++block) set_box(0, block, fill_block(mesh, block, tree), tree);
+    for (std::size_t block = begin; block < end; ++block) set_box(0, block, box_of_block(mesh, block, tree), tree);
   });
   for (int level = 1; level < tree.top_level(); ++level)
     for (std::size_t node = 0; node < sizes[level]; ++node) set_box(level, node, box_of_node(level, node, tree), tree);
   return tree;
 }
 
+std::vector<float> triangles_of_blocks(const TriangleMesh& mesh, const TriangleTree& tree) {
+  const std::size_t blocks = block_count(tree.order.size(), kWidth);
+  std::vector<float> values(blocks * 9 * kWidth);
+  for_each_block(blocks * kWidth, 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t place = begin; place < end; ++place) {
+      float* const planes = values.data() + place / kWidth * 9 * kWidth + place % kWidth;
+      const bool is_past_end = place >= tree.order.size();
+      const Triangle triangle = is_past_end ? Triangle{} : mesh.triangles[tree.order[place]];
+      const Vec3 a = (mesh.positions[triangle[0]] - tree.origin) / tree.scale,
+                 b = (mesh.positions[triangle[1]] - tree.origin) / tree.scale,
+                 c = (mesh.positions[triangle[2]] - tree.origin) / tree.scale;
+      for (int d = 0; d < 3; ++d) {
+        planes[d * kWidth] = is_past_end ? kFarAway : static_cast<float>(a[d]);
+        planes[(3 + d) * kWidth] = static_cast<float>(b[d] - a[d]);
+        planes[(6 + d) * kWidth] = static_cast<float>(c[d] - a[d]);
+      }
+    }
+  });
+  return values;
+}
+
 void update_triangle_tree(const TriangleMesh& mesh, std::span<const int> places, TriangleTree& tree) {
   std::vector<std::size_t> nodes;
-  for (const int place : places) nodes.push_back(static_cast<std::size_t>(place) / kWidth);
+  for (const int place : places) {
+    nodes.push_back(static_cast<std::size_t>(place) / kWidth);
+    for (const int vertex : mesh.triangles[tree.order[place]])
+      tree.points[vertex] = point_of(tree, mesh.positions[vertex]);
+  }
   for (int level = 0; level < tree.top_level(); ++level) {
     std::sort(nodes.begin(), nodes.end());
     nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
     for (std::size_t& node : nodes) {
-      set_box(level, node, level == 0 ? fill_block(mesh, node, tree) : box_of_node(level, node, tree), tree);
+      set_box(level, node, level == 0 ? box_of_block(mesh, node, tree) : box_of_node(level, node, tree), tree);
       node /= kWidth;
     }
   }
@@ -159,7 +176,7 @@ void open_children(const TriangleTree& tree, const OpenNode& node, const Eigen::
 NearestTriangle find_nearest_triangle(const TriangleMesh& mesh, const TriangleTree& tree, const Vec3& point,
                                       double bound, const std::function<bool(int triangle)>& counts) {
   constexpr double kRounding = 1e-6;  // of the tree's units: more than what rounding to float32 moves a point or box
-  const Eigen::Vector3f place = ((point - tree.origin) / tree.scale).cast<float>();
+  const Eigen::Vector3f place = point_of(tree, point);
   NearestTriangle nearest{-1, bound};
   const auto least_squared = [&] {
     const double scaled = std::min(1e9, nearest.distance / tree.scale) + kRounding;

@@ -17,10 +17,8 @@ struct TriangleTree {
   static constexpr int kWidth = 8;
   Vec3 origin = Vec3::Zero();
   double scale = 1;
-  std::vector<int> order;  ///< place in the tree -> triangle of the mesh
-  /// Per block nine planes of eight values: x, y, z of the first vertex, then of the edges to the second and third.
-  /// Places past the end hold a triangle far away.
-  std::vector<float> blocks;
+  std::vector<int> order;               ///< place in the tree -> triangle of the mesh
+  std::vector<Eigen::Vector3f> points;  ///< the mesh's vertices
   /// Per node of levels 1 and up six planes of eight values, one per child: least x, y, z, greatest x, y, z. Places
   /// past the end hold a box far away.
   std::vector<float> boxes;
@@ -34,6 +32,10 @@ TriangleTree build_triangle_tree(const TriangleMesh& mesh);
 /// The same over the triangles in a given order, in which those that follow each other lie near each other.
 /// \param order  each triangle once
 TriangleTree build_triangle_tree(const TriangleMesh& mesh, std::vector<int> order);
+
+/// The triangles of the tree's blocks: per block nine planes of eight values, x, y, z of the first vertex, then of the
+/// edges to the second and third. Places past the end hold a triangle far away.
+std::vector<float> triangles_of_blocks(const TriangleMesh& mesh, const TriangleTree& tree);
 
 /// Makes a tree fit again after triangles have moved, by no more than their mesh's extent.
 /// \param places  theirs in the order of the tree

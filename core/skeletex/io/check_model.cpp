@@ -20,6 +20,11 @@ class ModelCheck {
     require(m_.diagonal >= kSmallestDiagonal && m_.diagonal <= kLargestDiagonal, "diagonal",
             fmt::format("must be a length from {:g} to {:g}, as single precision holds no others", kSmallestDiagonal,
                         kLargestDiagonal));
+    const UnitFrame& frame = m_.skeleton.frame;
+    require(frame.scale >= kSmallestScale && frame.scale <= kLargestScale, "frame",
+            fmt::format("its scale must be a length from {:g} to {:g}", kSmallestScale, kLargestScale));
+    require(frame.offset.allFinite() && frame.offset.cwiseAbs().maxCoeff() <= kLargestScale, "frame",
+            fmt::format("its offset must lie within {:g} of zero", kLargestScale));
     require(m_.origin.allFinite() && m_.origin.cwiseAbs().maxCoeff() <= 1e12 * m_.diagonal, "origin",
             "must be finite, and within 1e12 diagonals of zero");
     require(m_.genus >= 0, "genus", "must not be negative");

@@ -47,12 +47,19 @@ void append(std::string& out, VertexColour colour) {
   append(out, colour.b);
 }
 
-/// What is written as single precision must stay a number in it.
+/// Whether positions take double precision: far from the origin, or where single precision ends.
+bool needs_double(const TriangleMesh& mesh) {
+  constexpr double kMostDiagonals = 8, kSmallest = 1e-30, kLargest = 1e37;  // a rounding of 2^-22 diagonals
+  const BoundingBox box = bounding_box(mesh);
+  const double farthest = std::max(box.lower.cwiseAbs().maxCoeff(), box.upper.cwiseAbs().maxCoeff());
+  return box.diagonal() < kSmallest || farthest > kLargest || farthest > kMostDiagonals * box.diagonal();
+}
+
+/// What is written must be a number.
 void check_finite(const TriangleMesh& mesh, const PlyAttributes& attributes, const std::string& where) {
-  const auto is_good = [](double x) { return std::isfinite(static_cast<float>(x)); };
   for (std::size_t i = 0; i < mesh.positions.size(); ++i)
     for (int axis = 0; axis < 3; ++axis)
-      if (!is_good(mesh.positions[i][axis]))
+      if (!std::isfinite(mesh.positions[i][axis]))
         throw IoError(fmt::format("{}: {} of vertex {} is {}, which the file cannot hold; nothing was written", where,
                                   "xyz"[axis], i, mesh.positions[i][axis]));
   for (std::size_t i = 0; i < attributes.vertex_normals.size(); ++i)
@@ -66,9 +73,10 @@ void check_finite(const TriangleMesh& mesh, const PlyAttributes& attributes, con
 
 void write_ply(OutputFile& file, const TriangleMesh& mesh, const PlyAttributes& attributes) {
   constexpr const char* kColour = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  const bool has_doubles = needs_double(mesh);
   std::string header = fmt::format(
-      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n",
-      mesh.positions.size());
+      "ply\nformat binary_little_endian 1.0\nelement vertex {0}\nproperty {1} x\nproperty {1} y\nproperty {1} z\n",
+      mesh.positions.size(), has_doubles ? "double" : "float");
   if (!attributes.vertex_normals.empty()) header += "property float nx\nproperty float ny\nproperty float nz\n";
   if (!attributes.vertex_colours.empty()) header += kColour;
   if (!attributes.vertex_property.empty())
@@ -77,7 +85,7 @@ void write_ply(OutputFile& file, const TriangleMesh& mesh, const PlyAttributes& 
   if (!attributes.face_colours.empty()) header += kColour;
   file.write(header + "end_header\n");
   write_blocks(file, mesh.positions.size(), [&](std::size_t i, std::string& out) {
-    for (const double x : mesh.positions[i]) append(out, static_cast<float>(x));
+    for (const double x : mesh.positions[i]) has_doubles ? append(out, x) : append(out, static_cast<float>(x));
     for (int axis = 0; axis < 3 && !attributes.vertex_normals.empty(); ++axis)
       append(out, static_cast<float>(attributes.vertex_normals[i][axis]));
     if (!attributes.vertex_colours.empty()) append(out, attributes.vertex_colours[i]);
@@ -91,9 +99,10 @@ void write_ply(OutputFile& file, const TriangleMesh& mesh, const PlyAttributes& 
 }
 
 void write_obj(OutputFile& file, const TriangleMesh& mesh) {
+  const int digits = needs_double(mesh) ? 17 : 9;
   write_blocks(file, mesh.positions.size(), [&](std::size_t i, std::string& out) {
     const Vec3& p = mesh.positions[i];
-    fmt::format_to(std::back_inserter(out), "v {:.9g} {:.9g} {:.9g}\n", p[0], p[1], p[2]);
+    fmt::format_to(std::back_inserter(out), "v {:.{}g} {:.{}g} {:.{}g}\n", p[0], digits, p[1], digits, p[2], digits);
   });
   write_blocks(file, mesh.triangles.size(), [&](std::size_t i, std::string& out) {
     const Triangle& t = mesh.triangles[i];

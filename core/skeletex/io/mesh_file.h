@@ -16,8 +16,9 @@ struct MeshFile {
   int triangles = 0;      ///< after polygons were split into fans
   int degenerate_faces =
       0;  ///< faces with fewer than three different vertices (after welding): they have no area and are left out
-  int vertices_in_file = 0;  ///< for STL, three per triangle
-  int merged_vertices = 0;   ///< equal positions welded (STL; other formats are not welded)
+  int vertices_in_file = 0;   ///< for STL, three per triangle
+  int merged_vertices = 0;    ///< equal positions welded (STL; other formats are not welded)
+  bool ends_in_face = false;  ///< OBJ: the last line is a face without a line break, as where a file was cut
   MeshAttributes attributes;
   std::vector<std::string> material_files;  ///< that an OBJ names, as it names them
 };
@@ -45,10 +46,10 @@ struct PlyAttributes {
   std::span<const Vec3> vertex_normals;  ///< nx, ny, nz
 };
 
-/// Writes binary PLY (little endian, float positions) or OBJ by the ending, under a temporary name that is renamed when
-/// complete. Attributes go into PLY only.
-/// \throw IoError (unknown ending, folder not writable, disk full, attributes that do not fit the mesh, a number that
-/// is not finite in single precision): no file is left behind
+/// Writes binary PLY (little endian) or OBJ by the ending, under a temporary name that is renamed when complete.
+/// Positions have single precision, or double where that is needed: far from the origin, and for very small or large
+/// meshes. Attributes go into PLY only. \throw IoError (unknown ending, folder not writable, disk full, attributes that
+/// do not fit the mesh, a number that is not finite): no file is left behind
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, const PlyAttributes& attributes = {});
 
 }  // namespace skeletex

@@ -107,6 +107,19 @@ TexelSampling sampling_from(const Entry& header) {
   return {is_true("prefilter"), is_true("snap"), is_true("fit")};
 }
 
+Vec3 vector_from(const Entry& entry) {
+  const std::vector<double> values = entry.numbers();
+  if (values.size() != 3) entry.fail("three numbers are expected");
+  return {values[0], values[1], values[2]};
+}
+
+/// Models of version 1 are in the user's units.
+UnitFrame frame_from(const Entry& header) {
+  if (!header.has("frame")) return {};
+  const Entry frame = header.member("frame");
+  return {vector_from(frame.member("offset")), frame.member("scale").number()};
+}
+
 SeamCorner corner_from(const Entry& entry, const Skeleton& skeleton) {
   SeamCorner corner;
   corner.node = entry.member("node").index_into(skeleton.nodes.size());
@@ -198,7 +211,9 @@ json conventions() {
        "Kind "
        "\"normal\": the unit normal (a, c, n) along, around and out as p = (a, c) / (|a| + |c| + |n|), and where n < 0 "
        "as ((1 - |p2|) sign(p1), (1 - |p1|) sign(p2)); \"colour\": linear light; \"number\": any number"},
-      {"units", "lengths in the units of the input mesh, angles in turns"},
+      {"units",
+       "lengths and places in the unit frame, in which the input has a diagonal of 1: in the user's units a place p is "
+       "frame.offset + frame.scale p; angles in turns"},
   };
 }
 
@@ -307,10 +322,12 @@ json model_to_json(const SkeletexModel& model, const std::string& where) {
   for (const SeamCorner& corner : model.corners)
     corners.push_back(
         {{"node", corner.node}, {"bones", corner.bones}, {"sample", {corner.sample.turn, corner.sample.distance}}});
+  const UnitFrame& frame = model.skeleton.frame;
   json result = {{"format", "skeletex"},
                  {"version", kModelFileVersion},
                  {"conventions", conventions()},
                  {"skeleton", skeleton_to_json(model.skeleton)},
+                 {"frame", {{"offset", {frame.offset[0], frame.offset[1], frame.offset[2]}}, {"scale", frame.scale}}},
                  {"origin", {model.origin[0], model.origin[1], model.origin[2]}},
                  {"diagonal", model.diagonal},
                  {"genus", model.genus},
@@ -352,9 +369,8 @@ SkeletexModel model_from_json(const json& root, const std::string& where) {
 
   SkeletexModel model;
   model.skeleton = skeleton_from_json(header.member("skeleton").value(), where + ": skeleton");
-  const std::vector<double> origin = header.member("origin").numbers();
-  if (origin.size() != 3) header.member("origin").fail("three numbers are expected");
-  model.origin = {origin[0], origin[1], origin[2]};
+  model.skeleton.frame = frame_from(header);
+  model.origin = vector_from(header.member("origin"));
   model.diagonal = header.member("diagonal").number();
   model.genus = header.member("genus").integer(0, kMaxInt);
   model.diagonals = diagonals_from(header);

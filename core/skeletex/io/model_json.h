@@ -9,7 +9,7 @@
 namespace skeletex {
 
 /// Version of the model file's JSON that this library writes, and the newest it reads.
-inline constexpr int kModelFileVersion = 1;
+inline constexpr int kModelFileVersion = 2;
 
 /// Everything of a model but its texels (docs/file-formats.md). Doubles come back bit by bit.
 /// \throw IoError when names or settings are no valid text

@@ -37,21 +37,30 @@ std::size_t index_of(const std::vector<Named>& all, const std::string& name, con
 }
 
 /// A number of a pose: what is larger is a slip of the pen, and its square may be infinite.
-double pose_number(const nlohmann::json& json, const std::string& where) {
-  constexpr double kMost = 1e15;
-  const double value = json_number(json, where);
-  if (std::abs(value) > kMost)
+/// \param unit  what the number is measured in
+double pose_number(const nlohmann::json& json, const std::string& where, double unit = 1) {
+  const double most = 1e15 * unit, value = json_number(json, where);
+  if (std::abs(value) > most)
     throw IoError(
-        fmt::format("{}: {:g} is out of range; numbers of a pose go from {:g} to {:g}", where, value, -kMost, kMost));
+        fmt::format("{}: {:g} is out of range; numbers of a pose go from {:g} to {:g}", where, value, -most, most));
   return value;
 }
 
 template <std::size_t N>
-Eigen::Matrix<double, N, 1> numbers_from_json(const nlohmann::json& json, const char* what, const std::string& where) {
+Eigen::Matrix<double, N, 1> numbers_from_json(const nlohmann::json& json, const char* what, const std::string& where,
+                                              double unit = 1) {
   if (!json.is_array() || json.size() != N) throw IoError(fmt::format("{}: {} is expected", where, what));
   Eigen::Matrix<double, N, 1> v;
-  for (std::size_t i = 0; i < N; ++i) v[static_cast<Eigen::Index>(i)] = pose_number(json[i], where);
+  for (std::size_t i = 0; i < N; ++i) v[static_cast<Eigen::Index>(i)] = pose_number(json[i], where, unit);
   return v;
+}
+
+/// The largest number by which nodes are measured: that of a skeleton far from the origin, or of a large one.
+double unit_of(const Skeleton& skeleton) {
+  double unit = skeleton.frame.scale;
+  for (const Node& node : skeleton.nodes)
+    unit = std::max(unit, skeleton.frame.to_user(node.position).cwiseAbs().maxCoeff());
+  return unit;
 }
 
 Eigen::Quaterniond rotation_from_json(const nlohmann::json& json, const std::string& where) {
@@ -89,7 +98,8 @@ Pose pose_from_json(const nlohmann::json& json, const Skeleton& skeleton, const 
     for (const Node& node : skeleton.nodes) pose.nodes.push_back(node.position);
     for (const auto& [name, value] : object_member(json, "nodes", where).items())
       pose.nodes[index_of(skeleton.nodes, name, "node", where + ", \"nodes\"")] =
-          numbers_from_json<3>(value, "three numbers [x, y, z]", fmt::format("{}, \"nodes\", \"{}\"", where, name));
+          skeleton.frame.from_user(numbers_from_json<3>(
+              value, "three numbers [x, y, z]", fmt::format("{}, \"nodes\", \"{}\"", where, name), unit_of(skeleton)));
   }
   if (json.contains("roll")) {
     pose.rolls.assign(skeleton.bones.size(), 0);
@@ -136,8 +146,10 @@ nlohmann::json pose_to_json(const Pose& pose, const Skeleton& skeleton) {
       json["rotations"][skeleton.bones[i].name] = {{"quaternion", {q.x(), q.y(), q.z(), q.w()}}};
   }
   for (std::size_t i = 0; i < pose.nodes.size(); ++i)
-    if (pose.nodes[i] != skeleton.nodes[i].position)
-      json["nodes"][skeleton.nodes[i].name] = {pose.nodes[i][0], pose.nodes[i][1], pose.nodes[i][2]};
+    if (pose.nodes[i] != skeleton.nodes[i].position) {
+      const Vec3 node = skeleton.frame.to_user(pose.nodes[i]);
+      json["nodes"][skeleton.nodes[i].name] = {node[0], node[1], node[2]};
+    }
   for (std::size_t i = 0; i < pose.rolls.size(); ++i)
     if (pose.rolls[i] != 0) json["roll"][skeleton.bones[i].name] = pose.rolls[i] * 180 / std::numbers::pi;
   return json;

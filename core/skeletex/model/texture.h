@@ -76,7 +76,7 @@ struct TexelSampling {
   bool is_fitted = false;  ///< those of VSM patches were moved so that the triangles between lie nearer to the mesh
 };
 
-/// Lengths, in the units of the mesh, whose squares single precision holds with room to spare: diagonals of models lie
+/// Lengths, in the frame of the model, whose squares single precision holds with room to spare: diagonals of models lie
 /// between them.
 inline constexpr double kSmallestDiagonal = 1e-15, kLargestDiagonal = 1e15;
 /// How many diagonals a model's nodes, seams and texels may lie away from its origin.
@@ -96,10 +96,11 @@ struct Layer {
   std::vector<std::vector<float>> planes;  ///< as those of the texture
 };
 
-/// A model: one texture and what is needed to turn it back into a mesh.
+/// A model: one texture and what is needed to turn it back into a mesh. Its lengths and places are in the frame of its
+/// skeleton; reconstruct_mesh gives the user's units.
 struct SkeletexModel {
   Skeleton skeleton;           ///< bind pose, every bone with its s
-  Vec3 origin = Vec3::Zero();  ///< world position that device coordinates are relative to (the input's box centre)
+  Vec3 origin = Vec3::Zero();  ///< place that device coordinates are relative to (the input's box centre)
   double diagonal = 0;         ///< of the input mesh's bounding box
   int genus = 0;
   DiagonalRule diagonals = DiagonalRule::kNearest;
@@ -115,5 +116,9 @@ struct SkeletexModel {
   std::vector<Layer> layers;
   std::string encoder_settings;  ///< JSON object: how the model was made, for the record; nothing depends on it
 };
+
+/// The same model in another frame. Of scales that differ, texels are rounded once more.
+/// \throw InputError when its diagonal would not be between kSmallestDiagonal and kLargestDiagonal there
+SkeletexModel in_frame(SkeletexModel model, const UnitFrame& frame);
 
 }  // namespace skeletex

@@ -51,16 +51,8 @@ void download_texels(ClContext& context, const DevicePlanes& texels, Displacemen
 }
 
 DeviceTables upload_tables(ClContext& context, const FrameTables& tables) {
-  const std::size_t count = tables.columns.size();
-  std::vector<float> columns(4 * count);
-  for (std::size_t i = 0; i < count; ++i) {
-    columns[i] = tables.columns[i].cosine;
-    columns[count + i] = tables.columns[i].sine;
-    columns[2 * count + i] = tables.columns[i].slope_head;
-    columns[3 * count + i] = tables.columns[i].slope_tail;
-  }
-  return {context.upload(tables.patches), context.upload(tables.rows), context.upload(columns),
-          static_cast<int>(count)};
+  return {context.upload(tables.patches), context.upload(tables.rows), upload_columns(context, tables.columns),
+          static_cast<int>(tables.columns.size())};
 }
 
 FrameTables in_bone_axes(FrameTables tables) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <array>
+#include <bit>
 #include <span>
 #include <vector>
 
@@ -33,6 +34,16 @@ std::array<std::vector<float>, 3> download_planes(ClContext& context, const Devi
 void download_points(ClContext& context, const DevicePlanes& points, const Vec3& origin, std::span<Vec3> positions);
 /// Waits for the queue and copies the planes to a texture, whose size is left as it is.
 void download_texels(ClContext& context, const DevicePlanes& texels, DisplacementTexture& texture);
+
+/// Records of four floats (ColumnRecord, PosedColumnRecord) as four planes behind each other.
+template <class Record>
+ClBuffer<float> upload_columns(ClContext& context, const std::vector<Record>& records) {
+  std::vector<float> planes(4 * records.size());
+  for (std::size_t i = 0; i < records.size(); ++i)
+    for (std::size_t k = 0; k < 4; ++k)
+      planes[k * records.size() + i] = std::bit_cast<std::array<float, 4>>(records[i])[k];
+  return context.upload(planes);
+}
 
 /// The frame tables on the device. The columns are four planes: cosine, sine, slope_head, slope_tail.
 struct DeviceTables {

@@ -53,6 +53,12 @@ std::vector<LatticeRow> lattice_rows(const std::vector<Patch>& patches, RowChoic
   return rows;
 }
 
+std::vector<LatticeRow> quad_rows(const std::vector<Patch>& patches) {
+  std::vector<LatticeRow> rows = lattice_rows(patches, RowChoice::kInner);
+  std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == patches[row[0]].rectangle.height - 2; });
+  return rows;
+}
+
 Lattice number_lattice(const SkeletexModel& model) {
   const int count = static_cast<int>(model.patches.size());
   Lattice lattice;

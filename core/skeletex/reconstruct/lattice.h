@@ -31,6 +31,8 @@ enum class RowChoice { kAll, kInner };  ///< kInner leaves out rows 0 and height
 
 /// The chosen rows of every patch. Vertices and quads are numbered patch by patch, row by row.
 std::vector<LatticeRow> lattice_rows(const std::vector<Patch>& patches, RowChoice choice);
+/// The inner rows that quads begin at: all but the last one of each patch.
+std::vector<LatticeRow> quad_rows(const std::vector<Patch>& patches);
 
 /// \throw InputError when a rectangle is below 4 x 4 or arcs and ends do not fit together, naming the bone
 Lattice number_lattice(const SkeletexModel& model);

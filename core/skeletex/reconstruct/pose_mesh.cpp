@@ -17,14 +17,6 @@ namespace skeletex {
 DevicePose upload_pose(ClContext& context, const PreparedModel& model, const PosedPlanes& posed, RowChoice choice,
                        DistanceRule rule) {
   const PoseTables tables = pose_tables(model.model, posed);
-  const std::size_t count = tables.columns.size();
-  std::vector<float> columns(4 * count);
-  for (std::size_t i = 0; i < count; ++i) {
-    columns[i] = tables.columns[i].roll_head;
-    columns[count + i] = tables.columns[i].roll_tail;
-    columns[2 * count + i] = tables.columns[i].slope_head;
-    columns[3 * count + i] = tables.columns[i].slope_tail;
-  }
   std::vector<LatticeRow> plain = model.rows(choice), other;
   const auto is_plain = [&](const LatticeRow& row) {
     const PosedRowRecord& record = tables.rows[tables.patches[row[0]].row_begin + row[1]];
@@ -36,7 +28,7 @@ DevicePose upload_pose(ClContext& context, const PreparedModel& model, const Pos
   std::erase_if(plain, [&](const LatticeRow& row) { return !is_plain(row); });
   return {context.upload(tables.patches),
           context.upload(tables.rows),
-          context.upload(columns),
+          upload_columns(context, tables.columns),
           context.upload(plain),
           context.upload(other),
           rule == DistanceRule::kFromBone,
@@ -141,7 +133,7 @@ TriangleMesh reconstruct_mesh(ClContext& context, const PreparedModel& model, co
       break;
     case Deformation::kPaper: pose_by_paper(context, model, posed, rule.distance, mesh.positions); break;
   }
-  return std::move(mesh);
+  return in_user_units(std::move(mesh), posed.frame);
 }
 
 TriangleMesh constant_offset_mesh(ClContext& context, const PreparedModel& prepared, const Skeleton& posed,
@@ -175,7 +167,7 @@ TriangleMesh constant_offset_mesh(ClContext& context, const PreparedModel& prepa
         mesh.triangles.push_back({v00, v11, v10});
       }
   }
-  return mesh;
+  return in_user_units(std::move(mesh), posed.frame);
 }
 
 }  // namespace skeletex

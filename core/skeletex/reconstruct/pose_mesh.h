@@ -22,9 +22,8 @@ struct PoseRule {
 };
 
 /// The model's mesh in a pose. Vertices and triangles are numbered as in reconstruct_mesh(context, model): all poses of
-/// a model share their triangles, and every pose is as closed as the bind pose.
-/// \param posed apply_pose(model.skeleton,
-/// ...)
+/// a model share their triangles, and every pose is as closed as the bind pose. Positions are in the user's units.
+/// \param posed  apply_pose(model.skeleton, ...)
 TriangleMesh reconstruct_mesh(ClContext& context, const PreparedModel& model, const Skeleton& posed,
                               const PoseRule& rule = {});
 
@@ -36,8 +35,9 @@ void place_shared_vertices(const PreparedModel& model, const PosedPlanes& posed,
                            std::vector<Vec3>& positions);
 
 /// A plane of constant texels (0, 0, offset) in bone tangent space (paper, Figure 7): per chosen bone all rows and
-/// columns of its patch as a mesh that is closed around the bone and open at its ends.
-/// \param bones   empty: all    \param offset  world units, > 0
+/// columns of its patch as a mesh that is closed around the bone and open at its ends, in the user's units.
+/// \param bones   empty: all
+/// \param offset  in the model's frame, > 0
 TriangleMesh constant_offset_mesh(ClContext& context, const PreparedModel& model, const Skeleton& posed,
                                   std::span<const int> bones, double offset,
                                   DistanceRule rule = DistanceRule::kFromBone);

@@ -76,23 +76,19 @@ std::vector<Vec3> place_vertices(ClContext& context, const PreparedModel& prepar
   return positions;
 }
 
+/// The triangles of the quads between inner rows.
+/// \param inner  points of the inner vertices
+std::vector<Triangle> triangulate(ClContext& context, const PreparedModel& prepared, const DevicePlanes& inner) {
+  const std::vector<LatticeRow> rows = quad_rows(prepared.model.patches);
+  auto triangles = context.allocate<Triangle>(2 * static_cast<std::size_t>(prepared.lattice.quad_count));
+  context.launch({"reconstruct.cl", "triangulate"}, row_range(context, rows.size()),
+                 TriangulateParameters{static_cast<int>(rows.size()), static_cast<int>(inner.count),
+                                       static_cast<int>(prepared.model.diagonals == DiagonalRule::kSmooth)},
+                 context.upload(rows), context.upload(prepared.tables.patches), inner.values, triangles);
+  return context.download(triangles);
+}
+
 }  // namespace
-
-DeviceQuads upload_quads(ClContext& context, const PreparedModel& prepared) {
-  std::vector<LatticeRow> rows = prepared.inner_rows;
-  std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == prepared.tables.patches[row[0]].height - 2; });
-  return {context.upload(rows), context.upload(prepared.tables.patches)};
-}
-
-ClBuffer<Triangle> triangulate(ClContext& context, DiagonalRule rule, const DeviceQuads& quads, const Lattice& lattice,
-                               const DevicePlanes& inner) {
-  auto triangles = context.allocate<Triangle>(lattice.triangle_count);
-  context.launch({"reconstruct.cl", "triangulate"}, row_range(context, quads.rows.size),
-                 TriangulateParameters{static_cast<int>(quads.rows.size), static_cast<int>(inner.count),
-                                       static_cast<int>(rule == DiagonalRule::kSmooth)},
-                 quads.rows, quads.patches, inner.values, triangles);
-  return triangles;
-}
 
 void append_end_triangles(const SkeletexModel& model, const Lattice& lattice, std::span<const Vec3> positions,
                           const EndSeam& seam, int bone, BoneEnd end, std::vector<Triangle>& triangles) {
@@ -124,16 +120,14 @@ BindMesh reconstruct_bind_mesh(ClContext& context, const PreparedModel& model) {
   BindMesh bind;
   bind.inner = row_points(context, model, RowChoice::kInner);
   bind.mesh.positions = place_vertices(context, model, bind.inner);
-  bind.mesh.triangles = context.download(
-      triangulate(context, model.model.diagonals, upload_quads(context, model), model.lattice, bind.inner));
-  bind.mesh.triangles.resize(2 * static_cast<std::size_t>(model.lattice.quad_count));
+  bind.mesh.triangles = triangulate(context, model, bind.inner);
   const std::vector<Triangle> ends = end_triangles(model, bind.mesh.positions);
   bind.mesh.triangles.insert(bind.mesh.triangles.end(), ends.begin(), ends.end());
   return bind;
 }
 
 TriangleMesh reconstruct_mesh(ClContext& context, const PreparedModel& model) {
-  return reconstruct_bind_mesh(context, model).mesh;
+  return in_user_units(reconstruct_bind_mesh(context, model).mesh, model.model.skeleton.frame);
 }
 
 }  // namespace skeletex

@@ -16,11 +16,12 @@ namespace skeletex {
 
 /// The mesh of a model in its bind pose, at the model's own resolution (paper 3.6). It is closed, oriented, 2-manifold
 /// and of the input's genus by construction: inner rows are vertices of their own, seams and corners are polylines that
-/// the patches on both sides share, and poles are single vertices. Quads take diagonals by the model's rule.
+/// the patches on both sides share, and poles are single vertices. Quads take diagonals by the model's rule. Positions
+/// are in the user's units.
 /// \throw DeviceError
 TriangleMesh reconstruct_mesh(ClContext& context, const PreparedModel& model);
 
-/// That mesh, and its inner vertices as they are on the device, relative to the model's origin.
+/// That mesh in the model's frame, and its inner vertices as they are on the device, relative to the model's origin.
 struct BindMesh {
   TriangleMesh mesh;
   DevicePlanes inner;
@@ -45,17 +46,6 @@ EndSeam end_seam(const SkeletexModel& model, const SeparationPlanes& separation,
 /// Appends the triangles between an end and the inner row next to it: a fan at a pole, else a strip.
 void append_end_triangles(const SkeletexModel& model, const Lattice& lattice, std::span<const Vec3> positions,
                           const EndSeam& seam, int bone, BoneEnd end, std::vector<Triangle>& triangles);
-
-/// What the device needs to choose the diagonals of quads between inner rows.
-struct DeviceQuads {
-  ClBuffer<LatticeRow> rows;  ///< that quads begin at
-  ClBuffer<PatchRecord> patches;
-};
-DeviceQuads upload_quads(ClContext& context, const PreparedModel& model);
-/// Queues the triangles of the quads between inner rows (one launch); those at ends are not written.
-/// \param inner  points of the inner vertices    \return room for all triangles of the lattice
-ClBuffer<Triangle> triangulate(ClContext& context, DiagonalRule rule, const DeviceQuads& quads, const Lattice& lattice,
-                               const DevicePlanes& inner);
 
 /// Places seam samples and corners. They are few, and several patches share them, so the host does this in double
 /// precision.

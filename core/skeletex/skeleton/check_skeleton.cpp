@@ -87,7 +87,7 @@ void check_connected(const Skeleton& skeleton) {
     if (!is_reached[bone.head])
       throw TopologyError(fmt::format(
           "bone \"{}\" at {} is not connected with bone \"{}\"; let them share a node, or join them by further bones",
-          bone.name, text_of(skeleton.nodes[bone.head].position), skeleton.bones[0].name));
+          bone.name, text_of(skeleton, skeleton.nodes[bone.head].position), skeleton.bones[0].name));
 }
 
 [[noreturn]] void refuse_outside_node(const CutMesh& mesh, const Skeleton& skeleton, int n) {
@@ -104,7 +104,7 @@ void check_connected(const Skeleton& skeleton) {
     }
   throw TopologyError(fmt::format(
       "node \"{}\" (bone {}) lies outside the mesh at {}; move it into the body, whose nearest vertex is at {}",
-      node.name, bones, text_of(node.position), text_of(vertex)));
+      node.name, bones, text_of(skeleton, node.position), text_of(skeleton, vertex)));
 }
 
 void check_nodes(const CutMesh& mesh, const Skeleton& skeleton) {
@@ -121,7 +121,7 @@ void check_nodes(const CutMesh& mesh, const Skeleton& skeleton) {
     if (winding < 0)
       throw TopologyError(fmt::format(
           "the mesh is turned inside out around node \"{}\" at {}; reverse the order of every triangle's vertices",
-          node.name, text_of(node.position)));
+          node.name, text_of(skeleton, node.position)));
     refuse_outside_node(mesh, skeleton, static_cast<int>(n));
   }
 }
@@ -141,7 +141,7 @@ void check_bones(const CutMesh& mesh, const Skeleton& skeleton) {
     throw TopologyError(fmt::format(
         "bone \"{}\" leaves the mesh at {}, {:.0f} % of the way from node \"{}\" to node \"{}\"; move one of them, or "
         "bend the bone with a node in between",
-        bone.name, text_of(head + t * (tail - head)), 100 * t, skeleton.nodes[bone.head].name,
+        bone.name, text_of(skeleton, head + t * (tail - head)), 100 * t, skeleton.nodes[bone.head].name,
         skeleton.nodes[bone.tail].name));
   }
 }

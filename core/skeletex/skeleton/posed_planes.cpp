@@ -272,12 +272,6 @@ std::vector<PosedBound> PosedPlanes::bounds(int bone, BoneEnd end) const {
   return bounds;
 }
 
-int PosedPlanes::arc_at(int bone, BoneEnd end, double turn) const {
-  double t;
-  const Interval* interval = interval_at(bone, end, turn, t);
-  return interval ? interval->arc : -1;
-}
-
 PosedRadial PosedPlanes::radial_on(const Arc& arc, int s, double t, double turn) const {
   const Side& side = arc.sides[s];
   PosedRadial result;

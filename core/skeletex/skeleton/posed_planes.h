@@ -63,9 +63,6 @@ class PosedPlanes {
   Vec3 sample_point(int arc, int sample, DistanceRule rule, int side = 0) const;
   Vec3 corner_point(int corner, DistanceRule rule) const;
 
-  /// The arc at a bone's end and a bind angle; -1 at a free end.
-  int arc_at(int bone, BoneEnd end, double turn) const;
-
  private:
   /// An arc as one of its bones sees it. Parameter t runs along the arc from its first corner (0) to its last (1).
   struct Side {

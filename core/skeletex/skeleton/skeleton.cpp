@@ -12,6 +12,21 @@
 
 namespace skeletex {
 
+Skeleton in_unit_frame(Skeleton skeleton, const UnitFrame& frame) {
+  for (Node& node : skeleton.nodes) node.position = frame.rounded_from_user(skeleton.frame.to_user(node.position));
+  skeleton.frame = frame;
+  return skeleton;
+}
+
+Skeleton in_frame(Skeleton skeleton, const UnitFrame& frame) {
+  if (frame == skeleton.frame) return skeleton;
+  for (Node& node : skeleton.nodes) node.position = frame.from_user(skeleton.frame.to_user(node.position));
+  skeleton.frame = frame;
+  return skeleton;
+}
+
+std::string text_of(const Skeleton& skeleton, const Vec3& point) { return text_of(skeleton.frame.to_user(point)); }
+
 std::vector<std::vector<BoneAtNode>> bones_at_nodes(const Skeleton& skeleton) {
   std::vector<std::vector<BoneAtNode>> at(skeleton.nodes.size());
   for (int i = 0; i < static_cast<int>(skeleton.bones.size()); ++i) {
@@ -51,12 +66,11 @@ void check_directions(const Skeleton& skeleton) {
       for (std::size_t j = i + 1; j < at_nodes[n].size(); ++j) {
         const BoneAtNode &a = at_nodes[n][i], &b = at_nodes[n][j];
         if ((direction_from(skeleton, a) - direction_from(skeleton, b)).norm() >= kLeast) continue;
-        const Vec3& p = skeleton.nodes[n].position;
-        throw TopologyError(fmt::format(
-            "bones \"{}\" and \"{}\" leave node \"{}\" at ({:.6g}, {:.6g}, {:.6g}) in the same direction, so no plane "
-            "separates them; "
-            "move the far end of one of them",
-            skeleton.bones[a.bone].name, skeleton.bones[b.bone].name, skeleton.nodes[n].name, p.x(), p.y(), p.z()));
+        throw TopologyError(
+            fmt::format("bones \"{}\" and \"{}\" leave node \"{}\" at {} in the same direction, so no plane separates "
+                        "them; move the far end of one of them",
+                        skeleton.bones[a.bone].name, skeleton.bones[b.bone].name, skeleton.nodes[n].name,
+                        text_of(skeleton, skeleton.nodes[n].position)));
       }
 }
 

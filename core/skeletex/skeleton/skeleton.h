@@ -28,7 +28,15 @@ struct Bone {
 struct Skeleton {
   std::vector<Node> nodes;
   std::vector<Bone> bones;
+  UnitFrame frame{};  ///< of the positions; a model's texels and seams are in that of its skeleton
 };
+
+/// The skeleton of a mesh in the unit frame of the mesh, rounded (UnitFrame::rounded_from_user).
+Skeleton in_unit_frame(Skeleton skeleton, const UnitFrame& frame);
+/// The skeleton with its nodes in another frame.
+Skeleton in_frame(Skeleton skeleton, const UnitFrame& frame);
+/// Where a point of the skeleton's frame is, in the user's units, for messages.
+std::string text_of(const Skeleton& skeleton, const Vec3& point);
 
 /// Orthonormal right-handed basis of a bone (paper 3.1): o along the bone, b = o x s. The angle about the bone runs
 /// from s towards b.

@@ -25,10 +25,9 @@ struct FitReport {
 /// directions: Gauss-Newton with weights 1 / |residual|, so the mean distance falls and not its square. Samples are
 /// four points of the mesh per quad of the lattice and the middle of each of its triangles. End rows stay; no point
 /// moves by more than a quarter of a cell in a step and a cell in all. See docs/steps/snap.md.
-/// \param covering  per
-/// texel the triangle of the map that covers its place, as encode.cl's cover_texels leaves it
+/// \param covering  per texel the triangle of the map that covers its place, as encode.cl's cover_texels leaves it
 FitReport fit_points(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps,
-                     const ClBuffer<int>& covering, const ReadingPositions& positions, TexelPoints& points,
+                     const ClBuffer<int>& covering, const ReadingPositions& positions, DevicePlanes& points,
                      const FitOptions& options = {});
 
 }  // namespace skeletex

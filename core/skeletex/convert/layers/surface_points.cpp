@@ -63,7 +63,7 @@ std::vector<SurfacePoint> surface_points(ClContext& context, const PreparedModel
   const SkeletexModel& model = prepared.model;
   const RowPoints rows = points_of_rows(context, prepared);
   std::vector<int> nearest(rows.points.size());
-  NearestSearch(context, tree).find(rows.points, nearest);
+  NearestSearch(context, mesh, tree).find(rows.points, nearest);
   std::vector<SurfacePoint> result(static_cast<std::size_t>(model.texture.width) * model.texture.height);
   for_each_block(prepared.all_rows.size(), 8, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {

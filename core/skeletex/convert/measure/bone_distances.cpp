@@ -20,10 +20,11 @@ struct Samples {
   void end_bone() { begins.push_back(points.size()); }
 };
 
-std::vector<BoneDistance> measure(ClContext& context, const Samples& samples, const TriangleTree& tree, double enough) {
+std::vector<BoneDistance> measure(ClContext& context, const Samples& samples, const TriangleMesh& mesh,
+                                  const TriangleTree& tree, double enough) {
   std::vector<int> triangles(samples.points.size());
   std::vector<float> distances(samples.points.size());
-  NearestSearch(context, tree).find(samples.points, triangles, distances, static_cast<float>(enough));
+  NearestSearch(context, mesh, tree).find(samples.points, triangles, distances, static_cast<float>(enough));
   std::vector<BoneDistance> found(samples.begins.size() - 1);
   for (std::size_t bone = 0; bone < found.size(); ++bone) {
     double sum = 0, weight = 0;
@@ -40,7 +41,7 @@ std::vector<BoneDistance> measure(ClContext& context, const Samples& samples, co
 }  // namespace
 
 std::vector<BoneDistance> distances_from_bones(ClContext& context, std::span<const Chart> charts,
-                                               const TriangleTree& tree, double enough) {
+                                               const TriangleMesh& mesh, const TriangleTree& tree, double enough) {
   Samples samples;
   for (const Chart& chart : charts) {
     if (enough == 0)
@@ -49,11 +50,12 @@ std::vector<BoneDistance> distances_from_bones(ClContext& context, std::span<con
     for (const Vec3& position : chart.positions) samples.add(position, enough == 0 ? 0 : 1);
     samples.end_bone();
   }
-  return measure(context, samples, tree, enough);
+  return measure(context, samples, mesh, tree, enough);
 }
 
 std::vector<BoneDistance> distances_to_surface(ClContext& context, const SkeletexModel& model, const Lattice& lattice,
-                                               const TriangleMesh& mesh, const TriangleTree& tree) {
+                                               const TriangleMesh& mesh, const TriangleMesh& input,
+                                               const TriangleTree& tree) {
   Samples samples;
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
     const Rectangle& r = model.patches[bone].rectangle;
@@ -64,7 +66,7 @@ std::vector<BoneDistance> distances_to_surface(ClContext& context, const Skelete
     }
     samples.end_bone();
   }
-  return measure(context, samples, tree, 0);
+  return measure(context, samples, input, tree, 0);
 }
 
 }  // namespace skeletex

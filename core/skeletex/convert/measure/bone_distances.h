@@ -21,12 +21,13 @@ struct BoneDistance {
 inline constexpr double kNearEnough = 1e-4;
 
 /// From the parts of the input to the mesh that the decoder makes: what the model lacks.
-/// \param tree    of that mesh
+/// \param mesh    that mesh
+/// \param tree    of it
 /// \param enough  above 0: distances up to it need not be exact (they are never more than it then), and vertices alone
 ///                are measured: faster
 /// \return per chart
 std::vector<BoneDistance> distances_from_bones(ClContext& context, std::span<const Chart> charts,
-                                               const TriangleTree& tree, double enough);
+                                               const TriangleMesh& mesh, const TriangleTree& tree, double enough);
 
 /// From the parts of that mesh to the input: what the model has and the input has not. The triangles next to seams and
 /// poles are not measured.
@@ -34,6 +35,7 @@ std::vector<BoneDistance> distances_from_bones(ClContext& context, std::span<con
 /// \param tree     of the input
 /// \return per patch
 std::vector<BoneDistance> distances_to_surface(ClContext& context, const SkeletexModel& model, const Lattice& lattice,
-                                               const TriangleMesh& mesh, const TriangleTree& tree);
+                                               const TriangleMesh& mesh, const TriangleMesh& input,
+                                               const TriangleTree& tree);
 
 }  // namespace skeletex

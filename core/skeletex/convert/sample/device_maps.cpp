@@ -19,7 +19,7 @@ struct SplitValues {
 
 DeviceLayout upload_layout(ClContext& context, std::span<const Patch> patches, const FrameTables& tables, int width,
                            int height) {
-  DeviceLayout layout{width, height, {}, {}};
+  DeviceLayout layout{width, height, {}, upload_tables(context, tables)};
   std::vector<int> texel_patches(layout.size(), -1);
   for (std::size_t bone = 0; bone < patches.size(); ++bone) {
     const Rectangle& r = patches[bone].rectangle;
@@ -28,7 +28,6 @@ DeviceLayout upload_layout(ClContext& context, std::span<const Patch> patches, c
                   static_cast<int>(bone));
   }
   layout.texel_patches = context.upload(texel_patches);
-  layout.patches = context.upload(tables.patches);
   return layout;
 }
 
@@ -36,7 +35,8 @@ namespace {
 
 /// The planes of all maps on the host.
 struct HostMaps {
-  std::vector<int> corners, turns, across, poles, triangle_patches;
+  std::size_t triangle_count = 0;
+  std::vector<int> triangles;
   SplitValues u, v;
   std::vector<float> x, y, z;
 };
@@ -52,9 +52,10 @@ void append_vertices(const Chart& chart, const Vec3& origin, HostMaps& maps) {
   }
 }
 
-/// \param first  the number of the chart's first triangle    \param base  of its first vertex
-void set_triangle(const Chart& chart, std::size_t triangle, int first, int base, HostMaps& maps) {
-  const std::size_t at = first + triangle, count = maps.poles.size();
+/// \param first  the number of the chart's first triangle
+/// \param base   of its first vertex
+void set_triangle(const Chart& chart, int patch, std::size_t triangle, int first, int base, HostMaps& maps) {
+  const auto value = [&](int plane) -> int& { return maps.triangles[plane * maps.triangle_count + first + triangle]; };
   const Triangle& vertices = chart.triangles[triangle];
   int pole = -1;
   for (int k = 0; k < 3; ++k)
@@ -62,12 +63,13 @@ void set_triangle(const Chart& chart, std::size_t triangle, int first, int base,
   const int shift = pole < 0 ? 0 : (pole + 1) % 3;  // the pole becomes corner 2
   for (int k = 0; k < 3; ++k) {
     const int from = (k + shift) % 3;
-    maps.corners[k * count + at] = base + vertices[from];
-    maps.turns[k * count + at] = from == pole ? 0 : chart.turns[triangle][from];
+    value(MAP_CORNERS + k) = base + vertices[from];
+    value(MAP_TURNS + k) = from == pole ? 0 : chart.turns[triangle][from];
     const int twin = chart.half_edges.twins[3 * triangle + (from + 1) % 3];
-    maps.across[k * count + at] = twin < 0 ? -1 : first + twin / 3;
+    value(MAP_ACROSS + k) = twin < 0 ? -1 : first + twin / 3;
   }
-  if (pole >= 0) maps.poles[at] = chart.kinds[vertices[pole]] == ChartVertex::kTailPole ? 1 : -1;
+  value(MAP_POLES) = pole < 0 ? 0 : chart.kinds[vertices[pole]] == ChartVertex::kTailPole ? 1 : -1;
+  value(MAP_PATCHES) = patch;
 }
 
 }  // namespace
@@ -75,34 +77,30 @@ void set_triangle(const Chart& chart, std::size_t triangle, int first, int base,
 DeviceMaps upload_maps(ClContext& context, std::span<const Chart> charts, std::span<const Patch> patches,
                        const Vec3& origin) {
   DeviceMaps maps;
-  for (std::size_t bone = 0; bone < charts.size(); ++bone) {
-    maps.first_triangle.push_back(maps.triangle_count);
-    if (!is_height_field(patches[bone].method)) maps.triangle_count += static_cast<int>(charts[bone].triangles.size());
-  }
-  maps.first_triangle.push_back(maps.triangle_count);
-  const std::size_t count = maps.triangle_count;
   HostMaps host;
-  for (std::vector<int>* plane : {&host.corners, &host.turns, &host.across}) plane->resize(3 * count);
-  host.poles.assign(count, 0), host.triangle_patches.resize(count);
   for (std::size_t bone = 0; bone < charts.size(); ++bone) {
-    const int base = static_cast<int>(host.x.size()), first = maps.first_triangle[bone];
-    maps.first_vertex.push_back(base);
+    maps.first_triangle.push_back(static_cast<int>(host.triangle_count));
+    if (!is_height_field(patches[bone].method)) host.triangle_count += charts[bone].triangles.size();
+  }
+  maps.first_triangle.push_back(static_cast<int>(host.triangle_count));
+  host.triangles.resize(MAP_TRIANGLE_PLANES * host.triangle_count);
+  for (std::size_t bone = 0; bone < charts.size(); ++bone) {
     if (is_height_field(patches[bone].method)) continue;
+    const int base = static_cast<int>(host.x.size());
     append_vertices(charts[bone], origin, host);
-    for (std::size_t t = 0; t < charts[bone].triangles.size(); ++t) set_triangle(charts[bone], t, first, base, host);
-    std::fill_n(host.triangle_patches.begin() + first, charts[bone].triangles.size(), static_cast<int>(bone));
+    for (std::size_t t = 0; t < charts[bone].triangles.size(); ++t)
+      set_triangle(charts[bone], static_cast<int>(bone), t, maps.first_triangle[bone], base, host);
   }
   SplitValues row_u;
   for (const Patch& patch : patches)
     for (const double value : patch.row_u) row_u.push_back(value);
-
-  maps.corners = context.upload(host.corners), maps.turns = context.upload(host.turns);
-  maps.across = context.upload(host.across);
-  maps.poles = context.upload(host.poles), maps.triangle_patches = context.upload(host.triangle_patches);
-  maps.u_high = context.upload(host.u.high), maps.u_low = context.upload(host.u.low);
-  maps.v_high = context.upload(host.v.high), maps.v_low = context.upload(host.v.low);
-  maps.x = context.upload(host.x), maps.y = context.upload(host.y), maps.z = context.upload(host.z);
-  maps.row_high = context.upload(row_u.high), maps.row_low = context.upload(row_u.low);
+  std::vector<float> values;
+  for (const auto* plane :
+       {&host.u.high, &host.u.low, &host.v.high, &host.v.low, &host.x, &host.y, &host.z, &row_u.high, &row_u.low})
+    values.insert(values.end(), plane->begin(), plane->end());
+  maps.sizes = {static_cast<int>(host.triangle_count), static_cast<int>(host.x.size()),
+                static_cast<int>(row_u.high.size())};
+  maps.triangles = context.upload(host.triangles), maps.values = context.upload(values);
   return maps;
 }
 

@@ -9,32 +9,30 @@ namespace skeletex {
 namespace {
 
 /// Over those that are not 0.
-double root_mean_square(const ClMapping<float>& squares) {
+double root_mean_square(std::span<const float> squares) {
   double sum = 0;
   int count = 0;
-  for (std::size_t i = 0; i < squares.size(); ++i) sum += squares.data()[i], count += squares.data()[i] > 0;
+  for (const float square : squares) sum += square, count += square > 0;
   return count > 0 ? std::sqrt(sum / count) : 0;
-}
-
-/// Planes of one buffer as buffers of their own.
-TexelPoints separate_planes(ClContext& context, const DevicePlanes& planes) {
-  const auto [x, y, z] = download_planes(context, planes);
-  return {context.upload(x), context.upload(y), context.upload(z)};
 }
 
 }  // namespace
 
 RoundingReport round_to_half(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches,
-                             const DeviceLayout& layout, const ClBuffer<RowRecord>& rows,
-                             const ClBuffer<ColumnRecord>& columns, const TexelPoints& points, TexelPoints& texels) {
-  const auto diagonals = choose_diagonals(context, rule, patches, layout.patches, layout.width, layout.size(), points);
-  auto nearest2 = context.allocate<float>(layout.size()), chosen2 = context.allocate<float>(layout.size());
-  context.fill(nearest2, 0.f), context.fill(chosen2, 0.f);
+                             const DeviceLayout& layout, const DevicePlanes& points, DevicePlanes& texels) {
+  const auto diagonals =
+      choose_diagonals(context, rule, quad_rows(patches), layout.tables.patches, layout.width, points);
+  auto squares = context.allocate<float>(2 * layout.size());
+  context.fill(squares, 0.f);
   const auto inner_rows = context.upload(lattice_rows(patches, RowChoice::kInner));
-  context.launch({"half.cl", "round_texels"}, row_range(context, inner_rows.size), static_cast<int>(inner_rows.size),
-                 layout.width, inner_rows, layout.patches, rows, columns, points.x, points.y, points.z, diagonals,
-                 texels.x, texels.y, texels.z, nearest2, chosen2);
-  return {root_mean_square(context.map(nearest2)), root_mean_square(context.map(chosen2))};
+  context.launch({"half.cl", "round_texels"}, row_range(context, inner_rows.size),
+                 TexelParameters{layout.width, static_cast<int>(layout.size()), static_cast<int>(inner_rows.size),
+                                 layout.tables.column_count, 0},
+                 inner_rows, layout.tables.patches, layout.tables.rows, layout.tables.columns, points.values, diagonals,
+                 texels.values, squares);
+  const ClMapping<float> mapped = context.map(squares);
+  return {root_mean_square({mapped.data(), layout.size()}),
+          root_mean_square({mapped.data() + layout.size(), layout.size()})};
 }
 
 RoundedModel round_to_half(ClContext& context, const SkeletexModel& model) {
@@ -51,13 +49,9 @@ RoundedModel round_to_half(ClContext& context, const SkeletexModel& model) {
   DevicePlanes points = allocate_planes(context, layout.size());
   context.fill(points.values, 0.f);
   displace(context, lattice, points);
-  TexelPoints texels = separate_planes(context, lattice.texels);
-  const RoundingReport report =
-      round_to_half(context, model.diagonals, model.patches, layout, context.upload(tables.rows),
-                    context.upload(tables.columns), separate_planes(context, points), texels);
+  const RoundingReport report = round_to_half(context, model.diagonals, model.patches, layout, points, lattice.texels);
   RoundedModel rounded{model, report};
-  rounded.model.texture = {texture.width, texture.height, context.download(texels.x), context.download(texels.y),
-                           context.download(texels.z)};
+  download_texels(context, lattice.texels, rounded.model.texture);
   return rounded;
 }
 

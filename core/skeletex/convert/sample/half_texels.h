@@ -21,12 +21,10 @@ struct RoundingReport {
 /// planes around, so that they move along the surface. Texels of rows 0 and height-1, and numbers that are 0, stay: SPD
 /// texels are the nearest ones.
 /// \param rule     of the lattice's diagonals
-/// \param rows, columns  see frame_tables
-/// \param points   of the texels, relative to the origin of the tables
+/// \param points   of the texels, relative to the origin of the layout's tables
 /// \param texels   in and out: along, around, out
 RoundingReport round_to_half(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches,
-                             const DeviceLayout& layout, const ClBuffer<RowRecord>& rows,
-                             const ClBuffer<ColumnRecord>& columns, const TexelPoints& points, TexelPoints& texels);
+                             const DeviceLayout& layout, const DevicePlanes& points, DevicePlanes& texels);
 
 struct RoundedModel {
   SkeletexModel model;

@@ -83,41 +83,18 @@ std::vector<int> fill_uncovered(std::span<const Patch> patches, int texture_widt
   return counts;
 }
 
-TexelPoints allocate_points(ClContext& context, std::size_t size) {
-  return {context.allocate<float>(size), context.allocate<float>(size), context.allocate<float>(size)};
+/// Points, or texels, of 0.
+DevicePlanes clear_planes(ClContext& context, std::size_t size) {
+  DevicePlanes planes = allocate_planes(context, size);
+  context.fill(planes.values, 0.f);
+  return planes;
 }
 
 template <class T>
-void copy_plane(ClContext& context, const ClBuffer<T>& from, ClBuffer<T>& to) {
-  context.copy(from, to);
-}
-
-TexelPoints copy_points(ClContext& context, const TexelPoints& points) {
-  TexelPoints copy = allocate_points(context, points.x.size);
-  copy_plane(context, points.x, copy.x), copy_plane(context, points.y, copy.y), copy_plane(context, points.z, copy.z);
+ClBuffer<T> copy_of(ClContext& context, const ClBuffer<T>& buffer) {
+  ClBuffer<T> copy = context.allocate<T>(buffer.size);
+  context.copy(buffer, copy);
   return copy;
-}
-
-/// Rows 0 and height - 1: seams and poles.
-void place_end_rows(ClContext& context, const TexelSources& sources, int texture_width, const Vec3& origin,
-                    TexelPoints& points) {
-  std::vector<int> texels;
-  std::array<std::vector<float>, 3> values;
-  for (std::size_t bone = 0; bone < sources.patches.size(); ++bone) {
-    const Rectangle& r = sources.patches[bone].rectangle;
-    for (const int end : {0, 1}) {
-      const std::vector<Vec3>& end_points = sources.end_points[bone][end];
-      const int row = r.y + (end == 0 ? 0 : r.height - 1);
-      for (int j = 0; j < r.width; ++j) {
-        texels.push_back(row * texture_width + r.x + j);
-        const Vec3 p = (end_points.size() == 1 ? end_points[0] : end_points[j]) - origin;
-        for (int i = 0; i < 3; ++i) values[i].push_back(static_cast<float>(p[i]));
-      }
-    }
-  }
-  context.launch({"encode.cl", "place_points"}, ClRange(texels.size()), static_cast<int>(texels.size()),
-                 context.upload(texels), context.upload(values[0]), context.upload(values[1]),
-                 context.upload(values[2]), points.x, points.y, points.z);
 }
 
 /// Per texel whether it lies in a VSM patch.
@@ -136,16 +113,14 @@ bool has_spd(std::span<const Patch> patches) {
   return std::any_of(patches.begin(), patches.end(), [](const Patch& patch) { return is_height_field(patch.method); });
 }
 
-PlacedTexels download_texels(ClContext& context, const TexelPoints& points, const ClBuffer<float>& offset_x,
-                             const ClBuffer<float>& offset_y, const ClBuffer<int>& anchors,
-                             const ClBuffer<int>& map_triangles) {
-  auto [x, y, z, own_x, own_y, own_anchors, triangles] =
-      context.download(points.x, points.y, points.z, offset_x, offset_y, anchors, map_triangles);
-  return {{std::move(x), std::move(y), std::move(z)},
-          std::move(own_x),
-          std::move(own_y),
-          std::move(own_anchors),
-          std::move(triangles)};
+/// \param offsets  planes, the first two
+PlacedTexels download_texels(ClContext& context, const DevicePlanes& points, const ClBuffer<float>& offsets,
+                             const ClBuffer<int>& anchors, const ClBuffer<int>& map_triangles) {
+  const ClMapping<float> mapped = context.map(offsets);
+  const float *const x = mapped.data(), *const y = x + points.count;
+  return {download_planes(context, points), std::vector(x, y),
+          std::vector(y, y + points.count), context.download(anchors),
+          context.download(map_triangles),  points};
 }
 
 SnapReport report_snap(int vertices, int edges, int reverted, const std::vector<int>& anchors) {
@@ -169,21 +144,23 @@ SnapReport report_snap(int vertices, int edges, int reverted, const std::vector<
 struct TexelStage {
   ClContext& context;
   const TexelSources& sources;
-  FrameTables tables;
   DeviceLayout layout;
-  ClBuffer<RowRecord> rows;
-  ClBuffer<ColumnRecord> columns;
-  ClBuffer<LatticeRow> inner_rows, all_rows;
+  ClBuffer<LatticeRow> mapped_rows, all_rows;  // inner rows of VSM patches; all
   DeviceMaps maps;
-  bool has_gaps = false;  // between rectangles
 
   std::vector<Patch> patches() const { return {sources.patches.begin(), sources.patches.end()}; }
-  bool has_maps() const { return maps.triangle_count > 0; }
+  bool has_maps() const { return maps.sizes.triangle_count > 0; }
+  MapParameters map_parameters(std::size_t count) const {
+    return {maps.sizes, layout.width, static_cast<int>(layout.size()), static_cast<int>(count), 0, 0, 0};
+  }
+  TexelParameters texel_parameters(std::size_t count) const {
+    return {layout.width, static_cast<int>(layout.size()), static_cast<int>(count), layout.tables.column_count, 0};
+  }
 };
 
 /// Where texels read, and what they have read.
 struct ReadTexels {
-  TexelPoints points;
+  DevicePlanes points;
   ReadingPositions positions;
   ClBuffer<int> map_triangles;  // per texel; kNoTriangle: none
 };
@@ -191,48 +168,63 @@ struct ReadTexels {
 TexelStage prepare_stage(ClContext& context, const Skeleton& skeleton, const SeparationPlanes& separation,
                          const TexelSources& sources, int width, int height, const Vec3& origin) {
   const std::vector<Patch> patches(sources.patches.begin(), sources.patches.end());
-  const FrameTables tables = frame_tables(skeleton, separation, patches, origin);
-  std::size_t in_patches = 0;
-  for (const Patch& patch : patches)
-    in_patches += static_cast<std::size_t>(patch.rectangle.width) * patch.rectangle.height;
-  TexelStage stage{context,
-                   sources,
-                   tables,
-                   upload_layout(context, patches, tables, width, height),
-                   context.upload(tables.rows),
-                   context.upload(tables.columns),
-                   context.upload(lattice_rows(patches, RowChoice::kInner)),
-                   context.upload(lattice_rows(patches, RowChoice::kAll)),
-                   upload_maps(context, sources.charts, patches, origin)};
-  stage.has_gaps = in_patches < stage.layout.size();
-  return stage;
+  std::vector<LatticeRow> mapped_rows = lattice_rows(patches, RowChoice::kInner);
+  std::erase_if(mapped_rows, [&](const LatticeRow& row) { return is_height_field(patches[row[0]].method); });
+  return {context,
+          sources,
+          upload_layout(context, patches, frame_tables(skeleton, separation, patches, origin), width, height),
+          context.upload(mapped_rows),
+          context.upload(lattice_rows(patches, RowChoice::kAll)),
+          upload_maps(context, sources.charts, patches, origin)};
+}
+
+/// Rows 0 and height - 1: seams and poles.
+void place_end_rows(const TexelStage& stage, const Vec3& origin, DevicePlanes& points) {
+  std::vector<int> texels;
+  std::array<std::vector<float>, 3> values;
+  for (std::size_t bone = 0; bone < stage.sources.patches.size(); ++bone) {
+    const Rectangle& r = stage.sources.patches[bone].rectangle;
+    for (const int end : {0, 1}) {
+      const std::vector<Vec3>& end_points = stage.sources.end_points[bone][end];
+      const int row = r.y + (end == 0 ? 0 : r.height - 1);
+      for (int j = 0; j < r.width; ++j) {
+        texels.push_back(row * stage.layout.width + r.x + j);
+        const Vec3 p = (end_points.size() == 1 ? end_points[0] : end_points[j]) - origin;
+        for (int i = 0; i < 3; ++i) values[i].push_back(static_cast<float>(p[i]));
+      }
+    }
+  }
+  stage.context.launch({"encode.cl", "place_points"}, ClRange(texels.size()), stage.texel_parameters(texels.size()),
+                       stage.context.upload(texels),
+                       upload_planes(stage.context, values[0], values[1], values[2]).values, points.values);
+}
+
+/// Texels of VSM patches that nothing holds read where they are; the points of the others become 0.
+void read_surface(const TexelStage& stage, const ClBuffer<float>& offsets, ReadTexels& texels) {
+  stage.context.launch({"encode.cl", "read_surface"}, row_range(stage.context, stage.mapped_rows.size),
+                       stage.map_parameters(stage.mapped_rows.size), stage.mapped_rows, stage.layout.tables.patches,
+                       stage.maps.triangles, stage.maps.values, offsets, texels.positions.anchors, texels.map_triangles,
+                       texels.points.values);
 }
 
 /// VSM patches at the places of their texels.
 /// \param missed  out, per bone
-ReadTexels read_regular_grid(const TexelStage& stage, ClBuffer<int>& is_read, std::vector<int>& missed) {
+ReadTexels read_regular_grid(const TexelStage& stage, std::vector<int>& missed) {
   ClContext& context = stage.context;
   const DeviceLayout& layout = stage.layout;
   const DeviceMaps& maps = stage.maps;
-  ReadTexels texels{allocate_points(context, layout.size()), even_positions(context, layout),
+  ReadTexels texels{clear_planes(context, layout.size()), even_positions(context, layout),
                     context.allocate<int>(layout.size())};
-  for (ClBuffer<float>* plane : {&texels.points.x, &texels.points.y, &texels.points.z}) context.fill(*plane, 0.f);
   context.fill(texels.map_triangles, kNoTriangle);
   if (!stage.has_maps()) return texels;
   // A CPU looks at each triangle once; a GPU needs more work-items for the rows of tall ones.
   const std::size_t shares = context.device().type == "cpu" ? 1 : 8;
-  context.launch({"encode.cl", "cover_texels"}, ClRange(maps.triangle_count, shares), maps.triangle_count, maps.corners,
-                 maps.turns, maps.poles, maps.triangle_patches, maps.u_high, maps.u_low, maps.v_high, maps.v_low,
-                 layout.patches, maps.row_high, maps.row_low, layout.width, texels.map_triangles);
+  context.launch({"encode.cl", "cover_texels"}, ClRange(maps.sizes.triangle_count, shares), stage.map_parameters(0),
+                 maps.triangles, maps.values, layout.tables.patches, texels.map_triangles);
   std::vector<int> map_triangles = context.download(texels.map_triangles);
   missed = fill_uncovered(stage.sources.patches, layout.width, map_triangles);
   context.write(texels.map_triangles, map_triangles);
-  context.launch({"encode.cl", "read_surface"}, row_range(context, stage.inner_rows.size),
-                 static_cast<int>(stage.inner_rows.size), layout.width, maps.triangle_count, stage.inner_rows,
-                 texels.map_triangles, maps.corners, maps.turns, maps.poles, maps.u_high, maps.u_low, maps.v_high,
-                 maps.v_low, maps.x, maps.y, maps.z, layout.patches, maps.row_high, maps.row_low,
-                 texels.positions.home_x, texels.positions.home_y, texels.points.x, texels.points.y, texels.points.z,
-                 is_read);
+  read_surface(stage, texels.positions.home, texels);
   return texels;
 }
 
@@ -246,7 +238,7 @@ double hit_fraction(const SpdHits& hits, const Chart& chart) {
 }
 
 /// SPD patches, by their rays.
-void place_spd_patches(const TexelStage& stage, TexelPoints& points, TexelReport& report) {
+void place_spd_patches(const TexelStage& stage, DevicePlanes& points, TexelReport& report) {
   const DeviceLayout& layout = stage.layout;
   std::vector<float> distances(layout.size(), -1);
   for (std::size_t bone = 0; bone < stage.sources.patches.size(); ++bone) {
@@ -260,71 +252,52 @@ void place_spd_patches(const TexelStage& stage, TexelPoints& points, TexelReport
                   distances.begin() + (r.y + row) * static_cast<std::size_t>(layout.width) + r.x);
     report.sampled_triangle_fractions[bone] = hit_fraction(hits, stage.sources.charts[bone]);
   }
-  stage.context.launch({"encode.cl", "place_spd_points"}, layout.range(), layout.width, layout.height,
-                       layout.texel_patches, stage.context.upload(distances), layout.patches, stage.rows, stage.columns,
-                       points.x, points.y, points.z);
+  stage.context.launch({"encode.cl", "place_spd_points"}, layout.range(), stage.texel_parameters(0),
+                       layout.texel_patches, stage.context.upload(distances), layout.tables.patches, layout.tables.rows,
+                       layout.tables.columns, points.values);
 }
 
-UnfoldReport unfold(const TexelStage& stage, ClBuffer<int>& is_read, ReadTexels& texels) {
-  const DeviceLayout& layout = stage.layout;
-  const DeviceMaps& maps = stage.maps;
-  const auto read_listed = [&](const ClBuffer<int>& listed, int count) {
-    stage.context.launch({"encode.cl", "read_listed"}, ClRange(count), count, layout.width, maps.triangle_count, listed,
-                         layout.texel_patches, texels.map_triangles, maps.corners, maps.turns, maps.poles, maps.across,
-                         maps.u_high, maps.u_low, maps.v_high, maps.v_low, maps.x, maps.y, maps.z, layout.patches,
-                         maps.row_high, maps.row_low, texels.positions.home_x, texels.positions.home_y, texels.points.x,
-                         texels.points.y, texels.points.z, is_read);
+UnfoldReport unfold(const TexelStage& stage, ReadTexels& texels) {
+  const auto read_listed = [&](const ClBuffer<int>& listed, int first, int count) {
+    MapParameters parameters = stage.map_parameters(count);
+    parameters.first = first;
+    stage.context.launch({"encode.cl", "read_listed"}, ClRange(count), parameters, listed, stage.layout.tables.patches,
+                         stage.maps.triangles, stage.maps.values, texels.positions.home, texels.map_triangles,
+                         texels.points.values);
   };
-  return unfold_lattice(stage.context, layout, stage.sources.patches, maps, texels.map_triangles, read_listed,
-                        texels.positions, texels.points);
+  return unfold_lattice(stage.context, stage.layout, stage.sources.patches, stage.maps, texels.map_triangles,
+                        read_listed, texels.positions, texels.points);
 }
 
 /// Texels of VSM patches where they snap to.
-/// \param regular  its positions are taken over
-ReadTexels snap(const TexelStage& stage, ClBuffer<int>& is_read, ReadTexels& regular) {
+ReadTexels snap(const TexelStage& stage, const ReadTexels& regular) {
   ClContext& context = stage.context;
-  const DeviceLayout& layout = stage.layout;
-  const DeviceMaps& maps = stage.maps;
   const DeviceSnapTables& features = *stage.sources.features;
-  const SnappedPositions snapped = snap_positions(context, layout, features, regular.positions);
-  const std::size_t size = layout.size();
-  ReadTexels texels{allocate_points(context, size),
-                    {context.allocate<float>(size), context.allocate<float>(size), context.allocate<int>(size),
-                     regular.positions.home_x, regular.positions.home_y},
-                    context.allocate<int>(size)};
-  if (stage.has_gaps) {
-    context.fill(texels.map_triangles, kNoTriangle), context.fill(texels.positions.anchors, 0);
-    for (ClBuffer<float>* plane : {&texels.points.x, &texels.points.y, &texels.points.z}) context.fill(*plane, 0.f);
-    context.fill(texels.positions.x, 0.f), context.fill(texels.positions.y, 0.f);
-  }
-  context.launch({"encode.cl", "read_snapped"}, row_range(context, stage.all_rows.size),
-                 static_cast<int>(stage.all_rows.size), layout.width, maps.triangle_count, stage.all_rows,
-                 regular.map_triangles, maps.corners, maps.turns, maps.poles, maps.across, maps.u_high, maps.u_low,
-                 maps.v_high, maps.v_low, maps.x, maps.y, maps.z, layout.patches, maps.row_high, maps.row_low,
-                 regular.positions.home_x, regular.positions.home_y, snapped.x, snapped.y, snapped.anchors,
-                 snapped.parameters, features.vertex_points, features.edge_points, regular.points.x, regular.points.y,
-                 regular.points.z, texels.positions.x, texels.positions.y, texels.positions.anchors,
-                 texels.map_triangles, texels.points.x, texels.points.y, texels.points.z, is_read);
+  ReadTexels texels{{copy_of(context, regular.points.values), regular.points.count},
+                    snap_positions(context, stage.layout, features, regular.positions),
+                    copy_of(context, regular.map_triangles)};
+  read_surface(stage, texels.positions.offsets, texels);
+  MapParameters parameters = stage.map_parameters(0);
+  parameters.vertex_count = features.vertex_count;
+  context.launch({"encode.cl", "place_anchored"}, ClRange(stage.layout.size()), parameters, texels.positions.anchors,
+                 texels.positions.offsets, features.points, stage.maps.values, texels.points.values);
   return texels;
 }
 
 /// A copy of the regular grid, to be fitted.
 ReadTexels copy_of(const TexelStage& stage, const ReadTexels& regular) {
   ReadTexels texels = regular;
-  texels.points = copy_points(stage.context, regular.points);
-  copy_plane(stage.context, regular.positions.home_x, texels.positions.x);
-  copy_plane(stage.context, regular.positions.home_y, texels.positions.y);
+  texels.points.values = copy_of(stage.context, regular.points.values);
+  stage.context.copy(regular.positions.home, texels.positions.offsets);
   return texels;
 }
 
-TexelPoints prefilter(const TexelStage& stage, const TexelPoints& points, const ClBuffer<int>& are_kept, int kept) {
-  TexelPoints filtered = allocate_points(stage.context, stage.layout.size());
-  if (stage.has_gaps)
-    for (ClBuffer<float>* plane : {&filtered.x, &filtered.y, &filtered.z}) stage.context.fill(*plane, 0.f);
-  stage.context.launch({"encode.cl", "prefilter_positions"}, row_range(stage.context, stage.all_rows.size),
-                       static_cast<int>(stage.all_rows.size), stage.layout.width, kept, stage.all_rows,
-                       stage.layout.patches, are_kept, points.x, points.y, points.z, filtered.x, filtered.y,
-                       filtered.z);
+DevicePlanes prefilter(const TexelStage& stage, const DevicePlanes& points, const ClBuffer<int>& are_kept, int kept) {
+  DevicePlanes filtered = clear_planes(stage.context, stage.layout.size());
+  TexelParameters parameters = stage.texel_parameters(stage.all_rows.size);
+  parameters.kept = kept;
+  stage.context.launch({"encode.cl", "prefilter_positions"}, row_range(stage.context, stage.all_rows.size), parameters,
+                       stage.all_rows, stage.layout.tables.patches, are_kept, points.values, filtered.values);
   return filtered;
 }
 
@@ -333,26 +306,28 @@ TexelPoints prefilter(const TexelStage& stage, const TexelPoints& points, const 
 std::vector<int> revert(const TexelStage& stage, const TexelOptions& options, std::span<const int> vertex_points,
                         const ReadTexels& regular, ReadTexels& texels, TexelReport& report) {
   ClContext& context = stage.context;
-  const TexelPoints stored =
+  const DevicePlanes stored =
       options.has_prefilter ? prefilter(stage, regular.points, regular.map_triangles, kNoneIsKept) : regular.points;
-  const PlacedTexels grid = download_texels(context, stored, texels.positions.home_x, texels.positions.home_y,
-                                            texels.positions.anchors, regular.map_triangles);
-  PlacedTexels placed = download_texels(context, texels.points, texels.positions.x, texels.positions.y,
-                                        texels.positions.anchors, texels.map_triangles);
+  const PlacedTexels grid =
+      download_texels(context, stored, texels.positions.home, texels.positions.anchors, regular.map_triangles);
+  PlacedTexels placed =
+      download_texels(context, texels.points, texels.positions.offsets, texels.positions.anchors, texels.map_triangles);
   report.revert = revert_faults(context, *stage.sources.revert, vertex_points, grid, placed);
-  texels.points = {context.upload(placed.points[0]), context.upload(placed.points[1]),
-                   context.upload(placed.points[2])};
+  texels.points = placed.on_device;
   return std::move(placed.anchors);
 }
 
-/// Points of VSM patches snapped or fitted, with what then reverts.
-TexelPoints place_points(const TexelStage& stage, const TexelOptions& options, ClBuffer<int>& is_read,
-                         ReadTexels& regular, TexelReport& report) {
+/// Texels of VSM patches snapped or fitted, with what then reverts.
+ReadTexels place_texels(const TexelStage& stage, const TexelOptions& options, const ReadTexels& regular,
+                        TexelReport& report) {
   ClContext& context = stage.context;
   const TexelSources& sources = stage.sources;
   std::vector<int> vertex_points;
-  if (sources.features) vertex_points = context.download(sources.features->vertex_points);
-  ReadTexels texels = sources.features ? snap(stage, is_read, regular) : copy_of(stage, regular);
+  if (sources.features) {
+    vertex_points = context.download(sources.features->points);
+    vertex_points.resize(sources.features->vertex_count);
+  }
+  ReadTexels texels = sources.features ? snap(stage, regular) : copy_of(stage, regular);
   if (options.fit_steps > 0)
     report.fit = fit_points(context, stage.layout, stage.maps, texels.map_triangles, texels.positions, texels.points,
                             {.steps = options.fit_steps});
@@ -366,31 +341,32 @@ TexelPoints place_points(const TexelStage& stage, const TexelOptions& options, C
   const int reverted = report.revert ? report.revert->reverted_texels : 0;
   if (report.fit) report.fit->reverted_texels = reverted;
   if (sources.features)
-    report.snap = report_snap(static_cast<int>(vertex_points.size()),
-                              static_cast<int>(sources.features->edge_points.size), report.fit ? 0 : reverted, anchors);
-  return texels.points;
+    report.snap =
+        report_snap(sources.features->vertex_count, sources.features->edge_count, report.fit ? 0 : reverted, anchors);
+  return texels;
 }
 
 /// Points in bone tangent space: along, around, out.
-TexelPoints encode_points(const TexelStage& stage, const TexelPoints& points) {
-  ClContext& context = stage.context;
-  TexelPoints stored = allocate_points(context, stage.layout.size());
-  for (ClBuffer<float>* plane : {&stored.x, &stored.y, &stored.z})
-    if (stage.has_gaps) context.fill(*plane, 0.f);
-  context.launch({"encode.cl", "encode_texels"}, row_range(context, stage.all_rows.size),
-                 static_cast<int>(stage.all_rows.size), stage.layout.width, stage.all_rows, stage.layout.patches,
-                 stage.rows, stage.columns, points.x, points.y, points.z, stored.x, stored.y, stored.z);
+DevicePlanes encode_points(const TexelStage& stage, const DevicePlanes& points) {
+  const DeviceTables& tables = stage.layout.tables;
+  DevicePlanes stored = clear_planes(stage.context, stage.layout.size());
+  stage.context.launch({"encode.cl", "encode_texels"}, row_range(stage.context, stage.all_rows.size),
+                       stage.texel_parameters(stage.all_rows.size), stage.all_rows, tables.patches, tables.rows,
+                       tables.columns, points.values, stored.values);
   return stored;
 }
 
-/// The share of each VSM chart's triangles that a texel has read.
-void report_read(const TexelStage& stage, const ClBuffer<int>& is_read, TexelReport& report) {
-  const std::vector<int> marks = stage.context.download(is_read);
+/// The share of each VSM chart's triangles that a texel reads, on the regular grid or where it is placed.
+void report_read(const TexelStage& stage, const ReadTexels& regular, const ReadTexels& placed, TexelReport& report) {
+  std::vector<char> is_read(stage.maps.sizes.triangle_count, 0);
+  for (const ClBuffer<int>& triangles : {regular.map_triangles, placed.map_triangles})
+    for (const int triangle : stage.context.download(triangles))
+      if (triangle != kNoTriangle) is_read[triangle] = 1;
   for (std::size_t bone = 0; bone < stage.sources.patches.size(); ++bone) {
     const int begin = stage.maps.first_triangle[bone], end = stage.maps.first_triangle[bone + 1];
     if (end > begin)
       report.sampled_triangle_fractions[bone] =
-          static_cast<double>(std::count(marks.begin() + begin, marks.begin() + end, 1)) / (end - begin);
+          static_cast<double>(std::count(is_read.begin() + begin, is_read.begin() + end, 1)) / (end - begin);
   }
 }
 
@@ -399,31 +375,26 @@ void report_read(const TexelStage& stage, const ClBuffer<int>& is_read, TexelRep
 TexelResult read_texels(ClContext& context, const Skeleton& skeleton, const SeparationPlanes& separation,
                         const TexelSources& sources, int texture_width, int texture_height, const Vec3& origin,
                         const TexelOptions& options) {
-  TexelResult result;
+  TexelResult result{{texture_width, texture_height, {}, {}, {}}, {}};
   TexelReport& report = result.report;
   report.sampled_triangle_fractions.resize(sources.patches.size(), 0);
   report.missed_texels.resize(sources.patches.size(), 0);
   const TexelStage stage = prepare_stage(context, skeleton, separation, sources, texture_width, texture_height, origin);
-  auto is_read = context.allocate<int>(std::max(1, stage.maps.triangle_count));
-  context.fill(is_read, 0);
 
-  ReadTexels regular = read_regular_grid(stage, is_read, report.missed_texels);
+  ReadTexels regular = read_regular_grid(stage, report.missed_texels);
   if (has_spd(sources.patches)) place_spd_patches(stage, regular.points, report);
-  place_end_rows(context, sources, texture_width, origin, regular.points);
-  if (options.has_unfold && stage.has_maps()) report.unfold = unfold(stage, is_read, regular);
-  TexelPoints points;
+  place_end_rows(stage, origin, regular.points);
+  if (options.has_unfold && stage.has_maps()) report.unfold = unfold(stage, regular);
+  ReadTexels placed = regular;
   if (stage.has_maps() && (sources.features || options.fit_steps > 0))
-    points = place_points(stage, options, is_read, regular, report);
-  else
-    points =
-        options.has_prefilter ? prefilter(stage, regular.points, regular.map_triangles, kNoneIsKept) : regular.points;
-  TexelPoints stored = encode_points(stage, points);
+    placed = place_texels(stage, options, regular, report);
+  else if (options.has_prefilter)
+    placed.points = prefilter(stage, regular.points, regular.map_triangles, kNoneIsKept);
+  DevicePlanes stored = encode_points(stage, placed.points);
   if (options.half_rule)
-    report.rounding = round_to_half(context, *options.half_rule, stage.patches(), stage.layout, stage.rows,
-                                    stage.columns, points, stored);
-  report_read(stage, is_read, report);
-  auto [along, around, out] = context.download(stored.x, stored.y, stored.z);
-  result.texture = {texture_width, texture_height, std::move(along), std::move(around), std::move(out)};
+    report.rounding = round_to_half(context, *options.half_rule, stage.patches(), stage.layout, placed.points, stored);
+  report_read(stage, regular, placed, report);
+  download_texels(context, stored, result.texture);
   return result;
 }
 

@@ -2,6 +2,7 @@
 #include "skeletex/convert/sample/unfold.h"
 
 #include <algorithm>
+#include <vector>
 
 namespace skeletex {
 namespace {
@@ -12,8 +13,8 @@ constexpr int kRelaxingPasses = 8;
 
 UnfoldReport unfold_lattice(ClContext& context, const DeviceLayout& layout, std::span<const Patch> patches,
                             const DeviceMaps& maps, const ClBuffer<int>& triangles,
-                            const std::function<void(const ClBuffer<int>& texels, int count)>& read,
-                            ReadingPositions& positions, TexelPoints& points) {
+                            const std::function<void(const ClBuffer<int>& texels, int first, int count)>& read,
+                            ReadingPositions& positions, DevicePlanes& points) {
   std::vector<int> all;
   for (const Patch& patch : patches) {
     if (is_height_field(patch.method)) continue;
@@ -21,40 +22,39 @@ UnfoldReport unfold_lattice(ClContext& context, const DeviceLayout& layout, std:
     for (int row = 0; row + 1 < r.height; ++row)
       for (int j = 0; j < r.width; ++j) all.push_back((r.y + row) * layout.width + r.x + j);
   }
-  auto quads = context.upload(all), quad_count = context.upload(std::vector{static_cast<int>(all.size())});
-  auto marked = context.allocate<int>(layout.size()), is_marked = context.allocate<int>(layout.size()),
-       is_listed = context.allocate<int>(layout.size());
-  auto found = context.allocate<int>(2), back_count = context.allocate<int>(1);
-  std::size_t most_quads = all.size();
-  int marks = 0;
-  const auto find = [&] {
-    context.fill(found, 0);
-    context.launch({"unfold.cl", "find_folds"}, ClRange(most_quads), layout.width, maps.triangle_count,
-                   layout.texel_patches, layout.patches, triangles, maps.corners, maps.x, maps.y, maps.z, points.x,
-                   points.y, points.z, quad_count, quads, is_listed, found, marked, is_marked);
-    const std::vector<int> counts = context.download(found);
-    marks = counts[1];
-    most_quads = std::min(all.size(), 4 * static_cast<std::size_t>(marks));
-    return counts[0];
+  const auto quad_count = static_cast<int>(all.size()), size = static_cast<int>(layout.size());
+  auto lists = context.allocate<int>(4 * layout.size()), counts = context.allocate<int>(FOLD_COUNTS);
+  context.fill(lists, 0), context.write(lists, all);  // see FoldLists of unfold.cl
+  MapParameters parameters{maps.sizes, layout.width, size, 0, 2 * size, 0, 0};
+  // What is counted from here on, but for the quads.
+  const auto start_count = [&](int quads) { context.write(counts, std::vector{quads, 0, 0, 0}); };
+  const auto find = [&](int most_quads) {
+    context.launch({"unfold.cl", "find_folds"}, ClRange(most_quads), parameters, layout.texel_patches,
+                   layout.tables.patches, triangles, maps.triangles, maps.values, points.values, counts, lists);
+    const std::vector<int> found = context.download(counts);
+    parameters.count = found[FOLD_MARKED];
+    return found[FOLD_FOUND];
   };
   const auto relax = [&](bool is_back) {
-    context.fill(quad_count, 0), context.fill(back_count, 0);
-    context.launch({"unfold.cl", "relax_folds"}, ClRange(marks), layout.width, marks, static_cast<int>(is_back), marked,
-                   layout.texel_patches, layout.patches, triangles, points.x, points.y, points.z, is_marked,
-                   positions.home_x, positions.home_y, quad_count, quads, is_listed, back_count);
-    read(marked, marks);
-    return is_back ? context.download(back_count)[0] : 0;
+    parameters.is_back = is_back;
+    start_count(0);
+    context.launch({"unfold.cl", "relax_folds"}, ClRange(parameters.count), parameters, layout.texel_patches,
+                   layout.tables.patches, triangles, points.values, positions.home, counts, lists);
+    read(lists, parameters.first, parameters.count);
+    return is_back ? context.download(counts)[FOLD_RETURNED] : 0;
   };
+  // Four quads are at a texel at most.
+  const auto find_again = [&] { return find(std::min(quad_count, 4 * parameters.count)); };
 
-  context.fill(is_listed, 0), context.fill(is_marked, 0);
+  start_count(quad_count);
   UnfoldReport report;
-  report.folded_quads = report.left = find();
+  report.folded_quads = report.left = find(quad_count);
   for (int pass = 0; pass < kRelaxingPasses && report.left > 0; ++pass) {
     relax(false);
-    report.left = find();
+    report.left = find_again();
   }
   // A texel that goes back can fold a quad beside it. Texels only ever go back, so this ends.
-  while (report.left > 0 && relax(true) > 0) report.left = find();
+  while (report.left > 0 && relax(true) > 0) report.left = find_again();
   return report;
 }
 

@@ -113,7 +113,7 @@ void Segmenter::throw_crossing(int node, const CutOutcome& outcome) const {
       fmt::format("bone \"{}\": the separation planes at node \"{}\" and at node \"{}\" cross inside the body, at {} "
                   "on the surface; move the "
                   "nodes apart, or turn the bones there so that their separation planes stand more nearly parallel",
-                  bone_name(bone), node_name(other), node_name(node), text_of(outcome.point)));
+                  bone_name(bone), node_name(other), node_name(node), text_of(skeleton_, outcome.point)));
 }
 
 void Segmenter::cut() {
@@ -137,7 +137,7 @@ void Segmenter::cut() {
     if (outcome.status == CutStatus::kNoSurface)
       throw TopologyError(fmt::format(
           "bone \"{}\": no separation plane of node \"{}\" at {} meets the surface; move the node into the body",
-          bone_name(nodes[n].cells[0].bone.bone), node_name(nodes[n].node), text_of(nodes[n].position)));
+          bone_name(nodes[n].cells[0].bone.bone), node_name(nodes[n].node), text_of(skeleton_, nodes[n].position)));
     for (const Cell& cell : nodes[n].cells) sides_.push_back({nodes[n].node, cell.bone});
   }
   split_short_arcs();
@@ -180,8 +180,8 @@ void Segmenter::throw_run_over(int first, int second) const {
   throw TopologyError(
       fmt::format("bone \"{}\": its surface runs over into that of bone \"{}\", from {} at node \"{}\" to {} at node "
                   "\"{}\" without a separation plane between; {}",
-                  bone_name(a.bone.bone), bone_name(b.bone.bone), text_of(position(mesh_.origins[first])),
-                  node_name(a.node), text_of(position(mesh_.origins[second])), node_name(b.node), remedy));
+                  bone_name(a.bone.bone), bone_name(b.bone.bone), text_of(skeleton_, position(mesh_.origins[first])),
+                  node_name(a.node), text_of(skeleton_, position(mesh_.origins[second])), node_name(b.node), remedy));
 }
 
 /// Marks the triangles of a component from one of them on.
@@ -223,14 +223,15 @@ void Segmenter::assign_components() {
     if (component.seam < 0 && components_.size() > 1)
       throw TopologyError(
           fmt::format("a part of the mesh at {} belongs to no bone; join the mesh to one piece, or remove the part",
-                      text_of(position(mesh_.origins[3 * component.first]))));
+                      text_of(skeleton_, position(mesh_.origins[3 * component.first]))));
     const int bone = component.seam < 0 ? 0 : side(component.seam).bone.bone;
     if (component_of_bone[bone] >= 0)
-      throw TopologyError(fmt::format(
-          "bone \"{}\": its separation planes at node \"{}\" cut off a second piece of surface at {}; move "
-          "the node so that they meet "
-          "only the body around it",
-          bone_name(bone), node_name(side(component.seam).node), text_of(position(mesh_.origins[component.seam]))));
+      throw TopologyError(
+          fmt::format("bone \"{}\": its separation planes at node \"{}\" cut off a second piece of surface at {}; move "
+                      "the node so that they meet "
+                      "only the body around it",
+                      bone_name(bone), node_name(side(component.seam).node),
+                      text_of(skeleton_, position(mesh_.origins[component.seam]))));
     component_of_bone[bone] = c;
     bone_of.push_back(bone);
   }
@@ -239,8 +240,9 @@ void Segmenter::assign_components() {
       throw TopologyError(fmt::format(
           "bone \"{}\" gets no surface: the separation planes at its nodes \"{}\" {} and \"{}\" {} leave it none; move "
           "its nodes apart",
-          bone_name(b), node_name(skeleton_.bones[b].head), text_of(end_position(skeleton_, b, BoneEnd::kHead)),
-          node_name(skeleton_.bones[b].tail), text_of(end_position(skeleton_, b, BoneEnd::kTail))));
+          bone_name(b), node_name(skeleton_.bones[b].head),
+          text_of(skeleton_, end_position(skeleton_, b, BoneEnd::kHead)), node_name(skeleton_.bones[b].tail),
+          text_of(skeleton_, end_position(skeleton_, b, BoneEnd::kTail))));
   triangle_counts_.assign(bone_count, 0);
   for (const int component : component_of_) {
     result_.triangle_bones.push_back(bone_of[component]);
@@ -259,7 +261,8 @@ HalfEdgeLoop Segmenter::trace_loop(int start) {
       throw TopologyError(fmt::format(
           "bone \"{}\": the separation planes at nodes \"{}\" and \"{}\" meet at {} on the surface; move the nodes "
           "apart",
-          bone_name(bone), node_name(first.node), node_name(side(h).node), text_of(position(mesh_.origins[h]))));
+          bone_name(bone), node_name(first.node), node_name(side(h).node),
+          text_of(skeleton_, position(mesh_.origins[h]))));
     loop.half_edges.push_back(h);
     h = CutMesh::next(h);
     while (mesh_.seams[h] < 0) h = CutMesh::next(mesh_.opposites[h]);
@@ -283,7 +286,7 @@ void Segmenter::check_loops(int bone, BoneEnd end, bool is_wanted) const {
     throw TopologyError(
         fmt::format("bone \"{}\": its surface does not reach the separation planes of its node \"{}\" at {}; move "
                     "the node, or lengthen the bone",
-                    bone_name(bone), node_name(node), text_of(skeleton_.nodes[node].position)));
+                    bone_name(bone), node_name(node), text_of(skeleton_, skeleton_.nodes[node].position)));
   if (loops.size() > (is_wanted ? 1 : 0)) {
     // The one that winds around the bone is right; name another.
     const auto wrong = std::find_if(loops.begin(), loops.end(), [](const HalfEdgeLoop& l) { return l.turning == 0; });
@@ -293,15 +296,16 @@ void Segmenter::check_loops(int bone, BoneEnd end, bool is_wanted) const {
         "planes there "
         "reach a second part of the body; move the node or turn the bones so that they meet only the body around "
         "it",
-        bone_name(bone), loops.size(), node_name(node), text_of(position(mesh_.origins[loop.half_edges[0]]))));
+        bone_name(bone), loops.size(), node_name(node),
+        text_of(skeleton_, position(mesh_.origins[loop.half_edges[0]]))));
   }
   // With the surface on the left, a boundary at the head runs with growing v, one at the tail against it.
   if (is_wanted && loops[0].turning != (end == BoneEnd::kHead ? 1 : -1))
-    throw TopologyError(
-        fmt::format("bone \"{}\": its boundary at node \"{}\", through {}, does not run once around the bone; move "
-                    "the node to the "
-                    "middle of the body",
-                    bone_name(bone), node_name(node), text_of(position(mesh_.origins[loops[0].half_edges[0]]))));
+    throw TopologyError(fmt::format(
+        "bone \"{}\": its boundary at node \"{}\", through {}, does not run once around the bone; move "
+        "the node to the "
+        "middle of the body",
+        bone_name(bone), node_name(node), text_of(skeleton_, position(mesh_.origins[loops[0].half_edges[0]]))));
 }
 
 /// All boundaries of all segments, checked.
@@ -351,7 +355,8 @@ void Segmenter::add_arc(int bone, BoneEnd end, bool has_corners, std::span<const
       throw TopologyError(fmt::format(
           "bone \"{}\": its neighbour at node \"{}\" changes from \"{}\" to \"{}\" at {} without a corner; move "
           "the node",
-          bone_name(bone), node_name(node), bone_name(other), bone_name(changed), text_of(position(mesh_.origins[h]))));
+          bone_name(bone), node_name(node), bone_name(other), bone_name(changed),
+          text_of(skeleton_, position(mesh_.origins[h]))));
   if (bone > other) return;
   Arc arc;
   arc.node = node;
@@ -445,8 +450,8 @@ void Segmenter::check_topology(const Segment& segment) const {
       fmt::format("bone \"{}\" around {}: its surface is no {} but has {} handle{} (Euler number {} instead of "
                   "{}); lay a ring of "
                   "bones through every handle of the body",
-                  bone_name(segment.bone), text_of(centre), to_string(segment.topology), (wanted - euler) / 2,
-                  wanted - euler == 2 ? "" : "s", euler, wanted));
+                  bone_name(segment.bone), text_of(skeleton_, centre), to_string(segment.topology),
+                  (wanted - euler) / 2, wanted - euler == 2 ? "" : "s", euler, wanted));
 }
 
 void Segmenter::build_segments() {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <numeric>
+#include <set>
 #include <utility>
 
 #include "skeletex/convert/snap/snap.h"
@@ -51,22 +52,18 @@ void for_each_inner_row(const SkeletexModel& model, const Lattice& lattice, cons
 
 }  // namespace
 
-ClBuffer<int> choose_diagonals(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches,
-                               const ClBuffer<PatchRecord>& records, int texture_width, std::size_t texels,
-                               const TexelPoints& points) {
+ClBuffer<int> choose_diagonals(ClContext& context, DiagonalRule rule, const std::vector<LatticeRow>& rows,
+                               const ClBuffer<PatchRecord>& records, int texture_width, const DevicePlanes& points) {
   constexpr int kBandRows = 16, kBandColumns = 64;  // of a group; columns as in lattice.cl
-  std::vector<LatticeRow> rows = lattice_rows(patches, RowChoice::kInner);
-  std::erase_if(rows, [&](const LatticeRow& row) { return row[1] == patches[row[0]].rectangle.height - 2; });
   const int count = static_cast<int>(rows.size());
-  int widest = 0;
-  for (const Patch& patch : patches) widest = std::max(widest, patch.rectangle.width);
   ClRange groups = row_range(context, (count + kBandRows - 1) / kBandRows);
-  groups.global[1] = (widest + kBandColumns - 1) / kBandColumns;
-  auto diagonals = context.allocate<int>(texels);
+  groups.global[1] = (texture_width + kBandColumns - 1) / kBandColumns;
+  auto diagonals = context.allocate<int>(points.count);
   context.fill(diagonals, 0);
-  context.launch({"lattice.cl", "choose_diagonals"}, groups, count, kBandRows, texture_width,
-                 static_cast<int>(rule == DiagonalRule::kSmooth), context.upload(rows), records, points.x, points.y,
-                 points.z, diagonals);
+  context.launch({"lattice.cl", "choose_diagonals"}, groups,
+                 DiagonalParameters{texture_width, static_cast<int>(points.count), count, kBandRows,
+                                    static_cast<int>(rule == DiagonalRule::kSmooth)},
+                 context.upload(rows), records, points.values, diagonals);
   return diagonals;
 }
 
@@ -75,9 +72,7 @@ LatticeFrame frame_lattice(ClContext& context, const SkeletexModel& model) {
   const SeparationPlanes& separation = prepared.separation;
   const Lattice& lattice = prepared.lattice;
   LatticeFrame frame{model, lattice, context.upload(prepared.tables.patches), {}, {}, {}, {}, {}, {}, {}};
-  frame.rows = lattice_rows(model.patches, RowChoice::kInner);
-  std::erase_if(frame.rows,
-                [&](const LatticeRow& row) { return row[1] == model.patches[row[0]].rectangle.height - 2; });
+  frame.rows = quad_rows(model.patches);
   frame.positions.resize(lattice.vertex_count);
   place_seams(model, separation, lattice, frame.positions);
   frame.ends.resize(2 * model.patches.size());
@@ -106,10 +101,6 @@ LatticeFrame frame_lattice(ClContext& context, const SkeletexModel& model) {
 }
 
 namespace {
-
-Vec3 position_of(const SkeletexModel& model, const TexelPlanes& points, int texel) {
-  return model.origin + Vec3(points[0][texel], points[1][texel], points[2][texel]);
-}
 
 /// Strips and fans of some ends: of patch i 2 i and 2 i + 1.
 std::vector<std::vector<Triangle>> make_ends(const LatticeFrame& frame, std::span<const int> ends,
@@ -145,7 +136,7 @@ void replace_triangles(std::span<const Triangle> triangles, int first, std::span
 
 /// The two triangles of the quad to the right of and above a texel, as reconstruct.cl writes them.
 std::array<Triangle, 2> quad_triangles(const LatticeFrame& frame, int patch, int row, int column,
-                                       const std::vector<int>& diagonals) {
+                                       const ClMapping<int>& diagonals) {
   const int width = frame.model.patches[patch].rectangle.width;
   const int first = frame.numbers.first_inner[patch] + (row - 1) * width;
   const int own = first + column, right = column + 1 < width ? own + 1 : first;
@@ -154,29 +145,30 @@ std::array<Triangle, 2> quad_triangles(const LatticeFrame& frame, int patch, int
   return {{{own, right, beyond}, {own, beyond, above}}};
 }
 
-/// The diagonals that the decoder takes over points, on the host.
-std::vector<int> diagonals_of(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
-                              const TexelPlanes& points) {
-  return context.download(
-      choose_diagonals(context, rule, frame.model.patches, frame.patches, frame.model.texture.width, points[0].size(),
-                       {context.upload(points[0]), context.upload(points[1]), context.upload(points[2])}));
+/// The diagonals that the decoder takes over points, for the host.
+ClMapping<int> diagonals_of(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
+                            const std::vector<LatticeRow>& rows, const DevicePlanes& points) {
+  return context.map(choose_diagonals(context, rule, rows, frame.patches, frame.model.texture.width, points));
 }
 
 }  // namespace
 
-TriangleMesh build_lattice_mesh(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
-                                const TexelPlanes& points) {
+void build_lattice_mesh(ClContext& context, const LatticeFrame& frame, DiagonalRule rule, const DevicePlanes& points,
+                        TriangleMesh& mesh) {
   const Lattice& lattice = frame.numbers;
-  TriangleMesh mesh{frame.positions, {}};
+  mesh.positions = frame.positions;
+  const ClMapping<int> diagonals = diagonals_of(context, frame, rule, frame.rows, points);
+  const ClMapping<float> values = context.map(points.values);
+  const float *const x = values.data(), *const y = x + points.count, *const z = y + points.count;
   for_each_block(lattice.vertex_count, 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t vertex = begin; vertex < end; ++vertex)
-      if (frame.texels[vertex] >= 0) mesh.positions[vertex] = position_of(frame.model, points, frame.texels[vertex]);
+      if (const int texel = frame.texels[vertex]; texel >= 0)
+        mesh.positions[vertex] = frame.model.origin + Vec3(x[texel], y[texel], z[texel]);
   });
   std::vector<int> ends(frame.ends.size());
   std::iota(ends.begin(), ends.end(), 0);
   const std::vector<std::vector<Triangle>> of_ends = make_ends(frame, ends, mesh.positions);
   mesh.triangles.resize(lattice.triangle_count);
-  const std::vector<int> diagonals = diagonals_of(context, frame, rule, points);
   for_each_block(frame.rows.size(), 16, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const auto [patch, row, unused, first_quad] = frame.rows[i];
@@ -188,16 +180,22 @@ TriangleMesh build_lattice_mesh(ClContext& context, const LatticeFrame& frame, D
   });
   auto next = mesh.triangles.begin() + 2 * static_cast<std::ptrdiff_t>(lattice.quad_count);
   for (const std::vector<Triangle>& triangles : of_ends) next = std::copy(triangles.begin(), triangles.end(), next);
-  return mesh;
 }
 
 std::vector<int> move_texels(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
-                             std::span<const int> texels, const TexelPlanes& points, TriangleMesh& mesh) {
+                             std::span<const int> texels, const TexelPlanes& points, DevicePlanes& on_device,
+                             TriangleMesh& mesh) {
   if (texels.empty()) return {};
   const SkeletexModel& model = frame.model;
+  TexelPlanes moved;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const int texel : texels) moved[axis].push_back(points[axis][texel]);
+  context.launch(
+      {"encode.cl", "place_points"}, ClRange(texels.size()),
+      TexelParameters{model.texture.width, static_cast<int>(on_device.count), static_cast<int>(texels.size()), 0, 0},
+      context.upload(texels), upload_planes(context, moved[0], moved[1], moved[2]).values, on_device.values);
   std::vector<char> has_moved(mesh.positions.size(), 0), is_near(frame.numbers.quad_count, 0);
   std::vector<int> changed;
-  const std::vector<int> diagonals = diagonals_of(context, frame, rule, points);
   const auto place_of = [&](int texel) {
     const Rectangle& r = model.patches[frame.texel_patches[texel]].rectangle;
     return std::array{frame.texel_patches[texel], texel / model.texture.width - r.y, texel % model.texture.width - r.x};
@@ -206,17 +204,28 @@ std::vector<int> move_texels(ClContext& context, const LatticeFrame& frame, Diag
     const auto [patch, row, column] = place_of(texel);
     const int vertex = frame.numbers.first_inner[patch] + (row - 1) * model.patches[patch].rectangle.width + column;
     has_moved[vertex] = 1;
-    mesh.positions[vertex] = position_of(model, points, texel);
+    mesh.positions[vertex] = model.origin + Vec3(points[0][texel], points[1][texel], points[2][texel]);
   }
+  // The diagonal of a quad depends on the 4 x 4 vertices around it.
+  const auto rows_near = [&](int patch, int row) {
+    return std::array{std::max(1, row - 2), std::min(model.patches[patch].rectangle.height - 3, row + 1)};
+  };
+  std::set<std::array<int, 2>> are_near;
   for (const int texel : texels) {
     const auto [patch, row, column] = place_of(texel);
-    const Rectangle& r = model.patches[patch].rectangle;
-    // The diagonal of a quad depends on the 4 x 4 vertices around it.
-    for (int i = std::max(1, row - 2); i <= std::min(r.height - 3, row + 1); ++i)
+    for (auto [i, last] = rows_near(patch, row); i <= last; ++i) are_near.insert({patch, i});
+  }
+  std::vector<LatticeRow> rows = frame.rows;
+  std::erase_if(rows, [&](const LatticeRow& row) { return !are_near.contains({row[0], row[1]}); });
+  const ClMapping<int> diagonals = diagonals_of(context, frame, rule, rows, on_device);
+  for (const int texel : texels) {
+    const auto [patch, row, column] = place_of(texel);
+    const int width = model.patches[patch].rectangle.width;
+    for (auto [i, last] = rows_near(patch, row); i <= last; ++i)
       for (int j = column - 2; j <= column + 1; ++j) {
-        const int quad = frame.numbers.first_quad[patch] + (i - 1) * r.width + wrapped(j, r.width);
+        const int quad = frame.numbers.first_quad[patch] + (i - 1) * width + wrapped(j, width);
         if (std::exchange(is_near[quad], 1) != 0) continue;
-        replace_triangles(quad_triangles(frame, patch, i, wrapped(j, r.width), diagonals), 2 * quad, has_moved, mesh,
+        replace_triangles(quad_triangles(frame, patch, i, wrapped(j, width), diagonals), 2 * quad, has_moved, mesh,
                           changed);
       }
   }

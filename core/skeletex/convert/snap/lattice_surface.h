@@ -14,10 +14,10 @@ using TexelPlanes = std::array<std::vector<float>, 3>;
 
 /// Which diagonals the decoder takes: per texel whether the quad to the right of and above it takes the second one.
 /// \param records  see frame_tables
+/// \param rows     that the quads begin at, see quad_rows; all other values are 0
 /// \param points   x, y, z per texel; those of rows 0 and height-1 do not count
-ClBuffer<int> choose_diagonals(ClContext& context, DiagonalRule rule, const std::vector<Patch>& patches,
-                               const ClBuffer<PatchRecord>& records, int texture_width, std::size_t texels,
-                               const TexelPoints& points);
+ClBuffer<int> choose_diagonals(ClContext& context, DiagonalRule rule, const std::vector<LatticeRow>& rows,
+                               const ClBuffer<PatchRecord>& records, int texture_width, const DevicePlanes& points);
 
 /// What the meshes of all points of one layout have in common: numbers of vertices and triangles (lattice.h), seams.
 struct LatticeFrame {
@@ -37,13 +37,16 @@ LatticeFrame frame_lattice(ClContext& context, const SkeletexModel& model);
 
 /// The mesh that the model would reconstruct to, were its texels at given points: what reconstruct_mesh makes.
 /// \param rule    of its diagonals, in place of the model's
-/// \param points  of rows 0 and height-1 only poles count
-TriangleMesh build_lattice_mesh(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
-                                const TexelPlanes& points);
+/// \param points  per texel; of rows 0 and height-1 only poles count
+/// \param mesh    out; empty before, or one of the same frame, whose memory is used again
+void build_lattice_mesh(ClContext& context, const LatticeFrame& frame, DiagonalRule rule, const DevicePlanes& points,
+                        TriangleMesh& mesh);
 /// After inner texels have moved: diagonals and strips next to them are chosen again.
-/// \param rule, points  as for build_lattice_mesh
+/// \param points     where they are now
+/// \param on_device  takes over the points of those that have moved
 /// \return the triangles that are not what they were, or not where, in order
 std::vector<int> move_texels(ClContext& context, const LatticeFrame& frame, DiagonalRule rule,
-                             std::span<const int> texels, const TexelPlanes& points, TriangleMesh& mesh);
+                             std::span<const int> texels, const TexelPlanes& points, DevicePlanes& on_device,
+                             TriangleMesh& mesh);
 
 }  // namespace skeletex

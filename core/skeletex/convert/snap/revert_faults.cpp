@@ -65,7 +65,7 @@ class TexelSet {
 
 /// The regular grid, and where it is at fault itself: there is nothing to revert to, as long as it is not much worse.
 struct RegularGrid {
-  TriangleMesh mesh;
+  const PlacedTexels& texels;
   RegularGridFaults faults;
   TexelSet near_faults;
   bool tolerates_inversion = false, tolerates_intersection = false;
@@ -73,11 +73,12 @@ struct RegularGrid {
   bool is_near_fault(const Triangle& triangle) const { return near_faults.has(triangle); }
 };
 
+/// \param mesh  out, of the regular grid
 RegularGrid prepare_regular_grid(ClContext& context, const LatticeFrame& frame, const OriginalSurface& original,
-                                 const PlacedTexels& texels) {
-  RegularGrid grid{build_lattice_mesh(context, frame, DiagonalRule::kNearest, texels.points), {}, TexelSet(frame)};
-  grid.faults = measure_regular_grid({frame, grid.mesh, texels.map_triangles}, original);
-  for (const int triangle : grid.faults.inverted) grid.near_faults.add(grid.mesh.triangles[triangle], kTolerance);
+                                 const PlacedTexels& texels, TriangleMesh& mesh) {
+  build_lattice_mesh(context, frame, DiagonalRule::kNearest, texels.on_device, mesh);
+  RegularGrid grid{texels, measure_regular_grid({frame, mesh, texels.map_triangles}, original), TexelSet(frame)};
+  for (const int triangle : grid.faults.inverted) grid.near_faults.add(mesh.triangles[triangle], kTolerance);
   return grid;
 }
 
@@ -119,9 +120,11 @@ void measure(const LatticeFrame& frame, const OriginalSurface& original, std::sp
 }
 
 /// The first pass measures all.
+/// \param mesh  of the regular grid, whose memory is used again
 Pass start_passes(ClContext& context, const LatticeFrame& frame, const OriginalSurface& original,
-                  std::span<const int> vertex_points, const PlacedTexels& texels, double limit) {
-  Pass pass{build_lattice_mesh(context, frame, frame.model.diagonals, texels.points), {}, {}, {}, {}};
+                  std::span<const int> vertex_points, const PlacedTexels& texels, double limit, TriangleMesh mesh) {
+  Pass pass{std::move(mesh), {}, {}, {}, {}};
+  build_lattice_mesh(context, frame, frame.model.diagonals, texels.on_device, pass.mesh);
   pass.tree = build_triangle_tree(pass.mesh, frame.triangle_order);
   std::vector<int> all(pass.mesh.triangles.size());
   std::iota(all.begin(), all.end(), 0);
@@ -131,10 +134,10 @@ Pass start_passes(ClContext& context, const LatticeFrame& frame, const OriginalS
 
 /// Further ones measure what has changed.
 void next_pass(ClContext& context, const LatticeFrame& frame, const OriginalSurface& original,
-               std::span<const int> vertex_points, const PlacedTexels& texels, double limit,
-               std::span<const int> reverted, Pass& pass) {
+               std::span<const int> vertex_points, PlacedTexels& texels, double limit, std::span<const int> reverted,
+               Pass& pass) {
   const std::vector<int> changed =
-      move_texels(context, frame, frame.model.diagonals, reverted, texels.points, pass.mesh);
+      move_texels(context, frame, frame.model.diagonals, reverted, texels.points, texels.on_device, pass.mesh);
   std::vector<int> places;
   for (const int triangle : changed) places.push_back(frame.triangle_places[triangle]);
   update_triangle_tree(pass.mesh, places, pass.tree);
@@ -142,16 +145,18 @@ void next_pass(ClContext& context, const LatticeFrame& frame, const OriginalSurf
 }
 
 /// Decides by the first pass which faults near those of the regular grid are left.
-void choose_tolerances(const LatticeFrame& frame, const Pass& pass, RegularGrid& grid) {
+void choose_tolerances(ClContext& context, const LatticeFrame& frame, const Pass& pass, RegularGrid& grid) {
   const auto inverted = std::count_if(pass.suspects.begin(), pass.suspects.end(), [&](const MeasuredTriangle& t) {
     return t.is_inverted && grid.is_near_fault(pass.triangle(t.triangle));
   });
   grid.tolerates_inversion =
       static_cast<double>(inverted) <= kMuchWorse * static_cast<double>(grid.faults.inverted.size());
   if (pass.intersections.size() <= kManyPairs) return;
-  const Pairs pairs = find_self_intersections(grid.mesh, build_triangle_tree(grid.mesh, frame.triangle_order),
-                                              triangles_in(pass.intersections));
-  for (const int triangle : triangles_in(pairs)) grid.near_faults.add(grid.mesh.triangles[triangle], kTolerance);
+  TriangleMesh mesh;
+  build_lattice_mesh(context, frame, DiagonalRule::kNearest, grid.texels.on_device, mesh);
+  const Pairs pairs =
+      find_self_intersections(mesh, build_triangle_tree(mesh, frame.triangle_order), triangles_in(pass.intersections));
+  for (const int triangle : triangles_in(pairs)) grid.near_faults.add(mesh.triangles[triangle], kTolerance);
   const auto near = std::count_if(pass.intersections.begin(), pass.intersections.end(), [&](const auto& pair) {
     return grid.is_near_fault(pass.triangle(pair[0])) && grid.is_near_fault(pass.triangle(pair[1]));
   });
@@ -184,12 +189,13 @@ RevertReport revert_faults(ClContext& context, const RevertSources& sources, std
                            const PlacedTexels& regular, PlacedTexels& texels) {
   const LatticeFrame frame = frame_lattice(context, sources.model);
   const OriginalSurface original = prepare_original(sources.mesh, sources.tree, sources.charts, frame);
-  RegularGrid grid = prepare_regular_grid(context, frame, original, regular);
+  TriangleMesh mesh;
+  RegularGrid grid = prepare_regular_grid(context, frame, original, regular, mesh);
   const double limit = kShareOfFurthest * grid.faults.furthest;
   RevertReport report;
   report.regular_inverted_triangles = static_cast<int>(grid.faults.inverted.size());
-  Pass pass = start_passes(context, frame, original, vertex_points, texels, limit);
-  choose_tolerances(frame, pass, grid);
+  Pass pass = start_passes(context, frame, original, vertex_points, texels, limit, std::move(mesh));
+  choose_tolerances(context, frame, pass, grid);
   for (int number = 0;; ++number) {
     report.inverted_triangles =
         static_cast<int>(std::count_if(pass.suspects.begin(), pass.suspects.end(),
@@ -204,7 +210,8 @@ RevertReport revert_faults(ClContext& context, const RevertSources& sources, std
     if (reverted.empty() && with_vertices) break;
     next_pass(context, frame, original, vertex_points, texels, limit, reverted, pass);
   }
-  report.distances = distances_from_bones(context, sources.charts, pass.tree, kNearEnough * frame.model.diagonal);
+  report.distances =
+      distances_from_bones(context, sources.charts, pass.mesh, pass.tree, kNearEnough * frame.model.diagonal);
   return report;
 }
 

@@ -13,6 +13,7 @@ struct PlacedTexels {
   std::vector<float> offset_x, offset_y;  ///< where they read, see ReadingPositions
   std::vector<int> anchors;               ///< likewise
   std::vector<int> map_triangles;         ///< near them, numbered as in DeviceMaps; beyond all of them: none
+  DevicePlanes on_device{};               ///< the same points
 
   bool has_same_point(int texel, const PlacedTexels& other) const {
     return points[0][texel] == other.points[0][texel] && points[1][texel] == other.points[1][texel] &&

@@ -157,14 +157,22 @@ SnapFeatures place_features(const MapFeatures& features, std::span<const Chart> 
   return placed;
 }
 
-ReadingPositions even_positions(ClContext& context, const DeviceLayout& layout) {
-  ReadingPositions positions{context.allocate<float>(layout.size()), context.allocate<float>(layout.size()),
-                             context.allocate<int>(layout.size()), context.allocate<float>(layout.size()),
-                             context.allocate<float>(layout.size())};
-  for (ClBuffer<float>* plane : {&positions.x, &positions.y, &positions.home_x, &positions.home_y})
-    context.fill(*plane, 0.f);
-  context.fill(positions.anchors, 0);
+namespace {
+
+/// All at their places.
+ReadingPositions positions_of(ClContext& context, const DeviceLayout& layout, ClBuffer<float> home) {
+  ReadingPositions positions{context.allocate<float>(3 * layout.size()), context.allocate<int>(layout.size()),
+                             std::move(home)};
+  context.fill(positions.offsets, 0.f), context.fill(positions.anchors, 0);
   return positions;
+}
+
+}  // namespace
+
+ReadingPositions even_positions(ClContext& context, const DeviceLayout& layout) {
+  auto home = context.allocate<float>(2 * layout.size());
+  context.fill(home, 0.f);
+  return positions_of(context, layout, home);
 }
 
 namespace {
@@ -234,7 +242,7 @@ void for_each_bin(const SnapFeatures::Edge& edge, int width, int height, const A
   }
 }
 
-SnapTables::Edge edge_record(const SnapFeatures::Edge& edge, int number, int turn, int width) {
+SnapEdge edge_record(const SnapFeatures::Edge& edge, int number, int turn, int width) {
   const auto x0 = static_cast<float>(edge.x[0] - turn * width), y0 = static_cast<float>(edge.y[0]);
   const auto ex = static_cast<float>(edge.x[1] - edge.x[0]), ey = static_cast<float>(edge.y[1] - edge.y[0]);
   const float length2 = ex * ex + ey * ey, inverse = length2 > 0 ? -1 / length2 : 0;
@@ -286,26 +294,25 @@ void fill_bins(const std::vector<SnapFeatures::Edge>& edges, std::span<const Pat
 }
 
 /// \param reservations  0
+/// \param snapped       by colour
 void snap_to_vertices(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables,
-                      ClBuffer<int>& reservations, SnappedPositions& positions) {
-  if (tables.vertex_x.size == 0) return;
-  const int count = static_cast<int>(tables.vertex_x.size);
-  const auto &patch = tables.vertex_patches, &rank = tables.vertex_ranks;
-  const auto &x = tables.vertex_x, &y = tables.vertex_y;
+                      ClBuffer<int>& reservations, ReadingPositions& snapped) {
+  const int count = tables.vertex_count;
+  if (count == 0) return;
   auto states = context.allocate<int>(count), open = context.allocate<int>(2 * static_cast<std::size_t>(count));
   context.fill(states, 0);
   // A reservation is more than all of the rounds before, so these need not be taken off.
-  const int step = 1 << std::bit_width(static_cast<unsigned>(count));
-  for (int round = 0; round < kWideRounds; ++round) {
-    context.launch({"snap.cl", "reserve_texels"}, over(count), count, layout.width, round * step, patch, x, y, rank,
-                   layout.patches, positions.anchors, states, reservations);
-    context.launch({"snap.cl", "decide_reservations"}, over(count), count, layout.width, round * step, patch, x, y,
-                   rank, layout.patches, reservations, states, positions.anchors, positions.x, positions.y);
+  SnapParameters parameters{layout.width, static_cast<int>(layout.size()), count, 0, 0, 0, 0};
+  parameters.step = 1 << std::bit_width(static_cast<unsigned>(count));
+  for (int round = 0; round < kWideRounds; ++round, parameters.least += parameters.step) {
+    context.launch({"snap.cl", "reserve_texels"}, over(count), parameters, tables.vertices, layout.tables.patches,
+                   snapped.anchors, states, reservations);
+    context.launch({"snap.cl", "decide_reservations"}, over(count), parameters, tables.vertices, layout.tables.patches,
+                   reservations, states, snapped.anchors, snapped.offsets);
   }
   // One work-group: on a CPU one work-item.
-  context.launch({"snap.cl", "decide_the_rest"}, row_range(context, 1), count, layout.width,
-                 static_cast<int>(layout.size()), kWideRounds * step, step, patch, x, y, rank, layout.patches,
-                 reservations, states, positions.anchors, positions.x, positions.y, open);
+  context.launch({"snap.cl", "decide_the_rest"}, row_range(context, 1), parameters, tables.vertices,
+                 layout.tables.patches, reservations, states, snapped.anchors, snapped.offsets, open);
 }
 
 }  // namespace
@@ -314,9 +321,8 @@ SnapTables tables_of(const SnapFeatures& features, std::span<const Patch> patche
   SnapTables tables;
   tables.edge_points.reserve(features.edges.size());
   for (const SnapFeatures::Vertex& vertex : features.vertices) {
-    tables.vertex_patches.push_back(vertex.patch), tables.vertex_points.push_back(vertex.point),
-        tables.vertex_ranks.push_back(vertex.rank);
-    tables.vertex_x.push_back(static_cast<float>(vertex.x)), tables.vertex_y.push_back(static_cast<float>(vertex.y));
+    tables.vertices.push_back({static_cast<float>(vertex.x), static_cast<float>(vertex.y), vertex.patch, vertex.rank});
+    tables.vertex_points.push_back(vertex.point);
   }
   for (const SnapFeatures::Edge& edge : features.edges) tables.edge_points.push_back(edge.points);
   const int bins = list_rows(patches, tables.rows);
@@ -325,34 +331,42 @@ SnapTables tables_of(const SnapFeatures& features, std::span<const Patch> patche
 }
 
 DeviceSnapTables upload_tables(ClContext& context, const SnapTables& tables) {
-  return {context.upload(tables.vertex_patches), context.upload(tables.vertex_points),
-          context.upload(tables.vertex_ranks),   context.upload(tables.vertex_x),
-          context.upload(tables.vertex_y),       context.upload(tables.edge_points),
-          context.upload(tables.edges),          {context.upload(tables.rows[0]), context.upload(tables.rows[1])},
-          context.upload(tables.bin_begins),     context.upload(tables.bin_edges)};
+  std::vector<int> points = tables.vertex_points, bins = tables.bin_begins;
+  for (const auto& ends : tables.edge_points) points.insert(points.end(), ends.begin(), ends.end());
+  bins.insert(bins.end(), tables.bin_edges.begin(), tables.bin_edges.end());
+  return {static_cast<int>(tables.vertices.size()),
+          static_cast<int>(tables.edge_points.size()),
+          context.upload(tables.vertices),
+          context.upload(points),
+          context.upload(tables.edges),
+          {context.upload(tables.rows[0]), context.upload(tables.rows[1])},
+          context.upload(bins),
+          static_cast<int>(tables.bin_begins.size()) - 1};
 }
 
-SnappedPositions snap_positions(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables,
-                                ReadingPositions& positions) {
-  SnappedPositions snapped{std::move(positions.x), std::move(positions.y), std::move(positions.anchors),
-                           context.allocate<float>(layout.size())};
+ReadingPositions snap_positions(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables,
+                                const ReadingPositions& positions) {
+  // Inner rows of VSM patches have their even columns first while texels snap.
+  ReadingPositions by_colour = positions_of(context, layout, {}),
+                   snapped = positions_of(context, layout, positions.home);
+  const auto for_rows = [&](const char* kernel, int parity, bool is_again, const auto&... arguments) {
+    const std::size_t count = tables.rows[parity].size;
+    context.launch({"snap.cl", kernel}, row_range(context, count),
+                   SnapParameters{layout.width, static_cast<int>(layout.size()), static_cast<int>(count), 0, 0,
+                                  tables.bin_count, is_again},
+                   tables.rows[parity], layout.tables.patches, arguments...);
+  };
+  for (const int parity : {0, 1}) for_rows("part_colours", parity, false, positions.home, by_colour.offsets);
   auto spare = context.allocate<int>(layout.size());
   context.fill(spare, 0);
-  const auto& rows = tables.rows;
-  const auto for_rows = [&](const char* kernel, int parity, const auto&... arguments) {
-    const std::size_t count = rows[parity].size;
-    context.launch({"snap.cl", kernel}, row_range(context, count), static_cast<int>(count), layout.width, arguments...);
-  };
-  for (const int parity : {0, 1})
-    for_rows("part_colours", parity, rows[parity], layout.patches, positions.home_x, positions.home_y, snapped.x,
-             snapped.y);
-  snap_to_vertices(context, layout, tables, spare, snapped);
-  const auto target_x = context.allocate<float>(layout.size()), target_y = context.allocate<float>(layout.size());
-  for (int round = 0; round < (tables.edges.size == 0 ? 0 : kEdgeRounds); ++round)
+  snap_to_vertices(context, layout, tables, spare, by_colour);
+  const auto targets = context.allocate<float>(2 * layout.size());
+  for (int round = 0; round < (tables.edge_count == 0 ? 0 : kEdgeRounds); ++round)
     for (const int parity : {0, 1})
-      for_rows("place_on_edges", parity, static_cast<int>(round > 0), rows[parity], layout.patches, tables.bin_begins,
-               tables.bin_edges, tables.edges, snapped.anchors, snapped.parameters, snapped.x, snapped.y, spare,
-               target_x, target_y);
+      for_rows("place_on_edges", parity, round > 0, tables.bins, tables.edges, by_colour.anchors, by_colour.offsets,
+               spare, targets);
+  for (const int parity : {0, 1})
+    for_rows("join_colours", parity, false, by_colour.offsets, by_colour.anchors, snapped.offsets, snapped.anchors);
   return snapped;
 }
 

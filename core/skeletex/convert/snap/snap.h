@@ -5,6 +5,7 @@
 
 #include "skeletex/convert/sample/device_maps.h"
 #include "skeletex/reconstruct/displace.h"
+#include "snap_structs.h"
 
 namespace skeletex {
 
@@ -67,15 +68,10 @@ SnapFeatures place_features(const MapFeatures& features, std::span<const Chart> 
 
 /// Features as the kernels take them (snap.cl).
 struct SnapTables {
-  /// An edge at one turn of v, as EdgeRecord of snap.cl.
-  struct Edge {
-    float x, y, ex, ey, over_x, over_y, flatness;
-    int number;
-  };
-  std::vector<int> vertex_patches, vertex_points, vertex_ranks;
-  std::vector<float> vertex_x, vertex_y;  ///< cells
-  std::vector<std::array<int, 2>> edge_points;
-  std::vector<Edge> edges;
+  std::vector<SnapVertex> vertices;
+  std::vector<int> vertex_points;               ///< their numbers among the maps' vertices
+  std::vector<std::array<int, 2>> edge_points;  ///< likewise
+  std::vector<SnapEdge> edges;
   std::array<std::vector<LatticeRow>, 2> rows;  ///< of VSM patches, inner ones, even and odd: patch, row, first bin, 0
   std::vector<int> bin_begins, bin_edges;       ///< the edges near each bin of eight columns of two rows
 };
@@ -85,36 +81,28 @@ SnapTables tables_of(const SnapFeatures& features, std::span<const Patch> patche
 /// Where each texel reads, a thing of its own between the map and the texel: per texel an offset from its place in the
 /// regular grid, in cells, at most 1 along each axis, and what holds it there.
 struct ReadingPositions {
-  ClBuffer<float> x, y;            ///< around, along
-  ClBuffer<int> anchors;           ///< 0: nothing; 1 + i: vertex i of the features; -1 - i: edge i
-  ClBuffer<float> home_x, home_y;  ///< the offsets that texels go back to: 0, but where the regular grid is unfolded
+  ClBuffer<float> offsets;  ///< planes: around, along, and of texels on edges their places there, 0 at the first point
+  ClBuffer<int> anchors;    ///< 0: nothing; 1 + i: vertex i of the features; -1 - i: edge i
+  ClBuffer<float> home;     ///< the offsets that texels go back to, planes: 0, but where the regular grid is unfolded
 };
 /// The regular grid.
 ReadingPositions even_positions(ClContext& context, const DeviceLayout& layout);
 
-/// The same as they are while texels snap: inner rows of VSM patches have their even columns first, then their odd
-/// ones.
-struct SnappedPositions {
-  ClBuffer<float> x, y;        ///< see ReadingPositions; 0 in all other rows
-  ClBuffer<int> anchors;       ///< likewise
-  ClBuffer<float> parameters;  ///< place on the edge, 0 at its first point, 1 at its last; of texels on edges alone
-};
-
-/// SnapTables on the device; lists that are empty are buffers of size 0.
+/// SnapTables on the device.
 struct DeviceSnapTables {
-  ClBuffer<int> vertex_patches, vertex_points, vertex_ranks;
-  ClBuffer<float> vertex_x, vertex_y;
-  ClBuffer<std::array<int, 2>> edge_points;
-  ClBuffer<SnapTables::Edge> edges;
+  int vertex_count = 0, edge_count = 0;  ///< that texels can sit on
+  ClBuffer<SnapVertex> vertices;
+  ClBuffer<int> points;  ///< vertex_points, then edge_points
+  ClBuffer<SnapEdge> edges;
   std::array<ClBuffer<LatticeRow>, 2> rows;
-  ClBuffer<int> bin_begins, bin_edges;
+  ClBuffer<int> bins;  ///< bin_begins, then bin_edges
+  int bin_count = 0;
 };
 /// \throw DeviceError when there is no room
 DeviceSnapTables upload_tables(ClContext& context, const SnapTables& tables);
 
 /// Moves reading positions from home to vertices, strongest first, and then to creased edges; the map does not fold.
-/// \param positions  0 but for what is at home; x, y and anchors are taken over
-SnappedPositions snap_positions(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables,
-                                ReadingPositions& positions);
+ReadingPositions snap_positions(ClContext& context, const DeviceLayout& layout, const DeviceSnapTables& tables,
+                                const ReadingPositions& positions);
 
 }  // namespace skeletex

@@ -40,8 +40,9 @@ CurvatureResult mean_curvature(ClContext& context, const SkeletexModel& model, c
   result.solver = solved.report;
   const std::vector<Vec3> curvature_normals = download_vectors(context, solved.x),
                           normals = vertex_normals(context, surface);
+  const double unit = model.diagonal * model.skeleton.frame.scale;
   for (std::size_t i = 0; i < normals.size(); ++i)
-    result.mean_curvature.push_back(static_cast<float>(0.5 * normals[i].dot(curvature_normals[i]) / model.diagonal));
+    result.mean_curvature.push_back(static_cast<float>(0.5 * normals[i].dot(curvature_normals[i]) / unit));
   return result;
 }
 

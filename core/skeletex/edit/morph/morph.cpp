@@ -9,7 +9,6 @@
 #include <deque>
 #include <numbers>
 
-#include "skeletex/edit/morph/blend.h"
 #include "skeletex/edit/morph/orientation.h"
 #include "skeletex/edit/morph/seam_mean.h"
 #include "skeletex/edit/morph/surface_map.h"
@@ -168,11 +167,12 @@ Morph::Morph(ClContext& context, std::vector<SkeletexModel> models, std::span<co
     if (options.size == 0) size = std::max({size, models_[m].texture.width, models_[m].texture.height});
   }
   DisplacementTexture all;
+  const UnitFrame frame = models_[0].skeleton.frame;
   for (SkeletexModel& model : models_) {
-    const SkeletexModel own = resample_model(context, model, size);
+    const SkeletexModel own = resample_model(context, in_frame(std::move(model), frame), size);
     own_sampling_.push_back(own.sampling), own_diagonals_.push_back(own.diagonals);
     model = regular_grid(context, own);
-    own_moves_.push_back(moves_between(model, own));
+    own_moves_.push_back(options.has_own_texels ? moves_between(model, own) : DisplacementTexture{});
     traced_seams_.push_back(trace_seams(model));
     texel_begins_.push_back(static_cast<int>(all.out.size()));
     append(model.texture, all);
@@ -253,10 +253,11 @@ SkeletexModel Morph::without_texels(std::span<const double> weights) const {
   return std::move(between(weights, false)->model);
 }
 
-SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) const {
+MorphPlan Morph::plan(std::span<const double> given) const {
   const std::unique_ptr<Between> between = this->between(given, true);
-  const auto& [weights, result, maps, separation] = *between;
-  BlendTables tables;
+  auto& [weights, result, maps, separation] = *between;
+  MorphPlan plan;
+  BlendTables& tables = plan.tables;
   const std::vector<LatticeRow> rows = lattice_rows(result.patches, RowChoice::kAll);
   const auto add_source = [&](std::size_t m, int texel_begin, double weight) {
     ++tables.source_count;
@@ -276,15 +277,25 @@ SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) 
     if (has_own_texels(static_cast<int>(m)) && own_share(weights[m]) > 0)
       add_source(m, move_begins_[m], own_share(weights[m]));
   }
+  plan.moves = end_moves(result, *separation, maps, weights);
+  plan.model = std::move(result);
+  return plan;
+}
+
+SkeletexModel Morph::queue(std::span<const double> given, DevicePlanes& texels) const {
+  MorphPlan plan = this->plan(given);
+  const SkeletexModel& result = plan.model;
+  const std::vector<LatticeRow> rows = lattice_rows(result.patches, RowChoice::kAll);
   const std::size_t area = static_cast<std::size_t>(result.texture.width) * result.texture.height;
   if (texels.count != area) {
     texels = allocate_planes(*context_, area);
     context_->fill(texels.values, 0);
   }
-  const FrameTables frames = frame_tables(result.skeleton, *separation, result.patches, result.origin);
-  blend_texels(*context_, tables, rows, frames, result.texture.width, texels_, texels);
-  move_ends(*context_, end_moves(result, *separation, maps, weights), rows, frames, result.texture.width, texels);
-  return std::move(between->model);
+  const FrameTables frames =
+      frame_tables(result.skeleton, SeparationPlanes(result.skeleton), result.patches, result.origin);
+  blend_texels(*context_, plan.tables, rows, frames, result.texture.width, texels_, texels);
+  move_ends(*context_, plan.moves, rows, frames, result.texture.width, texels);
+  return std::move(plan.model);
 }
 
 int Morph::layout_index(std::span<const double> weights) const {

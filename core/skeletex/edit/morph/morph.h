@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "skeletex/edit/morph/blend.h"
 #include "skeletex/edit/morph/seam_map.h"
 #include "skeletex/model/texture.h"
 #include "skeletex/reconstruct/displace.h"
@@ -15,8 +16,17 @@ struct MorphOptions {
   /// Number of the model whose bones (names, order, directions), rectangles and seam samples the result takes. Default:
   /// the model of the largest weight, the first of several. So a morph that ends at a model ends at its very texels.
   std::optional<int> layout;
-  int size = 0;           ///< longer side of the result's texture; 0: the largest of the models'
-  bool is_smooth = true;  ///< at() removes creases where bones of different rotations meet (orientation.h)
+  int size = 0;                ///< longer side of the result's texture; 0: the largest of the models'
+  bool has_own_texels = true;  ///< the ends are snapped models' own texels; without, those of regular_grid
+  bool is_smooth = true;       ///< at() removes creases where bones of different rotations meet (orientation.h)
+};
+
+/// An in-between model before its texels are blended: the model without texels, where they are read, and what moves the
+/// rows at the ends onto the seams.
+struct MorphPlan {
+  SkeletexModel model;
+  BlendTables tables;  ///< of the models with a weight above 0
+  EndMoves moves;
 };
 
 /// In-between models of two or more models (paper 5). Texels, the distances of seams and corners, and the positions of
@@ -43,6 +53,8 @@ class Morph {
   /// Queues the same on the device, with creases. The texels stay there, in planes of the result's size; the texture of
   /// the returned model has a size and no texels. For animations see LiveMorph (live.h).
   SkeletexModel queue(std::span<const double> weights, DevicePlanes& texels) const;
+  /// What queue does to the texels.
+  MorphPlan plan(std::span<const double> weights) const;
   /// The model that queue returns, without any work per texel.
   SkeletexModel without_texels(std::span<const double> weights) const;
 

@@ -24,6 +24,7 @@ SkeletexModel mirrored(const SkeletexModel& model) {
   }
   for (Node& node : result.skeleton.nodes) mirror_x(node.position);
   mirror_x(result.origin);
+  mirror_x(result.skeleton.frame.offset);
   // b = o x s comes out opposite to its mirror image: angles run the other way, and so does `around`.
   for (const Patch& patch : model.patches) {
     const auto [x, y, width, height] = patch.rectangle;

@@ -133,7 +133,8 @@ SkeletexModel transfer(ClContext& context, const SkeletexModel& source, const Sk
                        std::vector<TransferredPart>* report) {
   if (bones.empty()) throw InputError("there are no bones to transfer");
   check_options(options);
-  const TransferInput input(context, source, target, options);
+  const SkeletexModel from = in_frame(source, target.skeleton.frame);
+  const TransferInput input(context, from, target, options);
   const Pairs pairs = pair_parts(input, bones);
 
   SkeletexModel result = target;

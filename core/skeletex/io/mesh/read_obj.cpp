@@ -12,7 +12,7 @@ namespace {
 
 class ObjReader {
  public:
-  ObjReader(std::string_view bytes, const std::string& where) : text_(bytes, where), where_(where) {}
+  ObjReader(std::string_view bytes, const std::string& where) : bytes_(bytes), text_(bytes, where), where_(where) {}
 
   MeshFile read() {
     while (!text_.at_end()) read_line();
@@ -24,13 +24,16 @@ class ObjReader {
     drop_missing(attributes.texture_coordinates.values.size(), attributes.texture_coordinates.corners);
     if (!attributes.colours.empty())
       attributes.colours.values.resize(static_cast<std::size_t>(mesh_.vertex_count()), Colour::Ones());
-    return mesh_.take(where_, std::move(material_files_));
+    MeshFile file = mesh_.take(where_, std::move(material_files_));
+    file.ends_in_face = is_face_last_ && !ends_with_line_break();
+    return file;
   }
 
  private:
   void read_line() {
-    const std::string_view line = next_line();
+    const std::string_view line = without_byte_order_mark(next_line());  // files that were put together have it inside
     const std::vector<std::string_view>& words = text_.split(line, '#');
+    is_face_last_ = !words.empty() && words[0] == "f";
     if (words.empty()) return;
     MeshAttributes& attributes = mesh_.attributes();
     if (words[0] == "v") {
@@ -49,6 +52,8 @@ class ObjReader {
       use_material(words.size() > 1 ? rest_of(line, words[1]) : "");
     } else if (words[0] == "mtllib" && words.size() > 1) {
       material_files_.push_back(rest_of(line, words[1]));
+    } else if (static_cast<unsigned char>(words[0][0]) >= 0x80) {
+      text_.fail(fmt::format("{} is no keyword of OBJ; save the file as plain text", quoted_word(words[0])));
     }
   }
 
@@ -104,6 +109,10 @@ class ObjReader {
       has_texture = has_texture || texture_.back() >= 0;
       has_normals = has_normals || normals_.back() >= 0;
     }
+    if (corners_.size() < 3 && text_.at_end() && !ends_with_line_break())
+      text_.fail(
+          fmt::format("the file ends within a face, after {} of its corners; it was not copied or written completely",
+                      corners_.size()));
     const auto given = [](bool is_given, const std::vector<int>& indices) {
       return is_given ? std::span<const int>(indices) : std::span<const int>();
     };
@@ -148,6 +157,9 @@ class ObjReader {
         if (corner >= static_cast<int>(count)) corner = -1;
   }
 
+  bool ends_with_line_break() const { return bytes_.ends_with('\n') || bytes_.ends_with('\r'); }
+
+  std::string_view bytes_;
   TextReader text_;
   const std::string& where_;
   MeshBuilder mesh_;
@@ -157,6 +169,7 @@ class ObjReader {
   int material_ = -1;
   int last_corner_ = -1;
   std::size_t last_corner_line_ = 0;
+  bool is_face_last_ = false;
 };
 
 }  // namespace

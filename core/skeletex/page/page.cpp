@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/page/page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "skeletex/analysis/metro.h"
+#include "skeletex/device/kernel_source.h"
+#include "skeletex/edit/morph/morph.h"
+#include "skeletex/edit/transfer/transfer.h"
+#include "skeletex/geometry/best_rotation.h"
+#include "skeletex/model/error.h"
+#include "skeletex/page/pack.h"
+#include "skeletex/page/stage.h"
+#include "skeletex/reconstruct/levels.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/skeleton/pose.h"
+
+namespace skeletex {
+
+/// The page without its data; its text is empty when npm was missing at build time.
+std::span<const EmbeddedKernelFile> embedded_page_files();
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kTexelStep = 5e-6;  // diagonals
+constexpr int kKeys = 16;            // intervals of a morph
+constexpr double kSwitch = 1e-4;     // where the seams of a morph change, it is found to this part of the way
+constexpr double kNearEnd = 1e-7;    // where the tables of a model without weight are taken
+constexpr const char* kPlaceOfData = "<!-- skeletex data -->";
+
+Json to_json(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
+
+/// The keys of a morph, and two more around every place where its seams change.
+std::vector<PageKey> morph_keys(const Morph& morph) {
+  const auto weights_at = [](double t) { return std::vector<double>{1 - t, t}; };
+  const auto at = [&](double t) {
+    MorphPlan plan = morph.plan(weights_at(std::clamp(t, kNearEnd, 1 - kNearEnd)));
+    return PageKey{t, morph.at(weights_at(t)), std::move(plan.tables), std::move(plan.moves)};
+  };
+  std::vector<PageKey> keys{at(0)};
+  for (int i = 1; i <= kKeys; ++i) {
+    PageKey next = at(static_cast<double>(i) / kKeys);
+    while (!has_same_seams(keys.back().model, next.model)) {
+      const SkeletexModel& before = keys.back().model;
+      double low = keys.back().t, high = next.t;
+      while (high - low > kSwitch) {
+        const double middle = (low + high) / 2;
+        const bool is_same = has_same_seams(before, morph.without_texels(weights_at(middle)));
+        (is_same ? low : high) = middle;
+      }
+      if (low > keys.back().t) keys.push_back(at(low));
+      if (high >= next.t) break;
+      keys.push_back(at(high));
+    }
+    keys.push_back(std::move(next));
+  }
+  return keys;
+}
+
+/// The skeleton, and for a morph what mean_nodes takes: the second one's nodes and the rotation to them.
+Json skeleton_json(std::span<const PageKey> keys, const PageOptions& options) {
+  const Skeleton& skeleton = keys.front().model.skeleton;
+  Json json{{"nodes", Json::array()}, {"bones", Json::array()}, {"first", Json::array()}, {"keys", Json::array()}};
+  std::vector<Vec3> first, second;
+  for (const Node& node : skeleton.nodes) {
+    json["nodes"].push_back(node.name);
+    json["first"].push_back(to_json(node.position));
+    first.push_back(node.position);
+  }
+  for (const Bone& bone : skeleton.bones)
+    json["bones"].push_back({{"name", bone.name}, {"head", bone.head}, {"tail", bone.tail}});
+  if (options.second) {
+    json["second"] = Json::array();
+    for (const int node : options.second->correspondence.nodes) {
+      second.push_back(options.second->model.skeleton.nodes[node].position);
+      json["second"].push_back(to_json(second.back()));
+    }
+    for (std::vector<Vec3>* nodes : {&first, &second}) {
+      const Vec3 centre =
+          std::accumulate(nodes->begin(), nodes->end(), Vec3(Vec3::Zero())) / static_cast<double>(nodes->size());
+      for (Vec3& node : *nodes) node -= centre;
+    }
+    const Eigen::Quaterniond turn = best_rotation(first, second);
+    const double sign = turn.w() < 0 ? -1 : 1;
+    json["turn"] = {sign * turn.x(), sign * turn.y(), sign * turn.z(), sign * turn.w()};
+  }
+  for (const PageKey& key : keys) {
+    Json directions = Json::array();
+    for (const BoneBasis& basis : bone_bases(key.model.skeleton)) directions.push_back(to_json(basis.s));
+    json["keys"].push_back({{"t", key.t}, {"s", directions}});
+  }
+  return json;
+}
+
+std::vector<float> rows_of(const SkeletexModel& model) {
+  std::vector<float> rows;
+  for (const Patch& patch : model.patches)
+    for (const double u : patch.row_u) rows.push_back(static_cast<float>(u));
+  return rows;
+}
+
+Json texture_json(PageArrays& arrays, const SkeletexModel& model) {
+  Json json = add_texels(arrays, model.texture, model.patches, kTexelStep * model.diagonal);
+  json["width"] = model.texture.width;
+  json["height"] = model.texture.height;
+  json["patches"] = Json::array();
+  for (const Patch& patch : model.patches) {
+    const auto [x, y, width, height] = patch.rectangle;
+    json["patches"].push_back({x, y, width, height});
+  }
+  return json;
+}
+
+/// What a transfer makes of every bone by itself, in one texture: seams stay, so any choice of bones fits together.
+Json transfer_json(ClContext& context, PageArrays& arrays, const SkeletexModel& source, const SkeletexModel& target,
+                   const Correspondence& correspondence) {
+  SkeletexModel all = target;
+  Json refused = Json::array();
+  for (int bone = 0; bone < static_cast<int>(target.patches.size()); ++bone) {
+    try {
+      const SkeletexModel one =
+          transfer(context, source, target,
+                   {{source.skeleton.bones[correspondence.bones[bone]].name, target.skeleton.bones[bone].name}});
+      all.patches[bone] = one.patches[bone];
+      const auto [x, y, width, height] = target.patches[bone].rectangle;
+      for (int row = y; row < y + height; ++row)
+        for (const auto plane :
+             {&DisplacementTexture::along, &DisplacementTexture::around, &DisplacementTexture::out}) {
+          const auto begin = static_cast<std::ptrdiff_t>(row) * target.texture.width + x;
+          std::copy_n((one.texture.*plane).begin() + begin, width, (all.texture.*plane).begin() + begin);
+        }
+    } catch (const InputError& error) {
+      refused.push_back({{"bone", bone}, {"why", error.what()}});
+    }
+  }
+  Json json = texture_json(arrays, all);
+  json["rows"] = arrays.add(rows_of(all));
+  json["refused"] = refused;
+  return json;
+}
+
+/// Distances of the lattice's vertices to a mesh, in 65535ths of the largest.
+Json error_json(ClContext& context, PageArrays& arrays, const SkeletexModel& model, const TriangleMesh& reference) {
+  const std::vector<float> distances =
+      closest_distances(context, reference, reconstruct_mesh(context, model).positions);
+  std::vector<float> shares;
+  const double diagonal = bounding_box(reference).diagonal();
+  for (const float distance : distances) shares.push_back(static_cast<float>(distance / diagonal));
+  std::vector<float> sorted = shares;
+  const auto at = sorted.begin() + static_cast<std::ptrdiff_t>((sorted.size() - 1) * 99 / 100);
+  std::nth_element(sorted.begin(), at, sorted.end());
+  const float highest = *std::max_element(shares.begin(), shares.end());
+  std::vector<unsigned char> low, high;
+  for (const float share : shares) {
+    const auto step = static_cast<unsigned>(std::lround(65535 * (highest > 0 ? share / highest : 0)));
+    low.push_back(static_cast<unsigned char>(step & 255U));
+    high.push_back(static_cast<unsigned char>(step >> 8U));
+  }
+  return {{"scale", std::max(*at, 1e-12f)}, {"highest", highest}, {"low", arrays.add(low)}, {"high", arrays.add(high)}};
+}
+
+/// One level of detail.
+Json level_json(ClContext& context, PageArrays& arrays, std::span<const PageKey> keys, const PageOptions& options) {
+  const SkeletexModel& first = keys.front().model;
+  Json level = texture_json(arrays, first);
+  level["rows"] = arrays.add(rows_of(first));
+  level["stages"] = Json::array();
+  for (std::size_t begin = 0; begin < keys.size();) {
+    std::size_t end = begin + 1;
+    while (end < keys.size() && has_same_seams(keys[begin].model, keys[end].model)) ++end;
+    level["stages"].push_back(add_stage(context, arrays, keys.subspan(begin, end - begin)));
+    begin = end;
+  }
+  if (options.reference) level["error"] = error_json(context, arrays, first, *options.reference);
+  return level;
+}
+
+Json morph_levels(ClContext& context, PageArrays& arrays, const SkeletexModel& model, const PageOptions& options,
+                  Json& skeleton) {
+  Json levels = Json::array();
+  const PageSecond& second = *options.second;
+  for (int size = std::max(model.texture.width, model.texture.height); size >= std::max(4, options.smallest);
+       size /= 2) {
+    try {
+      const Morph morph(context, {model, second.model}, std::span(&second.correspondence, 1),
+                        {.layout = 0, .size = size, .has_own_texels = false, .is_smooth = false});
+      const std::vector<PageKey> keys = morph_keys(morph);
+      if (levels.empty()) skeleton = skeleton_json(keys, options);
+      levels.push_back(level_json(context, arrays, keys, options));
+      const SkeletexModel& source = morph.models()[1];
+      levels.back()["second"] = texture_json(arrays, source);
+      levels.back()["second"]["rows"] = arrays.add(rows_of(keys.back().model));
+      levels.back()["blend"] = add_blend(arrays, morph, keys);
+      levels.back()["transfer"] = transfer_json(context, arrays, source, keys.front().model, second.correspondence);
+    } catch (const InputError&) {
+      if (levels.empty()) throw;
+      break;  // too small for the number of bones
+    }
+  }
+  return levels;
+}
+
+}  // namespace
+
+bool has_page_script() { return !embedded_page_files().front().text.empty(); }
+
+std::string make_page(ClContext& context, const SkeletexModel& model, const PageOptions& options) {
+  if (!has_page_script())
+    throw InputError(
+        "this build has no script for pages; install nodejs and npm (scripts/install-dependencies.sh), then configure "
+        "and build again");
+  PageArrays arrays;
+  Json json{{"version", 1}, {"name", options.name}};
+  json["second"] = options.second ? Json(options.second->name) : Json();
+  json["up"] = options.is_z_up ? "z" : "y";
+  json["diagonal"] = model.diagonal;
+  json["origin"] = to_json(model.origin);
+  json["roots"] = root_nodes(model.skeleton);
+  if (options.second) {
+    Json skeleton;
+    json["levels"] = morph_levels(context, arrays, model, options, skeleton);
+    json["skeleton"] = skeleton;
+  } else {
+    json["levels"] = Json::array();
+    for (const SkeletexModel& level : make_levels(context, model, options.smallest)) {
+      const std::vector<PageKey> keys{{0, level, {}, {}}};
+      if (json["levels"].empty()) json["skeleton"] = skeleton_json(keys, options);
+      json["levels"].push_back(level_json(context, arrays, keys, options));
+    }
+  }
+  std::string page(embedded_page_files().front().text);
+  const std::size_t place = page.find(kPlaceOfData);
+  if (place == std::string::npos) throw InputError("the page's script has no place for data; build again");
+  page.replace(place, std::string_view(kPlaceOfData).size(),
+               fmt::format("<script id=\"data\" type=\"text/plain\">{}</script>", arrays.text(json)));
+  return page;
+}
+
+}  // namespace skeletex
