@@ -255,7 +255,11 @@ SkeletexModel Morph::without_texels(std::span<const double> weights) const {
 
 MorphPlan Morph::plan(std::span<const double> given) const {
   const std::unique_ptr<Between> between = this->between(given, true);
-  auto& [weights, result, maps, separation] = *between;
+  // No structured binding: clang does not capture it.
+  const std::vector<double>& weights = between->weights;
+  SkeletexModel& result = between->model;
+  const std::deque<SeamMap>& maps = between->maps;
+  const SeparationPlanes& separation = *between->separation;
   MorphPlan plan;
   BlendTables& tables = plan.tables;
   const std::vector<LatticeRow> rows = lattice_rows(result.patches, RowChoice::kAll);
@@ -267,7 +271,7 @@ MorphPlan Morph::plan(std::span<const double> given) const {
       BlendSource source{
           texel_begin + y * stride + x,          stride, width, height, static_cast<int>(tables.columns.size()), -1,
           static_cast<float>(maps[m].sign(bone))};
-      append_turned_columns(maps[m], *separation, bone, result.patches[bone].rectangle.width, source, tables);
+      append_turned_columns(maps[m], separation, bone, result.patches[bone].rectangle.width, source, tables);
       tables.sources.push_back(source);
     }
     append_rows(maps[m], rows, result.patches, weight, tables);
@@ -277,7 +281,7 @@ MorphPlan Morph::plan(std::span<const double> given) const {
     if (has_own_texels(static_cast<int>(m)) && own_share(weights[m]) > 0)
       add_source(m, move_begins_[m], own_share(weights[m]));
   }
-  plan.moves = end_moves(result, *separation, maps, weights);
+  plan.moves = end_moves(result, separation, maps, weights);
   plan.model = std::move(result);
   return plan;
 }
