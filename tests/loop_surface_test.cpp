@@ -25,8 +25,9 @@ TEST(LoopSurface, HasTheLimitOfEachVertexWhateverTheNumberOfRounds) {
   const TestModel model = load_standard_model("triceratops");
   const TriangleMesh once = loop_surface(model.mesh, {}, 1).mesh, twice = loop_surface(model.mesh, {}, 2).mesh;
   EXPECT_EQ(twice.triangles.size(), 16 * model.mesh.triangles.size());
+  const double diagonal = bounding_box(once).diagonal();  // OpenMesh's weights are good to single precision
   for (std::size_t v = 0; v < once.positions.size(); ++v)
-    EXPECT_LT((once.positions[v] - twice.positions[v]).norm(), 1e-12);
+    EXPECT_LT((once.positions[v] - twice.positions[v]).norm(), 1e-6 * diagonal);
   EXPECT_TRUE(measure_manifold(twice).is_closed_manifold());
   EXPECT_EQ(measure_manifold(twice).genus, measure_manifold(model.mesh).genus);
 }
