@@ -3,16 +3,21 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <numeric>
 #include <random>
 
 #include "reconstruct_structs.h"
+#include "skeletex/analysis/metro.h"
+#include "skeletex/convert/encode_model.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/reconstruct/resample_snapped.h"
+#include "support/load_model.h"
 #include "support/mesh_topology.h"
 #include "support/reconstruct_twin.h"
 #include "support/synthetic_model.h"
@@ -186,6 +191,70 @@ TEST(Resample, SeamSamplesStayOnTheSeparationPlaneAndNearTheOldPolyline) {
         EXPECT_LT(nearest, cell * cell / (4 * 0.3)) << "arc " << a << " at " << other_size;
       }
     }
+  }
+}
+
+TEST(ResampleSnapped, FinerRowsAndColumnsHaveAllOldOnes) {
+  for (const int old : {4, 5, 9, 40, 77})
+    for (const int made : {old, old + 1, 2 * old - 1, 2 * old, 2 * old + 1, 3 * old + 2}) {
+      const std::vector<double> rows = rows_of_finer(old, made), columns = columns_of_finer(old, made);
+      ASSERT_EQ(rows.size(), static_cast<std::size_t>(made));
+      ASSERT_EQ(columns.size(), static_cast<std::size_t>(made));
+      EXPECT_EQ(rows.back(), old - 1);
+      EXPECT_LT(columns.back(), old);
+      for (const auto* places : {&rows, &columns}) {
+        EXPECT_TRUE(std::is_sorted(places->begin(), places->end()));
+        for (int i = 0; i < old; ++i) EXPECT_TRUE(std::find(places->begin(), places->end(), i) != places->end());
+      }
+    }
+}
+
+TEST(ResampleSnapped, ChartsCoverTheMeshOnceAndTheirMapsDoNotFold) {
+  const TestModel model = load_standard_model("bear");
+  EncodeOptions options;
+  options.width = options.height = 96;
+  const SkeletexModel encoded = encode_model(device(), model.mesh, model.skeleton, options).model;
+  const PreparedModel prepared(encoded);
+  const TriangleMesh mesh = reconstruct_mesh(device(), prepared);
+  double area = 0;
+  std::size_t triangles = 0;
+  for (const Chart& chart : charts_of_mesh(prepared, mesh)) {
+    area += surface_area({chart.positions, chart.triangles});
+    triangles += chart.triangles.size();
+    double texture_area = 0;
+    for (const double each : texture_areas(chart)) {
+      EXPECT_GE(each, -1e-12);
+      texture_area += each;
+    }
+    EXPECT_NEAR(texture_area, 1, 1e-9);
+  }
+  EXPECT_NEAR(area, surface_area(mesh), 1e-9 * area);
+  EXPECT_EQ(triangles, mesh.triangles.size());
+}
+
+TEST(ResampleSnapped, KeepsTheSurfaceAtLargerSizesAndIsAsGoodAsEncodedAtSmallerOnes) {
+  for (const char* const name : {"bear", "bunny00"}) {
+    const TestModel model = load_standard_model(name);
+    const auto encoded = [&](int size) {
+      EncodeOptions options;
+      options.width = options.height = size;
+      return encode_model(device(), model.mesh, model.skeleton, options).model;
+    };
+    const auto mean_of = [&](const SkeletexModel& made) {
+      const TriangleMesh mesh = reconstruct_mesh(device(), made);
+      EXPECT_EQ(broken_rule(mesh, 0), "") << name;
+      return symmetric_mean(measure_metro(device(), model.mesh, mesh));
+    };
+    const SkeletexModel from = encoded(256);
+    const double mean = mean_of(from);
+    for (const auto& [size, limit] : {std::pair{512, 1.05}, std::pair{384, 1.1}}) {
+      const double finer = mean_of(resample_model(device(), from, size));
+      RecordProperty(name + std::to_string(size), std::to_string(finer / mean));
+      EXPECT_LT(finer, limit * mean) << name << ' ' << size;
+    }
+    const double coarser = mean_of(resample_model(device(), from, 128)), own = mean_of(encoded(128));
+    RecordProperty(name + std::string("128"), std::to_string(coarser / own));
+    EXPECT_LT(coarser, 1.5 * own) << name;
   }
 }
 

@@ -19,6 +19,7 @@
 #include "rig_file.h"
 #include "skeletex/convert/encode_model.h"
 #include "skeletex/convert/guess_stance.h"
+#include "skeletex/convert/subdivide/loop_surface.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/io/suggestion.h"
@@ -32,7 +33,7 @@ constexpr const char* kHybrid = "hybrid";  // each bone has a method of its own
 
 struct Arguments {
   std::string mesh, skeleton, output, device, json, size = "512", method = "vsm";
-  int iterations = 4;
+  int iterations = 4, subdivisions = 0;
   double alpha = 0.5, stop_spread = 0, hybrid_threshold = EncodeOptions{}.hybrid_unseen_threshold;
   std::string rows = "surface", spd_hit = "last", share, diagonals, compression = "auto", rounding = "surface";
   bool has_no_prefilter = false, has_no_unfold = false, is_snapped = false, is_fitted = false, is_paper_recipe = false,
@@ -148,6 +149,27 @@ struct Input {
   Skeleton skeleton;
 };
 
+/// Replaces the mesh by its Loop subdivision surface. Weights are linear over its triangles, as named numbers are.
+void subdivide(Input& input, int rounds) {
+  std::vector<VertexNumbers>& numbers = input.attributes.numbers;
+  const std::size_t own_numbers = numbers.size();
+  for (std::size_t bone = 0; bone < input.skeleton.bones.size() && !input.weights.empty(); ++bone)
+    numbers.push_back({"", std::vector<float>(input.weights.size(), 0.f)});
+  for (std::size_t v = 0; v < input.weights.size(); ++v)
+    for (const auto& [bone, weight] : input.weights[v])
+      numbers[own_numbers + bone].values[v] = static_cast<float>(weight);
+  AttributedMesh smooth = loop_surface(input.mesh, input.attributes, rounds);
+  input.mesh = std::move(smooth.mesh);
+  input.attributes = std::move(smooth.attributes);
+  if (input.weights.empty()) return;
+  input.weights.assign(input.mesh.positions.size(), {});
+  for (std::size_t bone = 0; own_numbers + bone < numbers.size(); ++bone)
+    for (std::size_t v = 0; v < input.weights.size(); ++v)
+      if (const float weight = numbers[own_numbers + bone].values[v]; weight > 0)
+        input.weights[v].push_back({static_cast<int>(bone), weight});
+  numbers.resize(own_numbers);
+}
+
 Input read_input(ClContext& context, const Arguments& arguments, const EncodeOptions& options) {
   Input input;
   if (is_gltf_file(arguments.mesh)) {
@@ -175,6 +197,14 @@ Input read_input(ClContext& context, const Arguments& arguments, const EncodeOpt
     require_valid(input.mesh, input.skeleton, &input.tree);
   }
   if (input.mesh.triangles != triangles) turn_over(input.attributes);
+  if (arguments.subdivisions > 0) {
+    subdivide(input, arguments.subdivisions);
+    // The surface lies inside of what is convex: bones and nodes may leave it.
+    if (input.skeleton.bones.empty())
+      input.tree = require_closed(input.mesh);
+    else
+      require_valid(input.mesh, input.skeleton, &input.tree);
+  }
   const UnitFrame frame = unit_frame(input.mesh);
   input.mesh = in_unit_frame(std::move(input.mesh), frame);
   input.skeleton = in_unit_frame(std::move(input.skeleton), frame);
@@ -395,6 +425,11 @@ void add_encode_command(CLI::App& program) {
       ->required()
       ->type_name("FILE");
   add(command, "Options", "--size", a.size, "texels: N for N x N, or WIDTHxHEIGHT").type_name("N|WxH");
+  add(command, "Options", "--subdivide", a.subdivisions,
+      "encode the smooth surface that Loop subdivision makes of the mesh, divided N times, 0 to 6: more texels make it "
+      "smoother. Distances are then to that surface")
+      .type_name("N")
+      ->check(number_in(0, 6));
   std::vector<std::string> methods = method_names();
   methods.push_back(kHybrid);
   take_one_of(add(command, "Options", "--method", a.method,

@@ -191,7 +191,7 @@ Json morph_levels(ClContext& context, PageArrays& arrays, const SkeletexModel& m
        size /= 2) {
     try {
       const Morph morph(context, {model, second.model}, std::span(&second.correspondence, 1),
-                        {.layout = 0, .size = size, .is_smooth = false});
+                        {.layout = 0, .size = size, .has_own_texels = false, .is_smooth = false});
       const std::vector<PageKey> keys = morph_keys(morph);
       if (levels.empty()) skeleton = skeleton_json(keys, options);
       levels.push_back(level_json(context, arrays, keys, options));

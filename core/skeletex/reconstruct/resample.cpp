@@ -8,12 +8,14 @@
 #include <numbers>
 
 #include "reconstruct_structs.h"
+#include "skeletex/convert/layers/read_layers.h"
 #include "skeletex/convert/layout/pack_atlas.h"
 #include "skeletex/model/encoder_settings.h"
 #include "skeletex/model/memory.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/layers/layer_values.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/reconstruct/resample_snapped.h"
 #include "skeletex/skeleton/frame.h"
 
 namespace skeletex {
@@ -407,6 +409,22 @@ SeamArc resample_arc(const SkeletexModel& model, const SeparationPlanes& separat
   return result;
 }
 
+/// An arc with samples as the patches at it have columns.
+/// \param keeps_samples  each of the old ones is one of the new ones
+SeamArc resample_arc(const PreparedModel& prepared, const SkeletexModel& result, const SeamArc& arc,
+                     bool keeps_samples) {
+  const SkeletexModel& model = prepared.model;
+  double ratio = 0;
+  for (const int bone : arc.bones)
+    ratio = std::max(ratio,
+                     static_cast<double>(result.patches[bone].rectangle.width) / model.patches[bone].rectangle.width);
+  if (keeps_samples)
+    return divide_arc(model, prepared.separation, arc, std::max(1, static_cast<int>(std::lround(ratio))));
+  const int old_cells = static_cast<int>(arc.samples.size()) + (arc.is_closed() ? 0 : 1);
+  return resample_arc(model, prepared.separation, arc,
+                      std::max(arc.is_closed() ? 3 : 2, static_cast<int>(std::lround(old_cells * ratio))));
+}
+
 /// A plane of one value per texel at another size, linear between texels of the same patch.
 std::vector<float> resample_plane(const std::vector<float>& values, const SkeletexModel& model,
                                   const SkeletexModel& result) {
@@ -446,21 +464,24 @@ SkeletexModel resample_model(ClContext& context, const PreparedModel& prepared, 
   result.texture.width = width;
   result.texture.height = height;
   result.patches = scale_patches(model, width, height);
-  result.diagonals = DiagonalRule::kNearest;  // new texels lie evenly
-  TexelResampling(context, prepared, result).run(result.texture);
-  for (std::vector<float>& weights : result.bone_weights) weights = resample_plane(weights, model, result);
-  for (SeamArc& arc : result.arcs) {
-    double ratio = 0;
-    for (const int bone : arc.bones)
-      ratio = std::max(ratio,
-                       static_cast<double>(result.patches[bone].rectangle.width) / model.patches[bone].rectangle.width);
-    const int old_cells = static_cast<int>(arc.samples.size()) + (arc.is_closed() ? 0 : 1);
-    arc = resample_arc(model, prepared.separation, arc,
-                       std::max(arc.is_closed() ? 3 : 2, static_cast<int>(std::lround(old_cells * ratio))));
+  const bool has_own_places = model.sampling.is_snapped || model.sampling.is_fitted,
+             keeps_texels = has_own_places && is_finer(model, result.patches);
+  for (SeamArc& arc : result.arcs) arc = resample_arc(prepared, result, arc, keeps_texels);
+  if (keeps_texels) {
+    refine_texels(context, prepared, result);
+  } else if (has_own_places) {
+    snap_again(context, prepared, result);
+  } else {
+    result.diagonals = DiagonalRule::kNearest;  // new texels lie evenly
+    TexelResampling(context, prepared, result).run(result.texture);
+    // The filter fits the surface between texels, which leaves them off it as the prefilter does.
+    result.sampling = {.is_prefiltered = true, .is_snapped = false, .is_fitted = false};
   }
-  if (!result.layers.empty()) resample_layers(prepared, result);
-  // The filter fits the surface between texels, which leaves them off it as the prefilter does.
-  result.sampling = {.is_prefiltered = true, .is_snapped = false, .is_fitted = false};
+  for (std::vector<float>& weights : result.bone_weights) weights = resample_plane(weights, model, result);
+  if (has_own_places)
+    result.layers = read_layers_of(context, model, result);
+  else if (!result.layers.empty())
+    resample_layers(prepared, result);
   record_setting(result, "resampled_from", {model.texture.width, model.texture.height});
   return result;
 }

@@ -85,6 +85,28 @@ EndMoves end_moves(const SkeletexModel& result, const SeparationPlanes& separati
   return moves;
 }
 
+/// How much of a model's own texels there is at a weight, in place of those on a regular grid.
+double own_share(double weight) {
+  const double share = std::max(0.0, 2 * weight - 1);
+  return share * share * (3 - 2 * share);
+}
+
+/// What the texels of a model are more than those of another one of the same layout; nothing where they are the same.
+DisplacementTexture moves_between(const SkeletexModel& from, const SkeletexModel& to) {
+  if (!to.sampling.is_snapped) return {};
+  DisplacementTexture moves = to.texture;
+  for (std::size_t i = 0; i < moves.out.size(); ++i)
+    moves.along[i] -= from.texture.along[i], moves.around[i] -= from.texture.around[i],
+        moves.out[i] -= from.texture.out[i];
+  return moves;
+}
+
+void append(const DisplacementTexture& texture, DisplacementTexture& all) {
+  all.along.insert(all.along.end(), texture.along.begin(), texture.along.end());
+  all.around.insert(all.around.end(), texture.around.begin(), texture.around.end());
+  all.out.insert(all.out.end(), texture.out.begin(), texture.out.end());
+}
+
 std::vector<double> checked_weights(std::span<const double> weights, std::size_t count) {
   if (weights.size() != count)
     throw InputError(fmt::format("{} weights for {} models; give one per model", weights.size(), count));
@@ -152,13 +174,18 @@ Morph::Morph(ClContext& context, std::vector<SkeletexModel> models, std::span<co
   DisplacementTexture all;
   const UnitFrame frame = models_[0].skeleton.frame;
   for (SkeletexModel& model : models_) {
-    model = in_frame(std::move(model), frame);
-    model = resample_model(context, regular_grid(context, model), size);
+    const SkeletexModel own = resample_model(context, in_frame(std::move(model), frame), size);
+    own_sampling_.push_back(own.sampling), own_diagonals_.push_back(own.diagonals);
+    own_layers_.push_back(own.layers);
+    model = regular_grid(context, own);
+    own_moves_.push_back(options.has_own_texels ? moves_between(model, own) : DisplacementTexture{});
     traced_seams_.push_back(trace_seams(model));
     texel_begins_.push_back(static_cast<int>(all.out.size()));
-    all.along.insert(all.along.end(), model.texture.along.begin(), model.texture.along.end());
-    all.around.insert(all.around.end(), model.texture.around.begin(), model.texture.around.end());
-    all.out.insert(all.out.end(), model.texture.out.begin(), model.texture.out.end());
+    append(model.texture, all);
+  }
+  for (const DisplacementTexture& moves : own_moves_) {
+    move_begins_.push_back(static_cast<int>(all.out.size()));
+    append(moves, all);
   }
   texels_ = upload_texels(context, all);
 }
@@ -183,6 +210,12 @@ void Morph::set_mean_skeleton(int layout, Between& between) const {
   result.diagonals = models_[layout].diagonals;
   result.sampling = models_[layout].sampling;
   result.stance = models_[layout].stance;
+  for (std::size_t m = 0; m < models_.size(); ++m) {
+    const double own = own_share(between.weights[m]);
+    if (!has_own_texels(static_cast<int>(m)) || own == 0) continue;
+    result.sampling = own_sampling_[m];
+    if (own > 0.5) result.diagonals = own_diagonals_[m];
+  }
   result.encoder_settings = models_[layout].encoder_settings;
   std::vector<const Skeleton*> skeletons;
   std::vector<Correspondence> from_layout;
@@ -229,25 +262,33 @@ SkeletexModel Morph::without_texels(std::span<const double> weights) const {
 
 MorphPlan Morph::plan(std::span<const double> given) const {
   const std::unique_ptr<Between> between = this->between(given, true);
-  auto& [weights, result, maps, separation] = *between;
+  // No structured binding: clang does not capture it.
+  const std::vector<double>& weights = between->weights;
+  SkeletexModel& result = between->model;
+  const std::deque<SeamMap>& maps = between->maps;
+  const SeparationPlanes& separation = *between->separation;
   MorphPlan plan;
   BlendTables& tables = plan.tables;
   const std::vector<LatticeRow> rows = lattice_rows(result.patches, RowChoice::kAll);
-  for (std::size_t m = 0; m < models_.size(); ++m) {
-    if (weights[m] == 0) continue;
+  const auto add_source = [&](std::size_t m, int texel_begin, double weight) {
     ++tables.source_count;
     for (int bone = 0; bone < static_cast<int>(result.patches.size()); ++bone) {
       const auto [x, y, width, height] = models_[m].patches[maps[m].model_bone(bone)].rectangle;
       const int stride = models_[m].texture.width;
       BlendSource source{
-          texel_begins_[m] + y * stride + x,     stride, width, height, static_cast<int>(tables.columns.size()), -1,
+          texel_begin + y * stride + x,          stride, width, height, static_cast<int>(tables.columns.size()), -1,
           static_cast<float>(maps[m].sign(bone))};
-      append_turned_columns(maps[m], *separation, bone, result.patches[bone].rectangle.width, source, tables);
+      append_turned_columns(maps[m], separation, bone, result.patches[bone].rectangle.width, source, tables);
       tables.sources.push_back(source);
     }
-    append_rows(maps[m], rows, result.patches, weights[m], tables);
+    append_rows(maps[m], rows, result.patches, weight, tables);
+  };
+  for (std::size_t m = 0; m < models_.size(); ++m) {
+    if (weights[m] > 0) add_source(m, texel_begins_[m], weights[m]);
+    if (has_own_texels(static_cast<int>(m)) && own_share(weights[m]) > 0)
+      add_source(m, move_begins_[m], own_share(weights[m]));
   }
-  plan.moves = end_moves(result, *separation, maps, weights);
+  plan.moves = end_moves(result, separation, maps, weights);
   plan.model = std::move(result);
   return plan;
 }
@@ -272,6 +313,16 @@ int Morph::layout_index(std::span<const double> weights) const {
   return layout_.value_or(static_cast<int>(std::max_element(weights.begin(), weights.end()) - weights.begin()));
 }
 
+SkeletexModel Morph::model_with_own(int model, double share) const {
+  SkeletexModel result = models_[model];
+  const DisplacementTexture& moves = own_moves_[model];
+  const auto by = static_cast<float>(share);
+  for (std::size_t i = 0; share > 0 && i < moves.out.size(); ++i)
+    result.texture.along[i] += by * moves.along[i], result.texture.around[i] += by * moves.around[i],
+        result.texture.out[i] += by * moves.out[i];
+  return result;
+}
+
 SkeletexModel Morph::at(std::span<const double> given) const {
   DevicePlanes texels;
   SkeletexModel model = queue(given, texels);
@@ -280,7 +331,7 @@ SkeletexModel Morph::at(std::span<const double> given) const {
   const int layout = layout_index(weights);
   const bool is_model = std::find(weights.begin(), weights.end(), 1.0) != weights.end();
   if (is_model && weights[layout] == 1) {  // its own texels
-    model.layers = models_[layout].layers;
+    model.layers = has_own_texels(layout) ? own_layers_[layout] : models_[layout].layers;
     return model;
   }
   const bool has_layers =
@@ -290,7 +341,8 @@ SkeletexModel Morph::at(std::span<const double> given) const {
   std::vector<std::vector<Vec3>> sources(models_.size());
   for (std::size_t m = 0; m < models_.size(); ++m)
     if (weights[m] > 0)
-      sources[m] = map_surface(*context_, model, models_[m], correspondence(layout, static_cast<int>(m)));
+      sources[m] = map_surface(*context_, model, model_with_own(static_cast<int>(m), own_share(weights[m])),
+                               correspondence(layout, static_cast<int>(m)));
   if (is_smooth) model = blend_orientations(*context_, model, sources, weights).model;
   if (!has_layers) return model;
   std::vector<LayerSource> layer_sources;

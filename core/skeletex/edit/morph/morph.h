@@ -14,11 +14,11 @@ namespace skeletex {
 
 struct MorphOptions {
   /// Number of the model whose bones (names, order, directions), rectangles and seam samples the result takes. Default:
-  /// the model of the largest weight, the first of several. So a morph that ends at a model ends at its very texels (of
-  /// a snapped model: those of regular_grid).
+  /// the model of the largest weight, the first of several. So a morph that ends at a model ends at its very texels.
   std::optional<int> layout;
-  int size = 0;           ///< longer side of the result's texture; 0: the largest of the models'
-  bool is_smooth = true;  ///< at() removes creases where bones of different rotations meet (orientation.h)
+  int size = 0;                ///< longer side of the result's texture; 0: the largest of the models'
+  bool has_own_texels = true;  ///< the ends are snapped models' own texels; without, those of regular_grid
+  bool is_smooth = true;       ///< at() removes creases where bones of different rotations meet (orientation.h)
 };
 
 /// An in-between model before its texels are blended: the model without texels, where they are read, and what moves the
@@ -30,8 +30,9 @@ struct MorphPlan {
 };
 
 /// In-between models of two or more models (paper 5). Texels, the distances of seams and corners, and the positions of
-/// rows along the bones are weighted means of the models' values at corresponding places. Places correspond at the same
-/// share of the rows, and at angles given by a SeamMap from the mean skeleton to each model.
+/// rows along the bones are weighted means of the models' values at corresponding places. Of a snapped model these
+/// texels are those of regular_grid; what its own are off them is added as its weight goes from a half to 1. Places
+/// correspond at the same share of the rows, and at angles given by a SeamMap from the mean skeleton to each model.
 class Morph {
  public:
   /// \param models      at least two; those of another size than the result are resampled
@@ -62,13 +63,20 @@ class Morph {
   std::unique_ptr<Between> between(std::span<const double> weights, bool has_loops) const;
   void set_mean_skeleton(int layout, Between& between) const;
   int layout_index(std::span<const double> weights) const;
+  /// A model of models_, its texels moved by a share of own_moves_.
+  SkeletexModel model_with_own(int model, double share) const;
+  bool has_own_texels(int model) const { return !own_moves_[model].out.empty(); }
 
   ClContext* context_;
   std::vector<SkeletexModel> models_;
-  std::vector<Correspondence> from_first_;  ///< per model
-  std::vector<SeamLoops> traced_seams_;     ///< per model
-  std::vector<int> texel_begins_;           ///< per model: of its texture in texels_
-  DevicePlanes texels_;                     ///< of all models
+  std::vector<Correspondence> from_first_;       ///< per model
+  std::vector<SeamLoops> traced_seams_;          ///< per model
+  std::vector<TexelSampling> own_sampling_;      ///< per model: as it was given, not on a regular grid
+  std::vector<DiagonalRule> own_diagonals_;      ///< likewise
+  std::vector<std::vector<Layer>> own_layers_;   ///< likewise
+  std::vector<DisplacementTexture> own_moves_;   ///< per model: its own texels less those on the grid; empty: none
+  std::vector<int> texel_begins_, move_begins_;  ///< per model: of its texture and its moves in texels_
+  DevicePlanes texels_;                          ///< of all models, then their moves
   std::optional<int> layout_;
   bool is_smooth_;
 };
