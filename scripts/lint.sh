@@ -23,6 +23,9 @@ for ending in h cpp; do
   done < <(git ls-files "core/**/*.$ending" | xargs -n 1 dirname | sort | uniq -c)
 done
 
+# Each entry of a docstring has a line of its own, also after clang-format has filled lines.
+! grep -nE '///<? .*\S.*\\(param|returns?|throws?|pre)\b|///.*\\(param|return|throw|pre)\s*$' $(git ls-files 'c*/*.h' 'c*/*.cpp') || status=1
+
 if [ $# -gt 0 ]; then
   checked=("$@")
 else

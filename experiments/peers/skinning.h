@@ -14,7 +14,8 @@ using VertexWeights = std::vector<std::vector<BoneWeight>>;
 
 /// One implicit step of the cotangent Laplacian, (M + width^2 L) w = M w0 with w0 = 1 for the vertex' own bone. Weights
 /// below 0 are cut; no number of bones is.
-/// \param own    bone of each vertex    \param width  world units
+/// \param own  bone of each vertex
+/// \param width  world units
 VertexWeights diffused_weights(const TriangleMesh& bind, std::span<const int> own, int bone_count, double width);
 
 std::vector<Vec3> skin_linearly(std::span<const Vec3> bind, const VertexWeights& weights,

@@ -15,7 +15,9 @@ struct ProcessResult {
 };
 
 /// Runs a program to its end; standard output goes nowhere. Where this process ends before, by a signal too, so does
-/// the program. \param environment  set on top of this process's own \throw IoError when it cannot be started
+/// the program.
+/// \param environment  set on top of this process's own
+/// \throw IoError when it cannot be started
 ProcessResult run_process(const std::string& program, const std::vector<std::string>& arguments,
                           const std::map<std::string, std::string>& environment,
                           const std::filesystem::path& error_file);

@@ -62,7 +62,9 @@ std::vector<NamedShape> all_shapes();
 /// The zero set of a smooth union of round cones, one per bone, from the radius of its head to that of its tail.
 /// Polygonized by marching the tetrahedra of a body-centred cubic lattice, which gives a closed, oriented 2-manifold
 /// whatever the function; the vertices are then evened out on the surface. Deterministic.
-/// \param radii  per node      \param blend  how far the union rounds its creases      \param cell  size of the lattice
+/// \param radii  per node
+/// \param blend  how far the union rounds its creases
+/// \param cell  size of the lattice
 TriangleMesh thickened(const Skeleton& skeleton, const std::vector<double>& radii, double blend, double cell);
 
 /// x -> scale rotation x + translation.

@@ -17,7 +17,8 @@ inline double faded(double rows, double width, bool is_linear) {
 }
 
 /// Kernel read_source, one point.
-/// \param source  points by vertex   \param at  receives the source's column
+/// \param source  points by vertex
+/// \param at  receives the source's column
 inline Vec3 read(const TransferPatch& patch, const TransferRow& row, const TransferColumn& column,
                  const std::function<Vec3(int)>& source, double& at) {
   const double lifted = column.head_column + row.axial * (column.tail_column - column.head_column);

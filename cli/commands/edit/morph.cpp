@@ -89,7 +89,8 @@ std::vector<std::string> outputs_of(const Arguments& arguments, const CLI::App& 
   return outputs;
 }
 
-/// Distortion of the map from the first model to each other one. \param text  a table of them
+/// Distortion of the map from the first model to each other one.
+/// \param text  a table of them
 Json measure_maps(ClContext& context, const Arguments& arguments, const Morph& morph,
                   const std::vector<Correspondence>& from_first, std::string& text) {
   Json maps = Json::array();

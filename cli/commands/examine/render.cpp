@@ -280,7 +280,8 @@ void draw_skeleton(GlContext& gl, const Subject& subject, const Camera& camera, 
   blend_over(image, draw(gl, upload_surface(gl, bones), paint, camera, plain), 0.85);
 }
 
-/// Takes mesh, skeleton and view from a file of configs/models. \return the view, null where there is none
+/// Takes mesh, skeleton and view from a file of configs/models.
+/// \return the view, null where there is none
 nlohmann::json resolve_config(Arguments& arguments, const CLI::App& command) {
   if (!has_ending(arguments.input, ".json")) return {};
   const ModelConfig config = read_model_config(arguments.input);

@@ -102,8 +102,9 @@ struct EncodeResult {
 
 /// Turns a closed mesh and its skeleton into a model (paper 3.1-3.4): half edges, segments, maps, atlas, texels. Both
 /// are in the frame of the skeleton, which becomes that of the model; unit_frame (geometry/mesh.h) is the frame in
-/// which all scales and places give the same texels. \pre validate_before_segmentation reports no error      \throw
-/// TopologyError, InputError, DeviceError
+/// which all scales and places give the same texels.
+/// \pre validate_before_segmentation reports no error
+/// \throw TopologyError, InputError, DeviceError
 EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& skeleton,
                           const EncodeOptions& options = {});
 

@@ -42,7 +42,8 @@ class LiveBlend {
   /// \throw InputError when the two differ in more than texels, rows and places of seams; DeviceError
   LiveBlend(ClContext& context, SkeletexModel first, const SkeletexModel& second);
 
-  /// \param share  0: the first, 1: the second, bit by bit   \param texels  as in LiveMorph::queue
+  /// \param share  0: the first, 1: the second, bit by bit
+  /// \param texels  as in LiveMorph::queue
   SkeletexModel queue(double share, DevicePlanes& texels) const;
   /// The same model with its texels.
   SkeletexModel at(double share) const;

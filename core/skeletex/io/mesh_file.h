@@ -26,7 +26,8 @@ struct MeshFile {
 /// Reads OBJ, PLY (ascii, binary), OFF, STL or glTF (gltf_surface.h) by the ending, in double precision. Faces are
 /// counted in and out, so that nothing is dropped silently: faces in file = triangles - (corners beyond three of kept
 /// polygons) + degenerate faces. NaN and infinity are kept (not in STL) for validation to report. An UTF-8 byte order
-/// mark is skipped. \throw IoError naming the file, what is wrong and, where the format allows, the line
+/// mark is skipped.
+/// \throw IoError naming the file, what is wrong and, where the format allows, the line
 MeshFile read_mesh(const std::filesystem::path& path);
 /// Reads the pictures of a mesh's materials, and first the files that an OBJ names for its materials.
 /// \param path  of the mesh; names are relative to its folder

@@ -105,7 +105,8 @@ std::vector<float>& plane(DisplacementTexture& texture, int i) {
   return i == 0 ? texture.along : i == 1 ? texture.around : texture.out;
 }
 
-/// \param is_good  what a value of the channel must be    \param what  why it is not
+/// \param is_good  what a value of the channel must be
+/// \param what  why it is not
 template <class Good>
 void check_plane(const std::vector<float>& values, const std::string& channel, const DisplacementTexture& texture,
                  const Good& is_good, const char* what, const std::string& where) {

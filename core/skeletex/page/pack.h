@@ -26,8 +26,9 @@ class PageArrays {
 };
 
 /// Adds numbers as whole steps, as differences from the array before: from one key of a morph to the next they are
-/// small. \param before  the steps of the array before, of any length, which become this one's; empty: none \return
-/// {"step", "differences"}: bytes 0 to 3 of each, plane by plane; small ones of either sign as small numbers
+/// small.
+/// \param before  the steps of the array before, of any length, which become this one's; empty: none
+/// \return {"step", "differences"}: bytes 0 to 3 of each, plane by plane; small ones of either sign as small numbers
 nlohmann::ordered_json add_steps(PageArrays& arrays, std::span<const float> values, double step,
                                  std::vector<int>& before);
 

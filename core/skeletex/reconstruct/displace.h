@@ -71,7 +71,8 @@ DeviceLattice upload_lattice(ClContext& context, const FrameTables& tables, cons
 DeviceLattice upload_lattice(ClContext& context, const PreparedModel& model, RowChoice choice);
 
 /// Queues the texels of points at the places of some rows (one launch): the inverse of displace.
-/// \param points  of the rows, in each bone's own axes (in_bone_axes)   \param texels  of texture_width columns
+/// \param points  of the rows, in each bone's own axes (in_bone_axes)
+/// \param texels  of texture_width columns
 void enter_tangent_space(ClContext& context, const DeviceTables& tables, const ClBuffer<LatticeRow>& rows,
                          int texture_width, const DevicePlanes& points, DevicePlanes& texels);
 

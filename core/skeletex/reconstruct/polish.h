@@ -20,7 +20,8 @@ struct PolishReport {
 /// Curvature Flow, 1999), in up to 20 rounds. The round with the fewest new folds is kept. Connected parts that would
 /// get more new intersections of triangles are reverted, so that a pose gets more of neither. Other vertices keep their
 /// places. Cost: several searches for intersections, below a second for 130 000 triangles.
-/// \param positions  of the bind mesh's vertices in the pose    \throw InputError when their number differs
+/// \param positions  of the bind mesh's vertices in the pose
+/// \throw InputError when their number differs
 PolishReport polish_pose(const TriangleMesh& bind, std::vector<Vec3>& positions);
 
 }  // namespace skeletex

@@ -11,7 +11,8 @@ namespace skeletex {
 /// A model and what follows from it. Make one per model and pass it on. A model converts to one implicitly, for callers
 /// that need it once.
 struct PreparedModel {
-  /// \param of  must outlive this    \throw InputError as number_lattice
+  /// \param of  must outlive this
+  /// \throw InputError as number_lattice
   PreparedModel(const SkeletexModel& of);
   /// The lattice's rows, all of them or the inner ones.
   const std::vector<LatticeRow>& rows(RowChoice choice) const;

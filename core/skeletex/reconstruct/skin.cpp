@@ -56,7 +56,8 @@ void weigh_inner_vertices(ClContext& context, const WeightWalks& walks, const De
 }
 
 /// The weights of a place in a patch that a model's own weights say; the patch's own bone where all of them are 0.
-/// \param row  0 to height - 1    \param turn  v; between columns weights are linear
+/// \param row  0 to height - 1
+/// \param turn  v; between columns weights are linear
 std::vector<BoneWeight> weights_at(const SkeletexModel& model, int bone, int row, double turn) {
   const Rectangle& r = model.patches[bone].rectangle;
   const double x = (turn - std::floor(turn)) * r.width;

@@ -26,13 +26,17 @@ struct ImportedRig {
 /// Skeleton, weights and animations of a glTF scene. A bone leads from a joint to each joint below it, and moves with
 /// the upper one; joints without one below get a bone that ends where the surface that they move ends. Left out are
 /// joints that move nothing, as far as nothing below them does, and a root of that kind; joints in one place are one
-/// node; twist joints are merged into the bone along which they lie. \param surface  of the scene \param repair   when
-/// given, changes the skeleton before weights and poses are read for it
+/// node; twist joints are merged into the bone along which they lie.
+/// \param surface  of the scene
+/// \param repair  when given, changes the skeleton before weights and poses are read for it
 ImportedRig import_rig(const GltfScene& scene, const GltfSurface& surface,
                        const std::function<Skeleton(const Skeleton&)>& repair = {});
 
 /// Per bone a plane of texels as SkeletexModel::bone_weights has them: the weights of the mesh's vertices where the
-/// texels lie on it. \param weights  per vertex of the mesh    \param tree  of the mesh \throw DeviceError
+/// texels lie on it.
+/// \param weights  per vertex of the mesh
+/// \param tree  of the mesh
+/// \throw DeviceError
 std::vector<std::vector<float>> weight_planes(ClContext& context, const PreparedModel& model, const TriangleMesh& mesh,
                                               const TriangleTree& tree,
                                               std::span<const std::vector<BoneWeight>> weights);

@@ -60,8 +60,8 @@ Skeleton apply_pose(const Skeleton& bind, const Pose& pose);
 
 /// A random pose: every bone that is not at a root turns about an axis that is uniform on the sphere, by an angle that
 /// is uniform in [0, largest]. The same seed gives the same pose on every machine.
-/// \param largest  radians    \throw
-/// InputError for skeletons with cycles, whose bones cannot be turned
+/// \param largest  radians
+/// \throw InputError for skeletons with cycles, whose bones cannot be turned
 Pose make_random_pose(const Skeleton& skeleton, double largest, std::uint64_t seed);
 
 }  // namespace skeletex

@@ -67,8 +67,7 @@ BoneEnd end_at(const Skeleton& skeleton, int bone, int node);
 /// about the one bone lies at v about the other, or at -v when the same end of both is at the node. (Where a tail meets
 /// a head this is the smallest rotation between the two.) Carried breadth first from the given ones, else from the
 /// first bone of each component, whose own s is the world axis least aligned with o, made orthogonal.
-/// \throw InputError
-/// naming a bone of no length, or one whose s is parallel to it
+/// \throw InputError naming a bone of no length, or one whose s is parallel to it
 std::vector<BoneBasis> bone_bases(const Skeleton& skeleton);
 
 /// That no two bones leave a node in the same direction, so that a plane separates them.

@@ -165,7 +165,8 @@ struct LiveFrame {
 };
 
 /// Frames of a live edit, each at another place of its way, against a copy of two textures in and one lattice of points
-/// out. \param queue  (share, texels) -> model
+/// out.
+/// \param queue  (share, texels) -> model
 template <class Queue>
 void set_live(Stage& stage, ClContext& context, const Queue& queue, std::size_t texels, double prepare_ms) {
   stage.run = [&context, queue, frame = std::make_shared<LiveFrame>(), t = 0.0]() mutable {

@@ -21,8 +21,8 @@ inline const std::vector<std::string> kStageNames{"reconstruct", "pose",  "morph
 /// The bind pose's vertices.
 Stage reconstruct_stage(ClContext& context, TextureInputPointer input);
 /// Those of a pose; what is made once per pose is included, what is made once per model is not.
-/// \param pose  default: the skeleton bent by 40 degrees over its longest axis    \param deformation  kSmooth or
-/// kPaper, else InputError
+/// \param pose  default: the skeleton bent by 40 degrees over its longest axis
+/// \param deformation  kSmooth or kPaper, else InputError
 Stage pose_stage(ClContext& context, TextureInputPointer input, const std::optional<Pose>& pose = {},
                  Deformation deformation = Deformation::kSmooth);
 /// A live morph: another weight every time, texels blended, and the vertices of the model in between.
@@ -48,7 +48,8 @@ Stage metro_stage(ClContext& context, MeshInputPointer input, double noise_rel_d
 Stage segment_stage(ClContext& context, MeshInputPointer input);
 /// The command `skeletex encode`, process and files included; against OpenMesh reading the mesh file and OpenEXR
 /// writing as many texels.
-/// \param program  skeletex    \param device  selector for it
+/// \param program  skeletex
+/// \param device  selector for it
 Stage encode_stage(MeshInputPointer input, int size, const std::string& program, const std::string& device = "");
 /// What snapping and fit, as they are by default, add to that command's encoding; against its whole parameterization.
 /// Parameters as above.

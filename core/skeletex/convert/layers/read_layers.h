@@ -23,7 +23,8 @@ struct LayerOptions {
 bool has_layers(const MeshAttributes& attributes, const LayerOptions& options);
 
 /// The attributes of a mesh at points of it, numbered as the points: unit normals, colours and numbers.
-/// \param mesh  closed, outward    \param attributes  its pictures are read, see read_materials
+/// \param mesh  closed, outward
+/// \param attributes  its pictures are read, see read_materials
 MeshAttributes attributes_at(const TriangleMesh& mesh, const MeshAttributes& attributes,
                              std::span<const SurfacePoint> points, const LayerOptions& options = {});
 
@@ -32,7 +33,7 @@ struct ReadLayers {
   std::vector<std::string> notes;  ///< sentences on what was left out
 };
 /// Reads normals, colours and numbers of a mesh at the surface point of every texel.
-/// \param mesh        closed, outward
+/// \param mesh  closed, outward
 /// \param attributes  of the mesh; its pictures are read, see read_materials
 /// \throw DeviceError
 ReadLayers read_layers(ClContext& context, const PreparedModel& model, const TriangleMesh& mesh,

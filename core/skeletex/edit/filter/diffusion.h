@@ -52,7 +52,8 @@ SolveResult solve_diffusion(ClContext& context, const SurfaceOperator& surface, 
 
 /// Solves (M + time L) x = 0 where is_free is 1, with given values elsewhere: interpolation that decays over distances
 /// of about sqrt(time).
-/// \param negated  minus the given values; 0 where is_free is 1   \return x where is_free is 1, 0 elsewhere
+/// \param negated  minus the given values; 0 where is_free is 1
+/// \return x where is_free is 1, 0 elsewhere
 SolveResult interpolate_field(ClContext& context, const SurfaceOperator& surface, double time,
                               const std::vector<float>& is_free, const DeviceField& negated);
 /// The reports of two solves as one: the sum of the steps, the largest residual.

@@ -20,7 +20,8 @@ struct MovedModel {
 
 /// The model with its surface moved. Seams stay in their separation planes: they slide over the moved surface, and the
 /// rows next to them follow. What does not move stays bit by bit.
-/// \param laplace  the operator of `surface`   \param moves  per vertex, world units
+/// \param laplace  the operator of `surface`
+/// \param moves  per vertex, world units
 MovedModel move_surface(ClContext& context, const SkeletexModel& model, const ModelSurface& surface,
                         const SurfaceOperator& laplace, std::span<const Vec3> moves);
 

@@ -19,7 +19,8 @@ struct BlendTables {
 };
 
 /// The columns, at the bone's head and tail, that the columns of one patch of the result read in a model.
-/// \param bone  of the result   \param width  columns of its patch
+/// \param bone  of the result
+/// \param width  columns of its patch
 std::array<std::vector<float>, 2> model_columns(const SeamMap& map, int bone, int width);
 /// Appends the same, and their smoothed values. Texels are not turned.
 void append_columns(const SeamMap& map, int bone, int width, BlendTables& tables);
@@ -37,7 +38,8 @@ void append_rows(const SeamMap& map, const std::vector<LatticeRow>& rows, const 
 double u_at_same_share(const Patch& model, int row, int height, bool is_reversed);
 
 /// Queues the blend.
-/// \param texels  of all sources   \param rows  of the result's patches, those to do
+/// \param texels  of all sources
+/// \param rows  of the result's patches, those to do
 void blend_texels(ClContext& context, const BlendTables& tables, const std::vector<LatticeRow>& rows,
                   const FrameTables& result, int texture_width, const DevicePlanes& texels, DevicePlanes& blended);
 

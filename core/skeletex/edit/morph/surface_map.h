@@ -9,7 +9,8 @@ namespace skeletex {
 
 /// The map of a morph from one model's surface to another's: the places on `to` of the vertices of `from`'s mesh. With
 /// these positions, the triangles of that mesh show `to`'s surface at the resolution of `from`'s lattice.
-/// \return positions in the order of reconstruct_mesh(context, from), world units    \throw DeviceError
+/// \return positions in the order of reconstruct_mesh(context, from), world units
+/// \throw DeviceError
 std::vector<Vec3> map_surface(ClContext& context, const SkeletexModel& from, const SkeletexModel& to,
                               const Correspondence& correspondence);
 

@@ -25,12 +25,14 @@ struct TransferTables {
 };
 
 /// Queues the kernel.
-/// \param source, target  points in bone axes   \return points in the axes of the result's bones
+/// \param source, target  points in bone axes
+/// \return points in the axes of the result's bones
 DevicePlanes place_part(ClContext& context, const TransferTables& tables, const DevicePlanes& source,
                         const DevicePlanes& target);
 
 /// Queues the kernel.
-/// \param points  of the source's rows   \return these points, read where place_part reads
+/// \param points  of the source's rows
+/// \return these points, read where place_part reads
 DevicePlanes read_source(ClContext& context, const TransferTables& tables, const DevicePlanes& points);
 
 /// Queues the kernel that restores the target's texels where its surface is kept.

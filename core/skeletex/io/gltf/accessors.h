@@ -12,7 +12,8 @@ namespace skeletex {
 /// The numbers of a glTF file, every index and size checked.
 class GltfAccessors {
  public:
-  /// \param where  the file, in messages    \param model  must outlive this
+  /// \param where  the file, in messages
+  /// \param model  must outlive this
   GltfAccessors(const tinygltf::Model& model, std::string where) : model_(model), where_(std::move(where)) {}
 
   /// All values of an accessor behind each other: strided, sparse and normalised ones too.

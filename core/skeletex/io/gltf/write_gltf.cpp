@@ -41,7 +41,8 @@ class GltfBuffer {
     return static_cast<int>(model_.bufferViews.size()) - 1;
   }
 
-  /// \param values  of one accessor behind each other    \param target  of the view; 0: none
+  /// \param values  of one accessor behind each other
+  /// \param target  of the view; 0: none
   /// \return the accessor
   template <class T>
   int add(const std::vector<T>& values, int component_type, int type, int target, bool has_bounds = false) {

@@ -48,7 +48,8 @@ class MeshBuilder {
 };
 
 /// The readers of single formats.
-/// \param bytes  the whole file    \param where  its name in messages
+/// \param bytes  the whole file
+/// \param where  its name in messages
 /// \throw IoError with the line (text) or the element (binary)
 MeshFile read_obj(std::string_view bytes, const std::string& where);
 MeshFile read_off(std::string_view bytes, const std::string& where);

@@ -44,8 +44,9 @@ std::vector<Layer> layers_of_vertices(const PreparedModel& model, const MeshAttr
 void resample_layers(const PreparedModel& model, SkeletexModel& result);
 
 /// Turns the normals of a model whose vertices have moved, see turn_normals. The others stay bit by bit.
-/// \param mesh      of the model before    \param positions  of its vertices afterwards
-/// \param result    of the same layout; its layer of normals, where it has one, is set
+/// \param mesh  of the model before
+/// \param positions  of its vertices afterwards
+/// \param result  of the same layout; its layer of normals, where it has one, is set
 void turn_normal_layer(const PreparedModel& model, const TriangleMesh& mesh, std::span<const Vec3> positions,
                        SkeletexModel& result);
 

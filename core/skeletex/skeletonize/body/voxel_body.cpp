@@ -143,7 +143,8 @@ void join_runs(const Runs& runs, const Columns& columns, int x, int y, std::arra
   }
 }
 
-/// The set of each run; \param steps neighbouring columns.
+/// The set of each run;
+/// \param steps neighbouring columns.
 std::vector<int> sets_of(const Runs& runs, const Columns& columns, std::span<const std::array<int, 2>> steps, int gap) {
   UnionFind sets(static_cast<int>(runs.runs.size()));
   for (int x = 0; x < columns.x_count; ++x)
