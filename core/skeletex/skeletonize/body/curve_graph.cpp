@@ -153,6 +153,26 @@ void smooth(std::vector<Vec3>& points) {
   }
 }
 
+/// The branch between two hubs of which one's ball holds the other, the nearest such; no loop, nor beside another one.
+/// \return the number of branches where there is none
+std::size_t find_bridge(const CurveGraph& graph, const std::vector<double>& radii) {
+  const std::vector<int> degree = graph.degrees();
+  std::size_t nearest = graph.branches.size();
+  double least = 1;
+  for (std::size_t b = 0; b < graph.branches.size(); ++b) {
+    const Branch& branch = graph.branches[b];
+    if (branch.from == branch.to || degree[branch.from] < 3 || degree[branch.to] < 3) continue;
+    const auto is_parallel = [&](const Branch& other) {
+      return &other != &branch && std::minmax(other.from, other.to) == std::minmax(branch.from, branch.to);
+    };
+    if (std::any_of(graph.branches.begin(), graph.branches.end(), is_parallel)) continue;
+    const double near =
+        (graph.nodes[branch.from] - graph.nodes[branch.to]).norm() / std::max(radii[branch.from], radii[branch.to]);
+    if (near < least) least = near, nearest = b;
+  }
+  return nearest;
+}
+
 }  // namespace
 
 std::vector<int> CurveGraph::degrees() const {
@@ -246,22 +266,9 @@ void smooth_branches(const Surface& surface, double voxel_side, CurveGraph& grap
 
 void merge_hubs(const Surface& surface, CurveGraph& graph) {
   for (;;) {
-    const std::vector<int> degree = graph.degrees();
     std::vector<double> radii;
     for (const Vec3& node : graph.nodes) radii.push_back(surface.radius(node));
-    std::size_t nearest = graph.branches.size();
-    double least = 1;
-    for (std::size_t b = 0; b < graph.branches.size(); ++b) {
-      const Branch& branch = graph.branches[b];
-      if (branch.from == branch.to || degree[branch.from] < 3 || degree[branch.to] < 3) continue;
-      const auto is_parallel = [&](const Branch& other) {
-        return &other != &branch && std::minmax(other.from, other.to) == std::minmax(branch.from, branch.to);
-      };
-      if (std::any_of(graph.branches.begin(), graph.branches.end(), is_parallel)) continue;
-      const double near =
-          (graph.nodes[branch.from] - graph.nodes[branch.to]).norm() / std::max(radii[branch.from], radii[branch.to]);
-      if (near < least) least = near, nearest = b;
-    }
+    const std::size_t nearest = find_bridge(graph, radii);
     if (nearest == graph.branches.size()) return;
     Branch bridge = std::move(graph.branches[nearest]);
     graph.branches.erase(graph.branches.begin() + static_cast<std::ptrdiff_t>(nearest));

@@ -18,15 +18,15 @@ struct PlaceMasks {
   std::uint32_t near = 0;                               ///< the 18 places that share a face or an edge with the middle
 };
 
+/// How far two places are from each other along an axis, in voxels.
+constexpr int gap(int a, int b, int axis) {
+  const auto coordinate = [axis](int place) { return axis == 0 ? place / 9 : axis == 1 ? place / 3 % 3 : place % 3; };
+  const int g = coordinate(a) - coordinate(b);
+  return g < 0 ? -g : g;
+}
+
 constexpr PlaceMasks make_masks() {
   PlaceMasks masks;
-  const auto coordinate = [](int place, int d) {
-    return (d == 0 ? place / 9 : d == 1 ? place / 3 % 3 : place % 3) - 1;
-  };
-  const auto gap = [&](int a, int b, int d) {
-    const int g = coordinate(a, d) - coordinate(b, d);
-    return g < 0 ? -g : g;
-  };
   for (int a = 0; a < kVoxelPlaces; ++a) {
     if (a == kOwnPlace) continue;
     const int steps = gap(a, kOwnPlace, 0) + gap(a, kOwnPlace, 1) + gap(a, kOwnPlace, 2);
