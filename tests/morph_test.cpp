@@ -30,10 +30,11 @@ ClContext& device() {
   return context;
 }
 
-SkeletexModel encoded(const TriangleMesh& mesh, const Skeleton& skeleton, std::optional<Method> method, int size) {
+SkeletexModel encoded(const TriangleMesh& mesh, const Skeleton& skeleton, std::optional<Method> method, int size,
+                      bool has_snap = false) {
   EncodeOptions options;
   options.width = options.height = size;
-  options.has_snap = options.has_fit = false;
+  options.has_snap = has_snap, options.has_fit = false;
   options.method = method;
   return encode_model(device(), mesh, skeleton, options).model;
 }
@@ -151,7 +152,9 @@ TEST(Morph, EndsAtTheOtherSurfaceInTheFirstOnesLayout) {
 }
 
 TEST(Morph, OfSnappedModelsNearsTheirOwnTexelsSteadily) {
-  const SkeletexModel &a = standard("bull", Method::kVsm, 160), &b = standard("camel", Method::kVsm, 128);
+  const TestModel bull = load_standard_model("bull"), camel = load_standard_model("camel");
+  const SkeletexModel a = encoded(bull.mesh, bull.skeleton, Method::kVsm, 160, true),
+                      b = encoded(camel.mesh, camel.skeleton, Method::kVsm, 128, true);
   ASSERT_TRUE(a.sampling.is_snapped && b.sampling.is_snapped);
   const Morph morph = morph_of(a, b);
   const TriangleMesh own = reconstruct_mesh(device(), a);

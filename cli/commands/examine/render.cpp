@@ -265,6 +265,20 @@ void pose_surface(GlContext& gl, ClContext& context, const Arguments& arguments,
             *subject.skeleton, surface);
 }
 
+/// Places the surface and its normals as a model's texture and the pose say; that of a mesh stays.
+/// \return its points
+std::vector<Vec3> place_surface(GlContext& gl, ClContext& context, const Arguments& arguments, const Subject& subject,
+                                GpuSurface& surface) {
+  const std::vector<Vec3>& normals = subject.attributes.normals.values;
+  if (!normals.empty()) write_normals(surface, normals);
+  if (!subject.model) return subject.mesh.positions;
+  pose_surface(gl, context, arguments, subject, surface);
+  std::vector<Vec3> points = download_positions(surface);
+  if (!normals.empty())
+    write_normals(surface, arguments.pose.empty() ? normals : turn_normals(subject.mesh, normals, points));
+  return points;
+}
+
 void draw_skeleton(GlContext& gl, const Subject& subject, const Camera& camera, const DrawOptions& options,
                    Image& image) {
   const TriangleMesh bones = skeleton_mesh(*subject.skeleton, 0.009 * bounding_box(subject.mesh).diagonal());
@@ -327,20 +341,9 @@ void run(Arguments arguments, const CLI::App& command) {
   bar.show("drawing", 0.3);
   const SurfacePaint paint = paint_of(arguments, subject, context, scale);
   GpuSurface surface = upload_surface(gl, subject.mesh);
-  double displace_ms = 0;
-  const bool has_own_normals = !subject.attributes.normals.empty();
-  if (has_own_normals) write_normals(surface, subject.attributes.normals.values);
-  std::vector<Vec3> points = subject.mesh.positions;
-  if (subject.model) {
-    watch.lap_ms();
-    pose_surface(gl, context, arguments, subject, surface);
-    points = download_positions(surface);
-    if (has_own_normals)
-      write_normals(surface, arguments.pose.empty()
-                                 ? subject.attributes.normals.values
-                                 : turn_normals(subject.mesh, subject.attributes.normals.values, points));
-    displace_ms = watch.lap_ms();
-  }
+  watch.lap_ms();
+  const std::vector<Vec3> points = place_surface(gl, context, arguments, subject, surface);
+  const double displace_ms = subject.model ? watch.lap_ms() : 0;
   DrawOptions options{.width = width, .height = height, .samples = arguments.samples, .is_flat = arguments.is_flat};
   if (arguments.has_wires) options.wire_pixels = 0.45;
   if (arguments.mode == "error" || arguments.mode == "weights") options.lighting = 0.55;

@@ -280,6 +280,7 @@ void write_model_levels(const std::filesystem::path& path, std::span<const Skele
   const std::string where = path.string();
   if (levels.empty()) throw IoError(where + ": a model has at least one level");
   std::vector<ExrPart> parts;
+  parts.reserve(levels.size());  // the frame of a part that is copied shows into the old one
   for (const SkeletexModel& level : levels) parts.push_back(make_part(level, options, where));
   // To be handed a plain line takes a thread longer than to write it.
   if (std::any_of(parts.begin(), parts.end(),

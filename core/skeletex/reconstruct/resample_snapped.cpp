@@ -164,7 +164,7 @@ std::vector<double> columns_of_finer(int old_width, int width) {
 
 void refine_texels(ClContext& context, const PreparedModel& prepared, SkeletexModel& result) {
   const SkeletexModel& model = prepared.model;
-  const TriangleMesh mesh = reconstruct_mesh(context, prepared);
+  const TriangleMesh mesh = reconstruct_bind_mesh(context, prepared).mesh;
   const std::vector<char> are_first = first_diagonals(prepared, mesh);
   const std::array<std::vector<float>, 3> old = download_planes(context, points_in_bone_axes(context, prepared));
   std::vector<std::size_t> begins{0}, old_begins{0};
@@ -274,7 +274,7 @@ std::vector<Chart> charts_of_mesh(const PreparedModel& prepared, const TriangleM
 
 void snap_again(ClContext& context, const PreparedModel& prepared, SkeletexModel& result) {
   const SkeletexModel& model = prepared.model;
-  const TriangleMesh mesh = reconstruct_mesh(context, prepared);
+  const TriangleMesh mesh = reconstruct_bind_mesh(context, prepared).mesh;
   const TriangleTree tree = build_triangle_tree(mesh);
   const std::vector<Chart> charts = charts_of_mesh(prepared, mesh);
   std::vector<Method> methods;

@@ -243,10 +243,17 @@ SkeletexModel filter_layer(ClContext& context, const SkeletexModel& model, const
                  [&](std::size_t i, std::size_t k, auto& value) { values[k * count + i] = static_cast<float>(value); });
   const auto time = static_cast<float>(options.scale * options.scale);
   const auto everywhere = context.upload(std::vector<float>(count, 1.f));
-  const DeviceField b =
-      apply_operator(context, job.laplace, 0, -time, everywhere, {components, context.upload(values)});
-  const std::vector<float> moves =
-      context.download(solve_diffusion(context, job.laplace, time, everywhere, b).x.values);
+  std::vector<float> moves;
+  const auto solve = [&](int first, int solved) {
+    const auto begin = values.begin() + static_cast<std::ptrdiff_t>(first * count);
+    const std::vector<float> part(begin, begin + static_cast<std::ptrdiff_t>(solved * count));
+    const DeviceField b = apply_operator(context, job.laplace, 0, -time, everywhere, {solved, context.upload(part)});
+    const std::vector<float> found =
+        context.download(solve_diffusion(context, job.laplace, time, everywhere, b).x.values);
+    moves.insert(moves.end(), found.begin(), found.end());
+  };
+  solve(0, std::min(components, 3));
+  if (components > 3) solve(3, components - 3);  // opacity
   for_each_value(attributes, [&](std::size_t i, std::size_t k, auto& value) {
     using Value = std::decay_t<decltype(value)>;
     value -= static_cast<Value>(options.gain * static_cast<double>(job.weights[i]) *

@@ -81,8 +81,8 @@ std::string ply_header(const TriangleMesh& mesh, const WrittenAttributes& attrib
   constexpr const char* kAlpha = "property uchar alpha\n";
   std::string header = "ply\nformat binary_little_endian 1.0\n";
   if (!attributes.image_file.empty()) header += fmt::format("comment TextureFile {}\n", attributes.image_file);
-  header +=
-      fmt::format("element vertex {}\nproperty float x\nproperty float y\nproperty float z\n", mesh.positions.size());
+  header += fmt::format("element vertex {0}\nproperty {1} x\nproperty {1} y\nproperty {1} z\n", mesh.positions.size(),
+                        needs_double(mesh) ? "double" : "float");
   if (!attributes.vertex_normals.empty()) header += "property float nx\nproperty float ny\nproperty float nz\n";
   if (!attributes.vertex_colours.empty()) header += kColour;
   if (has_opacity(attributes.vertex_colours)) header += kAlpha;
