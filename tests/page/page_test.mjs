@@ -35,9 +35,13 @@ function readPly(path) {
   const bytes = readFileSync(path), end = bytes.indexOf('end_header\n') + 11, header = bytes.toString('latin1', 0, end);
   const vertexCount = Number(/element vertex (\d+)/.exec(header)[1]), faceCount = Number(/element face (\d+)/.exec(header)[1]);
   const type = /property (float|double|float32|float64) x/.exec(header)[1], size = /double|64/.test(type) ? 8 : 4;
+  const sizes = {char: 1, uchar: 1, short: 2, ushort: 2, int: 4, uint: 4, float: 4, float32: 4, double: 8, float64: 8};
+  const properties = [...header.slice(0, header.indexOf('element face')).matchAll(/property (\w+) \w+/g)].map((match) => match[1]);
+  const stride = properties.reduce((sum, name) => sum + sizes[name], 0);
   const positions = new Float64Array(3 * vertexCount), triangles = [];
   let offset = end;
-  for (let i = 0; i < positions.length; ++i, offset += size) positions[i] = size === 8 ? bytes.readDoubleLE(offset) : bytes.readFloatLE(offset);
+  for (let i = 0; i < vertexCount; ++i, offset += stride)
+    for (let k = 0; k < 3; ++k) positions[3 * i + k] = size === 8 ? bytes.readDoubleLE(offset + 8 * k) : bytes.readFloatLE(offset + 4 * k);
   for (let i = 0; i < faceCount; ++i, offset += 13) triangles.push([bytes.readInt32LE(offset + 1), bytes.readInt32LE(offset + 5), bytes.readInt32LE(offset + 9)]);
   return {positions, triangles};
 }
@@ -205,14 +209,14 @@ async function testPlaces() {
 async function testMorph() {
   const page = await open(browser, at('morph.html'));
   for (const t of [0, 0.25, 0.4375, 0.4, 1]) {
-    run('morph', at('man.skx.exr'), at('homer.skx.exr'), '--t', String(t), '--layout', '1', '--creases', '-o', at('morph.ply'));
+    run('morph', at('man.skx.exr'), at('homer.skx.exr'), '--t', String(t), '--layout', '1', '--creases', '--regular-grid', '-o', at('morph.ply'));
     await page.evaluate(async (to) => (await globalThis.skeletex).change({t: to}), t);
     const shown = await drawn(page);
     // Exact at its keys, multiples of a sixteenth; between them but for columns at corners.
     compare(shown, readPly(at('morph.ply')), `morph at ${t}`, 1e-4, Number.isInteger(16 * t) ? 1 : 0.98);
     checkClosed(shown, `morph at ${t}`);
   }
-  run('morph', at('man.skx.exr'), at('homer.skx.exr'), '--t', '0', '--layout', '1', '--creases', '-o', at('target.skx.exr'));
+  run('morph', at('man.skx.exr'), at('homer.skx.exr'), '--t', '0', '--layout', '1', '--creases', '--regular-grid', '-o', at('target.skx.exr'));
   run('transfer', at('homer.skx.exr'), at('target.skx.exr'), '--bones', 'head=head', '-o', at('transfer.ply'));
   await page.evaluate(async () => {
     const page = await globalThis.skeletex;

@@ -27,7 +27,7 @@ struct Arguments {
   std::vector<double> times, weights;
   std::string output, device, json;
   int frames = 0, layout = 0, size = 0;
-  bool has_creases = false;
+  bool has_creases = false, has_regular_grid = false;
 };
 
 /// out.skx.exr -> out_007.skx.exr
@@ -129,6 +129,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
   if (arguments.layout > 0) options.layout = arguments.layout - 1;
   options.size = arguments.size;
   options.is_smooth = !arguments.has_creases;
+  options.has_own_texels = !arguments.has_regular_grid;
   const Morph morph(context, std::move(models), from_first, options);
 
   Json json{{"maps", Json::array()}, {"results", Json::array()}};
@@ -190,6 +191,8 @@ void add_morph_command(CLI::App& program) {
       ->type_name("N");
   command.add_flag("--creases", arguments->has_creases,
                    "leave creases where bones of different turns meet: the texels' means alone, as at frame rates");
+  command.add_flag("--regular-grid", arguments->has_regular_grid,
+                   "texels of snapped models on regular grids at the ends too, where they are else the models' own");
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(
