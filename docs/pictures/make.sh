@@ -46,6 +46,11 @@ modules=build/release/core/page/node_modules
 node docs/pictures/page.mjs "$modules" "$work/morph.html" '#t=0.3&mode=segments' 1100x720 light "$work/wide.png"
 node docs/pictures/page.mjs "$modules" "$work/bear.html" '#mode=checker' 380x720 dark "$work/phone.png"
 
+# The examples in Python.
+for name in first_steps shape_space; do
+  PYTHONPATH=build/release/python MPLBACKEND=Agg /usr/bin/python3 -W ignore "python/examples/$name.py" "$work"
+done
+
 /usr/bin/python3 - "$work" "$target" <<'PYTHON'
 import pathlib
 import sys
@@ -71,5 +76,7 @@ side_by_side(["error"], "error")
 side_by_side(["bind", "sit", "walk", "weights"], "pose")
 side_by_side(["bind", "smooth", "enhance", "noise"], "filter")
 side_by_side(["wide", "phone"], "view")
+side_by_side(["first_steps"], "python")
+side_by_side(["shape_space"], "shape-space")
 PYTHON
 ls -l "$target"
