@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+import math
+import operator
 import os
 import warnings
 from pathlib import Path as FilePath
@@ -51,10 +53,13 @@ def pose_json(pose: Pose) -> str:
 
 def size_pair(size: Union[int, Tuple[int, int]], name: str, lowest: int, highest: int) -> Tuple[int, int]:
     """Width and height."""
-    pair = (size, size) if isinstance(size, int) else tuple(size)
+    try:
+        pair = [operator.index(side) for side in (size if isinstance(size, (tuple, list)) else (size, size))]
+    except TypeError:
+        pair = []
     if len(pair) != 2 or not all(lowest <= side <= highest for side in pair):
         raise InputError(f"{name}: {lowest} to {highest}, one number or (width, height); not {size!r}")
-    return int(pair[0]), int(pair[1])
+    return pair[0], pair[1]
 
 
 def one_of(value: str, words: Sequence[str], name: str) -> str:
@@ -64,11 +69,26 @@ def one_of(value: str, words: Sequence[str], name: str) -> str:
     return value
 
 
+def whole(value: int, name: str, lowest: int, highest: int) -> int:
+    """The whole number, where it lies within limits."""
+    try:
+        result = operator.index(value)
+    except TypeError:
+        raise InputError(f"{name}: {value!r} is no whole number") from None
+    if not lowest <= result <= highest:
+        raise InputError(f"{name}: {result} does not lie from {lowest} to {highest}")
+    return result
+
+
 def number(value: float, name: str, lowest: float, highest: float) -> float:
     """The number, where it lies within limits."""
-    if not lowest <= value <= highest:
-        raise InputError(f"{name}: {value} does not lie from {lowest:g} to {highest:g}")
-    return float(value)
+    try:
+        result = float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: {value!r} is no number") from None
+    if not lowest <= result <= highest:
+        raise InputError(f"{name}: {result:g} does not lie from {lowest:g} to {highest:g}")
+    return result
 
 
 def encode(
@@ -114,10 +134,6 @@ def encode(
     width, height = size_pair(size, "size", 4, 16384)
     if bone_methods and method != "hybrid":
         raise InputError('bone_methods: they need method="hybrid"')
-    if iterations is not None:
-        number(iterations, "iterations", 0, 100)
-    if alpha is not None:
-        number(alpha, "alpha", 0, 2)
     options = {
         "width": width,
         "height": height,
@@ -130,8 +146,8 @@ def encode(
         "unfold": unfold,
         "rows": rows and one_of(rows, ("surface", "uniform"), "rows"),
         "share": share and one_of(share, ("error", "triangles", "area"), "share"),
-        "iterations": iterations,
-        "alpha": alpha,
+        "iterations": None if iterations is None else whole(iterations, "iterations", 0, 100),
+        "alpha": None if alpha is None else number(alpha, "alpha", 0, 2),
         "paper_recipe": paper_recipe,
     }
     given = skeleton._tuple() if skeleton is not None else None
@@ -169,11 +185,11 @@ def skeletonize(
     :raises InvalidInput: where the mesh has errors
     :raises TopologyError: where no skeleton was accepted
     """
-    if bones is not None:
-        number(bones, "bones", 1, 500)
-    if detail is not None:
-        number(detail, "detail", 0, 1)
-    options = {"bones": bones, "detail": detail, "purpose": one_of(purpose, ("pose", "size"), "purpose")}
+    options = {
+        "bones": None if bones is None else whole(bones, "bones", 1, 500),
+        "detail": None if detail is None else number(detail, "detail", 0, 1),
+        "purpose": one_of(purpose, ("pose", "size"), "purpose"),
+    }
     return Skeleton._of(_core.skeletonize(mesh.vertices, mesh.triangles, to_json(options, "options"), progress))
 
 
@@ -236,10 +252,8 @@ def random_pose(model: Model, degrees: float, seed: int = 0) -> Dict[str, Any]:
 
     :raises InputError: where the skeleton has cycles
     """
-    number(degrees, "degrees", 0, 180)
-    number(seed, "seed", 0, 2**63)
-    result = json.loads(_core.random_pose(model._core, degrees * 3.141592653589793 / 180, int(seed)))
-    return dict(result)
+    largest = math.radians(number(degrees, "degrees", 0, 180))
+    return dict(json.loads(_core.random_pose(model._core, largest, whole(seed, "seed", 0, 2**63))))
 
 
 def lod(model: Model, size: int) -> Model:
@@ -248,7 +262,7 @@ def lod(model: Model, size: int) -> Model:
     :param size: texels along the longer side, 4 to 16384
     :raises InputError: where the size is too small for the number of bones
     """
-    return Model(_core.resample(model._core, int(number(size, "size", 4, 16384))))
+    return Model(_core.resample(model._core, whole(size, "size", 4, 16384)))
 
 
 def levels(model: Model, smallest: int = 32) -> List[Model]:
@@ -256,4 +270,4 @@ def levels(model: Model, smallest: int = 32) -> List[Model]:
 
     :param smallest: longer side of the last one
     """
-    return [Model(core) for core in _core.levels(model._core, int(number(smallest, "smallest", 4, 16384)))]
+    return [Model(core) for core in _core.levels(model._core, whole(smallest, "smallest", 4, 16384))]

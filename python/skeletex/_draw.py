@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from ._convert import Pose, lod, number, one_of, pose, reconstruct, size_pair, to_json
+from ._convert import Pose, lod, one_of, pose, reconstruct, size_pair, to_json, whole
 from ._data import Mesh, Path, Skeleton, colour_array
 from ._edit import BonePairs, bone_pairs
 from ._errors import InputError, IoError
@@ -136,7 +136,7 @@ def render(
         "view": view,
         "width": width,
         "height": height,
-        "samples": int(number(samples, "samples", 1, 8)),
+        "samples": whole(samples, "samples", 1, 8),
         "flat": flat,
         "wireframe": wireframe,
         "normals": mode == "normals",
@@ -229,7 +229,7 @@ def view(
     :raises InputError: where the two do not correspond, or the library was built without npm
     """
     own = max(model.width, model.height)
-    wanted = min(own, _LARGEST_PAGE) if size is None else int(number(size, "size", 4, 2048))
+    wanted = min(own, _LARGEST_PAGE) if size is None else whole(size, "size", 4, 2048)
     if wanted != own:
         model = lod(model, wanted)
     options = {

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from ._convert import number, one_of, to_json
+from ._convert import number, one_of, to_json, whole
 from ._data import Mesh
 from ._errors import InputError
 from ._model import Model
@@ -185,10 +185,14 @@ def smooth(
     :param bones: filter these bones only; None: all
     :param falloff: over what distance the effect fades out inside them, in diagonals
     """
-    number(iterations, "iterations", 1, 1000)
-    number(scale, "scale", 0, 1e6)
     return _filtered(
-        model, "smooth", bones, falloff, scale=scale, iterations=int(iterations), keep_volume=keep_volume
+        model,
+        "smooth",
+        bones,
+        falloff,
+        scale=number(scale, "scale", 0, 1e6),
+        iterations=whole(iterations, "iterations", 1, 1000),
+        keep_volume=keep_volume,
     )
 
 
@@ -206,8 +210,9 @@ def enhance(
     :param bones: filter these bones only; None: all
     :param falloff: over what distance the effect fades out inside them, in diagonals
     """
-    number(scale, "scale", 0, 1e6)
-    return _filtered(model, "enhance", bones, falloff, scale=scale, gain=number(gain, "gain", -1, 100))
+    return _filtered(
+        model, "enhance", bones, falloff, scale=number(scale, "scale", 0, 1e6), gain=number(gain, "gain", -1, 100)
+    )
 
 
 def add_noise(
@@ -236,8 +241,8 @@ def add_noise(
         falloff,
         amplitude=number(amplitude, "amplitude", 0, 1),
         wavelength=number(wavelength, "wavelength", 0, 1e6),
-        octaves=int(number(octaves, "octaves", 1, 16)),
-        seed=int(number(seed, "seed", 0, 2**32 - 1)),
+        octaves=whole(octaves, "octaves", 1, 16),
+        seed=whole(seed, "seed", 0, 2**32 - 1),
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from ._convert import number, reconstruct
+from ._convert import reconstruct, whole
 from ._data import Mesh, real_array
 from ._errors import InputError
 from ._model import Model
@@ -61,7 +61,7 @@ def metro(a: Union[Mesh, Model], b: Union[Mesh, Model], samples: int = 0) -> Met
     """
     first, second = mesh_of(a), mesh_of(b)
     diagonal, forward, backward, vertex, distances = _core.metro(
-        first.vertices, first.triangles, second.vertices, second.triangles, int(number(samples, "samples", 0, 1e9))
+        first.vertices, first.triangles, second.vertices, second.triangles, whole(samples, "samples", 0, 10**9)
     )
     return Metro(diagonal, Distances(*forward), Distances(*backward), Distances(*vertex), distances)
 

@@ -20,7 +20,8 @@ std::vector<Model> morph(const std::vector<Model>& models, const std::vector<std
                          const BonePairs& bones, std::optional<int> layout, int size, bool is_smooth) {
   std::vector<SkeletexModel> given;
   for (const Model& model : models) given.push_back(whole(model));
-  std::vector<SkeletexModel> made = run([&](ClContext& context) {
+  const py::none no_callback;
+  std::vector<SkeletexModel> made = run_watched(no_callback, [&](ClContext& context, const auto& progress) {
     std::vector<Correspondence> from_first;
     for (std::size_t m = 1; m < given.size(); ++m)
       from_first.push_back(find_correspondence(given[0].skeleton, given[m].skeleton, {.given = bones}));
@@ -30,7 +31,10 @@ std::vector<Model> morph(const std::vector<Model>& models, const std::vector<std
     options.is_smooth = is_smooth;
     const Morph between(context, std::move(given), from_first, options);
     std::vector<SkeletexModel> results;
-    for (const std::vector<double>& one : weights) results.push_back(between.at(one));
+    for (const std::vector<double>& one : weights) {
+      if (!progress("morph", 0)) throw Error("cancelled");  // Ctrl-C
+      results.push_back(between.at(one));
+    }
     return results;
   });
   std::vector<Model> results;

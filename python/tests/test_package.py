@@ -247,7 +247,10 @@ def test_the_curvature_of_a_ball_is_one_over_its_radius() -> None:
     model = skeletex.encode(ball, skeletex.Skeleton([[-1, 0, 0], [1, 0, 0]], [[0, 1]]), size=64)
     mesh, values = skeletex.mean_curvature(model, scale=0.1)
     assert len(values) == len(mesh.vertices)
-    assert abs(np.median(values) - 1 / 3) < 0.03 and (np.abs(values - 1 / 3) < 0.1).mean() > 0.9
+    # Averaging (I + scale^2 L)^-1 weakens places on a ball, which are eigenfunctions of L, by the eigenvalue 2 / r^2.
+    radius = 1 / np.sqrt(12)  # in diagonals
+    expected = 1 / 3 / (1 + 2 * 0.1**2 / radius**2)
+    assert abs(np.median(values) / expected - 1) < 0.02 and np.abs(values / expected - 1).max() < 0.1
 
 
 # Measuring
@@ -403,13 +406,13 @@ def test_other_threads_run_meanwhile_and_results_do_not_depend_on_them(
     threads = [threading.Thread(target=work, args=(i,)) for i in range(4)]
     for thread in threads:
         thread.start()
-    longest, last = 0.0, time.monotonic()
+    ticks = 0
     while any(thread.is_alive() for thread in threads):
         time.sleep(0.001)
-        longest, last = max(longest, time.monotonic() - last), time.monotonic()
+        ticks += 1
     assert np.array_equal(results[1], bear.texture) and np.array_equal(results[3], bear.texture)
     assert np.array_equal(results[0], results[2])
-    assert longest < 0.5  # seconds that this thread had to wait for the others
+    assert ticks > 40  # with Python's lock held, four calls leave a handful
 
 
 # Pictures
