@@ -234,7 +234,11 @@ def reconstruct(
     if size is not None and size != max(model.width, model.height):
         model = lod(model, size)
     given = None if pose is None else pose_json(pose)
-    return Mesh(*_core.reconstruct(model._core, given, time, deform, polish))
+    return Mesh(*_core.reconstruct(model._core, given, _moment(time), deform, polish))
+
+
+def _moment(time: Optional[float]) -> Optional[float]:
+    return None if time is None else number(time, "time", -1e300, 1e300)
 
 
 def pose(model: Model, pose: Pose, *, time: Optional[float] = None) -> Skeleton:
@@ -244,7 +248,7 @@ def pose(model: Model, pose: Pose, *, time: Optional[float] = None) -> Skeleton:
     :param time: moment of an animation; None: its first frame
     :raises InputError: naming what the skeleton does not have
     """
-    return Skeleton._of(_core.pose(model._core, pose_json(pose), time))
+    return Skeleton._of(_core.pose(model._core, pose_json(pose), _moment(time)))
 
 
 def random_pose(model: Model, degrees: float, seed: int = 0) -> Dict[str, Any]:

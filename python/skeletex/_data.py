@@ -86,6 +86,8 @@ class Mesh:
         :raises IoError: and leaves no file behind
         """
         given = None if colours is None else colour_array(self, colours)
+        if given is not None and not os.fspath(path).lower().endswith(".ply"):
+            raise InputError(f"colours: only PLY files have them, not {os.fspath(path)}")
         _core.write_mesh(os.fspath(path), *self._checked(), given)
 
     @property
@@ -165,7 +167,7 @@ class Skeleton:
 
     def write(self, path: Path) -> None:
         """Writes a skeleton file (JSON)."""
-        _core.write_skeleton(os.fspath(path), self._tuple())
+        _core.write_skeleton(os.fspath(path), self._checked())
 
     def bone(self, name: str) -> int:
         """The number of a bone.
@@ -190,6 +192,15 @@ class Skeleton:
         # Members may have been set since.
         checked = Skeleton(self.nodes, self.bones, self.node_names, self.bone_names, self.s)
         return checked.node_names, checked.nodes, checked.bone_names, checked.bones, checked.s
+
+    def _checked(self) -> SkeletonTuple:
+        """The parts, whose indices exist and whose numbers are finite."""
+        parts = self._tuple()
+        if not np.isfinite(parts[1]).all():
+            raise InputError("nodes: a coordinate is not finite")
+        if parts[3].size and (parts[3].min() < 0 or parts[3].max() >= len(parts[1])):
+            raise InputError(f"bones: an index is not from 0 to {len(parts[1]) - 1}")
+        return parts
 
     def __repr__(self) -> str:
         return f"Skeleton({len(self.nodes)} nodes, {len(self.bones)} bones)"

@@ -143,7 +143,7 @@ def render(
         "lighting": 1.0 if colours is None else 0.55,
     }
     drawn = _core.render(
-        *mesh._checked(), paint, corner_uv, None if bones is None else bones._tuple(), to_json(options, "view")
+        *mesh._checked(), paint, corner_uv, None if bones is None else bones._checked(), to_json(options, "view")
     )
     return _picture(drawn, ground)
 

@@ -48,6 +48,13 @@ def correspond(a: Model, b: Model, bones: Optional[BonePairs] = None) -> Corresp
     )
 
 
+def _weight_array(weights: ArrayLike) -> NDArray[np.float64]:
+    try:
+        return np.asarray(weights, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError("weights: an array of numbers is wanted") from None
+
+
 def morphs(
     models: Sequence[Model],
     weights: ArrayLike,
@@ -61,7 +68,7 @@ def morphs(
 
     :param weights: n x m, for each result one weight per model
     """
-    given = np.asarray(weights, dtype=np.float64)
+    given = _weight_array(weights)
     if given.ndim != 2:
         raise InputError("weights: a list for each result, with one weight per model")
     if bones is not None and len(models) != 2:
@@ -91,7 +98,7 @@ def morph(
     :param creases: leave creases where bones of different turns meet: the texels' means alone
     :raises InputError: where weights, numbers of handles or branching do not fit
     """
-    given = np.asarray(weights, dtype=np.float64)
+    given = _weight_array(weights)
     if given.ndim == 0 and len(models) == 2:
         given = np.array([1 - float(given), float(given)])
     if given.ndim != 1:

@@ -52,6 +52,8 @@ void translate(std::exception_ptr exception) {
     raise("Cancelled", error);
   } catch (const Error& error) {
     raise("Error", error);
+  } catch (const nlohmann::json::exception& error) {  // an option of another type
+    raise("InputError", InputError(std::string("an option: ") + error.what()));
   }
 }
 

@@ -66,6 +66,7 @@ def test_indices_that_do_not_exist_are_refused_where_they_would_be_read(tmp_path
         lambda: mesh.write(tmp_path / "mesh.ply"),
         lambda: skeletex.metro(mesh, mesh),
         lambda: skeletex.deformation(mesh, mesh),
+        lambda: skeletex.render(skeletex.Mesh(*TETRAHEDRON), skeleton=skeletex.Skeleton([[0, 0, 0]], [[0, 7]])),
     ):
         with pytest.raises(skeletex.InputError):
             use()
@@ -334,6 +335,8 @@ def test_options_out_of_range_are_refused_by_name(bear: skeletex.Model, bear_mes
         "method": lambda: skeletex.encode(bear_mesh, bear.skeleton, method="magic"),
         "rows": lambda: skeletex.encode(bear_mesh, rows="some"),
         "iterations": lambda: skeletex.encode(bear_mesh, iterations=1000),
+        "boolean": lambda: skeletex.encode(bear_mesh, snap="yes"),  # type: ignore[arg-type]
+        "time": lambda: skeletex.reconstruct(bear, {}, time=float("nan")),
         "deform": lambda: skeletex.reconstruct(bear, {}, deform="some"),
         "weight": lambda: skeletex.morph([bear, bear], [0.5, 0.6]),
         "blend": lambda: skeletex.transfer(bear, bear, {"head": "head"}, blend="some"),
