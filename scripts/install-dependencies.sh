@@ -16,6 +16,7 @@ packages=(
   clang-format clang-tidy                                            # scripts/lint.sh
   libbenchmark-dev python3 python3-matplotlib                                           # benchmarks, tables of the experiments
   libmeshoptimizer-dev libcgal-dev draco                                                # what the experiments compare with
+  pybind11-dev python3-dev python3-numpy python3-setuptools python3-venv python3-pytest mypy  # the Python package, and its tests
   chromium                                                                              # tests: the report and the page of `view` in a browser
 )
 # The page of `skeletex view` is bundled with npm. Debian has it as a package of its own; that of nodejs.org and of

@@ -29,7 +29,7 @@ done
 if [ $# -gt 0 ]; then
   checked=("$@")
 else
-  mapfile -t checked < <(git ls-files 'core/*.cpp' 'cli/*.cpp' 'experiments/*.cpp')
+  mapfile -t checked < <(git ls-files 'core/*.cpp' 'cli/*.cpp' 'experiments/*.cpp' 'python/*.cpp')
 fi
 printf '%s\0' "${checked[@]}" | xargs -0 -n 4 -P "$(nproc)" clang-tidy -p build/release --quiet 2> >(grep -v 'warnings\? \(generated\|treated\)' >&2) || status=1
 exit "$status"

@@ -46,6 +46,11 @@ modules=build/release/core/page/node_modules
 node docs/pictures/page.mjs "$modules" "$work/morph.html" '#t=0.3&mode=segments' 1100x720 light "$work/wide.png"
 node docs/pictures/page.mjs "$modules" "$work/bear.html" '#mode=checker' 380x720 dark "$work/phone.png"
 
+# The examples in Python.
+for name in first_steps shape_space; do
+  PYTHONPATH=build/release/python MPLBACKEND=Agg /usr/bin/python3 -W ignore "python/examples/$name.py" "$work"
+done
+
 /usr/bin/python3 - "$work" "$target" <<'PYTHON'
 import pathlib
 import sys
@@ -55,7 +60,7 @@ from PIL import Image
 work, target = map(pathlib.Path, sys.argv[1:])
 
 
-def side_by_side(names, name):
+def side_by_side(names, name, is_dithered=False):
     images = [Image.open(work / f"{n}.png").convert("RGB") for n in names]
     height = max(image.height for image in images)
     row = Image.new("RGB", (sum(image.width for image in images), height), "white")
@@ -63,6 +68,9 @@ def side_by_side(names, name):
     for image in images:
         row.paste(image, (x, (height - image.height) // 2))
         x += image.width
+    if is_dithered:  # many colours
+        palette = row.quantize(256, method=Image.Quantize.MAXCOVERAGE)
+        row = row.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG)
     row.quantize(256).save(target / f"{name}.png", optimize=True)
 
 
@@ -71,5 +79,7 @@ side_by_side(["error"], "error")
 side_by_side(["bind", "sit", "walk", "weights"], "pose")
 side_by_side(["bind", "smooth", "enhance", "noise"], "filter")
 side_by_side(["wide", "phone"], "view")
+side_by_side(["first_steps"], "python", is_dithered=True)
+side_by_side(["shape_space"], "shape-space")
 PYTHON
 ls -l "$target"

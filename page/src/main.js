@@ -363,7 +363,7 @@ class Page {
     clearTimeout(this.timer);
     this.timer = setTimeout(() => {
       this.ownHash = write(this.model, this.shown);
-      history.replaceState(null, '', this.ownHash);
+      if (location.protocol !== 'about:') history.replaceState(null, '', this.ownHash);  // in a notebook's frame
     }, 150);
   }
 
