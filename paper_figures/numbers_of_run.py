@@ -3,7 +3,7 @@
 import fig14_fidelity
 import table1_times
 from pictures import is_good
-from results import largest, symmetric
+from results import largest, symmetric, unique
 
 SIZE = 512  # texels along each side, the paper's choice for its results
 
@@ -73,7 +73,9 @@ def article(results):
         copy = next(key for key in measured if key.startswith(f"{model} "))
         ours, paper = table1_times.median_ms(measured[copy], table1_times.PAPER_STAGES), table1_times.paper_ms(name)
         values |= {f"time_{model}": f"{ours:,.0f}", f"time_{model}_paper": f"{paper:,.0f}", f"time_{model}_factor": f"{paper / ours:,.0f}",
-                   f"time_{model}_all": f"{table1_times.median_ms(measured[copy], table1_times.STAGES):,.0f}", f"vertices_{model}": f"{measured[copy][0]['vertices']:,}"}
+                   f"time_{model}_all": f"{table1_times.median_ms(measured[copy], table1_times.STAGES):,.0f}"}
+        if model == "bunny00":
+            values["vertices_bunny00"] = f"{measured[copy][0]['vertices']:,}"
     for model in ("bear", "bunny00"):
         at = _symmetric_at(results, "fidelity", model=model, method="vsm", size=SIZE)
         half = _symmetric_at(results, "fidelity", model=model, method="vsm", size=SIZE // 2)
@@ -100,7 +102,7 @@ def article(results):
     values |= {"distance_furthest": f"{100 * distance['max']:.1f}", "volume_restored": f"{100 * (distance['volume restored'] - 1):+.1f}", "volume_not_restored": f"{100 * (distance['volume not restored'] - 1):+.1f}"}
     posing = [row["columns"] for row in results.rows("posing") if row["parameters"]["method"] == "vsm"]
     values |= {"posing_bodies": str(len(posing)), "posing_poses": str(sum(columns["poses"] for columns in posing))}
-    for rule in ("smooth", "polished", "paper", "dual_quaternions", "linear"):
+    for rule in ("smooth", "paper", "dual_quaternions", "linear"):
         values |= {f"folds_{rule}": f"{sum(columns[f'{rule}_new_folds'] for columns in posing):,}", f"crossings_{rule}": f"{sum(columns[f'{rule}_new_intersections'] for columns in posing):,}"}
     morph = results.rows("morph")
     values |= {"morph_closed": str(sum(bool(row["columns"]["closed"]) for row in morph)), "morph_all": str(len(morph))}
@@ -115,7 +117,7 @@ def article(results):
     values |= {"cyclic_count": str(len(genus)), "cyclic_genus": str(genus[0])}
     record = results.record("fidelity")
     values |= {"machine": f"{record['machine']['processor']}, {record['machine']['cores']} cores", "opencl": f"{record['device']['name']} ({record['device']['platform']})", "compiler": record["compiler"],
-               "commit": record["git"]["commit"][:10], "version": record["version"]}
+               "commit": ", ".join(unique(results.record(name)["git"]["commit"][:10] for name in results.experiments())), "version": record["version"]}
     sizes = sorted(results.parameters("fidelity", "size"))
     table = ["| model, method | " + " | ".join(str(size) for size in sizes) + " |", "|---|" + "---|" * len(sizes)]
     for model in ("bear", "bunny00"):

@@ -77,7 +77,7 @@ def _sheet(block, folder):
     columns = min(block.wrap, max(len(row) for row in block.rows))
     lines = []
     for row in block.rows:
-        figures = "".join(f'<figure><img loading=lazy alt="{escape(picture.caption)}" src="{_picture_data(picture.path)}"><figcaption>{escape(picture.caption)}</figcaption></figure>' for picture in row)
+        figures = "".join(f'<figure><img alt="{escape(picture.caption)}" src="{_picture_data(picture.path)}"><figcaption>{escape(picture.caption)}</figcaption></figure>' for picture in row)
         lines.append(f'<div class=sheet style="grid-template-columns:repeat({columns},1fr)">{figures}</div>')
     return "".join(lines)
 

@@ -9,7 +9,7 @@ def _table(rows, columns, first="model"):
     return Table([first] + [head for head, _ in columns], [[row["key"]] + [show(row) for _, show in columns] for row in rows])
 
 
-def _number(name, form="{:.3g}"):
+def _number(name, form="{:.2e}"):
     return lambda row: "" if row["columns"].get(name) is None else form.format(row["columns"][name])
 
 
@@ -17,8 +17,8 @@ def yes(value):
     return "yes" if value else "no"
 
 
-ERRORS = [("vertices of the original: mean", _number("vertex_mean")), ("deviation", _number("vertex_std")), ("surfaces: mean", lambda row: f"{symmetric(row['columns']):.3g}"),
-          ("furthest", lambda row: f"{largest(row['columns']):.3g}")]
+ERRORS = [("vertices of the original: mean", _number("vertex_mean")), ("deviation", _number("vertex_std")), ("surfaces: mean", lambda row: f"{symmetric(row['columns']):.2e}"),
+          ("furthest", lambda row: f"{largest(row['columns']):.2e}")]
 
 
 def pipeline(results):
@@ -100,7 +100,7 @@ def detail(results):
 def overview(results):
     rows = results.rows("results")
     kinds = [("input", "input and skeleton"), ("shaded", "reconstruction"), ("error", "distance of the vertices"), ("layout", "layout"), ("map", "texture")]
-    return [Sheet("fig15_results", [[Picture(results.file("results", f"{row['model']}-{kind}.png"), f"{row['model']}: {title}") for kind, title in kinds] for row in rows], wrap=5),
+    return [Sheet("fig15_results", [[Picture(results.file("results", f"{row['model']}-{kind}.png"), f"{row['model']}: {title}") for kind, title in kinds] for row in rows], wrap=3),
             _table(rows, [("vertices", _number("vertices", "{:,}"))] + ERRORS + [("upper end of the colours", _number("error_scale"))])]
 
 
@@ -177,6 +177,9 @@ def reach(results):
 
 
 def viewer(results):
+    failed = results.failed("view")
+    if len(failed) == len(results.all_rows("view")):  # a build without npm has no page; everything else is there
+        return [Text(f"The page could not be made: {failed[0].get('reason', '')}")]
     return [Viewer(results.file("view", f"{pair}.html")) for pair in results.parameters("view", "pair")]
 
 

@@ -25,7 +25,7 @@ def check(results, wanted):
     for section in wanted:
         try:
             for experiment in section.experiments:
-                results.rows(experiment)
+                results.all_rows(experiment)
                 results.record(experiment)
             made.append((section, section.make(results)))
         except MissingInput as error:
@@ -51,8 +51,8 @@ def head(results, is_own, now):
     title = f"{model}: what a texture makes of it" if is_own else "Skeletex: the paper's figures and tables, made anew"
     text = f"<h1>{page.escape(title)}</h1>"
     if not is_own:
-        text += ("<p>The paper <i>Skeletex</i> (2018) stores a mesh as a skeleton and one texture of displacements. This page shows every figure and table of it: made by this program on models that are free to "
-                 "pass on, or drawn from the formulas. <b>The paper</b> says what it shows, <b>Here</b> what we show, <b>Differences</b> where the two part, and why. Distances are divided by the diagonal of "
+        text += ("<p>The paper <i>Skeletex</i> (2018) stores a mesh as a skeleton and one texture of displacements. This page shows every figure and table of it: made by this program on meshes that "
+                 "Debian distributes, or drawn from the formulas. <b>The paper</b> says what it shows, <b>Here</b> what we show, <b>Differences</b> where the two part, and why. Distances are divided by the diagonal of "
                  "the mesh's bounding box. Click a picture to see it at full size.</p>")
     else:
         text += "<p>Distances are divided by the diagonal of the mesh's bounding box. Click a picture to see it at full size.</p>"

@@ -65,8 +65,8 @@ def separation_planes():
     for k, (name, (a, b)) in enumerate(bones.items()):
         _bone(right, a, b, name, [BLUE, GREEN, GREEN, GREEN][k], offset=[(0, 0.12), (-0.05, 0.15), (0.25, -0.1), (0.25, 0.05)][k])
     right.annotate("$Sub_B$", (-0.15, -0.75), color=BLUE, fontsize=14, ha="center")
-    right.annotate("linear node", (-1.12, -0.3), ha="right", color=GREY)
-    right.annotate("branch node", (0.85, 0.22), ha="right", va="center", color=GREY)
+    right.annotate("linear node", (-1.12, -0.3), ha="right", va="center", color=GREY)
+    right.annotate("branch node", (0.8, -0.3), ha="right", va="center", color=GREY)
     right.set_title("All planes of a bone bound its cell (section through space)")
     for axis in (left, right):
         style.bare(axis)

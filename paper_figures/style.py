@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: MIT
 """One look for all figures, which prints in grey. Figures are as wide as the page, so that their letters can be read."""
 import io
+import logging
 import pathlib
+import time
 
 import matplotlib
+from PIL import Image, ImageDraw, ImageFont
 
 matplotlib.use("Agg")
+logging.getLogger("fontTools").setLevel(logging.ERROR)  # it finds the dates odd that are left out
 import matplotlib.pyplot as plt  # noqa: E402
 
 # Colours differ in lightness too, and every series has its own marker and dash, so that a grey print can be read.
@@ -42,27 +46,42 @@ def bare(axis, equal=True):
         axis.set_aspect("equal")
 
 
+SHEET = 2000  # pixels across
+_FONT = ImageFont.truetype(str(pathlib.Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"), 26)
+
+
 def save_sheet(sheet, folder):
-    """The pictures of a sheet as one figure, as they lie on the page."""
+    """The pictures of a sheet as one picture, as they lie on the page."""
     rows = [row[i:i + sheet.wrap] for row in sheet.rows for i in range(0, len(row), sheet.wrap)]
-    columns = max(len(row) for row in rows)
-    cell = WIDTH / columns
-    shapes = [[plt.imread(picture.path).shape for picture in row] for row in rows]
-    heights = [max(shape[0] / shape[1] for shape in row) for row in shapes]
-    caption = 0.3 + 0.18 * max(picture.caption.count("\n") for row in rows for picture in row)
-    figure = plt.figure(figsize=(WIDTH, sum(height * cell + caption for height in heights)))
-    grid = figure.add_gridspec(len(rows), columns, height_ratios=[height * cell + caption for height in heights], wspace=0.02, hspace=0.02)
-    for i, row in enumerate(rows):
-        for j, picture in enumerate(row):
-            axis = figure.add_subplot(grid[i, j])
-            bare(axis, equal=False)
-            axis.imshow(plt.imread(picture.path), interpolation="lanczos")
-            axis.set_title(picture.caption, fontsize=10, pad=3)
-    return save_picture(figure, folder, sheet.name)
-
-
-def save_picture(figure, folder, name):
+    cell = SHEET // max(len(row) for row in rows)
+    lines = []
+    for row in rows:
+        pictures = []
+        for entry in row:
+            picture = Image.open(entry.path).convert("RGB")
+            pictures.append((picture.resize((cell - 8, round(picture.height * (cell - 8) / picture.width)), Image.Resampling.LANCZOS), _fitting(entry.caption, cell - 8)))
+        lines.append((pictures, max(picture.height for picture, _ in pictures), max(len(words) for _, words in pictures)))
+    page = Image.new("RGB", (SHEET, sum(height + 34 * words + 16 for _, height, words in lines)), "white")
+    pen = ImageDraw.Draw(page)
+    y = 0
+    for pictures, height, words in lines:
+        for j, (picture, caption) in enumerate(pictures):
+            page.paste(picture, (j * cell + 4, y + height - picture.height))
+            for k, line in enumerate(caption):
+                pen.text((j * cell + cell // 2, y + height + 34 * k + 4), line, fill="#222222", font=_FONT, anchor="ma")
+        y += height + 34 * words + 16
     folder.mkdir(parents=True, exist_ok=True)
-    figure.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None}, dpi=150)
-    figure.savefig(pathlib.Path(folder) / f"{name}.png", metadata={"Software": None}, dpi=150)
-    plt.close(figure)
+    page.save(folder / f"{sheet.name}.png")
+    page.save(folder / f"{sheet.name}.pdf", quality=92, creationDate=time.gmtime(0), modDate=time.gmtime(0))
+
+
+def _fitting(text, width):
+    """Lines of at most this width."""
+    lines = [""]
+    for word in text.split():
+        longer = f"{lines[-1]} {word}".strip()
+        if lines[-1] and _FONT.getlength(longer) > width:
+            lines.append(word)
+        else:
+            lines[-1] = longer
+    return lines

@@ -39,6 +39,7 @@ def draw_iterations(results):
             axis.plot([row["parameters"]["iterations"] for row in some], [1e5 * symmetric(row["columns"]) for row in some], marker=marker, linestyle=dash, color=colour,
                       label=f"w A / A3^{alpha}" if alpha else "w A (paper)")
         axis.set_xlabel("iterations")
+        axis.set_xticks(results.parameters("iterations", "iterations"))
         axis.set_ylim(0, None)
     axes[0].set_ylabel("symmetric mean / diagonal, 1e-5")
     return _legend_above(figure, axes[0])
