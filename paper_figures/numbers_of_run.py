@@ -21,8 +21,8 @@ def summary(results):
     """Five numbers of the paper's page: (what, here, the paper, anchor of the section)."""
     rows = results.rows("results")
     models = ", ".join(row["model"] for row in rows)
-    recipe = {row["parameters"]["recipe"]: row["columns"] for row in results.rows("recipe") if row["model"] == results.models("recipe")[0] and row["parameters"]["size"] == results.parameters("recipe", "size")[0]}
-    size, model = results.parameters("recipe", "size")[0], results.models("recipe")[0]
+    size, model = max(results.parameters("recipe", "size")), results.models("recipe")[0]
+    recipe = {row["parameters"]["recipe"]: row["columns"] for row in results.rows("recipe") if row["model"] == model and row["parameters"]["size"] == size}
     measured = table1_times.measured(results)
     copy = next(name for name in measured if name.startswith("bunny00 "))
     ours, paper = table1_times.median_ms(measured[copy], table1_times.PAPER_STAGES), table1_times.paper_ms("Bunny")
@@ -60,7 +60,7 @@ def own_summary(results):
             ("Reconstructions that are closed 2-manifolds", f"{closed} of {len(rows)}", "fidelity")]
 
 
-def _symmetric_at(results, experiment, **parameters):
+def _columns_at(results, experiment, **parameters):
     model = parameters.pop("model")
     return next(row["columns"] for row in results.rows(experiment) if row["model"] == model and row["parameters"] == parameters)
 
@@ -77,15 +77,15 @@ def article(results):
         if model == "bunny00":
             values["vertices_bunny00"] = f"{measured[copy][0]['vertices']:,}"
     for model in ("bear", "bunny00"):
-        at = _symmetric_at(results, "fidelity", model=model, method="vsm", size=SIZE)
-        half = _symmetric_at(results, "fidelity", model=model, method="vsm", size=SIZE // 2)
-        double = _symmetric_at(results, "fidelity", model=model, method="vsm", size=2 * SIZE)
+        at = _columns_at(results, "fidelity", model=model, method="vsm", size=SIZE)
+        half = _columns_at(results, "fidelity", model=model, method="vsm", size=SIZE // 2)
+        double = _columns_at(results, "fidelity", model=model, method="vsm", size=2 * SIZE)
         values |= {f"vertex_{model}": scientific(at["vertex_mean"]), f"vertex_{model}_std": scientific(at["vertex_std"]), f"surface_{model}": scientific(symmetric(at)),
                    f"furthest_{model}": scientific(largest(at)), f"gain_to_{model}": f"{symmetric(half) / symmetric(at):.1f}", f"gain_beyond_{model}": f"{symmetric(at) / symmetric(double):.1f}"}
     for method in ("spd", "vsm", "hybrid"):
-        at = _symmetric_at(results, "fidelity", model="bunny00", method=method, size=SIZE)
+        at = _columns_at(results, "fidelity", model="bunny00", method=method, size=SIZE)
         values |= {f"bunny_{method}": scientific(symmetric(at)), f"bunny_{method}_furthest": scientific(largest(at))}
-    size = results.parameters("recipe", "size")[0]
+    size = max(results.parameters("recipe", "size"))
     recipe = {row["parameters"]["recipe"]: row["columns"] for row in results.rows("recipe") if row["model"] == "bear" and row["parameters"]["size"] == size}
     values |= {"recipe_size": str(size), "recipe_paper": scientific(symmetric(recipe["paper"])), "recipe_default": scientific(symmetric(recipe["default"])),
                "recipe_regular": scientific(symmetric(recipe["regular grid"])), "recipe_factor": f"{symmetric(recipe['paper']) / symmetric(recipe['default']):.1f}"}

@@ -14,7 +14,7 @@ from results import state_of_checkout, unique
 CSS = """
 :root{color-scheme:light}
 body{font:17px/1.5 system-ui,sans-serif;max-width:1500px;margin:0 auto;padding:1rem 2rem 4rem;color:#1d1d1f;background:#fff}
-p,ul{max-width:80ch}h1{font-size:2rem;margin:.5rem 0}h2{font-size:1.5rem;margin:3.5rem 0 .5rem;border-top:1px solid #ddd;padding-top:1.2rem}
+p,ul{max-width:80ch;overflow-wrap:anywhere}h1{font-size:2rem;margin:.5rem 0}h2{font-size:1.5rem;margin:3.5rem 0 .5rem;border-top:1px solid #ddd;padding-top:1.2rem}
 h2 small{font-size:1rem;color:#666;font-weight:normal;margin-left:.6rem}a{color:#1b4f9c}
 img{width:100%;height:auto;display:block}figure{margin:0}figcaption{font-size:.95rem;padding:.2rem .2rem .8rem;color:#333}
 .sheet{display:grid;gap:.4rem 1rem;margin:1rem 0;align-items:end}.sheet img{cursor:zoom-in}.plot{margin:1rem 0}

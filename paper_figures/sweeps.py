@@ -40,7 +40,7 @@ def draw_iterations(results):
                       label=f"w A / A3^{alpha}" if alpha else "w A (paper)")
         axis.set_xlabel("iterations")
         axis.set_xticks(results.parameters("iterations", "iterations"))
-        axis.set_ylim(0, None)
+    axes[0].set_ylim(0, 1.1 * axes[0].get_ylim()[1])  # shared
     axes[0].set_ylabel("symmetric mean / diagonal, 1e-5")
     return _legend_above(figure, axes[0])
 
