@@ -14,7 +14,7 @@ packages=(
   libcli11-dev libspdlog-dev libembree-dev                           # program (bench compares with Embree)
   libgtest-dev openexr oclgrind                                      # tests (models against exrheader, kernels under Oclgrind)
   clang-format clang-tidy                                            # scripts/lint.sh
-  libbenchmark-dev python3 python3-matplotlib                                           # benchmarks, tables of the experiments
+  libbenchmark-dev python3 python3-matplotlib python3-pil                               # benchmarks, tables of the experiments
   libmeshoptimizer-dev libcgal-dev draco                                                # what the experiments compare with
   pybind11-dev python3-dev python3-numpy python3-setuptools python3-venv python3-pytest mypy  # the Python package, and its tests
   chromium                                                                              # tests: the report and the page of `view` in a browser

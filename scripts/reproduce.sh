@@ -6,18 +6,23 @@
 #   scripts/reproduce.sh --main     the main job alone: a few minutes
 #   scripts/reproduce.sh --quick    every experiment, reduced
 #   scripts/reproduce.sh            every experiment in full
-#   scripts/reproduce.sh [--quick] MESH SKELETON    a model of your own: its row of Figure 15, its curves of Figure 14, its row of
-#                                   Table 1, its segments, methods and levels of detail; on results/own/report/index.html
+#   scripts/reproduce.sh [--quick] MESH SKELETON    a model of your own: which size it needs, its errors, times, segments, methods and
+#                                   levels of detail; on results/own/report/index.html
 #
-# What is done is kept: after an interruption the same command goes on.
+# What the same commit has done is kept: after an interruption the same command goes on. The page is made from a clean checkout only, so
+# that its commit tells what ran; --draft, while you change the program, makes one all the same and says so on it.
 set -euo pipefail
-usage() { echo "usage: scripts/reproduce.sh [--main|--quick] | [--quick] MESH SKELETON" >&2; exit 2; }
-options=() main=""
-case "${1:-}" in
-  --quick) options=(--quick); shift ;;
-  --main) main=yes; shift ;;
-  -*) usage ;;
-esac
+usage() { echo "usage: scripts/reproduce.sh [--main | --quick] [--draft] | [--quick] MESH SKELETON" >&2; exit 2; }
+options=() main="" draft=()
+while [[ "${1:-}" == -* ]]; do
+  case "$1" in
+    --quick) options+=(--quick) ;;
+    --main) main=yes ;;
+    --draft) draft=(--draft) ;;
+    *) usage ;;
+  esac
+  shift
+done
 list=configs/paper.json results=results
 case $# in
   0) ;;
@@ -30,6 +35,10 @@ case $# in
 esac
 
 cd "$(dirname "$0")/.."
+if [ "$results" = results ] && [ -z "$main" ] && [ "${#draft[@]}" -eq 0 ]; then
+  changed=$(git status --porcelain) || { echo "reproduce: this is no git checkout, so the page could not say what ran; go on with --draft" >&2; exit 1; }
+  [ -z "$changed" ] || { printf 'reproduce: changed files:\n%s\nCommit them or put them away, or go on with --draft.\n' "$changed" >&2; exit 1; }
+fi
 bash scripts/install-dependencies.sh
 cmake --preset release
 targets=(skeletex)
@@ -43,6 +52,6 @@ if [ -n "$main" ]; then
 fi
 status=0
 "$program" run "$list" --resume "${options[@]}" || status=$?
-page=$(/usr/bin/python3 paper_figures/report.py "$results")  # the interpreter that python3-matplotlib belongs to
+page=$(/usr/bin/python3 paper_figures/report.py "$results" "${draft[@]}")  # the interpreter that python3-matplotlib belongs to
 echo "Everything on one page: $page"
 exit "$status"

@@ -122,11 +122,11 @@ TEST_F(Runner, RecordsAFailureWithItsReasonAndGoesOn) {
   EXPECT_TRUE(holds(read_file(folder_ / "out/results.csv"), "because"));
   const OrderedJson record = OrderedJson::parse(read_file(folder_ / "out/record.json"));
   for (const char* key :
-       {"source", "experiment", "inputs", "git", "compiler", "device", "machine", "seconds", "peak_memory_mb"})
+       {"date", "source", "experiment", "inputs", "git", "compiler", "device", "machine", "seconds", "peak_memory_mb"})
     EXPECT_TRUE(record.contains(key)) << key;
 }
 
-TEST_F(Runner, ResumesWhatIsDoneUnlessCommandsOrInputsChanged) {
+TEST_F(Runner, ResumesWhatIsDoneUnlessCommitCommandsOrInputsChanged) {
   const std::string text = fmt::format(
       R"({{"name": "e", "models": [{}], "sweep": {{"n": [1, 2]}}, "steps": [{{"name": "s", "tool": "sh", "run": ["-c", "echo x >> {{out}}/log; test {{n}} = 1"]}}]}})",
       kModel);
@@ -137,6 +137,13 @@ TEST_F(Runner, ResumesWhatIsDoneUnlessCommandsOrInputsChanged) {
   EXPECT_EQ(again.kept, 1);  // the one that failed runs again
   EXPECT_EQ(runs(), 3u);
   std::ofstream(folder_ / "y.skeleton.json", std::ios::app) << "\n";
+  EXPECT_EQ(run(read_experiment(write(text)), true).kept, 0);
+  // What another commit has made is not kept: the record would name the wrong one.
+  const auto item = folder_ / "out/items/y-1.json";
+  OrderedJson made = OrderedJson::parse(read_file(item));
+  EXPECT_EQ(run(read_experiment(write(text)), true).kept, 1);
+  made["signature"]["commit"] = "another";
+  std::ofstream(item) << made.dump();
   EXPECT_EQ(run(read_experiment(write(text)), true).kept, 0);
 }
 

@@ -46,17 +46,19 @@ std::string hash_text(std::string_view text) {
 
 std::string hash_file(const std::filesystem::path& path) { return hash_text(read_file(path)); }
 
+OrderedJson describe_checkout() {
+  const std::string commit = output_of("git rev-parse HEAD 2>/dev/null");
+  return {{"commit", commit},
+          {"changed_files", commit.empty() ? "" : output_of("git status --porcelain 2>/dev/null | wc -l")}};
+}
+
 OrderedJson describe_build_and_machine(const std::string& device_selector) {
   const ClContext context(device_selector);
   const ClDeviceInfo& device = context.device();
   utsname system{};
   ::uname(&system);
-  const std::string commit = output_of("git rev-parse HEAD 2>/dev/null");
   return {
       {"version", SKELETEX_VERSION},
-      {"git",
-       {{"commit", commit},
-        {"changed_files", commit.empty() ? "" : output_of("git status --porcelain 2>/dev/null | wc -l")}}},
       {"compiler", SKELETEX_COMPILER},
       {"libraries",
        {{"eigen", fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},

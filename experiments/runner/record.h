@@ -4,7 +4,11 @@
 
 namespace skeletex {
 
-/// Where and with what a run was made: git state, compiler, libraries, machine, OpenCL device and driver.
+/// The checkout that the working folder is in: {"commit", "changed_files"}, the latter the number of files that differ
+/// from the commit or are not in it. Both are "" outside of a checkout.
+OrderedJson describe_checkout();
+
+/// With what a run was made: compiler, libraries, machine, OpenCL device and driver.
 OrderedJson describe_build_and_machine(const std::string& device_selector);
 
 /// FNV-1a (64 bit) of a file's bytes, as "fnv1a64:hex".

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "run_experiment.h"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <ctime>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -54,8 +56,9 @@ OrderedJson value_at(const OrderedJson& json, const std::string& place) {
   return *at;
 }
 
-/// What an item's result depends on: its commands, with the work and result folders left open, and its inputs.
-OrderedJson signature_of(const Experiment& experiment, const Item& item,
+/// What an item's result depends on: the version of this program, its commands, with the work and result folders left
+/// open, and its inputs.
+OrderedJson signature_of(const Experiment& experiment, const Item& item, const OrderedJson& checkout,
                          const std::map<fs::path, std::string>& hashes) {
   OrderedJson commands = OrderedJson::array();
   for (const Step& step : experiment.steps)
@@ -67,7 +70,10 @@ OrderedJson signature_of(const Experiment& experiment, const Item& item,
   if (item.model >= 0)
     for (const fs::path& path : {experiment.models[item.model].mesh, experiment.models[item.model].skeleton})
       inputs[path.filename().string()] = hashes.at(path);
-  return {{"commands", commands}, {"inputs", inputs}};
+  return {{"commit", checkout.at("commit")},
+          {"is_clean", checkout.at("changed_files") == "0"},
+          {"commands", commands},
+          {"inputs", inputs}};
 }
 
 std::string program_of(const Step& step, const RunOptions& options) {
@@ -212,6 +218,8 @@ OrderedJson experiment_json(const Experiment& experiment) {
 // NOLINTNEXTLINE(readability-function-cognitive-complexity,readability-function-size)
 RunSummary run_experiment(const Experiment& experiment, const RunOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
+  const std::string date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+  const OrderedJson checkout = describe_checkout();
   const std::vector<Item> items = plan_items(experiment);
   std::error_code code;
   fs::create_directories(options.folder / "items", code);
@@ -225,7 +233,7 @@ RunSummary run_experiment(const Experiment& experiment, const RunOptions& option
   std::vector<std::size_t> open;
   RunSummary summary;
   for (std::size_t i = 0; i < items.size(); ++i) {
-    const OrderedJson signature = signature_of(experiment, items[i], hashes);
+    const OrderedJson signature = signature_of(experiment, items[i], checkout, hashes);
     if (options.is_resumed)
       if (auto old = read_json_file(options.folder / "items" / (items[i].key + ".json"));
           old && old->value("status", "") == "done" && old->value("signature", OrderedJson()) == signature) {
@@ -253,7 +261,8 @@ RunSummary run_experiment(const Experiment& experiment, const RunOptions& option
     try {
       for (std::size_t k = next++; k < open.size(); k = next++) {
         const Item& item = items[open[k]];
-        OrderedJson result = run_item(experiment, item, options, signature_of(experiment, item, hashes), environment);
+        OrderedJson result =
+            run_item(experiment, item, options, signature_of(experiment, item, checkout, hashes), environment);
         write_json_file(options.folder / "items" / (item.key + ".json"), result);
         const std::lock_guard lock(mutex);
         ++finished;
@@ -288,8 +297,11 @@ RunSummary run_experiment(const Experiment& experiment, const RunOptions& option
                      {"rows", std::move(rows)}};
   write_json_file(options.folder / "results.json", summary.results);
   write_text_atomically(options.folder / "results.csv", csv_of(experiment, summary.results.at("rows")));
-  OrderedJson record{
-      {"source", options.source}, {"experiment", experiment_json(experiment)}, {"inputs", OrderedJson::object()}};
+  OrderedJson record{{"date", date},
+                     {"source", options.source},
+                     {"experiment", experiment_json(experiment)},
+                     {"inputs", OrderedJson::object()},
+                     {"git", checkout}};
   for (const auto& [path, hash] : hashes) record["inputs"][path.filename().string()] = hash;
   record.update(describe_build_and_machine(options.device));
   record["jobs"] = options.jobs;

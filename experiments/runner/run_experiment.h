@@ -9,7 +9,7 @@ namespace skeletex {
 struct RunOptions {
   std::string program;           ///< this program, which the steps call
   std::filesystem::path folder;  ///< of the results
-  bool is_resumed = false;       ///< keep items that are done and whose commands and inputs have not changed
+  bool is_resumed = false;       ///< keep items that are done, by the same commit, commands and inputs
   int jobs = 1;
   std::string device;  ///< --device of every step; "" for the default
   OrderedJson source;  ///< for the record: the file and the changes that the experiment was made of
@@ -27,7 +27,7 @@ struct RunSummary {
 ///   items/KEY.json   parameters, commands, the steps' JSON, seconds, peak memory; written as soon as the item ends
 ///   results.json     one row per item: model, parameters, status, columns
 ///   results.csv      the same as a table
-///   record.json      the experiment as it was resolved, input hashes, git state, compiler, device, machine
+///   record.json      the experiment as it was resolved, date, input hashes, git state, compiler, device, machine
 /// \throw IoError when the folder cannot be written or a placeholder is unknown
 RunSummary run_experiment(const Experiment& experiment, const RunOptions& options);
 

@@ -197,7 +197,7 @@ void add_run_command(CLI::App& program) {
       ->take_all();
   command.add_flag("--quick", arguments->is_quick, "the experiment's own quick settings");
   command.add_flag("--resume", arguments->is_resumed,
-                   "keep items that are done and whose commands and inputs are the same");
+                   "keep items that the same commit has done with the same commands and inputs");
   command.add_option("--jobs", arguments->jobs, "items at a time; timings want 1")
       ->check(number_in(1, 256))
       ->type_name("N");
