@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/compact/skeleton_code.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+
+namespace skeletex {
+namespace {
+
+/// Two directions across an axis.
+std::array<Vec3, 2> across_axis(const Vec3& axis) {
+  int least = 0;
+  for (int k = 1; k < 3; ++k)
+    if (std::abs(axis[k]) < std::abs(axis[least])) least = k;
+  const Vec3 x = (Vec3::Unit(least) - axis[least] * axis).normalized();
+  return {x, axis.cross(x)};
+}
+
+}  // namespace
+
+int angle_code(const Vec3& axis, const Vec3& s) {
+  const auto [x, y] = across_axis(axis);
+  const double turn = std::atan2(s.dot(y), s.dot(x)) / (2 * std::numbers::pi);
+  return static_cast<int>(std::lround(turn * kAngleSteps)) & (kAngleSteps - 1);
+}
+
+Vec3 direction_of_code(const Vec3& axis, int code) {
+  const auto [x, y] = across_axis(axis);
+  const double angle = 2 * std::numbers::pi * code / kAngleSteps;
+  return std::cos(angle) * x + std::sin(angle) * y;
+}
+
+Skeleton rounded_skeleton(const Skeleton& skeleton) {
+  const std::vector<BoneBasis> bases = bone_bases(skeleton);
+  Skeleton rounded = skeleton;
+  for (Node& node : rounded.nodes) node.position = (node.position / kNodeStep).array().rint() * kNodeStep;
+  for (std::size_t bone = 0; bone < rounded.bones.size(); ++bone) {
+    const Vec3 axis = direction_from(rounded, {static_cast<int>(bone), BoneEnd::kHead});
+    rounded.bones[bone].s = direction_of_code(axis, angle_code(axis, bases[bone].s));
+  }
+  return rounded;
+}
+
+}  // namespace skeletex
