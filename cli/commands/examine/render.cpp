@@ -45,7 +45,7 @@ struct Arguments {
   bool is_flat = false, has_wires = false, shows_skeleton = false, is_distance_dropped = false, is_polished = false;
 };
 
-bool is_model(const std::string& path) { return has_ending(path, ".exr"); }
+bool is_model(const std::string& path) { return has_ending(path, ".exr") || has_ending(path, ".skx"); }
 
 std::array<int, 2> parse_picture_size(const std::string& text) {
   std::array<int, 2> size{0, 0};

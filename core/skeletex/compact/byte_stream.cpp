@@ -114,8 +114,8 @@ std::string ByteReader::text(std::size_t most) {
 
 std::string compress(std::string_view bytes) {
   std::string best;
-  for (int pb = 0; pb <= 1; ++pb)
-    for (int lp = 0; lp <= 1; ++lp)
+  for (const int pb : {0})
+    for (const int lp : {0})
       for (int lc = 0; lc + lp <= 4; ++lc) {
         const int settings = lc + 5 * lp + 25 * pb;
         std::string packed = static_cast<char>(settings) + compress_with(bytes, settings);
