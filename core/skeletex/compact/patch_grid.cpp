@@ -56,16 +56,17 @@ std::vector<Vec3> site_points(const CompactModel& model, const Refinement& refin
     for (const Site& site : refinement.sites()) points.push_back(site.predicted);
     return points;
   }
-  const double q = normal_step(model.step, step) / 64,
-               tangential = tangential_step(model.step, step, refinement.mean_spacing());
+  const double q = normal_step(model.step, step);
   std::vector<int> offsets(refinement.site_count());
   for (int i = 0; i < refinement.site_count(); ++i) {
     const Site& site = refinement.sites()[i];
     offsets[i] = offset_of(residuals->normal[i],
                            expected_offset(model.weights[rows ? 1 : 0], neighbours_of(i, refinement.site_columns()), offsets));
-    Vec3 point = site.predicted + q * offsets[i] * site.normal;
-    if (!residuals->side.empty())
+    Vec3 point = site.predicted + q / 64 * offsets[i] * site.normal;
+    if (!residuals->side.empty()) {
+      const double tangential = tangential_step(q, step, refinement.mean_spacing(), site);
       point += tangential * (residuals->side[i] * site.side + residuals->across[i] * site.across);
+    }
     points.push_back(point);
   }
   return points;

@@ -37,6 +37,7 @@ Vec3 unit_or_zero(const Vec3& v) {
 /// Normal and tangents, given the directions along and across the refined one.
 void set_frame(Site& site, const Vec3& along, const Vec3& across) {
   site.spacing = along.norm();
+  site.width = 0.25 * across.norm();
   site.side = unit_or_zero(along);
   site.normal = unit_or_zero(along.cross(across));
   if (site.normal == Vec3::Zero()) {  // any direction that both sides agree on
@@ -120,8 +121,9 @@ int expected_offset(const OffsetWeights& weights, const std::array<int, 4>& neig
   return static_cast<int>(sum / 64);
 }
 
-double tangential_step(double q, int number, double mean_spacing) {
-  return stays_home(number) ? std::max(0.03 * mean_spacing, 4 * q) : 16 * q;
+double tangential_step(double q, int number, double mean_spacing, const Site& site) {
+  if (stays_home(number)) return std::max(0.03 * mean_spacing, 4 * q);
+  return std::clamp(0.25 * std::min(site.spacing, site.width), q / 4, 16 * q);
 }
 
 double normal_step(double q, int number) { return number < 4 ? 0.6 * q : q; }

@@ -28,7 +28,8 @@ struct Site {
   int row = 0, column = 0;         ///< in the refined grid
   std::array<int, 2> parents{};    ///< indices into the points before the step
   Vec3 predicted, normal, side, across;  ///< unit directions: side from the first to the second parent
-  double spacing = 0;              ///< between the parents
+  double spacing = 0;  ///< between the parents
+  double width = 0;    ///< between points across
 };
 
 /// The points that a step adds to a grid, as predicted.
@@ -78,9 +79,10 @@ Point halfway(const At& point, int before, int after) {
   return sum;
 }
 
-/// Tangential step of a patch's step.
+/// Tangential step of a site: of coarse steps a share of their spacing, else fine enough that neighbours do not pass
+/// each other.
 /// \param number  of the step in its patch, 0: the coarsest
-double tangential_step(double q, int number, double mean_spacing);
+double tangential_step(double q, int number, double mean_spacing, const Site& site);
 /// q of a patch's step.
 double normal_step(double q, int number);
 /// Whether a step's points stay at their home places.

@@ -113,32 +113,78 @@ class PatchEncoder {
     Place place;
   };
 
-  Residual residual_of(const Site& site, const Traced& traced, int step, double q, double tangential, int expected,
-                       double rounding) {
-    const Place &a = traced.places[site.parents[0]];
-    Place b = traced.places[site.parents[1]];
-    b[1] = a[1] + source_.columns * shortest(b[1] - a[1]);
-    const Place middle = 0.5 * (a + b);
+  /// A step's number and its quantization.
+  struct Step {
+    int number = 0;
+    bool is_rows = false;
+    double q = 0, mean_spacing = 0;
+  };
+
+  Residual residual_of(const Site& site, const Traced& traced, const Step& step, int expected,
+                       const std::vector<Place>& before) const {
+    const Place a = traced.places[site.parents[0]], b = near(traced.places[site.parents[1]], a), middle = 0.5 * (a + b);
     Residual residual;
-    if (!stays_home(step)) {
+    if (!stays_home(step.number)) {
       const Place reach = options_.reach * Place(row_scale_, column_scale_);
-      if (const auto found = meet_line(source_, middle, reach, site.predicted, site.normal, tolerance(q, site))) {
+      const auto found = meet_line(source_, middle, reach, site.predicted, site.normal, tolerance(step.q, site));
+      if (std::min(site.spacing, site.width) < options_.least_spacing * step.q) {
+        residual.place = found ? found->place : middle;
+        return residual;
+      }
+      if (found && !folds(found->place, site, traced, step.is_rows, before)) {
         residual.place = found->place;
-        residual.normal = rounded_towards_zero((64 * found->distance / q - expected) / 64, rounding);
+        residual.normal = rounded_towards_zero((64 * found->distance / step.q - expected) / 64, options_.rounding);
         return residual;
       }
     }
-    return home_residual(site, middle, q, tangential, expected, rounding);
+    return home_residual(site, middle, step, expected);
   }
 
-  double shortest(double columns) const {
-    const double turns = columns / source_.columns;
-    return turns - std::round(turns);
+  /// The same place, in the period next to another one.
+  Place near(Place place, const Place& other) const {
+    place[1] -= source_.columns * std::round((place[1] - other[1]) / source_.columns);
+    return place;
   }
   double tolerance(double q, const Site& site) const { return std::max(0.05 * q, 1e-4 * site.spacing); }
 
-  Residual home_residual(const Site& site, const Place& middle, double q, double tangential, int expected,
-                         double rounding) {
+  /// Whether a cell of the refined grid whose corners are the new point and points before it would be turned over, or
+  /// nearly so, in rows and columns of the source.
+  bool folds(const Place& place, const Site& site, const Traced& traced, bool is_rows,
+             const std::vector<Place>& before) const {
+    const PatchGrid& grid = traced.grid;
+    const double least = 0.3 * row_scale_ * column_scale_ / 2;
+    const auto old = [&](int row, int column) { return near(traced.places[grid.index(row, column)], place); };
+    const auto is_good = [&](const Place& upper_left, const Place& upper_right, const Place& lower_right,
+                             const Place& lower_left) {
+      const std::array<Place, 4> corners{near(upper_left, place), near(upper_right, place), near(lower_right, place),
+                                         near(lower_left, place)};
+      for (int i = 0; i < 4; ++i) {
+        const Place one = corners[(i + 1) % 4] - corners[i], two = corners[(i + 3) % 4] - corners[i];
+        if (one[1] * two[0] - one[0] * two[1] < least) return false;
+      }
+      return true;
+    };
+    if (is_rows) {
+      const int r = (site.row - 1) / 2, c = site.column, first = r * grid.columns;
+      const auto beside = [&](int left, int right, const Place& left_place, const Place& right_place) {
+        return is_good(old(r, left), old(r, right), right_place, left_place) &&
+               is_good(left_place, right_place, old(r + 1, right), old(r + 1, left));
+      };
+      if (c > 0 && !beside(c - 1, c, before[first + c - 1], place)) return true;
+      return c == grid.columns - 1 && !beside(c, 0, place, before[first]);
+    }
+    const int r = site.row, c = (site.column - 1) / 2;
+    const Place upper = r > 1 ? before[before.size() - grid.columns] : Place(0.5 * (old(0, c) + old(0, c + 1)));
+    if (!is_good(old(r - 1, c), upper, place, old(r, c)) || !is_good(upper, old(r - 1, c + 1), old(r, c + 1), place))
+      return true;
+    if (r + 1 < grid.intervals) return false;
+    const Place lower = 0.5 * (old(r + 1, c) + old(r + 1, c + 1));
+    return !is_good(old(r, c), place, lower, old(r + 1, c)) ||
+           !is_good(place, old(r, c + 1), old(r + 1, c + 1), lower);
+  }
+
+  Residual home_residual(const Site& site, const Place& middle, const Step& step, int expected) const {
+    const double tangential = tangential_step(step.q, step.number, step.mean_spacing, site);
     Residual residual;
     residual.place = middle;
     const Vec3 offset = source_.at(middle) - site.predicted;
@@ -147,18 +193,18 @@ class PatchEncoder {
     const Vec3 moved = site.predicted + tangential * (residual.side * site.side + residual.across * site.across);
     double distance = offset.dot(site.normal);
     const Place reach = Place(0.25 * row_scale_, 0.25 * column_scale_);
-    if (const auto found = meet_line(source_, middle, reach, moved, site.normal, tolerance(q, site))) {
+    if (const auto found = meet_line(source_, middle, reach, moved, site.normal, tolerance(step.q, site))) {
       residual.place = found->place;
       distance = found->distance;
     }
-    residual.normal = rounded_towards_zero((64 * distance / q - expected) / 64, rounding);
+    residual.normal = rounded_towards_zero((64 * distance / step.q - expected) / 64, options_.rounding);
     return residual;
   }
 
   Traced encode_step(const Traced& traced, int step, bool rows) {
     const Refinement refinement(traced.grid, rows);
-    const double q = normal_step(compact_.step, step),
-                 tangential = tangential_step(compact_.step, step, refinement.mean_spacing());
+    const Step quantization{step, rows, normal_step(compact_.step, step), refinement.mean_spacing()};
+    const double q = quantization.q;
     row_scale_ = static_cast<double>(source_.rows - 1) / traced.grid.intervals;
     column_scale_ = static_cast<double>(source_.columns) / traced.grid.columns;
     const int coded = patch_.step_count - compact_.bare_levels;
@@ -171,9 +217,10 @@ class PatchEncoder {
     for (int i = 0; i < refinement.site_count(); ++i) {
       const Site& site = refinement.sites()[i];
       const int expected = expected_offset(compact_.weights[rows ? 1 : 0], neighbours_of(i, refinement.site_columns()), offsets);
-      Residual r = residual_of(site, traced, step, q, tangential, expected, options_.rounding);
-      if (is_sparse && std::abs(r.normal) < options_.least_kept) r.normal = 0;
+      Residual r = residual_of(site, traced, quantization, expected, places);
+      if (is_sparse && std::abs(r.normal) < options_.least_kept) r.normal = r.side = r.across = 0;
       offsets[i] = offset_of(r.normal, expected);
+      const double tangential = tangential_step(q, step, refinement.mean_spacing(), site);
       points.push_back(site.predicted + q / 64 * offsets[i] * site.normal +
                        tangential * (r.side * site.side + r.across * site.across));
       places.push_back(r.place);

@@ -7,11 +7,13 @@ namespace skeletex {
 
 /// What the encoder chooses beside the step.
 struct ResidualOptions {
-  double reach = 0.08;      ///< how far a point may slide from its home, in distances of its parents
+  double reach = 0.8;       ///< how far a point may slide from its home, in distances of its parents
   double rounding = 0.45;   ///< added before rounding down: 0.5 rounds to nearest, less prefers 0
+  /// Points nearer to each other than so many steps get no residuals: their normals would follow the rounding.
+  double least_spacing = 8;
   /// Residuals below so many steps are dropped in the `kept_levels` finest steps that have some.
-  double least_kept = 0;
-  int kept_levels = 0;
+  double least_kept = 3;
+  int kept_levels = 2;
 };
 
 /// Fills a patch's coarse grid and residuals, and its row table.

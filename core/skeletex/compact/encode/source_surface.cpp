@@ -78,7 +78,7 @@ std::optional<Meeting> meet_line(const SourcePatch& patch, const Place& start, c
     Eigen::Matrix3d jacobian;
     jacobian << by_row, by_column, -direction;
     const double determinant = jacobian.determinant();
-    if (std::abs(determinant) < 1e-3 * by_row.norm() * by_column.norm()) return {};
+    if (!(std::abs(determinant) > 1e-3 * by_row.norm() * by_column.norm())) return {};
     const Vec3 move = jacobian.inverse() * -miss;
     place += Place(move[0], move[1]);
     place = place.cwiseMax(start - reach).cwiseMin(start + reach);
