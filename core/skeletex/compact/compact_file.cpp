@@ -25,8 +25,10 @@ constexpr std::int64_t kMostPosition = std::int64_t{1} << 40, kMostInteger = 1 <
 constexpr double kMostPoints = 16384.0 * 16384.0;
 
 void write_skeleton(ByteWriter& out, const Skeleton& skeleton) {
-  out.real(skeleton.frame.scale);
-  for (int k = 0; k < 3; ++k) out.real(skeleton.frame.offset[k]);
+  const FrameCode frame = frame_code(skeleton.frame);
+  out.number(frame.exponent);
+  for (int k = 0; k < 3; ++k) out.byte(static_cast<int>(frame.mantissa >> (8 * k) & 255));
+  for (const std::int64_t offset : frame.offset) out.number(offset);
   out.count(skeleton.nodes.size());
   for (const Node& node : skeleton.nodes) out.text(node.name);
   for (const Node& node : skeleton.nodes)
@@ -45,8 +47,11 @@ void write_skeleton(ByteWriter& out, const Skeleton& skeleton) {
 
 Skeleton read_skeleton(ByteReader& in) {
   Skeleton skeleton;
-  skeleton.frame.scale = in.real();
-  for (int k = 0; k < 3; ++k) skeleton.frame.offset[k] = in.real();
+  FrameCode frame;
+  frame.exponent = static_cast<int>(in.number(1000));
+  for (int k = 0; k < 3; ++k) frame.mantissa |= static_cast<std::uint32_t>(in.byte()) << (8 * k);
+  for (std::int64_t& offset : frame.offset) offset = in.number(kMostPosition);
+  skeleton.frame = frame_of_code(frame);
   skeleton.nodes.resize(in.count(kMostBones + 1));
   for (Node& node : skeleton.nodes) node.name = in.text(kMostName);
   for (Node& node : skeleton.nodes)
@@ -163,7 +168,7 @@ void read_patches(ByteReader& in, CompactModel& model) {
     patch.row_steps = static_cast<std::uint32_t>(in.count(0xffffffff));
     for (int& knot : patch.row_knots) knot = in.byte();
     const auto& k = patch.row_knots;
-    if (patch.columns < 4 || patch.columns > 64 || patch.intervals < 3 || patch.intervals > 64 ||
+    if (patch.columns < 4 || patch.columns > 64 || patch.intervals < 2 || patch.intervals > 64 ||
         patch.step_count > static_cast<int>(kMostSteps) || patch.base_exponent > 30 || patch.row_steps >> patch.step_count != 0 ||
         k[0] < 1 || k[1] <= k[0] || k[2] <= k[1])
       throw IoError("the size of a patch is impossible");
@@ -209,6 +214,14 @@ void for_each_step(Model& model, const Each& each) {
       if (patch.step_count > level && !each(patch, patch.step_count - 1 - level)) return;
 }
 
+/// A value of the coarse grid as those before it foretell: the left one, and how the row above goes on from there.
+int expected_base(const CompactPatch& patch, std::size_t i) {
+  const std::size_t row = 3 * static_cast<std::size_t>(patch.columns);
+  const bool has_left = i % row >= 3, has_above = i >= row;
+  if (has_left && has_above) return patch.base[i - 3] + patch.base[i - row] - patch.base[i - row - 3];
+  return has_left ? patch.base[i - 3] : has_above ? patch.base[i - row] : 0;
+}
+
 std::string payload_of(const CompactModel& model) {
   ByteWriter out;
   write_skeleton(out, model.skeleton);
@@ -224,10 +237,9 @@ std::string payload_of(const CompactModel& model) {
     for (const int value : arc.base) out.number(value);
     for (const StepResiduals& step : arc.steps) write_step(out, step);
   }
-  // The coarse grids: each value less that of the column before.
   for (const CompactPatch& patch : model.patches)
     for (std::size_t k = 0; k < 3; ++k)
-      for (std::size_t i = k; i < patch.base.size(); i += 3) out.residual(patch.base[i] - (i >= 3 ? patch.base[i - 3] : 0));
+      for (std::size_t i = k; i < patch.base.size(); i += 3) out.residual(patch.base[i] - expected_base(patch, i));
   for_each_step(model, [&](const CompactPatch& patch, int step) {
     write_step(out, patch.steps[step]);
     return true;
@@ -259,7 +271,7 @@ CompactModel model_of(std::string_view payload, PrefixRule rule) {
     patch.base.resize(3 * static_cast<std::size_t>(patch.intervals - 1) * patch.columns);
     for (std::size_t k = 0; k < 3; ++k)
       for (std::size_t i = k; i < patch.base.size(); i += 3)
-        patch.base[i] = std::clamp(in.residual() + (i >= 3 ? patch.base[i - 3] : 0), -static_cast<int>(kMostInteger), static_cast<int>(kMostInteger));
+        patch.base[i] = std::clamp(in.residual() + expected_base(patch, i), -static_cast<int>(kMostInteger), static_cast<int>(kMostInteger));
   }
   for_each_step(model, [&](CompactPatch& patch, int step) {
     // A step of which a part is missing is left out: its points are where they are predicted.

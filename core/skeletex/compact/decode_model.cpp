@@ -23,12 +23,11 @@ struct PatchSize {
 };
 
 PatchSize patch_size(const CompactPatch& patch, int octaves) {
-  PatchSize size{std::clamp(patch.step_count + 2 * octaves, 0, 31), patch.columns, patch.intervals};
-  for (int step = 0; step < size.steps; ++step) {
-    // Beyond the model's own, rows and columns take turns as far as sizes are concerned: see refines_rows.
-    const bool rows = step < patch.step_count ? (patch.row_steps >> step & 1) != 0 : (step - patch.step_count) % 2 != 0;
-    (rows ? size.height : size.width) *= 2;
-  }
+  PatchSize size{0, patch.columns, patch.intervals};
+  const int wanted = std::min(patch.step_count + 2 * octaves, 31);
+  // A patch has three intervals between rows, or more.
+  for (; size.steps < wanted || (size.height < 3 && size.steps < 31); ++size.steps)
+    (step_doubles_rows(patch, size.steps) ? size.height : size.width) *= 2;
   ++size.height;
   return size;
 }

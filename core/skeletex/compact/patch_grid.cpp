@@ -35,15 +35,8 @@ PatchGrid empty_grid(const CompactPatch& patch, const std::array<bool, 2>& has_p
   return grid;
 }
 
-bool refines_rows(const CompactPatch& patch, int step, const PatchGrid& grid) {
-  if (step < patch.step_count) return (patch.row_steps >> step & 1) != 0;
-  double between_rows = 0, between_columns = 0;
-  for (int r = 1; r < grid.intervals; ++r)
-    for (int c = 0; c < grid.columns; ++c) {
-      between_rows += (grid.at(r, c) - grid.at(r - 1, c)).norm();
-      between_columns += (grid.at(r, c + 1) - grid.at(r, c)).norm();
-    }
-  return between_rows > between_columns;
+bool step_doubles_rows(const CompactPatch& patch, int step) {
+  return step < patch.step_count ? (patch.row_steps >> step & 1) != 0 : (step - patch.step_count) % 2 == 0;
 }
 
 namespace {
@@ -85,7 +78,7 @@ PatchGrid decode_patch(const CompactModel& model, const SeparationPlanes& separa
                                      steps[1] * patch.base[3 * i + 1] * sites[i].around +
                                      steps[2] * patch.base[3 * i + 2] * sites[i].along;
   for (int step = 0; step < step_count; ++step) {
-    const bool rows = refines_rows(patch, step, grid);
+    const bool rows = step_doubles_rows(patch, step);
     const Refinement refinement(grid, rows);
     const StepResiduals* residuals =
         step < static_cast<int>(patch.steps.size()) && !patch.steps[step].normal.empty() ? &patch.steps[step] : nullptr;

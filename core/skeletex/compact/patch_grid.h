@@ -29,8 +29,8 @@ PatchGrid empty_grid(const CompactPatch& patch, const std::array<bool, 2>& has_p
 /// Sets the rows at the ends.
 void set_ends(PatchGrid& grid, const EndRow& end_row);
 
-/// Whether a step doubles rows; steps beyond the model's own go where points are further apart.
-bool refines_rows(const CompactPatch& patch, int step, const PatchGrid& grid);
+/// Whether a step doubles rows. Beyond the model's own, rows and columns take turns.
+bool step_doubles_rows(const CompactPatch& patch, int step);
 
 /// The grid of a patch.
 /// \param step_count  steps to take; those that have no residuals are their predictions

@@ -122,7 +122,7 @@ int expected_offset(const OffsetWeights& weights, const std::array<int, 4>& neig
 }
 
 double tangential_step(double q, int number, double mean_spacing, const Site& site) {
-  if (stays_home(number)) return std::max(0.03 * mean_spacing, 4 * q);
+  if (stays_home(number)) return std::max(0.05 * mean_spacing, 4 * q);
   return std::clamp(0.25 * std::min(site.spacing, site.width), q / 4, 16 * q);
 }
 

@@ -86,6 +86,6 @@ double tangential_step(double q, int number, double mean_spacing, const Site& si
 /// q of a patch's step.
 double normal_step(double q, int number);
 /// Whether a step's points stay at their home places.
-inline bool stays_home(int number) { return number < 3; }
+inline bool stays_home(int number) { return number < 2; }
 
 }  // namespace skeletex

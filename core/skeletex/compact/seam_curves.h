@@ -22,7 +22,7 @@ ArcPlane arc_plane(const Skeleton& skeleton, const SeparationPlanes& separation,
                    const std::array<int, 2>& bones);
 
 /// Step of seams and corners, from q.
-inline double seam_step(double q) { return 0.7 * q; }
+inline double seam_step(double q) { return q; }
 
 /// Where a step expects a new point of a curve: halfway between two others.
 struct CurveSite {

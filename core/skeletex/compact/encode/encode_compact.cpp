@@ -30,13 +30,17 @@ Doublings doublings_of(double wanted, int least, int most) {
   return best;
 }
 
+/// Patches with more of all texels begin with more rows: they hold most of a body, whose rows are no simple tubes.
+constexpr double kLargeShare = 0.15;
+
 void set_sizes(CompactModel& compact, const SkeletexModel& model, int size) {
   double texels = 0;
   for (const Patch& patch : model.patches) texels += static_cast<double>(patch.rectangle.width) * patch.rectangle.height;
   const double scale = size / std::sqrt(texels);
   for (const Patch& patch : model.patches) {
+    const bool is_large = patch.rectangle.width * patch.rectangle.height > kLargeShare * texels;
     const Doublings columns = doublings_of(scale * patch.rectangle.width, 4, 7),
-                    rows = doublings_of(scale * (patch.rectangle.height - 1), 3, 5);
+                    rows = doublings_of(scale * (patch.rectangle.height - 1), is_large ? 3 : 2, is_large ? 5 : 3);
     CompactPatch& result = compact.patches.emplace_back();
     result.columns = columns.coarse;
     result.intervals = rows.coarse;
@@ -128,7 +132,7 @@ CompactModel encode_compact(const SkeletexModel& model, const SourceSurface& sou
   set_sizes(compact, model, options.size);
   const SeparationPlanes separation(compact.skeleton);
   set_poles(compact, separation, source);
-  encode_seams(compact, separation, source, (options.bare_levels + 1) / 2, options.residuals.rounding);
+  encode_seams(compact, separation, source, (options.bare_levels + options.residuals.kept_levels + 1) / 2, options.residuals.rounding);
   encode_patches(compact, separation, source, options.residuals);
   fit_weights(compact);
   encode_patches(compact, separation, source, options.residuals);

@@ -102,9 +102,13 @@ class PatchEncoder {
     const int taken = __builtin_popcount(patch_.row_steps & ((1u << step) - 1));
     if (taken >= row_step_count_) return false;
     if (step - taken >= patch_.step_count - row_step_count_) return true;
-    CompactPatch free = patch_;
-    free.step_count = 0;
-    return refines_rows(free, step, grid);
+    double between_rows = 0, between_columns = 0;
+    for (int r = 1; r < grid.intervals; ++r)
+      for (int c = 0; c < grid.columns; ++c) {
+        between_rows += (grid.at(r, c) - grid.at(r - 1, c)).norm();
+        between_columns += (grid.at(r, c + 1) - grid.at(r, c)).norm();
+      }
+    return between_rows > between_columns;
   }
 
   /// The integers of one point.
@@ -118,6 +122,7 @@ class PatchEncoder {
     int number = 0;
     bool is_rows = false;
     double q = 0, mean_spacing = 0;
+    double mean_columns = 0;  ///< distance between columns
   };
 
   Residual residual_of(const Site& site, const Traced& traced, const Step& step, int expected,
@@ -127,7 +132,8 @@ class PatchEncoder {
     if (!stays_home(step.number)) {
       const Place reach = options_.reach * Place(row_scale_, column_scale_);
       const auto found = meet_line(source_, middle, reach, site.predicted, site.normal, tolerance(step.q, site));
-      if (std::min(site.spacing, site.width) < options_.least_spacing * step.q) {
+      const double columns = step.is_rows ? site.width : site.spacing;
+      if (columns < options_.least_spacing * step.q && columns < 0.4 * step.mean_columns) {
         residual.place = found ? found->place : middle;
         return residual;
       }
@@ -203,7 +209,9 @@ class PatchEncoder {
 
   Traced encode_step(const Traced& traced, int step, bool rows) {
     const Refinement refinement(traced.grid, rows);
-    const Step quantization{step, rows, normal_step(compact_.step, step), refinement.mean_spacing()};
+    Step quantization{step, rows, normal_step(compact_.step, step), refinement.mean_spacing(), 0};
+    for (const Site& site : refinement.sites())
+      quantization.mean_columns += (rows ? site.width : site.spacing) / refinement.site_count();
     const double q = quantization.q;
     row_scale_ = static_cast<double>(source_.rows - 1) / traced.grid.intervals;
     column_scale_ = static_cast<double>(source_.columns) / traced.grid.columns;
