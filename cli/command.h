@@ -28,6 +28,8 @@ void add_correspond_command(CLI::App& program);
 void add_morph_command(CLI::App& program);
 void add_filter_command(CLI::App& program);
 void add_lod_command(CLI::App& program);
+void add_pack_command(CLI::App& program);
+void add_unpack_command(CLI::App& program);
 void add_export_command(CLI::App& program);
 void add_import_command(CLI::App& program);
 void add_pose_random_command(CLI::App& program);

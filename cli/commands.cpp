@@ -14,6 +14,8 @@ void add_commands(CLI::App& program) {
   add_morph_command(program);
   add_filter_command(program);
   add_lod_command(program);
+  add_pack_command(program);
+  add_unpack_command(program);
   add_export_command(program);
   add_import_command(program);
   add_transfer_command(program);

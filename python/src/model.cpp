@@ -79,7 +79,7 @@ void bind_files(py::module_& module) {
     if (colours)
       for (py::ssize_t i = 0; i < colours->shape(0); ++i)
         values.push_back({colours->at(i, 0), colours->at(i, 1), colours->at(i, 2)});
-    PlyAttributes attributes;
+    WrittenAttributes attributes;
     (values.size() == mesh.positions.size() ? attributes.vertex_colours : attributes.face_colours) = values;
     const py::gil_scoped_release released;
     skeletex::write_mesh(path, mesh, attributes);

@@ -13,6 +13,7 @@
 
 #include "close_mesh.h"
 #include "command.h"
+#include "compact_output.h"
 #include "encode_report.h"
 #include "files.h"
 #include "progress_bar.h"
@@ -42,6 +43,7 @@ struct Arguments {
   std::string up, front;
   std::vector<std::string> bone_methods;
   CloseOptions close;
+  CompactArguments compact;
 };
 
 /// "512" or "1024x512".
@@ -91,6 +93,15 @@ void take_paper_recipe(EncodeOptions& options) {
   if (!options.method || !is_height_field(*options.method)) options.texel_share = TexelShare::kTriangles;
 }
 
+/// A compact file is made from a dense regular grid: what lies along the surface in it costs nothing, and what the other
+/// placings gain is below its quantization.
+void take_compact_recipe(EncodeOptions& options) {
+  options.width = options.height = std::clamp(2 * std::max(options.width, options.height), 1024, 4096);
+  options.has_prefilter = false;
+  options.has_snap = false;
+  options.has_fit = false;
+}
+
 /// What is given beats the paper's recipe.
 void set_texel_options(const Arguments& arguments, const CLI::App& command, EncodeOptions& options) {
   const auto is_given = [&](const char* name) { return command.count(name) > 0; };
@@ -126,6 +137,7 @@ EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command
   if (options.method && (!arguments.bone_methods.empty() || command.count("--hybrid-threshold") > 0))
     throw CLI::ValidationError("--bone-method and --hybrid-threshold", "need --method hybrid");
   if (arguments.is_paper_recipe) take_paper_recipe(options);
+  if (is_compact_path(arguments.output)) take_compact_recipe(options);
   set_texel_options(arguments, command, options);
   return options;
 }
@@ -272,6 +284,10 @@ void warn_of_result(const EncodeReport& report) {
 }
 
 void run(const Arguments& arguments, const CLI::App& command) {
+  if (has_compact_option(command) && !is_compact_path(arguments.output))
+    throw CLI::ValidationError("--max-error, --max-bytes and --quality", "need an --output that ends in .skx");
+  if (arguments.is_half && is_compact_path(arguments.output))
+    throw CLI::ValidationError("--half", "needs an --output that ends in .skx.exr");
   EncodeOptions options = encode_options(arguments, command);
   Stopwatch watch;
   ClContext context(arguments.device);
@@ -297,6 +313,18 @@ void run(const Arguments& arguments, const CLI::App& command) {
   if (!input.weights.empty())
     result.model.bone_weights = weight_planes(
         context, result.model, input.mesh, input.tree ? *input.tree : build_triangle_tree(input.mesh), input.weights);
+  if (is_compact_path(arguments.output)) {
+    bar->show("compressing", 0.9);
+    const auto size = parse_size(arguments.size);
+    const Json compact = write_compact(context, result.model, &input.mesh, arguments.compact, command,
+                                       std::max(size[0], size[1]), arguments.output);
+    bar.reset();
+    warn_of_bones(result.report);
+    print(arguments.json, compact_text(compact));
+    write_json(arguments.json,
+               {{"output", compact}, {"times_ms", {{"total", watch.lap_ms()}}}, {"kernels", profile_json(context)}});
+    return;
+  }
   bar->show("writing", 1);
   write_model(arguments.output, result.model,
               {.format = arguments.is_half ? TexelFormat::kHalf : TexelFormat::kFloat,
@@ -412,7 +440,7 @@ void add_layer_options(CLI::App& command, Arguments& a) {
 void add_encode_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand(
-      "encode", "Turn a closed mesh and its skeleton into a model: one texture in an OpenEXR file");
+      "encode", "Turn a closed mesh and its skeleton into a model: one texture in an OpenEXR file, or a compact file");
   command.option_defaults()->always_capture_default();
   Arguments& a = *arguments;
   declare_input(command, &add(command, "Positionals", "MESH", a.mesh,
@@ -421,7 +449,8 @@ void add_encode_command(CLI::App& program) {
   declare_input(command, &add(command, "Positionals", "SKELETON", a.skeleton,
                               "skeleton: JSON with nodes and bones, in the mesh's coordinates; without, that of a rig, "
                               "or one is made (see skeletonize)"));
-  declare_output(command, &add(command, "Options", "-o,--output", a.output, "the model: .skx.exr"), {".exr"})
+  declare_output(command, &add(command, "Options", "-o,--output", a.output, "the model: .skx.exr, or a compact file: .skx"),
+                 {".exr", ".skx"})
       ->required()
       ->type_name("FILE");
   add(command, "Options", "--size", a.size, "texels: N for N x N, or WIDTHxHEIGHT").type_name("N|WxH");
@@ -445,6 +474,7 @@ void add_encode_command(CLI::App& program) {
   add_texel_options(command, a);
   add_layer_options(command, a);
   add_file_options(command, a);
+  add_compact_options(command, a.compact);
   add_close_options(command, a.close);
   command.add_flag("--verbose", a.is_verbose, "print what was done for each bone and how long each stage took, too");
   add_device_option(command, arguments->device);
@@ -455,6 +485,7 @@ void add_encode_command(CLI::App& program) {
       "  skeletex encode bear.off -o bear.skx.exr\n"
       "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr --method hybrid --bone-method head=vsm --size "
       "1024\n"
+      "  skeletex encode bear.off bear.skeleton.json -o bear.skx --max-error 5e-5\n"
       "  skeletex encode robot.glb -o robot.skx.exr\n"
       "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr --json - | jq .times_ms\n"
       "Areas are in the mesh's units squared, times in milliseconds.");

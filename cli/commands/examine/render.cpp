@@ -48,7 +48,7 @@ struct Arguments {
        is_smoothed = false, is_plain = false;
 };
 
-bool is_model(const std::string& path) { return has_ending(path, ".exr"); }
+bool is_model(const std::string& path) { return has_ending(path, ".exr") || has_ending(path, ".skx"); }
 
 std::array<int, 2> parse_picture_size(const std::string& text) {
   std::array<int, 2> size{0, 0};

@@ -22,10 +22,12 @@
 #include <cmath>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/check_model.h"
+#include "skeletex/io/compact_model_file.h"
 #include "skeletex/io/exr_survey.h"
 #include "skeletex/io/json_file.h"
 #include "skeletex/io/model_json.h"
@@ -422,15 +424,32 @@ ReadModel read_level(const std::filesystem::path& path, int level, ChecksumRule 
 
 }  // namespace
 
+namespace {
+
+/// The model of a compact file, or nothing where the file is another one.
+std::optional<SkeletexModel> read_compact_level(const std::filesystem::path& path, int level) {
+  if (!is_compact_file(path)) return {};
+  const std::string where = path.string();
+  if (level != 0) throw IoError(fmt::format("{}: there is no level {}; a compact file has level 0 alone", where, level));
+  return read_compact_model(path);
+}
+
+}  // namespace
+
 SkeletexModel read_model(const std::filesystem::path& path, int level, ChecksumRule rule) {
+  if (std::optional<SkeletexModel> compact = read_compact_level(path, level)) return std::move(*compact);
   return read_level(path, level, rule).model;
 }
 
 nlohmann::json read_model_header(const std::filesystem::path& path, int level) {
+  if (const std::optional<SkeletexModel> compact = read_compact_level(path, level))
+    return model_to_json(*compact, path.string());
   return read_level(path, level, ChecksumRule::kVerify).header;
 }
 
 std::vector<std::array<int, 2>> read_model_levels(const std::filesystem::path& path) {
+  if (const std::optional<SkeletexModel> compact = read_compact_level(path, 0))
+    return {{compact->texture.width, compact->texture.height}};
   std::vector<std::array<int, 2>> sizes;
   for (const ExrSurvey& part : survey_exr(path, kMaxTextureSize)) sizes.push_back({part.width, part.height});
   return sizes;

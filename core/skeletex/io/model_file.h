@@ -36,6 +36,7 @@ void write_model_levels(const std::filesystem::path& path, std::span<const Skele
 /// program was meant to change.
 enum class ChecksumRule { kVerify, kIgnore };
 
+/// A model of an OpenEXR file, or of a compact one, which its first bytes tell apart.
 /// \param level  part of the file: 0, the finest, is what files of one part have
 /// \throw IoError: there is no such level; not an EXR, truncated, no skeletex attribute, a newer version, or contents
 /// that do not fit together (every index, size and number is checked before use)

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <string>
+#include <string_view>
+
+#include "skeletex/compact/compact_model.h"
+
+namespace skeletex {
+
+/// Newest version of the compact format that this library reads, and the one it writes.
+inline constexpr int kCompactVersion = 1;
+
+/// The bytes of a compact file (docs/compact.md).
+std::string compact_bytes(const CompactModel& model);
+
+/// Whether a file's first bytes are those of a compact file.
+bool is_compact(std::string_view first_bytes);
+
+/// What may be missing of a file.
+enum class PrefixRule {
+  kWhole,   ///< nothing: the checksum must be right
+  kPrefix,  ///< finer levels: the file is the first bytes of one
+};
+/// \param where  the file, for messages
+/// \throw IoError that names the reason: no compact file, a newer version, damaged or truncated
+CompactModel read_compact(std::string_view bytes, const std::string& where, PrefixRule rule = PrefixRule::kWhole);
+
+}  // namespace skeletex

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include "skeletex/compact/compact_model.h"
+#include "skeletex/model/texture.h"
+
+namespace skeletex {
+
+/// The model of a compact one. The same integers give the same points.
+/// \param octaves  doublings of rows and columns beyond the size of the file; negative: halvings
+/// \throw IoError when its parts do not fit together; InputError when memory does not suffice
+SkeletexModel decode_model(const CompactModel& compact, int octaves = 0);
+
+/// The longer side of the texture that decode_model gives.
+int decoded_size(const CompactModel& compact, int octaves);
+
+}  // namespace skeletex

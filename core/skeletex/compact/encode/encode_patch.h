@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include "skeletex/compact/encode/source_surface.h"
+#include "skeletex/compact/patch_grid.h"
+
+namespace skeletex {
+
+/// What the encoder chooses beside the step.
+struct ResidualOptions {
+  double reach = 0.5;       ///< how far a point may slide from its home, in distances of its parents
+  double rounding = 0.42;   ///< added before rounding down: 0.5 rounds to nearest, less prefers 0
+  /// Points nearer to each other than so many steps get no residuals: their normals would follow the rounding.
+  double least_spacing = 8;
+  /// Residuals below so many steps are dropped in the `kept_levels` finest steps that have some.
+  double least_kept = 3;
+  int kept_levels = 2;
+};
+
+/// Fills a patch's coarse grid and residuals, and its row table.
+/// \param compact  its skeleton, steps, weights and the patch's sizes and poles are set
+void encode_patch(CompactModel& compact, const SeparationPlanes& separation, int bone,
+                  const std::array<bool, 2>& has_pole, const EndRow& end_row, const SourcePatch& source,
+                  const ResidualOptions& options);
+
+}  // namespace skeletex

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/compact/encode/search_compact.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "skeletex/analysis/metro.h"
+#include "skeletex/compact/compact_file.h"
+#include "skeletex/compact/decode_model.h"
+#include "skeletex/model/error.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+
+namespace skeletex {
+namespace {
+
+/// Trials are measured with so many points per surface, and the result with more.
+constexpr long kTrialSamples = 60'000, kSamples = 400'000;
+constexpr double kLargestStep = 1e-2, kSmallestStep = 1e-7;
+
+class Search {
+ public:
+  Search(ClContext& context, const SkeletexModel& model, const TriangleMesh* reference, const CompactGoal& goal)
+      : context_(context), model_(in_unit_frame(model)), goal_(goal) {
+    const PreparedModel prepared(model_);
+    source_ = source_surface(context, prepared);
+    reference_ = reference != nullptr ? *reference : reconstruct_bind_mesh(context, prepared).mesh;
+  }
+
+  CompactResult run() {
+    if (goal_.quality) return measured(by_quality());
+    return goal_.max_bytes ? by_bytes() : by_error(goal_.max_error.value_or(1e-4));
+  }
+
+ private:
+  struct Trial {
+    CompactOptions options;
+    CompactModel model;
+    double mean = 0;
+    std::size_t bytes = 0;
+  };
+
+  CompactOptions options_of(double step, int bare_levels) const {
+    CompactOptions options;
+    options.step = static_cast<float>(step);
+    options.size = goal_.size;
+    options.bare_levels = bare_levels;
+    return options;
+  }
+  MetroReport distance(const CompactModel& compact, int octaves, long samples) {
+    const SkeletexModel decoded = decode_model(compact, octaves);
+    return measure_metro(context_, reference_, reconstruct_bind_mesh(context_, decoded).mesh, {.samples = samples});
+  }
+  /// What is predicted alone is measured one octave beyond what has residuals; it hardly changes beyond.
+  double mean_of(const CompactModel& compact) {
+    ++trials_;
+    return symmetric_mean(distance(compact, -std::max(0, (compact.bare_levels - 2) / 2), kTrialSamples));
+  }
+  Trial trial(double step, int bare_levels) {
+    Trial result{options_of(step, bare_levels), {}, 0, 0};
+    result.model = encode_compact(model_, source_, result.options);
+    return result;
+  }
+  CompactResult measured(const Trial& trial) {
+    CompactResult result{compact_bytes(trial.model), trial.options, 0, 0, trials_};
+    const MetroReport report = distance(trial.model, 0, kSamples);
+    result.mean = symmetric_mean(report);
+    result.max = std::max(report.forward.max, report.backward.max);
+    return result;
+  }
+
+  /// The largest step at which `value`, which falls with the step, is at most `wanted`; some steps, then nothing.
+  /// \param value  of a trial; positive
+  std::optional<Trial> largest_step(int bare_levels, double first, double wanted, bool rises,
+                                    const std::function<double(Trial&)>& value) {
+    std::optional<Trial> best;
+    double log_low = std::log(kSmallestStep), log_high = std::log(kLargestStep), at = std::log(first);
+    double last_at = 0, last_value = 0;
+    for (int i = 0; i < 7; ++i) {
+      Trial now = trial(std::exp(at), bare_levels);
+      const double reached = std::log(value(now) / wanted), signed_off = rises ? reached : -reached;
+      // Above: the step must become smaller where the value rises with it.
+      (signed_off > 0 ? log_high : log_low) = at;
+      const bool is_good = reached <= 0;
+      if (is_good && (!best || (rises ? now.options.step > best->options.step : now.options.step < best->options.step)))
+        best = std::move(now);
+      if (is_good && reached > -0.02) break;
+      double slope = rises ? 0.8 : -0.9;
+      if (i > 0 && std::abs(at - last_at) > 1e-3) {
+        const double measured_slope = (reached - last_value) / (at - last_at);
+        slope = rises ? std::clamp(measured_slope, 0.15, 1.5) : std::clamp(measured_slope, -2.0, -0.2);
+      }
+      last_at = at;
+      last_value = reached;
+      at = std::clamp(at - (reached + 0.01) / slope, at - 2.5, at + 2.5);
+      if (at <= log_low || at >= log_high) at = std::clamp((log_low + log_high) / 2, last_at - 2.5, last_at + 2.5);
+      if (log_high - log_low < 0.01) break;
+    }
+    return best;
+  }
+
+  CompactResult by_error(double wanted) {
+    std::optional<Trial> best;
+    const auto try_levels = [&](int bare) {
+      if (bare < 0) return false;
+      std::optional<Trial> found = largest_step(bare, 3 * wanted, wanted, true, [&](Trial& t) { return t.mean = mean_of(t.model); });
+      if (!found) return false;
+      found->bytes = compact_bytes(found->model).size();
+      if (best && found->bytes >= best->bytes) return false;
+      best = std::move(found);
+      return true;
+    };
+    // Downhill from where the spacing of the residuals suits the error as on the standard models.
+    const int first = std::clamp(static_cast<int>(std::lround(2 * std::log2(goal_.size / 128.0) + std::log2(wanted / 1e-4))), 0, 12);
+    int bare = first;
+    while (bare >= 0 && !try_levels(bare)) bare -= 2;
+    if (!best)
+      throw InputError(fmt::format("an error of {:g} diagonals is out of reach at {} x {} texels; ask for more, or give a larger --size", wanted, goal_.size, goal_.size));
+    const int start = bare;
+    if (start == first)
+      while (try_levels(++bare)) {}
+    if (bare <= start + 1) {
+      bare = start;
+      while (try_levels(--bare)) {}
+    }
+    return measured(*best);
+  }
+
+  CompactResult by_bytes() {
+    const auto wanted = static_cast<double>(*goal_.max_bytes);
+    std::optional<Trial> best;
+    for (int bare = std::max(0, static_cast<int>(2 * std::log2(goal_.size / 256.0))); bare <= 12; ++bare) {
+      std::optional<Trial> found = largest_step(bare, 3e-4, wanted, false, [&](Trial& t) {
+        return static_cast<double>(t.bytes = compact_bytes(t.model).size());
+      });
+      if (!found) continue;
+      found->mean = mean_of(found->model);
+      if (best && found->mean >= best->mean) break;
+      best = std::move(found);
+    }
+    if (!best) throw InputError(fmt::format("the model does not fit into {} bytes", *goal_.max_bytes));
+    return measured(*best);
+  }
+
+  /// Finest levels are dropped while nearly all of their residuals are 0.
+  Trial by_quality() {
+    constexpr double kFewest = 0.04;
+    const double step = std::pow(10.0, -2 - *goal_.quality / 25);
+    Trial whole = trial(step, 0);
+    int bare = 0;
+    for (bool is_sparse = true; is_sparse && bare < 16; bare += is_sparse ? 1 : 0) {
+      std::size_t count = 0, others = 0;
+      for (const CompactPatch& patch : whole.model.patches) {
+        if (patch.step_count <= bare) continue;
+        const std::vector<int>& residuals = patch.steps[patch.step_count - 1 - bare].normal;
+        count += residuals.size();
+        others += residuals.size() - std::count(residuals.begin(), residuals.end(), 0);
+      }
+      is_sparse = count > 0 && static_cast<double>(others) < kFewest * static_cast<double>(count);
+    }
+    return bare == 0 ? whole : trial(step, bare);
+  }
+
+  ClContext& context_;
+  SkeletexModel model_;
+  CompactGoal goal_;
+  SourceSurface source_;
+  TriangleMesh reference_;
+  int trials_ = 0;
+};
+
+}  // namespace
+
+CompactResult search_compact(ClContext& context, const SkeletexModel& model, const TriangleMesh* reference,
+                             const CompactGoal& goal) {
+  return Search(context, model, reference, goal).run();
+}
+
+}  // namespace skeletex

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: MIT
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "skeletex/analysis/metro.h"
+#include "skeletex/compact/byte_stream.h"
+#include "skeletex/compact/compact_file.h"
+#include "skeletex/compact/decode_model.h"
+#include "skeletex/compact/encode/search_compact.h"
+#include "skeletex/io/check_model.h"
+#include "skeletex/io/compact_model_file.h"
+#include "skeletex/io/model_file.h"
+#include "skeletex/model/error.h"
+#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/skeleton/pose.h"
+#include "support/corrupted.h"
+#include "support/mesh_topology.h"
+#include "support/scratch.h"
+#include "support/synthetic_model.h"
+
+namespace skeletex {
+namespace {
+
+ClContext& context() {
+  static ClContext context;
+  return context;
+}
+
+/// Every shape that a skeleton can have at a node: no neighbour, one, two, more, and cycles.
+const std::map<std::string, Skeleton>& skeletons() {
+  static const std::map<std::string, Skeleton> all{{"lone", lone_bone()},  {"chain", chain(3)}, {"branch", y_branch()},
+                                                   {"cross", cross(5)},    {"ring", ring(5)},   {"ring with an arm", ring_with_arm(5)}};
+  return all;
+}
+
+const SkeletexModel& source_of(const std::string& name) {
+  static std::map<std::string, SkeletexModel> models;
+  const auto found = models.find(name);
+  if (found != models.end()) return found->second;
+  const SyntheticSurface surface(skeletons().at(name), 0.2);
+  SkeletexModel model = surface.model({skeletons().at(name).bones.size(), {96, 96}});
+  return models.emplace(name, std::move(model)).first->second;
+}
+
+CompactResult pack(const std::string& name, double max_error, std::size_t max_bytes, int size) {
+  CompactGoal goal;
+  if (max_error > 0) goal.max_error = max_error;
+  if (max_bytes > 0) goal.max_bytes = max_bytes;
+  goal.size = size;
+  return search_compact(context(), source_of(name), nullptr, goal);
+}
+const CompactResult& packed(const std::string& name) {
+  static std::map<std::string, CompactResult> results;
+  const auto found = results.find(name);
+  return found != results.end() ? found->second
+                                : results.emplace(name, pack(name, 3e-4, 0, 128)).first->second;
+}
+
+double mean_distance(const SkeletexModel& model, const SkeletexModel& other) {
+  return symmetric_mean(measure_metro(context(), reconstruct_mesh(context(), model), reconstruct_mesh(context(), other)));
+}
+
+class Compact : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(Compact, ReachesTheWantedErrorWithASmallFile) {
+  const CompactResult& result = packed(GetParam());
+  const SkeletexModel decoded = decode_model(read_compact(result.bytes, "file"));
+  EXPECT_LE(mean_distance(source_of(GetParam()), decoded), 3.2e-4);
+  EXPECT_LE(result.max, 3e-2);
+  EXPECT_LT(result.bytes.size(), 700 * skeletons().at(GetParam()).bones.size());
+}
+
+TEST_P(Compact, IsClosedAndOfTheGenusAtEverySizeAndInAPose) {
+  const CompactModel compact = read_compact(packed(GetParam()).bytes, "file");
+  for (const int octaves : {-2, -1, 0, 1}) {
+    const SkeletexModel model = decode_model(compact, octaves);
+    check_model(model, "model");
+    EXPECT_EQ(broken_rule(reconstruct_mesh(context(), model), source_of(GetParam()).genus), "") << octaves;
+    if (model.genus > 0) continue;  // random poses are those of trees
+    const Skeleton posed = apply_pose(model.skeleton, make_random_pose(model.skeleton, 0.5, 3));
+    EXPECT_EQ(broken_rule(reconstruct_mesh(context(), model, posed), 0), "") << octaves;
+  }
+}
+
+TEST_P(Compact, ComesBackWithNamesAndTheSameIntegers) {
+  const std::string& bytes = packed(GetParam()).bytes;
+  const CompactModel compact = read_compact(bytes, "file");
+  EXPECT_EQ(compact_bytes(compact), bytes);
+  const Skeleton& skeleton = source_of(GetParam()).skeleton;
+  for (std::size_t i = 0; i < skeleton.bones.size(); ++i) EXPECT_EQ(compact.skeleton.bones[i].name, skeleton.bones[i].name);
+  const SkeletexModel once = decode_model(compact), again = decode_model(read_compact(bytes, "file"));
+  EXPECT_EQ(once.texture.out, again.texture.out);
+  for (std::size_t i = 0; i < skeleton.nodes.size(); ++i) {
+    const Vec3 place = once.skeleton.frame.to_user(once.skeleton.nodes[i].position);
+    EXPECT_LT((place - skeleton.frame.to_user(skeleton.nodes[i].position)).norm(), 4e-6 * source_of(GetParam()).diagonal);
+  }
+}
+
+/// What is read of a prefix grows nearer to the whole.
+TEST_P(Compact, ReadsPrefixesAsCoarserModels) {
+  const std::string& bytes = packed(GetParam()).bytes;
+  const SkeletexModel whole = decode_model(read_compact(bytes, "file"));
+  double last = 1;
+  for (const double share : {0.7, 0.85, 1.0}) {
+    const std::string prefix = bytes.substr(0, static_cast<std::size_t>(share * static_cast<double>(bytes.size())));
+    const SkeletexModel model = decode_model(read_compact(prefix, "file", PrefixRule::kPrefix));
+    EXPECT_EQ(broken_rule(reconstruct_mesh(context(), model), whole.genus), "") << share;
+    const double off = mean_distance(whole, model);
+    EXPECT_LE(off, last + 1e-9);
+    last = off;
+  }
+  EXPECT_LT(last, 1e-10);
+}
+
+/// Whatever is changed is refused; and where nothing is checked, it gives a sound model or is refused.
+TEST_P(Compact, RefusesDamage) {
+  const std::string& bytes = packed(GetParam()).bytes;
+  for (std::size_t size = 0; size < bytes.size(); size += 1 + size / 8)
+    EXPECT_THROW(read_compact(bytes.substr(0, size), "file"), IoError) << size;
+  for_each_corruption(bytes, 300, 7, [&](const std::string& damaged) {
+    if (damaged == bytes) return;
+    EXPECT_THROW(read_compact(damaged, "file"), IoError);
+    try {
+      const SkeletexModel model = decode_model(read_compact(damaged, "file", PrefixRule::kPrefix), -3);
+      check_model(model, "damaged");
+    } catch (const Error&) {
+    }
+  });
+}
+
+/// The same for what stands behind the compression.
+TEST_P(Compact, RefusesDamageBehindTheCompression) {
+  const std::string& bytes = packed(GetParam()).bytes;
+  ByteReader head(std::string_view(bytes).substr(13));
+  const std::size_t size = head.count(1 << 30);
+  const std::string payload = decompress(std::string_view(bytes).substr(bytes.size() - head.left()), size, false);
+  for_each_corruption(payload, 300, 8, [&](const std::string& damaged) {
+    ByteWriter body;
+    body.count(damaged.size());
+    try {
+      const std::string file = bytes.substr(0, 13) + body.bytes() + compress(damaged);
+      const SkeletexModel model = decode_model(read_compact(file, "file", PrefixRule::kPrefix), -3);
+      check_model(model, "damaged");
+    } catch (const Error&) {
+    }
+  });
+}
+
+INSTANTIATE_TEST_SUITE_P(Skeletons, Compact, ::testing::Values("lone", "chain", "branch", "cross", "ring", "ring with an arm"),
+                         [](const auto& test) {
+                           std::string name = test.param;
+                           std::replace(name.begin(), name.end(), ' ', '_');
+                           return name;
+                         });
+
+TEST(CompactSearch, KeepsToANumberOfBytesAndBreaksNoWish) {
+  std::size_t last = 0;
+  double last_mean = 1;
+  for (const std::size_t wanted : {900u, 1500u, 3000u}) {
+    const CompactResult result = pack("branch", 0, wanted, 128);
+    EXPECT_LE(result.bytes.size(), wanted);
+    EXPECT_GT(result.bytes.size(), last);
+    EXPECT_LT(result.mean, last_mean);
+    last = result.bytes.size();
+    last_mean = result.mean;
+  }
+  EXPECT_THROW(pack("branch", 0, 100, 128), InputError);
+  EXPECT_THROW(pack("branch", 1e-9, 0, 64), InputError);
+}
+
+TEST(CompactFile, IsReadWhereModelsAreReadByItsFirstBytes) {
+  const ScratchFolder folder;
+  const std::string& bytes = packed("branch").bytes;
+  write_bytes(folder / "model.exr", bytes);
+  const SkeletexModel model = read_model(folder / "model.exr"), same = decode_model(read_compact(bytes, "file"));
+  EXPECT_EQ(model.texture.along, same.texture.along);
+  EXPECT_EQ(read_model_levels(folder / "model.exr").size(), 1u);
+  EXPECT_EQ(read_model_header(folder / "model.exr")["genus"], 0);
+  EXPECT_THROW(read_model(folder / "model.exr", 1), IoError);
+  const SkeletexModel larger = read_compact_model(folder / "model.exr", {.bytes = {}, .size = 200});
+  EXPECT_GE(std::max(larger.texture.width, larger.texture.height), 200);
+  EXPECT_LT(mean_distance(model, larger), 1e-3);
+}
+
+TEST(ByteStream, GivesBackWhatWasWritten) {
+  ByteWriter out;
+  const std::vector<std::int64_t> numbers{0, 1, -1, 63, 64, -64, 127, -128, 200, 100000, -100000, std::int64_t{1} << 40};
+  for (const std::int64_t number : numbers) out.number(number);
+  for (int value = -70000; value < 70000; value += 37) out.residual(value);
+  out.real(-1.0 / 3);
+  out.text("name");
+  const std::string packed_bytes = compress(out.bytes());
+  const std::string bytes = decompress(packed_bytes, out.bytes().size(), false);
+  ByteReader in(bytes);
+  for (const std::int64_t number : numbers) EXPECT_EQ(in.number(std::int64_t{1} << 41), number);
+  for (int value = -70000; value < 70000; value += 37) EXPECT_EQ(in.residual(), value);
+  EXPECT_EQ(in.real(), -1.0 / 3);
+  EXPECT_EQ(in.text(10), "name");
+  EXPECT_TRUE(in.is_at_end());
+  EXPECT_THROW(in.byte(), IoError);
+}
+
+}  // namespace
+}  // namespace skeletex
