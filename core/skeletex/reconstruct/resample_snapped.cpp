@@ -144,6 +144,24 @@ std::vector<std::array<EndSeam, 2>> end_seams(const PreparedModel& model, std::s
   return seams;
 }
 
+/// The vertices of a patch at their places in the map.
+void add_vertices(const PreparedModel& prepared, int bone, const std::array<EndSeam, 2>& seams, ChartBuilder& builder) {
+  const Patch& patch = prepared.model.patches[bone];
+  const Lattice& lattice = prepared.lattice;
+  const int width = patch.rectangle.width;
+  for (int row = 1; row + 1 < patch.rectangle.height; ++row)
+    for (int column = 0; column < width; ++column)
+      builder.add(lattice.first_inner[bone] + (row - 1) * width + column, ChartVertex::kInner, patch.row_u[row],
+                  static_cast<double>(column) / width);
+  for (const int end : {0, 1}) {
+    if (lattice.poles[bone][end] >= 0)
+      builder.add(lattice.poles[bone][end], end == 0 ? ChartVertex::kHeadPole : ChartVertex::kTailPole, end, 0);
+    for (std::size_t k = 0; k < seams[end].turns.size(); ++k)
+      builder.add(seams[end].ring.vertices[k], end == 0 ? ChartVertex::kHeadRow : ChartVertex::kTailRow, end,
+                  seams[end].turns[k]);
+  }
+}
+
 }  // namespace
 
 bool is_finer(const SkeletexModel& model, const std::vector<Patch>& patches) {
@@ -239,31 +257,18 @@ SeamArc divide_arc(const SkeletexModel& model, const SeparationPlanes& separatio
 
 std::vector<Chart> charts_of_mesh(const PreparedModel& prepared, const TriangleMesh& mesh) {
   const SkeletexModel& model = prepared.model;
-  const Lattice& lattice = prepared.lattice;
   const std::vector<std::array<EndSeam, 2>> seams = end_seams(prepared, mesh.positions);
-  std::vector<int> first_ends{2 * lattice.quad_count};
+  std::vector<int> first_ends{2 * prepared.lattice.quad_count};
   for (std::size_t bone = 0; bone < seams.size(); ++bone)
     for (const EndSeam& seam : seams[bone])
       first_ends.push_back(first_ends.back() + count_end_triangles(model, seam, static_cast<int>(bone)));
   std::vector<Chart> charts(model.patches.size());
   for_each_block(charts.size(), 1, [&](std::size_t bone, std::size_t, std::size_t) {
-    const Patch& patch = model.patches[bone];
-    const auto [x, y, width, height] = patch.rectangle;
+    const Rectangle& rectangle = model.patches[bone].rectangle;
     ChartBuilder builder(prepared, mesh, static_cast<int>(bone));
-    for (int row = 1; row + 1 < height; ++row)
-      for (int column = 0; column < width; ++column)
-        builder.add(lattice.first_inner[bone] + (row - 1) * width + column, ChartVertex::kInner, patch.row_u[row],
-                    static_cast<double>(column) / width);
-    for (const int end : {0, 1}) {
-      if (lattice.poles[bone][end] >= 0)
-        builder.add(lattice.poles[bone][end], end == 0 ? ChartVertex::kHeadPole : ChartVertex::kTailPole, end, 0);
-      const EndSeam& seam = seams[bone][end];
-      for (std::size_t k = 0; k < seam.turns.size(); ++k)
-        builder.add(seam.ring.vertices[k], end == 0 ? ChartVertex::kHeadRow : ChartVertex::kTailRow, end,
-                    seam.turns[k]);
-    }
-    const int first = 2 * lattice.first_quad[bone];
-    for (int triangle = first; triangle < first + 2 * width * (height - 3); ++triangle)
+    add_vertices(prepared, static_cast<int>(bone), seams[bone], builder);
+    const int first = 2 * prepared.lattice.first_quad[bone];
+    for (int triangle = first; triangle < first + 2 * rectangle.width * (rectangle.height - 3); ++triangle)
       builder.add(mesh.triangles[triangle]);
     for (int triangle = first_ends[2 * bone]; triangle < first_ends[2 * bone + 2]; ++triangle)
       builder.add(mesh.triangles[triangle]);
