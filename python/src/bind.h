@@ -54,7 +54,8 @@ Model model_of(SkeletexModel model);
 /// \throw InputError naming a texel that is not finite or out of all proportion
 SkeletexModel whole(const Model& model);
 
-/// \param name  of the argument, for messages    \throw InputError when its shape is wrong
+/// \param name  of the argument, for messages
+/// \throw InputError when its shape is wrong
 std::vector<Vec3> points_of(const Points& points, const char* name);
 std::vector<Triangle> triangles_of(const Indices& triangles);
 TriangleMesh mesh_of(const Points& vertices, const Indices& triangles);
@@ -92,7 +93,8 @@ class DeviceLock {
   DeviceLock& operator=(const DeviceLock&) = delete;
   ClContext& context();
 };
-/// Another device from now on. \param selector  as ClContext takes it; empty: the default
+/// Another device from now on.
+/// \param selector  as ClContext takes it; empty: the default
 void choose_device(const std::string& selector);
 
 /// Runs work(context) while other threads of Python go on.

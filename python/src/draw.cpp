@@ -25,8 +25,8 @@ py::array image_array(const Image& image) {
 
 std::vector<VertexColour> colours_of(const Bytes& array) {
   std::vector<VertexColour> colours(static_cast<std::size_t>(array.shape(0)));
-  static_assert(sizeof(VertexColour) == 3);
-  if (!colours.empty()) std::memcpy(colours.data(), array.data(), colours.size() * sizeof(VertexColour));
+  const unsigned char* const bytes = array.data();
+  for (std::size_t i = 0; i < colours.size(); ++i) colours[i] = {bytes[3 * i], bytes[3 * i + 1], bytes[3 * i + 2]};
   return colours;
 }
 
@@ -65,7 +65,8 @@ Image draw_scene(const Scene& scene) {
   return image;
 }
 
-/// \param options_json  from render() of the package    \return linear colour, premultiplied by opacity
+/// \param options_json  from render() of the package
+/// \return linear colour, premultiplied by opacity
 py::array render(const Points& vertices, const Indices& triangles, const std::optional<Bytes>& colours,
                  const std::optional<Numbers>& corner_uv, const std::optional<py::tuple>& skeleton,
                  const std::string& options_json) {

@@ -55,7 +55,8 @@ void unpack(const UnpackArguments& arguments, const CLI::App& command) {
     model = resample_model(context, model, *options.size);
   json["output"] = write_result(context, model, arguments.output);
   json["device"] = context.device().name;
-  print(arguments.json, fmt::format("{}: {} x {} texels\n", arguments.output, model.texture.width, model.texture.height));
+  print(arguments.json,
+        fmt::format("{}: {} x {} texels\n", arguments.output, model.texture.width, model.texture.height));
   write_json(arguments.json, json);
 }
 

@@ -169,8 +169,8 @@ void read_patches(ByteReader& in, CompactModel& model) {
     for (int& knot : patch.row_knots) knot = in.byte();
     const auto& k = patch.row_knots;
     if (patch.columns < 4 || patch.columns > 64 || patch.intervals < 2 || patch.intervals > 64 ||
-        patch.step_count > static_cast<int>(kMostSteps) || patch.base_exponent > 30 || patch.row_steps >> patch.step_count != 0 ||
-        k[0] < 1 || k[1] <= k[0] || k[2] <= k[1])
+        patch.step_count > static_cast<int>(kMostSteps) || patch.base_exponent > 30 ||
+        patch.row_steps >> patch.step_count != 0 || k[0] < 1 || k[1] <= k[0] || k[2] <= k[1])
       throw IoError("the size of a patch is impossible");
     points += std::ldexp(patch.columns * (patch.intervals + 1.0), patch.step_count);
     if (points > kMostPoints) throw IoError("it is larger than 16384 x 16384 texels");
@@ -271,7 +271,8 @@ CompactModel model_of(std::string_view payload, PrefixRule rule) {
     patch.base.resize(3 * static_cast<std::size_t>(patch.intervals - 1) * patch.columns);
     for (std::size_t k = 0; k < 3; ++k)
       for (std::size_t i = k; i < patch.base.size(); i += 3)
-        patch.base[i] = std::clamp(in.residual() + expected_base(patch, i), -static_cast<int>(kMostInteger), static_cast<int>(kMostInteger));
+        patch.base[i] = std::clamp(in.residual() + expected_base(patch, i), -static_cast<int>(kMostInteger),
+                                   static_cast<int>(kMostInteger));
   }
   for_each_step(model, [&](CompactPatch& patch, int step) {
     // A step of which a part is missing is left out: its points are where they are predicted.
@@ -314,13 +315,17 @@ CompactModel read_compact(std::string_view bytes, const std::string& where, Pref
     if (bytes.size() <= kHeader) throw IoError("it ends too early");
     const int version = static_cast<unsigned char>(bytes[kMagic.size()]);
     if (version > kCompactVersion)
-      throw IoError(fmt::format("it is written in version {} of the format, this program reads up to version {}; use a newer skeletex", version, kCompactVersion));
+      throw IoError(fmt::format(
+          "it is written in version {} of the format, this program reads up to version {}; use a newer skeletex",
+          version, kCompactVersion));
     std::uint64_t written = 0;
     for (std::size_t i = 0; i < 8; ++i)
       written |= static_cast<std::uint64_t>(static_cast<unsigned char>(bytes[kMagic.size() + 1 + i])) << (8 * i);
     const std::string_view rest = bytes.substr(kHeader);
     if (rule == PrefixRule::kWhole && XXH64(rest.data(), rest.size(), 0) != written)
-      throw IoError("it is damaged or truncated: the checksum is another one. Copy it again; `skeletex unpack --bytes` reads the first part of a file");
+      throw IoError(
+          "it is damaged or truncated: the checksum is another one. Copy it again; `skeletex unpack --bytes` reads the "
+          "first part of a file");
     ByteReader head(rest);
     const std::size_t size = head.count(kMostPayload);
     return model_of(decompress(rest.substr(rest.size() - head.left()), size, rule == PrefixRule::kPrefix), rule);

@@ -141,8 +141,7 @@ std::vector<Vec3> end_row(const CompactModel& model, const SeparationPlanes& sep
   if (ends[bone][side].arcs.empty()) {
     const BoneBasis& basis = separation.bases()[bone];
     const std::array<int, 3>& pole = model.patches[bone].poles[side];
-    return std::vector<Vec3>(columns,
-                             node + model.step * (pole[0] * basis.s + pole[1] * basis.b + pole[2] * basis.o));
+    return std::vector<Vec3>(columns, node + model.step * (pole[0] * basis.s + pole[1] * basis.b + pole[2] * basis.o));
   }
   std::vector<Vec3> points;
   for (const ArcUse& use : ends[bone][side].arcs) {

@@ -430,7 +430,8 @@ namespace {
 std::optional<SkeletexModel> read_compact_level(const std::filesystem::path& path, int level) {
   if (!is_compact_file(path)) return {};
   const std::string where = path.string();
-  if (level != 0) throw IoError(fmt::format("{}: there is no level {}; a compact file has level 0 alone", where, level));
+  if (level != 0)
+    throw IoError(fmt::format("{}: there is no level {}; a compact file has level 0 alone", where, level));
   return read_compact_model(path);
 }
 

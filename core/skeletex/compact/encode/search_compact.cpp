@@ -105,7 +105,8 @@ class Search {
     std::optional<Trial> best;
     const auto try_levels = [&](int bare) {
       if (bare < 0) return false;
-      std::optional<Trial> found = largest_step(bare, 3 * wanted, wanted, true, [&](Trial& t) { return t.mean = mean_of(t.model); });
+      std::optional<Trial> found =
+          largest_step(bare, 3 * wanted, wanted, true, [&](Trial& t) { return t.mean = mean_of(t.model); });
       if (!found) return false;
       found->bytes = compact_bytes(found->model).size();
       if (best && found->bytes >= best->bytes) return false;
@@ -113,17 +114,22 @@ class Search {
       return true;
     };
     // Downhill from where the spacing of the residuals suits the error as on the standard models.
-    const int first = std::clamp(static_cast<int>(std::lround(2 * std::log2(goal_.size / 128.0) + std::log2(wanted / 1e-4))), 0, 12);
+    const int first =
+        std::clamp(static_cast<int>(std::lround(2 * std::log2(goal_.size / 128.0) + std::log2(wanted / 1e-4))), 0, 12);
     int bare = first;
     while (bare >= 0 && !try_levels(bare)) bare -= 2;
     if (!best)
-      throw InputError(fmt::format("an error of {:g} diagonals is out of reach at {} x {} texels; ask for more, or give a larger --size", wanted, goal_.size, goal_.size));
+      throw InputError(fmt::format(
+          "an error of {:g} diagonals is out of reach at {} x {} texels; ask for more, or give a larger --size", wanted,
+          goal_.size, goal_.size));
     const int start = bare;
     if (start == first)
-      while (try_levels(++bare)) {}
+      while (try_levels(++bare)) {
+      }
     if (bare <= start + 1) {
       bare = start;
-      while (try_levels(--bare)) {}
+      while (try_levels(--bare)) {
+      }
     }
     return measured(*best);
   }
