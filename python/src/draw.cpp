@@ -158,7 +158,6 @@ void bind_draw(py::module_& module) {
   module.def("checker", checker);
   module.def("texture_image", texture_image);
   module.def("page", page);
-  module.def("has_page", has_page_script);
   module.def("viridis", [](const Numbers& values) {  // of 0 to 1
     py::array_t<std::uint8_t> colours({values.size(), py::ssize_t{3}});
     for (py::ssize_t i = 0; i < values.size(); ++i) {

@@ -147,7 +147,6 @@ def test_a_model_reconstructs_to_a_closed_mesh_near_the_input_at_every_size(
 
 def test_editing_the_texture_in_place_moves_the_surface_of_that_bone_alone(bear: skeletex.Model) -> None:
     model = bear.copy()
-    assert model.texture.base is not None and np.shares_memory(model.texture, model.texture)
     assert model.texture.shape == (128, 128, 3) and model.texture.dtype == np.float32
     assert np.array_equal(model.texture, bear.texture) and not np.shares_memory(model.texture, bear.texture)
     before = skeletex.reconstruct(model)
