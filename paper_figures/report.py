@@ -73,7 +73,8 @@ def contents(made, is_own):
     if not is_own:
         names = [(f"fig-{number}", f"Figure {number}") for number in range(1, 21)] + [("table-1", "Table 1")]
         text += "<p class=map>" + " ".join(f"<a href='#{anchor}'>{name}</a>" for anchor, name in names if anchor in places) + "</p>"
-    items = "".join(f"<li><a href='#{section.anchor}'>{page.escape(section.title)}</a>{f' ({page.escape(section.figures)}{" of the paper" if is_own else ""})' if section.figures else ''}</li>" for section, _ in made)
+    place = " of the paper" if is_own else ""
+    items = "".join(f"<li><a href='#{section.anchor}'>{page.escape(section.title)}</a>{f' ({page.escape(section.figures)}{place})' if section.figures else ''}</li>" for section, _ in made)
     return f"{text}<ol>{items}</ol></nav>"
 
 
