@@ -74,7 +74,7 @@ def table(block, words=False):
 
 def _sheet(block, folder):
     style.save_sheet(block, folder)
-    columns = min(block.wrap, max(len(row) for row in block.rows))
+    columns = max(2, min(block.wrap, max(len(row) for row in block.rows)))  # no picture is enlarged
     lines = []
     for row in block.rows:
         figures = "".join(f'<figure><img alt="{escape(picture.caption)}" src="{_picture_data(picture.path)}"><figcaption>{escape(picture.caption)}</figcaption></figure>' for picture in row)
