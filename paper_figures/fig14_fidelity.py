@@ -108,7 +108,7 @@ def which_size(results):
         lines = []
         for before, p in zip([None] + points, points):
             vertices_of_input = p.get("input_vertices")
-            lines.append([f"{p['size']} x {p['size']}", f"{p['size'] ** 2 / vertices_of_input:.2g}" if vertices_of_input else "", f"{p['triangles']:,}" if p.get("triangles") else "",
+            lines.append([f"{p['size']} x {p['size']}", f"{p['size'] ** 2 / vertices_of_input:,.2f}" if vertices_of_input else "", f"{p['triangles']:,}" if p.get("triangles") else "",
                           f"{p['bytes'] / 1e6:.2f} MB", f"{p['mean']:.2e}", f"{p['furthest']:.2e}", f"{before['mean'] / p['mean']:.1f} times smaller" if before else ""])
         made.append(Table(head, lines, f"{model}, method {method}, default options"))
     return made

@@ -20,7 +20,7 @@ img{width:100%;height:auto;display:block}figure{margin:0}figcaption{font-size:.9
 .sheet{display:grid;gap:.4rem 1rem;margin:1rem 0;align-items:end}.sheet img{cursor:zoom-in}.plot{margin:1rem 0}
 .scroll{overflow-x:auto;margin:.8rem 0}table{border-collapse:collapse;font-size:.95rem}caption{text-align:left;font-weight:600;padding:.3rem 0}
 td,th{padding:.25rem .8rem;text-align:right;border-bottom:1px solid #ddd;vertical-align:top}td:first-child,th:first-child{text-align:left}
-table.words td,table.words th{text-align:left}thead th{border-bottom:2px solid #999}
+table:not(.words) td{white-space:nowrap}table td.long{white-space:normal;min-width:40ch}table.words td,table.words th{text-align:left}thead th{border-bottom:2px solid #999}
 .quiet{color:#555;font-size:.9rem}.bad{background:#fdecea;border-left:5px solid #c0392b;padding:.6rem 1rem;max-width:none}
 details{margin:.6rem 0}summary{cursor:pointer}nav ol{columns:2;max-width:none;font-size:.95rem}nav .map{max-width:none;line-height:2}
 nav .map a{display:inline-block;border:1px solid #ccd;border-radius:5px;padding:0 .5rem;margin:0 .15rem;text-decoration:none}
@@ -67,14 +67,14 @@ def _picture_data(path):
 
 def table(block, words=False):
     head = "".join(f"<th>{escape(cell)}</th>" for cell in block.head)
-    body = "".join("<tr>" + "".join(f"<td>{cell if words else escape(cell)}</td>" for cell in line) + "</tr>" for line in block.lines)
+    body = "".join("<tr>" + "".join(f"<td{' class=long' if len(str(cell)) > 60 else ''}>{cell if words else escape(cell)}</td>" for cell in line) + "</tr>" for line in block.lines)
     caption = f"<caption>{escape(block.caption)}</caption>" if block.caption else ""
     return f"<div class=scroll><table{' class=words' if words else ''}>{caption}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
 
 
 def _sheet(block, folder):
     style.save_sheet(block, folder)
-    columns = min(block.wrap, max(len(row) for row in block.rows))
+    columns = max(2, min(block.wrap, max(len(row) for row in block.rows)))  # no picture is enlarged
     lines = []
     for row in block.rows:
         figures = "".join(f'<figure><img alt="{escape(picture.caption)}" src="{_picture_data(picture.path)}"><figcaption>{escape(picture.caption)}</figcaption></figure>' for picture in row)
@@ -128,7 +128,7 @@ def section(entry, blocks, results, folder, is_own):
     text = "".join(f"<a id={anchor}></a>" for anchor in entry.numbers)
     text += f"<h2 id={entry.anchor}>{escape(entry.title)}<small>{escape(entry.figures)}{' of the paper' if entry.figures and is_own else ''}</small></h2>"
     for name, words in (("The paper", entry.paper if not is_own else ""), ("Here", entry.here)):
-        text += f"<p><b>{name}.</b> {escape(words)}</p>" if words else ""
+        text += f"<p>{'' if is_own else f'<b>{name}.</b> '}{escape(words)}</p>" if words else ""
     text += "".join(block_html(block, folder) for block in blocks)
     if not is_own:
         text += f"<p><b>Differences.</b> {escape(entry.differs)}</p>" if entry.differs else ""

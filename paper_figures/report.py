@@ -15,7 +15,7 @@ import sys
 import numbers_of_run
 import page
 import sections
-from blocks import Table
+from blocks import Plot, Sheet, Table
 from results import ROOT, MissingInput, Results, state_of_checkout, unique
 
 
@@ -73,7 +73,8 @@ def contents(made, is_own):
     if not is_own:
         names = [(f"fig-{number}", f"Figure {number}") for number in range(1, 21)] + [("table-1", "Table 1")]
         text += "<p class=map>" + " ".join(f"<a href='#{anchor}'>{name}</a>" for anchor, name in names if anchor in places) + "</p>"
-    items = "".join(f"<li><a href='#{section.anchor}'>{page.escape(section.title)}</a>{f' ({page.escape(section.figures)})' if section.figures else ''}</li>" for section, _ in made)
+    place = " of the paper" if is_own else ""
+    items = "".join(f"<li><a href='#{section.anchor}'>{page.escape(section.title)}</a>{f' ({page.escape(section.figures)}{place})' if section.figures else ''}</li>" for section, _ in made)
     return f"{text}<ol>{items}</ol></nav>"
 
 
@@ -121,6 +122,9 @@ def main():
     parts.append(contents(made, is_own))
     folder = results.folder / "figures"
     parts += [page.section(section, blocks, results, folder, is_own) for section, blocks in made]
+    drawn = {block.name for _, blocks in made for block in blocks if isinstance(block, (Plot, Sheet))}
+    for old in [path for path in folder.iterdir() if path.suffix in (".png", ".pdf") and path.stem not in drawn]:
+        old.unlink()
     parts.append(links(is_own))
     target = results.folder / "report" / "index.html"
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -131,4 +135,7 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except MissingInput as error:
+        sys.exit(f"report: {error}")

@@ -42,7 +42,7 @@ fi
 bash scripts/install-dependencies.sh
 cmake --preset release
 targets=(skeletex)
-[ -n "$main" ] || targets+=(peers pose_rules)  # what experiments compare with
+[ -n "$main" ] || [ "$results" != results ] || targets+=(peers pose_rules)  # what experiments compare with
 cmake --build --preset release --target "${targets[@]}"
 program=build/release/bin/skeletex
 

@@ -117,6 +117,11 @@ def check_refusals():
     refused("report.py", REFERENCE, because=".png is missing")
     refused("report.py", WORK, because="morph/results.json is missing")
     refused("report.py", WORK / "nothing", because="holds no results")
+    damaged = WORK / "damaged" / "limits"
+    damaged.mkdir(parents=True)
+    (damaged / "results.json").write_text("{")
+    shutil.copy(WORK / "limits" / "record.json", damaged)
+    refused("report.py", damaged.parent, because="results.json is damaged")
     if sorted(REFERENCE.rglob("*")) != files or (WORK / "report").exists():
         fail("what is refused leaves files")
 
@@ -128,6 +133,13 @@ def check_coverage():
     anchors = [anchor for section in sections.PAPER for anchor in section.numbers if not anchor.startswith("section")]
     if sorted(anchors) != sorted([f"fig-{number}" for number in range(1, 21)] + ["table-1"]):
         fail(f"figures and tables on the page: {anchors}")
+
+
+def check_records():
+    for path in REFERENCE.glob("*/record.json"):
+        git = json.loads(path.read_text())["git"]
+        if not git["commit"] or git["changed_files"] != "0":
+            fail(f"{path}: not made from a clean checkout; make the reference run again with scripts/reference.sh")
 
 
 def check_own_model():
@@ -157,6 +169,7 @@ def main():
     shutil.rmtree(WORK, ignore_errors=True)
     WORK.mkdir(parents=True)
     check_coverage()
+    check_records()
     article = script("replication.py", "--check")
     if article.returncode != 0:
         fail(article.stderr)
