@@ -22,7 +22,8 @@ void warn_of_losses(const SkeletexModel& model, const std::string& path) {
     else
       lost.push_back(fmt::format("layer \"{}\"", layer.name));
   if (!model.bone_weights.empty()) lost.emplace_back("painted weights");
-  if (!lost.empty()) warn(fmt::format("{}: a compact file holds the shape alone; left out: {}", path, fmt::join(lost, ", ")));
+  if (!lost.empty())
+    warn(fmt::format("{}: a compact file holds the shape alone; left out: {}", path, fmt::join(lost, ", ")));
   if (has_normals) warn(fmt::format("{}: normals are left out, and derived from the shape", path));
 }
 

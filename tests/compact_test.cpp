@@ -9,7 +9,7 @@
 #include "skeletex/compact/decode_model.h"
 #include "skeletex/compact/encode/search_compact.h"
 #include "skeletex/io/check_model.h"
-#include "skeletex/io/compact_model_file.h"
+#include "skeletex/io/compact/compact_model_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/pose_mesh.h"
@@ -30,8 +30,9 @@ ClContext& context() {
 
 /// Every shape that a skeleton can have at a node: no neighbour, one, two, more, and cycles.
 const std::map<std::string, Skeleton>& skeletons() {
-  static const std::map<std::string, Skeleton> all{{"lone", lone_bone()},  {"chain", chain(3)}, {"branch", y_branch()},
-                                                   {"cross", cross(5)},    {"ring", ring(5)},   {"ring with an arm", ring_with_arm(5)}};
+  static const std::map<std::string, Skeleton> all{{"lone", lone_bone()},  {"chain", chain(3)},
+                                                   {"branch", y_branch()}, {"cross", cross(5)},
+                                                   {"ring", ring(5)},      {"ring with an arm", ring_with_arm(5)}};
   return all;
 }
 
@@ -54,12 +55,12 @@ CompactResult pack(const std::string& name, double max_error, std::size_t max_by
 const CompactResult& packed(const std::string& name) {
   static std::map<std::string, CompactResult> results;
   const auto found = results.find(name);
-  return found != results.end() ? found->second
-                                : results.emplace(name, pack(name, 3e-4, 0, 128)).first->second;
+  return found != results.end() ? found->second : results.emplace(name, pack(name, 3e-4, 0, 128)).first->second;
 }
 
 double mean_distance(const SkeletexModel& model, const SkeletexModel& other) {
-  return symmetric_mean(measure_metro(context(), reconstruct_mesh(context(), model), reconstruct_mesh(context(), other)));
+  return symmetric_mean(
+      measure_metro(context(), reconstruct_mesh(context(), model), reconstruct_mesh(context(), other)));
 }
 
 class Compact : public ::testing::TestWithParam<std::string> {};
@@ -89,12 +90,14 @@ TEST_P(Compact, ComesBackWithNamesAndTheSameIntegers) {
   const CompactModel compact = read_compact(bytes, "file");
   EXPECT_EQ(compact_bytes(compact), bytes);
   const Skeleton& skeleton = source_of(GetParam()).skeleton;
-  for (std::size_t i = 0; i < skeleton.bones.size(); ++i) EXPECT_EQ(compact.skeleton.bones[i].name, skeleton.bones[i].name);
+  for (std::size_t i = 0; i < skeleton.bones.size(); ++i)
+    EXPECT_EQ(compact.skeleton.bones[i].name, skeleton.bones[i].name);
   const SkeletexModel once = decode_model(compact), again = decode_model(read_compact(bytes, "file"));
   EXPECT_EQ(once.texture.out, again.texture.out);
   for (std::size_t i = 0; i < skeleton.nodes.size(); ++i) {
     const Vec3 place = once.skeleton.frame.to_user(once.skeleton.nodes[i].position);
-    EXPECT_LT((place - skeleton.frame.to_user(skeleton.nodes[i].position)).norm(), 4e-6 * source_of(GetParam()).diagonal);
+    EXPECT_LT((place - skeleton.frame.to_user(skeleton.nodes[i].position)).norm(),
+              4e-6 * source_of(GetParam()).diagonal);
   }
 }
 
@@ -148,7 +151,8 @@ TEST_P(Compact, RefusesDamageBehindTheCompression) {
   });
 }
 
-INSTANTIATE_TEST_SUITE_P(Skeletons, Compact, ::testing::Values("lone", "chain", "branch", "cross", "ring", "ring with an arm"),
+INSTANTIATE_TEST_SUITE_P(Skeletons, Compact,
+                         ::testing::Values("lone", "chain", "branch", "cross", "ring", "ring with an arm"),
                          [](const auto& test) {
                            std::string name = test.param;
                            std::replace(name.begin(), name.end(), ' ', '_');
@@ -186,7 +190,8 @@ TEST(CompactFile, IsReadWhereModelsAreReadByItsFirstBytes) {
 
 TEST(ByteStream, GivesBackWhatWasWritten) {
   ByteWriter out;
-  const std::vector<std::int64_t> numbers{0, 1, -1, 63, 64, -64, 127, -128, 200, 100000, -100000, std::int64_t{1} << 40};
+  const std::vector<std::int64_t> numbers{0,   1,    -1,  63,     64,      -64,
+                                          127, -128, 200, 100000, -100000, std::int64_t{1} << 40};
   for (const std::int64_t number : numbers) out.number(number);
   for (int value = -70000; value < 70000; value += 37) out.residual(value);
   out.real(-1.0 / 3);

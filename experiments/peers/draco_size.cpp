@@ -73,8 +73,8 @@ TriangleMesh decode(const std::vector<char>& file) {
   }
   for (draco::FaceIndex f(0); f < mesh->num_faces(); ++f) {
     const draco::Mesh::Face& face = mesh->face(f);
-    result.triangles.push_back({static_cast<int>(face[0].value()), static_cast<int>(face[1].value()),
-                                static_cast<int>(face[2].value())});
+    result.triangles.push_back(
+        {static_cast<int>(face[0].value()), static_cast<int>(face[1].value()), static_cast<int>(face[2].value())});
   }
   return result;
 }
@@ -116,22 +116,20 @@ void run(const Arguments& arguments) {
   for (double share = 0.8; share > 0.002 && worse < 4; share *= 0.8) {
     const auto vertices = static_cast<int>(share * static_cast<double>(original.positions.size()));
     if (vertices < 50) break;
-    std::optional<Found> found =
-        fewest_bits(context, original, simplify(original, vertices), arguments.max_error);
+    std::optional<Found> found = fewest_bits(context, original, simplify(original, vertices), arguments.max_error);
     if (!found) break;
     worse = best && found->bytes >= best->bytes ? worse + 1 : 0;
     if (!best || found->bytes < best->bytes) best = std::move(found);
   }
   if (!best) throw InputError("no number of bits reaches that error");
   write_mesh(arguments.output, best->mesh);
-  const nlohmann::ordered_json json{
-      {"bytes", best->bytes},
-      {"alone_bytes", alone ? nlohmann::json(alone->bytes) : nlohmann::json()},
-      {"vertices", best->vertices},
-      {"bits", best->bits},
-      {"mean", symmetric_mean(best->report)},
-      {"max", std::max(best->report.forward.max, best->report.backward.max)},
-      {"self_intersections", count_self_intersections(best->mesh)}};
+  const nlohmann::ordered_json json{{"bytes", best->bytes},
+                                    {"alone_bytes", alone ? nlohmann::json(alone->bytes) : nlohmann::json()},
+                                    {"vertices", best->vertices},
+                                    {"bits", best->bits},
+                                    {"mean", symmetric_mean(best->report)},
+                                    {"max", std::max(best->report.forward.max, best->report.backward.max)},
+                                    {"self_intersections", count_self_intersections(best->mesh)}};
   if (!arguments.json.empty()) write_text_atomically(arguments.json, json.dump(2) + "\n");
   fmt::print("{} bytes, {} vertices at {} bits: mean {:.3g}\n", best->bytes, best->vertices, best->bits,
              symmetric_mean(best->report));

@@ -87,8 +87,8 @@ void take_paper_recipe(EncodeOptions& options) {
   if (!options.method || !is_height_field(*options.method)) options.texel_share = TexelShare::kTriangles;
 }
 
-/// A compact file is made from a dense regular grid: what lies along the surface in it costs nothing, and what the other
-/// placings gain is below its quantization.
+/// A compact file is made from a dense regular grid: what lies along the surface in it costs nothing, and what the
+/// other placings gain is below its quantization.
 void take_compact_recipe(EncodeOptions& options) {
   options.width = options.height = std::clamp(2 * std::max(options.width, options.height), 1024, 4096);
   options.has_prefilter = false;
@@ -371,7 +371,8 @@ void add_encode_command(CLI::App& program) {
   declare_input(command, &add(command, "Positionals", "SKELETON", a.skeleton,
                               "skeleton: JSON with nodes and bones, in the mesh's coordinates; without, that of a rig, "
                               "or one is made (see skeletonize)"));
-  declare_output(command, &add(command, "Options", "-o,--output", a.output, "the model: .skx.exr, or a compact file: .skx"),
+  declare_output(command,
+                 &add(command, "Options", "-o,--output", a.output, "the model: .skx.exr, or a compact file: .skx"),
                  {".exr", ".skx"})
       ->required()
       ->type_name("FILE");

@@ -8,7 +8,7 @@
 #include "compact_output.h"
 #include "files.h"
 #include "result_file.h"
-#include "skeletex/io/compact_model_file.h"
+#include "skeletex/io/compact/compact_model_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
@@ -55,7 +55,8 @@ void unpack(const UnpackArguments& arguments, const CLI::App& command) {
     model = resample_model(context, model, *options.size);
   json["output"] = write_result(context, model, arguments.output);
   json["device"] = context.device().name;
-  print(arguments.json, fmt::format("{}: {} x {} texels\n", arguments.output, model.texture.width, model.texture.height));
+  print(arguments.json,
+        fmt::format("{}: {} x {} texels\n", arguments.output, model.texture.width, model.texture.height));
   write_json(arguments.json, json);
 }
 

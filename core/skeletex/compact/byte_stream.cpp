@@ -92,9 +92,7 @@ std::uint64_t ByteReader::count(std::uint64_t most) {
   if (value > most) throw IoError("a number is too large");
   return value;
 }
-std::int64_t ByteReader::number(std::int64_t most) {
-  return unzigzag(count(2 * static_cast<std::uint64_t>(most)));
-}
+std::int64_t ByteReader::number(std::int64_t most) { return unzigzag(count(2 * static_cast<std::uint64_t>(most))); }
 int ByteReader::residual() {
   const int symbol = byte();
   constexpr std::uint64_t kMost = 1u << 24;

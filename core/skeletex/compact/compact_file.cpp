@@ -169,8 +169,8 @@ void read_patches(ByteReader& in, CompactModel& model) {
     for (int& knot : patch.row_knots) knot = in.byte();
     const auto& k = patch.row_knots;
     if (patch.columns < 4 || patch.columns > 64 || patch.intervals < 2 || patch.intervals > 64 ||
-        patch.step_count > static_cast<int>(kMostSteps) || patch.base_exponent > 30 || patch.row_steps >> patch.step_count != 0 ||
-        k[0] < 1 || k[1] <= k[0] || k[2] <= k[1])
+        patch.step_count > static_cast<int>(kMostSteps) || patch.base_exponent > 30 ||
+        patch.row_steps >> patch.step_count != 0 || k[0] < 1 || k[1] <= k[0] || k[2] <= k[1])
       throw IoError("the size of a patch is impossible");
     points += std::ldexp(patch.columns * (patch.intervals + 1.0), patch.step_count);
     if (points > kMostPoints) throw IoError("it is larger than 16384 x 16384 texels");
@@ -247,20 +247,8 @@ std::string payload_of(const CompactModel& model) {
   return out.bytes();
 }
 
-CompactModel model_of(std::string_view payload, PrefixRule rule) {
-  ByteReader in(payload);
-  CompactModel model;
-  model.skeleton = read_skeleton(in);
-  model.step = in.real();
-  if (!(model.step > 1e-9 && model.step < 1)) throw IoError("its step is no length");
-  model.bare_levels = in.byte();
-  for (OffsetWeights& weights : model.weights)
-    for (int& weight : weights) weight = in.byte() - 128;
-  read_seams(in, model);
-  read_patches(in, model);
-  for_each_pole(model, [&](std::array<int, 3>& pole) {
-    for (int& value : pole) value = static_cast<int>(in.number(kMostInteger));
-  });
+/// The seams and the coarse grids.
+void read_coarse(ByteReader& in, CompactModel& model) {
   for (CompactArc& arc : model.arcs) {
     if (arc.is_closed()) arc.base.resize(8);
     for (int& value : arc.base) value = static_cast<int>(in.number(kMostInteger));
@@ -271,8 +259,12 @@ CompactModel model_of(std::string_view payload, PrefixRule rule) {
     patch.base.resize(3 * static_cast<std::size_t>(patch.intervals - 1) * patch.columns);
     for (std::size_t k = 0; k < 3; ++k)
       for (std::size_t i = k; i < patch.base.size(); i += 3)
-        patch.base[i] = std::clamp(in.residual() + expected_base(patch, i), -static_cast<int>(kMostInteger), static_cast<int>(kMostInteger));
+        patch.base[i] = std::clamp(in.residual() + expected_base(patch, i), -static_cast<int>(kMostInteger),
+                                   static_cast<int>(kMostInteger));
   }
+}
+
+void read_steps(ByteReader& in, CompactModel& model, PrefixRule rule) {
   for_each_step(model, [&](CompactPatch& patch, int step) {
     // A step of which a part is missing is left out: its points are where they are predicted.
     if (rule == PrefixRule::kPrefix) {
@@ -288,6 +280,24 @@ CompactModel model_of(std::string_view payload, PrefixRule rule) {
     }
     return true;
   });
+}
+
+CompactModel model_of(std::string_view payload, PrefixRule rule) {
+  ByteReader in(payload);
+  CompactModel model;
+  model.skeleton = read_skeleton(in);
+  model.step = in.real();
+  if (!(model.step > 1e-9 && model.step < 1)) throw IoError("its step is no length");
+  model.bare_levels = in.byte();
+  for (OffsetWeights& weights : model.weights)
+    for (int& weight : weights) weight = in.byte() - 128;
+  read_seams(in, model);
+  read_patches(in, model);
+  for_each_pole(model, [&](std::array<int, 3>& pole) {
+    for (int& value : pole) value = static_cast<int>(in.number(kMostInteger));
+  });
+  read_coarse(in, model);
+  read_steps(in, model, rule);
   if (rule == PrefixRule::kWhole && !in.is_at_end()) throw IoError("there is more in it than a model");
   return model;
 }
@@ -314,13 +324,17 @@ CompactModel read_compact(std::string_view bytes, const std::string& where, Pref
     if (bytes.size() <= kHeader) throw IoError("it ends too early");
     const int version = static_cast<unsigned char>(bytes[kMagic.size()]);
     if (version > kCompactVersion)
-      throw IoError(fmt::format("it is written in version {} of the format, this program reads up to version {}; use a newer skeletex", version, kCompactVersion));
+      throw IoError(fmt::format(
+          "it is written in version {} of the format, this program reads up to version {}; use a newer skeletex",
+          version, kCompactVersion));
     std::uint64_t written = 0;
     for (std::size_t i = 0; i < 8; ++i)
       written |= static_cast<std::uint64_t>(static_cast<unsigned char>(bytes[kMagic.size() + 1 + i])) << (8 * i);
     const std::string_view rest = bytes.substr(kHeader);
     if (rule == PrefixRule::kWhole && XXH64(rest.data(), rest.size(), 0) != written)
-      throw IoError("it is damaged or truncated: the checksum is another one. Copy it again; `skeletex unpack --bytes` reads the first part of a file");
+      throw IoError(
+          "it is damaged or truncated: the checksum is another one. Copy it again; `skeletex unpack --bytes` reads the "
+          "first part of a file");
     ByteReader head(rest);
     const std::size_t size = head.count(kMostPayload);
     return model_of(decompress(rest.substr(rest.size() - head.left()), size, rule == PrefixRule::kPrefix), rule);

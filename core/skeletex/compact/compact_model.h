@@ -10,8 +10,8 @@ namespace skeletex {
 
 /// The integers of the points that one refinement step adds (refine.h), in the order of their rows and columns.
 struct StepResiduals {
-  std::vector<int> normal;          ///< in steps of q; empty: the step is its prediction alone
-  std::vector<int> side, across;    ///< in tangential steps; both empty: all are 0
+  std::vector<int> normal;        ///< in steps of q; empty: the step is its prediction alone
+  std::vector<int> side, across;  ///< in tangential steps; both empty: all are 0
 };
 
 /// One bone's points: a coarse grid, and the steps that double its columns or the intervals between its rows.
@@ -19,7 +19,7 @@ struct CompactPatch {
   int columns = 4, intervals = 3;  ///< of the coarse grid; rows are vertex-centred, so it has one row more
   std::uint32_t row_steps = 0;     ///< bit i: step i doubles the intervals between rows, else the columns
   int step_count = 0;
-  int base_exponent = 0;            ///< tangential step of the coarse grid: q 2^base_exponent
+  int base_exponent = 0;                       ///< tangential step of the coarse grid: q 2^base_exponent
   std::array<int, 3> row_knots{64, 128, 192};  ///< u at 1/4, 1/2, 3/4 of the rows, in 256ths, increasing
   std::array<std::array<int, 3>, 2> poles{};   ///< at free ends: offset from the node along s, b, o in steps of q
   std::vector<int> base;                       ///< inner points of the coarse grid: out, around, along each
@@ -39,8 +39,8 @@ struct CompactArc {
   int node = -1;
   std::array<int, 2> bones{-1, -1};
   std::array<int, 2> corners{-1, -1};
-  int step_count = 0;                ///< each step doubles the intervals: an open arc begins with 1, a closed one with 4
-  std::vector<int> base;             ///< closed arcs: four points in the plane, two coordinates each, in steps
+  int step_count = 0;     ///< each step doubles the intervals: an open arc begins with 1, a closed one with 4
+  std::vector<int> base;  ///< closed arcs: four points in the plane, two coordinates each, in steps
   std::vector<StepResiduals> steps;  ///< as many as have residuals
   bool is_closed() const { return corners[0] < 0; }
 };
@@ -51,8 +51,8 @@ using OffsetWeights = std::array<int, 4>;
 
 /// A model as a compact file holds it (docs/compact.md).
 struct CompactModel {
-  Skeleton skeleton;  ///< as it is decoded: rounded, every bone with its s
-  double step = 1e-4;  ///< q: of offsets along the normal, in the unit frame
+  Skeleton skeleton;    ///< as it is decoded: rounded, every bone with its s
+  double step = 1e-4;   ///< q: of offsets along the normal, in the unit frame
   int bare_levels = 0;  ///< finest steps of every patch that have no residuals
   /// Of steps that double columns, and of those that double rows.
   std::array<OffsetWeights, 2> weights{};

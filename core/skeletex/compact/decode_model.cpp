@@ -68,7 +68,8 @@ std::array<int, 2> pack_shelves(std::vector<Rectangle>& rectangles) {
     const int limit = std::max(widest, static_cast<int>(side * (1 + i / 32.0)));
     const std::array<int, 2> size = place(limit);
     const auto longer = [](const std::array<int, 2>& s) { return std::max(s[0], s[1]); };
-    if (best[0] == 0 || longer(size) < longer(best) || (longer(size) == longer(best) && size[0] * size[1] < best[0] * best[1])) {
+    if (best[0] == 0 || longer(size) < longer(best) ||
+        (longer(size) == longer(best) && size[0] * size[1] < best[0] * best[1])) {
       best = size;
       best_limit = limit;
     }
@@ -78,7 +79,8 @@ std::array<int, 2> pack_shelves(std::vector<Rectangle>& rectangles) {
 
 /// u of rows: a monotone cubic (Fritsch and Carlson) through the knots.
 std::vector<double> row_table(const CompactPatch& patch, int rows) {
-  const std::array<double, 5> y{0, patch.row_knots[0] / 256.0, patch.row_knots[1] / 256.0, patch.row_knots[2] / 256.0, 1};
+  const std::array<double, 5> y{0, patch.row_knots[0] / 256.0, patch.row_knots[1] / 256.0, patch.row_knots[2] / 256.0,
+                                1};
   std::array<double, 5> slope{};
   for (int i = 0; i < 5; ++i) {
     const double left = i > 0 ? y[i] - y[i - 1] : y[1] - y[0], right = i < 4 ? y[i + 1] - y[i] : y[4] - y[3];
@@ -89,7 +91,8 @@ std::vector<double> row_table(const CompactPatch& patch, int rows) {
     const double x = 4.0 * row / (rows - 1);
     const int i = std::min(3, static_cast<int>(x));
     const double t = x - i, s = 1 - t;
-    table[row] = s * s * (1 + 2 * t) * y[i] + t * t * (1 + 2 * s) * y[i + 1] + t * s * s * slope[i] - t * t * s * slope[i + 1];
+    table[row] =
+        s * s * (1 + 2 * t) * y[i] + t * t * (1 + 2 * s) * y[i + 1] + t * s * s * slope[i] - t * t * s * slope[i + 1];
   }
   table.front() = 0;
   table.back() = 1;
@@ -143,8 +146,8 @@ void store_seams(SkeletexModel& model, const CompactModel& compact, const Separa
     const BoneEnd end = end_at(model.skeleton, arc.bones[0], arc.node);
     const Vec3& node = model.skeleton.nodes[arc.node].position;
     for (const Vec3& point : seams.arcs[i])
-      result.samples.push_back({separation.turn_of(arc.bones[0], point - node),
-                                separation.half_line_distance(arc.bones[0], end, point)});
+      result.samples.push_back(
+          {separation.turn_of(arc.bones[0], point - node), separation.half_line_distance(arc.bones[0], end, point)});
   }
 }
 
@@ -196,7 +199,8 @@ SkeletexModel decode_model(const CompactModel& compact, int octaves) {
   for (std::vector<float>* plane : {&model.texture.along, &model.texture.around, &model.texture.out})
     plane->assign(static_cast<std::size_t>(width) * height, 0);
   for (int bone = 0; bone < static_cast<int>(compact.patches.size()); ++bone) {
-    const int free_ends = static_cast<int>(model.ends[bone][0].arcs.empty()) + static_cast<int>(model.ends[bone][1].arcs.empty());
+    const int free_ends =
+        static_cast<int>(model.ends[bone][0].arcs.empty()) + static_cast<int>(model.ends[bone][1].arcs.empty());
     constexpr std::array kTopologies{SegmentTopology::kAnnulus, SegmentTopology::kDisk, SegmentTopology::kSphere};
     model.patches.push_back({rectangles[bone], Method::kVsm, kTopologies[free_ends],
                              row_table(compact.patches[bone], rectangles[bone].height)});

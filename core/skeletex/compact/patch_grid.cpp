@@ -53,8 +53,8 @@ std::vector<Vec3> site_points(const CompactModel& model, const Refinement& refin
   std::vector<int> offsets(refinement.site_count());
   for (int i = 0; i < refinement.site_count(); ++i) {
     const Site& site = refinement.sites()[i];
-    offsets[i] = offset_of(residuals->normal[i],
-                           expected_offset(model.weights[rows ? 1 : 0], neighbours_of(i, refinement.site_columns()), offsets));
+    offsets[i] = offset_of(residuals->normal[i], expected_offset(model.weights[rows ? 1 : 0],
+                                                                 neighbours_of(i, refinement.site_columns()), offsets));
     Vec3 point = site.predicted + q / 64 * offsets[i] * site.normal;
     if (!residuals->side.empty()) {
       const double tangential = tangential_step(q, step, refinement.mean_spacing(), site);

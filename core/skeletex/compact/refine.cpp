@@ -96,8 +96,13 @@ Refinement::Refinement(const PatchGrid& grid, bool refines_rows) : grid_(grid), 
 std::array<int, 4> neighbours_of(int site, int site_columns) {
   const int row = site / site_columns, column = site % site_columns;
   const int above = row > 0 ? site - site_columns : -1;
-  return {column > 0 ? site - 1 : -1, above, above < 0 ? -1 : column > 0 ? above - 1 : above + site_columns - 1,
-          above < 0 ? -1 : column + 1 < site_columns ? above + 1 : above + 1 - site_columns};
+  return {column > 0 ? site - 1 : -1, above,
+          above < 0    ? -1
+          : column > 0 ? above - 1
+                       : above + site_columns - 1,
+          above < 0                   ? -1
+          : column + 1 < site_columns ? above + 1
+                                      : above + 1 - site_columns};
 }
 
 PatchGrid Refinement::refined(const std::vector<Vec3>& points) const {

@@ -25,11 +25,11 @@ struct PatchGrid {
 
 /// Where a step expects a new point, and its frame. Exact on every machine that rounds as IEEE 754 says.
 struct Site {
-  int row = 0, column = 0;         ///< in the refined grid
-  std::array<int, 2> parents{};    ///< indices into the points before the step
+  int row = 0, column = 0;               ///< in the refined grid
+  std::array<int, 2> parents{};          ///< indices into the points before the step
   Vec3 predicted, normal, side, across;  ///< unit directions: side from the first to the second parent
-  double spacing = 0;  ///< between the parents
-  double width = 0;    ///< between points across
+  double spacing = 0;                    ///< between the parents
+  double width = 0;                      ///< between points across
 };
 
 /// The points that a step adds to a grid, as predicted.
@@ -42,7 +42,8 @@ class Refinement {
   double mean_spacing() const { return mean_spacing_; }
   /// How many sites a row has.
   int site_columns() const { return site_columns_; }
-  /// The refined grid without the rows at its ends, which the caller sets where columns double, and with new points from `points`, one per site.
+  /// The refined grid without the rows at its ends, which the caller sets where columns double, and with new points
+  /// from `points`, one per site.
   PatchGrid refined(const std::vector<Vec3>& points) const;
 
  private:
@@ -61,7 +62,8 @@ inline int offset_of(int residual, int expected) {
 /// Neighbours of a site among those before it: left, above, above left, above right; -1: none.
 std::array<int, 4> neighbours_of(int site, int site_columns);
 /// Prediction of an offset from those of the neighbours, in 64ths of q.
-int expected_offset(const OffsetWeights& weights, const std::array<int, 4>& neighbours, const std::vector<int>& offsets);
+int expected_offset(const OffsetWeights& weights, const std::array<int, 4>& neighbours,
+                    const std::vector<int>& offsets);
 
 /// The point halfway between the samples of a curve by the polynomial through up to three on each side.
 /// \param point  point(i), i = -2 .. 3; halfway lies between 0 and 1

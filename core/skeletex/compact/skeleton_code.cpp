@@ -37,7 +37,8 @@ FrameCode frame_code(const UnitFrame& frame) {
   const double mantissa = std::frexp(frame.scale, &code.exponent);
   code.mantissa = static_cast<std::uint32_t>(std::min(16777215.0, std::rint(std::ldexp(mantissa, 24))));
   const double scale = std::ldexp(code.mantissa, code.exponent - 24);
-  for (int k = 0; k < 3; ++k) code.offset[k] = std::llround(std::clamp(frame.offset[k] / scale * 0x1p24, -0x1p38, 0x1p38));
+  for (int k = 0; k < 3; ++k)
+    code.offset[k] = std::llround(std::clamp(frame.offset[k] / scale * 0x1p24, -0x1p38, 0x1p38));
   return code;
 }
 

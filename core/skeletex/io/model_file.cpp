@@ -27,7 +27,7 @@
 
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/check_model.h"
-#include "skeletex/io/compact_model_file.h"
+#include "skeletex/io/compact/compact_model_file.h"
 #include "skeletex/io/exr_survey.h"
 #include "skeletex/io/json_file.h"
 #include "skeletex/io/model_json.h"
@@ -428,7 +428,8 @@ namespace {
 std::optional<SkeletexModel> read_compact_level(const std::filesystem::path& path, int level) {
   if (!is_compact_file(path)) return {};
   const std::string where = path.string();
-  if (level != 0) throw IoError(fmt::format("{}: there is no level {}; a compact file has level 0 alone", where, level));
+  if (level != 0)
+    throw IoError(fmt::format("{}: there is no level {}; a compact file has level 0 alone", where, level));
   return read_compact_model(path);
 }
 

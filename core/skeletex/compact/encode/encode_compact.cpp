@@ -35,7 +35,8 @@ constexpr double kLargeShare = 0.15;
 
 void set_sizes(CompactModel& compact, const SkeletexModel& model, int size) {
   double texels = 0;
-  for (const Patch& patch : model.patches) texels += static_cast<double>(patch.rectangle.width) * patch.rectangle.height;
+  for (const Patch& patch : model.patches)
+    texels += static_cast<double>(patch.rectangle.width) * patch.rectangle.height;
   const double scale = size / std::sqrt(texels);
   for (const Patch& patch : model.patches) {
     const bool is_large = patch.rectangle.width * patch.rectangle.height > kLargeShare * texels;
@@ -50,10 +51,13 @@ void set_sizes(CompactModel& compact, const SkeletexModel& model, int size) {
   for (const SeamArc& arc : model.arcs) {
     const double wanted = scale * static_cast<double>(arc.samples.size() + (arc.is_closed() ? 0 : 1));
     const double coarse = arc.is_closed() ? 4 : 1;
-    compact.arcs.push_back({arc.node, arc.bones, arc.corners,
-                            std::max(arc.is_closed() ? 0 : 1, static_cast<int>(std::lround(std::log2(wanted / coarse)))),
-                            {},
-                            {}});
+    compact.arcs.push_back(
+        {arc.node,
+         arc.bones,
+         arc.corners,
+         std::max(arc.is_closed() ? 0 : 1, static_cast<int>(std::lround(std::log2(wanted / coarse)))),
+         {},
+         {}});
   }
   for (const SeamCorner& corner : model.corners) compact.corners.push_back({corner.node, corner.bones, 0, 0});
 }
@@ -132,7 +136,8 @@ CompactModel encode_compact(const SkeletexModel& model, const SourceSurface& sou
   set_sizes(compact, model, options.size);
   const SeparationPlanes separation(compact.skeleton);
   set_poles(compact, separation, source);
-  encode_seams(compact, separation, source, (options.bare_levels + options.residuals.kept_levels + 1) / 2, options.residuals.rounding);
+  encode_seams(compact, separation, source, (options.bare_levels + options.residuals.kept_levels + 1) / 2,
+               options.residuals.rounding);
   encode_patches(compact, separation, source, options.residuals);
   fit_weights(compact);
   encode_patches(compact, separation, source, options.residuals);

@@ -8,9 +8,9 @@
 namespace skeletex {
 
 struct CompactOptions {
-  double step = 1e-4;    ///< of offsets along the normal, in the unit frame
-  int size = 512;        ///< about the side of the texture that the file decodes to
-  int bare_levels = 4;   ///< finest steps of every patch without residuals
+  double step = 1e-4;   ///< of offsets along the normal, in the unit frame
+  int size = 512;       ///< about the side of the texture that the file decodes to
+  int bare_levels = 4;  ///< finest steps of every patch without residuals
   ResidualOptions residuals;
 };
 

@@ -22,9 +22,8 @@ struct Traced {
 
 class PatchEncoder {
  public:
-  PatchEncoder(CompactModel& compact, const SeparationPlanes& separation, int bone,
-               const std::array<bool, 2>& has_pole, const EndRow& end_row, const SourcePatch& source,
-               const ResidualOptions& options)
+  PatchEncoder(CompactModel& compact, const SeparationPlanes& separation, int bone, const std::array<bool, 2>& has_pole,
+               const EndRow& end_row, const SourcePatch& source, const ResidualOptions& options)
       : compact_(compact),
         patch_(compact.patches[bone]),
         separation_(separation),
@@ -91,8 +90,8 @@ class PatchEncoder {
         const int value = rounded(offsets[i].dot(axes[k]) / steps[k]);
         patch_.base.push_back(value);
       }
-      point = sites[i].predicted + steps[0] * patch_.base[3 * i] * axes[0] + steps[1] * patch_.base[3 * i + 1] * axes[1] +
-              steps[2] * patch_.base[3 * i + 2] * axes[2];
+      point = sites[i].predicted + steps[0] * patch_.base[3 * i] * axes[0] +
+              steps[1] * patch_.base[3 * i + 1] * axes[1] + steps[2] * patch_.base[3 * i + 2] * axes[2];
     }
     return traced;
   }
@@ -185,8 +184,7 @@ class PatchEncoder {
       return true;
     if (r + 1 < grid.intervals) return false;
     const Place lower = 0.5 * (old(r + 1, c) + old(r + 1, c + 1));
-    return !is_good(old(r, c), place, lower, old(r + 1, c)) ||
-           !is_good(place, old(r, c + 1), old(r + 1, c + 1), lower);
+    return !is_good(old(r, c), place, lower, old(r + 1, c)) || !is_good(place, old(r, c + 1), old(r + 1, c + 1), lower);
   }
 
   Residual home_residual(const Site& site, const Place& middle, const Step& step, int expected) const {
@@ -224,7 +222,8 @@ class PatchEncoder {
     bool has_tangential = false;
     for (int i = 0; i < refinement.site_count(); ++i) {
       const Site& site = refinement.sites()[i];
-      const int expected = expected_offset(compact_.weights[rows ? 1 : 0], neighbours_of(i, refinement.site_columns()), offsets);
+      const int expected =
+          expected_offset(compact_.weights[rows ? 1 : 0], neighbours_of(i, refinement.site_columns()), offsets);
       Residual r = residual_of(site, traced, quantization, expected, places);
       if (is_sparse && std::abs(r.normal) < options_.least_kept) r.normal = r.side = r.across = 0;
       offsets[i] = offset_of(r.normal, expected);

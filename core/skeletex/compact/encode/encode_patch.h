@@ -7,8 +7,8 @@ namespace skeletex {
 
 /// What the encoder chooses beside the step.
 struct ResidualOptions {
-  double reach = 0.5;       ///< how far a point may slide from its home, in distances of its parents
-  double rounding = 0.42;   ///< added before rounding down: 0.5 rounds to nearest, less prefers 0
+  double reach = 0.5;      ///< how far a point may slide from its home, in distances of its parents
+  double rounding = 0.42;  ///< added before rounding down: 0.5 rounds to nearest, less prefers 0
   /// Points nearer to each other than so many steps get no residuals: their normals would follow the rounding.
   double least_spacing = 8;
   /// Residuals below so many steps are dropped in the `kept_levels` finest steps that have some.

@@ -108,8 +108,9 @@ void encode_seams(CompactModel& compact, const SeparationPlanes& separation, con
     const int bone = corner.bones[0];
     const BoneEnd end = end_at(compact.skeleton, bone, corner.node);
     const Vec3& point = source.corners[i];
-    corner.turn = rounded(separation.turn_of(bone, point - compact.skeleton.nodes[corner.node].position) * kAngleSteps) %
-                  kAngleSteps;
+    corner.turn =
+        rounded(separation.turn_of(bone, point - compact.skeleton.nodes[corner.node].position) * kAngleSteps) %
+        kAngleSteps;
     corner.distance = rounded(separation.half_line_distance(bone, end, point) / seam_step(compact.step));
     corners.push_back(corner_point(compact, separation, corner));
   }

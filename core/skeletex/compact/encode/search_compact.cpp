@@ -71,7 +71,15 @@ class Search {
     return result;
   }
 
-  /// The largest step at which `value`, which falls with the step, is at most `wanted`; some steps, then nothing.
+  /// How the logarithm of a value grows with that of the step: what was measured, within what is usual.
+  static double slope_of(bool rises, double step_change, double value_change, bool is_measured) {
+    if (!is_measured || std::abs(step_change) <= 1e-3) return rises ? 0.8 : -0.9;
+    const double measured = value_change / step_change;
+    return rises ? std::clamp(measured, 0.15, 1.5) : std::clamp(measured, -2.0, -0.2);
+  }
+
+  /// The trial that keeps a value just within what is wanted; nothing where none does.
+  /// \param rises  whether the value grows with the step, as errors do, or falls, as sizes do
   /// \param value  of a trial; positive
   std::optional<Trial> largest_step(int bare_levels, double first, double wanted, bool rises,
                                     const std::function<double(Trial&)>& value) {
@@ -87,11 +95,7 @@ class Search {
       if (is_good && (!best || (rises ? now.options.step > best->options.step : now.options.step < best->options.step)))
         best = std::move(now);
       if (is_good && reached > -0.02) break;
-      double slope = rises ? 0.8 : -0.9;
-      if (i > 0 && std::abs(at - last_at) > 1e-3) {
-        const double measured_slope = (reached - last_value) / (at - last_at);
-        slope = rises ? std::clamp(measured_slope, 0.15, 1.5) : std::clamp(measured_slope, -2.0, -0.2);
-      }
+      const double slope = slope_of(rises, at - last_at, reached - last_value, i > 0);
       last_at = at;
       last_value = reached;
       at = std::clamp(at - (reached + 0.01) / slope, at - 2.5, at + 2.5);
@@ -105,7 +109,8 @@ class Search {
     std::optional<Trial> best;
     const auto try_levels = [&](int bare) {
       if (bare < 0) return false;
-      std::optional<Trial> found = largest_step(bare, 3 * wanted, wanted, true, [&](Trial& t) { return t.mean = mean_of(t.model); });
+      std::optional<Trial> found =
+          largest_step(bare, 3 * wanted, wanted, true, [&](Trial& t) { return t.mean = mean_of(t.model); });
       if (!found) return false;
       found->bytes = compact_bytes(found->model).size();
       if (best && found->bytes >= best->bytes) return false;
@@ -113,17 +118,22 @@ class Search {
       return true;
     };
     // Downhill from where the spacing of the residuals suits the error as on the standard models.
-    const int first = std::clamp(static_cast<int>(std::lround(2 * std::log2(goal_.size / 128.0) + std::log2(wanted / 1e-4))), 0, 12);
+    const int first =
+        std::clamp(static_cast<int>(std::lround(2 * std::log2(goal_.size / 128.0) + std::log2(wanted / 1e-4))), 0, 12);
     int bare = first;
     while (bare >= 0 && !try_levels(bare)) bare -= 2;
     if (!best)
-      throw InputError(fmt::format("an error of {:g} diagonals is out of reach at {} x {} texels; ask for more, or give a larger --size", wanted, goal_.size, goal_.size));
+      throw InputError(fmt::format(
+          "an error of {:g} diagonals is out of reach at {} x {} texels; ask for more, or give a larger --size", wanted,
+          goal_.size, goal_.size));
     const int start = bare;
     if (start == first)
-      while (try_levels(++bare)) {}
+      while (try_levels(++bare)) {
+      }
     if (bare <= start + 1) {
       bare = start;
-      while (try_levels(--bare)) {}
+      while (try_levels(--bare)) {
+      }
     }
     return measured(*best);
   }

@@ -10,10 +10,10 @@ namespace skeletex {
 
 /// What a compact file must reach; without anything, an error of 1e-4.
 struct CompactGoal {
-  std::optional<double> max_error;         ///< symmetric surface mean over the diagonal
-  std::optional<std::size_t> max_bytes;    ///< of the file
-  std::optional<double> quality;           ///< 0 to 100: the step is 10^-(2 + quality / 25) diagonals
-  int size = 512;                          ///< about the side of the texture that the file decodes to
+  std::optional<double> max_error;       ///< symmetric surface mean over the diagonal
+  std::optional<std::size_t> max_bytes;  ///< of the file
+  std::optional<double> quality;         ///< 0 to 100: the step is 10^-(2 + quality / 25) diagonals
+  int size = 512;                        ///< about the side of the texture that the file decodes to
 };
 
 struct CompactResult {

@@ -11,7 +11,8 @@
 namespace skeletex {
 
 Vec3 SourcePatch::at(const Place& place) const {
-  const double row = std::clamp(place[0], 0.0, rows - 1.0), column = place[1] - columns * std::floor(place[1] / columns);
+  const double row = std::clamp(place[0], 0.0, rows - 1.0),
+               column = place[1] - columns * std::floor(place[1] / columns);
   const int r = std::min(static_cast<int>(row), rows - 2), c = std::min(static_cast<int>(column), columns - 1),
             next = c + 1 < columns ? c + 1 : 0;
   const double s = row - r, t = column - c;
@@ -52,7 +53,8 @@ SourceSurface source_surface(ClContext& context, const PreparedModel& prepared) 
   for (std::size_t i = 0; i < model.arcs.size(); ++i) {
     const SeamArc& arc = model.arcs[i];
     const auto first = positions.begin() + lattice.first_sample[i];
-    std::vector<Vec3>& points = source.arcs.emplace_back(first, first + static_cast<std::ptrdiff_t>(arc.samples.size()));
+    std::vector<Vec3>& points =
+        source.arcs.emplace_back(first, first + static_cast<std::ptrdiff_t>(arc.samples.size()));
     if (arc.is_closed()) continue;
     points.insert(points.begin(), source.corners[arc.corners[0]]);
     points.push_back(source.corners[arc.corners[1]]);
