@@ -9,7 +9,7 @@
 #include "skeletex/compact/decode_model.h"
 #include "skeletex/compact/encode/search_compact.h"
 #include "skeletex/io/check_model.h"
-#include "skeletex/io/compact_model_file.h"
+#include "skeletex/io/compact/compact_model_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/pose_mesh.h"

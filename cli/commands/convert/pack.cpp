@@ -8,7 +8,7 @@
 #include "compact_output.h"
 #include "files.h"
 #include "result_file.h"
-#include "skeletex/io/compact_model_file.h"
+#include "skeletex/io/compact/compact_model_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"

@@ -247,20 +247,8 @@ std::string payload_of(const CompactModel& model) {
   return out.bytes();
 }
 
-CompactModel model_of(std::string_view payload, PrefixRule rule) {
-  ByteReader in(payload);
-  CompactModel model;
-  model.skeleton = read_skeleton(in);
-  model.step = in.real();
-  if (!(model.step > 1e-9 && model.step < 1)) throw IoError("its step is no length");
-  model.bare_levels = in.byte();
-  for (OffsetWeights& weights : model.weights)
-    for (int& weight : weights) weight = in.byte() - 128;
-  read_seams(in, model);
-  read_patches(in, model);
-  for_each_pole(model, [&](std::array<int, 3>& pole) {
-    for (int& value : pole) value = static_cast<int>(in.number(kMostInteger));
-  });
+/// The seams and the coarse grids.
+void read_coarse(ByteReader& in, CompactModel& model) {
   for (CompactArc& arc : model.arcs) {
     if (arc.is_closed()) arc.base.resize(8);
     for (int& value : arc.base) value = static_cast<int>(in.number(kMostInteger));
@@ -274,6 +262,9 @@ CompactModel model_of(std::string_view payload, PrefixRule rule) {
         patch.base[i] = std::clamp(in.residual() + expected_base(patch, i), -static_cast<int>(kMostInteger),
                                    static_cast<int>(kMostInteger));
   }
+}
+
+void read_steps(ByteReader& in, CompactModel& model, PrefixRule rule) {
   for_each_step(model, [&](CompactPatch& patch, int step) {
     // A step of which a part is missing is left out: its points are where they are predicted.
     if (rule == PrefixRule::kPrefix) {
@@ -289,6 +280,24 @@ CompactModel model_of(std::string_view payload, PrefixRule rule) {
     }
     return true;
   });
+}
+
+CompactModel model_of(std::string_view payload, PrefixRule rule) {
+  ByteReader in(payload);
+  CompactModel model;
+  model.skeleton = read_skeleton(in);
+  model.step = in.real();
+  if (!(model.step > 1e-9 && model.step < 1)) throw IoError("its step is no length");
+  model.bare_levels = in.byte();
+  for (OffsetWeights& weights : model.weights)
+    for (int& weight : weights) weight = in.byte() - 128;
+  read_seams(in, model);
+  read_patches(in, model);
+  for_each_pole(model, [&](std::array<int, 3>& pole) {
+    for (int& value : pole) value = static_cast<int>(in.number(kMostInteger));
+  });
+  read_coarse(in, model);
+  read_steps(in, model, rule);
   if (rule == PrefixRule::kWhole && !in.is_at_end()) throw IoError("there is more in it than a model");
   return model;
 }

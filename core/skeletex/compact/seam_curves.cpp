@@ -67,6 +67,25 @@ std::vector<Vec2> coarse_curve(const CompactModel& model, const CompactArc& arc,
   return points;
 }
 
+namespace {
+
+/// A curve's next step.
+/// \param residuals  null: it is its prediction alone
+std::vector<Vec2> added_points(const std::vector<Vec2>& curve, bool is_closed, double q,
+                               const StepResiduals* residuals) {
+  std::vector<Vec2> added;
+  for (const CurveSite& site : curve_sites(curve, is_closed)) {
+    added.push_back(site.predicted);
+    if (residuals == nullptr) continue;
+    const std::size_t i = added.size() - 1;
+    added[i] += q * residuals->normal[i] * site.normal;
+    if (!residuals->side.empty()) added[i] += 8 * q * residuals->side[i] * site.side;
+  }
+  return added;
+}
+
+}  // namespace
+
 SeamCurves decode_seams(const CompactModel& model, const SeparationPlanes& separation, int octaves) {
   SeamCurves seams;
   const double q = seam_step(model.step);
@@ -76,17 +95,8 @@ SeamCurves decode_seams(const CompactModel& model, const SeparationPlanes& separ
     std::vector<Vec2> curve = coarse_curve(model, arc, plane, seams.corners);
     const int steps = std::max(arc.is_closed() ? 0 : 1, arc.step_count + octaves);
     for (int step = 0; step < steps; ++step) {
-      std::vector<Vec2> added;
-      const StepResiduals* residuals =
-          step < static_cast<int>(arc.steps.size()) && !arc.steps[step].normal.empty() ? &arc.steps[step] : nullptr;
-      for (const CurveSite& site : curve_sites(curve, arc.is_closed())) {
-        added.push_back(site.predicted);
-        if (residuals == nullptr) continue;
-        const std::size_t i = added.size() - 1;
-        added[i] += q * residuals->normal[i] * site.normal;
-        if (!residuals->side.empty()) added[i] += 8 * q * residuals->side[i] * site.side;
-      }
-      curve = refined_curve(curve, added);
+      const StepResiduals* residuals = step < static_cast<int>(arc.steps.size()) ? &arc.steps[step] : nullptr;
+      curve = refined_curve(curve, added_points(curve, arc.is_closed(), q, residuals));
     }
     std::vector<Vec3>& points = seams.arcs.emplace_back();
     for (std::size_t i = arc.is_closed() ? 0 : 1; i + (arc.is_closed() ? 0 : 1) < curve.size(); ++i)
@@ -95,13 +105,35 @@ SeamCurves decode_seams(const CompactModel& model, const SeparationPlanes& separ
   return seams;
 }
 
+namespace {
+
+/// An arc of an end, with the corners that it runs between as that end sees it.
+struct Use {
+  ArcUse use;
+  int from, to;
+};
+
+/// The arcs of an end one after the other.
+std::vector<ArcUse> chained(std::vector<Use> open, std::size_t bone) {
+  std::vector<ArcUse> loop;
+  if (open.empty()) return loop;
+  const int first = open.front().from;
+  int corner = first;
+  do {
+    const auto next = std::find_if(open.begin(), open.end(), [&](const Use& use) { return use.from == corner; });
+    if (next == open.end()) throw IoError(fmt::format("the seams around bone {} do not close up", bone));
+    loop.push_back(next->use);
+    corner = next->to;
+    open.erase(next);
+  } while (corner != first && corner >= 0);
+  if (!open.empty()) throw IoError(fmt::format("bone {} has several loops of seams at one end", bone));
+  return loop;
+}
+
+}  // namespace
+
 std::vector<std::array<PatchEnd, 2>> ends_of(const CompactModel& model) {
   std::vector<std::array<PatchEnd, 2>> ends(model.skeleton.bones.size());
-  // Arcs of an end, each with the corners that it runs between as that end sees it.
-  struct Use {
-    ArcUse use;
-    int from, to;
-  };
   std::vector<std::array<std::vector<Use>, 2>> uses(ends.size());
   for (std::size_t i = 0; i < model.arcs.size(); ++i) {
     const CompactArc& arc = model.arcs[i];
@@ -115,21 +147,7 @@ std::vector<std::array<PatchEnd, 2>> ends_of(const CompactModel& model) {
     }
   }
   for (std::size_t bone = 0; bone < ends.size(); ++bone)
-    for (const int end : {0, 1}) {
-      std::vector<Use>& open = uses[bone][end];
-      std::vector<ArcUse>& loop = ends[bone][end].arcs;
-      if (open.empty()) continue;
-      const int first = open.front().from;
-      int corner = first;
-      do {
-        const auto next = std::find_if(open.begin(), open.end(), [&](const Use& use) { return use.from == corner; });
-        if (next == open.end()) throw IoError(fmt::format("the seams around bone {} do not close up", bone));
-        loop.push_back(next->use);
-        corner = next->to;
-        open.erase(next);
-      } while (corner != first && corner >= 0);
-      if (!open.empty()) throw IoError(fmt::format("bone {} has several loops of seams at one end", bone));
-    }
+    for (const int end : {0, 1}) ends[bone][end].arcs = chained(std::move(uses[bone][end]), bone);
   return ends;
 }
 

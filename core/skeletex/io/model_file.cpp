@@ -27,7 +27,7 @@
 
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/check_model.h"
-#include "skeletex/io/compact_model_file.h"
+#include "skeletex/io/compact/compact_model_file.h"
 #include "skeletex/io/exr_survey.h"
 #include "skeletex/io/json_file.h"
 #include "skeletex/io/model_json.h"

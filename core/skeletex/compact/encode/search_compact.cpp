@@ -71,7 +71,15 @@ class Search {
     return result;
   }
 
-  /// The largest step at which `value`, which falls with the step, is at most `wanted`; some steps, then nothing.
+  /// How the logarithm of a value grows with that of the step: what was measured, within what is usual.
+  static double slope_of(bool rises, double step_change, double value_change, bool is_measured) {
+    if (!is_measured || std::abs(step_change) <= 1e-3) return rises ? 0.8 : -0.9;
+    const double measured = value_change / step_change;
+    return rises ? std::clamp(measured, 0.15, 1.5) : std::clamp(measured, -2.0, -0.2);
+  }
+
+  /// The trial that keeps a value just within what is wanted; nothing where none does.
+  /// \param rises  whether the value grows with the step, as errors do, or falls, as sizes do
   /// \param value  of a trial; positive
   std::optional<Trial> largest_step(int bare_levels, double first, double wanted, bool rises,
                                     const std::function<double(Trial&)>& value) {
@@ -87,11 +95,7 @@ class Search {
       if (is_good && (!best || (rises ? now.options.step > best->options.step : now.options.step < best->options.step)))
         best = std::move(now);
       if (is_good && reached > -0.02) break;
-      double slope = rises ? 0.8 : -0.9;
-      if (i > 0 && std::abs(at - last_at) > 1e-3) {
-        const double measured_slope = (reached - last_value) / (at - last_at);
-        slope = rises ? std::clamp(measured_slope, 0.15, 1.5) : std::clamp(measured_slope, -2.0, -0.2);
-      }
+      const double slope = slope_of(rises, at - last_at, reached - last_value, i > 0);
       last_at = at;
       last_value = reached;
       at = std::clamp(at - (reached + 0.01) / slope, at - 2.5, at + 2.5);

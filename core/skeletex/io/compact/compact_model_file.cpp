@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/io/compact_model_file.h"
+#include "skeletex/io/compact/compact_model_file.h"
 
 #include <fmt/format.h>
 
