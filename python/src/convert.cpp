@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "bind.h"
 #include "skeletex/convert/encode_model.h"
+#include "skeletex/convert/guess_stance.h"
 #include "skeletex/io/pose_file.h"
 #include "skeletex/reconstruct/levels.h"
 #include "skeletex/reconstruct/polish.h"
@@ -132,6 +133,9 @@ py::tuple encode(const Points& vertices, const Indices& triangles, const std::op
     Input input = checked_input(mesh, given);
     findings = std::move(input.findings);
     if (!given) input.skeleton = made_skeleton(context, input, {}, watch);
+    const MeshAttributes attributes;  // the normals are computed
+    options.attributes = &attributes;
+    options.stance = guess_stance(input.mesh, input.skeleton);
     options.tree = &*input.tree;
     options.progress = watch;
     return encode_model(context, input.mesh, input.skeleton, options);

