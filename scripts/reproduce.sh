@@ -39,8 +39,12 @@ if [ "$results" = results ] && [ -z "$main" ] && [ "${#draft[@]}" -eq 0 ]; then
   changed=$(git status --porcelain) || { echo "reproduce: this is no git checkout, so the page could not say what ran; go on with --draft" >&2; exit 1; }
   [ -z "$changed" ] || { printf 'reproduce: changed files:\n%s\nCommit them or put them away, or go on with --draft.\n' "$changed" >&2; exit 1; }
 fi
-bash scripts/install-dependencies.sh
-cmake --preset release
+what=figures
+[ -z "$main" ] || what=main
+bash scripts/install-dependencies.sh "$what"
+# A build with tests stays one.
+if grep -qs '^SKELETEX_BUILD_TESTS:BOOL=ON' build/release/CMakeCache.txt; then what=release; fi
+cmake --preset "$what"
 targets=(skeletex)
 [ -n "$main" ] || [ "$results" != results ] || targets+=(peers pose_rules)  # what experiments compare with
 cmake --build --preset release --target "${targets[@]}"

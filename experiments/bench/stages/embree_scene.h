@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#if __has_include(<embree4/rtcore.h>)
+#include <embree4/rtcore.h>
+#else
 #include <embree3/rtcore.h>
+#endif
 
 #include <vector>
 

@@ -56,12 +56,23 @@ struct Rays {
   std::vector<std::vector<float>> distances;  ///< Embree's; 0 for a miss
 };
 
+void intersect_coherent(const int* valid, RTCScene scene, RTCRayHit8& packet) {
+#if RTC_VERSION_MAJOR >= 4
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+  rtcIntersect8(valid, scene, &packet, &arguments);
+#else
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  rtcIntersect8(valid, scene, &context, &packet);
+#endif
+}
+
 /// Rays [begin, end) in packets of eight.
 void cast_packets(RTCScene scene, const std::vector<Ray>& rays, std::size_t begin, std::size_t end,
                   std::vector<float>& distances) {
-  RTCIntersectContext intersect;
-  rtcInitIntersectContext(&intersect);
-  intersect.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   for (std::size_t k = begin; k < end; k += 8) {
     alignas(32) int valid[8];
     RTCRayHit8 packet{};
@@ -78,7 +89,7 @@ void cast_packets(RTCScene scene, const std::vector<Ray>& rays, std::size_t begi
       packet.ray.mask[lane] = ~0u;
       packet.hit.geomID[lane] = RTC_INVALID_GEOMETRY_ID;
     }
-    rtcIntersect8(valid, scene, &intersect, &packet);
+    intersect_coherent(valid, scene, packet);
     for (std::size_t lane = 0; lane < 8 && k + lane < end; ++lane)
       distances[k + lane] = packet.hit.geomID[lane] == RTC_INVALID_GEOMETRY_ID ? 0 : packet.ray.tfar[lane];
   }
