@@ -44,6 +44,7 @@ void add_render_command(CLI::App& program);
 void add_view_command(CLI::App& program);
 void add_bench_command(CLI::App& program);
 void add_run_command(CLI::App& program);
+void add_collect_command(CLI::App& program);
 void add_replay_command(CLI::App& program);
 
 /// All commands, in the order of the help. Each has its files checked (files.h) before it runs.

@@ -27,6 +27,7 @@ void add_commands(CLI::App& program) {
   add_inspect_command(program);
   add_bench_command(program);
   add_run_command(program);
+  add_collect_command(program);
   add_replay_command(program);
   add_devices_command(program);
   for (CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; }))

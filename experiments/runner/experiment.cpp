@@ -15,8 +15,8 @@
 namespace skeletex {
 namespace {
 
-const std::vector<std::string> kKeys{"name",  "title",   "paper", "models", "sweep",
-                                     "steps", "columns", "quick", "$schema"};
+const std::vector<std::string> kKeys{"name",    "title",  "paper",  "models", "sweep",  "steps",
+                                     "columns", "checks", "limits", "quick",  "$schema"};
 const std::vector<std::string> kStepKeys{"name", "run", "tool", "exit_code", "file_sizes"};
 const std::vector<std::string> kValueKeys{"label", "arguments", "values"};
 const std::vector<std::string> kModelKeys{"name", "mesh", "skeleton", "credits", "view"};
@@ -80,6 +80,46 @@ SweepValue value_of(const OrderedJson& json, const std::string& where) {
   return value;
 }
 
+double number_of(const OrderedJson& json, const std::string& where) {
+  if (!json.is_number() || !(json.get<double>() > 0)) throw IoError(where + " must be a number above 0");
+  return json.get<double>();
+}
+
+ItemLimits limits_of(const OrderedJson& json, const std::string& where) {
+  check_keys(json, {"seconds", "memory_mb"}, where);
+  ItemLimits limits;
+  if (json.contains("seconds")) limits.seconds = number_of(json.at("seconds"), where + ": \"seconds\"");
+  if (json.contains("memory_mb")) limits.memory_mb = number_of(json.at("memory_mb"), where + ": \"memory_mb\"");
+  return limits;
+}
+
+std::vector<Check> checks_of(const OrderedJson& json, const Experiment& experiment, const std::string& where) {
+  if (!json.is_object()) throw IoError(where + " must be an object of columns");
+  const auto require_column = [&](const std::string& name) {
+    std::vector<std::string> names;
+    for (const auto& [column, place] : experiment.columns) names.push_back(column);
+    if (std::find(names.begin(), names.end(), name) == names.end())
+      throw IoError(fmt::format("{}: there is no column \"{}\"{}", where, name, did_you_mean(name, names)));
+  };
+  std::vector<Check> checks;
+  for (const auto& [column, value] : json.items()) {
+    const std::string place = fmt::format("{}: \"{}\"", where, column);
+    require_column(column);
+    check_keys(value, {"equals", "like", "most"}, place);
+    if (value.size() != 1) throw IoError(place + " must have one of \"equals\", \"like\" and \"most\"");
+    Check check{column, value.value("equals", OrderedJson()), text_of(value, "like", place, ""), std::nullopt};
+    if (value.contains("like")) require_column(check.like);
+    if (value.contains("equals") && (check.equals.is_null() || check.equals.is_structured()))
+      throw IoError(place + ": \"equals\" must be a number, a string, true or false");
+    if (value.contains("most")) {
+      if (!value.at("most").is_number()) throw IoError(place + ": \"most\" must be a number");
+      check.most = value.at("most").get<double>();
+    }
+    checks.push_back(std::move(check));
+  }
+  return checks;
+}
+
 /// Sets "a.b.c" in place, making objects on the way.
 void set_at(OrderedJson& json, const std::string& path, const OrderedJson& value, const std::string& where) {
   OrderedJson* at = &json;
@@ -100,7 +140,8 @@ ModelConfig model_from(const OrderedJson& json, const std::filesystem::path& fol
   if (json.is_string()) return find_model(json.get<std::string>(), folder);
   check_keys(json, kModelKeys, where);
   const auto file = [&](const char* key) { return (folder / text_of(json, key, where)).lexically_normal(); };
-  return {text_of(json, "name", where), file("mesh"), file("skeleton"), text_of(json, "credits", where, ""),
+  return {text_of(json, "name", where), file("mesh"),
+          json.contains("skeleton") ? file("skeleton") : std::filesystem::path(), text_of(json, "credits", where, ""),
           nlohmann::json(json.value("view", OrderedJson()))};
 }
 
@@ -213,6 +254,8 @@ Experiment read_experiment(const std::filesystem::path& path, const ExperimentCh
         throw IoError(fmt::format("{}: column \"{}\" reads from \"{}\", which is no step", where, column, step));
       experiment.columns.emplace_back(column, place);
     }
+  if (json.contains("checks")) experiment.checks = checks_of(json.at("checks"), experiment, where + ": \"checks\"");
+  if (json.contains("limits")) experiment.limits = limits_of(json.at("limits"), where + ": \"limits\"");
   return experiment;
 }
 
@@ -265,6 +308,9 @@ std::vector<std::string> fill_arguments(const Experiment& experiment, const Item
     if ((what == "model" || what == "mesh" || what == "skeleton") && (colon != std::string::npos || item.model >= 0)) {
       const ModelConfig model = colon != std::string::npos ? find_model(name.substr(colon + 1), experiment.folder)
                                                            : experiment.models[item.model];
+      if (what == "skeleton" && model.skeleton.empty())
+        throw IoError(
+            fmt::format("{}: model \"{}\" has no skeleton, which {{{}}} asks for", experiment.name, model.name, name));
       return what == "model" ? model.name : what == "mesh" ? model.mesh.string() : model.skeleton.string();
     }
     throw IoError(fmt::format("{}: nothing sets the placeholder {{{}}}", experiment.name, name));

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,20 @@ struct Step {
   std::map<std::string, std::string> file_sizes;  ///< result name -> file whose bytes are counted
 };
 
+/// What a column must be for an item to be right: exactly one of the three is set.
+struct Check {
+  std::string column;
+  OrderedJson equals;          ///< this value; null: not set
+  std::string like;            ///< the value of another column; "": not set
+  std::optional<double> most;  ///< at most this
+};
+
+/// What each item may take; 0: anything.
+struct ItemLimits {
+  double seconds = 0;    ///< wall clock of all its steps
+  double memory_mb = 0;  ///< addresses of each of its processes
+};
+
 /// An experiment as its file describes it (configs/schema/experiment.schema.json): every model x every combination of
 /// the sweep is an item, and an item is a list of commands.
 struct Experiment {
@@ -40,7 +55,9 @@ struct Experiment {
   std::vector<SweepParameter> sweep;
   std::vector<Step> steps;
   std::vector<std::pair<std::string, std::string>>
-      columns;                   ///< column name -> place in the steps' JSON, e.g. metro.forward.mean
+      columns;  ///< column name -> place in the steps' JSON, e.g. metro.forward.mean
+  std::vector<Check> checks;
+  ItemLimits limits;
   std::filesystem::path folder;  ///< of the file: names of models are looked up beside it
 };
 

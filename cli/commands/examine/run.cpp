@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <memory>
 
@@ -24,8 +26,15 @@ namespace fs = std::filesystem;
 struct Arguments {
   std::string config, output = "results", device, json, mesh, skeleton;
   std::vector<std::string> settings, only, models;
-  bool is_quick = false, is_resumed = false;
-  int jobs = 1;
+  bool is_quick = false, is_resumed = false, are_failures_allowed = false;
+  int jobs = 1, shard = 1, shards = 1;
+  double timeout = 0, memory = 0;
+};
+
+struct CollectArguments {
+  std::vector<std::string> folders;
+  std::string output, json;
+  bool are_failures_allowed = false;
 };
 
 struct ReplayArguments {
@@ -63,6 +72,22 @@ std::string rows_text(const Experiment& experiment, const RunSummary& summary) {
   return table.text() + reasons;
 }
 
+std::string outcomes_text(const RunSummary& summary) {
+  std::string text;
+  for (const auto& [outcome, count] : summary.results.at("outcomes").items())
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count.get<int>(), outcome);
+  return text.empty() ? "no items" : text;
+}
+
+/// \throw CLI::ValidationError
+void read_shard(const std::string& text, Arguments& arguments) {
+  int end = 0;
+  if (std::sscanf(text.c_str(), "%d/%d%n", &arguments.shard, &arguments.shards, &end) != 2 ||
+      end != static_cast<int>(text.size()) || arguments.shard < 1 || arguments.shards < arguments.shard)
+    throw CLI::ValidationError("--shard",
+                               fmt::format("\"{}\" is no part; give I/N with 1 <= I <= N, such as 3/8", text));
+}
+
 RunSummary run_with_bar(const Experiment& experiment, RunOptions options) {
   ProgressBar bar;
   bar.show(experiment.name, 0);
@@ -92,7 +117,7 @@ void check_results(const CLI::App& command, const Experiment& experiment, const 
     check_made_output(command, path);
     for (const ModelConfig& model : experiment.models)
       for (const fs::path& input : {model.mesh, model.skeleton})
-        if (is_same_file(input, path))
+        if (!input.empty() && is_same_file(input, path))
           throw CLI::ValidationError("--output",
                                      fmt::format("{} of model {} would be replaced by the results; name another folder",
                                                  input.string(), model.name));
@@ -105,6 +130,8 @@ void run(const Arguments& arguments, const CLI::App& command) {
                      {"only", arguments.only},
                      {"quick", arguments.is_quick},
                      {"models", OrderedJson::array()}};
+  if (arguments.timeout > 0) source["settings"].push_back(fmt::format("limits.seconds={}", arguments.timeout));
+  if (arguments.memory > 0) source["settings"].push_back(fmt::format("limits.memory_mb={}", arguments.memory));
   const auto add_model = [&](const ModelConfig& model) {
     source["models"].push_back({{"name", model.name},
                                 {"mesh", model.mesh.string()},
@@ -125,22 +152,42 @@ void run(const Arguments& arguments, const CLI::App& command) {
                        .folder = fs::path(arguments.output) / experiment.name,
                        .is_resumed = arguments.is_resumed,
                        .jobs = arguments.jobs,
+                       .shard = arguments.shard,
+                       .shards = arguments.shards,
                        .device = arguments.device,
                        .source = source,
                        .progress = {}};
     check_results(command, experiment, options.folder);
     const RunSummary summary = run_with_bar(experiment, options);
     failed += summary.failed;
-    print(arguments.json, fmt::format("{}{} done ({} kept), {} failed: {}\n\n", rows_text(experiment, summary),
-                                      summary.done, summary.kept, summary.failed, options.folder.string()));
+    print(arguments.json, fmt::format("{}{} ({} kept): {}\n\n", rows_text(experiment, summary), outcomes_text(summary),
+                                      summary.kept, options.folder.string()));
     report.push_back({{"experiment", experiment.name},
                       {"folder", options.folder.string()},
                       {"done", summary.done},
                       {"kept", summary.kept},
-                      {"failed", summary.failed}});
+                      {"failed", summary.failed},
+                      {"outcomes", summary.results.at("outcomes")}});
   }
   write_json(arguments.json, report);
-  if (failed > 0) throw CLI::RuntimeError(kExitBad);
+  if (failed > 0 && !arguments.are_failures_allowed) throw CLI::RuntimeError(kExitBad);
+}
+
+void collect(const CollectArguments& arguments) {
+  const std::vector<fs::path> folders(arguments.folders.begin(), arguments.folders.end());
+  if (folders.size() > 1 && arguments.output.empty())
+    throw CLI::ValidationError("--output",
+                               "is needed for several folders: which of them, or another, gets all results");
+  const fs::path out = arguments.output.empty() ? folders[0] : fs::path(arguments.output);
+  const auto [experiment, summary] = collect_shards(folders, out);
+  print(arguments.json,
+        fmt::format("{}{}: {}\n", rows_text(experiment, summary), outcomes_text(summary), out.string()));
+  write_json(arguments.json, {{"experiment", experiment.name},
+                              {"folder", out.string()},
+                              {"done", summary.done},
+                              {"failed", summary.failed},
+                              {"outcomes", summary.results.at("outcomes")}});
+  if (summary.failed > 0 && !arguments.are_failures_allowed) throw CLI::RuntimeError(kExitBad);
 }
 
 void replay(const ReplayArguments& arguments, const CLI::App& command) {
@@ -165,6 +212,8 @@ void replay(const ReplayArguments& arguments, const CLI::App& command) {
                                                        .folder = folder,
                                                        .is_resumed = false,
                                                        .jobs = arguments.jobs,
+                                                       .shard = 1,
+                                                       .shards = 1,
                                                        .device = arguments.device,
                                                        .source = source,
                                                        .progress = {}});
@@ -201,6 +250,19 @@ void add_run_command(CLI::App& program) {
   command.add_option("--jobs", arguments->jobs, "items at a time; timings want 1")
       ->check(number_in(1, 256))
       ->type_name("N");
+  command
+      .add_option_function<std::string>(
+          "--shard", [arguments](const std::string& text) { read_shard(text, *arguments); },
+          "only part I of N of the items; `skeletex collect` joins the parts")
+      ->type_name("I/N");
+  command.add_option("--timeout", arguments->timeout, "seconds that an item may take")
+      ->check(number_above(0))
+      ->type_name("SECONDS");
+  command.add_option("--memory", arguments->memory, "addresses that each process of an item may take (ulimit -v)")
+      ->check(number_above(0))
+      ->type_name("MB");
+  command.add_flag("--allow-failures", arguments->are_failures_allowed,
+                   "failed items are results: end with 0 all the same");
   command.add_option("--only", arguments->only, "only this model of the experiment's")->type_name("MODEL")->take_all();
   command
       .add_option("--model", arguments->models,
@@ -221,9 +283,29 @@ void add_run_command(CLI::App& program) {
       "  skeletex run configs/experiments/fidelity.json --only bear --set sweep.size=[64,128]\n"
       "  skeletex run configs/experiments/fidelity.json --mesh my.obj --skeleton my.skeleton.json -o mine\n"
       "  skeletex run configs/paper.json --quick --resume\n"
+      "  skeletex run configs/experiments/fidelity.json --shard 1/2; .. --shard 2/2; skeletex collect "
+      "results/fidelity\n"
       "Writes results.json, results.csv, record.json and items/. A failed item is recorded and does not stop the rest; "
       "then the exit code is 1.");
   command.callback([arguments, &command] { run(*arguments, command); });
+}
+
+void add_collect_command(CLI::App& program) {
+  auto arguments = std::make_shared<CollectArguments>();
+  CLI::App& command = *program.add_subcommand("collect", "Join the results of all shards of an experiment");
+  declare_input(command, command.add_option("FOLDER", arguments->folders,
+                                            "where shards have written to: results/NAME, of each machine"))
+      ->required();
+  command.add_option("-o,--output", arguments->output, "folder for all results (default: FOLDER, if there is but one)")
+      ->type_name("FOLDER");
+  command.add_flag("--allow-failures", arguments->are_failures_allowed,
+                   "failed items are results: end with 0 all the same");
+  add_json_option(command, arguments->json);
+  command.footer(
+      "Example:\n"
+      "  skeletex collect a/fidelity b/fidelity -o results/fidelity\n"
+      "Writes results.json, results.csv and record.json as one run would have.");
+  command.callback([arguments] { collect(*arguments); });
 }
 
 void add_replay_command(CLI::App& program) {
