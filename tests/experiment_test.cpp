@@ -11,10 +11,12 @@
 
 #include "runner/process.h"
 #include "runner/run_experiment.h"
+#include "runner/run_item.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/read_file.h"
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/model/error.h"
+#include "skeletex/model/memory.h"
 #include "support/scratch.h"
 #include "support/shapes.h"
 
@@ -46,9 +48,30 @@ class Runner : public ::testing::Test {
                                        .folder = folder_ / "out",
                                        .is_resumed = is_resumed,
                                        .jobs = jobs,
+                                       .shard = 1,
+                                       .shards = 1,
                                        .device = "",
                                        .source = {},
                                        .progress = {}});
+  }
+  RunSummary run_shard(const Experiment& experiment, int shard, int shards, bool is_resumed = false) {
+    return run_experiment(experiment, {.program = "/bin/false",
+                                       .folder = folder_ / "parts",
+                                       .is_resumed = is_resumed,
+                                       .jobs = 1,
+                                       .shard = shard,
+                                       .shards = shards,
+                                       .device = "",
+                                       .source = {},
+                                       .progress = {}});
+  }
+  std::string collect_refusal() {
+    try {
+      collect_shards({folder_ / "parts"}, folder_ / "parts");
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "accepted";
   }
   static constexpr const char* kModel = R"({"name": "y", "mesh": "y.ply", "skeleton": "y.skeleton.json"})";
   ScratchFolder folder_;
@@ -145,6 +168,116 @@ TEST_F(Runner, ResumesWhatIsDoneUnlessCommitCommandsOrInputsChanged) {
   made["signature"]["commit"] = "another";
   std::ofstream(item) << made.dump();
   EXPECT_EQ(run(read_experiment(write(text)), true).kept, 0);
+}
+
+/// Items that end in every way; {json} stands for a way to write the step's JSON without braces.
+constexpr const char* kOutcomes = R"({"name": "e", "limits": {"seconds": 1, "memory_mb": 400},
+  "sweep": {"how": [
+    {"label": "right", "values": {"script": "echo 4"}},
+    {"label": "refuses", "values": {"script": "echo no such bone >&2; exit 1"}},
+    {"label": "sleeps", "values": {"script": "sleep 100 | sleep 100"}},
+    {"label": "crashes", "values": {"script": "kill -SEGV $$"}},
+    {"label": "killed", "values": {"script": "kill -KILL $$"}},
+    {"label": "takes", "values": {"script": "exec python3 -c 'bytearray(10**9)'"}},
+    {"label": "wrong", "values": {"script": "echo 5"}}]},
+  "steps": [{"name": "s", "tool": "bash", "run": ["-c", "{script}"]},
+            {"name": "t", "tool": "bash", "run": ["-c", "test {how} = wrong || printf '%b' '\\x7b\"v\": 4\\x7d' > {work}/t.json"]}],
+  "columns": {"v": "t.v"}, "checks": {"v": {"equals": 4}}})";
+
+TEST_F(Runner, CountsHowEachItemEndsWithinItsLimits) {
+  const RunSummary summary = run(read_experiment(write(kOutcomes)), false, 2);
+  std::map<std::string, std::string> outcomes;
+  for (const OrderedJson& row : summary.results.at("rows")) {
+    outcomes[row.at("key").get<std::string>()] = row.at("outcome").get<std::string>();
+    EXPECT_LT(row.at("seconds").get<double>(), 20);
+  }
+  EXPECT_EQ(outcomes, (std::map<std::string, std::string>{{"right", "success"},
+                                                          {"refuses", "refused"},
+                                                          {"sleeps", "out of time"},
+                                                          {"crashes", "crashed"},
+                                                          {"killed", "out of memory"},
+                                                          {"takes", "out of memory"},
+                                                          {"wrong", "wrong"}}));
+  EXPECT_EQ(summary.results.at("outcomes").at("out of memory"), 2);
+  EXPECT_EQ(summary.done, 1);
+  EXPECT_EQ(summary.failed, 6);
+  const std::string log = read_file(folder_ / "out/items/refuses.log");
+  EXPECT_TRUE(holds(log, "no such bone") && holds(log, "bash -c")) << log;
+  EXPECT_TRUE(holds(read_file(folder_ / "out/results.csv"), "v is null, and 4 is right"));
+}
+
+TEST_F(Runner, ShardsTogetherMakeTheResultsOfOneRun) {
+  const Experiment experiment = read_experiment(write(
+      R"({"name": "e", "sweep": {"a": [1, 2, 3], "b": ["x", "y", "z"]}, "steps": [{"name": "s", "tool": "sh", "run": ["-c", "printf {a}{b} > {out}/{a}{b}; test {a}{b} != 2z"], "file_sizes": {"n": "{out}/{a}{b}"}}], "columns": {"n": "s.n"}})"));
+  const OrderedJson whole = run(experiment).results;
+  std::multiset<std::string> keys;
+  for (const int shard : {4, 2, 1, 3}) {
+    const RunSummary part = run_shard(experiment, shard, 4);
+    for (const OrderedJson& row : part.results.at("rows")) keys.insert(row.at("key").get<std::string>());
+  }
+  EXPECT_EQ(keys.size(), 9u);
+  EXPECT_EQ(std::set<std::string>(keys.begin(), keys.end()).size(), 9u);
+  const Collected collected = collect_shards({folder_ / "parts"}, folder_ / "parts");
+  EXPECT_EQ(collected.summary.done, 8);
+  EXPECT_EQ(collected.summary.failed, 1);
+  OrderedJson parts = OrderedJson::parse(read_file(folder_ / "parts/results.json"));
+  OrderedJson one = OrderedJson::parse(read_file(folder_ / "out/results.json"));
+  for (OrderedJson* results : {&parts, &one})
+    for (OrderedJson& row : results->at("rows")) row["seconds"] = row["peak_memory_mb"] = 0;
+  EXPECT_EQ(parts.dump(), one.dump());
+  const OrderedJson record = OrderedJson::parse(read_file(folder_ / "parts/record.json"));
+  const OrderedJson whole_record = OrderedJson::parse(read_file(folder_ / "out/record.json"));
+  for (const auto& [key, value] : whole_record.items()) EXPECT_TRUE(record.contains(key)) << key;
+  EXPECT_EQ(record.at("shards").size(), 4u);
+
+  // Shards of several machines, each with a folder of its own.
+  std::filesystem::create_directories(folder_ / "second/shards");
+  std::filesystem::create_directories(folder_ / "second/items");
+  std::filesystem::rename(folder_ / "parts/shards/3-of-4.json", folder_ / "second/shards/3-of-4.json");
+  const OrderedJson third = OrderedJson::parse(read_file(folder_ / "second/shards/3-of-4.json"));
+  for (const OrderedJson& key : third.at("shard").at("keys"))
+    std::filesystem::rename(folder_ / ("parts/items/" + key.get<std::string>() + ".json"),
+                            folder_ / ("second/items/" + key.get<std::string>() + ".json"));
+  EXPECT_TRUE(holds(collect_refusal(), "are missing: 3"));
+  EXPECT_EQ(collect_shards({folder_ / "parts", folder_ / "second"}, folder_ / "all").summary.done, 8);
+  EXPECT_EQ(read_file(folder_ / "all/results.csv"), read_file(folder_ / "parts/results.csv"));
+  EXPECT_THROW(collect_shards({folder_ / "parts"}, folder_ / "parts/inner"), InputError);
+}
+
+TEST_F(Runner, RefusesToCollectShardsOfDifferentRuns) {
+  const char* text =
+      R"({{"name": "e", "sweep": {{"a": [1, 2, 3]}}, "steps": [{{"name": "s", "tool": "sh", "run": ["-c", "exit {}"]}}]}})";
+  EXPECT_TRUE(holds(collect_refusal(), "no such folder"));
+  run_shard(read_experiment(write(fmt::format(fmt::runtime(text), 0))), 1, 2);
+  EXPECT_TRUE(holds(collect_refusal(), "are missing: 2"));
+  run_shard(read_experiment(write(fmt::format(fmt::runtime(text), 1))), 2, 2);
+  EXPECT_TRUE(holds(collect_refusal(), "\"experiment\" differs"));
+  EXPECT_EQ(run_shard(read_experiment(write(fmt::format(fmt::runtime(text), 0))), 2, 2).done, 1);
+  EXPECT_EQ(collect_refusal(), "accepted");
+  std::filesystem::remove(folder_ / "parts/items/2.json");
+  EXPECT_TRUE(holds(collect_refusal(), "2.json"));
+}
+
+TEST_F(Runner, SaysWhatIsWrongWithChecksAndLimits) {
+  const std::string rest = R"("steps": [{"name": "s", "run": ["x"]}], "columns": {"mean": "s.m"}, )";
+  EXPECT_TRUE(
+      holds(refusal("{\"name\": \"e\", " + rest + R"("checks": {"meen": {"equals": 1}}})"), "did you mean mean?"));
+  EXPECT_TRUE(holds(refusal("{\"name\": \"e\", " + rest + R"("checks": {"mean": {}}})"), "must have one of"));
+  EXPECT_TRUE(
+      holds(refusal("{\"name\": \"e\", " + rest + R"("checks": {"mean": {"most": "1"}}})"), "must be a number"));
+  EXPECT_TRUE(holds(refusal("{\"name\": \"e\", " + rest + R"("limits": {"seconds": 0}})"), "above 0"));
+  EXPECT_EQ(refusal("{\"name\": \"e\", " + rest + R"("checks": {"mean": {"most": 1}}, "limits": {"seconds": 9}})"),
+            "accepted");
+}
+
+TEST(Outcomes, AProgramThatLacksMemoryIsKnownByItsWords) {
+  try {
+    require_memory(1e18, "encoding");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_TRUE(tells_of_memory(error.what())) << error.what();
+  }
+  EXPECT_FALSE(tells_of_memory("error: the mesh is not closed"));
 }
 
 TEST_F(Runner, ComparesNumbersByToleranceAndLeavesTimesOut) {

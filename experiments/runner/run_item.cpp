@@ -69,7 +69,7 @@ Ending ending_of(const Step& step, const ProcessResult& process, const ItemLimit
 bool tells_of_memory(const std::string& errors) {
   const auto holds = [&](const char* part) { return errors.find(part) != std::string::npos; };
   return holds("out of memory") || holds("of memory, and") || holds("(ulimit -v) leaves") || holds("bad_alloc") ||
-         holds("Cannot allocate memory");
+         holds("Cannot allocate memory") || holds("MemoryError");
 }
 
 OrderedJson run_item(const Experiment& experiment, const Item& item, const RunOptions& options,
