@@ -2,8 +2,12 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <Eigen/Geometry>
 #include <chrono>
+#include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
+#include <random>
 
 #include "bench/stages/subdivide.h"
 #include "simplify.h"
@@ -18,10 +22,38 @@ namespace {
 struct Arguments {
   std::string method, mesh, output, like, json;
   int vertices = 0;
+  double by = 0;
 };
 
 skeletex::TriangleMesh subdivided_to(skeletex::TriangleMesh mesh, int vertices) {
   while (static_cast<int>(mesh.positions.size()) < vertices) mesh = skeletex::subdivided(mesh);
+  return mesh;
+}
+
+/// The mesh with each vertex moved along its normal by up to so many diagonals, at random but the same each time.
+skeletex::TriangleMesh with_noise(skeletex::TriangleMesh mesh, double amplitude) {
+  using namespace skeletex;
+  std::vector<Vec3> normals(mesh.positions.size(), Vec3::Zero());
+  for (const Triangle& t : mesh.triangles) {
+    const Vec3 normal =
+        (mesh.positions[t[1]] - mesh.positions[t[0]]).cross(mesh.positions[t[2]] - mesh.positions[t[0]]);
+    for (const int corner : t) normals[corner] += normal;
+  }
+  std::mt19937 random(1);
+  const double largest = amplitude * bounding_box(mesh).diagonal();
+  for (std::size_t i = 0; i < normals.size(); ++i)
+    mesh.positions[i] += (2.0 * random() / std::mt19937::max() - 1) * largest * normals[i].stableNormalized();
+  return mesh;
+}
+
+skeletex::TriangleMesh turned(skeletex::TriangleMesh mesh, double degrees) {
+  const Eigen::AngleAxis<double> turn(degrees * std::numbers::pi / 180, skeletex::Vec3(1, 2, 3).normalized());
+  for (skeletex::Vec3& position : mesh.positions) position = turn * position;
+  return mesh;
+}
+
+skeletex::TriangleMesh scaled(skeletex::TriangleMesh mesh, double factor) {
+  for (skeletex::Vec3& position : mesh.positions) position *= factor;
   return mesh;
 }
 
@@ -37,7 +69,7 @@ void run(const Arguments& arguments) {
   const int wanted = !arguments.like.empty()  ? static_cast<int>(read_mesh(arguments.like).mesh.positions.size())
                      : arguments.vertices > 0 ? arguments.vertices
                                               : present;
-  const bool can_grow = arguments.method == "remesh" || arguments.method == "subdivide";
+  const bool can_grow = arguments.method != "decimate" && arguments.method != "simplify";
   if (!can_grow && wanted > present)
     throw InputError(
         fmt::format("{} has {} vertices, {} cannot make {}", arguments.mesh, present, arguments.method, wanted));
@@ -46,6 +78,9 @@ void run(const Arguments& arguments) {
                               : arguments.method == "simplify"  ? simplify(mesh, wanted)
                               : arguments.method == "remesh"    ? remesh(mesh, wanted)
                               : arguments.method == "subdivide" ? subdivided_to(mesh, wanted)
+                              : arguments.method == "noise"     ? with_noise(mesh, arguments.by)
+                              : arguments.method == "turn"      ? turned(mesh, arguments.by)
+                              : arguments.method == "scale"     ? scaled(mesh, arguments.by)
                                                                 : mesh;
   const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
   write_mesh(arguments.output, result);
@@ -65,17 +100,23 @@ int main(int argc, char** argv) {
                    "peers");
   Arguments arguments;
   program
-      .add_option("METHOD", arguments.method,
-                  "decimate (OpenMesh, quadrics), simplify (meshoptimizer, quadrics), remesh (CGAL, isotropic), "
-                  "subdivide (every triangle into four, at least as many as wanted) or copy (as it is)")
+      .add_option(
+          "METHOD", arguments.method,
+          "decimate (OpenMesh, quadrics), simplify (meshoptimizer, quadrics), remesh (CGAL, isotropic), "
+          "subdivide (every triangle into four, at least as many as wanted), noise, turn, scale, or copy (as it is)")
       ->required()
-      ->check(CLI::IsMember({"decimate", "simplify", "remesh", "subdivide", "copy"}));
+      ->check(CLI::IsMember({"decimate", "simplify", "remesh", "subdivide", "noise", "turn", "scale", "copy"}));
   program.add_option("MESH", arguments.mesh, "closed triangle mesh")->required();
   program.add_option("-o,--output", arguments.output, "the result: .ply or .obj")->required();
   CLI::Option* vertices =
       program.add_option("--vertices", arguments.vertices, "how many vertices (default: as many as there are)")
           ->check(CLI::Range(4, 100000000));
   program.add_option("--like", arguments.like, "as many vertices as this mesh has")->excludes(vertices);
+  program
+      .add_option("--by", arguments.by,
+                  "times as many vertices as there are; noise: diagonals; turn: degrees; scale: the factor")
+      ->check(CLI::PositiveNumber)
+      ->excludes(vertices);
   program.add_option("--json", arguments.json, "write vertices, triangles, ms, closed_manifold to this file");
   try {
     program.parse(argc, argv);

@@ -35,11 +35,10 @@ std::map<std::string, std::string> make_files(const Experiment& experiment, cons
   more["view"] = (work / "view.json").string();
   write_json_file(more["view"], view);
   more["config"] = (work / "model.json").string();
-  write_json_file(more["config"], {{"name", model.name},
-                                   {"mesh", fs::absolute(model.mesh).string()},
-                                   {"skeleton", fs::absolute(model.skeleton).string()},
-                                   {"credits", model.credits},
-                                   {"view", view}});
+  OrderedJson config{{"name", model.name}, {"mesh", fs::absolute(model.mesh).string()}};
+  if (!model.skeleton.empty()) config["skeleton"] = fs::absolute(model.skeleton).string();
+  config.update({{"credits", model.credits}, {"view", view}});
+  write_json_file(more["config"], config);
   return more;
 }
 

@@ -73,7 +73,8 @@ Acceptance::Trial Acceptance::encode(const Skeleton& skeleton) const {
     EncodeOptions options;
     options.width = options.height = kTrialSize;
     options.tree = &surface_.tree;
-    const EncodeResult result = encode_model(context_, surface_.mesh, named, options);
+    EncodeResult result = encode_model(context_, surface_.mesh, named, options);
+    result.model.skeleton.frame = {};  // that of surface_.mesh
     const TriangleMesh mesh = reconstruct_mesh(context_, result.model);
     return {symmetric_mean(measure_metro(context_, surface_.mesh, mesh, {.samples = kTrialSamples})), {}};
   } catch (const DeviceError&) {
