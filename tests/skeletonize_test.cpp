@@ -159,6 +159,9 @@ TEST(Skeletonize, ScaleAndPlaceOfTheMeshDoNotMatter) {
   const SkeletonizeResult result = skeletonized(shape.mesh);
   EXPECT_NEAR(static_cast<double>(result.skeleton.bones.size()), static_cast<double>(bones), 2);
   EXPECT_EQ(errors_of(shape.mesh, result.skeleton), "");
+  // Candidates are compared with the mesh where it is, and not where it would be at size 1.
+  EXPECT_GT(result.candidates.at(result.chosen).error, 0);
+  EXPECT_LT(result.candidates.at(result.chosen).error, 0.01);
 }
 
 TEST(Skeletonize, TheNumberOfBonesIsALimit) {

@@ -66,9 +66,12 @@ void run(const Arguments& arguments) {
   if (!report.is_closed_manifold())
     throw InputError(arguments.mesh + ": not a closed manifold; skeletex validate says where");
   const int present = static_cast<int>(mesh.positions.size());
+  const bool can_count = arguments.method != "noise" && arguments.method != "turn" && arguments.method != "scale";
   const int wanted = !arguments.like.empty()  ? static_cast<int>(read_mesh(arguments.like).mesh.positions.size())
                      : arguments.vertices > 0 ? arguments.vertices
-                                              : present;
+                     : can_count && arguments.by > 0
+                         ? std::max(4, static_cast<int>(std::lround(arguments.by * present)))
+                         : present;
   const bool can_grow = arguments.method != "decimate" && arguments.method != "simplify";
   if (!can_grow && wanted > present)
     throw InputError(
