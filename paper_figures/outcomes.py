@@ -26,6 +26,12 @@ def group_of(row, parameter):
     return "-" if value is None else str(value)
 
 
+def reason_of(row):
+    """The line of the error, without the warnings before it."""
+    lines = row["reason"].splitlines()
+    return next((line for line in lines if line.startswith("error")), lines[0])
+
+
 def table(rows, parameter):
     groups = list(dict.fromkeys(group_of(row, parameter) for row in rows)) if parameter else []
     lines = [f"| {parameter or ''} | items | " + " | ".join(OUTCOMES) + " | mean time, s |", "|---" + "|---:" * (len(OUTCOMES) + 2) + "|"]
@@ -42,7 +48,7 @@ def table(rows, parameter):
 def draw(rows, parameter, path):
     figure, axes = plt.subplots(figsize=(8, 5))
     groups = list(dict.fromkeys(group_of(row, parameter) for row in rows)) if parameter else []
-    longest = max(row["seconds"] for row in rows)
+    longest = 1.05 * max(row["seconds"] for row in rows)
     for name in [*groups, "all"]:
         part = [row for row in rows if name == "all" or group_of(row, parameter) == name]
         times = sorted(row["seconds"] for row in part if row["outcome"] == "success")
@@ -72,7 +78,7 @@ def main():
         known = ["model", *rows[0]["parameters"], *rows[0]["columns"]]
         sys.exit(f"outcomes: no item has \"{arguments.by}\"; there are {', '.join(known)}")
     print(table(rows, arguments.by))
-    reasons = [f"{row['outcome']}: {row['key']}: {row['reason'].splitlines()[0]}" for row in rows if row["outcome"] != "success"]
+    reasons = [f"{row['outcome']}: {row['key']}: {reason_of(row)}" for row in rows if row["outcome"] != "success"]
     if reasons:
         print("\n" + "\n".join(reasons))
     draw(rows, arguments.by, arguments.output or arguments.folder / "outcomes.png")

@@ -808,6 +808,17 @@ TEST_F(Program, RunsAnExperimentOnTheUsersOwnModelResumesAndReplaysIt) {
   expect_refused(1, {"run", "e.json", "--set", "swep.size=1"}, {"swep", "did you mean sweep?"});
   expect_refused(1, {"run", "absent.json"}, {"absent.json"});
   expect_refused(2, {"run", "e.json", "--mesh", "y.ply"}, {"--skeleton"});
+  expect_refused(2, {"run", "e.json", "--shard", "4/3"}, {"4/3", "1 <= I <= N"});
+  expect_refused(1, {"collect", "absent"}, {"absent"});
+  expect_refused(2, {"collect", "out/e", "out"}, {"--output"});
+  const Outcome late =
+      run({"run", "e.json", "--mesh", "y.ply", "--skeleton", "y.skeleton.json", "-o", "out", "--timeout", "0.001"});
+  EXPECT_EQ(late.code, 1);
+  EXPECT_NE(late.out.find("2 out of time"), std::string::npos) << late.out;
+  const Outcome narrow = run({"run", "e.json", "--mesh", "y.ply", "--skeleton", "y.skeleton.json", "-o", "out",
+                              "--memory", "300", "--allow-failures", "--shard", "1/2"});
+  EXPECT_EQ(narrow.code, 0) << narrow.err;
+  EXPECT_NE(narrow.out.find("1 out of memory"), std::string::npos) << narrow.out;
   fs::remove_all(folder_ / "out");
   for (const char* name : {"e.json", "run.json", "replay.json"}) fs::remove(folder_ / name);
 }

@@ -57,6 +57,26 @@ skeletex::TriangleMesh scaled(skeletex::TriangleMesh mesh, double factor) {
   return mesh;
 }
 
+/// How many vertices the result is to have.
+int wanted_vertices(const Arguments& arguments, int present) {
+  const bool can_count = arguments.method != "noise" && arguments.method != "turn" && arguments.method != "scale";
+  if (!arguments.like.empty()) return static_cast<int>(skeletex::read_mesh(arguments.like).mesh.positions.size());
+  if (arguments.vertices > 0) return arguments.vertices;
+  if (can_count && arguments.by > 0) return std::max(4, static_cast<int>(std::lround(arguments.by * present)));
+  return present;
+}
+
+skeletex::TriangleMesh result_of(const Arguments& arguments, const skeletex::TriangleMesh& mesh, int wanted) {
+  if (arguments.method == "decimate") return skeletex::decimate(mesh, wanted);
+  if (arguments.method == "simplify") return skeletex::simplify(mesh, wanted);
+  if (arguments.method == "remesh") return skeletex::remesh(mesh, wanted);
+  if (arguments.method == "subdivide") return subdivided_to(mesh, wanted);
+  if (arguments.method == "noise") return with_noise(mesh, arguments.by);
+  if (arguments.method == "turn") return turned(mesh, arguments.by);
+  if (arguments.method == "scale") return scaled(mesh, arguments.by);
+  return mesh;
+}
+
 void run(const Arguments& arguments) {
   using namespace skeletex;
   for (const std::string& output : {arguments.output, arguments.json})
@@ -66,25 +86,15 @@ void run(const Arguments& arguments) {
   if (!report.is_closed_manifold())
     throw InputError(arguments.mesh + ": not a closed manifold; skeletex validate says where");
   const int present = static_cast<int>(mesh.positions.size());
-  const bool can_count = arguments.method != "noise" && arguments.method != "turn" && arguments.method != "scale";
-  const int wanted = !arguments.like.empty()  ? static_cast<int>(read_mesh(arguments.like).mesh.positions.size())
-                     : arguments.vertices > 0 ? arguments.vertices
-                     : can_count && arguments.by > 0
-                         ? std::max(4, static_cast<int>(std::lround(arguments.by * present)))
-                         : present;
-  const bool can_grow = arguments.method != "decimate" && arguments.method != "simplify";
+  const int wanted = wanted_vertices(arguments, present);
+  const bool can_grow = arguments.method == "remesh" || arguments.method == "subdivide";
   if (!can_grow && wanted > present)
     throw InputError(
         fmt::format("{} has {} vertices, {} cannot make {}", arguments.mesh, present, arguments.method, wanted));
   const auto begin = std::chrono::steady_clock::now();
-  const TriangleMesh result = arguments.method == "decimate"    ? decimate(mesh, wanted)
-                              : arguments.method == "simplify"  ? simplify(mesh, wanted)
-                              : arguments.method == "remesh"    ? remesh(mesh, wanted)
-                              : arguments.method == "subdivide" ? subdivided_to(mesh, wanted)
-                              : arguments.method == "noise"     ? with_noise(mesh, arguments.by)
-                              : arguments.method == "turn"      ? turned(mesh, arguments.by)
-                              : arguments.method == "scale"     ? scaled(mesh, arguments.by)
-                                                                : mesh;
+  if (arguments.by == 0 && (arguments.method == "noise" || arguments.method == "turn" || arguments.method == "scale"))
+    throw InputError(arguments.method + " needs --by");
+  const TriangleMesh result = result_of(arguments, mesh, wanted);
   const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
   write_mesh(arguments.output, result);
   const nlohmann::ordered_json json{{"vertices", result.positions.size()},

@@ -63,6 +63,54 @@ Ending ending_of(const Step& step, const ProcessResult& process, const ItemLimit
   return {"refused", std::move(reason)};
 }
 
+/// Runs the steps of an item one by one and gathers what they report.
+struct StepRunner {
+  const Experiment& experiment;
+  const Item& item;
+  const RunOptions& options;
+  const std::map<std::string, std::string>&more, &environment;
+  fs::path work;
+  std::string log;
+  double seconds, peak_memory_mb;
+  OrderedJson steps;
+
+  Ending run(const Step& step) {
+    std::vector<std::string> arguments = fill_arguments(experiment, item, step.run, more);
+    const fs::path report = work / (step.name + ".json");
+    if (step.tool.empty()) {
+      arguments.insert(arguments.end(), {"--json", report.string()});
+      if (!options.device.empty()) arguments.insert(arguments.end(), {"--device", options.device});
+    }
+    const std::string program = program_of(step, options);
+    ProcessResult process;
+    Ending ending;
+    try {
+      const double most = experiment.limits.seconds;
+      process = run_process(program, arguments, environment, work / "errors.txt",
+                            {most > 0 ? std::max(most - seconds, 1e-3) : 0, experiment.limits.memory_mb});
+      ending = ending_of(step, process, experiment.limits);
+    } catch (const Error& error) {
+      ending = {"refused", error.what()};
+    }
+    log += fmt::format("{}: {} {}\n{}{}{}: exit code {} after {:.3f} s, {:.0f} MB\n", step.name, program,
+                       fmt::join(arguments, " "), process.errors, process.errors.empty() ? "" : "\n", step.name,
+                       process.exit_code, process.seconds, process.peak_memory_mb);
+    seconds += process.seconds;
+    peak_memory_mb = std::max(peak_memory_mb, process.peak_memory_mb);
+    OrderedJson reported = read_json_file(report).value_or(OrderedJson::object());
+    steps[step.name] = reported.is_object() ? std::move(reported) : OrderedJson{{"result", std::move(reported)}};
+    steps[step.name]["process"] = {{"seconds", process.seconds}, {"peak_memory_mb", process.peak_memory_mb}};
+    if (step.exit_code != 0) steps[step.name]["process"]["errors"] = process.errors;
+    if (!ending.outcome.empty()) return ending;
+    for (const auto& [name, file] : step.file_sizes) {
+      std::error_code code;
+      const std::uintmax_t size = fs::file_size(fill_arguments(experiment, item, {file}, more)[0], code);
+      steps[step.name][name] = code ? OrderedJson() : OrderedJson(size);
+    }
+    return ending;
+  }
+};
+
 }  // namespace
 
 bool tells_of_memory(const std::string& errors) {
@@ -79,56 +127,25 @@ OrderedJson run_item(const Experiment& experiment, const Item& item, const RunOp
                      {"model", item.model < 0 ? OrderedJson() : OrderedJson(experiment.models[item.model].name)}};
   for (const auto& [name, label] : item.parameters) result["parameters"][name] = label;
   result["signature"] = signature;
+  StepRunner runner{experiment, item, options, more, environment, work.path(), {}, 0, 0, OrderedJson::object()};
   Ending ending;
-  std::string log;
-  double seconds = 0, peak = 0;
-  OrderedJson steps = OrderedJson::object();
   for (const Step& step : experiment.steps) {
-    std::vector<std::string> arguments = fill_arguments(experiment, item, step.run, more);
-    const fs::path report = work.path() / (step.name + ".json");
-    if (step.tool.empty()) {
-      arguments.insert(arguments.end(), {"--json", report.string()});
-      if (!options.device.empty()) arguments.insert(arguments.end(), {"--device", options.device});
-    }
-    const std::string program = program_of(step, options);
-    ProcessResult process;
-    try {
-      const double most = experiment.limits.seconds;
-      process = run_process(program, arguments, environment, work.path() / "errors.txt",
-                            {most > 0 ? std::max(most - seconds, 1e-3) : 0, experiment.limits.memory_mb});
-      ending = ending_of(step, process, experiment.limits);
-    } catch (const Error& error) {
-      ending = {"refused", error.what()};
-    }
-    log += fmt::format("{}: {} {}\n{}{}{}: exit code {} after {:.3f} s, {:.0f} MB\n", step.name, program,
-                       fmt::join(arguments, " "), process.errors, process.errors.empty() ? "" : "\n", step.name,
-                       process.exit_code, process.seconds, process.peak_memory_mb);
-    seconds += process.seconds;
-    peak = std::max(peak, process.peak_memory_mb);
-    OrderedJson reported = read_json_file(report).value_or(OrderedJson::object());
-    steps[step.name] = reported.is_object() ? std::move(reported) : OrderedJson{{"result", std::move(reported)}};
-    steps[step.name]["process"] = {{"seconds", process.seconds}, {"peak_memory_mb", process.peak_memory_mb}};
-    if (step.exit_code != 0) steps[step.name]["process"]["errors"] = process.errors;
-    if (!ending.outcome.empty()) {
-      result["failed_step"] = step.name;
-      break;
-    }
-    for (const auto& [name, file] : step.file_sizes) {
-      std::error_code code;
-      const std::uintmax_t size = fs::file_size(fill_arguments(experiment, item, {file}, more)[0], code);
-      steps[step.name][name] = code ? OrderedJson() : OrderedJson(size);
-    }
+    ending = runner.run(step);
+    if (ending.outcome.empty()) continue;
+    result["failed_step"] = step.name;
+    break;
   }
   if (ending.outcome.empty())
-    if (std::string reason = failed_check(experiment, steps); !reason.empty()) ending = {"wrong", std::move(reason)};
+    if (std::string reason = failed_check(experiment, runner.steps); !reason.empty())
+      ending = {"wrong", std::move(reason)};
   result["status"] = ending.outcome.empty() ? "done" : "failed";
   result["outcome"] = ending.outcome.empty() ? "success" : ending.outcome;
   if (!ending.reason.empty()) result["reason"] = ending.reason;
-  result["seconds"] = seconds;
-  result["peak_memory_mb"] = peak;
-  result["steps"] = std::move(steps);
+  result["seconds"] = runner.seconds;
+  result["peak_memory_mb"] = runner.peak_memory_mb;
+  result["steps"] = std::move(runner.steps);
   write_text_atomically(options.folder / "items" / (item.key + ".log"),
-                        fmt::format("{}{}{}{}\n", log, result["outcome"].get<std::string>(),
+                        fmt::format("{}{}{}{}\n", runner.log, result["outcome"].get<std::string>(),
                                     ending.reason.empty() ? "" : ": ", ending.reason));
   return result;
 }

@@ -71,6 +71,9 @@ def check():
     runs = [len((WORK / f"results/sweep/ran-{n}").read_text().split()) for n in range(ITEMS)]
     # What was done before the kill has not run again: at most one item of each shard was under way, and the refused one is tried again.
     assert sum(runs) <= ITEMS + 2 * SHARDS + 4, runs
+    table = subprocess.run(["/usr/bin/python3", SOURCE / "paper_figures/outcomes.py", WORK / "results/sweep"], capture_output=True, text=True, check=True).stdout
+    assert f"| all | {ITEMS} | {ITEMS - 1} ({100 * (ITEMS - 1) / ITEMS:.1f} %) | 0 | 0 | 1 | 0 | 0 |" in table and "refused: 4: exit code 1" in table, table
+    assert (WORK / "results/sweep/outcomes.png").stat().st_size > 5000
     print(f"{ENGINE}: items ran {runs} times")
 
 

@@ -176,8 +176,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
 void collect(const CollectArguments& arguments) {
   const std::vector<fs::path> folders(arguments.folders.begin(), arguments.folders.end());
   if (folders.size() > 1 && arguments.output.empty())
-    throw CLI::ValidationError("--output",
-                               "is needed for several folders: which of them, or another, gets all results");
+    throw CLI::ValidationError("--output", "is needed for several folders: name another one, which gets all results");
   const fs::path out = arguments.output.empty() ? folders[0] : fs::path(arguments.output);
   const auto [experiment, summary] = collect_shards(folders, out);
   print(arguments.json,
@@ -296,7 +295,8 @@ void add_collect_command(CLI::App& program) {
   declare_input(command, command.add_option("FOLDER", arguments->folders,
                                             "where shards have written to: results/NAME, of each machine"))
       ->required();
-  command.add_option("-o,--output", arguments->output, "folder for all results (default: FOLDER, if there is but one)")
+  declare_output_folder(command, command.add_option("-o,--output", arguments->output,
+                                                    "another folder, for all results (default: FOLDER, if only one)"))
       ->type_name("FOLDER");
   command.add_flag("--allow-failures", arguments->are_failures_allowed,
                    "failed items are results: end with 0 all the same");
