@@ -31,6 +31,7 @@ figures=(
   "${main[@]}" "${page[@]}" python3 python3-matplotlib python3-pil
   libbenchmark-dev libmeshoptimizer-dev libcgal-dev draco libdraco-dev                  # what the experiments compare with
 )
+# shellcheck disable=SC2034  # by its name below
 all=(
   "${figures[@]}" "${package[@]}"
   libgtest-dev openexr oclgrind                                      # tests (models against exrheader, kernels under Oclgrind)
