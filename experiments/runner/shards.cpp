@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <string_view>
 
 #include "json_files.h"
 #include "results.h"
@@ -32,6 +33,13 @@ void copy_results(const fs::path& from, const fs::path& to) {
   if (code) throw IoError(fmt::format("{} cannot be copied to {}: {}", from.string(), to.string(), code.message()));
 }
 
+/// What shards of one run have in common, of a record. How many files differ from the commit may change on the way.
+OrderedJson identity_of(const OrderedJson& record, const char* key) {
+  const OrderedJson& value = record.at(key);
+  if (key != std::string_view("git")) return value;
+  return {{"commit", value.at("commit")}, {"is_clean", value.at("changed_files") == "0"}};
+}
+
 /// The records of all shards, in order.
 /// \throw InputError when some are missing or do not belong together
 std::vector<OrderedJson> read_records(const fs::path& folder) {
@@ -52,7 +60,7 @@ std::vector<OrderedJson> read_records(const fs::path& folder) {
       missing.push_back(i);
   for (const OrderedJson& record : records)
     for (const char* key : {"experiment", "inputs", "git"})
-      if (record.at(key) != records[0].at(key) || record.at("shard").at("count") != count)
+      if (identity_of(record, key) != identity_of(records[0], key) || record.at("shard").at("count") != count)
         throw InputError(fmt::format("{}: shards {}/{} and {}/{} are not of one run, as \"{}\" differs; run one again",
                                      folder.string(), index(records[0]), count, index(record),
                                      record.at("shard").at("count").get<int>(), key));
