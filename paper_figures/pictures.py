@@ -146,6 +146,13 @@ def morph_methods(results):
                           ("symmetric Dirichlet energy (4: none)", _number("symmetric_dirichlet", "{:.2f}"))], "pair and method")]
 
 
+def landmarks(results):
+    names = {"without": "the skeletons alone", "with": "with landmarks at eyes, brows, nose and mouth"}
+    return [Sheet("landmarks", [[Picture(results.file("landmarks", f"{case}.png"), names.get(case, case)) for case in results.parameters("landmarks", "case")]], wrap=2),
+            _table(results.rows("landmarks"), [("map: area distortion", _number("area_distortion", "{:.2f}")), ("angle distortion", _number("angle_distortion", "{:.2f}")),
+                                               ("symmetric Dirichlet energy (4: none)", _number("symmetric_dirichlet", "{:.2f}"))], "case")]
+
+
 def animation(results):
     rows = results.rows("animation")
     names, times = results.parameters("animation", "animation"), sorted(results.parameters("animation", "time"))

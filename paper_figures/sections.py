@@ -130,6 +130,9 @@ PAPER = [
             here="Weights of the bone that turns, from 0 (dark) to 1 (bright); the bones beyond it go along as a whole.",
             remark="The man's upper arm moves the arm and its shoulder alone. A joint in the middle of a wide trunk reaches as far as the trunk is wide: the thighs of the camel and the cow take part of the other "
                    "thigh along, and the armadillo's neck its chest, shell and upper arms."),
+    Section("landmarks", "Beyond the paper: landmarks", pictures.landmarks, "", (), ("landmarks",),
+            here="Half-way from man to homer at 512 x 512 texels. Nine points on each face are to meet; the map of the head bends smoothly so that they do, and stays one-to-one.",
+            remark="With landmarks there is one mouth and one nose. They cost some distortion of the map."),
     Section("iterations", "Beyond the paper: iterations of VSM", sweeps.iterations, "", (), ("iterations",),
             here="The paper's weights w A even out areas in the texture; divided by a power of the surface area they even out the texels on the surface. Zero iterations are the barycentric map with equal weights."),
     Section("recipe", "Beyond the paper: its recipe, and each change alone", sweeps.recipe, "", (), ("recipe",),

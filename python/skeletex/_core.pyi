@@ -59,6 +59,8 @@ def morph(
     layout: Optional[int],
     size: int,
     is_smooth: bool,
+    first_landmarks: _Points,
+    second_landmarks: _Points,
     /,
 ) -> List[Model]: ...
 def correspond(a: Model, b: Model, bones: _Pairs, /) -> Tuple[List[int], List[bool], float]: ...

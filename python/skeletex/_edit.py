@@ -63,6 +63,7 @@ def morphs(
     layout: Optional[int] = None,
     size: Optional[int] = None,
     creases: bool = False,
+    landmarks: Sequence[Tuple[ArrayLike, ArrayLike]] = (),
 ) -> List[Model]:
     """Several in-between models, see :func:`morph`; what they have in common is computed once.
 
@@ -73,8 +74,23 @@ def morphs(
         raise InputError("weights: a list for each result, with one weight per model")
     if bones is not None and len(models) != 2:
         raise InputError("bones: they pair the bones of two models")
+    if len(landmarks) > 0 and len(models) != 2:
+        raise InputError("landmarks: they pair the points of two models")
+    try:
+        pairs = np.asarray(landmarks, dtype=np.float64).reshape(-1, 2, 3)
+    except (TypeError, ValueError):
+        raise InputError("landmarks: pairs of points [x, y, z] are wanted") from None
     lists = [[float(weight) for weight in row] for row in given]
-    made = _core.morph([model._core for model in models], lists, bone_pairs(bones), layout, size or 0, not creases)
+    made = _core.morph(
+        [model._core for model in models],
+        lists,
+        bone_pairs(bones),
+        layout,
+        size or 0,
+        not creases,
+        np.ascontiguousarray(pairs[:, 0]),
+        np.ascontiguousarray(pairs[:, 1]),
+    )
     return [Model(core) for core in made]
 
 
@@ -86,6 +102,7 @@ def morph(
     layout: Optional[int] = None,
     size: Optional[int] = None,
     creases: bool = False,
+    landmarks: Sequence[Tuple[ArrayLike, ArrayLike]] = (),
 ) -> Model:
     """An in-between model of two or more models whose skeletons branch alike.
 
@@ -96,14 +113,15 @@ def morph(
         largest weight. Results of one layout have textures that correspond texel by texel.
     :param size: texels along the longer side; None: the largest of the models'
     :param creases: leave creases where bones of different turns meet: the texels' means alone
-    :raises InputError: where weights, numbers of handles or branching do not fit
+    :param landmarks: of two models: pairs of points, one on each surface, that are to become one
+    :raises InputError: where weights, numbers of handles or branching do not fit, or landmarks cannot meet
     """
     given = _weight_array(weights)
     if given.ndim == 0 and len(models) == 2:
         given = np.array([1 - float(given), float(given)])
     if given.ndim != 1:
         raise InputError("weights: one per model; of two models also one number")
-    return morphs(models, [given], bones=bones, layout=layout, size=size, creases=creases)[0]
+    return morphs(models, [given], bones=bones, layout=layout, size=size, creases=creases, landmarks=landmarks)[0]
 
 
 def transfer(

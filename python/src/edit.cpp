@@ -3,6 +3,7 @@
 #include "skeletex/edit/filter/differential.h"
 #include "skeletex/edit/filter/filter.h"
 #include "skeletex/edit/live.h"
+#include "skeletex/edit/morph/landmarks.h"
 #include "skeletex/edit/morph/morph.h"
 #include "skeletex/edit/regular_grid.h"
 #include "skeletex/edit/transfer/mirror.h"
@@ -17,7 +18,13 @@ using BonePairs = std::vector<std::pair<std::string, std::string>>;
 
 /// One model for each list of weights.
 std::vector<Model> morph(const std::vector<Model>& models, const std::vector<std::vector<double>>& weights,
-                         const BonePairs& bones, std::optional<int> layout, int size, bool is_smooth) {
+                         const BonePairs& bones, std::optional<int> layout, int size, bool is_smooth,
+                         const Points& first_landmarks, const Points& second_landmarks) {
+  const std::vector<Vec3> first_points = points_of(first_landmarks, "landmarks"),
+                          second_points = points_of(second_landmarks, "landmarks");
+  std::vector<Landmark> landmarks;
+  for (std::size_t i = 0; i < first_points.size(); ++i)
+    landmarks.push_back({std::to_string(i), first_points[i], second_points.at(i)});
   std::vector<SkeletexModel> given;
   for (const Model& model : models) given.push_back(whole(model));
   const py::none no_callback;
@@ -25,6 +32,8 @@ std::vector<Model> morph(const std::vector<Model>& models, const std::vector<std
     std::vector<Correspondence> from_first;
     for (std::size_t m = 1; m < given.size(); ++m)
       from_first.push_back(find_correspondence(given[0].skeleton, given[m].skeleton, {.given = bones}));
+    if (!landmarks.empty())
+      given[1] = align_landmarks(context, given[0], std::move(given[1]), from_first[0], landmarks);
     MorphOptions options;
     options.layout = layout;
     options.size = size;

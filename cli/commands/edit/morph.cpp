@@ -11,6 +11,7 @@
 #include "bone_pairs.h"
 #include "command.h"
 #include "files.h"
+#include "landmark_file.h"
 #include "progress_bar.h"
 #include "result_file.h"
 #include "skeletex/edit/morph/surface_map.h"
@@ -25,7 +26,7 @@ namespace {
 struct Arguments {
   std::vector<std::string> models, bones;
   std::vector<double> times, weights;
-  std::string output, device, json;
+  std::string output, device, json, landmarks;
   int frames = 0, layout = 0, size = 0;
   bool has_creases = false, has_regular_grid = false;
 };
@@ -60,6 +61,8 @@ void check_arguments(const Arguments& arguments) {
         fmt::format("{} weights for {} models; give one per model", arguments.weights.size(), arguments.models.size()));
   if (!arguments.bones.empty() && arguments.models.size() != 2)
     throw CLI::ValidationError("--bones", "pairs the bones of two models");
+  if (!arguments.landmarks.empty() && arguments.models.size() != 2)
+    throw CLI::ValidationError("--landmarks", "pairs the points of two models");
   if (arguments.layout > static_cast<int>(arguments.models.size()))
     throw CLI::ValidationError(
         fmt::format("--layout {}: there are {} models", arguments.layout, arguments.models.size()));
@@ -106,8 +109,31 @@ Json measure_maps(ClContext& context, const Arguments& arguments, const Morph& m
                     {"cost", from_first[m - 1].cost},
                     {"distortion", distortion_json(d)}});
   }
-  text = table.text() + '\n';
+  text += table.text() + '\n';
   return maps;
+}
+
+/// Makes the landmarks of two models meet.
+/// \param text  a table of them
+Json meet_landmarks(ClContext& context, const std::string& path, std::vector<SkeletexModel>& models,
+                    const Correspondence& first_to_second, std::string& text) {
+  const std::vector<Landmark> landmarks = read_landmarks(path);
+  const auto distances = [&] { return landmark_distances(context, models[0], models[1], first_to_second, landmarks); };
+  const std::vector<double> before = distances();
+  try {
+    models[1] = align_landmarks(context, models[0], std::move(models[1]), first_to_second, landmarks);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", path, error.what()));
+  }
+  const std::vector<double> after = distances();
+  Json json = Json::array();
+  Table table({"landmark, distance / diagonal", "without", "with"});
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    table.add({landmarks[i].name, fmt::format("{:.1e}", before[i]), fmt::format("{:.1e}", after[i])});
+    json.push_back({{"name", landmarks[i].name}, {"distance_without", before[i]}, {"distance", after[i]}});
+  }
+  text += table.text() + '\n';
+  return json;
 }
 
 void run(const Arguments& arguments, const CLI::App& command) {
@@ -130,10 +156,12 @@ void run(const Arguments& arguments, const CLI::App& command) {
   options.size = arguments.size;
   options.is_smooth = !arguments.has_creases;
   options.has_own_texels = !arguments.has_regular_grid;
-  const Morph morph(context, std::move(models), from_first, options);
-
   Json json{{"maps", Json::array()}, {"results", Json::array()}};
   std::string text;
+  if (!arguments.landmarks.empty())
+    json["landmarks"] = meet_landmarks(context, arguments.landmarks, models, from_first[0], text);
+  const Morph morph(context, std::move(models), from_first, options);
+
   {
     ProgressBar bar(context);
     bar.show("measuring", 0.05);
@@ -181,6 +209,9 @@ void add_morph_command(CLI::App& program) {
   command.add_option("--bones", arguments->bones, "pairs of bones that must correspond; the rest is found")
       ->delimiter(',')
       ->type_name("A=B,..");
+  declare_input(command, command.add_option("--landmarks", arguments->landmarks,
+                                            "points on both surfaces that are to meet, as JSON: see docs/morph.md"))
+      ->type_name("FILE");
   command
       .add_option("--layout", arguments->layout,
                   "take rectangles, names and order of bones from the K-th model (default: that of the largest weight)")

@@ -470,7 +470,8 @@ SkeletexModel resample_model(ClContext& context, const PreparedModel& prepared, 
   if (keeps_texels) {
     refine_texels(context, prepared, result);
   } else if (has_own_places) {
-    snap_again(context, prepared, result);
+    const TriangleMesh mesh = reconstruct_bind_mesh(context, prepared).mesh;
+    snap_again(context, prepared, mesh, charts_of_mesh(prepared, mesh), result);
   } else {
     result.diagonals = DiagonalRule::kNearest;  // new texels lie evenly
     TexelResampling(context, prepared, result).run(result.texture);

@@ -277,17 +277,16 @@ std::vector<Chart> charts_of_mesh(const PreparedModel& prepared, const TriangleM
   return charts;
 }
 
-void snap_again(ClContext& context, const PreparedModel& prepared, SkeletexModel& result) {
+void snap_again(ClContext& context, const PreparedModel& prepared, const TriangleMesh& mesh,
+                std::span<const Chart> charts, SkeletexModel& result) {
   const SkeletexModel& model = prepared.model;
-  const TriangleMesh mesh = reconstruct_bind_mesh(context, prepared).mesh;
   const TriangleTree tree = build_triangle_tree(mesh);
-  const std::vector<Chart> charts = charts_of_mesh(prepared, mesh);
   std::vector<Method> methods;
   std::vector<SpdHits> hits(charts.size());
   for (std::size_t bone = 0; bone < charts.size(); ++bone) {
-    methods.push_back(model.patches[bone].method);
+    methods.push_back(result.patches[bone].method);
     if (is_height_field(methods[bone]))
-      hits[bone] = cast_spd_rays(context, model.skeleton, prepared.separation, std::span(charts).subspan(bone, 1),
+      hits[bone] = cast_spd_rays(context, model.skeleton, prepared.separation, charts.subspan(bone, 1),
                                  std::span(result.patches).subspan(bone, 1), SpdHit::kLast)[0];
   }
   result.diagonals = model.diagonals;

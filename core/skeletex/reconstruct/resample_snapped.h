@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <span>
 #include <vector>
 
 #include "skeletex/convert/parameterize/chart.h"
@@ -27,10 +28,12 @@ void refine_texels(ClContext& context, const PreparedModel& model, SkeletexModel
 /// The arc with each of its edges divided.
 SeamArc divide_arc(const SkeletexModel& model, const SeparationPlanes& separation, const SeamArc& arc, int parts);
 
-/// Sets the texels of a coarser layout: the mesh of the model is snapped and fitted anew, with the texels' places as
-/// its map.
+/// Sets the texels of a layout that is no refinement: the mesh of the model is snapped and fitted anew.
+/// \param mesh    of the model, see reconstruct_bind_mesh
+/// \param charts  its map: charts_of_mesh, or these with moved places
 /// \param result  with its patches and seams; its sampling and rule of diagonals are set too
-void snap_again(ClContext& context, const PreparedModel& model, SkeletexModel& result);
+void snap_again(ClContext& context, const PreparedModel& model, const TriangleMesh& mesh, std::span<const Chart> charts,
+                SkeletexModel& result);
 
 /// The patches of a model's mesh as mapped charts: texels at their places.
 /// \param mesh  see reconstruct_mesh

@@ -7,9 +7,9 @@
 
 namespace skeletex {
 
-/// Normals of a surface after its vertices have moved: they turn as the triangles around a vertex do. Each triangle
-/// maps a normal by the inverse transpose of the linear map that takes its edges and unit normal to those that it has
-/// afterwards; the mean, weighted by the areas before, is what the vertex gets.
+/// Normals of a surface after its vertices have moved: they turn as the triangles around a vertex do, by the rotation
+/// nearest to the maps of their axes. So a mesh's creases stay out of smooth normals, and no stretch magnifies the
+/// angle between normals and triangles, as the inverse transpose of a triangle's map would.
 /// \param before  triangles, and where the vertices were
 /// \param normals  unit, per vertex
 /// \param after  where they are
