@@ -14,6 +14,7 @@ packages=(
   libcli11-dev libspdlog-dev libembree-dev                           # program (bench compares with Embree)
   libgtest-dev openexr oclgrind                                      # tests (models against exrheader, kernels under Oclgrind)
   clang-format clang-tidy                                            # scripts/lint.sh
+  groff-base zsh fish                                                # tests: manual pages, and completions by the shells
   libbenchmark-dev python3 python3-matplotlib python3-pil                               # benchmarks, tables of the experiments
   libmeshoptimizer-dev libcgal-dev draco libdraco-dev                                   # what the experiments compare with
   pybind11-dev python3-dev python3-numpy python3-setuptools python3-venv python3-pytest mypy  # the Python package, and its tests
