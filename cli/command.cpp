@@ -9,6 +9,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <map>
 
 #include "files.h"
 #include "skeletex/analysis/manifold.h"
@@ -33,13 +34,56 @@ void add_json_option(CLI::App& command, std::string& target) {
       ->type_name("FILE|-");
 }
 
+namespace {
+
+std::map<const CLI::Option*, std::vector<std::string>>& words_of_options() {
+  static std::map<const CLI::Option*, std::vector<std::string>> all;
+  return all;
+}
+
+}  // namespace
+
+std::vector<std::string> words_of(const CLI::Option& option) {
+  const auto found = words_of_options().find(&option);
+  return found == words_of_options().end() ? std::vector<std::string>() : found->second;
+}
+
 void take_one_of(CLI::Option& option, const std::vector<std::string>& words) {
+  words_of_options()[&option] = words;
   std::string list;
   for (const std::string& word : words) list += (list.empty() ? "" : "|") + word;
   option.type_name(list)->check(
       [words, list](const std::string& given) -> std::string {
         if (std::find(words.begin(), words.end(), given) != words.end()) return {};
         return fmt::format("\"{}\" is not one of {}{}", given, list, did_you_mean(given, words));
+      },
+      "");
+}
+
+namespace {
+
+std::vector<std::string> command_names(const CLI::App& program) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; }))
+    names.push_back(command->get_name());
+  return names;
+}
+
+}  // namespace
+
+void check_command(const CLI::App& program, const std::string& name) {
+  const std::vector<std::string> names = command_names(program);
+  if (std::find(names.begin(), names.end(), name) == names.end())
+    throw CLI::ExtrasError(fmt::format("unknown command {}{}", name, did_you_mean(name, names)),
+                           CLI::ExitCodes::ExtrasError);
+}
+
+void take_command(CLI::Option& option, const CLI::App& program) {
+  words_of_options()[&option] = command_names(program);
+  option.check(
+      [&program](const std::string& given) {
+        check_command(program, given);
+        return std::string();
       },
       "");
 }

@@ -40,6 +40,9 @@ void add_segment_command(CLI::App& program);
 void add_validate_command(CLI::App& program);
 void add_inspect_command(CLI::App& program);
 void add_devices_command(CLI::App& program);
+void add_help_command(CLI::App& program);
+void add_completions_command(CLI::App& program);
+void add_manual_command(CLI::App& program);
 void add_render_command(CLI::App& program);
 void add_view_command(CLI::App& program);
 void add_bench_command(CLI::App& program);
@@ -59,6 +62,12 @@ void add_device_option(CLI::App& command, std::string& selector);
 void add_json_option(CLI::App& command, std::string& target);
 /// The option takes one of a few words; the message about another one names the nearest.
 void take_one_of(CLI::Option& option, const std::vector<std::string>& words);
+/// The option takes the name of one of the commands that the program has by now.
+void take_command(CLI::Option& option, const CLI::App& program);
+/// \throw CLI::ExtrasError that names the nearest command when there is none of this name
+void check_command(const CLI::App& program, const std::string& name);
+/// \return the words of take_one_of and take_command; none where the option takes others
+std::vector<std::string> words_of(const CLI::Option& option);
 /// Writes to the file (atomically) or, for "-", to standard output. Does nothing for "".
 void write_json(const std::string& target, const Json& json);
 

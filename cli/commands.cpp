@@ -30,6 +30,11 @@ void add_commands(CLI::App& program) {
   add_collect_command(program);
   add_replay_command(program);
   add_devices_command(program);
+  add_help_command(program);
+  add_completions_command(program);
+  add_manual_command(program);
+  for (const char* name : {"help", "manual"})
+    take_command(*program.get_subcommand(name)->get_option("COMMAND"), program);
   for (CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; }))
     command->parse_complete_callback([command] { check_files(*command); });
 }

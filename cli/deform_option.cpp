@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 
+#include "files.h"
+#include "skeletex/io/pose_file.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex::cli {
@@ -15,6 +17,21 @@ constexpr std::array kDeformations{Deformation::kSmooth, Deformation::kCoordinat
                                    Deformation::kLinear};
 
 }  // namespace
+
+CLI::Option* add_pose_option(CLI::App& command, std::string& value) {
+  return declare_input(command, command.add_option("--pose", value,
+                                                   "pose or animation of a model: .json. A pattern such as "
+                                                   "'poses/*.json' takes all of them, each with an output of its own, "
+                                                   "in which {name} is the pose's name"))
+      ->type_name("FILE");
+}
+
+std::optional<Skeleton> posed_skeleton(const Skeleton& bind, const std::string& pose,
+                                       const std::optional<double>& time) {
+  if (pose.empty()) return std::nullopt;
+  const PoseAnimation animation = read_animation(pose, bind);
+  return apply_pose(bind, pose_at(bind, animation, time.value_or(animation.frames.front().time)));
+}
 
 CLI::Option* add_deform_option(CLI::App& command, std::string& value) {
   CLI::Option* option = command.add_option(

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <optional>
 #include <string>
 
 #include "command.h"
@@ -7,6 +8,14 @@
 
 namespace skeletex::cli {
 
+/// --pose, a file or a pattern of files (output_names.h).
+CLI::Option* add_pose_option(CLI::App& command, std::string& value);
+/// The skeleton as a file poses it.
+/// \param pose  empty: not at all
+/// \param time  in an animation; none: that of its first frame
+/// \throw IoError, InputError
+std::optional<Skeleton> posed_skeleton(const Skeleton& bind, const std::string& pose,
+                                       const std::optional<double>& time);
 /// --deform smooth, coordinates, paper or linear.
 CLI::Option* add_deform_option(CLI::App& command, std::string& value);
 /// --polish.

@@ -122,6 +122,8 @@ bool has_ending(const std::string& path, const std::string& ending) {
   return lower.ends_with(ending);
 }
 
+bool is_model_path(const std::string& path) { return has_ending(path, ".exr") || has_ending(path, ".skx"); }
+
 std::string option_name(const CLI::Option& option) {
   return option.get_lnames().empty() ? option.get_name(true) : "--" + option.get_lnames().front();
 }

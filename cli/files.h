@@ -31,6 +31,8 @@ const std::vector<FileOption>& files_of(const CLI::App& command);
 
 /// \param ending  with its dot, in lower case; the path's may be in capitals
 bool has_ending(const std::string& path, const std::string& ending);
+/// Whether it is a model to read: .skx.exr, or a compact file.
+bool is_model_path(const std::string& path);
 /// As messages name it: "MESH", "--output".
 std::string option_name(const CLI::Option& option);
 

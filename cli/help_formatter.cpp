@@ -35,18 +35,22 @@ std::string entry(const std::string& name, const std::string& description) {
 
 }  // namespace
 
+std::string describe(const CLI::Option& option) {
+  std::string description = option.get_description();
+  const std::string standard = option.get_default_str();
+  if (!standard.empty() && standard != "[]" && option.get_type_size() > 0)
+    description += " (default: " + standard + ")";
+  if (!option.get_positional() && option.get_required()) description += " (required)";
+  return description;
+}
+
 HelpFormatter::HelpFormatter() { column_width(kIndent); }
 
 std::string HelpFormatter::make_option(const CLI::Option* option, bool is_positional) const {
   std::string name = is_positional ? option->get_name(true) : option->get_name(false, true);
   if (!is_positional && option->get_type_size() > 0 && !option->get_type_name().empty())
     name += ' ' + option->get_type_name();
-  std::string description = option->get_description();
-  const std::string standard = option->get_default_str();
-  if (!standard.empty() && standard != "[]" && option->get_type_size() > 0)
-    description += " (default: " + standard + ")";
-  if (!is_positional && option->get_required()) description += " (required)";
-  return entry(name, description);
+  return entry(name, describe(*option));
 }
 
 std::string HelpFormatter::make_subcommand(const CLI::App* command) const {

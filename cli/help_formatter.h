@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <CLI/CLI.hpp>
+#include <string>
 
 namespace skeletex::cli {
 
@@ -11,5 +12,8 @@ class HelpFormatter : public CLI::Formatter {
   std::string make_option(const CLI::Option* option, bool is_positional) const override;
   std::string make_subcommand(const CLI::App* command) const override;
 };
+
+/// The description of an option with its default, or that it is required.
+std::string describe(const CLI::Option& option);
 
 }  // namespace skeletex::cli

@@ -3,6 +3,7 @@
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -21,9 +22,6 @@ namespace {
 /// Reports a mistyped command or option with the nearest name before the parser, whose message has none.
 /// \param chosen  the command's name, as soon as it is known
 void check_names(const CLI::App& program, int argc, char** argv, std::string& chosen) {
-  const std::vector<const CLI::App*> all = program.get_subcommands([](const CLI::App*) { return true; });
-  std::vector<std::string> commands;
-  for (const CLI::App* command : all) commands.push_back(command->get_name());
   const CLI::App* app = &program;
   for (int i = 1; i < argc; ++i) {
     const std::string argument = argv[i];
@@ -37,11 +35,8 @@ void check_names(const CLI::App& program, int argc, char** argv, std::string& ch
         throw CLI::ExtrasError(fmt::format("unknown option {}{}", name, did_you_mean(name, names)),
                                CLI::ExitCodes::ExtrasError);
     } else if (app == &program && !argument.starts_with('-')) {
-      const auto found = std::find(commands.begin(), commands.end(), argument);
-      if (found == commands.end())
-        throw CLI::ExtrasError(fmt::format("unknown command {}{}", argument, did_you_mean(argument, commands)),
-                               CLI::ExitCodes::ExtrasError);
-      app = all[found - commands.begin()];
+      check_command(program, argument);
+      app = program.get_subcommand(argument);
       chosen = argument + ' ';
     }
   }
@@ -59,12 +54,12 @@ class PrintableText : public spdlog::custom_flag_formatter {
 
 int run(int argc, char** argv) {
   CLI::App program("A closed triangle mesh and its skeleton as one displacement texture, and back.", "skeletex");
-  program.set_version_flag("--version", std::string("skeletex ") + SKELETEX_VERSION);
+  program.set_version_flag("-v,--version", std::string("skeletex ") + SKELETEX_VERSION);
   program.require_subcommand(1);
   program.formatter(std::make_shared<HelpFormatter>());
   add_commands(program);
   program.footer(
-      "`skeletex COMMAND --help` tells more. Exit codes: 0 done, 1 input or run, 2 usage.\n"
+      "`skeletex help COMMAND` tells more. Exit codes: 0 done, 1 input or run, 2 usage.\n"
       "Examples:\n"
       "  skeletex encode bear.off bear.skeleton.json -o bear.skx.exr\n"
       "  skeletex reconstruct bear.skx.exr -o bear.ply\n"
@@ -104,7 +99,9 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   auto log = spdlog::stderr_color_mt("skeletex");
   auto pattern = std::make_unique<spdlog::pattern_formatter>();
-  pattern->add_flag<skeletex::cli::PrintableText>('*').set_pattern("%^%l:%$ %*");
+  // On a terminal a message takes the place of the progress bar.
+  pattern->add_flag<skeletex::cli::PrintableText>('*').set_pattern(
+      std::string(::isatty(STDERR_FILENO) != 0 ? "\r\033[K" : "") + "%^%l:%$ %*");
   log->set_formatter(std::move(pattern));
   spdlog::set_default_logger(log);
   return skeletex::cli::run(argc, argv);

@@ -36,6 +36,7 @@ all=(
   "${figures[@]}" "${package[@]}"
   libgtest-dev openexr oclgrind                                      # tests (models against exrheader, kernels under Oclgrind)
   clang-format clang-tidy                                            # scripts/lint.sh
+  groff-base zsh fish                                                # tests: manual pages, and completions by the shells
   pybind11-dev python3-dev python3-numpy python3-setuptools python3-venv python3-pytest mypy  # the Python package, and its tests
   chromium                                                                              # tests: the report and the page of `view` in a browser
   snakemake slurmctld slurmd slurm-client munge                                         # tests: sweeps on many machines

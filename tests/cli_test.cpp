@@ -152,7 +152,22 @@ TEST_F(Program, HelpsWithEveryCommandOnStandardOutput) {
   }
 }
 
-TEST_F(Program, SaysItsVersion) { EXPECT_TRUE(run({"--version"}).out.starts_with("skeletex 0.")); }
+TEST_F(Program, SaysItsVersion) {
+  EXPECT_TRUE(run({"--version"}).out.starts_with("skeletex 0."));
+  EXPECT_EQ(run({"-v"}).out, run({"--version"}).out);
+}
+
+TEST_F(Program, HelpWithACommandSaysWhatTheCommandsHelpSays) {
+  for (const std::string& command : kCommands) {
+    const Outcome help = run({"help", command});
+    EXPECT_EQ(help.code, 0) << help.err;
+    EXPECT_EQ(help.out, run({command, "--help"}).out);
+  }
+  EXPECT_EQ(run({"help"}).out, run({"--help"}).out);
+  expect_refused(2, {"help", "encoed"}, {"unknown command encoed", "did you mean encode?"});
+  expect_refused(2, {"manual", "metor"}, {"unknown command metor", "did you mean metro?"});
+  expect_refused(2, {"completions", "bsh"}, {"did you mean bash?"});
+}
 
 TEST_F(Program, EndsWithTwoOnWrongUsageAndGivesTheNearestName) {
   expect_refused(2, {}, {"skeletex --help"});
@@ -508,6 +523,23 @@ TEST_F(Program, MeasuresAndReportsWhatTheContractNames) {
   for (const char* name : {"again.ply", "d.csv", "d.ply"}) fs::remove(folder_ / name);
 }
 
+TEST_F(Program, MeasuresModelsAsTheMeshesThatTheyReconstructTo) {
+  ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "large.ply", "--size", "96"}).code, 0);
+  ASSERT_EQ(run({"pack", "y.skx.exr", "-o", "y.skx", "--size", "64", "--quality", "20"}).code, 0);
+  const nlohmann::json mesh = json_of({"metro", "y.ply", "large.ply", "--samples", "20000"}),
+                       model = json_of({"metro", "y.ply", "y.skx.exr", "--size", "96", "--samples", "20000"}),
+                       compact = json_of({"metro", "y.skx.exr", "y.skx", "--samples", "20000"});
+  for (const char* part : {"forward", "backward", "vertex"})
+    EXPECT_NEAR(model[part]["mean"].get<double>(), mesh[part]["mean"].get<double>(),
+                1e-3 * mesh[part]["mean"].get<double>());
+  EXPECT_NEAR(model["normals"]["forward"]["shading"]["mean"].get<double>(),
+              mesh["normals"]["forward"]["shading"]["mean"].get<double>(), 0.01);
+  EXPECT_GT(compact["forward"]["mean"].get<double>(), 0);
+  EXPECT_LT(compact["forward"]["mean"].get<double>(), 1e-3);
+  expect_refused(2, {"metro", "y.ply", "y.ply", "--size", "64"}, {"--size", "neither A nor B"});
+  for (const char* name : {"large.ply", "y.skx"}) fs::remove(folder_ / name);
+}
+
 TEST_F(Program, FindsNoDistanceFromAMeshToItself) {
   const nlohmann::json json = json_of({"metro", "y.ply", "y.ply", "--samples", "5000"});
   EXPECT_LT(json["forward"]["max"].get<double>(), 1e-6);
@@ -783,6 +815,104 @@ TEST_F(Program, DrawsModelsAndMeshesInEveryMode) {
   std::ofstream(folder_ / "view.json") << R"({"azimut": 3})";
   expect_refused(1, {"render", "y.ply", "-o", "a.png", "--camera", "view.json"}, {"view.json", "azimut"});
   for (const char* name : {"y.json", "a.json", "view.json"}) fs::remove(folder_ / name);
+}
+
+TEST_F(Program, LooksAtTheSideOfTheModelThatIsNamed) {
+  ASSERT_EQ(run({"encode", "y.ply", "y.skeleton.json", "-o", "z.skx.exr", "--size", "32", "--up", "z"}).code, 0);
+  const auto picture = [&](std::vector<std::string> view) {
+    std::vector<std::string> arguments{"render", "z.skx.exr", "-o", "a.png", "--size", "64x48", "--samples", "1"};
+    arguments.insert(arguments.end(), view.begin(), view.end());
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return text_of(folder_ / "a.png");
+  };
+  // The model stands along z and looks along -y; its left is x.
+  const std::vector<std::array<const char*, 4>> sides{{"front", "-y", "0", "0"}, {"back", "+y", "180", "0"},
+                                                      {"left", "+x", "90", "0"}, {"right", "-x", "-90", "0"},
+                                                      {"top", "+z", "0", "90"},  {"bottom", "-z", "0", "-90"}};
+  std::set<std::string> all;
+  for (const auto& [side, axis, azimuth, elevation] : sides) {
+    const std::string named = picture({"--view", side});
+    EXPECT_EQ(named, picture({"--azimuth", azimuth, "--elevation", elevation})) << side;
+    EXPECT_EQ(named, picture({"--view", axis})) << side;
+    all.insert(named);
+  }
+  EXPECT_EQ(all.size(), sides.size());
+  expect_refused(2, {"render", "y.ply", "-o", "b.png", "--view", "frnt"}, {"--view", "did you mean front?"});
+  expect_refused(2, {"render", "y.ply", "-o", "b.png", "--view", "+w"}, {"--view", "+x"});
+  expect_refused(2, {"render", "y.ply", "-o", "b.png", "--view", "left", "--azimuth", "3"}, {"--view", "--azimuth"});
+  for (const char* name : {"a.png", "z.skx.exr"}) fs::remove(folder_ / name);
+}
+
+TEST_F(Program, TakesAllPosesOfAPatternAndDrawsThemAllTheWayRound) {
+  const std::string bone = read_skeleton(folder_ / "y.skeleton.json").bones[1].name;
+  fs::create_directory(folder_ / "poses");
+  for (const int degrees : {20, 40})
+    std::ofstream(folder_ / "poses" / fmt::format("bent{}.json", degrees))
+        << nlohmann::json{{"rotations", {{bone, {{"axis", {1, 0, 0}}, {"degrees", degrees}}}}}};
+  const nlohmann::json meshes =
+      json_of({"reconstruct", "y.skx.exr", "--pose", "poses/*.json", "-o", "all_{name}.ply", "--no-report"});
+  ASSERT_EQ(meshes.size(), 2u);
+  EXPECT_EQ(meshes[1].at("output"), "all_bent40.ply");
+  ASSERT_EQ(run({"reconstruct", "y.skx.exr", "--pose", "poses/bent40.json", "-o", "one.ply"}).code, 0);
+  EXPECT_EQ(text_of(folder_ / "one.ply"), text_of(folder_ / "all_bent40.ply"));
+  EXPECT_NE(text_of(folder_ / "one.ply"), text_of(folder_ / "all_bent20.ply"));
+
+  const std::vector<std::string> small{"--size", "64x48", "--samples", "1"};
+  const auto render = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "render");
+    arguments.insert(arguments.end(), small.begin(), small.end());
+    return json_of(arguments);
+  };
+  const nlohmann::json turned = render({"y.skx.exr", "--pose", "poses/*.json", "--turntable", "3", "-o", "{name}.png"});
+  ASSERT_EQ(turned.size(), 2u);
+  EXPECT_EQ(turned[0].at("pictures"), (std::vector<std::string>{"bent20_000.png", "bent20_001.png", "bent20_002.png"}));
+  std::set<std::string> pictures;
+  for (const nlohmann::json& pose : turned)
+    for (const std::string path : pose.at("pictures")) pictures.insert(text_of(folder_ / path));
+  EXPECT_EQ(pictures.size(), 6u);
+  render({"y.skx.exr", "--pose", "poses/bent40.json", "--turntable", "3", "-o", "again.png"});
+  EXPECT_EQ(text_of(folder_ / "again_001.png"), text_of(folder_ / "bent40_001.png"));
+  EXPECT_EQ(render({"y.ply", "--turntable", "2", "-o", "mesh.png"}).at("pictures").size(), 2u);
+  for (const char* name : {"all_bent20.ply", "all_bent40.ply", "one.ply", "mesh_000.png", "mesh_001.png"})
+    EXPECT_TRUE(fs::remove(folder_ / name)) << name;
+  for (const char* stem : {"bent20", "bent40", "again"})
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(fs::remove(folder_ / fmt::format("{}_{:03}.png", stem, i)));
+
+  expect_refused(1, {"reconstruct", "y.skx.exr", "--pose", "none/*.json", "-o", "{name}.ply"}, {"none/*.json"});
+  expect_refused(2, {"reconstruct", "y.skx.exr", "--pose", "poses/*.json", "-o", "a.ply"}, {"{name}", "2 poses"});
+  expect_refused(1, {"reconstruct", "y.skx.exr", "--pose", "poses/*.json", "-o", "no/{name}.ply"}, {"no"});
+  expect_refused(2, {"render", "y.skx.exr", "--turntable", "3", "--views", "2", "-o", "a.png"}, {"--turntable"});
+  expect_refused(2, {"render", "y.skx.exr", "--turntable", "3", "--mode", "map", "-o", "a.png"}, {"texture"});
+  std::ofstream(folder_ / "eye.json") << R"({"eye": [9, 0, 0]})";
+  expect_refused(2, {"render", "y.skx.exr", "--turntable", "3", "--camera", "eye.json", "-o", "a.png"}, {"eye"});
+  for (const char* more : {"a", "b"}) {
+    fs::create_directory(folder_ / "poses" / more);
+    fs::copy(folder_ / "poses" / "bent20.json", folder_ / "poses" / more / "bent20.json");
+  }
+  expect_refused(2, {"reconstruct", "y.skx.exr", "--pose", "poses/*/bent20.json", "-o", "{name}.ply"},
+                 {"same name", "bent20.ply"});
+  fs::remove_all(folder_ / "poses");
+  fs::remove(folder_ / "eye.json");
+}
+
+TEST_F(Program, WarnsOfWhatACompactFileLeavesOutOnlyWhereTheInputHasIt) {
+  const auto encode = [&](const char* mesh, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments{"encode", mesh, "y.skeleton.json", "-o", "c.skx",
+                                       "--size", "64", "--quality",       "20"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments).err;
+  };
+  EXPECT_EQ(encode("y.ply"), "");
+  const std::string without = text_of(folder_ / "c.skx");
+  const TriangleMesh mesh = read_mesh(folder_ / "y.ply").mesh;
+  MeshAttributes attributes;
+  for (const Vec3& p : mesh.positions) attributes.normals.values.push_back(p.normalized());
+  write_mesh(folder_ / "smooth.ply", mesh, attributes);
+  EXPECT_NE(encode("smooth.ply").find("normals are left out"), std::string::npos);
+  EXPECT_EQ(text_of(folder_ / "c.skx"), without);
+  EXPECT_EQ(encode("smooth.ply", {"--no-normals"}), "");
+  for (const char* name : {"c.skx", "smooth.ply"}) fs::remove(folder_ / name);
 }
 
 TEST_F(Program, RunsAnExperimentOnTheUsersOwnModelResumesAndReplaysIt) {
@@ -1187,6 +1317,23 @@ TEST_F(Program, ShowsProgressOnATerminalAndNeverInAPipe) {
   for (const char c : {'\r', '\033'}) EXPECT_EQ((piped.out + piped.err).find(c), std::string::npos);
   EXPECT_NE(run_on_terminal(arguments).find("\r\033[K[###"), std::string::npos);
   fs::remove(folder_ / "p.skx.exr");
+}
+
+TEST_F(Program, SaysOnATerminalThatItCompilesKernelsAndOnlyTheFirstTime) {
+  const KernelCache cache(folder_ / "kernels");
+  const auto compiles = [](const std::vector<std::string>& arguments) {
+    return run_on_terminal(arguments).find("compiling kernels, once") != std::string::npos;
+  };
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"metro", "y.ply", "y.ply", "--samples", "1000"},
+        {"filter", "y.skx.exr", "smooth", "-o", "f.ply"}}) {
+    const bool is_first = compiles(arguments);
+    if (cache.files().empty()) GTEST_SKIP() << "the device is none of PoCL's";
+    EXPECT_TRUE(is_first) << arguments[0];
+    EXPECT_FALSE(compiles(arguments)) << arguments[0];
+  }
+  fs::remove(folder_ / "f.ply");
+  fs::remove_all(folder_ / "kernels");
 }
 
 }  // namespace skeletex

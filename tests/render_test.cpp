@@ -148,6 +148,35 @@ TEST(Render, FitsEveryPointIntoThePictureAndFillsIt) {
         }
 }
 
+TEST(Render, TurnsATableAtOneDistanceWithEveryPointInEveryPicture) {
+  const std::vector<Vec3> points = creature_shape().mesh.positions;
+  for (const double fov : {0.0, 20.0, 70.0})
+    for (const double elevation : {-90.0, 0.0, 35.0}) {
+      const View view{.azimuth_deg = 12, .elevation_deg = elevation, .fov_deg = fov};
+      const std::vector<Camera> cameras = turntable(view, points, 400, 300, 7);
+      ASSERT_EQ(cameras.size(), 7u);
+      EXPECT_LT((cameras[0].back - fit_camera(view, points, 400, 300).back).norm(), 1e-12);
+      double largest = 0;
+      for (std::size_t i = 0; i < cameras.size(); ++i) {
+        // One turn about the up axis carries each camera to the next, and the last to the first.
+        const Eigen::AngleAxisd step(2 * std::numbers::pi / 7, Vec3::UnitY());
+        const Camera& next = cameras[(i + 1) % cameras.size()];
+        EXPECT_LT((step * cameras[i].back - next.back).norm(), 1e-9);
+        EXPECT_LT((step * cameras[i].right - next.right).norm(), 1e-9);
+        EXPECT_NEAR(next.eye.y(), cameras[0].eye.y(), 1e-9);
+        EXPECT_EQ(next.tan_x, cameras[0].tan_x);
+        const Eigen::Matrix4d matrix = view_projection(cameras[i], Vec3::Zero());
+        for (const Vec3& p : points) {
+          const Eigen::Vector4d clip = matrix * p.homogeneous();
+          ASSERT_GT(clip.w(), 0);
+          ASSERT_LE(std::abs(clip.z() / clip.w()), 1);
+          largest = std::max({largest, std::abs(clip.x() / clip.w()), std::abs(clip.y() / clip.w())});
+        }
+      }
+      EXPECT_NEAR(largest, 0.92, 0.01) << "fov " << fov << ", elevation " << elevation;
+    }
+}
+
 TEST(Render, TurnsTheModelsLeftSideToTheEyeAtNinetyDegrees) {
   const std::vector<Vec3> points{Vec3(-1, -1, -1), Vec3(1, 1, 1)};
   const Camera front = fit_camera({.azimuth_deg = 0, .elevation_deg = 0}, points, 100, 100);

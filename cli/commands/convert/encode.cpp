@@ -303,6 +303,8 @@ void run(const Arguments& arguments, const CLI::App& command) {
     check_bone_names(arguments, options, input.skeleton);
   }
   options.attributes = &input.attributes;
+  // A compact file has none: those that the mesh has not are not made to be left out.
+  if (is_compact_path(arguments.output) && input.attributes.normals.empty()) options.layers.has_normals = false;
   options.stance = stance_of(arguments, input);
   options.tree = input.tree ? &*input.tree : nullptr;
   options.progress = [&](const std::string& stage, double done) {

@@ -3,10 +3,12 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "close_mesh.h"
 #include "command.h"
 #include "files.h"
+#include "progress_bar.h"
 #include "rig_file.h"
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/analysis/validate_input.h"
@@ -75,6 +77,8 @@ std::pair<std::string, Json> findings_of(TriangleMesh mesh, const Skeleton& skel
 void run(const Arguments& arguments) {
   const RigFile file = load_rig(arguments.rig, arguments.close);
   ClContext context(arguments.device);
+  std::optional<ProgressBar> bar(std::in_place, context);
+  bar->show("importing", 0.2);
   const ImportedRig rig = import_rig(context, file);
   const TriangleMesh& mesh = file.surface.mesh;
   const fs::path folder = arguments.output;
@@ -107,6 +111,7 @@ void run(const Arguments& arguments) {
                   rig.animations.size(), rig.animations.size() == 1 ? "" : "s");
   text += findings_text;
   for (const std::string& path : written) text += path + "\n";
+  bar.reset();
   print(arguments.json, text);
   Json json{{"files", written},
             {"vertices", mesh.positions.size()},

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 
 #include "command.h"
 #include "files.h"
+#include "progress_bar.h"
 #include "result_file.h"
 #include "skeletex/convert/sample/half_texels.h"
 #include "skeletex/io/model_file.h"
@@ -32,6 +34,8 @@ void run(const Arguments& arguments) {
         "--output", fmt::format("\"{}\" must end in .skx.exr: half floats are those of a model", arguments.output));
   const SkeletexModel model = read_model(arguments.model);
   ClContext context(arguments.device);
+  std::optional<ProgressBar> bar(std::in_place, context);
+  bar->show("resampling", 0.2);
   Stopwatch watch;
   Json json;
   std::string text;
@@ -61,6 +65,7 @@ void run(const Arguments& arguments) {
     text = fmt::format("{} x {} texels from {} x {}\n", small.texture.width, small.texture.height, model.texture.width,
                        model.texture.height);
   }
+  bar.reset();
   json["times_ms"]["write"] = watch.lap_ms();
   json["device"] = context.device().name;
   json["kernels"] = profile_json(context);

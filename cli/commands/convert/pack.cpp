@@ -3,10 +3,12 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "command.h"
 #include "compact_output.h"
 #include "files.h"
+#include "progress_bar.h"
 #include "result_file.h"
 #include "skeletex/io/compact/compact_model_file.h"
 #include "skeletex/io/model_file.h"
@@ -26,8 +28,11 @@ void pack(const PackArguments& arguments, const CLI::App& command) {
   Stopwatch watch;
   const SkeletexModel model = read_model(arguments.model);
   ClContext context(arguments.device);
+  std::optional<ProgressBar> bar(std::in_place, context);
+  bar->show("compressing", 0.2);
   Json json;
   json["output"] = write_compact(context, model, nullptr, arguments.compact, command, arguments.size, arguments.output);
+  bar.reset();
   json["times_ms"]["total"] = watch.lap_ms();
   json["device"] = context.device().name;
   print(arguments.json, compact_text(json["output"]));
@@ -51,9 +56,12 @@ void unpack(const UnpackArguments& arguments, const CLI::App& command) {
   Json json;
   json["times_ms"]["decode"] = watch.lap_ms();
   ClContext context(arguments.device);
+  std::optional<ProgressBar> bar(std::in_place, context);
+  bar->show("reconstructing", 0.5);
   if (options.size && std::max(model.texture.width, model.texture.height) != *options.size)
     model = resample_model(context, model, *options.size);
   json["output"] = write_result(context, model, arguments.output);
+  bar.reset();
   json["device"] = context.device().name;
   print(arguments.json,
         fmt::format("{}: {} x {} texels\n", arguments.output, model.texture.width, model.texture.height));

@@ -11,12 +11,12 @@
 #include "command.h"
 #include "deform_option.h"
 #include "files.h"
+#include "output_names.h"
 #include "progress_bar.h"
 #include "skeletex/analysis/deformation.h"
 #include "skeletex/io/image_file.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_file.h"
-#include "skeletex/io/pose_file.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/layers/layer_values.h"
 #include "skeletex/reconstruct/layers/turn_normals.h"
@@ -83,7 +83,7 @@ std::filesystem::path relative_to(const std::string& picture, const std::string&
 
 /// What is written beside the surface; writes the picture, where one is asked for.
 MeshAttributes attributes_of(ClContext& context, const PreparedModel& prepared, bool is_posed, const TriangleMesh& mesh,
-                             const Arguments& arguments) {
+                             const Arguments& arguments, const std::string& output) {
   MeshAttributes attributes = vertex_attributes(prepared);
   const bool has_texture = !arguments.texture.empty();
   if (!is_posed && !has_texture) return attributes;
@@ -94,7 +94,7 @@ MeshAttributes attributes_of(ClContext& context, const PreparedModel& prepared, 
   BakedTexture baked = bake_texture(prepared, bind);
   attributes.colours = {};
   attributes.texture_coordinates = std::move(baked.coordinates);
-  attributes.materials.emplace_back().image_file = relative_to(arguments.texture, arguments.output);
+  attributes.materials.emplace_back().image_file = relative_to(arguments.texture, output);
   write_image(arguments.texture, baked.image);
   return attributes;
 }
@@ -110,83 +110,107 @@ void check_arguments(const Arguments& arguments) {
   if (!arguments.constant_offset) check_distance_option(arguments.is_distance_dropped, arguments.deform);
 }
 
-void run(const Arguments& arguments) {
-  check_arguments(arguments);
-  Stopwatch total, watch;
-  SkeletexModel model = read_model(arguments.model, arguments.level);
-  std::optional<Skeleton> posed;
-  if (!arguments.pose.empty()) {
-    const PoseAnimation animation = read_animation(arguments.pose, model.skeleton);
-    posed = apply_pose(model.skeleton,
-                       pose_at(model.skeleton, animation, arguments.time.value_or(animation.frames.front().time)));
-  }
-  const double read_ms = watch.lap_ms();
-  ClContext context(arguments.device);
-  const double start_ms = watch.lap_ms();
-  double resample_ms = 0, reconstruct_ms = 0, write_ms = 0;
-  TriangleMesh mesh;
-  std::optional<PoseReport> pose_report;
+/// The model as it is reconstructed.
+struct Source {
+  ClContext& context;
+  ProgressBar& bar;
+  const PreparedModel prepared;
+  double read_ms = 0, device_ms = 0, resample_ms = 0;
+};
+
+std::string text_of(const PolishReport& report, double diagonal) {
+  return fmt::format("polish: {} new folds became {}, {} vertices moved by up to {:.2g} diagonals\n",
+                     report.folds_before, report.folds_after, report.moved_vertices, report.farthest / diagonal);
+}
+
+Json json_of(const PolishReport& report, double diagonal) {
+  return {{"new_folds_before", report.folds_before},
+          {"new_folds", report.folds_after},
+          {"rounds", report.rounds},
+          {"moved_vertices", report.moved_vertices},
+          {"farthest", report.farthest / diagonal}};
+}
+
+/// Writes the surface in one pose, or in none.
+/// \param posed  the skeleton
+/// \param text   what is printed is added to it
+/// \return for the JSON
+Json write_surface(const Source& source, const Arguments& arguments, const std::optional<Skeleton>& posed,
+                   const std::string& output, std::string& text) {
+  ClContext& context = source.context;
+  const PreparedModel& prepared = source.prepared;
+  const SkeletexModel& model = prepared.model;
+  Stopwatch watch;
+  source.bar.show("reconstructing", 0.3);
+  TriangleMesh mesh = surface_of(context, prepared, posed, arguments);
   std::optional<PolishReport> polish_report;
-  {
-    ProgressBar bar(context);
-    if (arguments.size > 0 && arguments.size != std::max(model.texture.width, model.texture.height)) {
-      bar.show("resampling", 0.1);
-      model = resample_model(context, model, arguments.size);
-    }
-    resample_ms = watch.lap_ms();
-    bar.show("reconstructing", 0.3);
-    const PreparedModel prepared(model);
-    mesh = surface_of(context, prepared, posed, arguments);
-    if (arguments.is_polished) {
-      bar.show("polishing", 0.5);
-      polish_report = polish_pose(reconstruct_mesh(context, prepared), mesh.positions);
-    }
-    const MeshAttributes attributes = arguments.constant_offset
-                                          ? MeshAttributes()
-                                          : attributes_of(context, prepared, posed.has_value(), mesh, arguments);
-    reconstruct_ms = watch.lap_ms();
-    bar.show("writing", 0.7);
-    write_mesh(arguments.output, mesh, attributes);
-    write_ms = watch.lap_ms();
-    if (posed && !arguments.constant_offset && !arguments.has_no_report) {
-      bar.show("measuring the pose", 0.8);
-      pose_report = report_pose(reconstruct_mesh(context, prepared), mesh);
-    }
+  if (arguments.is_polished) {
+    source.bar.show("polishing", 0.5);
+    polish_report = polish_pose(reconstruct_mesh(context, prepared), mesh.positions);
   }
-  const double total_ms = total.lap_ms();
-  std::string pose_text;
-  if (polish_report)
-    pose_text = fmt::format("polish: {} new folds became {}, {} vertices moved by up to {:.2g} diagonals\n",
-                            polish_report->folds_before, polish_report->folds_after, polish_report->moved_vertices,
-                            polish_report->farthest / model.diagonal);
-  if (pose_report) pose_text += pose_report->text;
-  print(arguments.json,
-        fmt::format(
-            "{} vertices, {} triangles from {} x {} texels, on {}\n"
-            "read {:.0f} ms, device {:.0f} ms, resample {:.0f} ms, reconstruct {:.0f} ms, write {:.0f} ms\n{}{}\n",
-            mesh.positions.size(), mesh.triangles.size(), model.texture.width, model.texture.height,
-            context.device().name, read_ms, start_ms, resample_ms, reconstruct_ms, write_ms, pose_text,
-            arguments.output));
+  const MeshAttributes attributes = arguments.constant_offset
+                                        ? MeshAttributes()
+                                        : attributes_of(context, prepared, posed.has_value(), mesh, arguments, output);
+  const double reconstruct_ms = watch.lap_ms();
+  source.bar.show("writing", 0.7);
+  write_mesh(output, mesh, attributes);
+  const double write_ms = watch.lap_ms();
+  std::optional<PoseReport> pose_report;
+  if (posed && !arguments.constant_offset && !arguments.has_no_report) {
+    source.bar.show("measuring the pose", 0.8);
+    pose_report = report_pose(reconstruct_mesh(context, prepared), mesh);
+  }
+  text += fmt::format(
+      "{} vertices, {} triangles from {} x {} texels, on {}\n"
+      "read {:.0f} ms, device {:.0f} ms, resample {:.0f} ms, reconstruct {:.0f} ms, write {:.0f} ms\n{}{}{}\n",
+      mesh.positions.size(), mesh.triangles.size(), model.texture.width, model.texture.height, context.device().name,
+      source.read_ms, source.device_ms, source.resample_ms, reconstruct_ms, write_ms,
+      polish_report ? text_of(*polish_report, model.diagonal) : "", pose_report ? pose_report->text : "", output);
   Json json{{"vertices", mesh.positions.size()},
             {"triangles", mesh.triangles.size()},
             {"size", {model.texture.width, model.texture.height}},
             {"times_ms",
-             {{"read", read_ms},
-              {"device", start_ms},
-              {"resample", resample_ms},
+             {{"read", source.read_ms},
+              {"device", source.device_ms},
+              {"resample", source.resample_ms},
               {"reconstruct", reconstruct_ms},
-              {"write", write_ms},
-              {"total", total_ms}}},
-            {"device", context.device().name},
-            {"kernels", profile_json(context)}};
+              {"write", write_ms}}}};
   if (pose_report) json["pose"] = pose_report->json;
-  if (polish_report)
-    json["polish"] = {{"new_folds_before", polish_report->folds_before},
-                      {"new_folds", polish_report->folds_after},
-                      {"rounds", polish_report->rounds},
-                      {"moved_vertices", polish_report->moved_vertices},
-                      {"farthest", polish_report->farthest / model.diagonal}};
-  write_json(arguments.json, json);
+  if (polish_report) json["polish"] = json_of(*polish_report, model.diagonal);
+  return json;
+}
+
+void run(const Arguments& arguments, const CLI::App& command) {
+  check_arguments(arguments);
+  const std::vector<PoseOutput> outputs = pose_outputs(command, arguments.pose, arguments.output);
+  Stopwatch total, watch;
+  SkeletexModel model = read_model(arguments.model, arguments.level);
+  std::vector<std::optional<Skeleton>> posed;
+  for (const PoseOutput& one : outputs) posed.push_back(posed_skeleton(model.skeleton, one.pose, arguments.time));
+  const double read_ms = watch.lap_ms();
+  ClContext context(arguments.device);
+  const double device_ms = watch.lap_ms();
+  std::optional<ProgressBar> bar(std::in_place, context);
+  if (arguments.size > 0 && arguments.size != std::max(model.texture.width, model.texture.height)) {
+    bar->show("resampling", 0.1);
+    model = resample_model(context, model, arguments.size);
+  }
+  const double resample_ms = watch.lap_ms();
+  const Source source{context, *bar, PreparedModel(model), read_ms, device_ms, resample_ms};
+  std::string text;
+  Json all = Json::array();
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    Json json = write_surface(source, arguments, posed[i], outputs[i].output, text);
+    if (is_pattern(arguments.pose)) json["output"] = outputs[i].output;
+    json["times_ms"]["total"] = total.lap_ms();
+    json["device"] = context.device().name;
+    json["kernels"] = profile_json(context);
+    context.reset_profile();
+    all.push_back(std::move(json));
+  }
+  bar.reset();
+  print(arguments.json, text);
+  write_json(arguments.json, is_pattern(arguments.pose) ? all : all[0]);
 }
 
 }  // namespace
@@ -210,8 +234,7 @@ void add_reconstruct_command(CLI::App& program) {
                   "level of a file that `skeletex lod --levels` has written (default: 0, the finest)")
       ->check(number_from(0))
       ->type_name("K");
-  CLI::Option* pose = declare_input(command, command.add_option("--pose", arguments->pose, "pose or animation: .json"))
-                          ->type_name("FILE");
+  CLI::Option* pose = add_pose_option(command, arguments->pose);
   command.add_option("--time", arguments->time, "time in the animation (default: its first frame)")
       ->check(any_number())
       ->type_name("T")
@@ -249,10 +272,11 @@ void add_reconstruct_command(CLI::App& program) {
       "  skeletex reconstruct bear.skx.exr -o bear.ply\n"
       "  skeletex reconstruct bear.skx.exr -o draft.obj --size 64\n"
       "  skeletex reconstruct bear.skx.exr -o waving.ply --pose wave.json --time 0.5\n"
+      "  skeletex reconstruct bear.skx.exr -o meshes/{name}.ply --pose 'poses/*.json'\n"
       "  skeletex reconstruct bear.skx.exr -o tubes.ply --pose wave.json --constant-offset 0.05\n"
       "The mesh is closed, oriented, 2-manifold and of the input's genus at every size and in every pose. Coordinates "
       "are in the input mesh's units.");
-  command.callback([arguments] { run(*arguments); });
+  command.callback([arguments, &command] { run(*arguments, command); });
 }
 
 }  // namespace skeletex::cli

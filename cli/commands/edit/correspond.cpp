@@ -19,7 +19,7 @@ struct Arguments {
 };
 
 Skeleton skeleton_of(const std::string& path) {
-  return has_ending(path, ".exr") || has_ending(path, ".skx") ? read_model(path).skeleton : read_skeleton(path);
+  return is_model_path(path) ? read_model(path).skeleton : read_skeleton(path);
 }
 
 void run(const Arguments& arguments) {

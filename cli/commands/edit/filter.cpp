@@ -8,10 +8,12 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 
 #include "command.h"
 #include "files.h"
+#include "progress_bar.h"
 #include "result_file.h"
 #include "skeletex/edit/filter/differential.h"
 #include "skeletex/edit/regular_grid.h"
@@ -76,6 +78,8 @@ void run_curvature(const Arguments& arguments) {
         "--output", fmt::format("\"{}\" must end in .ply: curvature is a mesh with values", arguments.output));
   const SkeletexModel stored = read_model(arguments.model);
   ClContext context(arguments.device);
+  std::optional<ProgressBar> bar(std::in_place, context);
+  bar->show("filtering", 0.2);
   Stopwatch watch;
   const SkeletexModel model = regular_grid(context, stored);  // as for filters: slivers slow the solver down
   const ModelSurface surface = upload_surface(context, model);
@@ -91,6 +95,7 @@ void run_curvature(const Arguments& arguments) {
   attributes.vertex_colours = colours;
   attributes.vertex_numbers = {{"mean_curvature", result.mean_curvature}};
   write_mesh(arguments.output, reconstruct_mesh(context, model), attributes);
+  bar.reset();
   print(arguments.json, fmt::format("mean curvature at {} vertices, averaged over {:.3g} diagonals; colours from "
                                     "{:.4g} to {:.4g}\n{:.0f} ms on {}\n{}\n",
                                     normals.size(), result.scale, -colour_scale, colour_scale, ms,
@@ -125,6 +130,8 @@ void run_layer(const Arguments& arguments) {
                                  names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
   }
   ClContext context(arguments.device);
+  std::optional<ProgressBar> bar(std::in_place, context);
+  bar->show("filtering", 0.2);
   Stopwatch watch;
   LayerFilterOptions options{.layer = arguments.layer};
   if (arguments.scale > 0) options.scale = arguments.scale;
@@ -132,6 +139,7 @@ void run_layer(const Arguments& arguments) {
   const SkeletexModel result = filter_layer(context, model, options, arguments.region);
   const double filter_ms = watch.lap_ms();
   const Json output = write_result(context, result, arguments.output);
+  bar.reset();
   print(arguments.json, fmt::format("{} of layer \"{}\": {:.0f} ms on {}\n{}\n", arguments.filter, arguments.layer,
                                     filter_ms, context.device().name, arguments.output));
   write_json(arguments.json, {{"filter", arguments.filter},
@@ -153,10 +161,13 @@ void run(const Arguments& arguments) {
   }
   const SkeletexModel model = read_model(arguments.model);
   ClContext context(arguments.device);
+  std::optional<ProgressBar> bar(std::in_place, context);
+  bar->show("filtering", 0.2);
   Stopwatch watch;
   const FilterResult result = apply_filter(context, model, arguments);
   const double filter_ms = watch.lap_ms();
   const Json output = write_result(context, result.model, arguments.output);
+  bar.reset();
   const double write_ms = watch.lap_ms();
   const FilterReport& report = result.report;
   print(arguments.json,

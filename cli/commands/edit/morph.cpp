@@ -12,6 +12,7 @@
 #include "command.h"
 #include "files.h"
 #include "landmark_file.h"
+#include "output_names.h"
 #include "progress_bar.h"
 #include "result_file.h"
 #include "skeletex/edit/morph/surface_map.h"
@@ -30,14 +31,6 @@ struct Arguments {
   int frames = 0, layout = 0, size = 0;
   bool has_creases = false, has_regular_grid = false;
 };
-
-/// out.skx.exr -> out_007.skx.exr
-std::string numbered(const std::string& path, std::size_t number) {
-  const std::filesystem::path file(path);
-  std::string name = file.filename().string();
-  name.insert(std::min(name.find('.', 1), name.size()), fmt::format("_{:03}", number));
-  return (file.parent_path() / name).string();
-}
 
 Json distortion_json(const Distortion& d) {
   return {{"area", d.area},

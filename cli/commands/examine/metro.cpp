@@ -12,7 +12,10 @@
 #include "progress_bar.h"
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/mesh_file.h"
+#include "skeletex/io/model_file.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
+#include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/render/colours.h"
 #include "table.h"
 
@@ -22,6 +25,7 @@ namespace {
 struct Arguments {
   std::string a, b, device, json, csv, ply;
   long samples = 0;
+  int size = 0;
   double ply_max = 0;
 };
 
@@ -29,10 +33,25 @@ Json statistics_json(const DistanceStatistics& s) {
   return {{"mean", s.mean}, {"std", s.std}, {"rms", s.rms}, {"max", s.max}};
 }
 
-MeshFile load_surface(const std::string& path) {
+/// A surface with its own normals, where it has some.
+struct Surface {
+  TriangleMesh mesh;
+  CornerValues<Vec3> normals;
+};
+
+/// A mesh as it stands in its file, or that of a model.
+/// \param size  of a model's texture; 0: its own
+Surface load_surface(ClContext& context, const std::string& path, int size) {
+  if (is_model_path(path)) {
+    SkeletexModel model = read_model(path);
+    if (size > 0 && size != std::max(model.texture.width, model.texture.height))
+      model = resample_model(context, model, size);
+    const PreparedModel prepared(model);
+    return {reconstruct_mesh(context, prepared), vertex_attributes(prepared).normals};
+  }
   MeshFile file = load_mesh_file(path, false);
   if (file.mesh.triangles.empty()) throw InputError(path + ": no triangles, so there is no surface to measure from");
-  return file;
+  return {std::move(file.mesh), std::move(file.attributes.normals)};
 }
 
 Json angles_json(const AngleStatistics& s) { return {{"mean", s.mean}, {"p95", s.percent95}, {"p99", s.percent99}}; }
@@ -83,20 +102,23 @@ void write_coloured(const std::string& path, const TriangleMesh& mesh, const std
 void run(const Arguments& arguments) {
   if (!arguments.ply.empty() && !has_ending(arguments.ply, ".ply"))
     throw CLI::ValidationError("--ply", "\"" + arguments.ply + "\" does not end in .ply");
-  const MeshFile file_a = load_surface(arguments.a), file_b = load_surface(arguments.b);
-  const TriangleMesh &a = file_a.mesh, &b = file_b.mesh;
-  const auto own_normals = [](const MeshFile& file) {
-    return file.attributes.normals.empty() ? nullptr : &file.attributes.normals;
-  };
+  if (arguments.size > 0 && !is_model_path(arguments.a) && !is_model_path(arguments.b))
+    throw CLI::ValidationError("--size", "is of models; neither A nor B is one (.skx.exr, .skx)");
+  const auto own_normals = [](const Surface& surface) { return surface.normals.empty() ? nullptr : &surface.normals; };
   ClContext context(arguments.device);
+  Surface surface_a, surface_b;
   MetroReport report;
   {
     ProgressBar bar(context);
-    bar.show("measuring", 0.2);
+    bar.show("reading", 0.1);
+    surface_a = load_surface(context, arguments.a, arguments.size);
+    surface_b = load_surface(context, arguments.b, arguments.size);
+    bar.show("measuring", 0.3);
     report = measure_metro(
-        context, a, b,
-        {.samples = arguments.samples, .normals_a = own_normals(file_a), .normals_b = own_normals(file_b)});
+        context, surface_a.mesh, surface_b.mesh,
+        {.samples = arguments.samples, .normals_a = own_normals(surface_a), .normals_b = own_normals(surface_b)});
   }
+  const TriangleMesh& a = surface_a.mesh;
   if (!arguments.csv.empty()) write_csv(arguments.csv, a, report.vertex_distances);
   const double scale =
       arguments.ply_max > 0 ? arguments.ply_max * report.diagonal : colour_scale(report.vertex_distances);
@@ -138,9 +160,16 @@ void run(const Arguments& arguments) {
 void add_metro_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("metro", "Measure the distance between two surfaces, in both directions");
-  declare_input(command, command.add_option("A", arguments->a, "mesh, usually the original: its diagonal is the unit"))
+  declare_input(command,
+                command.add_option("A", arguments->a, "mesh or model, usually the original: its diagonal is the unit"))
       ->required();
-  declare_input(command, command.add_option("B", arguments->b, "mesh, usually the reconstruction"))->required();
+  declare_input(command, command.add_option("B", arguments->b, "mesh or model (.skx.exr, .skx), usually the result"))
+      ->required();
+  command
+      .add_option("--size", arguments->size,
+                  "texels along the longer side that models are reconstructed at, 4 to 16384 (default: their own)")
+      ->check(number_in(4, 16384))
+      ->type_name("N");
   command
       .add_option(
           "--samples", arguments->samples,
@@ -166,6 +195,7 @@ void add_metro_command(CLI::App& program) {
   command.footer(
       "Examples:\n"
       "  skeletex metro bear.off bear.ply\n"
+      "  skeletex metro bear.off bear.skx.exr\n"
       "  skeletex metro bear.off bear.ply --ply error.ply --csv error.csv --json error.json\n"
       "Means, RMS and maxima are divided by the diagonal of A's bounding box. \"Surface\" measures from points spread "
       "evenly over a surface (as the "

@@ -10,13 +10,14 @@
 #include "command.h"
 #include "deform_option.h"
 #include "files.h"
+#include "output_names.h"
+#include "picture_format.h"
 #include "progress_bar.h"
 #include "skeletex/analysis/metro.h"
 #include "skeletex/convert/segment/segment_mesh.h"
 #include "skeletex/io/json_file.h"
 #include "skeletex/io/model_config.h"
 #include "skeletex/io/model_file.h"
-#include "skeletex/io/pose_file.h"
 #include "skeletex/io/read_file.h"
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/model/error.h"
@@ -31,6 +32,7 @@
 #include "skeletex/render/gpu_model.h"
 #include "skeletex/render/scene.h"
 #include "skeletex/render/texture_image.h"
+#include "view_options.h"
 
 namespace skeletex::cli {
 namespace {
@@ -38,69 +40,15 @@ namespace {
 constexpr int kCheckerCells = 24;
 
 struct Arguments {
-  std::string deform = "smooth", input, output, skeleton, pose, camera, against, device, gl_device, json, up, front,
-              bone;
+  std::string deform = "smooth", input, output, skeleton, pose, against, device, gl_device, json, bone;
   std::string mode = "shaded", size = "1200x900", background = "white";
-  std::optional<double> time, azimuth, elevation, fov, zoom;
+  ViewArguments view;
+  std::optional<double> time;
   double error_max = 0;
-  int lattice = 0, views = 1, samples = 2;
+  int lattice = 0, samples = 2;
   bool is_flat = false, has_wires = false, shows_skeleton = false, is_distance_dropped = false, is_polished = false,
        is_smoothed = false, is_plain = false;
 };
-
-bool is_model(const std::string& path) { return has_ending(path, ".exr") || has_ending(path, ".skx"); }
-
-std::array<int, 2> parse_picture_size(const std::string& text) {
-  std::array<int, 2> size{0, 0};
-  const char* const end = text.data() + text.size();
-  const auto first = std::from_chars(text.data(), end, size[0]);
-  bool is_good = first.ec == std::errc() && first.ptr != end && (*first.ptr == 'x' || *first.ptr == 'X');
-  if (is_good) {
-    const auto second = std::from_chars(first.ptr + 1, end, size[1]);
-    is_good = second.ec == std::errc() && second.ptr == end;
-  }
-  if (!is_good || size[0] < 16 || size[1] < 16 || size[0] > 8192 || size[1] > 8192)
-    throw CLI::ValidationError(
-        "--size", "\"" + text + "\" is no picture size; give WIDTHxHEIGHT, 16 to 8192 pixels, e.g. 1200x900");
-  return size;
-}
-
-/// Linear colour, or nothing for "transparent".
-std::optional<LinearRgb> parse_background(const std::string& text) {
-  if (text == "transparent") return std::nullopt;
-  if (text == "white") return LinearRgb{1, 1, 1};
-  if (text == "black") return LinearRgb{0, 0, 0};
-  unsigned value = 0;
-  const char* const end = text.data() + text.size();
-  const bool is_hex = text.size() == 7 && text[0] == '#';
-  if (is_hex) {
-    const auto [rest, code] = std::from_chars(text.data() + 1, end, value, 16);
-    if (code == std::errc() && rest == end)
-      return to_linear({static_cast<unsigned char>(value >> 16), static_cast<unsigned char>(value >> 8 & 255),
-                        static_cast<unsigned char>(value & 255)});
-  }
-  throw CLI::ValidationError("--background",
-                             "\"" + text + "\" is no background; give white, black, transparent or #rrggbb");
-}
-
-/// \param stance  of the model; a view that the user names comes before it
-View view_of(const Arguments& arguments, const nlohmann::json& own_view, const std::optional<Stance>& stance) {
-  View view;
-  if (stance) view.up = stance->up, view.front = stance->front;
-  if (!own_view.is_null()) view = parse_view(own_view, arguments.input);
-  if (!arguments.camera.empty())
-    view = parse_view(parse_json(read_file(arguments.camera), arguments.camera), arguments.camera);
-  if (!arguments.up.empty()) view.up = parse_direction("--up", arguments.up);
-  if (!arguments.front.empty()) view.front = parse_direction("--front", arguments.front);
-  // A model that stands along z looks along -y, as most tools that have z up have it.
-  else if (view.up.normalized().cross(view.front).norm() < 1e-9)
-    view.front = -Vec3::UnitY();
-  view.azimuth_deg = arguments.azimuth.value_or(view.azimuth_deg);
-  view.elevation_deg = arguments.elevation.value_or(view.elevation_deg);
-  view.fov_deg = arguments.fov.value_or(view.fov_deg);
-  view.zoom = arguments.zoom.value_or(view.zoom);
-  return view;
-}
 
 /// What is drawn, from either kind of input, in the model's frame or the unit frame of the mesh.
 struct Subject {
@@ -110,12 +58,13 @@ struct Subject {
   std::vector<int> bones;     ///< per triangle, where the mode asks for it
   std::optional<SkeletexModel> model;
   std::optional<Skeleton> skeleton;  ///< as posed
+  bool is_posed = false;             ///< not in the bind pose
 };
 
 Subject load_subject(const Arguments& arguments, ClContext& context) {
   Subject subject;
   if (!arguments.skeleton.empty()) subject.skeleton = read_skeleton(arguments.skeleton);
-  if (!is_model(arguments.input)) {
+  if (!is_model_path(arguments.input)) {
     if (arguments.mode != "segments") {
       MeshFile file = load_mesh_file(arguments.input);
       if (file.attributes.normals.empty() || arguments.is_smoothed)
@@ -142,12 +91,8 @@ Subject load_subject(const Arguments& arguments, ClContext& context) {
       arguments.lattice != std::max(subject.model->texture.width, subject.model->texture.height))
     subject.model = resample_model(context, *subject.model, arguments.lattice);
   subject.skeleton = subject.model->skeleton;
+  subject.is_posed = !arguments.pose.empty();
   subject.frame = subject.skeleton->frame;
-  if (!arguments.pose.empty()) {
-    const PoseAnimation animation = read_animation(arguments.pose, *subject.skeleton);
-    subject.skeleton = apply_pose(*subject.skeleton, pose_at(*subject.skeleton, animation,
-                                                             arguments.time.value_or(animation.frames.front().time)));
-  }
   const PreparedModel prepared(*subject.model);
   subject.mesh = reconstruct_bind_mesh(context, prepared).mesh;
   subject.attributes = vertex_attributes(prepared);
@@ -217,7 +162,9 @@ void write_picture(const std::string& path, const Image& image) {
 void check_arguments(const Arguments& arguments) {
   check_distance_option(arguments.is_distance_dropped, arguments.deform);
   const bool is_texture = arguments.mode == "map" || arguments.mode == "layout";
-  if (!is_model(arguments.input)) {
+  if (is_texture && (arguments.view.turntable > 0 || is_pattern(arguments.pose)))
+    throw CLI::ValidationError("--mode", arguments.mode + " shows the texture, which no turntable and no pose changes");
+  if (!is_model_path(arguments.input)) {
     if (arguments.mode == "weights") throw CLI::ValidationError("--mode", "weights are a model's; a mesh has none");
     if (is_texture || arguments.mode == "checker")
       throw CLI::ValidationError("--mode", arguments.mode + " shows a model's texture; a mesh has none");
@@ -252,7 +199,7 @@ void pose_surface(GlContext& gl, ClContext& context, const Arguments& arguments,
     surface = upload_surface(gl, posed);
     return;
   }
-  if (arguments.pose.empty() || deformation == Deformation::kPaper) {
+  if (!subject.is_posed || deformation == Deformation::kPaper) {
     displace(gl, upload_model(model), model, *subject.skeleton, distance, surface);
     return;
   }
@@ -275,7 +222,7 @@ std::vector<Vec3> place_surface(GlContext& gl, ClContext& context, const Argumen
   pose_surface(gl, context, arguments, subject, surface);
   std::vector<Vec3> points = download_positions(surface);
   if (!normals.empty())
-    write_normals(surface, arguments.pose.empty() ? normals : turn_normals(subject.mesh, normals, points));
+    write_normals(surface, !subject.is_posed ? normals : turn_normals(subject.mesh, normals, points));
   return points;
 }
 
@@ -318,6 +265,97 @@ void run_texture(const Arguments& arguments, int size) {
       {{"picture", arguments.output}, {"mode", arguments.mode}, {"size", {model.texture.width, model.texture.height}}});
 }
 
+/// What the pictures of a command have in common.
+struct Studio {
+  const Arguments& arguments;
+  ClContext& context;
+  GlContext& gl;
+  ProgressBar& bar;
+  DrawOptions options;
+  std::optional<LinearRgb> background;
+  SurfacePaint paint;
+  ErrorScale scale;
+};
+
+/// One picture, of views side by side.
+Image draw_picture(Studio& studio, const Subject& subject, const GpuSurface& surface,
+                   const std::vector<Camera>& cameras) {
+  const Arguments& arguments = studio.arguments;
+  const bool shows_skeleton =
+      subject.skeleton && (arguments.shows_skeleton || (!arguments.skeleton.empty() && arguments.mode != "segments"));
+  std::vector<Image> images;
+  for (const Camera& camera : cameras) {
+    Image image = draw(studio.gl, surface, studio.paint, camera, studio.options);
+    if (shows_skeleton) draw_skeleton(studio.gl, subject, camera, studio.options, image);
+    images.push_back(std::move(image));
+  }
+  Image picture = tile(images, static_cast<int>(cameras.size()));
+  const std::optional<LinearRgb>& background = studio.background;
+  if (background) fill_background(picture, *background);
+  const bool is_dark = background && (*background)[1] < 0.2f;
+  if (!studio.scale.colours.empty())
+    draw_scale(picture, studio.scale.colours, 0, studio.scale.highest, "error / diagonal",
+               is_dark ? std::array{0.9, 0.9, 0.9} : std::array{0.1, 0.1, 0.1});
+  return picture;
+}
+
+/// All pictures of the subject as it is posed.
+/// \return for the JSON
+Json draw_subject(Studio& studio, const Subject& subject, const View& view, const std::string& output,
+                  double prepare_ms) {
+  const Arguments& arguments = studio.arguments;
+  Stopwatch watch;
+  GpuSurface surface = upload_surface(studio.gl, subject.mesh);
+  watch.lap_ms();
+  const std::vector<Vec3> points = place_surface(studio.gl, studio.context, arguments, subject, surface);
+  const double displace_ms = subject.model ? watch.lap_ms() : 0;
+  const auto pictures = cameras_of(arguments.view, view, points, studio.options.width, studio.options.height);
+  std::vector<std::string> paths;
+  Json size;
+  double draw_ms = 0;
+  watch.lap_ms();
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    studio.bar.show("drawing", 0.3 + 0.6 * static_cast<double>(i) / static_cast<double>(pictures.size()));
+    const Image picture = draw_picture(studio, subject, surface, pictures[i]);
+    draw_ms += watch.lap_ms();
+    paths.push_back(arguments.view.turntable > 0 ? numbered(output, i) : output);
+    write_picture(paths.back(), picture);
+    size = {picture.width, picture.height};
+    watch.lap_ms();
+  }
+  Json json;
+  if (arguments.view.turntable > 0)
+    json["pictures"] = paths;
+  else
+    json["picture"] = output;
+  json["mode"] = arguments.mode;
+  json["size"] = size;
+  json["vertices"] = surface.vertex_count;
+  json["triangles"] = surface.triangle_count;
+  json["times_ms"] = {{"prepare", prepare_ms}, {"displace", displace_ms}, {"draw", draw_ms}};
+  json["renderer"] = studio.gl.renderer();
+  if (!studio.scale.colours.empty()) json["error_max"] = studio.scale.highest;
+  return json;
+}
+
+std::string text_of(const Json& json, const std::string& output) {
+  const std::string files = json.contains("pictures")
+                                ? fmt::format("{} .. {}", json["pictures"].front().get<std::string>(),
+                                              json["pictures"].back().get<std::string>())
+                                : output;
+  const Json& times = json["times_ms"];
+  return fmt::format(
+      "{} ({} x {}): {} vertices, {} triangles; prepare {:.0f} ms, displace {:.0f} ms, draw {:.0f} ms on {}\n", files,
+      json["size"][0].get<int>(), json["size"][1].get<int>(), json["vertices"].get<std::size_t>(),
+      json["triangles"].get<std::size_t>(), times["prepare"].get<double>(), times["displace"].get<double>(),
+      times["draw"].get<double>(), json["renderer"].get<std::string>());
+}
+
+/// A file for each picture of a turntable may be none that is read, and must be writable.
+void check_turntable(const CLI::App& command, const std::string& output, int count) {
+  for (int i = 0; i < count; ++i) check_made_output(command, numbered(output, static_cast<std::size_t>(i)));
+}
+
 void run(Arguments arguments, const CLI::App& command) {
   const nlohmann::json own_view = resolve_config(arguments, command);
   check_arguments(arguments);
@@ -328,66 +366,48 @@ void run(Arguments arguments, const CLI::App& command) {
     run_texture(arguments, std::max(width, height));
     return;
   }
+  const std::vector<PoseOutput> outputs = pose_outputs(command, arguments.pose, arguments.output);
+  for (const PoseOutput& one : outputs) check_turntable(command, one.output, arguments.view.turntable);
   ClContext context(arguments.device);
-  ProgressBar bar(context);
-  bar.show("reading", 0.05);
+  std::optional<ProgressBar> bar(std::in_place, context);
+  bar->show("reading", 0.05);
   Subject subject = load_subject(arguments, context);
-  View view = view_of(arguments, own_view, subject.model ? subject.model->stance : std::nullopt);
+  View view = view_of(arguments.view, own_view, arguments.input, subject.model ? subject.model->stance : std::nullopt);
   for (std::optional<Vec3>* point : {&view.target, &view.eye})
     if (*point) *point = subject.frame.from_user(**point);
-  ErrorScale scale;
   GlContext gl(arguments.gl_device);
   const double prepare_ms = watch.lap_ms();
-  bar.show("drawing", 0.3);
-  const SurfacePaint paint = paint_of(arguments, subject, context, scale);
-  GpuSurface surface = upload_surface(gl, subject.mesh);
-  watch.lap_ms();
-  const std::vector<Vec3> points = place_surface(gl, context, arguments, subject, surface);
-  const double displace_ms = subject.model ? watch.lap_ms() : 0;
-  DrawOptions options{.width = width, .height = height, .samples = arguments.samples, .is_flat = arguments.is_flat};
-  if (arguments.has_wires) options.wire_pixels = 0.45;
-  if (arguments.mode == "error" || arguments.mode == "weights") options.lighting = 0.55;
-  const bool shows_skeleton =
-      subject.skeleton && (arguments.shows_skeleton || (!arguments.skeleton.empty() && arguments.mode != "segments"));
-  std::vector<Image> images;
-  for (int i = 0; i < arguments.views; ++i) {
-    bar.show("drawing", 0.3 + 0.6 * i / arguments.views);
-    View turned = view;
-    turned.azimuth_deg += 360.0 * i / arguments.views;
-    const Camera camera = fit_camera(turned, points, width, height);
-    Image image = draw(gl, surface, paint, camera, options);
-    if (shows_skeleton) draw_skeleton(gl, subject, camera, options, image);
-    images.push_back(std::move(image));
+  bar->show("drawing", 0.3);
+  Studio studio{.arguments = arguments,
+                .context = context,
+                .gl = gl,
+                .bar = *bar,
+                .options = {},
+                .background = background,
+                .paint = {},
+                .scale = {}};
+  studio.options = {.width = width, .height = height, .samples = arguments.samples, .is_flat = arguments.is_flat};
+  if (arguments.has_wires) studio.options.wire_pixels = 0.45;
+  if (arguments.mode == "error" || arguments.mode == "weights") studio.options.lighting = 0.55;
+  studio.paint = paint_of(arguments, subject, context, studio.scale);
+  std::vector<std::optional<Skeleton>> posed;
+  for (const PoseOutput& one : outputs)
+    posed.push_back(one.pose.empty() ? std::nullopt : posed_skeleton(*subject.skeleton, one.pose, arguments.time));
+  Json all = Json::array();
+  std::string text;
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    if (posed[i]) subject.skeleton = std::move(posed[i]);
+    Json json = draw_subject(studio, subject, view, outputs[i].output, prepare_ms);
+    text += text_of(json, outputs[i].output);
+    all.push_back(std::move(json));
   }
-  Image picture = tile(images, arguments.views);
-  if (background) fill_background(picture, *background);
-  const bool is_dark = background && (*background)[1] < 0.2f;
-  if (!scale.colours.empty())
-    draw_scale(picture, scale.colours, 0, scale.highest, "error / diagonal",
-               is_dark ? std::array{0.9, 0.9, 0.9} : std::array{0.1, 0.1, 0.1});
-  const double draw_ms = watch.lap_ms();
-  bar.show("writing", 0.95);
-  write_picture(arguments.output, picture);
-  print(arguments.json,
-        fmt::format(
-            "{} ({} x {}): {} vertices, {} triangles; prepare {:.0f} ms, displace {:.0f} ms, draw {:.0f} ms on {}\n",
-            arguments.output, picture.width, picture.height, surface.vertex_count, surface.triangle_count, prepare_ms,
-            displace_ms, draw_ms, gl.renderer()));
-  Json json{{"picture", arguments.output},
-            {"mode", arguments.mode},
-            {"size", {picture.width, picture.height}},
-            {"vertices", surface.vertex_count},
-            {"triangles", surface.triangle_count},
-            {"times_ms", {{"prepare", prepare_ms}, {"displace", displace_ms}, {"draw", draw_ms}}},
-            {"renderer", gl.renderer()}};
-  if (!scale.colours.empty()) json["error_max"] = scale.highest;
-  write_json(arguments.json, json);
+  bar.reset();
+  print(arguments.json, text);
+  write_json(arguments.json, is_pattern(arguments.pose) ? all : all[0]);
 }
 
 void add_pose_options(CLI::App& command, Arguments& arguments) {
-  CLI::Option* pose =
-      declare_input(command, command.add_option("--pose", arguments.pose, "pose or animation of a model: .json"))
-          ->type_name("FILE");
+  CLI::Option* pose = add_pose_option(command, arguments.pose);
   command.add_option("--time", arguments.time, "time in the animation (default: its first frame)")
       ->check(any_number())
       ->type_name("T")
@@ -398,28 +418,6 @@ void add_pose_options(CLI::App& command, Arguments& arguments) {
                 "with --deform paper or coordinates: do not restore the distances to the bones")
       ->needs(pose);
   add_polish_option(command, arguments.is_polished, pose);
-}
-
-void add_camera_options(CLI::App& command, Arguments& arguments) {
-  declare_input(command, command.add_option("--camera", arguments.camera,
-                                            "view: .json with azimuth, elevation, fov, zoom, up, front, target, eye"))
-      ->type_name("FILE");
-  command.add_option("--azimuth", arguments.azimuth, "degrees about the up axis, 0 from the front (default: 30)")
-      ->check(any_number())
-      ->type_name("DEG");
-  command.add_option("--elevation", arguments.elevation, "degrees above the horizon (default: 15)")
-      ->check(number_in(-90.0, 90.0))
-      ->type_name("DEG");
-  command.add_option("--fov", arguments.fov, "degrees of the shorter side, 0: orthographic (default: 25)")
-      ->check(number_in(0.0, 120.0))
-      ->type_name("DEG");
-  command.add_option("--zoom", arguments.zoom, "1: the model fills the picture")
-      ->check(number_in(0.01, 1000.0))
-      ->type_name("X");
-  command.add_option("--up", arguments.up, "the model's up direction (default: its own, else y)")
-      ->type_name("x|-y|..|X,Y,Z");
-  command.add_option("--front", arguments.front, "where the model looks (default: its own, else z)")
-      ->type_name("x|-y|..|X,Y,Z");
 }
 
 }  // namespace
@@ -464,10 +462,7 @@ void add_render_command(CLI::App& program) {
   command.add_option("--lattice", arguments->lattice, "draw a model at another texture size, 4 to 16384 texels")
       ->check(number_in(4, 16384))
       ->type_name("N");
-  add_camera_options(command, *arguments);
-  command.add_option("--views", arguments->views, "pictures side by side, all the way round")
-      ->check(number_in(1, 24))
-      ->type_name("N");
+  add_view_options(command, arguments->view);
   command.add_option("--size", arguments->size, "of one view, pixels (default: 1200x900)")->type_name("WxH");
   command.add_option("--samples", arguments->samples, "per pixel and direction, 1 to 8 (default: 2)")
       ->check(number_in(1, 8))
@@ -487,6 +482,8 @@ void add_render_command(CLI::App& program) {
       "  skeletex render bear.off --skeleton bear.skeleton.json --mode segments --show-skeleton -o segments.png\n"
       "  skeletex render bear.off --mode error --against bear.ply -o error.png\n"
       "  skeletex render bear.skx.exr --pose wave.json --views 4 --size 600x800 -o round.png\n"
+      "  skeletex render bear.skx.exr --view left --pose 'poses/*.json' -o pictures/{name}.png\n"
+      "  skeletex render bear.skx.exr --turntable 36 -o turn.png\n"
       "No display is needed. Models are placed on the GL device, straight from their texture.");
   command.callback([arguments, &command] { run(*arguments, command); });
 }

@@ -246,8 +246,9 @@ ClContext::Driver::Driver(const ClDeviceInfo& info_given, ::cl::Device device_gi
     if (const auto it = programs.find(key_of(files)); it != programs.end()) return it->second;
 
   const std::vector<std::string_view>& files = candidates.front();
+  // -w: PoCL writes the number of warnings to standard error, among them those of vectors wider than the CPU's.
   const std::string options =
-      fmt::format("-cl-std=CL1.2 -cl-kernel-arg-info -DROW_ITEMS={} {}", workarounds::row_items(info), name.options);
+      fmt::format("-cl-std=CL1.2 -cl-kernel-arg-info -w -DROW_ITEMS={} {}", workarounds::row_items(info), name.options);
   cl_int code = CL_SUCCESS;
   ::cl::Program built(context, workarounds::marked_source(options, kernel_source(files)), false, &code);
   check(code, fmt::format("{}: creating the program", name.file));

@@ -113,10 +113,12 @@ class CameraFit {
 
   void fit_orthographic() {
     const auto [low, high] = bounds_of(points_, [this](const Vec3& p) { return seen(p); });
-    if (!view_.target) target_ += 0.5 * (low.x() + high.x()) * camera_.right + 0.5 * (low.y() + high.y()) * camera_.up;
-    const double scale =
-        std::max({0.5 * (high.x() - low.x()) / camera_.tan_x, 0.5 * (high.y() - low.y()) / camera_.tan_y, 1e-12}) /
-        kUsable / view_.zoom;
+    Vec3 half = 0.5 * (high - low);
+    if (view_.target)
+      half = high.cwiseMax(-low);
+    else
+      target_ += 0.5 * (low.x() + high.x()) * camera_.right + 0.5 * (low.y() + high.y()) * camera_.up;
+    const double scale = std::max({half.x() / camera_.tan_x, half.y() / camera_.tan_y, 1e-12}) / kUsable / view_.zoom;
     camera_.tan_x *= scale;
     camera_.tan_y *= scale;
     camera_.eye = target_ + 3 * radius_ * camera_.back;
@@ -203,6 +205,35 @@ Camera fit_camera(const View& view, std::span<const Vec3> points, int width, int
   camera.far = std::max(farthest, radius) + 0.05 * radius;
   camera.near = std::max(std::min(nearest, camera.far) - 0.05 * radius, 1e-3 * camera.far);
   return camera;
+}
+
+std::vector<Camera> turntable(const View& view, std::span<const Vec3> points, int width, int height, int count) {
+  const auto [lower, upper] = bounds_of(points, [](const Vec3& p) { return p; });
+  View turned = view;
+  turned.target = view.target.value_or(0.5 * (lower + upper));
+  std::vector<Camera> cameras;
+  double distance = 0, nearest = std::numeric_limits<double>::infinity();
+  Camera widest;
+  for (int i = 0; i < count; ++i) {
+    turned.azimuth_deg = view.azimuth_deg + 360.0 * i / count;
+    cameras.push_back(fit_camera(turned, points, width, height));
+    const Camera& camera = cameras.back();
+    const double own = (camera.eye - *turned.target).norm();
+    distance = std::max(distance, own);
+    // Relative to the target.
+    nearest = std::min(nearest, camera.near - own);
+    widest.far = i == 0 ? camera.far - own : std::max(widest.far, camera.far - own);
+    widest.tan_x = i == 0 ? camera.tan_x : std::max(widest.tan_x, camera.tan_x);
+    widest.tan_y = i == 0 ? camera.tan_y : std::max(widest.tan_y, camera.tan_y);
+  }
+  for (Camera& camera : cameras) {
+    camera.eye = *turned.target + distance * camera.back;
+    camera.tan_x = widest.tan_x;
+    camera.tan_y = widest.tan_y;
+    camera.far = distance + widest.far;
+    camera.near = std::max(distance + nearest, 1e-3 * camera.far);
+  }
+  return cameras;
 }
 
 Eigen::Matrix4d view_projection(const Camera& camera, const Vec3& origin) {

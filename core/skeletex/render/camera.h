@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "skeletex/geometry/mesh.h"
 
@@ -39,6 +40,13 @@ struct Camera {
 /// A camera that shows all points in a picture of the given shape, with 4 % of margin at zoom 1.
 /// \throw InputError when up is parallel to the viewing direction's plane of reference, or the eye lies on the target
 Camera fit_camera(const View& view, std::span<const Vec3> points, int width, int height);
+
+/// Cameras all the way round the model, of which the first looks as `view` says: about the up axis through the target,
+/// without it the middle of the points, all from the same distance, at which the points are in every picture.
+/// \param view   has no eye
+/// \param count  of cameras, at least 1
+/// \throw InputError as fit_camera
+std::vector<Camera> turntable(const View& view, std::span<const Vec3> points, int width, int height, int count);
 
 /// World relative to `origin` -> OpenGL clip space.
 Eigen::Matrix4d view_projection(const Camera& camera, const Vec3& origin);
