@@ -77,9 +77,12 @@ def morphs(
     if len(landmarks) > 0 and len(models) != 2:
         raise InputError("landmarks: they pair the points of two models")
     try:
-        pairs = np.asarray(landmarks, dtype=np.float64).reshape(-1, 2, 3)
+        pairs = np.asarray(landmarks, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError("landmarks: pairs of points [x, y, z] are wanted") from None
+        pairs = np.empty(1)
+    if pairs.size > 0 and pairs.shape[1:] != (2, 3):
+        raise InputError("landmarks: pairs of points [x, y, z] are wanted")
+    pairs = pairs.reshape(-1, 2, 3)
     lists = [[float(weight) for weight in row] for row in given]
     made = _core.morph(
         [model._core for model in models],

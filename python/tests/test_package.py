@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import html
 import inspect
+import json
 import os
 import re
 import shutil
@@ -226,6 +227,33 @@ def test_models_of_one_layout_have_textures_that_correspond(bear: skeletex.Model
     assert np.linalg.norm(mean.texture - (corners[0].texture + corners[1].texture) / 2) < 0.25 * change
     with pytest.raises(skeletex.InputError, match="weight"):
         skeletex.morph([bear, bear_bis], [1.2, -0.2])
+
+
+def test_landmarks_are_the_program_s(
+    tmp_path: Path, program: str, bear: skeletex.Model, bear_bis: skeletex.Model
+) -> None:
+    paths = [tmp_path / "a.skx.exr", tmp_path / "b.skx.exr"]
+    for model, path in zip((bear, bear_bis), paths):
+        model.write(path)
+    models = [skeletex.Model.read(path) for path in paths]
+    # The nose of one is to become what lies below the nose of the other.
+    points = []
+    for model in models:
+        vertices = skeletex.reconstruct(model).vertices
+        head = vertices[vertices[:, 1] > np.quantile(vertices[:, 1], 0.8)]
+        points.append(head[np.argmax(head[:, 2])])
+    vertices = skeletex.reconstruct(models[1]).vertices
+    points[1] = vertices[np.argmin(np.linalg.norm(vertices - (points[1] - [0, 0.05, 0]), axis=1))]
+    given = tmp_path / "landmarks.json"
+    given.write_text(json.dumps({"landmarks": [{"name": "nose", "points": [list(point) for point in points]}]}))
+    run(program, "morph", *paths, "--t", 0.5, "--landmarks", given, "-o", tmp_path / "half.skx.exr")
+    skeletex.morph(models, 0.5, landmarks=[tuple(points)]).write(tmp_path / "own.skx.exr")
+    assert (tmp_path / "own.skx.exr").read_bytes() == (tmp_path / "half.skx.exr").read_bytes()
+    skeletex.morph(models, 0.5).write(tmp_path / "without.skx.exr")
+    assert (tmp_path / "own.skx.exr").read_bytes() != (tmp_path / "without.skx.exr").read_bytes()
+    for wrong in ([1, 2], [points[0]], "nose"):
+        with pytest.raises(skeletex.InputError, match="landmarks"):
+            skeletex.morph(models, 0.5, landmarks=wrong)  # type: ignore[arg-type]
 
 
 def test_a_correspondence_names_bones(bear: skeletex.Model, bear_bis: skeletex.Model) -> None:
