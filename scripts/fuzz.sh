@@ -1,12 +1,25 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Fuzzes every reader with libFuzzer, address and undefined-behaviour sanitizers: scripts/fuzz.sh [SECONDS each, 20] [READER ..]
-# Readers are those of tests/fuzz. A finding ends with 1, and its input lies in build/fuzz/tests/fuzz/faults.
+# Fuzzes what reads files, and what edits models, with libFuzzer and the address and undefined-behaviour sanitizers:
+#   scripts/fuzz.sh [SECONDS each, 60] [TARGET ..]
+# Targets are tests/fuzz/<target>_fuzz.cpp; without any, all of them. A finding ends with 1; its input stays in
+# build/fuzz/tests/fuzz/faults, and build/fuzz/bin/<target>_fuzz INPUT shows it again.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-seconds=${1:-20}
-shift || true
-readers=$(IFS='|'; echo "${*:-.*}")
+seconds=${1:-60}
+[ $# -eq 0 ] || shift
+[[ $seconds =~ ^[1-9][0-9]*$ ]] || { echo "fuzz.sh: \"$seconds\" is no number of seconds" >&2; exit 2; }
+targets=()
+for target in "$@"; do
+  [ -e "tests/fuzz/${target}_fuzz.cpp" ] || { echo "fuzz.sh: no tests/fuzz/${target}_fuzz.cpp" >&2; exit 2; }
+  targets+=("${target}_fuzz")
+done
+names=$(IFS='|'; echo "${*:-.*}")
+faults=build/fuzz/tests/fuzz/faults
 cmake --preset fuzz -D SKELETEX_FUZZ_SECONDS="$seconds"
-cmake --build --preset fuzz
-ctest --preset fuzz --parallel "$(nproc)" -R "^fuzz/($readers)$"
+cmake --build --preset fuzz --target "${targets[@]:-fuzz_targets}"
+touch build/fuzz/started
+ctest --preset fuzz --parallel "$(nproc)" -R "^fuzz/($names)\$" && exit
+echo "fuzz.sh: findings:" >&2
+find "$faults" -type f -newer build/fuzz/started >&2
+exit 1

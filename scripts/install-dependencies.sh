@@ -34,7 +34,7 @@ figures=(
 # shellcheck disable=SC2034  # by its name below
 all=(
   "${figures[@]}" "${package[@]}"
-  libgtest-dev openexr oclgrind                                      # tests (models against exrheader, kernels under Oclgrind)
+  libgtest-dev librapidcheck-dev openexr oclgrind                    # tests (models against exrheader, kernels under Oclgrind)
   clang-format clang-tidy clang-14 libclang-rt-14-dev                                    # scripts/lint.sh, scripts/fuzz.sh
   groff-base zsh fish                                                # tests: manual pages, and completions by the shells
   pybind11-dev python3-dev python3-numpy python3-setuptools python3-venv python3-pytest mypy  # the Python package, and its tests
