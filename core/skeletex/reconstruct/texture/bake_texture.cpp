@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 #include "skeletex/io/image_file.h"
@@ -71,8 +72,7 @@ void paint_patch(const SkeletexModel& model, const Layer& layer, int bone, const
 
 }  // namespace
 
-BakedTexture bake_texture(const PreparedModel& prepared, const TriangleMesh& mesh) {
-  const SkeletexModel& model = prepared.model;
+BakedTexture bake_texture(const SkeletexModel& model, const PreparedModel& prepared, const TriangleMesh& mesh) {
   const auto layer = std::find_if(model.layers.begin(), model.layers.end(),
                                   [](const Layer& l) { return l.kind == LayerKind::kColour; });
   if (layer == model.layers.end())
@@ -90,6 +90,7 @@ BakedTexture bake_texture(const PreparedModel& prepared, const TriangleMesh& mes
 
   const std::vector<int> bones = triangle_bones(prepared.lattice, mesh.triangles);
   const std::vector<std::array<double, 2>> corners = corner_coordinates(prepared, mesh);
+  std::map<std::array<float, 2>, int> numbers;  // of coordinates
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const Rectangle& r = model.patches[bones[t]].rectangle;
     const auto& [x, y] = shelves.places[bones[t]];
@@ -98,9 +99,11 @@ BakedTexture bake_texture(const PreparedModel& prepared, const TriangleMesh& mes
     Triangle triangle{};
     for (int k = 0; k < 3; ++k) {
       const auto& [u, v] = corners[3 * t + static_cast<std::size_t>(k)];
-      triangle[k] = static_cast<int>(baked.coordinates.values.size());
-      baked.coordinates.values.emplace_back(static_cast<float>((x + (v - turns) * r.width + 0.5) / shelves.width),
-                                            static_cast<float>(1 - (y + u * (r.height - 1) + 0.5) / shelves.height));
+      const Eigen::Vector2f place(static_cast<float>((x + (v - turns) * r.width + 0.5) / shelves.width),
+                                  static_cast<float>(1 - (y + u * (r.height - 1) + 0.5) / shelves.height));
+      const auto [found, is_new] = numbers.try_emplace({place.x(), place.y()}, static_cast<int>(numbers.size()));
+      if (is_new) baked.coordinates.values.push_back(place);
+      triangle[k] = found->second;
     }
     baked.coordinates.corners.push_back(triangle);
   }
