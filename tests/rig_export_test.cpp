@@ -171,7 +171,7 @@ TEST(RigExport, ColoursComeAlongByVertexOrAsAPicture) {
   for (std::size_t v = 0; v < colours.size(); ++v) EXPECT_LT((plain.colours[v] - colours[v]).norm(), 1e-6);
   EXPECT_EQ(by_vertex.materials.at(0).base_colour, Colour::Ones());
 
-  const GltfScene scene = written_and_read(export_rig(device(), model, {.picture = &model}));
+  const GltfScene scene = written_and_read(export_rig(device(), model, {.texture_size = 256}));
   const GltfPrimitive& textured = scene.meshes.at(0).primitives.at(0);
   ASSERT_EQ(scene.images.size(), 1u);
   EXPECT_EQ(scene.materials.at(textured.material).image, 0);
@@ -191,7 +191,21 @@ TEST(RigExport, ColoursComeAlongByVertexOrAsAPicture) {
       ASSERT_LT((seen - colours[vertex].head<3>().cast<double>()).cwiseAbs().maxCoeff(), 0.02) << t;
     }
   const SkeletexModel bare = model_of(lone_bone(), 0.15);
-  EXPECT_THROW(export_rig(device(), bare, {.picture = &bare}), InputError);
+  // So it is where the mesh has fewer texels than the picture, whose colours are then the original's.
+  const SkeletexModel small = resample_model(device(), model, 40);
+  const GltfScene coarse = export_rig(device(), small, {.texture_size = 264, .original = &model});
+  const GltfPrimitive& surface = coarse.meshes.at(0).primitives.at(0);
+  for (const Triangle& triangle : surface.triangles) {
+    Eigen::Vector2f uv = Eigen::Vector2f::Zero();
+    Vec3 middle = Vec3::Zero();
+    for (const int corner : triangle) {
+      uv += surface.texture_coordinates[corner] / 3;
+      middle += surface.positions[corner] / 3;
+    }
+    const Vec3 seen = picture_at(coarse.images[0], {uv.x(), 1 - uv.y()});
+    for (int k = 0; k < 3; ++k) ASSERT_NEAR(seen[k], 0.5 + 0.4 * std::sin(3 * middle[k]), 0.05);
+  }
+  EXPECT_THROW(export_rig(device(), bare, {.texture_size = 64}), InputError);
 }
 
 TEST(RigExport, NormalsAreThoseOfTheModel) {

@@ -58,22 +58,22 @@ std::string model_name(const std::string& path) {
 
 void run(const Arguments& arguments) {
   Stopwatch watch;
-  SkeletexModel model = read_model(arguments.model, arguments.level);
-  const std::vector<NamedAnimation> animations = read_animations(arguments.animations, model.skeleton);
+  const SkeletexModel original = read_model(arguments.model, arguments.level);
+  const std::vector<NamedAnimation> animations = read_animations(arguments.animations, original.skeleton);
   ClContext context(arguments.device);
   ProgressBar bar(context);
-  std::optional<SkeletexModel> picture;
-  if (arguments.texture > 0) picture = resample_model(context, model, arguments.texture);
-  if (arguments.size > 0 && arguments.size != std::max(model.texture.width, model.texture.height)) {
+  std::optional<SkeletexModel> resized;
+  if (arguments.size > 0 && arguments.size != std::max(original.texture.width, original.texture.height)) {
     bar.show("resampling", 0.1);
-    model = resample_model(context, model, arguments.size);
+    resized = resample_model(context, original, arguments.size);
   }
   bar.show("reconstructing", 0.3);
-  const GltfScene scene = export_rig(context, model,
+  const GltfScene scene = export_rig(context, resized ? *resized : original,
                                      {.name = model_name(arguments.model),
                                       .placement = placement_of(arguments.up),
                                       .animations = animations,
-                                      .picture = picture ? &*picture : nullptr});
+                                      .texture_size = arguments.texture,
+                                      .original = &original});
   bar.show("writing", 0.7);
   write_gltf(arguments.output, scene);
   const double ms = watch.lap_ms();

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "skeletex/close/carry_over.h"
 #include "skeletex/io/gltf/write_gltf.h"
 #include "skeletex/reconstruct/layers/layer_values.h"
 #include "skeletex/reconstruct/linear_skin.h"
@@ -12,9 +13,20 @@
 namespace skeletex {
 namespace {
 
-/// Colours as a picture in place of those by vertex.
-void bake_colours(const SkeletexModel& picture, const PreparedModel& model, const TriangleMesh& bind,
-                  MeshAttributes& attributes) {
+/// Colours as a picture in place of those by vertex. Its texels lie on the surface that is exported, and have the
+/// colours that the original has there.
+void bake_colours(ClContext& context, const PreparedModel& model, const TriangleMesh& bind,
+                  const RigExportOptions& options, MeshAttributes& attributes) {
+  SkeletexModel picture = resample_model(context, model, options.texture_size);
+  if (options.original && !attributes.colours.empty()) {
+    const PreparedModel prepared(picture), original(*options.original);
+    const TriangleMesh surface = reconstruct_mesh(context, original);
+    MeshAttributes colours;
+    colours.colours = vertex_attributes(original).colours;
+    picture.layers = layers_of_vertices(
+        prepared,
+        carry_over(surface, build_triangle_tree(surface), colours, {}, reconstruct_mesh(context, prepared)).attributes);
+  }
   BakedTexture baked = bake_texture(picture, model, bind);
   attributes.colours = {};
   attributes.texture_coordinates = std::move(baked.coordinates);
@@ -22,11 +34,11 @@ void bake_colours(const SkeletexModel& picture, const PreparedModel& model, cons
 }
 
 GltfPrimitive make_primitive(ClContext& context, const PreparedModel& model, const Rig& rig,
-                             const SkeletexModel* picture, GltfScene& scene) {
+                             const RigExportOptions& options, GltfScene& scene) {
   BindMesh bind = reconstruct_bind_mesh(context, model);
   const VertexInfluences influences = strongest_influences(make_skin(context, model, bind.inner));
   MeshAttributes attributes = vertex_attributes(model);
-  if (picture) bake_colours(*picture, model, bind.mesh, attributes);
+  if (options.texture_size > 0) bake_colours(context, model, bind.mesh, options, attributes);
   scene.materials.push_back(material_of(attributes, scene.images));
   auto [primitive, sources] = primitive_of(in_user_units(std::move(bind.mesh), model.model.skeleton.frame), attributes);
   primitive.influences = 4;
@@ -106,7 +118,7 @@ GltfScene export_rig(ClContext& context, const PreparedModel& prepared, const Ri
     skin.inverse_binds.push_back(joint.bind.inverse().matrix());
   }
   scene.skins.push_back(skin);
-  scene.meshes.push_back({options.name, {make_primitive(context, prepared, rig, options.picture, scene)}});
+  scene.meshes.push_back({options.name, {make_primitive(context, prepared, rig, options, scene)}});
   for (const JointClip& clip : animated.clips) {
     GltfAnimation animation{clip.name, {}};
     for (std::size_t j = 0; j < rig.joints.size(); ++j)

@@ -14,8 +14,8 @@ struct RigExportOptions {
   std::string name = "model";                                     ///< of the mesh
   Eigen::Quaterniond placement = Eigen::Quaterniond::Identity();  ///< turns the model to the scene's y up
   std::span<const NamedAnimation> animations = {};
-  const SkeletexModel* picture =
-      nullptr;  ///< the model at the size of a picture of its colours; none: they go by vertex
+  int texture_size = 0;  ///< texels along the model's longer side for a picture of its colours; 0: they go by vertex
+  const SkeletexModel* original = nullptr;  ///< whose colours the picture has; none: the exported model's own
 };
 
 /// A model as other programs animate it: its mesh in the bind pose with its normals and colours, a skin with four

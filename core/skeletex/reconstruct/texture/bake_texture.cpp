@@ -24,15 +24,16 @@ struct Shelves {
   int width = 0, height = 0;
   std::vector<std::array<int, 2>> places;
 };
-/// Patches side by side, the tallest first. Each has a column more than it has texels: column 0 again.
-Shelves place_patches(const std::vector<Patch>& patches) {
+/// Patches side by side, the tallest first.
+/// \param repeated  columns that each has more than it has texels: its first ones again
+Shelves place_patches(const std::vector<Patch>& patches, int repeated) {
   std::vector<int> order(patches.size());
   std::iota(order.begin(), order.end(), 0);
   std::sort(order.begin(), order.end(), [&](int a, int b) {
     const int first = patches[a].rectangle.height, second = patches[b].rectangle.height;
     return first != second ? first > second : a < b;
   });
-  const auto outer_width = [](const Patch& patch) { return patch.rectangle.width + 1 + 2 * kGutter; };
+  const auto outer_width = [&](const Patch& patch) { return patch.rectangle.width + repeated + 2 * kGutter; };
   double area = 0;
   Shelves shelves;
   for (const Patch& patch : patches) {
@@ -53,10 +54,10 @@ Shelves place_patches(const std::vector<Patch>& patches) {
 }
 
 void paint_patch(const SkeletexModel& model, const Layer& layer, int bone, const std::array<int, 2>& place,
-                 ColourImage& image) {
+                 int repeated, ColourImage& image) {
   const Rectangle& r = model.patches[bone].rectangle;
   for (int row = -kGutter; row < r.height + kGutter; ++row)
-    for (int column = -kGutter; column <= r.width + kGutter; ++column) {
+    for (int column = -kGutter; column < r.width + repeated + kGutter; ++column) {
       const std::size_t texel = static_cast<std::size_t>(r.y + std::clamp(row, 0, r.height - 1)) *
                                     static_cast<std::size_t>(model.texture.width) +
                                 static_cast<std::size_t>(r.x + ((column % r.width) + r.width) % r.width);
@@ -77,7 +78,11 @@ BakedTexture bake_texture(const SkeletexModel& model, const PreparedModel& prepa
                                   [](const Layer& l) { return l.kind == LayerKind::kColour; });
   if (layer == model.layers.end())
     throw InputError("the model has no colours to make a picture of; encode a mesh with colours");
-  const Shelves shelves = place_patches(model.patches);
+  // Triangles that cross column 0 go on past the last one, by up to two columns of the mesh.
+  int repeated = 1;
+  for (std::size_t i = 0; i < model.patches.size(); ++i)
+    repeated = std::max(repeated, 2 * model.patches[i].rectangle.width / prepared.model.patches[i].rectangle.width);
+  const Shelves shelves = place_patches(model.patches, repeated);
   if (shelves.width > kMaxImageSize || shelves.height > kMaxImageSize)
     throw InputError(fmt::format("the picture would have {} x {} pixels, more than {}; reconstruct at a smaller size",
                                  shelves.width, shelves.height, kMaxImageSize));
@@ -86,7 +91,7 @@ BakedTexture bake_texture(const SkeletexModel& model, const PreparedModel& prepa
                  std::vector<std::uint8_t>(std::size_t{4} * static_cast<std::size_t>(shelves.width) *
                                            static_cast<std::size_t>(shelves.height))};
   for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
-    paint_patch(model, *layer, bone, shelves.places[bone], baked.image);
+    paint_patch(model, *layer, bone, shelves.places[bone], repeated, baked.image);
 
   const std::vector<int> bones = triangle_bones(prepared.lattice, mesh.triangles);
   const std::vector<std::array<double, 2>> corners = corner_coordinates(prepared, mesh);
