@@ -35,7 +35,7 @@ figures=(
 all=(
   "${figures[@]}" "${package[@]}"
   libgtest-dev openexr oclgrind                                      # tests (models against exrheader, kernels under Oclgrind)
-  clang-format clang-tidy                                            # scripts/lint.sh
+  clang-format clang-tidy clang-14 libclang-rt-14-dev                                    # scripts/lint.sh, scripts/fuzz.sh
   groff-base zsh fish                                                # tests: manual pages, and completions by the shells
   pybind11-dev python3-dev python3-numpy python3-setuptools python3-venv python3-pytest mypy  # the Python package, and its tests
   chromium                                                                              # tests: the report and the page of `view` in a browser
