@@ -12,4 +12,3 @@ cmake --preset "$preset"
 cmake --build --preset "$preset"
 [ "$preset" != release ] || bash scripts/lint.sh
 ctest --preset "$preset" --parallel "$(nproc)"
-[ "$preset" != release ] || bash scripts/fuzz.sh 15
