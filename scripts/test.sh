@@ -1,7 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Installs what is missing, builds everything, holds the code against the project's rules (scripts/lint.sh) runs every test,
-# and fuzzes the readers for some seconds each (scripts/fuzz.sh).
+# Installs what is missing, builds everything, holds the code against the project's rules (scripts/lint.sh) and runs every test.
 # Another preset by name runs its tests alone: scripts/test.sh asan
 set -euo pipefail
 cd "$(dirname "$0")/.."
