@@ -1,7 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Installs what is missing, builds everything, holds the code against the project's rules (scripts/lint.sh) runs every test,
-# and fuzzes the readers for some seconds each (scripts/fuzz.sh).
+# Installs what is missing, builds everything, holds the code against the project's rules (scripts/lint.sh) and runs every test.
 # Another preset by name runs its tests alone: scripts/test.sh asan
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -12,4 +11,3 @@ cmake --preset "$preset"
 cmake --build --preset "$preset"
 [ "$preset" != release ] || bash scripts/lint.sh
 ctest --preset "$preset" --parallel "$(nproc)"
-[ "$preset" != release ] || bash scripts/fuzz.sh 15

@@ -19,6 +19,7 @@
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/texture/bake_texture.h"
+#include "support/picture_at.h"
 #include "support/shapes.h"
 
 namespace skeletex {
@@ -277,26 +278,10 @@ TEST(Layers, AFilteredLayerIsSmootherAndTheSurfaceStays) {
   EXPECT_THROW(filter_layer(device(), model, {.layer = "none"}), InputError);
 }
 
-/// The picture's colour at a place, between pixels, in the bytes of its sRGB.
-Vec3 picture_at(const ColourImage& image, const Eigen::Vector2f& uv) {
-  const double x = static_cast<double>(uv.x()) * image.width - 0.5,
-               y = (1 - static_cast<double>(uv.y())) * image.height - 0.5;
-  const int column = static_cast<int>(std::floor(x)), row = static_cast<int>(std::floor(y));
-  Vec3 sum = Vec3::Zero();
-  for (int i = 0; i < 2; ++i)
-    for (int j = 0; j < 2; ++j) {
-      const double weight = (i == 0 ? 1 - (y - row) : y - row) * (j == 0 ? 1 - (x - column) : x - column);
-      const std::uint8_t* const p =
-          image.rgba.data() + 4 * (static_cast<std::size_t>(row + i) * image.width + (column + j));
-      for (int k = 0; k < 3; ++k) sum[k] += weight * static_cast<double>(linear_from_srgb(p[k] / 255.f));
-    }
-  return sum;
-}
-
 TEST(Layers, ABakedPictureHasTheColoursOfTheSurfaceAlsoAcrossSeams) {
   const SkeletexModel model = encode(creature_shape(), 128);
   const TriangleMesh mesh = reconstruct_mesh(device(), model);
-  const BakedTexture baked = bake_texture(model, mesh);
+  const BakedTexture baked = bake_texture(model, model, mesh);
   double largest = 0;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     Eigen::Vector2f uv = Eigen::Vector2f::Zero();
@@ -313,7 +298,7 @@ TEST(Layers, ABakedPictureHasTheColoursOfTheSurfaceAlsoAcrossSeams) {
   EXPECT_LT(largest, 0.1 * 0.03 * model.diagonal + 0.01);  // 8 bits
   SkeletexModel bare = model;
   bare.layers.clear();
-  EXPECT_THROW(bake_texture(bare, mesh), InputError);
+  EXPECT_THROW(bake_texture(bare, model, mesh), InputError);
 }
 
 TEST(Stance, IsGuessedFromTheWayABodyStands) {

@@ -12,10 +12,13 @@
 #include "skeletex/io/gltf/write_gltf.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
 #include "skeletex/reconstruct/linear_skin.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/reconstruct/texture/bake_texture.h"
 #include "skeletex/rig/export_rig.h"
+#include "support/picture_at.h"
 #include "support/scratch.h"
 #include "support/shapes.h"
 #include "support/synthetic_model.h"
@@ -147,6 +150,76 @@ TEST(RigExport, TheMeshIsClosedAndItsNormalsPointOutwards) {
   EXPECT_LT(against, mesh.triangles.size() / 100);
 }
 
+/// A model with colours that vary over its surface.
+SkeletexModel coloured(SkeletexModel model) {
+  const PreparedModel prepared(model);
+  MeshAttributes attributes;
+  for (const Vec3& p : reconstruct_mesh(device(), prepared).positions) {
+    const auto wave = [](double x) { return static_cast<float>(0.5 + 0.4 * std::sin(3 * x)); };
+    attributes.colours.values.emplace_back(wave(p.x()), wave(p.y()), wave(p.z()), 1.f);
+  }
+  model.layers = layers_of_vertices(prepared, attributes);
+  return model;
+}
+
+TEST(RigExport, ColoursComeAlongByVertexOrAsAPicture) {
+  const SkeletexModel model = coloured(model_of(random_tree(6, 3), 0.15));
+  const std::vector<Colour> colours = vertex_attributes(model).colours.values;
+  const GltfScene by_vertex = written_and_read(export_rig(device(), model));
+  const GltfPrimitive& plain = by_vertex.meshes.at(0).primitives.at(0);
+  ASSERT_EQ(plain.colours.size(), colours.size());
+  for (std::size_t v = 0; v < colours.size(); ++v) EXPECT_LT((plain.colours[v] - colours[v]).norm(), 1e-6);
+  EXPECT_EQ(by_vertex.materials.at(0).base_colour, Colour::Ones());
+
+  const GltfScene scene = written_and_read(export_rig(device(), model, {.texture_size = 256}));
+  const GltfPrimitive& textured = scene.meshes.at(0).primitives.at(0);
+  ASSERT_EQ(scene.images.size(), 1u);
+  EXPECT_EQ(scene.materials.at(textured.material).image, 0);
+  EXPECT_TRUE(textured.colours.empty());
+  EXPECT_EQ(textured.triangles.size(), plain.triangles.size());
+  // Vertices repeat at the borders of patches alone, and move as those that they stand for.
+  EXPECT_LT(textured.positions.size(), 1.3 * static_cast<double>(plain.positions.size()));
+  EXPECT_LT(largest_distance(play(scene, nullptr, 0), textured.positions), 1e-6 * model.diagonal);
+  for (std::size_t t = 0; t < textured.triangles.size(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      const int own = textured.triangles[t][k], vertex = plain.triangles[t][k];
+      ASSERT_EQ(textured.positions[own], plain.positions[vertex]);
+      ASSERT_EQ(textured.normals[own], plain.normals[vertex]);
+      for (int i = 0; i < 4; ++i) ASSERT_EQ(textured.weights[4 * own + i], plain.weights[4 * vertex + i]);
+      const Eigen::Vector2f& uv = textured.texture_coordinates[own];
+      const Vec3 seen = picture_at(scene.images[0], {uv.x(), 1 - uv.y()});
+      ASSERT_LT((seen - colours[vertex].head<3>().cast<double>()).cwiseAbs().maxCoeff(), 0.02) << t;
+    }
+  const SkeletexModel bare = model_of(lone_bone(), 0.15);
+  // So it is where the mesh has fewer texels than the picture, whose colours are then the original's.
+  const SkeletexModel small = resample_model(device(), model, 40);
+  const GltfScene coarse = export_rig(device(), small, {.texture_size = 264, .original = &model});
+  const GltfPrimitive& surface = coarse.meshes.at(0).primitives.at(0);
+  for (const Triangle& triangle : surface.triangles) {
+    Eigen::Vector2f uv = Eigen::Vector2f::Zero();
+    Vec3 middle = Vec3::Zero();
+    for (const int corner : triangle) {
+      uv += surface.texture_coordinates[corner] / 3;
+      middle += surface.positions[corner] / 3;
+    }
+    const Vec3 seen = picture_at(coarse.images[0], {uv.x(), 1 - uv.y()});
+    for (int k = 0; k < 3; ++k) ASSERT_NEAR(seen[k], 0.5 + 0.4 * std::sin(3 * middle[k]), 0.05);
+  }
+  EXPECT_THROW(export_rig(device(), bare, {.texture_size = 64}), InputError);
+}
+
+TEST(RigExport, NormalsAreThoseOfTheModel) {
+  SkeletexModel model = model_of(lone_bone(), 0.15);
+  const PreparedModel prepared(model);
+  MeshAttributes attributes;
+  for (const Vec3& p : reconstruct_mesh(device(), prepared).positions)
+    attributes.normals.values.push_back((p + Vec3(0, 0, 0.2)).normalized());
+  model.layers = layers_of_vertices(prepared, attributes);
+  const std::vector<Vec3> normals = vertex_attributes(model).normals.values;
+  const GltfScene scene = written_and_read(export_rig(device(), model));
+  EXPECT_LT(largest_distance(scene.meshes.at(0).primitives.at(0).normals, normals), 1e-6);
+}
+
 TEST(RigExport, WeightsAreTheFourStrongestAndSumToOne) {
   const SkeletexModel model = model_of(cross(6), 0.3);
   const PreparedModel prepared(model);
@@ -201,6 +274,37 @@ TEST(MeshFile, StlAndGltfHoldTheMesh) {
   const GltfScene scene = read_gltf(folder / "torus.glb");
   EXPECT_EQ(scene.meshes.at(0).primitives.at(0).triangles, mesh.triangles);
   EXPECT_LT(largest_distance(scene.meshes[0].primitives[0].positions, mesh.positions), 1e-6);
+}
+
+TEST(MeshFile, GltfHoldsColoursAndThePicture) {
+  const SkeletexModel model = coloured(model_of(random_tree(6, 3), 0.15));
+  const TriangleMesh mesh = reconstruct_mesh(device(), model);
+  MeshAttributes attributes = vertex_attributes(model);
+  const ScratchFolder folder;
+  write_mesh(folder / "colours.glb", mesh, attributes);
+  const MeshFile by_vertex = read_mesh(folder / "colours.glb");
+  ASSERT_EQ(by_vertex.attributes.colours.values.size(), attributes.colours.values.size());
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+    ASSERT_LT((by_vertex.attributes.colours.values[v] - attributes.colours.values[v]).norm(), 1e-6);
+
+  BakedTexture baked = bake_texture(model, model, mesh);
+  attributes.colours = {};
+  attributes.texture_coordinates = baked.coordinates;
+  attributes.materials.emplace_back().image = baked.image;
+  write_mesh(folder / "picture.glb", mesh, attributes);
+  const MeshFile textured = read_mesh(folder / "picture.glb");
+  EXPECT_TRUE(measure_manifold(textured.mesh).is_closed_manifold());
+  ASSERT_EQ(textured.attributes.materials.size(), 1u);
+  EXPECT_EQ(textured.attributes.materials[0].image.rgba, baked.image.rgba);
+  ASSERT_EQ(textured.mesh.triangles.size(), mesh.triangles.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      const auto uv_of = [&](const CornerValues<Eigen::Vector2f>& of, const TriangleMesh& in) {
+        return of.values[of.of(in, t)[k]];
+      };
+      ASSERT_LT((uv_of(textured.attributes.texture_coordinates, textured.mesh) - uv_of(baked.coordinates, mesh)).norm(),
+                1e-6);
+    }
 }
 
 TEST(GltfFile, DamagedFilesAreRefusedWithAReason) {

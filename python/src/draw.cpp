@@ -50,18 +50,7 @@ Image draw_scene(const Scene& scene) {
   const DrawOptions& options = scene.options;
   const Camera camera = fit_camera(scene.view, scene.mesh.positions, options.width, options.height);
   Image image = draw(gl, upload_surface(gl, scene.mesh), paint, camera, options);
-  if (!scene.skeleton) return image;
-  const TriangleMesh bones = skeleton_mesh(*scene.skeleton, 0.009 * bounding_box(scene.mesh).diagonal());
-  SurfacePaint bone_paint;
-  bone_paint.paint = Paint::kFace;
-  std::vector<VertexColour> colours;
-  for (const int bone : skeleton_mesh_bones(*scene.skeleton))
-    colours.push_back(bone < 0 ? VertexColour{38, 40, 46} : VertexColour{214, 92, 38});
-  bone_paint.colours = upload_colours(colours);
-  DrawOptions plain = options;
-  plain.wire_pixels = 0;
-  plain.lighting = 0.8;
-  blend_over(image, draw(gl, upload_surface(gl, bones), bone_paint, camera, plain), 0.85);
+  if (scene.skeleton) draw_skeleton(gl, *scene.skeleton, bounding_box(scene.mesh).diagonal(), camera, options, image);
   return image;
 }
 

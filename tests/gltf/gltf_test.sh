@@ -18,4 +18,12 @@ done
 echo '{"frames": [{"time": -1, "pose": {}}, {"time": 0.5, "pose": {"nodes": {"left_outer_up": [0.1, 0.2, 0.3]}}}]}' >move.json
 "$program" export eight.skx.exr -o eight.glb --animation move.json
 "$program" reconstruct eight.skx.exr -o plain.glb
-node validate.mjs still.glb man.glb eight.glb plain.glb
+# The same with a colour for each vertex, which goes out by vertex and as a picture.
+awk 'NF == 0 { next } !head { head = 1; print "COFF"; next } !count { count = $1; print; next }
+  row < count { printf "%s %d 128 %d 255\n", $0, row % 256, 255 * row / count; ++row; next } { print }' \
+  "$source/build/meshes/eight.off" >coloured.off
+"$program" encode coloured.off "$source/configs/skeletons/eight.skeleton.json" -o coloured.skx.exr --size 64
+"$program" export coloured.skx.exr -o coloured.glb
+"$program" export coloured.skx.exr -o picture.glb --lod 32 --texture 128
+"$program" reconstruct coloured.skx.exr -o plain_picture.glb --texture picture.png
+node validate.mjs still.glb man.glb eight.glb plain.glb coloured.glb picture.glb plain_picture.glb

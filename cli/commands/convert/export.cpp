@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -23,7 +24,7 @@ namespace {
 struct Arguments {
   std::string model, output, device, json, up = "y";
   std::vector<std::string> animations;
-  int size = 0, level = 0;
+  int size = 0, level = 0, texture = 0;
 };
 
 /// Animations are named as their files, each name once.
@@ -57,18 +58,22 @@ std::string model_name(const std::string& path) {
 
 void run(const Arguments& arguments) {
   Stopwatch watch;
-  SkeletexModel model = read_model(arguments.model, arguments.level);
-  const std::vector<NamedAnimation> animations = read_animations(arguments.animations, model.skeleton);
+  const SkeletexModel original = read_model(arguments.model, arguments.level);
+  const std::vector<NamedAnimation> animations = read_animations(arguments.animations, original.skeleton);
   ClContext context(arguments.device);
   ProgressBar bar(context);
-  if (arguments.size > 0 && arguments.size != std::max(model.texture.width, model.texture.height)) {
+  std::optional<SkeletexModel> resized;
+  if (arguments.size > 0 && arguments.size != std::max(original.texture.width, original.texture.height)) {
     bar.show("resampling", 0.1);
-    model = resample_model(context, model, arguments.size);
+    resized = resample_model(context, original, arguments.size);
   }
   bar.show("reconstructing", 0.3);
-  const GltfScene scene = export_rig(
-      context, model,
-      {.name = model_name(arguments.model), .placement = placement_of(arguments.up), .animations = animations});
+  const GltfScene scene = export_rig(context, resized ? *resized : original,
+                                     {.name = model_name(arguments.model),
+                                      .placement = placement_of(arguments.up),
+                                      .animations = animations,
+                                      .texture_size = arguments.texture,
+                                      .original = &original});
   bar.show("writing", 0.7);
   write_gltf(arguments.output, scene);
   const double ms = watch.lap_ms();
@@ -119,6 +124,12 @@ void add_export_command(CLI::App& program) {
                   "level of a file that `skeletex lod --levels` has written (default: 0, the finest)")
       ->check(number_from(0))
       ->type_name("K");
+  command
+      .add_option("--texture", arguments->texture,
+                  "colours as a picture of so many texels along the model's longer side, 16 to 8192 (default: colours "
+                  "by vertex)")
+      ->check(number_in(16, 8192))
+      ->type_name("N");
   take_one_of(*command.add_option("--up", arguments->up, "axis of the model that is up; y is in glTF (default: y)"),
               {"x", "y", "z", "-x", "-y", "-z"});
   add_device_option(command, arguments->device);

@@ -91,20 +91,21 @@ MeshAttributes attributes_of(ClContext& context, const PreparedModel& prepared, 
   if (is_posed && !attributes.normals.empty())
     attributes.normals.values = turn_normals(bind, attributes.normals.values, mesh.positions);
   if (!has_texture) return attributes;
-  BakedTexture baked = bake_texture(prepared, bind);
+  BakedTexture baked = bake_texture(prepared.model, prepared, bind);
   attributes.colours = {};
   attributes.texture_coordinates = std::move(baked.coordinates);
   attributes.materials.emplace_back().image_file = relative_to(arguments.texture, output);
   write_image(arguments.texture, baked.image);
+  attributes.materials[0].image = std::move(baked.image);  // a glTF file holds it as well
   return attributes;
 }
 
 void check_arguments(const Arguments& arguments) {
   if (arguments.constant_offset && !arguments.texture.empty())
     throw CLI::ValidationError("--texture", "--constant-offset writes no surface that has colours");
-  if (!arguments.texture.empty() && !has_ending(arguments.output, ".obj") && !has_ending(arguments.output, ".ply"))
-    throw CLI::ValidationError("--texture",
-                               "\"" + arguments.output + "\" must end in .obj or .ply, which take texture coordinates");
+  if (!arguments.texture.empty() && has_ending(arguments.output, ".stl"))
+    throw CLI::ValidationError(
+        "--texture", "\"" + arguments.output + "\" must end in .obj, .ply or .glb, which take texture coordinates");
   if (arguments.constant_offset && arguments.is_polished)
     throw CLI::ValidationError("--polish", "--constant-offset writes no surface that could be polished");
   if (!arguments.constant_offset) check_distance_option(arguments.is_distance_dropped, arguments.deform);

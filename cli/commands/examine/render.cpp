@@ -226,21 +226,6 @@ std::vector<Vec3> place_surface(GlContext& gl, ClContext& context, const Argumen
   return points;
 }
 
-void draw_skeleton(GlContext& gl, const Subject& subject, const Camera& camera, const DrawOptions& options,
-                   Image& image) {
-  const TriangleMesh bones = skeleton_mesh(*subject.skeleton, 0.009 * bounding_box(subject.mesh).diagonal());
-  SurfacePaint paint;
-  paint.paint = Paint::kFace;
-  std::vector<VertexColour> colours;
-  for (const int bone : skeleton_mesh_bones(*subject.skeleton))
-    colours.push_back(bone < 0 ? VertexColour{38, 40, 46} : VertexColour{214, 92, 38});
-  paint.colours = upload_colours(colours);
-  DrawOptions plain = options;
-  plain.wire_pixels = 0;
-  plain.lighting = 0.8;
-  blend_over(image, draw(gl, upload_surface(gl, bones), paint, camera, plain), 0.85);
-}
-
 /// Takes mesh, skeleton and view from a file of configs/models.
 /// \return the view, null where there is none
 nlohmann::json resolve_config(Arguments& arguments, const CLI::App& command) {
@@ -286,7 +271,8 @@ Image draw_picture(Studio& studio, const Subject& subject, const GpuSurface& sur
   std::vector<Image> images;
   for (const Camera& camera : cameras) {
     Image image = draw(studio.gl, surface, studio.paint, camera, studio.options);
-    if (shows_skeleton) draw_skeleton(studio.gl, subject, camera, studio.options, image);
+    if (shows_skeleton)
+      draw_skeleton(studio.gl, *subject.skeleton, bounding_box(subject.mesh).diagonal(), camera, studio.options, image);
     images.push_back(std::move(image));
   }
   Image picture = tile(images, static_cast<int>(cameras.size()));

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <type_traits>
 
 namespace skeletex {
@@ -31,6 +32,12 @@ void turn_over(MeshAttributes& attributes) {
 
 SplitMesh split_vertices(const TriangleMesh& mesh, const MeshAttributes& attributes) {
   SplitMesh split;
+  if (attributes.normals.corners.empty() && attributes.colours.corners.empty() &&
+      attributes.texture_coordinates.corners.empty()) {
+    split = {mesh, attributes, std::vector<int>(mesh.positions.size())};
+    std::iota(split.sources.begin(), split.sources.end(), 0);
+    return split;
+  }
   split.mesh.triangles.resize(mesh.triangles.size());
   split.attributes.materials = attributes.materials;
   split.attributes.triangle_materials = attributes.triangle_materials;
@@ -50,6 +57,7 @@ SplitMesh split_vertices(const TriangleMesh& mesh, const MeshAttributes& attribu
       split.mesh.triangles[t][k] = found->second;
       if (!is_new) continue;
       split.mesh.positions.push_back(mesh.positions[vertex]);
+      split.sources.push_back(vertex);
       take(attributes.normals, normal, split.attributes.normals);
       take(attributes.colours, colour, split.attributes.colours);
       take(attributes.texture_coordinates, texture, split.attributes.texture_coordinates);

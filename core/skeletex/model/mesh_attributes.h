@@ -59,6 +59,7 @@ void turn_over(MeshAttributes& attributes);
 struct SplitMesh {
   TriangleMesh mesh;
   MeshAttributes attributes;
+  std::vector<int> sources;  ///< per vertex: the vertex that it stands for
 };
 SplitMesh split_vertices(const TriangleMesh& mesh, const MeshAttributes& attributes);
 

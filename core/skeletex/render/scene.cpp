@@ -85,4 +85,19 @@ std::vector<int> skeleton_mesh_bones(const Skeleton& skeleton) {
   return bones;
 }
 
+void draw_skeleton(GlContext& gl, const Skeleton& skeleton, double diagonal, const Camera& camera,
+                   const DrawOptions& options, Image& image) {
+  std::vector<VertexColour> colours;
+  for (const int bone : skeleton_mesh_bones(skeleton))
+    colours.push_back(bone < 0 ? VertexColour{38, 40, 46} : VertexColour{214, 92, 38});
+  SurfacePaint paint;
+  paint.paint = Paint::kFace;
+  paint.colours = upload_colours(colours);
+  DrawOptions plain = options;
+  plain.wire_pixels = 0;
+  plain.lighting = 0.8;
+  blend_over(image, draw(gl, upload_surface(gl, skeleton_mesh(skeleton, 0.009 * diagonal)), paint, camera, plain),
+             0.85);
+}
+
 }  // namespace skeletex

@@ -5,6 +5,7 @@
 
 #include "skeletex/reconstruct/prepared_model.h"
 #include "skeletex/reconstruct/texture/corner_coordinates.h"
+#include "skeletex/render/draw.h"
 
 namespace skeletex {
 
@@ -18,5 +19,11 @@ std::vector<std::array<float, 2>> checker_coordinates(const PreparedModel& model
 TriangleMesh skeleton_mesh(const Skeleton& skeleton, double radius);
 /// The bone of each of its triangles, -1 for balls.
 std::vector<int> skeleton_mesh_bones(const Skeleton& skeleton);
+/// Lays the skeleton over a picture of its surface, as if seen through it.
+/// \param diagonal  of the surface
+/// \param options   of the picture
+/// \throw DeviceError
+void draw_skeleton(GlContext& gl, const Skeleton& skeleton, double diagonal, const Camera& camera,
+                   const DrawOptions& options, Image& image);
 
 }  // namespace skeletex

@@ -3,22 +3,46 @@
 
 #include <cmath>
 
+#include "skeletex/close/carry_over.h"
+#include "skeletex/io/gltf/write_gltf.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
 #include "skeletex/reconstruct/linear_skin.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/reconstruct/texture/bake_texture.h"
 
 namespace skeletex {
 namespace {
 
-GltfPrimitive make_primitive(ClContext& context, const PreparedModel& model, const Rig& rig) {
+/// Colours as a picture in place of those by vertex. Its texels lie on the surface that is exported, and have the
+/// colours that the original has there.
+void bake_colours(ClContext& context, const PreparedModel& model, const TriangleMesh& bind,
+                  const RigExportOptions& options, MeshAttributes& attributes) {
+  SkeletexModel picture = resample_model(context, model, options.texture_size);
+  if (options.original && !attributes.colours.empty()) {
+    const PreparedModel prepared(picture), original(*options.original);
+    const TriangleMesh surface = reconstruct_mesh(context, original);
+    MeshAttributes colours;
+    colours.colours = vertex_attributes(original).colours;
+    picture.layers = layers_of_vertices(
+        prepared,
+        carry_over(surface, build_triangle_tree(surface), colours, {}, reconstruct_mesh(context, prepared)).attributes);
+  }
+  BakedTexture baked = bake_texture(picture, model, bind);
+  attributes.colours = {};
+  attributes.texture_coordinates = std::move(baked.coordinates);
+  attributes.materials.emplace_back().image = std::move(baked.image);
+}
+
+GltfPrimitive make_primitive(ClContext& context, const PreparedModel& model, const Rig& rig,
+                             const RigExportOptions& options, GltfScene& scene) {
   BindMesh bind = reconstruct_bind_mesh(context, model);
   const VertexInfluences influences = strongest_influences(make_skin(context, model, bind.inner));
-  GltfPrimitive primitive;
-  primitive.normals = vertex_normals(bind.mesh);
-  primitive.triangles = bind.mesh.triangles;
-  primitive.positions = in_user_units(std::move(bind.mesh), model.model.skeleton.frame).positions;
+  MeshAttributes attributes = vertex_attributes(model);
+  if (options.texture_size > 0) bake_colours(context, model, bind.mesh, options, attributes);
+  scene.materials.push_back(material_of(attributes, scene.images));
+  auto [primitive, sources] = primitive_of(in_user_units(std::move(bind.mesh), model.model.skeleton.frame), attributes);
   primitive.influences = 4;
-  primitive.material = 0;
-  for (std::size_t v = 0; v < primitive.positions.size(); ++v)
+  for (const int v : sources)
     for (int i = 0; i < 4; ++i) {
       const float weight = influences.weights[v][i];
       primitive.joints.push_back(weight > 0 ? rig.joint_of_bone[influences.bones[v][i]] : 0);
@@ -71,7 +95,6 @@ GltfScene export_rig(ClContext& context, const PreparedModel& prepared, const Ri
       animate_rig(in_frame(model.skeleton, UnitFrame{}), in_user_units(options.animations, frame));
   const Rig& rig = animated.rig;
   GltfScene scene;
-  scene.materials.push_back({"surface", Eigen::Vector4f(0.8f, 0.8f, 0.8f, 1), -1});
   GltfNode body;
   body.name = options.name;
   body.mesh = body.skin = 0;
@@ -95,7 +118,7 @@ GltfScene export_rig(ClContext& context, const PreparedModel& prepared, const Ri
     skin.inverse_binds.push_back(joint.bind.inverse().matrix());
   }
   scene.skins.push_back(skin);
-  scene.meshes.push_back({options.name, {make_primitive(context, prepared, rig)}});
+  scene.meshes.push_back({options.name, {make_primitive(context, prepared, rig, options, scene)}});
   for (const JointClip& clip : animated.clips) {
     GltfAnimation animation{clip.name, {}};
     for (std::size_t j = 0; j < rig.joints.size(); ++j)

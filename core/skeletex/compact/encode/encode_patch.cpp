@@ -5,14 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "skeletex/compact/encode/rounding.h"
+
 namespace skeletex {
 namespace {
-
-int rounded(double x) { return static_cast<int>(std::lround(x)); }
-int rounded_towards_zero(double x, double rounding) {
-  const int magnitude = static_cast<int>(std::floor(std::abs(x) + rounding));
-  return x < 0 ? -magnitude : magnitude;
-}
 
 /// The grid as it is decoded, and where in the source its points were read.
 struct Traced {

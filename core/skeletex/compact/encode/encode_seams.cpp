@@ -4,16 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "skeletex/compact/encode/rounding.h"
 #include "skeletex/compact/skeleton_code.h"
 
 namespace skeletex {
 namespace {
-
-int rounded(double x) { return static_cast<int>(std::lround(x)); }
-int rounded_towards_zero(double x, double rounding) {
-  const int magnitude = static_cast<int>(std::floor(std::abs(x) + rounding));
-  return x < 0 ? -magnitude : magnitude;
-}
 
 /// A polyline with a place for each of its points: 0 to their number less 1, or round and round.
 struct Curve {

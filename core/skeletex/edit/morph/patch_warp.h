@@ -17,7 +17,8 @@ struct PlaceMove {
 class PatchWarp {
  public:
   /// \param width, height  of the patch, texels; columns are periodic
-  /// \param moves  each by the shorter way around. \pre none lies on an end, no two are at one place
+  /// \param moves  each by the shorter way around
+  /// \pre no move begins on an end, and no two at one place
   PatchWarp(int width, int height, std::span<const PlaceMove> moves);
 
   /// How far a place moves.

@@ -239,6 +239,34 @@ void add_materials(const GltfScene& scene, tinygltf::Model& model) {
 
 }  // namespace
 
+SurfacePrimitive primitive_of(const TriangleMesh& mesh, const MeshAttributes& attributes) {
+  const std::vector<Vec3> smooth = attributes.normals.empty() ? vertex_normals(mesh) : std::vector<Vec3>();
+  MeshAttributes given{attributes.normals, attributes.colours, attributes.texture_coordinates, {}, {}, {}};
+  if (!smooth.empty()) given.normals.values = smooth;
+  SplitMesh split = split_vertices(mesh, given);
+  SurfacePrimitive result;
+  result.primitive.positions = std::move(split.mesh.positions);
+  result.primitive.triangles = std::move(split.mesh.triangles);
+  result.primitive.normals = std::move(split.attributes.normals.values);
+  result.primitive.colours = std::move(split.attributes.colours.values);
+  for (const Eigen::Vector2f& uv : split.attributes.texture_coordinates.values)
+    result.primitive.texture_coordinates.emplace_back(uv.x(), 1 - uv.y());
+  result.primitive.material = 0;
+  result.sources = std::move(split.sources);
+  return result;
+}
+
+GltfMaterial material_of(const MeshAttributes& attributes, std::vector<ColourImage>& images) {
+  GltfMaterial material{"surface", Eigen::Vector4f::Ones(), -1};
+  if (!attributes.materials.empty() && !attributes.materials[0].image.empty()) {
+    material.image = static_cast<int>(images.size());
+    images.push_back(attributes.materials[0].image);
+  } else if (attributes.colours.empty()) {
+    material.base_colour = Eigen::Vector4f(0.8f, 0.8f, 0.8f, 1);
+  }
+  return material;
+}
+
 void write_gltf(const std::filesystem::path& path, const GltfScene& scene) {
   tinygltf::Model model;
   model.asset.version = "2.0";

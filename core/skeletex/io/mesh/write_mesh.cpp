@@ -169,15 +169,10 @@ void write_stl(OutputFile& file, const TriangleMesh& mesh) {
 }
 
 /// One mesh without a skin.
-GltfScene scene_of(const TriangleMesh& mesh, const WrittenAttributes& attributes, const std::string& name) {
-  GltfPrimitive primitive;
-  primitive.positions = mesh.positions;
-  primitive.normals = attributes.vertex_normals.empty()
-                          ? vertex_normals(mesh)
-                          : std::vector<Vec3>(attributes.vertex_normals.begin(), attributes.vertex_normals.end());
-  primitive.triangles = mesh.triangles;
+GltfScene scene_of(const TriangleMesh& mesh, const MeshAttributes& attributes, const std::string& name) {
   GltfScene scene;
-  scene.meshes.push_back({name, {std::move(primitive)}});
+  scene.materials.push_back(material_of(attributes, scene.images));
+  scene.meshes.push_back({name, {primitive_of(mesh, attributes).primitive}});
   scene.nodes.emplace_back().name = name;
   scene.nodes[0].mesh = 0;
   return scene;
@@ -213,7 +208,14 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, con
     throw IoError(
         fmt::format("{}: meshes are written as .ply, .obj, .stl or .glb, not as \"{}\"", path.string(), extension));
   check_attributes(mesh, attributes, path.string());
-  if (extension == ".glb") return write_gltf(path, scene_of(mesh, attributes, path.stem().string()));
+  if (extension == ".glb") {
+    MeshAttributes own;
+    own.normals.values.assign(attributes.vertex_normals.begin(), attributes.vertex_normals.end());
+    for (const auto& [r, g, b, a] : attributes.vertex_colours)
+      own.colours.values.emplace_back(linear_from_srgb(r / 255.f), linear_from_srgb(g / 255.f),
+                                      linear_from_srgb(b / 255.f), a / 255.f);
+    return write_gltf(path, scene_of(mesh, own, path.stem().string()));
+  }
   std::string material_file;
   if (extension == ".obj" && attributes.texture_coordinates && !attributes.image_file.empty()) {
     const std::filesystem::path material = std::filesystem::path(path).replace_extension(".mtl");
@@ -233,6 +235,8 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, con
 }
 
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, const MeshAttributes& attributes) {
+  if (lower_case(path.extension().string()) == ".glb")
+    return write_gltf(path, scene_of(mesh, attributes, path.stem().string()));
   std::vector<VertexColour> colours;
   for (const Colour& colour : attributes.colours.values) colours.push_back(bytes_of(colour));
   WrittenAttributes written;

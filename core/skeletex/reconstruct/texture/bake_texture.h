@@ -12,8 +12,10 @@ struct BakedTexture {
 };
 /// A pixel per texel, patch by patch, with a border of pixels around each that repeats what lies across: so neither
 /// filters nor the first mip levels see seams.
-/// \param mesh  the model's mesh in its bind pose
+/// \param colours  the model, of any size: the picture's
+/// \param model    the model, of the size of the mesh
+/// \param mesh     in its bind pose
 /// \throw InputError when the model has no colours, or the picture would be too large
-BakedTexture bake_texture(const PreparedModel& model, const TriangleMesh& mesh);
+BakedTexture bake_texture(const SkeletexModel& colours, const PreparedModel& model, const TriangleMesh& mesh);
 
 }  // namespace skeletex
