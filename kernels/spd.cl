@@ -9,8 +9,7 @@
 // of them per triangle. Lists of triangles are compressed rows: list i is list_triangles[list_begins[i] ..
 // list_begins[i+1]), with triangle numbers over all charts, increasing. Both triangles at an edge compute the same
 // section point from the same numbers in the same order, and which row a point belongs to depends on the point alone:
-// no ray slips between two triangles. Contraction would break that.
-#pragma OPENCL FP_CONTRACT OFF
+// no ray slips between two triangles. Contraction would break that: every kernel is built without.
 #include "skeletex_structs.h"
 #include "spd_structs.h"
 

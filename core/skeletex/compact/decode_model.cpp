@@ -10,6 +10,7 @@
 
 #include "skeletex/compact/patch_grid.h"
 #include "skeletex/compact/seam_curves.h"
+#include "skeletex/math/portable.h"
 #include "skeletex/model/error.h"
 #include "skeletex/model/memory.h"
 #include "skeletex/skeleton/frame.h"
@@ -117,7 +118,7 @@ void store_texels(SkeletexModel& model, const SeparationPlanes& separation, int 
   }
   for (int row = 0; row < r.height; ++row) {
     const Axial at = axial_of(patch.row_u[row], is_head_free, is_tail_free);
-    const double cosine = std::cos(at.latitude), sine = std::sin(at.latitude);
+    const double cosine = portable::cos(at.latitude), sine = portable::sin(at.latitude);
     TangentFrame frame;
     frame.foot = head + at.axial * (tail - head);
     for (int column = 0; column < r.width; ++column) {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "skeletex/math/portable.h"
+
 namespace skeletex {
 namespace {
 
@@ -22,14 +24,14 @@ std::array<Vec3, 2> across_axis(const Vec3& axis) {
 
 int angle_code(const Vec3& axis, const Vec3& s) {
   const auto [x, y] = across_axis(axis);
-  const double turn = std::atan2(s.dot(y), s.dot(x)) / (2 * std::numbers::pi);
+  const double turn = portable::atan2(s.dot(y), s.dot(x)) / (2 * std::numbers::pi);
   return static_cast<int>(std::lround(turn * kAngleSteps)) & (kAngleSteps - 1);
 }
 
 Vec3 direction_of_code(const Vec3& axis, int code) {
   const auto [x, y] = across_axis(axis);
   const double angle = 2 * std::numbers::pi * code / kAngleSteps;
-  return std::cos(angle) * x + std::sin(angle) * y;
+  return portable::cos(angle) * x + portable::sin(angle) * y;
 }
 
 FrameCode frame_code(const UnitFrame& frame) {

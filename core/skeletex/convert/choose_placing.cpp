@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "skeletex/convert/fit/fit.h"
+#include "skeletex/math/portable.h"
 
 namespace skeletex {
 namespace {
@@ -23,8 +24,9 @@ int choose_fit_steps(std::size_t texels, double texels_per_vertex) {
 
 /// The mean distance from the mesh as a share of that of a regular grid.
 double expected_error(bool has_snap, bool has_fit, double texels_per_vertex) {
-  if (has_snap) return has_fit ? 0.58 * std::pow(texels_per_vertex, -0.62) : std::pow(texels_per_vertex, -0.8);
-  return has_fit ? 0.72 * std::pow(texels_per_vertex, -0.18) : 1;
+  if (has_snap)
+    return has_fit ? 0.58 * portable::pow(texels_per_vertex, -0.62) : portable::pow(texels_per_vertex, -0.8);
+  return has_fit ? 0.72 * portable::pow(texels_per_vertex, -0.18) : 1;
 }
 
 }  // namespace

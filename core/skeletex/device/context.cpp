@@ -249,8 +249,11 @@ ClContext::Driver::Driver(const ClDeviceInfo& info_given, ::cl::Device device_gi
   // -w: PoCL writes the number of warnings to standard error, among them those of vectors wider than the CPU's.
   const std::string options =
       fmt::format("-cl-std=CL1.2 -cl-kernel-arg-info -w -DROW_ITEMS={} {}", workarounds::row_items(info), name.options);
+  // Contraction would round otherwise on a CPU with fused operations than on one without, and at the edges of triangles
+  // let rays slip between them.
+  const std::string source = "#pragma OPENCL FP_CONTRACT OFF\n" + kernel_source(files);
   cl_int code = CL_SUCCESS;
-  ::cl::Program built(context, workarounds::marked_source(options, kernel_source(files)), false, &code);
+  ::cl::Program built(context, workarounds::marked_source(options, source), false, &code);
   check(code, fmt::format("{}: creating the program", name.file));
   code = compile([&] { return built.build({device}, options.c_str()); });
   if (code != CL_SUCCESS) {

@@ -4,6 +4,7 @@
 
 #include "skeletex/geometry/half_edge_table.h"
 #include "skeletex/geometry/mesh.h"
+#include "skeletex/math/portable.h"
 
 namespace skeletex {
 namespace {
@@ -17,7 +18,7 @@ Vec3 corner_share(const TriangleMesh& mesh, const Triangle& t, int corner) {
   const Vec3 area = to_next.cross(to_last);
   const double twice_area = area.norm(), along = to_next.dot(to_last);
   if (!(twice_area > std::max(0.0, -kCapSlope * along))) return Vec3::Zero();
-  return std::atan2(twice_area, along) / twice_area * area;
+  return portable::atan2(twice_area, along) / twice_area * area;
 }
 
 Vec3 unit_or_zero(const Vec3& v) {
@@ -39,7 +40,7 @@ CornerValues<Vec3> creased_normals(const TriangleMesh& mesh, double crease_angle
   const HalfEdgeTable edges = link_half_edges(mesh.triangles, static_cast<int>(mesh.positions.size()));
   std::vector<Vec3> faces;
   for (const Triangle& t : mesh.triangles) faces.push_back(unit_or_zero(area_vector(mesh, t)));
-  const double least_cosine = std::cos(crease_angle);
+  const double least_cosine = portable::cos(crease_angle);
   // Half-edge h leaves the corner h % 3 of triangle h / 3; to its left is the edge that the corner's triangle shares
   // with the next one around the vertex.
   const auto turn = [&](int h) {

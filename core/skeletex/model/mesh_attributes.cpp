@@ -8,10 +8,13 @@
 #include <numeric>
 #include <type_traits>
 
+#include "skeletex/math/portable.h"
+
 namespace skeletex {
 
-float linear_from_srgb(float x) { return x <= 0.04045f ? x / 12.92f : std::pow((x + 0.055f) / 1.055f, 2.4f); }
-float srgb_from_linear(float x) { return x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1 / 2.4f) - 0.055f; }
+float power(float x, double exponent) { return static_cast<float>(portable::pow(x, exponent)); }
+float linear_from_srgb(float x) { return x <= 0.04045f ? x / 12.92f : power((x + 0.055f) / 1.055f, 2.4); }
+float srgb_from_linear(float x) { return x <= 0.0031308f ? 12.92f * x : 1.055f * power(x, 1 / 2.4) - 0.055f; }
 
 bool has_colour(const MeshAttributes& attributes) {
   // Many files give every mesh one plain material, which says nothing of its surface.

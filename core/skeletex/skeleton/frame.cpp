@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "capsule.h"
+#include "skeletex/math/portable.h"
 
 namespace skeletex {
 namespace {
@@ -48,7 +49,7 @@ TangentFrame tangent_frame(const Skeleton& skeleton, const SeparationPlanes& sep
   const Vec3 radial = separation.radial(bone, turn);
   const double k = (1 - at.axial) * separation.slope(bone, BoneEnd::kHead, turn) +
                    at.axial * separation.slope(bone, BoneEnd::kTail, turn);
-  const Vec3 f = std::cos(at.latitude) * (radial + k * basis.o) + std::sin(at.latitude) * basis.o;
+  const Vec3 f = portable::cos(at.latitude) * (radial + k * basis.o) + portable::sin(at.latitude) * basis.o;
   TangentFrame frame;
   frame.out = f.normalized();
   frame.around = basis.o.cross(radial);
@@ -106,12 +107,13 @@ FrameTables frame_tables(const Skeleton& skeleton, const SeparationPlanes& separ
     for (const double u : patch.row_u) {
       const Axial at = axial_of(u, is_head_free, is_tail_free);
       tables.rows.push_back({static_cast<float>(u), static_cast<float>(at.axial),
-                             static_cast<float>(std::cos(at.latitude)), static_cast<float>(std::sin(at.latitude))});
+                             static_cast<float>(portable::cos(at.latitude)),
+                             static_cast<float>(portable::sin(at.latitude))});
     }
     for (int j = 0; j < patch.rectangle.width; ++j) {
       const double turn = static_cast<double>(j) / patch.rectangle.width;
-      tables.columns.push_back({static_cast<float>(std::cos(2 * std::numbers::pi * turn)),
-                                static_cast<float>(std::sin(2 * std::numbers::pi * turn)),
+      tables.columns.push_back({static_cast<float>(portable::cos(2 * std::numbers::pi * turn)),
+                                static_cast<float>(portable::sin(2 * std::numbers::pi * turn)),
                                 static_cast<float>(separation.slope(bone, BoneEnd::kHead, turn)),
                                 static_cast<float>(separation.slope(bone, BoneEnd::kTail, turn))});
     }

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "skeletex/math/portable.h"
+
 namespace skeletex {
 
 SeparationPlanes::SeparationPlanes(const Skeleton& skeleton)
@@ -19,11 +21,11 @@ SeparationPlanes::SeparationPlanes(const Skeleton& skeleton)
 
 Vec3 SeparationPlanes::radial(int bone, double turn) const {
   const double angle = 2 * std::numbers::pi * turn;
-  return std::cos(angle) * bases_[bone].s + std::sin(angle) * bases_[bone].b;
+  return portable::cos(angle) * bases_[bone].s + portable::sin(angle) * bases_[bone].b;
 }
 
 double SeparationPlanes::turn_of(int bone, const Vec3& offset) const {
-  const double turn = std::atan2(offset.dot(bases_[bone].b), offset.dot(bases_[bone].s)) / (2 * std::numbers::pi);
+  const double turn = portable::atan2(offset.dot(bases_[bone].b), offset.dot(bases_[bone].s)) / (2 * std::numbers::pi);
   const double fraction = turn - std::floor(turn);
   return fraction < 1 ? fraction : 0;
 }

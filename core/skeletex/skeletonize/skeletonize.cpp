@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "skeletex/geometry/parallel.h"
+#include "skeletex/math/portable.h"
 #include "skeletex/model/error.h"
 #include "skeletex/skeletonize/accept.h"
 #include "skeletex/skeletonize/body/curve_graph.h"
@@ -38,7 +39,9 @@ TipRule rule_of(double detail) {
   const double at = std::clamp(detail, 0.0, 1.0) * (kRules.size() - 1);
   const std::size_t below = std::min<std::size_t>(static_cast<std::size_t>(at), kRules.size() - 2);
   const double t = at - static_cast<double>(below);
-  const auto mix = [t](double a, double b) { return a > 0 && b > 0 ? std::pow(a, 1 - t) * std::pow(b, t) : a; };
+  const auto mix = [t](double a, double b) {
+    return a > 0 && b > 0 ? portable::pow(a, 1 - t) * portable::pow(b, t) : a;
+  };
   const TipRule &a = kRules[below], &b = kRules[below + 1];
   return {mix(a.longer_than_wide, b.longer_than_wide), mix(a.least_length, b.least_length),
           mix(a.covered_radii, b.covered_radii), mix(a.least_covered, b.least_covered)};

@@ -10,6 +10,7 @@
 #include "skeletex/analysis/metro.h"
 #include "skeletex/compact/compact_file.h"
 #include "skeletex/compact/decode_model.h"
+#include "skeletex/math/portable.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 
@@ -84,11 +85,11 @@ class Search {
   std::optional<Trial> largest_step(int bare_levels, double first, double wanted, bool rises,
                                     const std::function<double(Trial&)>& value) {
     std::optional<Trial> best;
-    double log_low = std::log(kSmallestStep), log_high = std::log(kLargestStep), at = std::log(first);
+    double log_low = portable::log(kSmallestStep), log_high = portable::log(kLargestStep), at = portable::log(first);
     double last_at = 0, last_value = 0;
     for (int i = 0; i < 7; ++i) {
-      Trial now = trial(std::exp(at), bare_levels);
-      const double reached = std::log(value(now) / wanted), signed_off = rises ? reached : -reached;
+      Trial now = trial(portable::exp(at), bare_levels);
+      const double reached = portable::log(value(now) / wanted), signed_off = rises ? reached : -reached;
       // Above: the step must become smaller where the value rises with it.
       (signed_off > 0 ? log_high : log_low) = at;
       const bool is_good = reached <= 0;
@@ -157,7 +158,7 @@ class Search {
   /// Finest levels are dropped while nearly all of their residuals are 0.
   Trial by_quality() {
     constexpr double kFewest = 0.04;
-    const double step = std::pow(10.0, -2 - *goal_.quality / 25);
+    const double step = portable::pow(10.0, -2 - *goal_.quality / 25);
     Trial whole = trial(step, 0);
     int bare = 0;
     for (bool is_sparse = true; is_sparse && bare < 16; bare += is_sparse ? 1 : 0) {

@@ -10,6 +10,7 @@
 #include <numeric>
 #include <random>
 
+#include "skeletex/math/portable.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
@@ -234,13 +235,13 @@ Wanted wanted_from(std::span<const PatchRequest> requests, int width, int height
   wanted.share =
       raised_shares(requests, std::min(kMinSide * kMinSide / texels, 1.0 / static_cast<double>(requests.size())));
   for (int i = 0; i < wanted.count(); ++i) {
-    wanted.log_area.push_back(std::log(wanted.share[i] * texels));
-    wanted.log_aspect.push_back(std::log(requests[i].columns_per_row));
+    wanted.log_area.push_back(portable::log(wanted.share[i] * texels));
+    wanted.log_aspect.push_back(portable::log(requests[i].columns_per_row));
     // Large patches matter most, but no small one shall be ruined for them.
     wanted.weight.push_back(0.8 * wanted.share[i] + 0.2 / wanted.count());
   }
   wanted.log_of.resize(std::max(width, height) + 1, 0);
-  for (std::size_t i = 1; i < wanted.log_of.size(); ++i) wanted.log_of[i] = std::log(static_cast<double>(i));
+  for (std::size_t i = 1; i < wanted.log_of.size(); ++i) wanted.log_of[i] = portable::log(static_cast<double>(i));
   return wanted;
 }
 

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "skeletex/math/portable.h"
+
 namespace skeletex {
 namespace {
 
@@ -15,6 +17,7 @@ constexpr double kUniformPart = 1e-4;
 /// of a row's length, the area that has them with the length). But 3 spends rows on the few most stretched
 /// columns; 1.25 keeps the mean error and lowers the maximum (docs/steps/layout.md).
 constexpr double kExponent = 1.25;
+double power_of(double density) { return density * std::sqrt(std::sqrt(density)); }
 
 /// A width that rises linearly from `low` to `middle`, falls to `high`, and has the total `area`.
 struct Hat {
@@ -48,7 +51,7 @@ RowProfile finish(Bins bins) {
   double total = 0;
   for (std::size_t i = 0; i < gain.size(); ++i) {
     const double span = bins.borders[i + 1] - bins.borders[i];
-    gain[i] = span * std::pow(bins.power[i] / span, 1 / kExponent);
+    gain[i] = span * portable::pow(bins.power[i] / span, 1 / kExponent);
     total += gain[i];
     profile.length += bins.length[i];
   }
@@ -86,7 +89,7 @@ void add_hat(Bins& bins, double low, double middle, double high, double area, do
   if (!(high > low) || !(area > 0) || !std::isfinite(density)) return;
   std::size_t bin = std::upper_bound(bins.borders.begin(), bins.borders.end(), low) - bins.borders.begin();
   bin = bin == 0 ? 0 : bin - 1;
-  const double density_power = std::pow(density, kExponent);
+  const double density_power = power_of(density);
   const Hat hat{low, middle, high, area};
   double before = hat.integral_to(bins.borders[bin]);
   for (; bin < bins.length.size() && bins.borders[bin] < high; ++bin) {
@@ -148,7 +151,7 @@ RowProfile row_profile(std::span<const Vec3> positions, int rows, int columns) {
   for (int r = 0; r + 1 < rows; ++r)
     for (int j = 0; j < columns; ++j) {
       const double density = (positions[(r + 1) * columns + j] - positions[r * columns + j]).norm() * (rows - 1);
-      bins.add(r, 1.0 / ((rows - 1) * columns), density, std::pow(density, kExponent));
+      bins.add(r, 1.0 / ((rows - 1) * columns), density, power_of(density));
     }
   return finish(std::move(bins));
 }

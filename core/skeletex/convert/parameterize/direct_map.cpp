@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "skeletex/convert/parameterize/vsm_tables.h"
+#include "skeletex/math/portable.h"
 
 namespace skeletex {
 namespace {
@@ -84,7 +85,7 @@ int map_directly(Chart& chart, int iterations, double alpha) {
     for (int h = 0; h < static_cast<int>(table.twins.size()); ++h) {
       if (table.twins[h] < 0) continue;
       const int a = h / 3, b = table.twins[h] / 3;
-      weights[h] *= std::max(areas[a] + areas[b], 1e-300) / std::pow(surface[a] + surface[b], alpha);
+      weights[h] *= std::max(areas[a] + areas[b], 1e-300) / portable::pow(surface[a] + surface[b], alpha);
       largest = std::max(largest, weights[h]);
     }
     for (double& w : weights) w /= largest;

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "skeletex/geometry/parallel.h"
+#include "skeletex/math/portable.h"
 #include "spd_structs.h"
 
 namespace skeletex {
@@ -55,8 +56,9 @@ LocalTriangles localize(const Skeleton& skeleton, const SeparationPlanes& separa
       positions.push_back({static_cast<float>(offset.dot(basis.s)), static_cast<float>(offset.dot(basis.b)),
                            static_cast<float>(offset.dot(basis.o))});
       // Of the rounded coordinates: the device must find the same half-planes.
-      turns.push_back(std::atan2(static_cast<double>(positions.back()[1]), static_cast<double>(positions.back()[0])) /
-                      (2 * std::numbers::pi));
+      turns.push_back(
+          portable::atan2(static_cast<double>(positions.back()[1]), static_cast<double>(positions.back()[0])) /
+          (2 * std::numbers::pi));
       extents[k] = std::max(extents[k], offset.norm());
     }
     for (const Triangle& triangle : chart.triangles) {
@@ -166,13 +168,13 @@ struct RayTables {
     for (const double u : patch.row_u) {
       const Axial at = axial_of(u, is_head_free, is_tail_free);
       rows.push_back({static_cast<float>(u), static_cast<float>(at.axial),
-                      static_cast<float>(std::max(kPoleCosine, std::cos(at.latitude))),
-                      static_cast<float>(std::sin(at.latitude))});
+                      static_cast<float>(std::max(kPoleCosine, portable::cos(at.latitude))),
+                      static_cast<float>(portable::sin(at.latitude))});
     }
     append_guesses(std::span(rows).last(height), patches.back(), row_guesses);
     for (int j = 0; j < width; ++j) {
       const double turn = static_cast<double>(j) / width, angle = 2 * std::numbers::pi * turn;
-      columns.push_back({static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)),
+      columns.push_back({static_cast<float>(portable::cos(angle)), static_cast<float>(portable::sin(angle)),
                          static_cast<float>(separation.slope(bone, BoneEnd::kHead, turn)),
                          static_cast<float>(separation.slope(bone, BoneEnd::kTail, turn))});
     }
@@ -364,8 +366,8 @@ SpdCoordinates spd_coordinates(const Skeleton& skeleton, const SeparationPlanes&
   const double turn = separation.turn_of(bone, offset);
   const bool is_head_free = separation.is_free(bone, BoneEnd::kHead),
              is_tail_free = separation.is_free(bone, BoneEnd::kTail);
-  if (is_tail_free && z > length) return {u_of({1, std::atan2(z - length, x)}, is_head_free, is_tail_free), turn};
-  if (is_head_free && z < 0) return {u_of({0, std::atan2(z, x)}, is_head_free, is_tail_free), turn};
+  if (is_tail_free && z > length) return {u_of({1, portable::atan2(z - length, x)}, is_head_free, is_tail_free), turn};
+  if (is_head_free && z < 0) return {u_of({0, portable::atan2(z, x)}, is_head_free, is_tail_free), turn};
   // Along the line through P parallel to the bone: A_H and A_T are where it meets the separation planes (paper, Figure
   // 5).
   const double a_head = x * separation.slope(bone, BoneEnd::kHead, turn),

@@ -12,6 +12,7 @@
 #include "skeletex/convert/parameterize/direct_map.h"
 #include "skeletex/convert/parameterize/elimination.h"
 #include "skeletex/convert/parameterize/vsm_tables.h"
+#include "skeletex/math/portable.h"
 
 namespace skeletex {
 namespace {
@@ -30,10 +31,10 @@ void settle_rotation(Chart& chart, const std::vector<double>& guess) {
   for (std::size_t i = 0; i < guess.size(); ++i) {
     if (chart.kinds[i] != ChartVertex::kInner) continue;
     const double angle = 2 * std::numbers::pi * (guess[i] - chart.v[i]);
-    x += std::cos(angle);
-    y += std::sin(angle);
+    x += portable::cos(angle);
+    y += portable::sin(angle);
   }
-  const double shift = std::atan2(y, x) / (2 * std::numbers::pi);
+  const double shift = portable::atan2(y, x) / (2 * std::numbers::pi);
   for (std::size_t i = 0; i < guess.size(); ++i)
     if (chart.kinds[i] == ChartVertex::kInner) chart.v[i] += shift;
 }

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "skeletex/geometry/parallel.h"
+#include "skeletex/math/portable.h"
 
 namespace skeletex {
 namespace {
@@ -126,7 +127,7 @@ class TableBuilder {
         entry_triangles_[s_.layout.entries + e] = first_triangles_[k] + other;
         // The same bits in both directions.
         const float area = static_cast<float>(surface[own] + surface[other]);
-        s_.factors[e] = alpha_ == 0.5 ? 1 / std::sqrt(area) : std::pow(area, static_cast<float>(-alpha_));
+        s_.factors[e] = alpha_ == 0.5 ? 1 / std::sqrt(area) : static_cast<float>(portable::pow(area, -alpha_));
       }
     }
   }

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "skeletex/geometry/loop_turns.h"
+#include "skeletex/math/portable.h"
 
 namespace skeletex {
 namespace {
@@ -29,7 +30,7 @@ std::vector<int> bends_of(const Polyline& line) {
   std::vector<std::pair<double, int>> bends;
   for (int i = 1; i + 1 < static_cast<int>(line.points.size()); ++i) {
     const Vec3 before = line.points[i] - line.points[i - 1], after = line.points[i + 1] - line.points[i];
-    const double bend = std::atan2(before.cross(after).norm(), before.dot(after));
+    const double bend = portable::atan2(before.cross(after).norm(), before.dot(after));
     if (bend > kLeastBend) bends.emplace_back(-bend * (before.norm() + after.norm()), i);
   }
   std::sort(bends.begin(), bends.end());

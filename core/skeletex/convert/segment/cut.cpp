@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "skeletex/convert/segment/separation_network.h"
+#include "skeletex/math/portable.h"
 
 namespace skeletex {
 
@@ -62,11 +63,11 @@ std::vector<RayHit> cast_plane_rays(SeparationNetwork& network, const NodeCells&
     const double area = x[0] * y[1] - x[1] * y[0];
     if (area == 0) continue;
     const int from = area > 0 ? 0 : 1;
-    const double begin = std::atan2(y[from], x[from]) / kStep;
-    double end = std::atan2(y[1 - from], x[1 - from]) / kStep;
+    const double begin = portable::atan2(y[from], x[from]) / kStep;
+    double end = portable::atan2(y[1 - from], x[1 - from]) / kStep;
     if (end < begin) end += kRays;
     for (int r = static_cast<int>(std::ceil(begin)); r <= end; ++r) {
-      const double dx = std::cos(r * kStep), dy = std::sin(r * kStep);
+      const double dx = portable::cos(r * kStep), dy = portable::sin(r * kStep);
       const double across = dx * (y[1] - y[0]) - dy * (x[1] - x[0]);
       if (across == 0) continue;
       const double distance = std::abs(area / across);

@@ -10,6 +10,7 @@
 
 #include "skeletex/geometry/half_edge_table.h"
 #include "skeletex/geometry/parallel.h"
+#include "skeletex/math/portable.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
@@ -28,7 +29,7 @@ constexpr int kWideRounds = 2;         // of reservations with a work-item per v
 ClRange over(int count) { return {{static_cast<std::size_t>(count), 1}, {64, 1}}; }
 
 /// Angle between unit normals, precise for small ones too.
-double angle_between(const Vec3& a, const Vec3& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
+double angle_between(const Vec3& a, const Vec3& b) { return portable::atan2(a.cross(b).norm(), a.dot(b)); }
 
 /// std::floor is a call.
 int floor_of(double x) { return static_cast<int>(x) - (x < static_cast<int>(x)); }

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "skeletex/geometry/half_edge.h"
+#include "skeletex/math/portable.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
@@ -46,7 +47,8 @@ std::vector<Vec3> limit_positions(const HalfEdgeMesh& mesh) {
     Vec3 sum = Vec3::Zero();
     int valence = 0;
     for (const auto neighbour : mesh.vv_range(vertex)) sum += positions[neighbour.idx()], ++valence;
-    const double c = 3 + 2 * std::cos(2 * std::numbers::pi / valence), share = (40 - c * c) / 64;  // of the neighbours
+    const double c = 3 + 2 * portable::cos(2 * std::numbers::pi / valence),
+                 share = (40 - c * c) / 64;  // of the neighbours
     const double weight = 1 / (3 * valence / (8 * share) + valence);
     limits[vertex.idx()] = (1 - valence * weight) * positions[vertex.idx()] + weight * sum;
   }

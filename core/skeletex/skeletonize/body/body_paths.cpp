@@ -7,6 +7,8 @@
 #include <queue>
 #include <utility>
 
+#include "skeletex/math/portable.h"
+
 namespace skeletex {
 
 std::vector<double> distances_through(const VoxelBody& body, std::span<const PathSource> sources,
@@ -44,7 +46,7 @@ std::vector<double> middle_costs(const VoxelBody& body) {
   std::vector<double> costs;
   for (const double radius : body.radii) {
     const double depth = radius / deepest;
-    costs.push_back((1 + 80 * std::pow(1 - depth, 8)) / std::max(depth, 0.02));
+    costs.push_back((1 + 80 * portable::pow(1 - depth, 8)) / std::max(depth, 0.02));
   }
   return costs;
 }

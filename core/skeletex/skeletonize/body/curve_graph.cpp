@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "skeletex/geometry/union_find.h"
+#include "skeletex/math/portable.h"
 
 namespace skeletex {
 namespace {
@@ -132,7 +133,7 @@ Vec3 deepest_across(const Surface& surface, const Vec3& point, const Vec3& along
   for (double step = distance; step > 0.2 * distance; step *= 0.6)
     for (int i = 0; i < kAngles; ++i) {
       const double angle = 2 * std::numbers::pi * i / kAngles;
-      const Vec3 place = best + step * (std::cos(angle) * e + std::sin(angle) * f);
+      const Vec3 place = best + step * (portable::cos(angle) * e + portable::sin(angle) * f);
       if ((place - point).norm() > 1.5 * distance) continue;
       const double there = surface.radius(place);
       if (there > radius && !surface.is_between(best, place)) radius = there, best = place;
