@@ -19,8 +19,7 @@
 namespace skeletex {
 namespace {
 
-// A pragma of a file holds for those after it, so spd.cl, which has one, is last. Closest points are looked for alone
-// as well.
+// Closest points are looked for alone as well.
 const std::vector<std::vector<std::string_view>> kPrograms{
     {"metro.cl"},
     {"segment.cl", "vsm.cl", "elimination.cl", "encode.cl", "unfold.cl", "snap.cl", "fit.cl", "lattice.cl", "metro.cl",
