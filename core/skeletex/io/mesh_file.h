@@ -60,8 +60,9 @@ struct WrittenAttributes {
 /// renamed when complete. Positions have single precision; in PLY and OBJ double where that is needed: far from the
 /// origin, and for very small or large meshes. STL takes no attributes, glTF normals and colours; there normals are
 /// those of the triangles where none are given. An OBJ with a picture comes with a file of its material, of the same
-/// name with the ending .mtl. \throw IoError (unknown ending, folder not writable, disk full, attributes that do not
-/// fit the mesh, a number that is not finite): no file is left behind
+/// name with the ending .mtl.
+/// \throw IoError (unknown ending, folder not writable, disk full, attributes that do not fit the mesh, a number that
+/// is not finite): no file is left behind
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, const WrittenAttributes& attributes = {});
 /// The same with normals, colours and numbers by vertex. glTF holds the first picture.
 /// \pre normals and colours have no corners of their own
