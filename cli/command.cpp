@@ -60,16 +60,12 @@ void take_one_of(CLI::Option& option, const std::vector<std::string>& words) {
       "");
 }
 
-namespace {
-
 std::vector<std::string> command_names(const CLI::App& program) {
   std::vector<std::string> names;
   for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; }))
     names.push_back(command->get_name());
   return names;
 }
-
-}  // namespace
 
 void check_command(const CLI::App& program, const std::string& name) {
   const std::vector<std::string> names = command_names(program);

@@ -62,7 +62,9 @@ void add_device_option(CLI::App& command, std::string& selector);
 void add_json_option(CLI::App& command, std::string& target);
 /// The option takes one of a few words; the message about another one names the nearest.
 void take_one_of(CLI::Option& option, const std::vector<std::string>& words);
-/// The option takes the name of one of the commands that the program has by now.
+/// The names of the commands that the program has by now, in the order of the help.
+std::vector<std::string> command_names(const CLI::App& program);
+/// The option takes one of command_names.
 void take_command(CLI::Option& option, const CLI::App& program);
 /// \throw CLI::ExtrasError that names the nearest command when there is none of this name
 void check_command(const CLI::App& program, const std::string& name);

@@ -38,7 +38,7 @@ make_root() {
   fi
 }
 
-inside() { env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root DEBIAN_FRONTEND=noninteractive chroot "$root" "$@"; }
+inside() { env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/ DEBIAN_FRONTEND=noninteractive chroot "$root" "$@"; }
 
 try() {
   [ "$(id -u)" -eq 0 ] || { echo "package: --try needs root, for debootstrap and chroot" >&2; exit 1; }

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "command.h"
 #include "describe/argument.h"
 
 namespace skeletex::cli {
@@ -32,12 +33,6 @@ std::vector<std::string> option_names(const CLI::App& command, bool has_value_on
   std::vector<std::string> names;
   for (const Argument& option : some_of(command, false))
     if (!has_value_only || !option.value.empty()) names.insert(names.end(), option.names.begin(), option.names.end());
-  return names;
-}
-
-std::vector<std::string> command_names(const CLI::App& program) {
-  std::vector<std::string> names;
-  for (const CLI::App* command : commands_of(program)) names.push_back(command->get_name());
   return names;
 }
 

@@ -32,7 +32,7 @@ struct RunSummary {
 ///   record.json      the experiment as it was resolved, date, input hashes, git state, compiler, device, machine
 /// A shard has every shards-th item from the shard-th on. Instead of the last three it writes shards/I-of-N.json, its
 /// record, when all of its items have ended; shards may share a folder, and collect_shards makes the rest.
-/// \throw IoError when the folder cannot be written or a placeholder is unknown
+/// \throw IoError when the folder cannot be written or a {name} in a step is unknown
 RunSummary run_experiment(const Experiment& experiment, const RunOptions& options);
 
 struct Collected {

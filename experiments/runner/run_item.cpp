@@ -25,7 +25,8 @@ std::string program_of(const Step& step, const RunOptions& options) {
   return fs::is_regular_file(beside) ? beside.string() : step.tool;
 }
 
-/// The placeholders that are files of the item's own, which are written.
+/// Writes the files of the item's own, {view} and {config}.
+/// \return their paths by these names, and those of {work} and {out}
 std::map<std::string, std::string> make_files(const Experiment& experiment, const Item& item, const fs::path& work,
                                               const fs::path& results) {
   std::map<std::string, std::string> more{{"work", work.string()}, {"out", results.string()}};

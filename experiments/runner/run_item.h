@@ -17,7 +17,7 @@ namespace skeletex {
 /// Its log, what was called and what it printed to standard error, goes to items/KEY.log in the results.
 /// \param environment  of the processes, on top of this one's own
 /// \return what items/KEY.json holds
-/// \throw IoError when a file cannot be written or a placeholder is unknown
+/// \throw IoError when a file cannot be written or a {name} in a step is unknown
 OrderedJson run_item(const Experiment& experiment, const Item& item, const RunOptions& options,
                      const OrderedJson& signature, const std::map<std::string, std::string>& environment);
 
