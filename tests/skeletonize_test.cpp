@@ -176,6 +176,20 @@ TEST(Skeletonize, TheNumberOfBonesIsALimit) {
   }
 }
 
+TEST(Skeletonize, RingsOfManyBonesAreThinnedWithoutCrossings) {
+  const Shape shape = torus_shape(40);
+  const TriangleTree tree = build_triangle_tree(shape.mesh);
+  const Surface surface(shape.mesh, tree);
+  Repair repair(surface, shape.skeleton);
+  ASSERT_TRUE(repair.run());
+  repair.thin_out();
+  const Skeleton& thinned = repair.skeleton();
+  EXPECT_LT(thinned.bones.size(), 12u);
+  EXPECT_EQ(thinned.bones.size(), thinned.nodes.size()) << "not a ring";
+  for (const BoneMargin& margin : repair.margins()) EXPECT_GE(margin.margin, kEnoughMargin);
+  EXPECT_EQ(errors_of(shape.mesh, thinned), "");
+}
+
 TEST(Skeletonize, SpoiltSkeletonsAreRepaired) {
   RandomNumbers random(7);
   for (const char* name : {"bear", "cactus"}) {

@@ -9,7 +9,6 @@
 namespace skeletex {
 namespace {
 
-constexpr double kBend = 0.7;         // of the radius: further off a curve must not be from its bone
 constexpr double kLeastBend = 0.025;  // of the diagonal, where the body is thin
 constexpr double kSpare = 0.25;       // of the radius: what a bone leaves to the surface
 
@@ -18,8 +17,8 @@ double distance_to_line(const Vec3& p, const Vec3& a, const Vec3& b) { return di
 /// A branch as it is made straight.
 class Straightener {
  public:
-  Straightener(const Surface& surface, double side, const std::vector<Vec3>& points)
-      : surface_(surface), side_(side), points_(points) {
+  Straightener(const Surface& surface, double side, const std::vector<Vec3>& points, double bend)
+      : surface_(surface), side_(side), points_(points), bend_(bend) {
     for (const Vec3& p : points) radii_.push_back(surface.radius(p));
   }
 
@@ -58,7 +57,7 @@ class Straightener {
     double worst = 0;
     int at = (a + b) / 2;
     for (int i = a + 1; i < b; ++i) {
-      const double allowed = kBend * std::max({radii_[i], side_, kLeastBend * surface_.diagonal});
+      const double allowed = bend_ * std::max({radii_[i], side_, kLeastBend * surface_.diagonal});
       const double off = distance_to_line(points_[i], points_[a], points_[b]) / allowed;
       if (off > worst) worst = off, at = i;
     }
@@ -72,6 +71,7 @@ class Straightener {
   const Surface& surface_;
   double side_;
   const std::vector<Vec3>& points_;
+  double bend_;
   std::vector<double> radii_;
 };
 
@@ -89,11 +89,12 @@ void draw_back(const Surface& surface, double side, std::vector<Vec3>& points) {
 
 }  // namespace
 
-std::vector<int> straighten(const Surface& surface, double voxel_side, const std::vector<Vec3>& points, int pieces) {
-  return Straightener(surface, voxel_side, points).run(pieces);
+std::vector<int> straighten(const Surface& surface, double voxel_side, const std::vector<Vec3>& points, int pieces,
+                            double bend) {
+  return Straightener(surface, voxel_side, points, bend).run(pieces);
 }
 
-Skeleton make_bones(const Surface& surface, double voxel_side, const CurveGraph& graph) {
+Skeleton make_bones(const Surface& surface, double voxel_side, const CurveGraph& graph, double bend) {
   Skeleton skeleton;
   const std::vector<int> degree = graph.degrees();
   for (const Vec3& node : graph.nodes) skeleton.nodes.push_back({"", node});
@@ -112,7 +113,7 @@ Skeleton make_bones(const Surface& surface, double voxel_side, const CurveGraph&
       skeleton.nodes[branch.to].position = points.back();
     }
     const int least = branch.from == branch.to ? 3 : between[std::minmax(branch.from, branch.to)] > 1 ? 2 : 1;
-    const std::vector<int> kept = straighten(surface, voxel_side, points, least);
+    const std::vector<int> kept = straighten(surface, voxel_side, points, least, bend);
     int before = branch.from;
     for (std::size_t i = 1; i < kept.size(); ++i) {
       int node = branch.to;

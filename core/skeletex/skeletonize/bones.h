@@ -7,14 +7,18 @@
 
 namespace skeletex {
 
+/// Of the body's radius: how far off its curve a bone may be.
+constexpr double kBend = 0.7;
+
 /// Replaces the branches of a graph by straight bones inside the body, with nodes where they bend by more than a share
 /// of the body's radius there. Branches with a free end stop a ball before the tip. A cycle has three bones or more.
 /// Names are empty.
-Skeleton make_bones(const Surface& surface, double voxel_side, const CurveGraph& graph);
+Skeleton make_bones(const Surface& surface, double voxel_side, const CurveGraph& graph, double bend = kBend);
 
 /// Where a curve inside the body is split so that straight pieces between these points do for it, ascending, its ends
 /// included.
 /// \param pieces  at least so many
-std::vector<int> straighten(const Surface& surface, double voxel_side, const std::vector<Vec3>& points, int pieces);
+std::vector<int> straighten(const Surface& surface, double voxel_side, const std::vector<Vec3>& points, int pieces,
+                            double bend = kBend);
 
 }  // namespace skeletex

@@ -290,6 +290,18 @@ bool Repair::contract(int bone) {
   return true;
 }
 
+void Repair::thin_out() {
+  for (;;) {
+    const Skeleton before = skeleton_;
+    const std::vector<double> radii = radii_;
+    if (contract_cheapest() && worst_bone() < 0) continue;
+    skeleton_ = before;
+    radii_ = radii;
+    prepare();
+    return;
+  }
+}
+
 bool Repair::contract_cheapest() {
   Merge best;
   for (int b = 0; b < static_cast<int>(skeleton_.bones.size()); ++b) {

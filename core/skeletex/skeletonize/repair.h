@@ -36,6 +36,8 @@ class Repair {
   bool contract(int bone);
   /// The bone whose loss does the least to margins and shape.
   bool contract_cheapest();
+  /// Contracts the cheapest bones as long as all margins stay enough.
+  void thin_out();
 
   const Skeleton& skeleton() const { return skeleton_; }
   const std::vector<BoneMargin>& margins() const { return margins_; }

@@ -31,6 +31,9 @@ constexpr double kLimbReach = 0.1;  // a node so near to a tip reaches it; diago
 /// Of the least error: more than so many times that is too much for a limb. Corners and rims look like limbs too.
 constexpr double kLimbsMayCost = 3;
 constexpr std::array<double, 4> kDetails{0, 1.0 / 3, 2.0 / 3, 1};
+/// Where no skeleton of a body with handles works, its rings are tried as polygons of many sides: planes cross in the
+/// polygon's middle, and the more sides, the nearer that is to the middle of the hole.
+constexpr double kFineBend = 0.05 * kBend;
 
 /// The rule of tips at a level of detail from 0 to 1.
 TipRule rule_of(double detail) {
@@ -72,12 +75,13 @@ struct Level {
   Skeleton skeleton;  ///< the repaired one
 };
 
-Skeleton first_skeleton(const Surface& surface, const VoxelBody& body, const std::vector<int>& tips, int genus) {
+Skeleton first_skeleton(const Surface& surface, const VoxelBody& body, const std::vector<int>& tips, int genus,
+                        double bend = kBend) {
   CurveGraph graph = make_curve_graph(body, thin_body(body, tips));
   limit_cycles(surface, genus, graph);
   smooth_branches(surface, body.side, graph);
   merge_hubs(surface, graph);
-  return make_bones(surface, body.side, graph);
+  return make_bones(surface, body.side, graph, bend);
 }
 
 /// Where limbs begin: at the deepest voxel, or on the curves around the handles.
@@ -186,25 +190,37 @@ SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, cons
   std::vector<Level> levels = make_levels(surface, body, paths, result.genus, options);
   const Acceptance acceptance(context, surface);
   const std::optional<MirrorPlane> plane = find_mirror_plane(surface, body);
-  for (std::size_t l = 0; l < levels.size(); ++l) {
-    report("trying skeletons", 0.4 + 0.6 * static_cast<double>(l) / static_cast<double>(levels.size()));
-    Repair& repair = *levels[l].repair;
-    SkeletonCandidate candidate{levels[l].name, 0, 0, 0, {}};
+  const auto try_level = [&](Level& level) {
+    Repair& repair = *level.repair;
     while (options.most_bones && static_cast<int>(repair.skeleton().bones.size()) > std::max(1, *options.most_bones) &&
            repair.contract_cheapest()) {
     }
-    candidate.refusal = acceptance.segment(repair);
-    levels[l].skeleton = repair.skeleton();
-    if (candidate.refusal.empty()) make_symmetric(surface, plane, acceptance, levels[l].skeleton);
-    candidate.bones = static_cast<int>(levels[l].skeleton.bones.size());
-    candidate.limbs = count_limbs(body, limbs, levels[l].skeleton, kLimbReach * surface.diagonal);
+    SkeletonCandidate candidate{level.name, 0, 0, 0, acceptance.segment(repair)};
+    level.skeleton = repair.skeleton();
+    if (candidate.refusal.empty()) make_symmetric(surface, plane, acceptance, level.skeleton);
+    candidate.bones = static_cast<int>(level.skeleton.bones.size());
+    candidate.limbs = count_limbs(body, limbs, level.skeleton, kLimbReach * surface.diagonal);
     if (candidate.refusal.empty()) {
-      const Acceptance::Trial trial = acceptance.encode(levels[l].skeleton);
+      const Acceptance::Trial trial = acceptance.encode(level.skeleton);
       candidate.error = trial.error;
       candidate.refusal = trial.refusal;
     }
     result.candidates.push_back(std::move(candidate));
+  };
+  for (std::size_t l = 0; l < levels.size(); ++l) {
+    report("trying skeletons", 0.4 + 0.6 * static_cast<double>(l) / static_cast<double>(levels.size()));
+    try_level(levels[l]);
   }
+  if (result.genus > 0 && choose(result.candidates, options) < 0)
+    for (const bool is_thinned : {true, false}) {
+      Level level{is_thinned ? "fine handles" : "finest handles", {}, nullptr, {}};
+      level.repair = std::make_unique<Repair>(surface, first_skeleton(surface, body, {}, result.genus, kFineBend));
+      if (!level.repair->run()) break;
+      if (is_thinned) level.repair->thin_out();
+      try_level(level);
+      levels.push_back(std::move(level));
+      if (result.candidates.back().refusal.empty()) break;
+    }
   result.chosen = choose(result.candidates, options);
   if (result.chosen < 0)
     throw TopologyError(fmt::format("none of {} skeletons works; for \"{}\": {}", levels.size(),
