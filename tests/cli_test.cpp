@@ -275,6 +275,18 @@ TEST_F(Program, ReconstructsAndReportsWhatTheContractNames) {
   fs::remove(folder_ / "again.obj");
 }
 
+TEST_F(Program, ExportsACoarseMeshWithItsDisplacement) {
+  const nlohmann::json fine = json_of({"export", "y.skx.exr", "-o", "rig.glb"}),
+                       coarse = json_of(
+                           {"export", "y.skx.exr", "-o", "rig.glb", "--lod", "16", "--displacement", "rig.exr"});
+  EXPECT_LT(coarse["vertices"].get<int>(), fine["vertices"].get<int>() / 4);
+  EXPECT_GT(coarse["displacement"]["width"].get<int>() * coarse["displacement"]["height"].get<int>(), 64 * 32);
+  EXPECT_GT(fs::file_size(folder_ / "rig.exr"), 1000u);
+  expect_refused(2, {"export", "y.skx.exr", "-o", "no.glb", "--displacement", "no.png"}, {"no.png", ".exr"});
+  expect_refused(2, {"export", "y.skx.exr", "-o", "no.glb", "--displacement", "y.skx.exr"}, {"y.skx.exr", "MODEL"});
+  for (const char* name : {"rig.glb", "rig.exr"}) fs::remove(folder_ / name);
+}
+
 TEST_F(Program, BringsNormalsColoursAndNumbersBack) {
   const TriangleMesh mesh = read_mesh(folder_ / "y.ply").mesh;
   MeshAttributes attributes;

@@ -8,6 +8,9 @@
 #include <random>
 
 #include "skeletex/analysis/manifold.h"
+#include "skeletex/analysis/metro.h"
+#include "skeletex/convert/encode_model.h"
+#include "skeletex/edit/regular_grid.h"
 #include "skeletex/io/gltf/read_gltf.h"
 #include "skeletex/io/gltf/write_gltf.h"
 #include "skeletex/io/mesh_file.h"
@@ -16,8 +19,10 @@
 #include "skeletex/reconstruct/linear_skin.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/reconstruct/texture/bake_displacement.h"
 #include "skeletex/reconstruct/texture/bake_texture.h"
 #include "skeletex/rig/export_rig.h"
+#include "support/load_model.h"
 #include "support/picture_at.h"
 #include "support/scratch.h"
 #include "support/shapes.h"
@@ -206,6 +211,60 @@ TEST(RigExport, ColoursComeAlongByVertexOrAsAPicture) {
     for (int k = 0; k < 3; ++k) ASSERT_NEAR(seen[k], 0.5 + 0.4 * std::sin(3 * middle[k]), 0.05);
   }
   EXPECT_THROW(export_rig(device(), bare, {.texture_size = 64}), InputError);
+}
+
+/// A picture of vectors between its pixels, as programs read it that repeat it beyond its sides.
+Vec3 vector_at(const DisplacementPicture& picture, const Eigen::Vector2d& uv) {
+  const double x = uv.x() * picture.width - 0.5, y = (1 - uv.y()) * picture.height - 0.5;
+  const int column = static_cast<int>(std::floor(x)), row = static_cast<int>(std::floor(y));
+  Vec3 sum = Vec3::Zero();
+  for (const int i : {0, 1})
+    for (const int j : {0, 1})
+      sum += std::abs(1 - i - (y - row)) * std::abs(1 - j - (x - column)) *
+             picture.values.at(static_cast<std::size_t>(row + i) * picture.width + column + j).cast<double>();
+  return sum;
+}
+
+/// The coarse mesh with its triangles cut into steps^2 each, every point moved by the picture.
+TriangleMesh displaced(const TriangleMesh& base, const DisplacementPicture& picture, int steps) {
+  TriangleMesh result;
+  for (std::size_t t = 0; t < base.triangles.size(); ++t) {
+    const auto point = [&](int i, int j) {
+      const Vec3 share = Vec3(steps - i - j, i, j) / steps;
+      Vec3 place = Vec3::Zero();
+      Eigen::Vector2d uv = Eigen::Vector2d::Zero();
+      for (int k = 0; k < 3; ++k) {
+        place += share[k] * base.positions[base.triangles[t][k]];
+        uv += share[k] * picture.coordinates.values[picture.coordinates.corners[t][k]].cast<double>();
+      }
+      result.positions.push_back(place + vector_at(picture, uv));
+      return static_cast<int>(result.positions.size()) - 1;
+    };
+    for (int i = 0; i < steps; ++i)
+      for (int j = 0; i + j < steps; ++j) {
+        result.triangles.push_back({point(i, j), point(i + 1, j), point(i, j + 1)});
+        if (i + j + 1 < steps) result.triangles.push_back({point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)});
+      }
+  }
+  return result;
+}
+
+TEST(RigExport, ACoarseMeshAndItsDisplacementGiveTheSurface) {
+  for (const char* name : {"bear", "man", "eight"}) {
+    const TestModel standard = load_standard_model(name);
+    const SkeletexModel model = regular_grid(device(), encode_model(device(), standard.mesh, standard.skeleton).model);
+    const SkeletexModel base = resample_model(device(), model, 64);
+    const DisplacementPicture picture = bake_displacement(device(), model, base);
+    const TriangleMesh coarse = reconstruct_mesh(device(), base), fine = reconstruct_mesh(device(), model);
+    const double bare = symmetric_mean(measure_metro(device(), fine, coarse, {.samples = 100'000}));
+    const MetroReport report = measure_metro(device(), fine, displaced(coarse, picture, 8), {.samples = 100'000});
+    EXPECT_LT(symmetric_mean(report), 5e-5) << name;
+    EXPECT_LT(symmetric_mean(report), 0.25 * bare) << name;
+    EXPECT_LT(std::max(report.forward.max, report.backward.max), 3e-3) << name;
+    const GltfScene scene = written_and_read(export_rig(device(), base, {.coordinates = &picture.coordinates}));
+    EXPECT_EQ(scene.meshes.at(0).primitives.at(0).texture_coordinates.size(),
+              scene.meshes.at(0).primitives.at(0).positions.size());
+  }
 }
 
 TEST(RigExport, NormalsAreThoseOfTheModel) {

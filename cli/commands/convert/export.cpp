@@ -12,17 +12,22 @@
 #include "command.h"
 #include "files.h"
 #include "progress_bar.h"
+#include "skeletex/edit/regular_grid.h"
 #include "skeletex/io/gltf/write_gltf.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/pose_file.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/reconstruct/texture/bake_displacement.h"
+#include "skeletex/render/image.h"
 #include "skeletex/rig/export_rig.h"
 
 namespace skeletex::cli {
 namespace {
 
+constexpr int kBaseSize = 64;  // of the mesh below a displacement
+
 struct Arguments {
-  std::string model, output, device, json, up = "y";
+  std::string model, output, displacement, displacement_up = "z", device, json, up = "y";
   std::vector<std::string> animations;
   int size = 0, level = 0, texture = 0;
 };
@@ -56,25 +61,44 @@ std::string model_name(const std::string& path) {
   return name;
 }
 
+/// The picture as OpenEXR, in the axes of programs with z up, which turn what glTF holds, or in glTF's own.
+void write_displacement(const std::string& path, const DisplacementPicture& picture, bool is_z_up) {
+  Image image = make_image(picture.width, picture.height);
+  for (std::size_t i = 0; i < picture.values.size(); ++i) {
+    const Eigen::Vector3f& value = picture.values[i];
+    const Eigen::Vector3f turned = is_z_up ? Eigen::Vector3f(value.x(), -value.z(), value.y()) : value;
+    std::copy_n(turned.data(), 3, image.rgba.data() + 4 * i);
+    image.rgba[4 * i + 3] = 1;
+  }
+  write_exr_image(path, image);
+}
+
 void run(const Arguments& arguments) {
   Stopwatch watch;
-  const SkeletexModel original = read_model(arguments.model, arguments.level);
+  SkeletexModel original = read_model(arguments.model, arguments.level);
   const std::vector<NamedAnimation> animations = read_animations(arguments.animations, original.skeleton);
   ClContext context(arguments.device);
   ProgressBar bar(context);
   std::optional<SkeletexModel> resized;
-  if (arguments.size > 0 && arguments.size != std::max(original.texture.width, original.texture.height)) {
+  const bool is_displaced = !arguments.displacement.empty();
+  if (is_displaced) original = regular_grid(context, original);  // whose points move evenly between its texels
+  const int size = arguments.size > 0 ? arguments.size : is_displaced ? kBaseSize : 0;
+  if (size > 0 && size != std::max(original.texture.width, original.texture.height)) {
     bar.show("resampling", 0.1);
-    resized = resample_model(context, original, arguments.size);
+    resized = resample_model(context, original, size);
   }
   bar.show("reconstructing", 0.3);
+  std::optional<DisplacementPicture> displacement;
+  if (is_displaced) displacement = bake_displacement(context, original, resized ? *resized : original);
   const GltfScene scene = export_rig(context, resized ? *resized : original,
                                      {.name = model_name(arguments.model),
                                       .placement = placement_of(arguments.up),
                                       .animations = animations,
                                       .texture_size = arguments.texture,
-                                      .original = &original});
+                                      .original = &original,
+                                      .coordinates = displacement ? &displacement->coordinates : nullptr});
   bar.show("writing", 0.7);
+  if (displacement) write_displacement(arguments.displacement, *displacement, arguments.displacement_up == "z");
   write_gltf(arguments.output, scene);
   const double ms = watch.lap_ms();
   const GltfPrimitive& surface = scene.meshes[0].primitives[0];
@@ -89,7 +113,12 @@ void run(const Arguments& arguments) {
   print(arguments.json,
         fmt::format("{} vertices, {} triangles, {} joints\n{}{}\n", surface.positions.size(), surface.triangles.size(),
                     scene.skins[0].joints.size(), clips_text, arguments.output));
+  const Json picture =
+      displacement
+          ? Json{{"path", arguments.displacement}, {"width", displacement->width}, {"height", displacement->height}}
+          : Json();
   write_json(arguments.json, {{"output", arguments.output},
+                              {"displacement", picture},
                               {"vertices", surface.positions.size()},
                               {"triangles", surface.triangles.size()},
                               {"joints", scene.skins[0].joints.size()},
@@ -132,12 +161,26 @@ void add_export_command(CLI::App& program) {
       ->type_name("N");
   take_one_of(*command.add_option("--up", arguments->up, "axis of the model that is up; y is in glTF (default: y)"),
               {"x", "y", "z", "-x", "-y", "-z"});
+  declare_output(
+      command,
+      command.add_option("--displacement", arguments->displacement,
+                         "write the mesh coarse (--lod, default 64), and beside it a picture of the vectors to the "
+                         "model's own surface: .exr"),
+      {".exr"})
+      ->type_name("FILE")
+      ->excludes("--texture");
+  take_one_of(
+      *command.add_option("--displacement-up", arguments->displacement_up,
+                          "axis that is up in the program that reads the picture: Blender turns glTF to z, Maya "
+                          "and most renderers keep y (default: z)"),
+      {"y", "z"});
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(
       "Examples:\n"
       "  skeletex export bear.skx.exr -o bear.glb --lod 128\n"
       "  skeletex export man.skx.exr -o man.glb --up z --animation walk.json --animation sit.json\n"
+      "  skeletex export bear.skx.exr -o bear.glb --lod 64 --displacement bear.exr\n"
       "Other programs move the surface by linear blend skinning with the four strongest weights of smooth poses; "
       "`reconstruct --deform linear` shows the same. Each bone is a joint of its own name.");
   command.callback([arguments] { run(*arguments); });

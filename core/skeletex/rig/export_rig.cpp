@@ -39,6 +39,7 @@ GltfPrimitive make_primitive(ClContext& context, const PreparedModel& model, con
   const VertexInfluences influences = strongest_influences(make_skin(context, model, bind.inner));
   MeshAttributes attributes = vertex_attributes(model);
   if (options.texture_size > 0) bake_colours(context, model, bind.mesh, options, attributes);
+  if (options.coordinates) attributes.texture_coordinates = *options.coordinates;
   scene.materials.push_back(material_of(attributes, scene.images));
   auto [primitive, sources] = primitive_of(in_user_units(std::move(bind.mesh), model.model.skeleton.frame), attributes);
   primitive.influences = 4;

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_map>
 
+#include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/skeleton/separation_planes.h"
 
 namespace skeletex {
@@ -24,11 +26,26 @@ std::vector<int> triangle_bones(const Lattice& lattice, const std::vector<Triang
 
 namespace {
 
+/// v of the vertices of a seam, as its columns go along it.
+using SeamTurns = std::unordered_map<int, double>;
+
+SeamTurns turns_of_seam(const PreparedModel& model, const TriangleMesh& mesh, int bone, BoneEnd end) {
+  const EndSeam seam = end_seam(model.model, model.separation, model.lattice, mesh.positions, bone, end);
+  SeamTurns turns;
+  for (std::size_t i = 0; i < seam.turns.size(); ++i) turns[seam.ring.vertices[i]] = seam.turns[i];
+  return turns;
+}
+
 /// Rows and columns of the corners of one triangle. Poles have no v of their own: they take the mean of the others.
 class CornerPlaces {
  public:
-  CornerPlaces(const PreparedModel& model, const TriangleMesh& mesh, int bone, const Triangle& triangle)
-      : model_(model), mesh_(mesh), bone_(bone), rectangle_(model.model.patches[bone].rectangle), triangle_(triangle) {
+  /// \param seams  of the bone's head and tail
+  CornerPlaces(const PreparedModel& model, const std::array<SeamTurns, 2>& seams, int bone, const Triangle& triangle)
+      : model_(model),
+        seams_(seams),
+        bone_(bone),
+        rectangle_(model.model.patches[bone].rectangle),
+        triangle_(triangle) {
     int row = 1;
     for (const int vertex : triangle) row = std::max(row, row_of(vertex));
     const BoneEnd near_end = row <= 1 ? BoneEnd::kHead : BoneEnd::kTail;
@@ -63,13 +80,11 @@ class CornerPlaces {
       return;
     }
     u_[c] = near_end == BoneEnd::kHead ? 0 : 1;
-    if (!is_pole_[c])
-      v_[c] = model_.separation.turn_of(bone_,
-                                        mesh_.positions[vertex] - end_position(model_.model.skeleton, bone_, near_end));
+    if (!is_pole_[c]) v_[c] = seams_[static_cast<int>(near_end)].at(vertex);
   }
 
   const PreparedModel& model_;
-  const TriangleMesh& mesh_;
+  const std::array<SeamTurns, 2>& seams_;
   int bone_;
   Rectangle rectangle_;
   Triangle triangle_;
@@ -83,8 +98,12 @@ std::vector<std::array<double, 2>> corner_coordinates(const PreparedModel& model
   const std::vector<int> bones = triangle_bones(model.lattice, mesh.triangles);
   std::vector<std::array<double, 2>> coordinates;
   coordinates.reserve(3 * mesh.triangles.size());
+  std::vector<std::array<SeamTurns, 2>> seams;
+  for (int bone = 0; bone < static_cast<int>(model.model.patches.size()); ++bone)
+    seams.push_back(
+        {turns_of_seam(model, mesh, bone, BoneEnd::kHead), turns_of_seam(model, mesh, bone, BoneEnd::kTail)});
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-    CornerPlaces(model, mesh, bones[t], mesh.triangles[t]).append(coordinates);
+    CornerPlaces(model, seams[bones[t]], bones[t], mesh.triangles[t]).append(coordinates);
   return coordinates;
 }
 
