@@ -136,6 +136,13 @@ TEST(Skeletonize, MadeShapesGetSkeletonsThatCanBeEncoded) {
   }
 }
 
+TEST(Skeletonize, VerticesInNoTriangleAreNone) {
+  TriangleMesh mesh = capsule_shape().mesh;
+  for (int i = 0; i < 4; ++i) mesh.positions.push_back(Vec3::Constant(i));
+  EXPECT_EQ(genus_of(mesh), 0);
+  EXPECT_FALSE(skeletonized(mesh).skeleton.bones.empty());
+}
+
 TEST(Skeletonize, EveryLimbOfACreatureHasABoneAndTheSameBytesComeAgain) {
   const Shape shape = creature_shape();
   const SkeletonizeResult result = skeletonized(shape.mesh);

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/skeletonize/body/fitting_body.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include "skeletex/skeletonize/body/curve_graph.h"
 #include "skeletex/skeletonize/body/thinning.h"
@@ -19,7 +21,11 @@ constexpr double kWhole = 0.97;    // share of the voxels that must hang togethe
 }  // namespace
 
 int genus_of(const TriangleMesh& mesh) {
-  return (2 - (static_cast<int>(mesh.positions.size()) - static_cast<int>(mesh.triangles.size()) / 2)) / 2;
+  std::vector<char> is_used(mesh.positions.size(), 0);
+  for (const Triangle& triangle : mesh.triangles)
+    for (const int vertex : triangle) is_used[vertex] = 1;
+  const auto vertices = static_cast<int>(std::count(is_used.begin(), is_used.end(), 1));
+  return (2 - (vertices - static_cast<int>(mesh.triangles.size()) / 2)) / 2;
 }
 
 VoxelBody make_fitting_body(const Surface& surface, int genus) {
