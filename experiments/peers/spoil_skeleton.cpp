@@ -26,7 +26,7 @@ Vec3 random_in_ball(std::mt19937& random) {
   const auto coordinate = [&] { return 2.0 * random() / std::mt19937::max() - 1; };
   for (;;) {
     const double x = coordinate(), y = coordinate(), z = coordinate();
-    if (const Vec3 point(x, y, z); point.squaredNorm() <= 1) return point;
+    if (Vec3 point(x, y, z); point.squaredNorm() <= 1) return point;
   }
 }
 
