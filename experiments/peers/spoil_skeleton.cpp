@@ -4,12 +4,12 @@
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
-#include <random>
 
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/same_file.h"
 #include "skeletex/io/skeleton_file.h"
+#include "skeletex/skeletonize/repair.h"
 
 namespace {
 
@@ -21,21 +21,12 @@ struct Arguments {
   unsigned seed = 0;
 };
 
-/// A point of the unit ball, evenly distributed, from the generator's numbers alone: the same with every library.
-Vec3 random_in_ball(std::mt19937& random) {
-  const auto coordinate = [&] { return 2.0 * random() / std::mt19937::max() - 1; };
-  for (;;) {
-    const double x = coordinate(), y = coordinate(), z = coordinate();
-    if (Vec3 point(x, y, z); point.squaredNorm() <= 1) return point;
-  }
-}
-
 void run(const Arguments& arguments) {
   check_not_an_input(arguments.output, {arguments.mesh, arguments.skeleton});
   const double largest = arguments.by * bounding_box(read_mesh(arguments.mesh).mesh).diagonal();
   Skeleton skeleton = read_skeleton(arguments.skeleton);
-  std::mt19937 random(arguments.seed);
-  for (Node& node : skeleton.nodes) node.position += largest * random_in_ball(random);
+  RandomNumbers random(arguments.seed);
+  for (Node& node : skeleton.nodes) node.position += random.in_ball(largest);
   write_text_atomically(arguments.output, skeleton_to_json(skeleton).dump(1) + "\n");
 }
 

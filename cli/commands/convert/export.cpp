@@ -24,7 +24,7 @@
 namespace skeletex::cli {
 namespace {
 
-constexpr int kBaseSize = 64;  // of the mesh below a displacement
+constexpr int kBaseSize = 64;  // texels along the longer side of a mesh with a displacement, without --lod
 
 struct Arguments {
   std::string model, output, displacement, displacement_up = "z", device, json, up = "y";
@@ -61,7 +61,9 @@ std::string model_name(const std::string& path) {
   return name;
 }
 
-/// The picture as OpenEXR, in the axes of programs with z up, which turn what glTF holds, or in glTF's own.
+/// Writes the vectors as the channels R, G, B of an OpenEXR file.
+/// \param is_z_up  in the axes of a program that turns glTF from y up to z up; else in those of the glTF file
+/// \throw IoError
 void write_displacement(const std::string& path, const DisplacementPicture& picture, bool is_z_up) {
   Image image = make_image(picture.width, picture.height);
   for (std::size_t i = 0; i < picture.values.size(); ++i) {
@@ -81,7 +83,8 @@ void run(const Arguments& arguments) {
   ProgressBar bar(context);
   std::optional<SkeletexModel> resized;
   const bool is_displaced = !arguments.displacement.empty();
-  if (is_displaced) original = regular_grid(context, original);  // whose points move evenly between its texels
+  if (is_displaced)
+    original = regular_grid(context, original);  // snapped texels lie unevenly and would fold between pixels
   const int size = arguments.size > 0 ? arguments.size : is_displaced ? kBaseSize : 0;
   if (size > 0 && size != std::max(original.texture.width, original.texture.height)) {
     bar.show("resampling", 0.1);

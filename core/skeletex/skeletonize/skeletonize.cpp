@@ -31,8 +31,9 @@ constexpr double kLimbReach = 0.1;  // a node so near to a tip reaches it; diago
 /// Of the least error: more than so many times that is too much for a limb. Corners and rims look like limbs too.
 constexpr double kLimbsMayCost = 3;
 constexpr std::array<double, 4> kDetails{0, 1.0 / 3, 2.0 / 3, 1};
-/// Where no skeleton of a body with handles works, its rings are tried as polygons of many sides: planes cross in the
-/// polygon's middle, and the more sides, the nearer that is to the middle of the hole.
+/// Where no skeleton of a body with handles works, its rings are tried with many short bones. The separation planes of
+/// a ring meet inside its polygon; the more sides that has, the nearer they meet to the middle of the hole, outside the
+/// body.
 constexpr double kFineBend = 0.05 * kBend;
 
 /// The rule of tips at a level of detail from 0 to 1.
@@ -213,6 +214,7 @@ SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, cons
   }
   if (result.genus > 0 && choose(result.candidates, options) < 0)
     for (const bool is_thinned : {true, false}) {
+      report("trying finer rings", 0.95);
       Level level{is_thinned ? "fine handles" : "finest handles", {}, nullptr, {}};
       level.repair = std::make_unique<Repair>(surface, first_skeleton(surface, body, {}, result.genus, kFineBend));
       if (!level.repair->run()) break;

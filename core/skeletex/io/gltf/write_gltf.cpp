@@ -249,7 +249,8 @@ SurfacePrimitive primitive_of(const TriangleMesh& mesh, const MeshAttributes& at
   result.primitive.triangles = std::move(split.mesh.triangles);
   result.primitive.normals = std::move(split.attributes.normals.values);
   result.primitive.colours = std::move(split.attributes.colours.values);
-  for (Colour& colour : result.primitive.colours) colour = colour.cwiseMax(0).cwiseMin(1);  // means round beyond
+  for (Colour& colour : result.primitive.colours)
+    colour = colour.cwiseMax(0).cwiseMin(1);  // resampled ones may round to just above 1
   for (const Eigen::Vector2f& uv : split.attributes.texture_coordinates.values)
     result.primitive.texture_coordinates.emplace_back(uv.x(), 1 - uv.y());
   result.primitive.material = 0;

@@ -85,9 +85,11 @@ void for_each_pixel(const std::array<Eigen::Vector2d, 3>& corners, const std::ar
     }
 }
 
-/// The triangles at a pole have a point of the row above it in common, but not its column: on both sides of an edge it
-/// would be another one. So columns spread from the pole on, and edges keep theirs.
-/// \param apex  which corner the pole is, -1: none
+/// The column of the surface that belongs to a pixel of a triangle. At a pole, neighbouring triangles have different
+/// texture coordinates for the pole, and so for the edge between them. Each row of such a triangle is therefore
+/// stretched to the columns of its other two corners: then both triangles give the edge the same points.
+/// \param corners  pixels
+/// \param apex     which corner the pole is; -1: the pixel's own column
 double column_of(const std::array<Eigen::Vector2d, 3>& corners, int apex, int column, int row) {
   if (apex < 0) return column;
   const Eigen::Vector2d &pole = corners[apex], &a = corners[(apex + 1) % 3], &b = corners[(apex + 2) % 3];
@@ -95,7 +97,8 @@ double column_of(const std::array<Eigen::Vector2d, 3>& corners, int apex, int co
   return share > 1e-9 ? pole.x() + std::clamp((column - pole.x()) / share, -reach, reach) : pole.x();
 }
 
-/// Gives pixels that no triangle covers the value of a covered one near by, so that filters find nothing else.
+/// Gives pixels that no triangle covers the value of the nearest one that is covered, for filters that read across the
+/// border of a patch.
 void fill_up(DisplacementPicture& picture, std::vector<char>& is_covered) {
   std::queue<int> open;
   for (int i = 0; i < static_cast<int>(is_covered.size()); ++i)
@@ -126,7 +129,7 @@ DisplacementPicture bake_displacement(ClContext& context, const PreparedModel& d
   std::vector<char> is_covered(pixels, 0);
   const std::vector<int> bones = triangle_bones(base.lattice, mesh.triangles);
   const double scale = detail.model.skeleton.frame.scale;
-  // Filters mix the pixels inside a triangle with those around it, which follow it where no other triangle has them.
+  // Linear filters also read pixels just outside a triangle. Where no other triangle covers them, its plane goes on.
   for (const double margin : {1e-6, 1.5})
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
       const int x = layout.places[bones[t]][0], y = layout.places[bones[t]][1];
