@@ -215,6 +215,15 @@ TEST(Skeletonize, SpoiltSkeletonsAreRepaired) {
   }
 }
 
+TEST(Skeletonize, RepairMakesNoBoneWithoutLength) {
+  // Nodes that are moved to the middle of a voxel, and bones between them that are bent on their way through voxels.
+  const TestModel man = load_standard_model("man");
+  RandomNumbers random(4);
+  const Skeleton skeleton = spoilt(man.skeleton, 0.05 * bounding_box(man.mesh).diagonal(), random);
+  const RepairResult repaired = repair_skeleton(context(), man.mesh, build_triangle_tree(man.mesh), skeleton);
+  EXPECT_EQ(errors_of(man.mesh, repaired.skeleton), "");
+}
+
 TEST(Skeletonize, AGoodSkeletonIsNotChangedByRepair) {
   const Shape shape = y_shape();
   const RepairResult repaired = repair_skeleton(context(), shape.mesh, build_triangle_tree(shape.mesh), shape.skeleton);

@@ -179,10 +179,13 @@ class Draft {
       const Vec3 head = skeleton_.nodes[bone.head].position, tail = skeleton_.nodes[bone.tail].position;
       if (!surface_.is_between(head, tail)) continue;
       std::vector<Vec3> points{head};
+      // A node that was moved lies in the middle of a voxel, which would make a bone without length.
       for (const int v : path_between(body_, costs, nearest_voxel(head), nearest_voxel(tail)))
-        points.push_back(body_.centres[v]);
+        if (const Vec3& p = body_.centres[v]; std::min((p - head).norm(), (p - tail).norm()) > 1e-3 * body_.side)
+          points.push_back(p);
       points.push_back(tail);
       const std::vector<int> kept = straighten(surface_, body_.side, points, 2);
+      if (kept.size() < 3) continue;
       int before = bone.head;
       for (std::size_t i = 1; i + 1 < kept.size(); ++i) {
         skeleton_.nodes.push_back({free_name(bone.name + "_bend"), points[kept[i]]});
