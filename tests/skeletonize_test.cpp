@@ -18,6 +18,7 @@
 #include "skeletex/skeletonize/body/curve_graph.h"
 #include "skeletex/skeletonize/body/fitting_body.h"
 #include "skeletex/skeletonize/body/thinning.h"
+#include "skeletex/skeletonize/bones.h"
 #include "skeletex/skeletonize/repair.h"
 #include "skeletex/skeletonize/repair_skeleton.h"
 #include "support/load_model.h"
@@ -98,7 +99,7 @@ TEST(Skeletonize, TheMarginIsThatOfTheSeparationPlanesAndTheSurface) {
                    tail = planes.slope(b, BoneEnd::kTail, turn);
       const Vec3 o = planes.bases()[b].o, s = planes.radial(b, turn);
       const double rho =
-          std::max(first_hit_of_all(shape.mesh, end_position(shape.skeleton, b, BoneEnd::kHead), s + head * o),
+          std::min(first_hit_of_all(shape.mesh, end_position(shape.skeleton, b, BoneEnd::kHead), s + head * o),
                    first_hit_of_all(shape.mesh, end_position(shape.skeleton, b, BoneEnd::kTail), s + tail * o));
       if (head > tail) least = std::min(least, 1 - rho * (head - tail) / bone_length(shape.skeleton, b));
     }
@@ -197,6 +198,28 @@ TEST(Skeletonize, RingsOfManyBonesAreThinnedWithoutCrossings) {
   EXPECT_EQ(errors_of(shape.mesh, thinned), "");
 }
 
+TEST(Skeletonize, WheelsGetAnEvenRing) {
+  for (const NamedShape& shape : all_shapes()) {
+    const TriangleTree tree = build_triangle_tree(shape.shape.mesh);
+    const Surface surface(shape.shape.mesh, tree);
+    const VoxelBody body = make_fitting_body(surface, shape.genus);
+    const CurveGraph graph = make_curve_graph(body, thin_body(body, std::vector<int>{}));
+    const Skeleton ring = make_even_ring(surface, body, graph, 5);
+    if (shape.genus != 1) {
+      EXPECT_TRUE(ring.bones.empty()) << shape.name;
+      continue;
+    }
+    // A torus about z of radii 2 and 0.5: corners are as far outside the circle as the middles of bones are inside.
+    ASSERT_EQ(ring.bones.size(), 5) << shape.name;
+    for (const Bone& bone : ring.bones) {
+      const Vec3 &head = ring.nodes[bone.head].position, &tail = ring.nodes[bone.tail].position;
+      EXPECT_NEAR(head.z(), 0, 0.03);
+      EXPECT_NEAR(head.head<2>().norm(), 2.21, 0.05);
+      EXPECT_NEAR((head - tail).norm(), 2 * 2.21 * std::sin(std::numbers::pi / 5), 0.06);
+    }
+  }
+}
+
 TEST(Skeletonize, SpoiltSkeletonsAreRepaired) {
   RandomNumbers random(7);
   for (const char* name : {"bear", "cactus"}) {
@@ -229,6 +252,12 @@ TEST(Skeletonize, AGoodSkeletonIsNotChangedByRepair) {
   const RepairResult repaired = repair_skeleton(context(), shape.mesh, build_triangle_tree(shape.mesh), shape.skeleton);
   EXPECT_TRUE(repaired.changes.empty()) << repaired.changes.front();
   EXPECT_EQ(skeleton_to_json(repaired.skeleton), skeleton_to_json(shape.skeleton));
+}
+
+TEST(Skeletonize, BodiesOfTooManyHandlesAreRefused) {
+  const TriangleMesh mesh = read_mesh(SKELETEX_SOURCE_DIR "/build/meshes/cheese.off").mesh;
+  ASSERT_GT(genus_of(mesh), 100);
+  EXPECT_THROW(skeletonized(mesh), TopologyError);
 }
 
 TEST(Skeletonize, RepairRefusesWhatNoMoveMends) {

@@ -52,15 +52,19 @@ BoneMargin margin_of_bone(const TriangleMesh& mesh, const TriangleTree& tree, co
     }
     const double closing = (slopes[0] + slopes[1]) / length;
     if (closing <= 0 || others[0].empty() || others[1].empty()) continue;
+    // A plane whose ray leaves the body before they meet ends there: the nearer of the two exits counts.
+    int nearest = 0;
+    double rho = (1 - kLeastMargin) / closing;
     for (int e = 0; e < 2; ++e) {
       const Vec3 along = radial + (e == 0 ? slopes[e] : -slopes[e]) * o;
-      const double limit = std::min(4 * tree.scale / along.norm(), (1 - kLeastMargin) / closing);
-      const double rho = std::min(limit, find_first_hit(mesh, tree, ends[e], along, limit));
-      if (1 - rho * closing >= result.margin) continue;
-      result.margin = 1 - rho * closing;
-      result.point = ends[e] + rho * along;
-      result.end = e == 0 ? BoneEnd::kHead : BoneEnd::kTail;
+      rho = std::min(rho, 4 * tree.scale / along.norm());
+      const double exit = find_first_hit(mesh, tree, ends[e], along, rho);
+      if (exit < rho) rho = exit, nearest = e;
     }
+    if (1 - rho * closing >= result.margin) continue;
+    result.margin = 1 - rho * closing;
+    result.end = nearest == 0 ? BoneEnd::kHead : BoneEnd::kTail;
+    result.point = ends[nearest] + rho * (radial + (nearest == 0 ? slopes[0] : -slopes[1]) * o);
   }
   result.lean = lean;
   return result;

@@ -13,12 +13,13 @@ namespace skeletex {
 inline constexpr double kEnoughMargin = 0.05;
 
 /// How far the separation planes at both ends of a bone are from crossing inside the body. At the angle theta about
-/// the bone they meet at the distance L / (k_H - k_T) from its axis, with the slopes k of SeparationPlanes; rays along
-/// them leave the body at the distance rho.
+/// the bone they meet at the distance L / (k_H - k_T) from its axis, with the slopes k of SeparationPlanes. Rays along
+/// both leave the body at the distances rho_H and rho_T. Where one leaves it before they meet, its seam is there, and
+/// they do not meet on the surface: the lesser is rho.
 struct BoneMargin {
-  /// The least 1 - rho (k_H - k_T) / L of all rays, at most 1. Below 0 the planes cross inside the body.
+  /// The least 1 - rho (k_H - k_T) / L of all angles, at most 1. Below 0 the planes cross inside the body.
   double margin = 1;
-  Vec3 point = Vec3::Zero();  ///< where that ray leaves the body
+  Vec3 point = Vec3::Zero();  ///< where the ray of rho leaves the body
   BoneEnd end = BoneEnd::kHead;
   double lean = 1;  ///< mean of sqrt(1 + k^2): how much longer the planes are than planes across the bone
 };

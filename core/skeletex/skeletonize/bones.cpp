@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/skeletonize/bones.h"
 
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <utility>
+
+#include "skeletex/math/portable.h"
 
 namespace skeletex {
 namespace {
@@ -87,6 +92,19 @@ void draw_back(const Surface& surface, double side, std::vector<Vec3>& points) {
   points.erase(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(first));
 }
 
+/// The least distance from the surface of the nodes and the middles of the bones; 0 where the ring is not inside.
+double depth_of_ring(const Surface& surface, const std::vector<Vec3>& curve_inside, const Skeleton& ring) {
+  double depth = surface.diagonal;
+  for (const Bone& bone : ring.bones) {
+    const Vec3 &head = ring.nodes[bone.head].position, &tail = ring.nodes[bone.tail].position;
+    if (surface.is_between(head, tail)) return 0;
+    depth = std::min({depth, surface.radius(head), surface.radius(0.5 * (head + tail))});
+  }
+  const bool is_inside = std::any_of(curve_inside.begin(), curve_inside.end(),
+                                     [&](const Vec3& p) { return !surface.is_between(p, ring.nodes[0].position); });
+  return is_inside ? depth : 0;
+}
+
 }  // namespace
 
 std::vector<int> straighten(const Surface& surface, double voxel_side, const std::vector<Vec3>& points, int pieces,
@@ -126,6 +144,35 @@ Skeleton make_bones(const Surface& surface, double voxel_side, const CurveGraph&
     }
   }
   return skeleton;
+}
+
+Skeleton make_even_ring(const Surface& surface, const VoxelBody& body, const CurveGraph& graph, int bones) {
+  if (graph.branches.size() != 1 || graph.nodes.size() != 1) return {};
+  const std::vector<Vec3>& curve = graph.branches[0].points;
+  Vec3 centre = Vec3::Zero(), area = Vec3::Zero();
+  for (const Vec3& p : body.centres) centre += p / body.size();
+  for (std::size_t i = 0; i + 1 < curve.size(); ++i) area += (curve[i] - centre).cross(curve[i + 1] - centre);
+  Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
+  for (const Vec3& p : body.centres) moments += (p - centre) * (p - centre).transpose();
+  const Eigen::Matrix3d axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(moments).eigenvectors();
+  int along = 0;
+  (axes.transpose() * area).cwiseAbs().maxCoeff(&along);
+  const Vec3 across = axes.col((along + 1) % 3), up = axes.col((along + 2) % 3);
+  double radius = 0;
+  for (const Vec3& p : body.centres) radius += std::hypot(across.dot(p - centre), up.dot(p - centre)) / body.size();
+  Skeleton best;
+  double most_depth = 0;
+  for (double share = 0.6; share < 1.5; share += 0.02) {
+    Skeleton ring;
+    for (int n = 0; n < bones; ++n) {
+      const double angle = 2 * std::numbers::pi * n / bones;
+      ring.nodes.push_back({"", centre + share * radius * (portable::cos(angle) * across + portable::sin(angle) * up)});
+      ring.bones.push_back({"", n, (n + 1) % bones, {}});
+    }
+    const double depth = depth_of_ring(surface, curve, ring);
+    if (depth > most_depth) most_depth = depth, best = std::move(ring);
+  }
+  return best;
 }
 
 }  // namespace skeletex

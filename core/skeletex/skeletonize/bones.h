@@ -15,6 +15,11 @@ constexpr double kBend = 0.7;
 /// Names are empty.
 Skeleton make_bones(const Surface& surface, double voxel_side, const CurveGraph& graph, double bend = kBend);
 
+/// A regular polygon of bones around the handle of a body of genus 1: its axis is a principal axis of the body, and
+/// with its radius it is as deep inside as it can be. For wheels and tori.
+/// \return no bones where the graph is not a single loop, or a bone would leave the body
+Skeleton make_even_ring(const Surface& surface, const VoxelBody& body, const CurveGraph& graph, int bones);
+
 /// Where a curve inside the body is split so that straight pieces between these points do for it, ascending, its ends
 /// included.
 /// \param pieces  at least so many

@@ -16,9 +16,9 @@ constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 constexpr int kAngles = 16;       // of rays while nodes are moved
 constexpr int kFinalAngles = 32;  // to accept
 constexpr int kTrials = 20;
-constexpr int kPatience = 10;            // failed attempts before a bone is contracted
-constexpr double kHopeless = -30;        // margins that moves have not cured
-constexpr long kMostMeasured = 150'000;  // bones, a few seconds; then patience ends
+constexpr int kPatience = 10;           // failed attempts before a bone is contracted
+constexpr double kHopeless = -30;       // margins that moves have not cured
+constexpr long kMostMeasured = 40'000;  // bones, a second or two; then patience ends
 
 }  // namespace
 

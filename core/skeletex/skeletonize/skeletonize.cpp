@@ -35,6 +35,8 @@ constexpr std::array<double, 4> kDetails{0, 1.0 / 3, 2.0 / 3, 1};
 /// a ring meet inside its polygon; the more sides that has, the nearer they meet to the middle of the hole, outside the
 /// body.
 constexpr double kFineBend = 0.05 * kBend;
+constexpr int kMostHandles = 50;                 // those of machine parts; a ring around each takes three bones or more
+constexpr std::array<int, 2> kEvenRings{5, 10};  // bones
 
 /// The rule of tips at a level of detail from 0 to 1.
 TipRule rule_of(double detail) {
@@ -76,13 +78,12 @@ struct Level {
   Skeleton skeleton;  ///< the repaired one
 };
 
-Skeleton first_skeleton(const Surface& surface, const VoxelBody& body, const std::vector<int>& tips, int genus,
-                        double bend = kBend) {
+CurveGraph curves_of(const Surface& surface, const VoxelBody& body, const std::vector<int>& tips, int genus) {
   CurveGraph graph = make_curve_graph(body, thin_body(body, tips));
   limit_cycles(surface, genus, graph);
   smooth_branches(surface, body.side, graph);
   merge_hubs(surface, graph);
-  return make_bones(surface, body.side, graph, bend);
+  return graph;
 }
 
 /// Where limbs begin: at the deepest voxel, or on the curves around the handles.
@@ -102,6 +103,16 @@ std::vector<int> tips_of(const VoxelBody& body, const BodyPaths& paths, double d
   return tips;
 }
 
+void add_even_rings(const Surface& surface, const VoxelBody& body, const CurveGraph& curves,
+                    std::vector<Level>& levels) {
+  for (const int bones : kEvenRings) {
+    const Skeleton ring = make_even_ring(surface, body, curves, bones);
+    if (ring.bones.empty()) continue;
+    levels.push_back({fmt::format("even ring of {}", bones), {}, std::make_unique<Repair>(surface, ring), {}});
+    levels.back().repair->run();
+  }
+}
+
 std::vector<Level> make_levels(const Surface& surface, const VoxelBody& body, const BodyPaths& paths, int genus,
                                const SkeletonizeOptions& options) {
   std::vector<Level> levels;
@@ -119,9 +130,11 @@ std::vector<Level> make_levels(const Surface& surface, const VoxelBody& body, co
   for (const double detail : details)
     add(fmt::format("detail {:.2g}", detail), tips_of(body, paths, detail, surface.diagonal, genus));
   for_each_block(levels.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-    levels[i].repair = std::make_unique<Repair>(surface, first_skeleton(surface, body, levels[i].tips, genus));
+    const CurveGraph curves = curves_of(surface, body, levels[i].tips, genus);
+    levels[i].repair = std::make_unique<Repair>(surface, make_bones(surface, body.side, curves));
     levels[i].repair->run();
   });
+  if (genus == 1) add_even_rings(surface, body, curves_of(surface, body, {}, genus), levels);
   if (genus == 0) {
     levels.push_back({"single bone", {}, nullptr, {}});
     levels.back().repair = std::make_unique<Repair>(surface, single_bone(body));
@@ -179,6 +192,9 @@ SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, cons
   surface.frame = unit.frame;
   SkeletonizeResult result;
   result.genus = genus_of(mesh);
+  if (result.genus > kMostHandles)
+    throw TopologyError(
+        fmt::format("the mesh has {} handles, and skeletons are found for up to {}", result.genus, kMostHandles));
   report("filling the body", 0);
   const VoxelBody body = make_fitting_body(surface, result.genus);
   if (body.size() == 0)
@@ -216,7 +232,8 @@ SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, cons
     for (const bool is_thinned : {true, false}) {
       report("trying finer rings", 0.95);
       Level level{is_thinned ? "fine handles" : "finest handles", {}, nullptr, {}};
-      level.repair = std::make_unique<Repair>(surface, first_skeleton(surface, body, {}, result.genus, kFineBend));
+      level.repair = std::make_unique<Repair>(
+          surface, make_bones(surface, body.side, curves_of(surface, body, {}, result.genus), kFineBend));
       if (!level.repair->run()) break;
       if (is_thinned) level.repair->thin_out();
       try_level(level);

@@ -253,7 +253,7 @@ std::vector<unsigned> find_crossed_links(const Surface& surface, const VoxelBody
   std::vector<unsigned> crossed(body.size(), 0);
   for_each_block(crossed.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) {
-      if (body.radii[v] > std::sqrt(3.0) * body.side) continue;
+      if (!surface.is_near(body.centres[v], std::sqrt(3.0) * body.side)) continue;
       const int self = static_cast<int>(v);
       for (int place = 0; place < kVoxelPlaces; ++place) {
         const int other = body.neighbours[v][place];
@@ -288,7 +288,7 @@ std::vector<char> find_false_links(const Surface& surface, const VoxelBody& body
       const int other = body.neighbours[v][place];
       if (!(crossed[v] >> place & 1) || other < v || is_out[v] || is_out[other]) continue;
       if (!has_clean_detour(body, crossed, is_out, v, other))
-        is_out[body.radii[v] <= body.radii[other] ? v : other] = 1;
+        is_out[surface.radius(body.centres[v]) <= surface.radius(body.centres[other]) ? v : other] = 1;
     }
   }
   return is_out;
@@ -346,13 +346,13 @@ VoxelBody make_voxel_body(const Surface& surface, int count) {
   if (runs.runs.empty()) return body;
   fill_cavities(columns, runs);
   link_voxels(columns, runs, body);
-  measure_radii(surface, body);
   const std::vector<char> is_out = find_false_links(surface, body);
-  if (std::find(is_out.begin(), is_out.end(), 1) == is_out.end()) return body;
-  runs = without(runs, columns, is_out);
-  body.kept *= keep_largest(columns, runs);
-  fill_cavities(columns, runs);
-  link_voxels(columns, runs, body);
+  if (std::find(is_out.begin(), is_out.end(), 1) != is_out.end()) {
+    runs = without(runs, columns, is_out);
+    body.kept *= keep_largest(columns, runs);
+    fill_cavities(columns, runs);
+    link_voxels(columns, runs, body);
+  }
   measure_radii(surface, body);
   return body;
 }
