@@ -62,6 +62,7 @@ class SkeletonBuilder {
     for (int j = count() - 1; j >= 0; --j) mark_needed(j);
     drop_roots();
     join_roots();
+    turn_hierarchy();
     merge_twist_joints();
     group_joints();
     if (root_ >= 0) {
@@ -119,6 +120,10 @@ class SkeletonBuilder {
         if (!strongest || weight.weight > strongest->weight) strongest = &weight;
       }
       if (strongest) joints_[joint_of_node_[strongest->node]].vertices.push_back(v);
+      for (const JointWeight& a : surface_.weights[v])
+        for (const JointWeight& b : surface_.weights[v])
+          if (const int i = joint_of_node_[a.node], j = joint_of_node_[b.node]; i < j)
+            shared_[{i, j}] += std::min(a.weight, b.weight);
     }
   }
 
@@ -143,32 +148,94 @@ class SkeletonBuilder {
     }
   }
 
-  /// Several trees become one: their roots hang on the joint of the heaviest tree that is nearest.
+  Vec3 mean_of_vertices(int j) const {
+    Vec3 sum = Vec3::Zero();
+    for (const int v : joints_[j].vertices) sum += surface_.mesh.positions[v];
+    return sum / static_cast<double>(joints_[j].vertices.size());
+  }
+
+  /// What a bone between two joints costs. Joints that share vertices belong together, the more the better; between
+  /// others its length counts, and much more where it leaves the body.
+  double cost_of_bone(int a, int b) const {
+    constexpr double kLeastShare = 0.02, kOutside = 10;
+    const auto found = shared_.find(std::minmax(a, b));
+    if (found != shared_.end()) {
+      const double share = found->second / std::min(joints_[a].weight, joints_[b].weight);
+      if (share > kLeastShare) return 1 - share;
+    }
+    const Vec3 &p = joints_[a].position, &q = joints_[b].position;
+    return 1 + (q - p).norm() / diagonal_ * (probe_.crossings(p, q).empty() ? 1 : kOutside);
+  }
+
+  /// Several trees become one, by the cheapest bones between them (Prim). Some programs write all joints side by side,
+  /// and have the hierarchy in their code.
   void join_roots() {
     std::vector<double> heavy(joints_.size(), 0);
     for (int j = count() - 1; j >= 0; --j) {
       heavy[j] += joints_[j].weight;
       if (joints_[j].parent >= 0) heavy[joints_[j].parent] += heavy[j];
     }
-    for (int j = 0; j < count(); ++j)
-      if (is_kept(j) && joints_[j].parent < 0 && (root_ < 0 || heavy[j] > heavy[root_])) root_ = j;
-    if (root_ < 0) return;
-    const auto root_of = [&](int j) {
-      while (joints_[j].parent >= 0) j = joints_[j].parent;
-      return j;
-    };
+    std::vector<int> roots;
     for (int j = 0; j < count(); ++j) {
-      if (!is_kept(j) || joints_[j].parent >= 0 || j == root_) continue;
-      int nearest = root_;
-      for (int other = 0; other < count(); ++other)
-        if (is_kept(other) && root_of(other) == root_ &&
-            (joints_[other].position - joints_[j].position).norm() <
-                (joints_[nearest].position - joints_[j].position).norm())
-          nearest = other;
-      joints_[j].parent = nearest;
-      joints_[nearest].children.push_back(j);
-      joined_.push_back(fmt::format("\"{}\" to \"{}\"", joints_[j].name, joints_[nearest].name));
+      if (!is_kept(j) || joints_[j].parent >= 0) continue;
+      roots.push_back(j);
+      if (root_ < 0 || heavy[j] > heavy[root_]) root_ = j;
     }
+    std::vector<double> least(joints_.size(), INFINITY);  // per root what its bone to the joined trees costs
+    std::vector<int> nearest(joints_.size(), -1);         // and the joint there
+    for (int added = root_; added >= 0;) {
+      std::erase(roots, added);
+      std::vector<int> tree{added};
+      for (std::size_t i = 0; i < tree.size(); ++i)
+        for (const int child : kept_children(tree[i])) tree.push_back(child);
+      for (const int root : roots)
+        for (const int j : tree) {
+          if (const double cost = cost_of_bone(j, root); cost < least[root]) least[root] = cost, nearest[root] = j;
+        }
+      const auto next = std::min_element(roots.begin(), roots.end(), [&](int a, int b) { return least[a] < least[b]; });
+      added = next == roots.end() ? -1 : *next;
+      if (added < 0) break;
+      joints_[added].parent = nearest[added];
+      joints_[nearest[added]].children.push_back(added);
+      joined_.push_back(fmt::format("\"{}\" to \"{}\"", joints_[added].name, joints_[nearest[added]].name));
+    }
+  }
+
+  /// How far the surface that a joint moves lies from the middle of its bone to another joint; bone lengths.
+  double misfit(int joint, int other) const {
+    const Vec3 &p = joints_[joint].position, &q = joints_[other].position;
+    if (joints_[joint].vertices.empty() || (q - p).norm() < kSameJoint * diagonal_) return 0;
+    return (mean_of_vertices(joint) - 0.5 * (p + q)).norm() / (q - p).norm();
+  }
+
+  /// Where all joints lay side by side: takes the root from which the joints move the bones that begin at them.
+  void turn_hierarchy() {
+    std::vector<int> kept;
+    for (int j = 0; j < count(); ++j)
+      if (is_kept(j)) kept.push_back(j);
+    if (joined_.empty() || joined_.size() + 1 < kept.size()) return;  // some had a hierarchy
+    std::vector<std::vector<int>> neighbours(joints_.size());
+    for (const int j : kept)
+      if (joints_[j].parent >= 0)
+        neighbours[j].push_back(joints_[j].parent), neighbours[joints_[j].parent].push_back(j);
+    std::vector<int> parents, best;
+    double least = INFINITY;
+    for (const int root : kept) {
+      parents.assign(joints_.size(), -1);
+      double sum = 0;
+      std::vector<int> order{root};
+      for (std::size_t i = 0; i < order.size(); ++i)
+        for (const int next : neighbours[order[i]]) {
+          if (next == parents[order[i]]) continue;
+          parents[next] = order[i];
+          sum += misfit(order[i], next);
+          order.push_back(next);
+        }
+      if (sum < least) least = sum, best = parents, root_ = root;
+    }
+    for (const int j : kept) joints_[j].parent = best[j], joints_[j].children.clear();
+    for (const int j : kept)
+      if (best[j] >= 0) joints_[best[j]].children.push_back(j);
   }
 
   /// How far a joint lies beside the way from one to another, of its length; infinite beyond the ends.
@@ -210,8 +277,10 @@ class SkeletonBuilder {
   /// Joints in one place become one node of the skeleton: with the joint above, or with one beside.
   void group_joints() {
     if (root_ < 0) return;
-    for (int j = 0; j < count(); ++j) {
-      if (!is_kept(j)) continue;
+    std::vector<int> order{root_};  // parents first
+    for (std::size_t i = 0; i < order.size(); ++i)
+      for (const int child : kept_children(order[i])) order.push_back(child);
+    for (const int j : order) {
       Joint& joint = joints_[j];
       const auto is_here = [&](int other) {
         return joints_[other].group >= 0 && (joints_[other].position - joint.position).norm() < kSameJoint * diagonal_;
@@ -269,9 +338,7 @@ class SkeletonBuilder {
   /// Where the surface that a joint moves ends, less its own thickness, so that the bone stays inside.
   Vec3 tip_from_vertices(int j) const {
     const Joint& joint = joints_[j];
-    Vec3 mean = Vec3::Zero();
-    for (const int v : joint.vertices) mean += surface_.mesh.positions[v];
-    Vec3 direction = mean / static_cast<double>(joint.vertices.size()) - joint.position;
+    Vec3 direction = mean_of_vertices(j) - joint.position;
     if (!(direction.norm() > 1e-6 * diagonal_)) return joint.position;
     direction.normalize();
     double farthest = 0;
@@ -376,66 +443,16 @@ class SkeletonBuilder {
   std::vector<int> joint_of_node_;
   std::vector<std::vector<int>> bones_of_;  ///< per joint
   std::set<std::string> bone_names_, node_names_;
+  std::map<std::pair<int, int>, double> shared_;  ///< per two joints, the lesser weights of vertices that both move
   std::vector<std::string> merged_, joined_;
   int root_ = -1;
   JointSkeleton result_;
 };
 
-Vec3 middle_of(const Skeleton& skeleton, std::size_t bone) {
-  return 0.5 *
-         (skeleton.nodes[skeleton.bones[bone].head].position + skeleton.nodes[skeleton.bones[bone].tail].position);
-}
-
-int nearest_bone(const Skeleton& skeleton, const Vec3& point) {
-  int best = 0;
-  double least = INFINITY;
-  for (int bone = 0; bone < static_cast<int>(skeleton.bones.size()); ++bone) {
-    const double distance = distance_to_bone(point, end_position(skeleton, bone, BoneEnd::kHead),
-                                             end_position(skeleton, bone, BoneEnd::kTail));
-    if (distance < least) least = distance, best = bone;
-  }
-  return best;
-}
-
-/// \return the number of what has that name; -1: nothing has
-template <class T>
-int named(const std::vector<T>& list, const std::string& name) {
-  const auto found = std::find_if(list.begin(), list.end(), [&](const T& item) { return item.name == name; });
-  return found == list.end() ? -1 : static_cast<int>(found - list.begin());
-}
-
 }  // namespace
 
 JointSkeleton make_joint_skeleton(const GltfScene& scene, const GltfSurface& surface) {
   return SkeletonBuilder(scene, surface).build();
-}
-
-JointSkeleton with_skeleton(const JointSkeleton& joints, const Skeleton& skeleton) {
-  const Skeleton& before = joints.skeleton;
-  JointSkeleton result{skeleton, {}, {}, std::vector<std::vector<int>>(joints.bones_of_joint.size()), joints.notes};
-  std::vector<std::vector<int>> became(before.bones.size());  // per bone before, the bones that stand for it
-  for (std::size_t bone = 0; bone < skeleton.bones.size(); ++bone) {
-    int from = named(before.bones, skeleton.bones[bone].name);
-    if (from < 0) from = nearest_bone(before, middle_of(skeleton, bone));
-    result.bone_joint.push_back(joints.bone_joint[from]);
-    became[from].push_back(static_cast<int>(bone));
-  }
-  for (std::size_t bone = 0; bone < became.size(); ++bone)
-    if (became[bone].empty()) became[bone].push_back(nearest_bone(skeleton, middle_of(before, bone)));
-  for (std::size_t joint = 0; joint < joints.bones_of_joint.size(); ++joint) {
-    std::set<int> bones;
-    for (const int bone : joints.bones_of_joint[joint]) bones.insert(became[bone].begin(), became[bone].end());
-    result.bones_of_joint[joint].assign(bones.begin(), bones.end());
-  }
-  for (std::size_t node = 0; node < skeleton.nodes.size(); ++node) {
-    const int from = named(before.nodes, skeleton.nodes[node].name);
-    int joint = from >= 0 ? joints.node_joint[from] : -1;
-    for (std::size_t bone = 0; bone < skeleton.bones.size() && joint < 0; ++bone)
-      if (skeleton.bones[bone].tail == static_cast<int>(node) || skeleton.bones[bone].head == static_cast<int>(node))
-        joint = result.bone_joint[bone];
-    result.node_joint.push_back(std::max(joint, 0));
-  }
-  return result;
 }
 
 }  // namespace skeletex
