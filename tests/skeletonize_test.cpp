@@ -238,6 +238,35 @@ TEST(Skeletonize, SpoiltSkeletonsAreRepaired) {
   }
 }
 
+TEST(Skeletonize, RepairKeepsNodesNearTheirPlaces) {
+  const TestModel bear = load_standard_model("bear");
+  const TriangleTree tree = build_triangle_tree(bear.mesh);
+  const Surface surface(bear.mesh, tree);
+  RandomNumbers random(3);
+  double freely = 0, near_home = 0, brought_back = 0;
+  for (int i = 0; i < 12; ++i) {
+    const Skeleton start = spoilt(bear.skeleton, 0.025 * surface.diagonal, random);
+    const auto way = [&](const Repair& repair) {
+      double sum = 0;
+      for (const Node& node : repair.skeleton().nodes)
+        for (const Node& before : start.nodes)
+          if (before.name == node.name) sum += (before.position - node.position).norm();
+      return sum;
+    };
+    Repair free(surface, start), kept(surface, start, start);
+    free.run();
+    kept.run();
+    freely += way(free);
+    near_home += way(kept);
+    kept.bring_back();
+    brought_back += way(kept);
+    for (const BoneMargin& margin : kept.margins()) EXPECT_GE(margin.margin, kEnoughMargin);
+  }
+  EXPECT_GT(freely, 0);
+  EXPECT_LT(near_home, 0.9 * freely);
+  EXPECT_LT(brought_back, 0.9 * near_home);
+}
+
 TEST(Skeletonize, RepairMakesNoBoneWithoutLength) {
   // Nodes that are moved to the middle of a voxel, and bones between them that are bent on their way through voxels.
   const TestModel man = load_standard_model("man");

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <cstdint>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "skeletex/analysis/bone_margin.h"
@@ -23,7 +25,8 @@ class RandomNumbers {
 /// at the beginning and stay so. Bones and nodes keep their names.
 class Repair {
  public:
-  Repair(const Surface& surface, Skeleton skeleton);
+  /// \param home  nodes of the same names are kept near their places in it
+  Repair(const Surface& surface, Skeleton skeleton, const Skeleton& home = {});
 
   /// Moves the nodes around the bone of the least margin, over and over; contracts it where that does not help.
   /// \return whether all margins are enough now
@@ -39,6 +42,9 @@ class Repair {
   /// Contracts the cheapest bones as long as all margins stay enough.
   void thin_out();
 
+  /// Moves nodes back home as far as all margins stay enough.
+  void bring_back();
+
   const Skeleton& skeleton() const { return skeleton_; }
   const std::vector<BoneMargin>& margins() const { return margins_; }
 
@@ -53,6 +59,7 @@ class Repair {
   double cost(const Skeleton& skeleton, const std::vector<std::vector<BoneAtNode>>& at_nodes,
               const std::vector<int>& bones, double limit) const;
   bool is_placed_well(const Skeleton& skeleton, int node, double least_radius) const;
+  double cost_of_way(int node) const;
   bool move_node(int node, double step, int trials);
   bool improve(int bone);
   int worst_bone() const;
@@ -66,7 +73,8 @@ class Repair {
   const Surface& surface_;
   Skeleton skeleton_;
   std::vector<std::vector<BoneAtNode>> at_nodes_;
-  std::vector<double> radii_;  ///< per node, of the ball there before it was moved
+  std::vector<double> radii_;          ///< per node, of the ball there before it was moved
+  std::map<std::string, Vec3> homes_;  ///< by the names of nodes
   std::vector<BoneMargin> margins_;
   std::vector<int> failures_;  ///< per bone, how often moves did not help
   RandomNumbers random_{1};

@@ -274,10 +274,15 @@ RepairResult repair_skeleton(ClContext& context, const TriangleMesh& mesh, const
                     "through every handle, or start from skeletex skeletonize",
                     genus, genus == 1 ? "" : "s", cycles, cycles == 1 ? "" : "s"));
   const Acceptance acceptance(context, surface);
-  Repair repair(surface, draft.skeleton());
-  const std::string refusal = acceptance.is_accepted(draft.skeleton()) ? "" : acceptance.segment(repair);
-  if (!refusal.empty()) throw TopologyError(refusal);
-  RepairResult result{repair.skeleton(), std::move(draft.changes())};
+  Repair repair(surface, draft.skeleton(), named);
+  RepairResult result{draft.skeleton(), std::move(draft.changes())};
+  if (!acceptance.is_accepted(result.skeleton)) {
+    const std::string refusal = acceptance.segment(repair);
+    if (!refusal.empty()) throw TopologyError(refusal);
+    result.skeleton = repair.skeleton();
+    repair.bring_back();
+    if (acceptance.is_accepted(repair.skeleton())) result.skeleton = repair.skeleton();
+  }
   drop_bad_angles(result.skeleton);
   describe(named, result.skeleton, result.changes);
   result.skeleton = in_frame(std::move(result.skeleton), skeleton.frame);
