@@ -160,6 +160,21 @@ TEST(Skeletonize, EveryLimbOfACreatureHasABoneAndTheSameBytesComeAgain) {
   EXPECT_EQ(skeleton_to_json(result.skeleton), skeleton_to_json(skeletonized(shape.mesh).skeleton));
 }
 
+TEST(Skeletonize, StretchedArmsHaveElbows) {
+  Skeleton made;
+  made.nodes = {{"", {0, 0, 0}}, {"", {0, 1.5, 0}}, {"", {-3, 0, 0}}, {"", {3, 0, 0}}, {"", {0, -1.2, 0}}};
+  for (int n = 1; n < 5; ++n) made.bones.push_back({"", 0, n, {}});
+  const TriangleMesh mesh = thickened(made, {0.45, 0.4, 0.18, 0.18, 0.4}, 0.1, 0.1);
+  const auto has_node_near = [](const Skeleton& skeleton, const Vec3& place, double distance) {
+    return std::any_of(skeleton.nodes.begin(), skeleton.nodes.end(),
+                       [&](const Node& node) { return (node.position - place).norm() < distance; });
+  };
+  const Skeleton posable = skeletonized(mesh).skeleton;
+  for (const double x : {-1.7, 1.7}) EXPECT_TRUE(has_node_near(posable, {x, 0, 0}, 0.4)) << x;
+  EXPECT_FALSE(has_node_near(posable, {0, 0.8, 0}, 0.3)) << "short limbs have no joint";
+  EXPECT_EQ(errors_of(mesh, posable), "");
+}
+
 TEST(Skeletonize, ScaleAndPlaceOfTheMeshDoNotMatter) {
   Shape shape = creature_shape();
   const std::size_t bones = skeletonized(shape.mesh).skeleton.bones.size();

@@ -2,6 +2,7 @@
 #include "skeletex/skeletonize/limbs.h"
 
 #include <algorithm>
+#include <limits>
 #include <set>
 #include <utility>
 
@@ -160,6 +161,37 @@ std::optional<Skeleton> symmetrized(const Surface& surface, const MirrorPlane& p
   }
   drop_bones(gone, result);
   return is_inside(surface, result) ? std::optional(std::move(result)) : std::nullopt;
+}
+
+Skeleton with_joints(const Surface& surface, Skeleton skeleton) {
+  constexpr double kLong = 9;            // radii of the body
+  constexpr double kLeastLength = 0.08;  // diagonals
+  constexpr int kSteps = 20;
+  std::vector<int> bones;
+  for (const SkeletonLimb& limb : find_limbs(skeleton)) bones.insert(bones.end(), limb.bones.begin(), limb.bones.end());
+  for (const int long_bone : bones) {
+    const Vec3 head = end_position(skeleton, long_bone, BoneEnd::kHead),
+               tail = end_position(skeleton, long_bone, BoneEnd::kTail);
+    std::vector<double> radii;
+    double best_share = 0.5, least = std::numeric_limits<double>::infinity();
+    for (int step = 1; step < kSteps; ++step) {
+      const double share = static_cast<double>(step) / kSteps, from_middle = std::abs(share - 0.5);
+      radii.push_back(surface.radius(head + share * (tail - head)));
+      // Limbs get thinner outwards; a joint is where they are thinner than by that.
+      const double score = radii.back() * (1 + 1.5 * from_middle);
+      if (from_middle < 0.16 && score < least) least = score, best_share = share;
+    }
+    std::nth_element(radii.begin(), radii.begin() + kSteps / 2, radii.end());
+    const double length = (tail - head).norm();
+    if (length <= kLong * radii[kSteps / 2] || length < kLeastLength * surface.diagonal) continue;
+    const int node = static_cast<int>(skeleton.nodes.size());
+    skeleton.nodes.push_back({"", head + best_share * (tail - head)});
+    Bone& bone = skeleton.bones[long_bone];
+    const int end = std::exchange(bone.tail, node);
+    bone.s.reset();
+    skeleton.bones.push_back({"", node, end, {}});
+  }
+  return skeleton;
 }
 
 }  // namespace skeletex

@@ -21,6 +21,10 @@ std::vector<SkeletonLimb> find_limbs(const Skeleton& skeleton);
 std::vector<int> pair_limbs(const Skeleton& skeleton, const std::vector<SkeletonLimb>& limbs, const MirrorPlane& plane,
                             double apart);
 
+/// The skeleton with joints in the middle of limbs that are straight and long, where they are thinnest: arms that are
+/// stretched have elbows.
+Skeleton with_joints(const Surface& surface, Skeleton skeleton);
+
 /// The skeleton made its own mirror image: of two limbs that are images of each other one is the image of the other
 /// then, and what lies in the plane lies exactly there. Nothing where the skeleton is too far from it, or a bone would
 /// leave the body.

@@ -30,6 +30,7 @@ namespace {
 constexpr double kLimbReach = 0.1;  // a node so near to a tip reaches it; diagonals
 /// Of the least error: more than so many times that is too much for a limb. Corners and rims look like limbs too.
 constexpr double kLimbsMayCost = 3;
+constexpr double kJointsMayCost = 1.25;  // times the error, of joints in long limbs
 constexpr std::array<double, 4> kDetails{0, 1.0 / 3, 2.0 / 3, 1};
 /// Where no skeleton of a body with handles works, its rings are tried with many short bones. The separation planes of
 /// a ring meet inside its polygon; the more sides that has, the nearer they meet to the middle of the hole, outside the
@@ -244,6 +245,18 @@ SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, cons
   if (result.chosen < 0)
     throw TopologyError(fmt::format("none of {} skeletons works; for \"{}\": {}", levels.size(),
                                     result.candidates[0].name, result.candidates[0].refusal));
+  if (options.purpose == SkeletonPurpose::kPose && !options.most_bones) {
+    const int chosen = result.chosen;
+    Skeleton jointed = with_joints(surface, levels[chosen].skeleton);
+    if (jointed.bones.size() > levels[chosen].skeleton.bones.size()) {
+      Level level{levels[chosen].name + ", joints", {}, std::make_unique<Repair>(surface, std::move(jointed)), {}};
+      try_level(level);
+      levels.push_back(std::move(level));
+      const SkeletonCandidate &before = result.candidates[chosen], &after = result.candidates.back();
+      if (after.refusal.empty() && after.bones > before.bones && after.error <= kJointsMayCost * before.error)
+        result.chosen = static_cast<int>(result.candidates.size()) - 1;
+    }
+  }
   result.skeleton = std::move(levels[result.chosen].skeleton);
   name_by_place(surface, plane, result.skeleton);
   result.skeleton = in_frame(std::move(result.skeleton), {});
