@@ -2,6 +2,7 @@
 #include "skeletex/skeletonize/repair.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -18,6 +19,7 @@ constexpr int kAngles = 16;       // of rays while nodes are moved
 constexpr int kFinalAngles = 32;  // to accept
 constexpr int kTrials = 20;
 constexpr int kPatience = 10;           // failed attempts before a bone is contracted
+constexpr double kWorthTrying = -0.2;   // a margin that the segmentation may accept all the same
 constexpr double kHopeless = -30;       // margins that moves have not cured
 constexpr long kMostMeasured = 40'000;  // bones, a second or two; then patience ends
 
@@ -135,12 +137,12 @@ bool Repair::improve(int bone) {
       }
   const std::vector<int> bones = bones_around(nodes);
   const double before = cost(skeleton_, at_nodes_, bones, kNoLimit);
-  for (int scale = 0; scale < 3; ++scale)
+  for (int scale = 0; scale < 4; ++scale)
     for (const int node : nodes) {
       double length = 0;
       for (const BoneAtNode& at : at_nodes_[node]) length += bone_length(skeleton_, at.bone);
       length /= static_cast<double>(at_nodes_[node].size());
-      const double step = scale == 0 ? 0.16 * radii_[node] : scale == 1 ? 0.4 * radii_[node] : 0.4 * length;
+      const double step = scale < 3 ? std::array{0.16, 0.4, 0.05}[scale] * radii_[node] : 0.4 * length;
       move_node(node, step, kTrials);
     }
   const double after = cost(skeleton_, at_nodes_, bones, kNoLimit);
@@ -164,6 +166,7 @@ bool Repair::run() {
     if (margins_[bone].margin >= kEnoughMargin) continue;
     const bool is_patient = measured_ < kMostMeasured && margins_[bone].margin > kHopeless;
     if (failures_[bone] < (is_patient ? kPatience : 1)) continue;
+    if (margins_[bone].margin > kWorthTrying) return true;
     if (!contract(bone)) return false;
   }
 }

@@ -29,8 +29,10 @@ class Repair {
   Repair(const Surface& surface, Skeleton skeleton, const Skeleton& home = {});
 
   /// Moves the nodes around the bone of the least margin, over and over; contracts it where that does not help.
-  /// \return whether all margins are enough now
+  /// \return whether all margins are enough now, or so nearly that the segmentation may accept them
   bool run();
+  /// The bone whose margin lacks the most; -1: all have enough.
+  int worst_bone() const;
   /// Moves a node to a place near by that costs little, whatever the margins are: for what the margins do not see.
   void shake(int node);
   /// Takes a bone away: its ends become one node, or an end between two bones is left out. Where that is not possible,
@@ -62,7 +64,6 @@ class Repair {
   double cost_of_way(int node) const;
   bool move_node(int node, double step, int trials);
   bool improve(int bone);
-  int worst_bone() const;
   std::vector<Vec3> merge_places(int bone);
   bool try_merge(int bone, const Vec3& place, Merge& best) const;
   Skeleton merged(int bone, const Vec3& place) const;
