@@ -30,6 +30,23 @@ double slope_of(const std::vector<Vec3>& others, const Vec3& away, const Vec3& r
   return slope;
 }
 
+/// Where the first of the rays from both ends leaves the body.
+struct Exit {
+  double rho = 0;
+  int end = 0;
+};
+/// A plane whose ray leaves the body before they meet ends there: the nearer of the two exits counts.
+Exit first_exit(const TriangleMesh& mesh, const TriangleTree& tree, const std::array<Vec3, 2>& from,
+                const std::array<Vec3, 2>& along, double limit) {
+  Exit exit{limit, 0};
+  for (int e = 0; e < 2; ++e) {
+    exit.rho = std::min(exit.rho, 4 * tree.scale / along[e].norm());
+    const double rho = find_first_hit(mesh, tree, from[e], along[e], exit.rho);
+    if (rho < exit.rho) exit = {rho, e};
+  }
+  return exit;
+}
+
 }  // namespace
 
 BoneMargin margin_of_bone(const TriangleMesh& mesh, const TriangleTree& tree, const Skeleton& skeleton,
@@ -52,19 +69,12 @@ BoneMargin margin_of_bone(const TriangleMesh& mesh, const TriangleTree& tree, co
     }
     const double closing = (slopes[0] + slopes[1]) / length;
     if (closing <= 0 || others[0].empty() || others[1].empty()) continue;
-    // A plane whose ray leaves the body before they meet ends there: the nearer of the two exits counts.
-    int nearest = 0;
-    double rho = (1 - kLeastMargin) / closing;
-    for (int e = 0; e < 2; ++e) {
-      const Vec3 along = radial + (e == 0 ? slopes[e] : -slopes[e]) * o;
-      rho = std::min(rho, 4 * tree.scale / along.norm());
-      const double exit = find_first_hit(mesh, tree, ends[e], along, rho);
-      if (exit < rho) rho = exit, nearest = e;
-    }
-    if (1 - rho * closing >= result.margin) continue;
-    result.margin = 1 - rho * closing;
-    result.end = nearest == 0 ? BoneEnd::kHead : BoneEnd::kTail;
-    result.point = ends[nearest] + rho * (radial + (nearest == 0 ? slopes[0] : -slopes[1]) * o);
+    const std::array<Vec3, 2> along{radial + slopes[0] * o, radial - slopes[1] * o};
+    const Exit exit = first_exit(mesh, tree, ends, along, (1 - kLeastMargin) / closing);
+    if (1 - exit.rho * closing >= result.margin) continue;
+    result.margin = 1 - exit.rho * closing;
+    result.end = exit.end == 0 ? BoneEnd::kHead : BoneEnd::kTail;
+    result.point = ends[exit.end] + exit.rho * along[exit.end];
   }
   result.lean = lean;
   return result;

@@ -167,6 +167,22 @@ class SkeletonBuilder {
     return 1 + (q - p).norm() / diagonal_ * (probe_.crossings(p, q).empty() ? 1 : kOutside);
   }
 
+  /// The cheapest bone from a root to the trees that are joined already.
+  struct Link {
+    double cost = INFINITY;
+    int joint = -1;
+  };
+
+  /// Links from roots to a tree that was joined last.
+  void look_for_links(int tree_root, const std::vector<int>& roots, std::vector<Link>& links) const {
+    std::vector<int> tree{tree_root};
+    for (std::size_t i = 0; i < tree.size(); ++i)
+      for (const int child : kept_children(tree[i])) tree.push_back(child);
+    for (const int root : roots)
+      for (const int j : tree)
+        if (const double cost = cost_of_bone(j, root); cost < links[root].cost) links[root] = {cost, j};
+  }
+
   /// Several trees become one, by the cheapest bones between them (Prim). Some programs write all joints side by side,
   /// and have the hierarchy in their code.
   void join_roots() {
@@ -181,23 +197,19 @@ class SkeletonBuilder {
       roots.push_back(j);
       if (root_ < 0 || heavy[j] > heavy[root_]) root_ = j;
     }
-    std::vector<double> least(joints_.size(), INFINITY);  // per root what its bone to the joined trees costs
-    std::vector<int> nearest(joints_.size(), -1);         // and the joint there
-    for (int added = root_; added >= 0;) {
+    if (root_ < 0) return;
+    std::vector<Link> links(joints_.size());
+    for (int added = root_;;) {
       std::erase(roots, added);
-      std::vector<int> tree{added};
-      for (std::size_t i = 0; i < tree.size(); ++i)
-        for (const int child : kept_children(tree[i])) tree.push_back(child);
-      for (const int root : roots)
-        for (const int j : tree) {
-          if (const double cost = cost_of_bone(j, root); cost < least[root]) least[root] = cost, nearest[root] = j;
-        }
-      const auto next = std::min_element(roots.begin(), roots.end(), [&](int a, int b) { return least[a] < least[b]; });
-      added = next == roots.end() ? -1 : *next;
-      if (added < 0) break;
-      joints_[added].parent = nearest[added];
-      joints_[nearest[added]].children.push_back(added);
-      joined_.push_back(fmt::format("\"{}\" to \"{}\"", joints_[added].name, joints_[nearest[added]].name));
+      look_for_links(added, roots, links);
+      const auto next =
+          std::min_element(roots.begin(), roots.end(), [&](int a, int b) { return links[a].cost < links[b].cost; });
+      if (next == roots.end()) break;
+      added = *next;
+      const int parent = links[added].joint;
+      joints_[added].parent = parent;
+      joints_[parent].children.push_back(added);
+      joined_.push_back(fmt::format("\"{}\" to \"{}\"", joints_[added].name, joints_[parent].name));
     }
   }
 

@@ -163,6 +163,32 @@ void make_symmetric(const Surface& surface, const std::optional<MirrorPlane>& pl
   if (acceptance.is_accepted(*image)) skeleton = std::move(*image);
 }
 
+/// Rings of many short bones; nothing where they have no room.
+std::optional<Level> make_fine_level(const Surface& surface, const VoxelBody& body, int genus, bool is_thinned) {
+  Level level{is_thinned ? "fine handles" : "finest handles", {}, nullptr, {}};
+  level.repair =
+      std::make_unique<Repair>(surface, make_bones(surface, body.side, curves_of(surface, body, {}, genus), kFineBend));
+  if (!level.repair->run()) return std::nullopt;
+  if (is_thinned) level.repair->thin_out();
+  return level;
+}
+
+/// Adds the chosen skeleton with joints in its long limbs.
+/// \return whether there are any
+bool add_jointed_level(const Surface& surface, const SkeletonizeResult& result, std::vector<Level>& levels) {
+  const Level& chosen = levels[result.chosen];
+  Skeleton jointed = with_joints(surface, chosen.skeleton);
+  if (jointed.bones.size() == chosen.skeleton.bones.size()) return false;
+  levels.push_back({chosen.name + ", joints", {}, std::make_unique<Repair>(surface, std::move(jointed)), {}});
+  return true;
+}
+
+/// Of the last candidate, which is the chosen one with joints.
+bool is_worth_its_joints(const SkeletonizeResult& result) {
+  const SkeletonCandidate &before = result.candidates[result.chosen], &after = result.candidates.back();
+  return after.refusal.empty() && after.bones > before.bones && after.error <= kJointsMayCost * before.error;
+}
+
 /// Which of the accepted candidates is best; -1: none.
 int choose(const std::vector<SkeletonCandidate>& candidates, const SkeletonizeOptions& options) {
   double least = std::numeric_limits<double>::infinity();
@@ -232,30 +258,19 @@ SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, cons
   if (result.genus > 0 && choose(result.candidates, options) < 0)
     for (const bool is_thinned : {true, false}) {
       report("trying finer rings", 0.95);
-      Level level{is_thinned ? "fine handles" : "finest handles", {}, nullptr, {}};
-      level.repair = std::make_unique<Repair>(
-          surface, make_bones(surface, body.side, curves_of(surface, body, {}, result.genus), kFineBend));
-      if (!level.repair->run()) break;
-      if (is_thinned) level.repair->thin_out();
-      try_level(level);
-      levels.push_back(std::move(level));
+      std::optional<Level> level = make_fine_level(surface, body, result.genus, is_thinned);
+      if (!level) break;
+      levels.push_back(std::move(*level));
+      try_level(levels.back());
       if (result.candidates.back().refusal.empty()) break;
     }
   result.chosen = choose(result.candidates, options);
   if (result.chosen < 0)
     throw TopologyError(fmt::format("none of {} skeletons works; for \"{}\": {}", levels.size(),
                                     result.candidates[0].name, result.candidates[0].refusal));
-  if (options.purpose == SkeletonPurpose::kPose && !options.most_bones) {
-    const int chosen = result.chosen;
-    Skeleton jointed = with_joints(surface, levels[chosen].skeleton);
-    if (jointed.bones.size() > levels[chosen].skeleton.bones.size()) {
-      Level level{levels[chosen].name + ", joints", {}, std::make_unique<Repair>(surface, std::move(jointed)), {}};
-      try_level(level);
-      levels.push_back(std::move(level));
-      const SkeletonCandidate &before = result.candidates[chosen], &after = result.candidates.back();
-      if (after.refusal.empty() && after.bones > before.bones && after.error <= kJointsMayCost * before.error)
-        result.chosen = static_cast<int>(result.candidates.size()) - 1;
-    }
+  if (options.purpose == SkeletonPurpose::kPose && !options.most_bones && add_jointed_level(surface, result, levels)) {
+    try_level(levels.back());
+    if (is_worth_its_joints(result)) result.chosen = static_cast<int>(result.candidates.size()) - 1;
   }
   result.skeleton = std::move(levels[result.chosen].skeleton);
   name_by_place(surface, plane, result.skeleton);
