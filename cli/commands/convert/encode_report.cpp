@@ -122,7 +122,7 @@ std::string encode_report_text(const EncodeReport& report, const EncodedFile& fi
   if (report.rounding)
     text += fmt::format("error of the half floats: {:.1e} diagonals\n", report.rounding->chosen / report.diagonal);
   if (report.revert && report.revert->inverted_triangles > 0)
-    text += fmt::format("inverted triangles: {}\n", report.revert->inverted_triangles);
+    text += fmt::format("inverted triangles: {} of {}\n", report.revert->inverted_triangles, report.revert->triangles);
   return text;
 }
 

@@ -195,6 +195,7 @@ RevertReport revert_faults(ClContext& context, const RevertSources& sources, std
   RevertReport report;
   report.regular_inverted_triangles = static_cast<int>(grid.faults.inverted.size());
   Pass pass = start_passes(context, frame, original, vertex_points, texels, limit, std::move(mesh));
+  report.triangles = static_cast<int>(pass.mesh.triangles.size());
   choose_tolerances(context, frame, pass, grid);
   for (int number = 0;; ++number) {
     report.inverted_triangles =

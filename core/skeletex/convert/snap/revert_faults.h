@@ -21,6 +21,7 @@ struct RevertReport {
   int reverted_texels = 0;
   /// Triangles that look against the original: of the lattice, and of the regular grid but for its strips and fans.
   int inverted_triangles = 0, regular_inverted_triangles = 0;
+  int triangles = 0;                    ///< all of the lattice
   std::vector<BoneDistance> distances;  ///< of what is left, see distances_from_bones; per chart
 };
 
