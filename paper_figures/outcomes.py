@@ -26,6 +26,12 @@ def group_of(row, parameter):
     return "-" if value is None else str(value)
 
 
+def groups_of(rows, parameter):
+    """The parameter's values: numbers by size, others as they come."""
+    groups = dict.fromkeys(group_of(row, parameter) for row in rows) if parameter else []
+    return sorted(groups, key=lambda group: int(group) if group.isdigit() else 0)
+
+
 def reason_of(row):
     """The line of the error, without the warnings before it."""
     lines = row["reason"].splitlines()
@@ -33,7 +39,7 @@ def reason_of(row):
 
 
 def table(rows, parameter):
-    groups = list(dict.fromkeys(group_of(row, parameter) for row in rows)) if parameter else []
+    groups = groups_of(rows, parameter)
     lines = [f"| {parameter or ''} | items | " + " | ".join(OUTCOMES) + " | mean time, s |", "|---" + "|---:" * (len(OUTCOMES) + 2) + "|"]
     for name in [*groups, "all"]:
         part = [row for row in rows if name == "all" or group_of(row, parameter) == name]
@@ -47,7 +53,7 @@ def table(rows, parameter):
 
 def draw(rows, parameter, path):
     figure, axes = plt.subplots(figsize=(8, 5))
-    groups = list(dict.fromkeys(group_of(row, parameter) for row in rows)) if parameter else []
+    groups = groups_of(rows, parameter)
     longest = 1.05 * max(row["seconds"] for row in rows)
     for name in [*groups, "all"]:
         part = [row for row in rows if name == "all" or group_of(row, parameter) == name]

@@ -258,7 +258,7 @@ TEST(Skeletonize, RepairKeepsNodesNearTheirPlaces) {
   const TriangleTree tree = build_triangle_tree(bear.mesh);
   const Surface surface(bear.mesh, tree);
   RandomNumbers random(3);
-  double freely = 0, near_home = 0, brought_back = 0;
+  double freely = 0, near_places = 0, moved_back = 0;
   for (int i = 0; i < 12; ++i) {
     const Skeleton start = spoilt(bear.skeleton, 0.025 * surface.diagonal, random);
     const auto way = [&](const Repair& repair) {
@@ -272,14 +272,14 @@ TEST(Skeletonize, RepairKeepsNodesNearTheirPlaces) {
     free.run();
     kept.run();
     freely += way(free);
-    near_home += way(kept);
-    kept.bring_back();
-    brought_back += way(kept);
+    near_places += way(kept);
+    kept.move_back();
+    moved_back += way(kept);
     for (const BoneMargin& margin : kept.margins()) EXPECT_GE(margin.margin, kEnoughMargin);
   }
   EXPECT_GT(freely, 0);
-  EXPECT_LT(near_home, 0.9 * freely);
-  EXPECT_LT(brought_back, 0.9 * near_home);
+  EXPECT_LT(near_places, 0.9 * freely);
+  EXPECT_LT(moved_back, 0.9 * near_places);
 }
 
 TEST(Skeletonize, RepairMakesNoBoneWithoutLength) {

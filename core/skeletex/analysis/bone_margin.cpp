@@ -30,12 +30,11 @@ double slope_of(const std::vector<Vec3>& others, const Vec3& away, const Vec3& r
   return slope;
 }
 
-/// Where the first of the rays from both ends leaves the body.
+/// Where the first of the rays along both planes leaves the body.
 struct Exit {
   double rho = 0;
   int end = 0;
 };
-/// A plane whose ray leaves the body before they meet ends there: the nearer of the two exits counts.
 Exit first_exit(const TriangleMesh& mesh, const TriangleTree& tree, const std::array<Vec3, 2>& from,
                 const std::array<Vec3, 2>& along, double limit) {
   Exit exit{limit, 0};

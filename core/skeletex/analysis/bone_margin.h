@@ -14,8 +14,8 @@ inline constexpr double kEnoughMargin = 0.05;
 
 /// How far the separation planes at both ends of a bone are from crossing inside the body. At the angle theta about
 /// the bone they meet at the distance L / (k_H - k_T) from its axis, with the slopes k of SeparationPlanes. Rays along
-/// both leave the body at the distances rho_H and rho_T. Where one leaves it before they meet, its seam is there, and
-/// they do not meet on the surface: the lesser is rho.
+/// both leave the body. A plane ends where its ray leaves the body, so the planes cross only where both rays get as
+/// far: rho is the lesser of their distances from the axis.
 struct BoneMargin {
   /// The least 1 - rho (k_H - k_T) / L of all angles, at most 1. Below 0 the planes cross inside the body.
   double margin = 1;

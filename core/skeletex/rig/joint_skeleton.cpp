@@ -62,7 +62,7 @@ class SkeletonBuilder {
     for (int j = count() - 1; j >= 0; --j) mark_needed(j);
     drop_roots();
     join_roots();
-    turn_hierarchy();
+    choose_root();
     merge_twist_joints();
     group_joints();
     if (root_ >= 0) {
@@ -220,8 +220,8 @@ class SkeletonBuilder {
     return (mean_of_vertices(joint) - 0.5 * (p + q)).norm() / (q - p).norm();
   }
 
-  /// Where all joints lay side by side: takes the root from which the joints move the bones that begin at them.
-  void turn_hierarchy() {
+  /// Where no joint had a parent: makes the joint the root from which the others move the bones that begin at them.
+  void choose_root() {
     std::vector<int> kept;
     for (int j = 0; j < count(); ++j)
       if (is_kept(j)) kept.push_back(j);
@@ -245,7 +245,10 @@ class SkeletonBuilder {
         }
       if (sum < least) least = sum, best = parents, root_ = root;
     }
-    for (const int j : kept) joints_[j].parent = best[j], joints_[j].children.clear();
+    for (const int j : kept) {
+      joints_[j].parent = best[j];
+      std::erase_if(joints_[j].children, [&](int child) { return is_kept(child); });
+    }
     for (const int j : kept)
       if (best[j] >= 0) joints_[best[j]].children.push_back(j);
   }

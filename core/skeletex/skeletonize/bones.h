@@ -16,7 +16,9 @@ constexpr double kBend = 0.7;
 Skeleton make_bones(const Surface& surface, double voxel_side, const CurveGraph& graph, double bend = kBend);
 
 /// A regular polygon of bones around the handle of a body of genus 1: its axis is a principal axis of the body, and
-/// with its radius it is as deep inside as it can be. For wheels and tori.
+/// its radius is the one with which it lies deepest inside. For wheels and tori.
+/// \param graph  of the thinned body, world units
+/// \param bones  their number, at least 3
 /// \return no bones where the graph is not a single loop, or a bone would leave the body
 Skeleton make_even_ring(const Surface& surface, const VoxelBody& body, const CurveGraph& graph, int bones);
 

@@ -21,8 +21,8 @@ std::vector<SkeletonLimb> find_limbs(const Skeleton& skeleton);
 std::vector<int> pair_limbs(const Skeleton& skeleton, const std::vector<SkeletonLimb>& limbs, const MirrorPlane& plane,
                             double apart);
 
-/// The skeleton with joints in the middle of limbs that are straight and long, where they are thinnest: arms that are
-/// stretched have elbows.
+/// Splits the long bones of limbs about their middle, where the limb is thin: a stretched arm gets an elbow. The new
+/// nodes and bones have no names.
 Skeleton with_joints(const Surface& surface, Skeleton skeleton);
 
 /// The skeleton made its own mirror image: of two limbs that are images of each other one is the image of the other

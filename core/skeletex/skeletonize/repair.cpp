@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kGoodMargin = 0.25;  // more earns nothing
 constexpr double kReachWeight = 0.05;
-constexpr double kWayWeight = 0.02;  // of the way from home, in radii of the body; 0.1 costs bones
+constexpr double kDisplacementWeight = 0.02;  // with 0.1, bones are contracted that moves would save
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 constexpr int kAngles = 16;       // of rays while nodes are moved
 constexpr int kFinalAngles = 32;  // to accept
@@ -40,9 +40,9 @@ Vec3 RandomNumbers::in_ball(double radius) {
   }
 }
 
-Repair::Repair(const Surface& surface, Skeleton skeleton, const Skeleton& home)
+Repair::Repair(const Surface& surface, Skeleton skeleton, const Skeleton& original)
     : surface_(surface), skeleton_(std::move(skeleton)) {
-  for (const Node& node : home.nodes) homes_[node.name] = node.position;
+  for (const Node& node : original.nodes) original_places_[node.name] = node.position;
   skeleton_.frame = surface.frame;
   for (const Node& node : skeleton_.nodes) radii_.push_back(surface.radius(node.position));
   prepare();
@@ -95,18 +95,19 @@ bool Repair::is_placed_well(const Skeleton& skeleton, int node, double least_rad
   return true;
 }
 
-/// What it costs that a node is not at home.
-double Repair::cost_of_way(int node) const {
-  const auto home = homes_.find(skeleton_.nodes[node].name);
-  if (home == homes_.end()) return 0;
-  return kWayWeight * (skeleton_.nodes[node].position - home->second).squaredNorm() / (radii_[node] * radii_[node]);
+/// What the distance of a node from its original place costs; it is measured in radii of the body.
+double Repair::displacement_cost(int node) const {
+  const auto place = original_places_.find(skeleton_.nodes[node].name);
+  if (place == original_places_.end()) return 0;
+  return kDisplacementWeight * (skeleton_.nodes[node].position - place->second).squaredNorm() /
+         (radii_[node] * radii_[node]);
 }
 
 bool Repair::move_node(int node, double step, int trials) {
   std::vector<int> bones = bones_around({node});
   // The worst first: most moves are ruled out by it.
   std::stable_sort(bones.begin(), bones.end(), [&](int a, int b) { return margins_[a].margin < margins_[b].margin; });
-  const double before = cost_of_way(node) + cost(skeleton_, at_nodes_, bones, kNoLimit);
+  const double before = displacement_cost(node) + cost(skeleton_, at_nodes_, bones, kNoLimit);
   double least = before;
   const Vec3 start = skeleton_.nodes[node].position;
   Vec3 best = start;
@@ -116,8 +117,8 @@ bool Repair::move_node(int node, double step, int trials) {
     skeleton_.nodes[node].position = place;
     if (is_placed_well(skeleton_, node, 0.5 * radii_[node])) {
       measured_ += static_cast<long>(bones.size());
-      const double way = cost_of_way(node);
-      const double there = way + cost(skeleton_, at_nodes_, bones, least - way);
+      const double own = displacement_cost(node);
+      const double there = own + cost(skeleton_, at_nodes_, bones, least - own);
       if (there < least) least = there, best = place;
     }
   }
@@ -316,7 +317,7 @@ void Repair::thin_out() {
   }
 }
 
-void Repair::bring_back() {
+void Repair::move_back() {
   constexpr int kRounds = 3;
   const auto is_fine_at = [&](int node, const Vec3& place) {
     if (surface_.is_between(skeleton_.nodes[node].position, place)) return false;
@@ -332,8 +333,8 @@ void Repair::bring_back() {
   };
   for (int round = 0; round < kRounds; ++round)
     for (int node = 0; node < static_cast<int>(skeleton_.nodes.size()); ++node) {
-      const auto place = homes_.find(skeleton_.nodes[node].name);
-      if (place == homes_.end()) continue;
+      const auto place = original_places_.find(skeleton_.nodes[node].name);
+      if (place == original_places_.end()) continue;
       const Vec3 from = skeleton_.nodes[node].position;
       if ((place->second - from).norm() < 1e-3 * radii_[node]) continue;
       for (const double share : {1.0, 0.75, 0.5, 0.25})

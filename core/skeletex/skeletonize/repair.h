@@ -25,14 +25,12 @@ class RandomNumbers {
 /// at the beginning and stay so. Bones and nodes keep their names.
 class Repair {
  public:
-  /// \param home  nodes of the same names are kept near their places in it
-  Repair(const Surface& surface, Skeleton skeleton, const Skeleton& home = {});
+  /// \param original  nodes of the same names stay near their places in it
+  Repair(const Surface& surface, Skeleton skeleton, const Skeleton& original = {});
 
   /// Moves the nodes around the bone of the least margin, over and over; contracts it where that does not help.
   /// \return whether all margins are enough now, or so nearly that the segmentation may accept them
   bool run();
-  /// The bone whose margin lacks the most; -1: all have enough.
-  int worst_bone() const;
   /// Moves a node to a place near by that costs little, whatever the margins are: for what the margins do not see.
   void shake(int node);
   /// Takes a bone away: its ends become one node, or an end between two bones is left out. Where that is not possible,
@@ -44,8 +42,8 @@ class Repair {
   /// Contracts the cheapest bones as long as all margins stay enough.
   void thin_out();
 
-  /// Moves nodes back home as far as all margins stay enough.
-  void bring_back();
+  /// Moves nodes back towards their original places as far as all margins stay enough.
+  void move_back();
 
   const Skeleton& skeleton() const { return skeleton_; }
   const std::vector<BoneMargin>& margins() const { return margins_; }
@@ -61,9 +59,10 @@ class Repair {
   double cost(const Skeleton& skeleton, const std::vector<std::vector<BoneAtNode>>& at_nodes,
               const std::vector<int>& bones, double limit) const;
   bool is_placed_well(const Skeleton& skeleton, int node, double least_radius) const;
-  double cost_of_way(int node) const;
+  double displacement_cost(int node) const;
   bool move_node(int node, double step, int trials);
   bool improve(int bone);
+  int worst_bone() const;
   std::vector<Vec3> merge_places(int bone);
   bool try_merge(int bone, const Vec3& place, Merge& best) const;
   Skeleton merged(int bone, const Vec3& place) const;
@@ -74,8 +73,8 @@ class Repair {
   const Surface& surface_;
   Skeleton skeleton_;
   std::vector<std::vector<BoneAtNode>> at_nodes_;
-  std::vector<double> radii_;          ///< per node, of the ball there before it was moved
-  std::map<std::string, Vec3> homes_;  ///< by the names of nodes
+  std::vector<double> radii_;                    ///< per node, of the ball there before it was moved
+  std::map<std::string, Vec3> original_places_;  ///< by the names of nodes
   std::vector<BoneMargin> margins_;
   std::vector<int> failures_;  ///< per bone, how often moves did not help
   RandomNumbers random_{1};

@@ -280,7 +280,7 @@ RepairResult repair_skeleton(ClContext& context, const TriangleMesh& mesh, const
     const std::string refusal = acceptance.segment(repair);
     if (!refusal.empty()) throw TopologyError(refusal);
     result.skeleton = repair.skeleton();
-    repair.bring_back();
+    repair.move_back();
     if (acceptance.is_accepted(repair.skeleton())) result.skeleton = repair.skeleton();
   }
   drop_bad_angles(result.skeleton);

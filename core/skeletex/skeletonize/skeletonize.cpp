@@ -36,7 +36,7 @@ constexpr std::array<double, 4> kDetails{0, 1.0 / 3, 2.0 / 3, 1};
 /// a ring meet inside its polygon; the more sides that has, the nearer they meet to the middle of the hole, outside the
 /// body.
 constexpr double kFineBend = 0.05 * kBend;
-constexpr int kMostHandles = 50;                 // those of machine parts; a ring around each takes three bones or more
+constexpr int kMostHandles = 50;                 // a ring of three bones or more around each; more take minutes to fail
 constexpr std::array<int, 2> kEvenRings{5, 10};  // bones
 
 /// The rule of tips at a level of detail from 0 to 1.
@@ -77,6 +77,7 @@ struct Level {
   std::vector<int> tips;
   std::unique_ptr<Repair> repair;
   Skeleton skeleton;  ///< the repaired one
+  CurveGraph curves{};
 };
 
 CurveGraph curves_of(const Surface& surface, const VoxelBody& body, const std::vector<int>& tips, int genus) {
@@ -104,10 +105,10 @@ std::vector<int> tips_of(const VoxelBody& body, const BodyPaths& paths, double d
   return tips;
 }
 
-void add_even_rings(const Surface& surface, const VoxelBody& body, const CurveGraph& curves,
-                    std::vector<Level>& levels) {
+/// Regular polygons around the one handle, whose curve is that of the first level.
+void add_even_rings(const Surface& surface, const VoxelBody& body, std::vector<Level>& levels) {
   for (const int bones : kEvenRings) {
-    const Skeleton ring = make_even_ring(surface, body, curves, bones);
+    const Skeleton ring = make_even_ring(surface, body, levels[0].curves, bones);
     if (ring.bones.empty()) continue;
     levels.push_back({fmt::format("even ring of {}", bones), {}, std::make_unique<Repair>(surface, ring), {}});
     levels.back().repair->run();
@@ -131,11 +132,11 @@ std::vector<Level> make_levels(const Surface& surface, const VoxelBody& body, co
   for (const double detail : details)
     add(fmt::format("detail {:.2g}", detail), tips_of(body, paths, detail, surface.diagonal, genus));
   for_each_block(levels.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-    const CurveGraph curves = curves_of(surface, body, levels[i].tips, genus);
-    levels[i].repair = std::make_unique<Repair>(surface, make_bones(surface, body.side, curves));
+    levels[i].curves = curves_of(surface, body, levels[i].tips, genus);
+    levels[i].repair = std::make_unique<Repair>(surface, make_bones(surface, body.side, levels[i].curves));
     levels[i].repair->run();
   });
-  if (genus == 1) add_even_rings(surface, body, curves_of(surface, body, {}, genus), levels);
+  if (genus == 1) add_even_rings(surface, body, levels);
   if (genus == 0) {
     levels.push_back({"single bone", {}, nullptr, {}});
     levels.back().repair = std::make_unique<Repair>(surface, single_bone(body));
@@ -164,10 +165,10 @@ void make_symmetric(const Surface& surface, const std::optional<MirrorPlane>& pl
 }
 
 /// Rings of many short bones; nothing where they have no room.
-std::optional<Level> make_fine_level(const Surface& surface, const VoxelBody& body, int genus, bool is_thinned) {
+/// \param handles  the level without limbs
+std::optional<Level> make_fine_level(const Surface& surface, double voxel_side, const Level& handles, bool is_thinned) {
   Level level{is_thinned ? "fine handles" : "finest handles", {}, nullptr, {}};
-  level.repair =
-      std::make_unique<Repair>(surface, make_bones(surface, body.side, curves_of(surface, body, {}, genus), kFineBend));
+  level.repair = std::make_unique<Repair>(surface, make_bones(surface, voxel_side, handles.curves, kFineBend));
   if (!level.repair->run()) return std::nullopt;
   if (is_thinned) level.repair->thin_out();
   return level;
@@ -258,7 +259,7 @@ SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, cons
   if (result.genus > 0 && choose(result.candidates, options) < 0)
     for (const bool is_thinned : {true, false}) {
       report("trying finer rings", 0.95);
-      std::optional<Level> level = make_fine_level(surface, body, result.genus, is_thinned);
+      std::optional<Level> level = make_fine_level(surface, body.side, levels[0], is_thinned);
       if (!level) break;
       levels.push_back(std::move(*level));
       try_level(levels.back());
