@@ -282,6 +282,15 @@ TEST_F(Program, ExportsACoarseMeshWithItsDisplacement) {
   EXPECT_LT(coarse["vertices"].get<int>(), fine["vertices"].get<int>() / 4);
   EXPECT_GT(coarse["displacement"]["width"].get<int>() * coarse["displacement"]["height"].get<int>(), 64 * 32);
   EXPECT_GT(fs::file_size(folder_ / "rig.exr"), 1000u);
+  std::set<std::string> pictures;  // maya and arnold take the same
+  for (const char* reader : {"blender", "object", "maya", "arnold", "materialx"}) {
+    json_of({"export", "y.skx.exr", "-o", "rig.glb", "--lod", "16", "--displacement", "rig.exr", "--displacement-for",
+             reader});
+    pictures.insert(text_of(folder_ / "rig.exr"));
+  }
+  EXPECT_EQ(pictures.size(), 4u);
+  expect_refused(2, {"export", "y.skx.exr", "-o", "no.glb", "--displacement", "no.exr", "--displacement-for", "max"},
+                 {"max", "maya"});
   expect_refused(2, {"export", "y.skx.exr", "-o", "no.glb", "--displacement", "no.png"}, {"no.png", ".exr"});
   expect_refused(2, {"export", "y.skx.exr", "-o", "no.glb", "--displacement", "y.skx.exr"}, {"y.skx.exr", "MODEL"});
   for (const char* name : {"rig.glb", "rig.exr"}) fs::remove(folder_ / name);

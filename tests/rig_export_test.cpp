@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <numbers>
 #include <random>
 
@@ -21,6 +22,7 @@
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/texture/bake_displacement.h"
 #include "skeletex/reconstruct/texture/bake_texture.h"
+#include "skeletex/reconstruct/texture/vertex_tangents.h"
 #include "skeletex/rig/export_rig.h"
 #include "support/load_model.h"
 #include "support/picture_at.h"
@@ -226,7 +228,11 @@ Vec3 vector_at(const DisplacementPicture& picture, const Eigen::Vector2d& uv) {
 }
 
 /// The coarse mesh with its triangles cut into steps^2 each, every point moved by the picture.
-TriangleMesh displaced(const TriangleMesh& base, const DisplacementPicture& picture, int steps) {
+/// \param vector_of  what a vector of the picture is at a point of a triangle, given by its share of the corners
+TriangleMesh displaced(
+    const TriangleMesh& base, const DisplacementPicture& picture, int steps,
+    const std::function<Vec3(std::size_t t, const Vec3& share, const Vec3& vector)>& vector_of =
+        [](std::size_t, const Vec3&, const Vec3& vector) { return vector; }) {
   TriangleMesh result;
   for (std::size_t t = 0; t < base.triangles.size(); ++t) {
     const auto point = [&](int i, int j) {
@@ -237,7 +243,7 @@ TriangleMesh displaced(const TriangleMesh& base, const DisplacementPicture& pict
         place += share[k] * base.positions[base.triangles[t][k]];
         uv += share[k] * picture.coordinates.values[picture.coordinates.corners[t][k]].cast<double>();
       }
-      result.positions.push_back(place + vector_at(picture, uv));
+      result.positions.push_back(place + vector_of(t, share, vector_at(picture, uv)));
       return static_cast<int>(result.positions.size()) - 1;
     };
     for (int i = 0; i < steps; ++i)
@@ -261,9 +267,66 @@ TEST(RigExport, ACoarseMeshAndItsDisplacementGiveTheSurface) {
     EXPECT_LT(symmetric_mean(report), 5e-5) << name;
     EXPECT_LT(symmetric_mean(report), 0.25 * bare) << name;
     EXPECT_LT(std::max(report.forward.max, report.backward.max), 3e-3) << name;
-    const GltfScene scene = written_and_read(export_rig(device(), base, {.coordinates = &picture.coordinates}));
+    const GltfScene scene = written_and_read(export_rig(device(), base, {.displacement = &picture}));
     EXPECT_EQ(scene.meshes.at(0).primitives.at(0).texture_coordinates.size(),
               scene.meshes.at(0).primitives.at(0).positions.size());
+  }
+}
+
+TEST(RigExport, TangentsFollowTheTextureCoordinates) {
+  const TriangleMesh square{{{0, 0, 0}, {2, 0, 0}, {2, 0, -2}, {0, 0, -2}}, {{0, 1, 2}, {0, 2, 3}}};
+  const std::vector<Vec3> up(4, Vec3::UnitY());
+  const std::vector<Eigen::Vector2f> straight{{0, 0}, {1, 0}, {1, 1}, {0, 1}}, mirrored{{1, 0}, {0, 0}, {0, 1}, {1, 1}};
+  for (const Eigen::Vector4d& tangent : vertex_tangents(square, up, straight))
+    EXPECT_LT((tangent - Eigen::Vector4d(1, 0, 0, 1)).norm(), 1e-12);
+  for (const Eigen::Vector4d& tangent : vertex_tangents(square, up, mirrored)) {
+    EXPECT_LT((tangent - Eigen::Vector4d(-1, 0, 0, -1)).norm(), 1e-12);
+    const ShadingFrame frame = tangent_frame(3 * Vec3::UnitY(), tangent);
+    EXPECT_LT((frame.bitangent - Vec3(0, 0, -1)).norm(), 1e-12);  // v grows there
+  }
+}
+
+/// The tangents of a mesh in any pose, and its coarse triangles displaced by a picture in tangent space.
+TriangleMesh displaced_in_tangent_space(const TriangleMesh& base, const DisplacementPicture& picture, int steps) {
+  MeshAttributes attributes;
+  attributes.normals.values = vertex_normals(base);
+  attributes.texture_coordinates = picture.coordinates;
+  const SplitMesh split = split_vertices(base, attributes);
+  const std::vector<Eigen::Vector4d> tangents =
+      vertex_tangents(split.mesh, split.attributes.normals.values, split.attributes.texture_coordinates.values);
+  return displaced(base, picture, steps, [&](std::size_t t, const Vec3& share, const Vec3& vector) {
+    Vec3 normal = Vec3::Zero();
+    Eigen::Vector4d tangent = Eigen::Vector4d::Zero();
+    for (int k = 0; k < 3; ++k) {
+      normal += share[k] * split.attributes.normals.values[split.mesh.triangles[t][k]];
+      tangent += share[k] * tangents[split.mesh.triangles[t][k]];
+    }
+    const ShadingFrame frame = tangent_frame(normal, tangent);
+    return Vec3(vector.x() * frame.tangent + vector.y() * frame.normal + vector.z() * frame.bitangent);
+  });
+}
+
+TEST(RigExport, DisplacementsInTangentSpaceGiveTheSurfaceAndTurnWithIt) {
+  for (const char* name : {"bear", "man", "eight"}) {
+    const TestModel standard = load_standard_model(name);
+    const SkeletexModel model = regular_grid(device(), encode_model(device(), standard.mesh, standard.skeleton).model);
+    const SkeletexModel base = resample_model(device(), model, 64);
+    const DisplacementPicture picture = bake_displacement(device(), model, base, DisplacementSpace::kTangent);
+    const TriangleMesh coarse = reconstruct_mesh(device(), base), fine = reconstruct_mesh(device(), model);
+    const double bare = symmetric_mean(measure_metro(device(), fine, coarse, {.samples = 100'000}));
+    const TriangleMesh result = displaced_in_tangent_space(coarse, picture, 8);
+    const MetroReport report = measure_metro(device(), fine, result, {.samples = 100'000});
+    EXPECT_LT(symmetric_mean(report), 5e-5) << name;
+    EXPECT_LT(symmetric_mean(report), 0.25 * bare) << name;
+    EXPECT_LT(std::max(report.forward.max, report.backward.max), 3e-3) << name;
+    TriangleMesh turned = coarse;
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(1.2, Vec3(1, 2, 3).normalized()));
+    for (Vec3& p : turned.positions) p = turn * p;
+    std::vector<Vec3> expected = result.positions;
+    for (Vec3& p : expected) p = turn * p;
+    EXPECT_LT(largest_distance(displaced_in_tangent_space(turned, picture, 8).positions, expected),
+              1e-5 * model.diagonal)
+        << name;
   }
 }
 

@@ -26,5 +26,6 @@ awk 'NF == 0 { next } !head { head = 1; print "COFF"; next } !count { count = $1
 "$program" export coloured.skx.exr -o coloured.glb
 "$program" export coloured.skx.exr -o picture.glb --lod 32 --texture 128
 "$program" export coloured.skx.exr -o displaced.glb --lod 16 --displacement displaced.exr
+"$program" export coloured.skx.exr -o tangents.glb --lod 16 --displacement tangents.exr --displacement-for maya
 "$program" reconstruct coloured.skx.exr -o plain_picture.glb --texture picture.png
-node validate.mjs still.glb man.glb eight.glb plain.glb coloured.glb picture.glb displaced.glb plain_picture.glb
+node validate.mjs still.glb man.glb eight.glb plain.glb coloured.glb picture.glb displaced.glb tangents.glb plain_picture.glb

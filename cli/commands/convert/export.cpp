@@ -27,7 +27,7 @@ namespace {
 constexpr int kBaseSize = 64;  // texels along the longer side of a mesh with a displacement, without --lod
 
 struct Arguments {
-  std::string model, output, displacement, displacement_up = "z", device, json, up = "y";
+  std::string model, output, displacement, displacement_for = "blender", device, json, up = "y";
   std::vector<std::string> animations;
   int size = 0, level = 0, texture = 0;
 };
@@ -61,15 +61,18 @@ std::string model_name(const std::string& path) {
   return name;
 }
 
+bool is_in_tangent_space(const std::string& program) { return program != "blender" && program != "object"; }
+
 /// Writes the vectors as the channels R, G, B of an OpenEXR file.
-/// \param is_z_up  in the axes of a program that turns glTF from y up to z up; else in those of the glTF file
+/// \param program  of --displacement-for
 /// \throw IoError
-void write_displacement(const std::string& path, const DisplacementPicture& picture, bool is_z_up) {
+void write_displacement(const std::string& path, const DisplacementPicture& picture, const std::string& program) {
   Image image = make_image(picture.width, picture.height);
   for (std::size_t i = 0; i < picture.values.size(); ++i) {
-    const Eigen::Vector3f& value = picture.values[i];
-    const Eigen::Vector3f turned = is_z_up ? Eigen::Vector3f(value.x(), -value.z(), value.y()) : value;
-    std::copy_n(turned.data(), 3, image.rgba.data() + 4 * i);
+    Eigen::Vector3f value = picture.values[i];
+    if (program == "blender") value = {value.x(), -value.z(), value.y()};  // it turns glTF from y up to z up
+    if (program == "materialx") std::swap(value.y(), value.z());           // tangent, bitangent, normal
+    std::copy_n(value.data(), 3, image.rgba.data() + 4 * i);
     image.rgba[4 * i + 3] = 1;
   }
   write_exr_image(path, image);
@@ -92,16 +95,19 @@ void run(const Arguments& arguments) {
   }
   bar.show("reconstructing", 0.3);
   std::optional<DisplacementPicture> displacement;
-  if (is_displaced) displacement = bake_displacement(context, original, resized ? *resized : original);
+  if (is_displaced)
+    displacement = bake_displacement(
+        context, original, resized ? *resized : original,
+        is_in_tangent_space(arguments.displacement_for) ? DisplacementSpace::kTangent : DisplacementSpace::kObject);
   const GltfScene scene = export_rig(context, resized ? *resized : original,
                                      {.name = model_name(arguments.model),
                                       .placement = placement_of(arguments.up),
                                       .animations = animations,
                                       .texture_size = arguments.texture,
                                       .original = &original,
-                                      .coordinates = displacement ? &displacement->coordinates : nullptr});
+                                      .displacement = displacement ? &*displacement : nullptr});
   bar.show("writing", 0.7);
-  if (displacement) write_displacement(arguments.displacement, *displacement, arguments.displacement_up == "z");
+  if (displacement) write_displacement(arguments.displacement, *displacement, arguments.displacement_for);
   write_gltf(arguments.output, scene);
   const double ms = watch.lap_ms();
   const GltfPrimitive& surface = scene.meshes[0].primitives[0];
@@ -172,11 +178,12 @@ void add_export_command(CLI::App& program) {
       {".exr"})
       ->type_name("FILE")
       ->excludes("--texture");
-  take_one_of(
-      *command.add_option("--displacement-up", arguments->displacement_up,
-                          "axis that is up in the program that reads the picture: Blender turns glTF to z, Maya "
-                          "and most renderers keep y (default: z)"),
-      {"y", "z"});
+  take_one_of(*command.add_option(
+                  "--displacement-for", arguments->displacement_for,
+                  "how the picture has its vectors. blender: object space, z up, as its Displace modifier takes them "
+                  "(default); object: object space, y up; maya, arnold: tangent space, as tangent, normal, bitangent; "
+                  "materialx: tangent space, as tangent, bitangent, normal"),
+              {"blender", "object", "maya", "arnold", "materialx"});
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(

@@ -33,15 +33,28 @@ void bake_colours(ClContext& context, const PreparedModel& model, const Triangle
   attributes.materials.emplace_back().image = std::move(baked.image);
 }
 
+/// Per position of a primitive whose triangles are those of the mesh, in its order.
+std::vector<Eigen::Vector4f> tangents_of(const GltfPrimitive& primitive,
+                                         const CornerValues<Eigen::Vector4d>& tangents) {
+  std::vector<Eigen::Vector4f> result(primitive.positions.size(), Eigen::Vector4f::UnitX());
+  for (std::size_t t = 0; t < primitive.triangles.size(); ++t)
+    for (int k = 0; k < 3; ++k)
+      result[primitive.triangles[t][k]] = tangents.values[tangents.corners[t][k]].cast<float>();
+  return result;
+}
+
 GltfPrimitive make_primitive(ClContext& context, const PreparedModel& model, const Rig& rig,
                              const RigExportOptions& options, GltfScene& scene) {
   BindMesh bind = reconstruct_bind_mesh(context, model);
   const VertexInfluences influences = strongest_influences(make_skin(context, model, bind.inner));
   MeshAttributes attributes = vertex_attributes(model);
   if (options.texture_size > 0) bake_colours(context, model, bind.mesh, options, attributes);
-  if (options.coordinates) attributes.texture_coordinates = *options.coordinates;
+  if (options.displacement) attributes.texture_coordinates = options.displacement->coordinates;
+  const bool has_tangents = options.displacement && !options.displacement->tangents.empty();
+  if (has_tangents) attributes.normals = {};  // those of the tangent frames
   scene.materials.push_back(material_of(attributes, scene.images));
   auto [primitive, sources] = primitive_of(in_user_units(std::move(bind.mesh), model.model.skeleton.frame), attributes);
+  if (has_tangents) primitive.tangents = tangents_of(primitive, options.displacement->tangents);
   primitive.influences = 4;
   for (const int v : sources)
     for (int i = 0; i < 4; ++i) {

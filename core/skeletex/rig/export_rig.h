@@ -6,6 +6,7 @@
 #include "skeletex/device/context.h"
 #include "skeletex/io/gltf/gltf_scene.h"
 #include "skeletex/reconstruct/prepared_model.h"
+#include "skeletex/reconstruct/texture/bake_displacement.h"
 #include "skeletex/rig/joints.h"
 
 namespace skeletex {
@@ -16,8 +17,8 @@ struct RigExportOptions {
   std::span<const NamedAnimation> animations = {};
   int texture_size = 0;  ///< texels along the model's longer side for a picture of its colours; 0: they go by vertex
   const SkeletexModel* original = nullptr;  ///< whose colours the picture has; none: the exported model's own
-  /// Texture coordinates of the mesh, of a picture beside the file (bake_displacement). Not together with texture_size.
-  const CornerValues<Eigen::Vector2f>* coordinates = nullptr;
+  /// A picture beside the file, whose texture coordinates and tangents the mesh gets. Not together with texture_size.
+  const DisplacementPicture* displacement = nullptr;
 };
 
 /// A model as other programs animate it: its mesh in the bind pose with its normals and colours, a skin with four

@@ -25,9 +25,10 @@ struct GltfNode {
 struct GltfPrimitive {
   std::vector<Vec3> positions, normals;              ///< normals: none, or one per position; so are the others below
   std::vector<Eigen::Vector2f> texture_coordinates;  ///< (0, 0) is the upper left corner of the picture
-  std::vector<Eigen::Vector4f> colours;              ///< linear
-  int influences = 0;                                ///< joints per position
-  std::vector<int> joints;                           ///< of the node's skin
+  std::vector<Eigen::Vector4f> tangents;  ///< unit, and the sign of the bitangent; the reader leaves them out
+  std::vector<Eigen::Vector4f> colours;   ///< linear
+  int influences = 0;                     ///< joints per position
+  std::vector<int> joints;                ///< of the node's skin
   std::vector<float> weights;
   std::vector<Triangle> triangles;
   int material = -1;

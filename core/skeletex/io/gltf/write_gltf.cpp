@@ -123,6 +123,8 @@ tinygltf::Primitive make_primitive(GltfBuffer& buffer, const GltfPrimitive& from
   to.attributes["POSITION"] = buffer.add_floats(flat(from.positions), TINYGLTF_TYPE_VEC3, kVertices, true);
   if (!from.normals.empty())
     to.attributes["NORMAL"] = buffer.add_floats(flat(from.normals), TINYGLTF_TYPE_VEC3, kVertices);
+  if (!from.tangents.empty())
+    to.attributes["TANGENT"] = buffer.add_floats(flat(from.tangents), TINYGLTF_TYPE_VEC4, kVertices);
   if (!from.texture_coordinates.empty())
     to.attributes["TEXCOORD_0"] = buffer.add_floats(flat(from.texture_coordinates), TINYGLTF_TYPE_VEC2, kVertices);
   if (!from.colours.empty())

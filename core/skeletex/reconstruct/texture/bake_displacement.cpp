@@ -12,6 +12,7 @@
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/texture/corner_coordinates.h"
 #include "skeletex/reconstruct/texture/picture_layout.h"
+#include "skeletex/reconstruct/texture/vertex_tangents.h"
 
 namespace skeletex {
 namespace {
@@ -60,13 +61,12 @@ class SurfacePoints {
   std::vector<std::vector<Vec3>> ends_;  ///< per bone: head, tail
 };
 
-/// Calls `visit(column, row, point)` for the pixels of a patch that lie in a triangle of its coarse mesh or near by.
+/// Calls `visit(column, row, share)` for the pixels of a patch that lie in a triangle of its coarse mesh or near by.
 /// \param corners  pixels, from row 0 and column 0 of the patch
-/// \param points   there; the triangle's plane goes on beyond it
 /// \param margin   how far outside, pixels
+/// \param visit    share: of the corners in the pixel; outside the triangle some are below 0
 template <typename Visit>
-void for_each_pixel(const std::array<Eigen::Vector2d, 3>& corners, const std::array<Vec3, 3>& points, double margin,
-                    const Visit& visit) {
+void for_each_pixel(const std::array<Eigen::Vector2d, 3>& corners, double margin, const Visit& visit) {
   Eigen::Matrix2d edges;
   edges << corners[1] - corners[0], corners[2] - corners[0];
   const double area = std::abs(edges.determinant());
@@ -81,7 +81,7 @@ void for_each_pixel(const std::array<Eigen::Vector2d, 3>& corners, const std::ar
       const Eigen::Vector2d other = inverse * (Eigen::Vector2d(column, row) - corners[0]);
       const Vec3 share(1 - other.sum(), other[0], other[1]);
       if ((share.array() < least_share.array()).any()) continue;
-      visit(column, row, Vec3(share[0] * points[0] + share[1] * points[1] + share[2] * points[2]));
+      visit(column, row, share);
     }
 }
 
@@ -116,16 +116,64 @@ void fill_up(DisplacementPicture& picture, std::vector<char>& is_covered) {
   }
 }
 
+/// The coarse mesh with the tangent frames of its corners, where those are wanted.
+class BaseSurface {
+ public:
+  BaseSurface(TriangleMesh mesh, const CornerValues<Eigen::Vector2f>& coordinates, DisplacementSpace space)
+      : mesh_(std::move(mesh)) {
+    if (space == DisplacementSpace::kObject) return;
+    MeshAttributes attributes;
+    attributes.normals.values = vertex_normals(mesh_);
+    attributes.texture_coordinates = coordinates;
+    SplitMesh split = split_vertices(mesh_, attributes);
+    tangents_.values =
+        vertex_tangents(split.mesh, split.attributes.normals.values, split.attributes.texture_coordinates.values);
+    tangents_.corners = std::move(split.mesh.triangles);
+    normals_ = std::move(attributes.normals.values);
+  }
+
+  /// \param share   of the corners of triangle t in a point
+  /// \param target  where the point is to go
+  /// \return the way there, in the space of the picture
+  Vec3 displacement(std::size_t t, const Vec3& share, const Vec3& target) const {
+    Vec3 point = Vec3::Zero(), normal = Vec3::Zero();
+    Eigen::Vector4d tangent = Eigen::Vector4d::Zero();
+    for (int k = 0; k < 3; ++k) {
+      point += share[k] * mesh_.positions[mesh_.triangles[t][k]];
+      if (tangents_.empty()) continue;
+      normal += share[k] * normals_[mesh_.triangles[t][k]];
+      tangent += share[k] * tangents_.values[tangents_.corners[t][k]];
+    }
+    const Vec3 way = target - point;
+    if (tangents_.empty()) return way;
+    const ShadingFrame frame = tangent_frame(normal, tangent);
+    return {way.dot(frame.tangent), way.dot(frame.normal), way.dot(frame.bitangent)};
+  }
+
+  const TriangleMesh& mesh() const { return mesh_; }
+  CornerValues<Eigen::Vector4d>& tangents() { return tangents_; }
+
+ private:
+  TriangleMesh mesh_;
+  std::vector<Vec3> normals_;
+  CornerValues<Eigen::Vector4d> tangents_;
+};
+
 }  // namespace
 
-DisplacementPicture bake_displacement(ClContext& context, const PreparedModel& detail, const PreparedModel& base) {
+DisplacementPicture bake_displacement(ClContext& context, const PreparedModel& detail, const PreparedModel& base,
+                                      DisplacementSpace space) {
   const PictureLayout layout = lay_out_picture(detail.model, base);
   const SurfacePoints surface(detail, reconstruct_bind_mesh(context, detail).mesh.positions);
-  const TriangleMesh mesh = reconstruct_bind_mesh(context, base).mesh;
+  TriangleMesh base_mesh = reconstruct_bind_mesh(context, base).mesh;
   const std::size_t pixels = static_cast<std::size_t>(layout.width) * static_cast<std::size_t>(layout.height);
-  DisplacementPicture picture{layout.width, layout.height,
+  DisplacementPicture picture{layout.width,
+                              layout.height,
                               std::vector<Eigen::Vector3f>(pixels, Eigen::Vector3f::Zero()),
-                              picture_coordinates(layout, detail.model, base, mesh)};
+                              picture_coordinates(layout, detail.model, base, base_mesh),
+                              {}};
+  BaseSurface from(std::move(base_mesh), picture.coordinates, space);
+  const TriangleMesh& mesh = from.mesh();
   std::vector<char> is_covered(pixels, 0);
   const std::vector<int> bones = triangle_bones(base.lattice, mesh.triangles);
   const double scale = detail.model.skeleton.frame.scale;
@@ -134,7 +182,6 @@ DisplacementPicture bake_displacement(ClContext& context, const PreparedModel& d
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
       const int x = layout.places[bones[t]][0], y = layout.places[bones[t]][1];
       std::array<Eigen::Vector2d, 3> corners;
-      std::array<Vec3, 3> points;
       int apex = -1;
       for (int k = 0; k < 3; ++k) {
         if (const auto& poles = base.lattice.poles[bones[t]];
@@ -142,9 +189,8 @@ DisplacementPicture bake_displacement(ClContext& context, const PreparedModel& d
           apex = k;
         const Eigen::Vector2d uv = picture.coordinates.values[picture.coordinates.corners[t][k]].cast<double>();
         corners[k] = {uv.x() * layout.width - 0.5 - x, (1 - uv.y()) * layout.height - 0.5 - y};
-        points[k] = mesh.positions[mesh.triangles[t][k]];
       }
-      for_each_pixel(corners, points, margin, [&](int column, int row, const Vec3& point) {
+      for_each_pixel(corners, margin, [&](int column, int row, const Vec3& share) {
         const Rectangle& r = detail.model.patches[bones[t]].rectangle;
         const bool is_own = column >= -kGutter && column < r.width + layout.repeated + kGutter && row >= -kGutter &&
                             row < r.height + kGutter;
@@ -153,11 +199,12 @@ DisplacementPicture bake_displacement(ClContext& context, const PreparedModel& d
                                   static_cast<std::size_t>(x + column);
         if (is_covered[pixel]) return;
         const Vec3 target = surface.at(bones[t], row, column_of(corners, apex, column, row));
-        picture.values[pixel] = (scale * (target - point)).cast<float>();
+        picture.values[pixel] = (scale * from.displacement(t, share, target)).cast<float>();
         is_covered[pixel] = 1;
       });
     }
   fill_up(picture, is_covered);
+  picture.tangents = std::move(from.tangents());
   return picture;
 }
 
