@@ -35,10 +35,12 @@ struct Exit {
   double rho = 0;
   int end = 0;
 };
+/// \param limit  what is farther counts as this far
+/// \param least  below, it does not matter where
 Exit first_exit(const TriangleMesh& mesh, const TriangleTree& tree, const std::array<Vec3, 2>& from,
-                const std::array<Vec3, 2>& along, double limit) {
+                const std::array<Vec3, 2>& along, double limit, double least) {
   Exit exit{limit, 0};
-  for (int e = 0; e < 2; ++e) {
+  for (int e = 0; e < 2 && exit.rho > least; ++e) {
     exit.rho = std::min(exit.rho, 4 * tree.scale / along[e].norm());
     const double rho = find_first_hit(mesh, tree, from[e], along[e], exit.rho);
     if (rho < exit.rho) exit = {rho, e};
@@ -49,7 +51,7 @@ Exit first_exit(const TriangleMesh& mesh, const TriangleTree& tree, const std::a
 }  // namespace
 
 BoneMargin margin_of_bone(const TriangleMesh& mesh, const TriangleTree& tree, const Skeleton& skeleton,
-                          const std::vector<std::vector<BoneAtNode>>& at_nodes, int bone, int angles) {
+                          const std::vector<std::vector<BoneAtNode>>& at_nodes, int bone, int angles, double enough) {
   BoneMargin result;
   const std::array<Vec3, 2> ends{end_position(skeleton, bone, BoneEnd::kHead),
                                  end_position(skeleton, bone, BoneEnd::kTail)};
@@ -69,11 +71,12 @@ BoneMargin margin_of_bone(const TriangleMesh& mesh, const TriangleTree& tree, co
     const double closing = (slopes[0] + slopes[1]) / length;
     if (closing <= 0 || others[0].empty() || others[1].empty()) continue;
     const std::array<Vec3, 2> along{radial + slopes[0] * o, radial - slopes[1] * o};
-    const Exit exit = first_exit(mesh, tree, ends, along, (1 - kLeastMargin) / closing);
+    const Exit exit = first_exit(mesh, tree, ends, along, (1 - kLeastMargin) / closing, (1 - result.margin) / closing);
     if (1 - exit.rho * closing >= result.margin) continue;
     result.margin = 1 - exit.rho * closing;
     result.end = exit.end == 0 ? BoneEnd::kHead : BoneEnd::kTail;
     result.point = ends[exit.end] + exit.rho * along[exit.end];
+    if (result.margin < enough) break;
   }
   result.lean = lean;
   return result;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <limits>
 #include <vector>
 
 #include "skeletex/geometry/mesh.h"
@@ -26,9 +27,11 @@ struct BoneMargin {
 
 /// \param at_nodes  of the skeleton (bones_at_nodes)
 /// \param angles    number of rays per end, evenly around the bone
+/// \param enough    further angles are left out once the margin is below
 /// \pre the bone has a length and lies inside the body; directions at its nodes differ
 BoneMargin margin_of_bone(const TriangleMesh& mesh, const TriangleTree& tree, const Skeleton& skeleton,
-                          const std::vector<std::vector<BoneAtNode>>& at_nodes, int bone, int angles = 24);
+                          const std::vector<std::vector<BoneAtNode>>& at_nodes, int bone, int angles = 24,
+                          double enough = -std::numeric_limits<double>::infinity());
 
 /// Of all bones, on all processors.
 std::vector<BoneMargin> bone_margins(const TriangleMesh& mesh, const TriangleTree& tree, const Skeleton& skeleton,

@@ -70,11 +70,12 @@ double Repair::cost(const Skeleton& skeleton, const std::vector<std::vector<Bone
                     const std::vector<int>& bones, double limit) const {
   double sum = 0;
   for (const int bone : bones) {
-    const BoneMargin margin = margin_of_bone(surface_.mesh, surface_.tree, skeleton, at_nodes, bone, kAngles);
+    if (sum > limit) break;
+    const double enough = kGoodMargin - std::sqrt(limit - sum) - 1e-9;  // the cost is above the limit below
+    const BoneMargin margin = margin_of_bone(surface_.mesh, surface_.tree, skeleton, at_nodes, bone, kAngles, enough);
     const double lack = std::max(0.0, kGoodMargin - margin.margin);
     const double radius = radii_[skeleton.bones[bone].head] + radii_[skeleton.bones[bone].tail];
     sum += lack * lack + kReachWeight * margin.lean * radius / surface_.diagonal;
-    if (sum > limit) break;
   }
   return sum;
 }
@@ -163,6 +164,7 @@ bool Repair::run() {
   for (;;) {
     const int bone = worst_bone();
     if (bone < 0) return true;
+    if (failures_[bone] >= kPatience && margins_[bone].margin > kWorthTrying) return true;
     if (!improve(bone)) ++failures_[bone];
     if (margins_[bone].margin >= kEnoughMargin) continue;
     const bool is_patient = measured_ < kMostMeasured && margins_[bone].margin > kHopeless;
