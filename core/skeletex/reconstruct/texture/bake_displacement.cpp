@@ -134,7 +134,7 @@ class BaseSurface {
 
   /// \param share   of the corners of triangle t in a point
   /// \param target  where the point is to go
-  /// \return the way there, in the space of the picture
+  /// \return the vector from the point to there, in the space of the picture
   Vec3 displacement(std::size_t t, const Vec3& share, const Vec3& target) const {
     Vec3 point = Vec3::Zero(), normal = Vec3::Zero();
     Eigen::Vector4d tangent = Eigen::Vector4d::Zero();
@@ -144,10 +144,10 @@ class BaseSurface {
       normal += share[k] * normals_[mesh_.triangles[t][k]];
       tangent += share[k] * tangents_.values[tangents_.corners[t][k]];
     }
-    const Vec3 way = target - point;
-    if (tangents_.empty()) return way;
+    Vec3 displacement = target - point;
+    if (tangents_.empty()) return displacement;
     const ShadingFrame frame = tangent_frame(normal, tangent);
-    return {way.dot(frame.tangent), way.dot(frame.normal), way.dot(frame.bitangent)};
+    return {displacement.dot(frame.tangent), displacement.dot(frame.normal), displacement.dot(frame.bitangent)};
   }
 
   const TriangleMesh& mesh() const { return mesh_; }
