@@ -212,6 +212,28 @@ TEST(Render, NormalsInTheFlatCornerOfACapAreThoseAroundIt) {
   EXPECT_GT(normals[3 * 2 + 2], 0.999);
 }
 
+TEST(Render, TrianglesUpsideDownInASurfaceLookLikeIt) {
+  const TriangleMesh plate{{{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}},
+      partly_turned{plate.positions, {{0, 1, 2}, {0, 3, 2}}}, turned{plate.positions, {{0, 2, 1}, {0, 3, 2}}};
+  for (const double fov : {0.0, 40.0})
+    for (const double azimuth : {20.0, 200.0}) {  // from before and behind
+      const Camera camera =
+          fit_camera({.azimuth_deg = azimuth, .elevation_deg = 10, .fov_deg = fov}, plate.positions, 60, 60);
+      const auto picture = [&](const TriangleMesh& mesh, const Vec3& normal) {
+        GpuSurface surface = upload_surface(gl(), mesh);
+        write_normals(surface, std::vector<Vec3>(mesh.positions.size(), normal));
+        return draw(gl(), surface, {}, camera, {.width = 60, .height = 60, .samples = 1, .sky_lights = 8});
+      };
+      const Vec3 to_viewer = azimuth < 90 ? Vec3(Vec3::UnitZ()) : Vec3(-Vec3::UnitZ());
+      const Image expected = picture(azimuth < 90 ? plate : turned, to_viewer);
+      EXPECT_GT(expected.at(30, 30)[1], 0.05f);
+      if (azimuth < 90) {
+        EXPECT_EQ(picture(partly_turned, to_viewer).rgba, expected.rgba);
+      }
+      EXPECT_EQ(picture(plate, Vec3::UnitZ()).rgba, expected.rgba);  // from behind: the inside of an open surface
+    }
+}
+
 TEST(Render, APartInShadowIsDarkerThanTheSamePartInTheOpen) {
   // A plate below the camera's light, with and without a smaller plate between.
   const auto plate = [](double size, double z, TriangleMesh& mesh) {

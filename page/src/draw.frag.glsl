@@ -23,7 +23,9 @@ float is_dark_cell() {
 
 void main() {
   vec3 n = normalize(seen_normal);
-  if (!gl_FrontFacing) n = -n;
+  vec3 to_eye = normalize(-seen_point);
+  // A triangle that lies upside down in the surface has the surface's normals.
+  if (!gl_FrontFacing && dot(n, to_eye) < 0.0) n = -n;
   vec3 albedo = clay;
   float lighting = 1.0;
   if (mode == 1) albedo = to_linear(texelFetch(bone_colours, ivec2(bone, 0), 0).rgb);
@@ -37,7 +39,6 @@ void main() {
     lighting = 0.0;
   }
   if (bone == lit_bone && mode < 2) albedo = mix(albedo, vec3(1.0, 0.62, 0.25), 0.16);
-  vec3 to_eye = normalize(-seen_point);
   float key = max(0.0, dot(n, normalize(vec3(-0.45, 0.7, 0.55)))), fill = max(0.0, dot(n, normalize(vec3(0.8, 0.1, 0.5))));
   float sky = 0.5 + 0.5 * n.y, rim = pow(1.0 - max(0.0, dot(n, to_eye)), 3.0);
   vec3 light = 0.30 * mix(vec3(0.55, 0.52, 0.50), vec3(1.0, 1.02, 1.06), sky) + 0.78 * key * vec3(1.0, 0.98, 0.95) +

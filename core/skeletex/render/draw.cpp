@@ -144,6 +144,9 @@ void draw_geometry(GlContext& context, const GpuSurface& surface, const SurfaceP
   glUniform1f(4, static_cast<float>(options.wire_pixels * options.samples));
   glUniform1f(5, paint.paint == Paint::kNormal ? 0.0f : static_cast<float>(options.lighting));
   glUniform3f(6, 0.02f, 0.025f, 0.03f);
+  const Vec3 eye = camera.is_orthographic ? camera.back : Vec3(camera.eye - surface.origin);
+  glUniform4f(7, static_cast<float>(eye.x()), static_cast<float>(eye.y()), static_cast<float>(eye.z()),
+              camera.is_orthographic ? 0.0f : 1.0f);
   glDrawArrays(GL_TRIANGLES, 0, 3 * surface.triangle_count);
 }
 

@@ -6,6 +6,7 @@ layout(location = 1) in vec3 colour;
 layout(location = 2) in vec3 corner_weights;
 layout(location = 3) in vec2 uv;
 layout(location = 4) flat in int picture;
+layout(location = 5) in vec3 to_eye;
 layout(std430, binding = 6) readonly buffer Pictures { ivec4 pictures[]; };  // first pixel, width, height
 layout(std430, binding = 7) readonly buffer Pixels { uint pixels[]; };       // rows from the top, sRGB
 layout(location = 2) uniform int paint;
@@ -43,7 +44,9 @@ vec3 picture_over(ivec4 p) {
 }
 
 void main() {
-  const vec3 n = normalize(gl_FrontFacing ? normal : -normal);
+  // The inside of an open surface is lit as well. A triangle that lies upside down in the surface is lit as what is
+  // around it: its normals are the surface's.
+  const vec3 n = normalize(gl_FrontFacing || dot(normal, to_eye) >= 0.0 ? normal : -normal);
   vec3 c = colour;
   if (paint == 3) {
     const vec2 width = max(fwidth(uv), vec2(1e-6));

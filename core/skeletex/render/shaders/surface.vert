@@ -11,11 +11,13 @@ layout(location = 0) uniform mat4 view_projection;
 layout(location = 1) uniform int is_flat;
 layout(location = 2) uniform int paint;  // 0 one colour, 1 per face, 2 per vertex, 3 checker, 4 normals, 5 per corner and pictures
 layout(location = 3) uniform vec3 base;
+layout(location = 7) uniform vec4 eye;  // w 0: the direction to it, of an orthographic camera
 layout(location = 0) out vec3 normal;
 layout(location = 1) out vec3 colour;
 layout(location = 2) out vec3 corner_weights;
 layout(location = 3) out vec2 uv;
 layout(location = 4) flat out int picture;
+layout(location = 5) out vec3 to_eye;
 
 vec3 position_of(int vertex) { return vec3(positions[3 * vertex], positions[3 * vertex + 1], positions[3 * vertex + 2]); }
 vec3 linear_of(uint packed_srgb) {
@@ -28,6 +30,7 @@ void main() {
   const int vertex = indices[gl_VertexID];
   const vec3 p = position_of(vertex);
   gl_Position = view_projection * vec4(p, 1.0);
+  to_eye = eye.xyz - eye.w * p;
   if (is_flat != 0) {
     const vec3 a = position_of(indices[3 * triangle]), b = position_of(indices[3 * triangle + 1]), c = position_of(indices[3 * triangle + 2]);
     normal = cross(b - a, c - a);
