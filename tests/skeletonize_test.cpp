@@ -298,6 +298,14 @@ TEST(Skeletonize, AGoodSkeletonIsNotChangedByRepair) {
   EXPECT_EQ(skeleton_to_json(repaired.skeleton), skeleton_to_json(shape.skeleton));
 }
 
+TEST(Skeletonize, AThinShellWithHandlesGetsASkeleton) {
+  const TriangleMesh mesh = read_mesh(SKELETEX_SOURCE_DIR "/build/meshes/helmet.off").mesh;
+  const Skeleton skeleton = skeletonized(mesh).skeleton;
+  EXPECT_EQ(genus_of(mesh), 3);
+  EXPECT_EQ(skeleton.bones.size() - skeleton.nodes.size() + 1, 3u);
+  EXPECT_EQ(errors_of(mesh, skeleton), "");
+}
+
 TEST(Skeletonize, BodiesOfTooManyHandlesAreRefused) {
   const TriangleMesh mesh = read_mesh(SKELETEX_SOURCE_DIR "/build/meshes/cheese.off").mesh;
   ASSERT_GT(genus_of(mesh), 100);
