@@ -11,6 +11,8 @@
 
 #include "skeletex/analysis/bone_margin.h"
 #include "skeletex/analysis/findings.h"
+#include "skeletex/analysis/manifold.h"
+#include "skeletex/analysis/metro.h"
 #include "skeletex/analysis/validate_input.h"
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/model/error.h"
@@ -19,6 +21,7 @@
 #include "skeletex/skeletonize/body/fitting_body.h"
 #include "skeletex/skeletonize/body/thinning.h"
 #include "skeletex/skeletonize/bones.h"
+#include "skeletex/skeletonize/decimate.h"
 #include "skeletex/skeletonize/repair.h"
 #include "skeletex/skeletonize/repair_skeleton.h"
 #include "support/load_model.h"
@@ -304,6 +307,15 @@ TEST(Skeletonize, AThinShellWithHandlesGetsASkeleton) {
   EXPECT_EQ(genus_of(mesh), 3);
   EXPECT_EQ(skeleton.bones.size() - skeleton.nodes.size() + 1, 3u);
   EXPECT_EQ(errors_of(mesh, skeleton), "");
+}
+
+TEST(Skeletonize, DecimatedMeshesKeepTheirShapeAndHandles) {
+  const TestModel model = load_standard_model("eight");
+  const TriangleMesh coarse = decimate(model.mesh, 200);
+  EXPECT_EQ(coarse.positions.size(), 200u);
+  EXPECT_TRUE(measure_manifold(coarse).is_closed_manifold());
+  EXPECT_EQ(genus_of(coarse), 2);
+  EXPECT_LT(symmetric_mean(measure_metro(context(), model.mesh, coarse, {.samples = 20'000})), 5e-3);
 }
 
 TEST(Skeletonize, BodiesOfTooManyHandlesAreRefused) {

@@ -16,6 +16,7 @@
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/same_file.h"
 #include "skeletex/model/error.h"
+#include "skeletex/skeletonize/decimate.h"
 
 namespace {
 

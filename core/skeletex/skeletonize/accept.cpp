@@ -9,12 +9,16 @@
 #include "skeletex/convert/segment/segment_mesh.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/skeletonize/decimate.h"
 
 namespace skeletex {
 namespace {
 
 constexpr int kTrialSize = 128;
 constexpr long kTrialSamples = 40'000;
+/// Above so many triangles, maps take most of the time; trials use so many vertices instead.
+constexpr std::size_t kMostTriangles = 350'000;
+constexpr int kTrialVertices = 75'000;
 constexpr int kMovesPerBone = 8;  // before a bone is contracted
 constexpr int kMoves = 30;        // in all, of meshes up to 30 000 triangles
 
@@ -23,6 +27,13 @@ constexpr int kMoves = 30;        // in all, of meshes up to 30 000 triangles
 void give_numbers(Skeleton& skeleton) {
   for (std::size_t n = 0; n < skeleton.nodes.size(); ++n) skeleton.nodes[n].name = fmt::format("node_{}", n);
   for (std::size_t b = 0; b < skeleton.bones.size(); ++b) skeleton.bones[b].name = fmt::format("bone_{}", b);
+}
+
+Acceptance::Acceptance(ClContext& context, const Surface& surface)
+    : context_(context), surface_(surface), cut_(cut_mesh_of(surface.mesh)) {
+  if (surface.mesh.triangles.size() <= kMostTriangles) return;
+  coarse_.emplace().mesh = decimate(surface.mesh, kTrialVertices);
+  coarse_->tree = build_triangle_tree(coarse_->mesh);
 }
 
 std::string Acceptance::segment(Repair& repair) const {
@@ -67,16 +78,23 @@ bool Acceptance::is_accepted(const Skeleton& skeleton) const {
 }
 
 Acceptance::Trial Acceptance::encode(const Skeleton& skeleton) const {
+  if (coarse_)
+    if (Trial trial = encode_mesh(coarse_->mesh, coarse_->tree, skeleton); trial.refusal.empty()) return trial;
+  return encode_mesh(surface_.mesh, surface_.tree, skeleton);
+}
+
+Acceptance::Trial Acceptance::encode_mesh(const TriangleMesh& mesh, const TriangleTree& tree,
+                                          const Skeleton& skeleton) const {
   try {
     Skeleton named = skeleton;
     give_numbers(named);
     EncodeOptions options;
     options.width = options.height = kTrialSize;
-    options.tree = &surface_.tree;
-    EncodeResult result = encode_model(context_, surface_.mesh, named, options);
+    options.tree = &tree;
+    EncodeResult result = encode_model(context_, mesh, named, options);
     result.model.skeleton.frame = {};  // that of surface_.mesh
-    const TriangleMesh mesh = reconstruct_mesh(context_, result.model);
-    return {symmetric_mean(measure_metro(context_, surface_.mesh, mesh, {.samples = kTrialSamples})), {}};
+    const TriangleMesh reconstruction = reconstruct_mesh(context_, result.model);
+    return {symmetric_mean(measure_metro(context_, mesh, reconstruction, {.samples = kTrialSamples})), {}};
   } catch (const DeviceError&) {
     throw;
   } catch (const Error& error) {

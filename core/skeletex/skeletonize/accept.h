@@ -15,8 +15,7 @@ void give_numbers(Skeleton& skeleton);
 /// Repairs a skeleton until the encoder accepts it.
 class Acceptance {
  public:
-  Acceptance(ClContext& context, const Surface& surface)
-      : context_(context), surface_(surface), cut_(cut_mesh_of(surface.mesh)) {}
+  Acceptance(ClContext& context, const Surface& surface);
 
   /// Where segmentation refuses, nodes are moved and, when that does not help, bones contracted.
   /// \return why the skeleton cannot be used; empty when it can
@@ -29,13 +28,21 @@ class Acceptance {
     double error = 0;     ///< symmetric surface mean / diagonal
     std::string refusal;  ///< empty when it was encoded
   };
-  /// The error of a model of 128 x 128 texels with that skeleton.
+  /// The error of a model of 128 x 128 texels with that skeleton. Of a large mesh, a decimated one is encoded.
   Trial encode(const Skeleton& skeleton) const;
 
  private:
+  Trial encode_mesh(const TriangleMesh& mesh, const TriangleTree& tree, const Skeleton& skeleton) const;
+
   ClContext& context_;
   const Surface& surface_;
   CutMesh cut_;
+  /// In place of a large mesh.
+  struct Coarse {
+    TriangleMesh mesh;
+    TriangleTree tree;
+  };
+  std::optional<Coarse> coarse_;
 };
 
 }  // namespace skeletex
