@@ -9,6 +9,7 @@
 #include <random>
 #include <string>
 
+#include "skeletex/convert/encode_model.h"
 #include "skeletex/convert/segment/segment_mesh.h"
 #include "support/load_model.h"
 #include "support/random_skeleton.h"
@@ -465,6 +466,21 @@ TEST(Spd, TheLowestNumberWinsAmongEqualTriangles) {
   const Chart chart = bare_chart(made.bone(), made.segment.mesh.positions, triangles);
   for (const SpdHit which : {SpdHit::kFirst, SpdHit::kLast})
     for (const int triangle : cast(made.skeleton, chart, patch_of(13, 9), which).triangles) EXPECT_LT(triangle, count);
+}
+
+TEST(Spd, FalseSurfacesAreReportedWhereRaysMeetTheSurfaceTwice) {
+  const auto false_bones = [](const char* name, Method method) {
+    const TestModel model = load_standard_model(name);
+    EncodeOptions options;
+    options.width = options.height = 128;
+    options.method = method;
+    const EncodeReport report = encode_model(context(), model.mesh, model.skeleton, options).report;
+    return std::count_if(report.bones.begin(), report.bones.end(),
+                         [&](const BoneReport& bone) { return has_false_surface(bone, report.diagonal); });
+  };
+  EXPECT_GT(false_bones("man", Method::kSpd), 0);
+  EXPECT_EQ(false_bones("man", Method::kVsm), 0);
+  EXPECT_EQ(false_bones("bear", Method::kSpd), 0);
 }
 
 }  // namespace skeletex

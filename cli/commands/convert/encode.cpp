@@ -275,6 +275,13 @@ void warn_of_result(const EncodeReport& report) {
           "{:g})\n  remedy: more texels, or a bone of its own for that part",
           bone.name, 100 * bone.distance.furthest / report.diagonal, bone.distance.place[0], bone.distance.place[1],
           bone.distance.place[2]));
+    if (has_false_surface(bone, report.diagonal))
+      warn(
+          fmt::format("bone \"{}\": its part of the model is {:.1f} % of the diagonal away from the mesh on average, "
+                      "as rays meet the "
+                      "surface more than once, and {:.1f} % at ({:g}, {:g}, {:g})\n  remedy: --method hybrid or vsm",
+                      bone.name, 100 * bone.excess.mean / report.diagonal, 100 * bone.excess.furthest / report.diagonal,
+                      bone.excess.place[0], bone.excess.place[1], bone.excess.place[2]));
     if (bone.flipped_triangles > 0)
       warn(fmt::format("bone \"{}\": {} triangles are flipped in its map", bone.name, bone.flipped_triangles));
     if (is_height_field(bone.method) && bone.unseen_area_fraction > EncodeOptions{}.hybrid_unseen_threshold)

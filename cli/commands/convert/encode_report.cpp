@@ -10,6 +10,12 @@
 namespace skeletex::cli {
 namespace {
 
+Json distance_json(const BoneDistance& distance, double diagonal) {
+  return {{"mean", distance.mean / diagonal},
+          {"furthest", distance.furthest / diagonal},
+          {"place", {distance.place[0], distance.place[1], distance.place[2]}}};
+}
+
 Json bone_json(const BoneReport& bone, double diagonal) {
   const Rectangle& r = bone.rectangle;
   Json json{{"name", bone.name},
@@ -23,10 +29,8 @@ Json bone_json(const BoneReport& bone, double diagonal) {
             {"flipped_triangles", bone.flipped_triangles},
             {"sampled_triangle_fraction", bone.sampled_triangle_fraction},
             {"missed_texels", bone.missed_texels},
-            {"distance",
-             {{"mean", bone.distance.mean / diagonal},
-              {"furthest", bone.distance.furthest / diagonal},
-              {"place", {bone.distance.place[0], bone.distance.place[1], bone.distance.place[2]}}}}};
+            {"distance", distance_json(bone.distance, diagonal)}};
+  if (is_height_field(bone.method)) json["excess"] = distance_json(bone.excess, diagonal);
   if (!is_height_field(bone.method))
     json[to_string(bone.method)] = {{"iterations", bone.map.iterations},
                                     {"spread", bone.map.spread},

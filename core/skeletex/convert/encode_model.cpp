@@ -320,6 +320,15 @@ Encoding encode_hybrid(const EncodeJob& job, const SkeletexModel& start, MappedS
   return std::move(pure);
 }
 
+/// Of height fields how far the model is from the input, per bone.
+std::vector<BoneDistance> excess_of(const EncodeJob& job, const Encoding& encoding) {
+  if (std::none_of(encoding.methods.begin(), encoding.methods.end(), is_height_field))
+    return std::vector<BoneDistance>(encoding.methods.size());
+  const PreparedModel prepared(encoding.model);
+  return distances_to_surface(job.context, encoding.model, prepared.lattice,
+                              reconstruct_bind_mesh(job.context, prepared).mesh, job.mesh, job.tree);
+}
+
 void report_result(const EncodeJob& job, const Encoding& encoding, const MappedSurface& surface, EncodeReport& report) {
   const SkeletexModel& model = encoding.model;
   const TexelReport& texels = encoding.texels;
@@ -343,6 +352,7 @@ void report_result(const EncodeJob& job, const Encoding& encoding, const MappedS
     distances = distances_from_bones(job.context, surface.charts, decoded, build_triangle_tree(decoded),
                                      kNearEnough * model.diagonal);
   }
+  const std::vector<BoneDistance> excess = excess_of(job, encoding);
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
     const Segment& segment = surface.segmentation.segments[bone];
     BoneReport entry;
@@ -359,6 +369,10 @@ void report_result(const EncodeJob& job, const Encoding& encoding, const MappedS
     entry.missed_texels = texels.missed_texels[bone];
     entry.distance = distances[bone];
     entry.distance.place = model.skeleton.frame.to_user(distances[bone].place);
+    if (is_height_field(entry.method)) {
+      entry.excess = excess[bone];
+      entry.excess.place = model.skeleton.frame.to_user(excess[bone].place);
+    }
     entry.map = surface.reports[bone];
     report.bones.push_back(std::move(entry));
   }

@@ -69,6 +69,8 @@ struct BoneReport {
   double sampled_triangle_fraction = 0;  ///< share of the segment's triangles that a texel reads
   int missed_texels = 0;                 ///< SPD rays that hit nothing, filled from their neighbours
   BoneDistance distance;  ///< of its surface to the decoded mesh, in the unit frame; its place is the user's
+  /// Of height fields: of the decoded mesh to the surface, likewise.
+  BoneDistance excess;
   MapReport map;
 };
 
@@ -77,6 +79,10 @@ struct BoneReport {
 inline bool lacks_part(const BoneReport& bone, double diagonal) {
   return bone.distance.furthest > 10 * bone.distance.median && bone.distance.furthest > 0.005 * diagonal;
 }
+
+/// Whether a bone's part of the model is a false surface: it is three thousandths of the diagonal away on average. Rays
+/// that meet the surface more than once make such.
+inline bool has_false_surface(const BoneReport& bone, double diagonal) { return bone.excess.mean > 0.003 * diagonal; }
 
 struct EncodeReport {
   int vertices = 0, triangles = 0, genus = 0;
