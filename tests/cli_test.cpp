@@ -291,6 +291,7 @@ TEST_F(Program, ExportsACoarseMeshWithItsDisplacement) {
   EXPECT_EQ(pictures.size(), 4u);
   expect_refused(2, {"export", "y.skx.exr", "-o", "no.glb", "--displacement", "no.exr", "--displacement-for", "max"},
                  {"max", "maya"});
+  expect_refused(2, {"export", "y.skx.exr", "-o", "no.glb", "--displacement-for", "maya"}, {"--displacement"});
   expect_refused(2, {"export", "y.skx.exr", "-o", "no.glb", "--displacement", "no.png"}, {"no.png", ".exr"});
   expect_refused(2, {"export", "y.skx.exr", "-o", "no.glb", "--displacement", "y.skx.exr"}, {"y.skx.exr", "MODEL"});
   for (const char* name : {"rig.glb", "rig.exr"}) fs::remove(folder_ / name);

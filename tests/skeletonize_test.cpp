@@ -21,7 +21,7 @@
 #include "skeletex/skeletonize/body/fitting_body.h"
 #include "skeletex/skeletonize/body/thinning.h"
 #include "skeletex/skeletonize/bones.h"
-#include "skeletex/skeletonize/decimate.h"
+#include "skeletex/skeletonize/coarse_mesh.h"
 #include "skeletex/skeletonize/repair.h"
 #include "skeletex/skeletonize/repair_skeleton.h"
 #include "support/load_model.h"
@@ -309,9 +309,21 @@ TEST(Skeletonize, AThinShellWithHandlesGetsASkeleton) {
   EXPECT_EQ(errors_of(mesh, skeleton), "");
 }
 
-TEST(Skeletonize, DecimatedMeshesKeepTheirShapeAndHandles) {
+TEST(Skeletonize, LargeMeshesAreTriedCoarseAndAcceptedWhole) {
+  const TriangleMesh mesh = capsule_shape(2, 0.5, 500, 360).mesh;
+  ASSERT_GT(mesh.triangles.size(), 350'000u);
+  const SkeletonizeResult result = skeletonized(mesh);
+  EXPECT_EQ(errors_of(mesh, result.skeleton), "");
+  for (const SkeletonCandidate& candidate : result.candidates) {
+    EXPECT_EQ(candidate.refusal, "") << candidate.name;
+    EXPECT_GT(candidate.error, 0) << candidate.name;
+    EXPECT_LT(candidate.error, 1e-3) << candidate.name;
+  }
+}
+
+TEST(Skeletonize, CoarseMeshesKeepTheirShapeAndHandles) {
   const TestModel model = load_standard_model("eight");
-  const TriangleMesh coarse = decimate(model.mesh, 200);
+  const TriangleMesh coarse = make_coarse_mesh(model.mesh, 200);
   EXPECT_EQ(coarse.positions.size(), 200u);
   EXPECT_TRUE(measure_manifold(coarse).is_closed_manifold());
   EXPECT_EQ(genus_of(coarse), 2);

@@ -16,7 +16,6 @@
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/same_file.h"
 #include "skeletex/model/error.h"
-#include "skeletex/skeletonize/decimate.h"
 
 namespace {
 

@@ -5,6 +5,10 @@
 /// Other ways to bring a mesh to a given number of vertices, which the experiments compare reconstructions with.
 namespace skeletex {
 
+/// OpenMesh's decimater with quadrics (Garland and Heckbert 1997): collapses the cheapest halfedges. Closed manifolds
+/// stay such.
+TriangleMesh decimate(const TriangleMesh& mesh, int vertices);
+
 /// meshoptimizer's quadric simplification. It may stop earlier, and may leave edges with more than two triangles.
 TriangleMesh simplify(const TriangleMesh& mesh, int vertices);
 

@@ -278,8 +278,8 @@ void warn_of_result(const EncodeReport& report) {
     if (has_false_surface(bone, report.diagonal))
       warn(
           fmt::format("bone \"{}\": its part of the model is {:.1f} % of the diagonal away from the mesh on average, "
-                      "as rays meet the "
-                      "surface more than once, and {:.1f} % at ({:g}, {:g}, {:g})\n  remedy: --method hybrid or vsm",
+                      "and {:.1f} % at "
+                      "({:g}, {:g}, {:g})\n  remedy: --method hybrid or vsm, or more texels",
                       bone.name, 100 * bone.excess.mean / report.diagonal, 100 * bone.excess.furthest / report.diagonal,
                       bone.excess.place[0], bone.excess.place[1], bone.excess.place[2]));
     if (bone.flipped_triangles > 0)

@@ -30,8 +30,9 @@ Json bone_json(const BoneReport& bone, double diagonal) {
             {"sampled_triangle_fraction", bone.sampled_triangle_fraction},
             {"missed_texels", bone.missed_texels},
             {"distance", distance_json(bone.distance, diagonal)}};
-  if (is_height_field(bone.method)) json["excess"] = distance_json(bone.excess, diagonal);
-  if (!is_height_field(bone.method))
+  if (is_height_field(bone.method))
+    json["excess"] = distance_json(bone.excess, diagonal);
+  else
     json[to_string(bone.method)] = {{"iterations", bone.map.iterations},
                                     {"spread", bone.map.spread},
                                     {"solver_steps", bone.map.solver_steps},

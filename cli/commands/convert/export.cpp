@@ -170,20 +170,23 @@ void add_export_command(CLI::App& program) {
       ->type_name("N");
   take_one_of(*command.add_option("--up", arguments->up, "axis of the model that is up; y is in glTF (default: y)"),
               {"x", "y", "z", "-x", "-y", "-z"});
-  declare_output(
-      command,
-      command.add_option("--displacement", arguments->displacement,
-                         "write the mesh coarse (--lod, default 64), and beside it a picture of the vectors to the "
-                         "model's own surface: .exr"),
-      {".exr"})
-      ->type_name("FILE")
-      ->excludes("--texture");
-  take_one_of(*command.add_option(
-                  "--displacement-for", arguments->displacement_for,
-                  "how the picture has its vectors. blender: object space, z up, as its Displace modifier takes them "
-                  "(default); object: object space, y up; maya, arnold: tangent space, as tangent, normal, bitangent; "
-                  "materialx: tangent space, as tangent, bitangent, normal"),
-              {"blender", "object", "maya", "arnold", "materialx"});
+  CLI::Option* displacement =
+      declare_output(
+          command,
+          command.add_option("--displacement", arguments->displacement,
+                             "write the mesh coarse (--lod, default 64), and beside it a picture of the vectors to the "
+                             "model's own surface: .exr"),
+          {".exr"})
+          ->type_name("FILE")
+          ->excludes("--texture");
+  take_one_of(
+      *command
+           .add_option("--displacement-for", arguments->displacement_for,
+                       "what the vectors of the picture refer to. blender: object space, z up, as its Displace "
+                       "modifier takes them (default); object: object space, y up; maya, arnold: tangent space, "
+                       "as tangent, normal, bitangent; materialx: tangent space, as tangent, bitangent, normal")
+           ->needs(displacement),
+      {"blender", "object", "maya", "arnold", "materialx"});
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(

@@ -51,7 +51,8 @@ Exit first_exit(const TriangleMesh& mesh, const TriangleTree& tree, const std::a
 }  // namespace
 
 BoneMargin margin_of_bone(const TriangleMesh& mesh, const TriangleTree& tree, const Skeleton& skeleton,
-                          const std::vector<std::vector<BoneAtNode>>& at_nodes, int bone, int angles, double enough) {
+                          const std::vector<std::vector<BoneAtNode>>& at_nodes, int bone, int angles,
+                          double stop_below) {
   BoneMargin result;
   const std::array<Vec3, 2> ends{end_position(skeleton, bone, BoneEnd::kHead),
                                  end_position(skeleton, bone, BoneEnd::kTail)};
@@ -76,7 +77,7 @@ BoneMargin margin_of_bone(const TriangleMesh& mesh, const TriangleTree& tree, co
     result.margin = 1 - exit.rho * closing;
     result.end = exit.end == 0 ? BoneEnd::kHead : BoneEnd::kTail;
     result.point = ends[exit.end] + exit.rho * along[exit.end];
-    if (result.margin < enough) break;
+    if (result.margin < stop_below) break;
   }
   result.lean = lean;
   return result;

@@ -25,13 +25,13 @@ struct BoneMargin {
   double lean = 1;  ///< mean of sqrt(1 + k^2): how much longer the planes are than planes across the bone
 };
 
-/// \param at_nodes  of the skeleton (bones_at_nodes)
-/// \param angles    number of rays per end, evenly around the bone
-/// \param enough    further angles are left out once the margin is below
+/// \param at_nodes    of the skeleton (bones_at_nodes)
+/// \param angles      number of rays per end, evenly around the bone
+/// \param stop_below  further angles are left out once the margin is below
 /// \pre the bone has a length and lies inside the body; directions at its nodes differ
 BoneMargin margin_of_bone(const TriangleMesh& mesh, const TriangleTree& tree, const Skeleton& skeleton,
                           const std::vector<std::vector<BoneAtNode>>& at_nodes, int bone, int angles = 24,
-                          double enough = -std::numeric_limits<double>::infinity());
+                          double stop_below = -std::numeric_limits<double>::infinity());
 
 /// Of all bones, on all processors.
 std::vector<BoneMargin> bone_margins(const TriangleMesh& mesh, const TriangleTree& tree, const Skeleton& skeleton,

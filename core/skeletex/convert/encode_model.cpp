@@ -320,15 +320,6 @@ Encoding encode_hybrid(const EncodeJob& job, const SkeletexModel& start, MappedS
   return std::move(pure);
 }
 
-/// Of height fields how far the model is from the input, per bone.
-std::vector<BoneDistance> excess_of(const EncodeJob& job, const Encoding& encoding) {
-  if (std::none_of(encoding.methods.begin(), encoding.methods.end(), is_height_field))
-    return std::vector<BoneDistance>(encoding.methods.size());
-  const PreparedModel prepared(encoding.model);
-  return distances_to_surface(job.context, encoding.model, prepared.lattice,
-                              reconstruct_bind_mesh(job.context, prepared).mesh, job.mesh, job.tree);
-}
-
 void report_result(const EncodeJob& job, const Encoding& encoding, const MappedSurface& surface, EncodeReport& report) {
   const SkeletexModel& model = encoding.model;
   const TexelReport& texels = encoding.texels;
@@ -344,15 +335,17 @@ void report_result(const EncodeJob& job, const Encoding& encoding, const MappedS
   report.fit = texels.fit;
   report.rounding = texels.rounding;
   report.revert = texels.revert;
-  std::vector<BoneDistance> distances;
-  if (texels.revert) {
-    distances = texels.revert->distances;
-  } else {
-    const TriangleMesh decoded = reconstruct_bind_mesh(job.context, PreparedModel(model)).mesh;
-    distances = distances_from_bones(job.context, surface.charts, decoded, build_triangle_tree(decoded),
-                                     kNearEnough * model.diagonal);
+  const bool has_heights = std::any_of(encoding.methods.begin(), encoding.methods.end(), is_height_field);
+  std::vector<BoneDistance> distances, excess;
+  if (texels.revert) distances = texels.revert->distances;
+  if (!texels.revert || has_heights) {
+    const PreparedModel prepared(model);
+    const TriangleMesh decoded = reconstruct_bind_mesh(job.context, prepared).mesh;
+    if (!texels.revert)
+      distances = distances_from_bones(job.context, surface.charts, decoded, build_triangle_tree(decoded),
+                                       kNearEnough * model.diagonal);
+    if (has_heights) excess = distances_to_surface(job.context, model, prepared.lattice, decoded, job.mesh, job.tree);
   }
-  const std::vector<BoneDistance> excess = excess_of(job, encoding);
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
     const Segment& segment = surface.segmentation.segments[bone];
     BoneReport entry;

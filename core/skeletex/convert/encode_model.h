@@ -80,8 +80,8 @@ inline bool lacks_part(const BoneReport& bone, double diagonal) {
   return bone.distance.furthest > 10 * bone.distance.median && bone.distance.furthest > 0.005 * diagonal;
 }
 
-/// Whether a bone's part of the model is a false surface: it is three thousandths of the diagonal away on average. Rays
-/// that meet the surface more than once make such.
+/// Whether a bone's part of the model is a false surface: it is more than three thousandths of the diagonal away from
+/// the mesh on average, as where rays of SPD meet the surface more than once.
 inline bool has_false_surface(const BoneReport& bone, double diagonal) { return bone.excess.mean > 0.003 * diagonal; }
 
 struct EncodeReport {

@@ -9,7 +9,7 @@
 #include "skeletex/convert/segment/segment_mesh.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
-#include "skeletex/skeletonize/decimate.h"
+#include "skeletex/skeletonize/coarse_mesh.h"
 
 namespace skeletex {
 namespace {
@@ -32,7 +32,7 @@ void give_numbers(Skeleton& skeleton) {
 Acceptance::Acceptance(ClContext& context, const Surface& surface)
     : context_(context), surface_(surface), cut_(cut_mesh_of(surface.mesh)) {
   if (surface.mesh.triangles.size() <= kMostTriangles) return;
-  coarse_.emplace().mesh = decimate(surface.mesh, kTrialVertices);
+  coarse_.emplace().mesh = make_coarse_mesh(surface.mesh, kTrialVertices);
   coarse_->tree = build_triangle_tree(coarse_->mesh);
 }
 

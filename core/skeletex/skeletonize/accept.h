@@ -28,7 +28,7 @@ class Acceptance {
     double error = 0;     ///< symmetric surface mean / diagonal
     std::string refusal;  ///< empty when it was encoded
   };
-  /// The error of a model of 128 x 128 texels with that skeleton. Of a large mesh, a decimated one is encoded.
+  /// The error of a model of 128 x 128 texels with that skeleton. In place of a large mesh, a coarse one is encoded.
   Trial encode(const Skeleton& skeleton) const;
 
  private:

@@ -71,8 +71,9 @@ double Repair::cost(const Skeleton& skeleton, const std::vector<std::vector<Bone
   double sum = 0;
   for (const int bone : bones) {
     if (sum > limit) break;
-    const double enough = kGoodMargin - std::sqrt(limit - sum) - 1e-9;  // the cost is above the limit below
-    const BoneMargin margin = margin_of_bone(surface_.mesh, surface_.tree, skeleton, at_nodes, bone, kAngles, enough);
+    const double stop_below = kGoodMargin - std::sqrt(limit - sum) - 1e-9;  // below it the cost is above the limit
+    const BoneMargin margin =
+        margin_of_bone(surface_.mesh, surface_.tree, skeleton, at_nodes, bone, kAngles, stop_below);
     const double lack = std::max(0.0, kGoodMargin - margin.margin);
     const double radius = radii_[skeleton.bones[bone].head] + radii_[skeleton.bones[bone].tail];
     sum += lack * lack + kReachWeight * margin.lean * radius / surface_.diagonal;

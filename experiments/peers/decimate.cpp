@@ -1,15 +1,26 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/skeletonize/decimate.h"
-
+#include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <OpenMesh/Tools/Decimater/DecimaterT.hh>
 #include <OpenMesh/Tools/Decimater/ModQuadricT.hh>
 
-#include "skeletex/geometry/half_edge.h"
+#include "simplify.h"
 
 namespace skeletex {
+namespace {
+
+struct DoubleTraits : OpenMesh::DefaultTraits {
+  using Point = OpenMesh::Vec3d;
+  using Normal = OpenMesh::Vec3d;
+};
+using HalfEdgeMesh = OpenMesh::TriMesh_ArrayKernelT<DoubleTraits>;
+
+}  // namespace
 
 TriangleMesh decimate(const TriangleMesh& mesh, int vertices) {
-  HalfEdgeMesh half_edges = build_half_edges(mesh);
+  HalfEdgeMesh half_edges;
+  std::vector<HalfEdgeMesh::VertexHandle> handles;
+  for (const Vec3& p : mesh.positions) handles.push_back(half_edges.add_vertex({p.x(), p.y(), p.z()}));
+  for (const Triangle& t : mesh.triangles) half_edges.add_face(handles[t[0]], handles[t[1]], handles[t[2]]);
   OpenMesh::Decimater::DecimaterT<HalfEdgeMesh> decimater(half_edges);
   OpenMesh::Decimater::ModQuadricT<HalfEdgeMesh>::Handle quadrics;
   decimater.add(quadrics);
