@@ -11,9 +11,10 @@ namespace skeletex::cli {
 namespace {
 
 constexpr std::array kOptions{"--max-error", "--max-bytes", "--quality"};
+constexpr const char* kLayerSteps = "--layer-steps";
 
-/// A compact file holds shape and skeleton alone.
-void warn_of_losses(const SkeletexModel& model, const std::string& path) {
+/// What of the model the file does not hold.
+void warn_of_losses(const SkeletexModel& model, int layer_steps, const std::string& path) {
   std::vector<std::string> lost;
   bool has_normals = false;
   for (const Layer& layer : model.layers)
@@ -22,8 +23,8 @@ void warn_of_losses(const SkeletexModel& model, const std::string& path) {
     else
       lost.push_back(fmt::format("layer \"{}\"", layer.name));
   if (!model.bone_weights.empty()) lost.emplace_back("painted weights");
-  if (!lost.empty())
-    warn(fmt::format("{}: a compact file holds the shape alone; left out: {}", path, fmt::join(lost, ", ")));
+  if (layer_steps == 0 && !lost.empty())
+    warn(fmt::format("{}: {} 0 leaves out: {}", path, kLayerSteps, fmt::join(lost, ", ")));
   if (has_normals) warn(fmt::format("{}: normals are left out, and derived from the shape", path));
 }
 
@@ -50,6 +51,13 @@ void add_compact_options(CLI::App& command, CompactArguments& arguments) {
                         ->check(number_in(0.0, 100.0))
                         ->type_name("X")
                         ->default_str(""));
+  command
+      .add_option(kLayerSteps, arguments.layer_steps,
+                  "of a .skx: steps between the least and the largest value of a layer (colours, numbers, painted "
+                  "weights), 0 to 65536; 0 leaves them out")
+      ->check(number_in(0, 65536))
+      ->type_name("N")
+      ->group("Compact file");
   for (CLI::Option* option : options) {
     option->group("Compact file");
     for (CLI::Option* other : options)
@@ -58,7 +66,8 @@ void add_compact_options(CLI::App& command, CompactArguments& arguments) {
 }
 
 bool has_compact_option(const CLI::App& command) {
-  return std::any_of(kOptions.begin(), kOptions.end(), [&](const char* name) { return command.count(name) > 0; });
+  return command.count(kLayerSteps) > 0 ||
+         std::any_of(kOptions.begin(), kOptions.end(), [&](const char* name) { return command.count(name) > 0; });
 }
 
 bool is_compact_path(const std::string& path) { return has_ending(path, ".skx"); }
@@ -67,6 +76,7 @@ Json write_compact(ClContext& context, const SkeletexModel& model, const Triangl
                    const CompactArguments& arguments, const CLI::App& command, int size, const std::string& path) {
   CompactGoal goal;
   goal.size = size;
+  goal.layer_steps = arguments.layer_steps;
   if (command.count(kOptions[2]) > 0)
     goal.quality = arguments.quality;
   else if (command.count(kOptions[1]) > 0)
@@ -75,7 +85,7 @@ Json write_compact(ClContext& context, const SkeletexModel& model, const Triangl
     goal.max_error = arguments.max_error;
   const CompactResult result = search_compact(context, model, reference, goal);
   write_text_atomically(path, result.bytes);
-  warn_of_losses(model, path);
+  warn_of_losses(model, arguments.layer_steps, path);
   return {{"path", path},
           {"kind", "compact model"},
           {"bytes", result.bytes.size()},

@@ -12,6 +12,7 @@ namespace skeletex::cli {
 struct CompactArguments {
   double max_error = 1e-4, quality = 50;
   long max_bytes = 0;
+  int layer_steps = 64;
 };
 /// --max-error, --max-bytes and --quality, of which one may be given.
 void add_compact_options(CLI::App& command, CompactArguments& arguments);

@@ -12,8 +12,10 @@
 #include "skeletex/io/compact/compact_model_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/layers/layer_values.h"
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/reconstruct/skin.h"
 #include "skeletex/skeleton/pose.h"
 #include "support/corrupted.h"
 #include "support/mesh_topology.h"
@@ -36,17 +38,43 @@ const std::map<std::string, Skeleton>& skeletons() {
   return all;
 }
 
+/// Numbers and colours that follow from the place, within their ranges.
+float heat_at(const Vec3& point) { return static_cast<float>(100 + 30 * point.x() - 20 * point.y()); }
+Colour colour_at(const Vec3& point) {
+  const Vec3 c = (Vec3(0.5, 0.4, 0.3) + 0.2 * point).cwiseMax(0.1).cwiseMin(0.9);
+  return {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), 1};
+}
+
+SkeletexModel with_layers(SkeletexModel model) {
+  const PreparedModel prepared(model);
+  MeshAttributes attributes;
+  attributes.numbers.push_back({"heat", {}});
+  for (const Vec3& point : lattice_positions(context(), prepared)) {
+    attributes.numbers[0].values.push_back(heat_at(point));
+    attributes.colours.values.push_back(colour_at(point));
+  }
+  model.layers = layers_of_vertices(prepared, attributes);
+  model.bone_weights = weight_planes(context(), prepared);
+  return model;
+}
+
+constexpr const char* kWithLayers = "branch with layers";
+
 const SkeletexModel& source_of(const std::string& name) {
   static std::map<std::string, SkeletexModel> models;
   const auto found = models.find(name);
   if (found != models.end()) return found->second;
-  const SyntheticSurface surface(skeletons().at(name), 0.2);
-  SkeletexModel model = surface.model({skeletons().at(name).bones.size(), {96, 96}});
+  const bool has_layers = name == kWithLayers;
+  const Skeleton& skeleton = skeletons().at(has_layers ? "branch" : name);
+  const SyntheticSurface surface(skeleton, 0.2);
+  SkeletexModel model = surface.model({skeleton.bones.size(), {96, 96}});
+  if (has_layers) model = with_layers(std::move(model));
   return models.emplace(name, std::move(model)).first->second;
 }
 
-CompactResult pack(const std::string& name, double max_error, std::size_t max_bytes, int size) {
+CompactResult pack(const std::string& name, double max_error, std::size_t max_bytes, int size, int layer_steps = 64) {
   CompactGoal goal;
+  goal.layer_steps = layer_steps;
   if (max_error > 0) goal.max_error = max_error;
   if (max_bytes > 0) goal.max_bytes = max_bytes;
   goal.size = size;
@@ -70,7 +98,8 @@ TEST_P(Compact, ReachesTheWantedErrorWithASmallFile) {
   const SkeletexModel decoded = decode_model(read_compact(result.bytes, "file"));
   EXPECT_LE(mean_distance(source_of(GetParam()), decoded), 3.2e-4);
   EXPECT_LE(result.max, 3e-2);
-  EXPECT_LT(result.bytes.size(), 700 * skeletons().at(GetParam()).bones.size());
+  const std::size_t per_bone = GetParam() == kWithLayers ? 4000 : 700;
+  EXPECT_LT(result.bytes.size(), per_bone * source_of(GetParam()).skeleton.bones.size());
 }
 
 TEST_P(Compact, IsClosedAndOfTheGenusAtEverySizeAndInAPose) {
@@ -139,7 +168,7 @@ TEST_P(Compact, RefusesDamageBehindTheCompression) {
   ByteReader head(std::string_view(bytes).substr(13));
   const std::size_t size = head.count(1 << 30);
   const std::string payload = decompress(std::string_view(bytes).substr(bytes.size() - head.left()), size, false);
-  for_each_corruption(payload, 300, 8, [&](const std::string& damaged) {
+  for_each_corruption(payload, GetParam() == kWithLayers ? 50 : 300, 8, [&](const std::string& damaged) {
     ByteWriter body;
     body.count(damaged.size());
     try {
@@ -152,12 +181,56 @@ TEST_P(Compact, RefusesDamageBehindTheCompression) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Skeletons, Compact,
-                         ::testing::Values("lone", "chain", "branch", "cross", "ring", "ring with an arm"),
+                         ::testing::Values("lone", "chain", "branch", "cross", "ring", "ring with an arm", kWithLayers),
                          [](const auto& test) {
                            std::string name = test.param;
                            std::replace(name.begin(), name.end(), ' ', '_');
                            return name;
                          });
+
+/// Of values at the vertices, within a step of the range.
+TEST(CompactLayers, FollowTheSurface) {
+  const SkeletexModel model = decode_model(read_compact(packed(kWithLayers).bytes, "file"));
+  const PreparedModel prepared(model);
+  const MeshAttributes attributes = vertex_attributes(prepared);
+  ASSERT_EQ(attributes.numbers.size(), 1u);
+  EXPECT_EQ(attributes.numbers[0].name, "heat");
+  ASSERT_EQ(attributes.colours.values.size(), attributes.numbers[0].values.size());
+  const UnitFrame& frame = model.skeleton.frame;
+  const std::vector<Vec3> points = lattice_positions(context(), prepared);
+  const auto [least, most] =
+      std::minmax_element(attributes.numbers[0].values.begin(), attributes.numbers[0].values.end());
+  const float step = (*most - *least) / 64;
+  ASSERT_GT(step, 0.1);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vec3 point = frame.to_user(points[i]);
+    EXPECT_NEAR(attributes.numbers[0].values[i], heat_at(point), 1.5 * step) << i;
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(attributes.colours.values[i][k], colour_at(point)[k], 0.05) << i;
+  }
+  const std::vector<std::vector<float>> weights = weight_planes(context(), prepared);
+  ASSERT_EQ(model.bone_weights.size(), weights.size());
+  const Rectangle& r = model.patches[0].rectangle;
+  for (std::size_t bone = 0; bone < weights.size(); ++bone)
+    for (int row = 1; row + 1 < r.height; ++row)
+      for (int column = 0; column < r.width; ++column) {
+        const std::size_t texel = static_cast<std::size_t>(r.y + row) * model.texture.width + r.x + column;
+        EXPECT_NEAR(model.bone_weights[bone][texel], weights[bone][texel], 0.06);
+      }
+}
+
+TEST(CompactLayers, AreLeftOutWhenAskedAndCountAsBytes) {
+  const CompactResult without = pack(kWithLayers, 3e-4, 0, 128, 0);
+  EXPECT_LT(without.bytes.size(), packed(kWithLayers).bytes.size());
+  const SkeletexModel model = decode_model(read_compact(without.bytes, "file"));
+  EXPECT_TRUE(model.layers.empty());
+  EXPECT_TRUE(model.bone_weights.empty());
+  EXPECT_EQ(without.bytes, packed("branch").bytes);
+  const std::size_t wanted = 2 * packed(kWithLayers).bytes.size() / 3;
+  const CompactResult bounded = pack(kWithLayers, 0, wanted, 128, 16);
+  EXPECT_LE(bounded.bytes.size(), wanted);
+  EXPECT_EQ(decode_model(read_compact(bounded.bytes, "file")).layers.size(), 2u);
+  EXPECT_THROW(pack(kWithLayers, 0, 700, 128, 64), InputError);
+}
 
 TEST(CompactSearch, KeepsToANumberOfBytesAndBreaksNoWish) {
   std::size_t last = 0;

@@ -200,9 +200,9 @@ struct SurfaceStatistics {
   DistanceStatistics distances;
   NormalStatistics normals;
 };
-/// \param own, other  of the surface that the samples lie on, and of the one that is searched
-SurfaceStatistics measure_surface(DistanceSearch& search, const SurfaceSamples& samples, const MeshNormals& own,
-                                  const MeshNormals& other, double unit) {
+/// \param own, other  of the surface that the samples lie on, and of the one that is searched; null: no angles
+SurfaceStatistics measure_surface(DistanceSearch& search, const SurfaceSamples& samples, const MeshNormals* own,
+                                  const MeshNormals* other, double unit) {
   Accumulator accumulator;
   AngleCounter surface, shading;
   std::vector<Vec3> points;
@@ -216,10 +216,11 @@ SurfaceStatistics measure_surface(DistanceSearch& search, const SurfaceSamples& 
     samples.write(first, points, places);
     search.find(points, distances, feet);
     accumulator.add(distances);
+    if (own == nullptr) continue;
     for_each_block(points.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i)
-        angles[i] = {static_cast<float>(angle_between(own.of_triangle(places[i]), other.of_triangle(feet[i]))),
-                     static_cast<float>(angle_between(own.for_shading(places[i]), other.for_shading(feet[i])))};
+        angles[i] = {static_cast<float>(angle_between(own->of_triangle(places[i]), other->of_triangle(feet[i]))),
+                     static_cast<float>(angle_between(own->for_shading(places[i]), other->for_shading(feet[i])))};
     });
     for (const auto& [of_surface, of_shading] : angles) surface.add(of_surface), shading.add(of_shading);
   }
@@ -244,6 +245,18 @@ std::vector<double> distances_in_order(DistanceSearch& search, std::span<const V
 
 }  // namespace
 
+double measure_symmetric_mean(ClContext& context, const TriangleMesh& a, const TriangleMesh& b, long samples) {
+  check_mesh(a, "the first mesh");
+  check_mesh(b, "the second mesh");
+  DistanceSearch search_a(context, a), search_b(context, b);
+  const double diagonal = bounding_box(a).diagonal();
+  const SurfaceSamples samples_a(a, search_a.order(), samples, "the first mesh"),
+      samples_b(b, search_b.order(), samples, "the second mesh");
+  return (measure_surface(search_b, samples_a, nullptr, nullptr, diagonal).distances.mean +
+          measure_surface(search_a, samples_b, nullptr, nullptr, diagonal).distances.mean) /
+         2;
+}
+
 MetroReport measure_metro(ClContext& context, const TriangleMesh& a, const TriangleMesh& b,
                           const MetroOptions& options) {
   const auto start = std::chrono::steady_clock::now();
@@ -265,10 +278,10 @@ MetroReport measure_metro(ClContext& context, const TriangleMesh& a, const Trian
   const MeshNormals normals_a(a, options.normals_a), normals_b(b, options.normals_b);
   const SurfaceStatistics forward =
                               measure_surface(search_b, SurfaceSamples(a, search_a.order(), count, "the first mesh"),
-                                              normals_a, normals_b, report.diagonal),
+                                              &normals_a, &normals_b, report.diagonal),
                           backward =
                               measure_surface(search_a, SurfaceSamples(b, search_b.order(), count, "the second mesh"),
-                                              normals_b, normals_a, report.diagonal);
+                                              &normals_b, &normals_a, report.diagonal);
   report.forward = forward.distances, report.forward_normals = forward.normals;
   report.backward = backward.distances, report.backward_normals = backward.normals;
   const std::vector<double> distances = distances_in_order(search_b, a.positions);

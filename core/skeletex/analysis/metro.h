@@ -52,6 +52,11 @@ inline double symmetric_mean(const MetroReport& report) { return (report.forward
 MetroReport measure_metro(ClContext& context, const TriangleMesh& a, const TriangleMesh& b,
                           const MetroOptions& options = {});
 
+/// symmetric_mean of that report alone, without what it costs to compare normals and vertices.
+/// \param samples  points on each surface, at least 1
+/// \throw InputError as above
+double measure_symmetric_mean(ClContext& context, const TriangleMesh& a, const TriangleMesh& b, long samples);
+
 /// Distance from each point to the nearest point of the mesh, as exact as above, world units. The points may come in
 /// any order.
 /// \throw InputError as above, or when a point is not finite

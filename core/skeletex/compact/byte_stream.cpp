@@ -112,13 +112,10 @@ std::string ByteReader::text(std::size_t most) {
 
 std::string compress(std::string_view bytes) {
   std::string best;
-  for (const int pb : {0})
-    for (const int lp : {0})
-      for (int lc = 0; lc + lp <= 4; ++lc) {
-        const int settings = lc + 5 * lp + 25 * pb;
-        std::string packed = static_cast<char>(settings) + compress_with(bytes, settings);
-        if (best.empty() || packed.size() < best.size()) best = std::move(packed);
-      }
+  for (int lc = 0; lc <= 4; ++lc) {  // lp and pb are 0: the bytes do not come in groups
+    std::string packed = static_cast<char>(lc) + compress_with(bytes, lc);
+    if (best.empty() || packed.size() < best.size()) best = std::move(packed);
+  }
   return best;
 }
 

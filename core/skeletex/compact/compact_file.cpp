@@ -11,6 +11,7 @@
 #include <cmath>
 
 #include "skeletex/compact/byte_stream.h"
+#include "skeletex/compact/layer_planes.h"
 #include "skeletex/compact/skeleton_code.h"
 #include "skeletex/model/error.h"
 
@@ -20,7 +21,8 @@ namespace {
 constexpr std::string_view kMagic = "\x8fSKX";
 constexpr std::size_t kHeader = 13;  // magic, version, checksum
 /// Limits of what a file may hold: every size is checked against them before memory is taken.
-constexpr std::uint64_t kMostBones = 4096, kMostName = 4096, kMostSteps = 28, kMostPayload = std::uint64_t{1} << 30;
+constexpr std::uint64_t kMostBones = 4096, kMostName = 4096, kMostSteps = 28, kMostLayers = 1024,
+                        kMostPayload = std::uint64_t{1} << 30;
 constexpr std::int64_t kMostPosition = std::int64_t{1} << 40, kMostInteger = 1 << 24;
 constexpr double kMostPoints = 16384.0 * 16384.0;
 
@@ -177,12 +179,16 @@ void read_patches(ByteReader& in, CompactModel& model) {
   }
 }
 
-/// How many values a step has.
-std::size_t site_count(const CompactPatch& patch, int step) {
+/// How many points a step adds.
+/// \param is_inner  whether those of the ends' rows do not count
+std::size_t added_count(const CompactPatch& patch, int step, bool is_inner) {
   std::size_t columns = patch.columns, intervals = patch.intervals;
   for (int i = 0; i < step; ++i) ((patch.row_steps >> i & 1) != 0 ? intervals : columns) *= 2;
-  return (patch.row_steps >> step & 1) != 0 ? intervals * columns : (intervals - 1) * columns;
+  if ((patch.row_steps >> step & 1) != 0) return intervals * columns;
+  return (is_inner ? intervals - 1 : intervals + 1) * columns;
 }
+std::size_t site_count(const CompactPatch& patch, int step) { return added_count(patch, step, true); }
+std::size_t value_count(const CompactPatch& patch, int step) { return added_count(patch, step, false); }
 std::size_t site_count(const CompactArc& arc, int step) { return (arc.is_closed() ? std::size_t{4} : 1) << step; }
 
 void write_step(ByteWriter& out, const StepResiduals& step) {
@@ -204,14 +210,18 @@ StepResiduals read_step(ByteReader& in, std::size_t sites, bool has_across) {
   return step;
 }
 
-/// Calls `each` with the steps that have residuals, the coarsest level first: patch, number of the step in it.
+/// Calls `each` with the steps, the coarsest level first, while it returns true: patch, number of the step in it, and
+/// whether it is the turn of the points or that of the layers, which come after the points of their level.
 template <class Model, class Each>
 void for_each_step(Model& model, const Each& each) {
   int most = 0;
   for (const CompactPatch& patch : model.patches) most = std::max(most, patch.step_count);
-  for (int level = most - 1; level >= model.bare_levels; --level)
-    for (auto& patch : model.patches)
-      if (patch.step_count > level && !each(patch, patch.step_count - 1 - level)) return;
+  for (int level = most - 1; level >= 0; --level)
+    for (const bool is_layers : {false, true}) {
+      if (is_layers ? model.layers.empty() : level < model.bare_levels) continue;
+      for (auto& patch : model.patches)
+        if (patch.step_count > level && !each(patch, patch.step_count - 1 - level, is_layers)) return;
+    }
 }
 
 /// A value of the coarse grid as those before it foretell: the left one, and how the row above goes on from there.
@@ -222,6 +232,89 @@ int expected_base(const CompactPatch& patch, std::size_t i) {
   return has_left ? patch.base[i - 3] : has_above ? patch.base[i - row] : 0;
 }
 
+void write_layers(ByteWriter& out, const CompactModel& model) {
+  out.count(model.layers.size());
+  for (const CompactLayer& layer : model.layers) {
+    out.text(layer.name);
+    out.count(layer.planes);
+    out.byte(layer.is_bone_weights ? 1 : 0);
+    out.real(layer.offset);
+    out.real(layer.step);
+  }
+}
+
+void read_layers(ByteReader& in, CompactModel& model) {
+  model.layers.resize(in.count(kMostLayers));
+  double planes = 0;
+  for (CompactLayer& layer : model.layers) {
+    layer.name = in.text(kMostName);
+    layer.planes = static_cast<int>(in.count(kMostBones));
+    layer.is_bone_weights = in.byte() != 0;
+    layer.offset = in.real();
+    layer.step = in.real();
+    const bool is_number_or_colour = layer.planes == 1 || layer.planes == 3 || layer.planes == 4;
+    if (layer.is_bone_weights ? layer.planes != static_cast<int>(model.skeleton.bones.size()) : !is_number_or_colour)
+      throw IoError("a layer has an impossible number of planes");
+    if (!(std::abs(layer.offset) < 1e30 && layer.step > 0 && layer.step < 1e30))
+      throw IoError("a layer's step is impossible");
+    planes += layer.planes;
+  }
+  double points = 0;
+  for (const CompactPatch& patch : model.patches)
+    points += std::ldexp(patch.columns * (patch.intervals + 1.0), patch.step_count);
+  if (planes * points > kMostPoints) throw IoError("its layers are larger than 16384 x 16384 texels");
+}
+
+/// A plane's value in the coarse grid as those before it foretell.
+int expected_value(const CompactPatch& patch, const std::vector<int>& base, std::size_t i) {
+  if (i % patch.columns > 0) return base[i - 1];
+  return i > 0 ? base[i - patch.columns] : 0;
+}
+
+void write_base_planes(ByteWriter& out, const CompactModel& model) {
+  for (const CompactPatch& patch : model.patches)
+    for (const CompactPlane& plane : patch.planes) {
+      out.byte(plane.base.empty() ? 0 : 1);
+      for (std::size_t i = 0; i < plane.base.size(); ++i)
+        out.residual(plane.base[i] - expected_value(patch, plane.base, i));
+    }
+}
+
+void read_base_planes(ByteReader& in, CompactModel& model) {
+  for (CompactPatch& patch : model.patches) {
+    patch.planes.resize(plane_count(model));
+    for (CompactPlane& plane : patch.planes) {
+      if (in.byte() == 0) continue;
+      plane.base.resize(static_cast<std::size_t>(patch.intervals + 1) * patch.columns);
+      for (std::size_t i = 0; i < plane.base.size(); ++i)
+        plane.base[i] = std::clamp(in.residual() + expected_value(patch, plane.base, i),
+                                   -static_cast<int>(kMostInteger), static_cast<int>(kMostInteger));
+    }
+  }
+}
+
+/// A step of all planes that are not empty: whether it has residuals, and those.
+void write_plane_steps(ByteWriter& out, const CompactPatch& patch, int step) {
+  for (const CompactPlane& plane : patch.planes) {
+    if (plane.base.empty()) continue;
+    const bool has_residuals = step < static_cast<int>(plane.steps.size()) && !plane.steps[step].empty();
+    out.byte(has_residuals ? 1 : 0);
+    if (!has_residuals) continue;
+    for (const int residual : plane.steps[step]) out.residual(residual);
+  }
+}
+void read_plane_steps(ByteReader& in, CompactPatch& patch, int step) {
+  for (CompactPlane& plane : patch.planes) {
+    if (plane.base.empty()) continue;
+    std::vector<int>& residuals = plane.steps.emplace_back();
+    if (in.byte() == 0) continue;
+    const std::size_t count = value_count(patch, step);
+    if (count > in.left()) throw IoError("it ends too early");
+    residuals.resize(count);
+    for (int& residual : residuals) residual = in.residual();
+  }
+}
+
 std::string payload_of(const CompactModel& model) {
   ByteWriter out;
   write_skeleton(out, model.skeleton);
@@ -230,6 +323,7 @@ std::string payload_of(const CompactModel& model) {
   for (const OffsetWeights& weights : model.weights)
     for (const int weight : weights) out.byte(weight + 128);
   write_sides(out, model);
+  write_layers(out, model);
   for_each_pole(model, [&](const std::array<int, 3>& pole) {
     for (const int value : pole) out.number(value);
   });
@@ -240,8 +334,12 @@ std::string payload_of(const CompactModel& model) {
   for (const CompactPatch& patch : model.patches)
     for (std::size_t k = 0; k < 3; ++k)
       for (std::size_t i = k; i < patch.base.size(); i += 3) out.residual(patch.base[i] - expected_base(patch, i));
-  for_each_step(model, [&](const CompactPatch& patch, int step) {
-    write_step(out, patch.steps[step]);
+  write_base_planes(out, model);
+  for_each_step(model, [&](const CompactPatch& patch, int step, bool is_layers) {
+    if (is_layers)
+      write_plane_steps(out, patch, step);
+    else
+      write_step(out, patch.steps[step]);
     return true;
   });
   return out.bytes();
@@ -265,18 +363,26 @@ void read_coarse(ByteReader& in, CompactModel& model) {
 }
 
 void read_steps(ByteReader& in, CompactModel& model, PrefixRule rule) {
-  for_each_step(model, [&](CompactPatch& patch, int step) {
+  const auto read = [](ByteReader& from, CompactPatch& patch, int step, bool is_layers) {
+    if (is_layers)
+      read_plane_steps(from, patch, step);
+    else
+      patch.steps.push_back(read_step(from, site_count(patch, step), true));
+  };
+  for_each_step(model, [&](CompactPatch& patch, int step, bool is_layers) {
+    if (rule == PrefixRule::kWhole) {
+      read(in, patch, step, is_layers);
+      return true;
+    }
     // A step of which a part is missing is left out: its points are where they are predicted.
-    if (rule == PrefixRule::kPrefix) {
-      try {
-        ByteReader ahead = in;
-        patch.steps.push_back(read_step(ahead, site_count(patch, step), true));
-        in = ahead;
-      } catch (const IoError&) {
-        return false;
-      }
-    } else {
-      patch.steps.push_back(read_step(in, site_count(patch, step), true));
+    try {
+      ByteReader ahead = in;
+      CompactPatch read_patch = patch;
+      read(ahead, read_patch, step, is_layers);
+      patch = std::move(read_patch);
+      in = ahead;
+    } catch (const IoError&) {
+      return false;
     }
     return true;
   });
@@ -293,10 +399,12 @@ CompactModel model_of(std::string_view payload, PrefixRule rule) {
     for (int& weight : weights) weight = in.byte() - 128;
   read_seams(in, model);
   read_patches(in, model);
+  read_layers(in, model);
   for_each_pole(model, [&](std::array<int, 3>& pole) {
     for (int& value : pole) value = static_cast<int>(in.number(kMostInteger));
   });
   read_coarse(in, model);
+  read_base_planes(in, model);
   read_steps(in, model, rule);
   if (rule == PrefixRule::kWhole && !in.is_at_end()) throw IoError("there is more in it than a model");
   return model;
@@ -323,10 +431,10 @@ CompactModel read_compact(std::string_view bytes, const std::string& where, Pref
     if (!is_compact(bytes)) throw IoError("it is no compact model (.skx)");
     if (bytes.size() <= kHeader) throw IoError("it ends too early");
     const int version = static_cast<unsigned char>(bytes[kMagic.size()]);
-    if (version > kCompactVersion)
-      throw IoError(fmt::format(
-          "it is written in version {} of the format, this program reads up to version {}; use a newer skeletex",
-          version, kCompactVersion));
+    if (version != kCompactVersion)
+      throw IoError(fmt::format("it is written in version {} of the format, this program reads version {}; {}", version,
+                                kCompactVersion,
+                                version > kCompactVersion ? "use a newer skeletex" : "pack the model again"));
     std::uint64_t written = 0;
     for (std::size_t i = 0; i < 8; ++i)
       written |= static_cast<std::uint64_t>(static_cast<unsigned char>(bytes[kMagic.size() + 1 + i])) << (8 * i);

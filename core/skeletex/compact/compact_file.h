@@ -7,8 +7,8 @@
 
 namespace skeletex {
 
-/// Newest version of the compact format that this library reads, and the one it writes.
-inline constexpr int kCompactVersion = 1;
+/// The version of the compact format that this library reads and writes.
+inline constexpr int kCompactVersion = 2;
 
 /// The bytes of a compact file (docs/compact.md).
 std::string compact_bytes(const CompactModel& model);
@@ -22,7 +22,7 @@ enum class PrefixRule {
   kPrefix,  ///< finer levels: the file is the first bytes of one
 };
 /// \param where  the file, for messages
-/// \throw IoError that names the reason: no compact file, a newer version, damaged or truncated
+/// \throw IoError that names the reason: no compact file, another version, damaged or truncated
 CompactModel read_compact(std::string_view bytes, const std::string& where, PrefixRule rule = PrefixRule::kWhole);
 
 }  // namespace skeletex

@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "skeletex/skeleton/skeleton.h"
@@ -14,6 +15,22 @@ struct StepResiduals {
   std::vector<int> side, across;  ///< in tangential steps; both empty: all are 0
 };
 
+/// A layer as it is coded: a value is offset + step times an integer. The first three planes of colours are the roots
+/// of red, green and blue, less that of green for red and blue.
+struct CompactLayer {
+  std::string name;
+  int planes = 1;                ///< 1: numbers; 3, 4: colours; of weights one per bone
+  bool is_bone_weights = false;  ///< the model's painted weights, not one of its layers
+  double offset = 0, step = 1;
+  bool is_colour() const { return !is_bone_weights && planes >= 3; }
+};
+
+/// One plane of a layer in a patch.
+struct CompactPlane {
+  std::vector<int> base;  ///< of the coarse grid with its ends, row by row, in steps; empty: 0 all over the patch
+  std::vector<std::vector<int>> steps;  ///< per step of the patch the residuals of its new values; empty: all are 0
+};
+
 /// One bone's points: a coarse grid, and the steps that double its columns or the intervals between its rows.
 struct CompactPatch {
   int columns = 4, intervals = 3;  ///< of the coarse grid; rows are vertex-centred, so it has one row more
@@ -24,6 +41,7 @@ struct CompactPatch {
   std::array<std::array<int, 3>, 2> poles{};   ///< at free ends: offset from the node along s, b, o in steps of q
   std::vector<int> base;                       ///< inner points of the coarse grid: out, around, along each
   std::vector<StepResiduals> steps;            ///< as many as have residuals, at most step_count
+  std::vector<CompactPlane> planes;            ///< of all layers, one after the other
 };
 
 /// A point where three or more bones meet.
@@ -59,6 +77,7 @@ struct CompactModel {
   std::vector<CompactPatch> patches;  ///< one per bone
   std::vector<CompactCorner> corners;
   std::vector<CompactArc> arcs;
+  std::vector<CompactLayer> layers;
 };
 
 }  // namespace skeletex

@@ -8,8 +8,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "skeletex/compact/layer_planes.h"
 #include "skeletex/compact/patch_grid.h"
 #include "skeletex/compact/seam_curves.h"
+#include "skeletex/geometry/parallel.h"
 #include "skeletex/math/portable.h"
 #include "skeletex/model/error.h"
 #include "skeletex/model/memory.h"
@@ -174,7 +176,7 @@ SkeletexModel decode_model(const CompactModel& compact, int octaves) {
   double texels = 0;
   for (const Rectangle& r : rectangles) texels += static_cast<double>(r.width) * r.height;
   if (texels > 16384.0 * 16384.0) throw InputError("the size that is asked for exceeds 16384 x 16384 texels");
-  require_memory(400 * texels, fmt::format("decoding {:.0f} texels", texels));
+  require_memory((400.0 + 4 * plane_count(compact)) * texels, fmt::format("decoding {:.0f} texels", texels));
 
   SkeletexModel model;
   model.skeleton = compact.skeleton;
@@ -183,17 +185,18 @@ SkeletexModel decode_model(const CompactModel& compact, int octaves) {
   const SeparationPlanes separation(model.skeleton);
   const SeamCurves seams = decode_seams(compact, separation, 0);
   store_seams(model, compact, separation, octaves == 0 ? seams : decode_seams(compact, separation, octaves));
-  std::vector<PatchGrid> grids;
-  for (int bone = 0; bone < static_cast<int>(compact.patches.size()); ++bone) {
+  std::vector<PatchGrid> grids(compact.patches.size());
+  for_each_block(grids.size(), 1, [&](std::size_t block, std::size_t, std::size_t) {
+    const int bone = static_cast<int>(block);
     const CompactPatch& patch = compact.patches[bone];
     const std::array<bool, 2> has_pole{model.ends[bone][0].arcs.empty(), model.ends[bone][1].arcs.empty()};
     const EndRow row = [&](BoneEnd end, int columns) {
       return end_row(compact, separation, model.ends, seams, bone, end, columns);
     };
-    grids.push_back(decode_patch(compact, separation, bone, has_pole, row, patch_size(patch, octaves).steps));
-    rectangles[bone].width = grids.back().columns;
-    rectangles[bone].height = grids.back().intervals + 1;
-  }
+    grids[bone] = decode_patch(compact, separation, bone, has_pole, row, patch_size(patch, octaves).steps);
+    rectangles[bone].width = grids[bone].columns;
+    rectangles[bone].height = grids[bone].intervals + 1;
+  });
   const auto [width, height] = pack_shelves(rectangles);
   model.texture.width = width;
   model.texture.height = height;
@@ -205,8 +208,11 @@ SkeletexModel decode_model(const CompactModel& compact, int octaves) {
     constexpr std::array kTopologies{SegmentTopology::kAnnulus, SegmentTopology::kDisk, SegmentTopology::kSphere};
     model.patches.push_back({rectangles[bone], Method::kVsm, kTopologies[free_ends],
                              row_table(compact.patches[bone], rectangles[bone].height)});
-    store_texels(model, separation, bone, grids[bone]);
   }
+  for_each_block(grids.size(), 1, [&](std::size_t block, std::size_t, std::size_t) {
+    store_texels(model, separation, static_cast<int>(block), grids[block]);
+  });
+  decode_layers(model, compact);
   model.genus = genus_of(model);
   return model;
 }

@@ -22,16 +22,12 @@ std::vector<BaseSite> base_sites(const CompactModel& model, const SeparationPlan
   return sites;
 }
 
-void set_ends(PatchGrid& grid, const EndRow& end_row) {
-  const std::vector<Vec3> head = end_row(BoneEnd::kHead, grid.columns), tail = end_row(BoneEnd::kTail, grid.columns);
-  std::copy(head.begin(), head.end(), grid.points.begin());
-  std::copy(tail.begin(), tail.end(), grid.points.end() - grid.columns);
-}
-
 PatchGrid empty_grid(const CompactPatch& patch, const std::array<bool, 2>& has_pole, const EndRow& end_row) {
   PatchGrid grid{patch.intervals, patch.columns, has_pole, {}};
   grid.points.assign(static_cast<std::size_t>(patch.intervals + 1) * patch.columns, Vec3::Zero());
-  set_ends(grid, end_row);
+  const std::vector<Vec3> head = end_row(BoneEnd::kHead, grid.columns), tail = end_row(BoneEnd::kTail, grid.columns);
+  std::copy(head.begin(), head.end(), grid.points.begin());
+  std::copy(tail.begin(), tail.end(), grid.points.end() - grid.columns);
   return grid;
 }
 
@@ -79,12 +75,10 @@ PatchGrid decode_patch(const CompactModel& model, const SeparationPlanes& separa
                                      steps[2] * patch.base[3 * i + 2] * sites[i].along;
   for (int step = 0; step < step_count; ++step) {
     const bool rows = step_doubles_rows(patch, step);
-    const Refinement refinement(grid, rows);
+    const Refinement refinement(grid, rows, end_row);
     const StepResiduals* residuals =
         step < static_cast<int>(patch.steps.size()) && !patch.steps[step].normal.empty() ? &patch.steps[step] : nullptr;
-    PatchGrid fine = refinement.refined(site_points(model, refinement, residuals, step, rows));
-    if (!rows) set_ends(fine, end_row);
-    grid = std::move(fine);
+    grid = refinement.refined(site_points(model, refinement, residuals, step, rows));
   }
   return grid;
 }

@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <cmath>
-#include <functional>
 #include <vector>
 
 #include "skeletex/compact/refine.h"
 #include "skeletex/skeleton/separation_planes.h"
 
 namespace skeletex {
-
-/// The points of the patch's end at a number of columns.
-using EndRow = std::function<std::vector<Vec3>(BoneEnd end, int columns)>;
 
 /// Where the inner points of a coarse grid are expected, and the directions that their offsets are in.
 struct BaseSite {
@@ -26,8 +22,6 @@ inline std::array<double, 3> base_steps(const CompactModel& model, int bone) {
 }
 /// The coarse grid with its ends and without inner points.
 PatchGrid empty_grid(const CompactPatch& patch, const std::array<bool, 2>& has_pole, const EndRow& end_row);
-/// Sets the rows at the ends.
-void set_ends(PatchGrid& grid, const EndRow& end_row);
 
 /// Whether a step doubles rows. Beyond the model's own, rows and columns take turns.
 bool step_doubles_rows(const CompactPatch& patch, int step);

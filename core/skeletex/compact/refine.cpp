@@ -48,6 +48,21 @@ void set_frame(Site& site, const Vec3& along, const Vec3& across) {
   site.across = site.normal.cross(site.side);
 }
 
+/// By how much each new point of an end's row differs from its prediction along the row.
+std::vector<Vec3> end_misses(const PatchGrid& grid, int row, const std::vector<Vec3>& fine) {
+  std::vector<Vec3> misses;
+  for (int c = 0; c < grid.columns; ++c)
+    misses.push_back(fine[2 * c + 1] - halfway<Vec3>([&](int i) -> const Vec3& { return grid.at(row, c + i); }, 3, 3));
+  return misses;
+}
+
+/// How much of that a point inside is expected to follow, by its squared distance from the end in squared spacings:
+/// a wave along the end fades within one of its lengths.
+double end_share(double squared_distance, double squared_spacing) {
+  constexpr double kFade = 10;  // about pi^2
+  return squared_spacing / (squared_spacing + kFade * squared_distance);
+}
+
 }  // namespace
 
 const double* halfway_weights(int before, int after) {
@@ -60,37 +75,57 @@ const double* halfway_weights(int before, int after) {
   return table[before - 1][after - 1].data();
 }
 
-Refinement::Refinement(const PatchGrid& grid, bool refines_rows) : grid_(grid), refines_rows_(refines_rows) {
+Refinement::Refinement(const PatchGrid& grid, bool refines_rows, const EndRow& end_row)
+    : grid_(grid), refines_rows_(refines_rows) {
   site_columns_ = grid.columns;
-  const int before_first = rows_beyond(grid, 0), beyond_last = rows_beyond(grid, 1);
   if (refines_rows) {
-    for (int r = 0; r < grid.intervals; ++r)
-      for (int c = 0; c < grid.columns; ++c) {
-        Site site;
-        site.row = 2 * r + 1;
-        site.column = c;
-        site.parents = {grid.index(r, c), grid.index(r + 1, c)};
-        const int before = std::min(3, r + 1 + before_first), after = std::min(3, grid.intervals - r + beyond_last);
-        site.predicted = halfway<Vec3>([&](int i) -> const Vec3& { return grid.at(r + i, c); }, before, after);
-        set_frame(site, grid.at(r + 1, c) - grid.at(r, c),
-                  (grid.at(r, c + 1) + grid.at(r + 1, c + 1)) - (grid.at(r, c - 1) + grid.at(r + 1, c - 1)));
-        sites_.push_back(site);
-      }
+    add_rows();
   } else {
-    for (int r = 1; r < grid.intervals; ++r)
-      for (int c = 0; c < grid.columns; ++c) {
-        Site site;
-        site.row = r;
-        site.column = 2 * c + 1;
-        site.parents = {grid.index(r, c), grid.index(r, c + 1)};
-        site.predicted = halfway<Vec3>([&](int i) -> const Vec3& { return grid.at(r, c + i); }, 3, 3);
-        set_frame(site, grid.at(r, c + 1) - grid.at(r, c),
-                  (grid.at(r + 1, c) + grid.at(r + 1, c + 1)) - (grid.at(r - 1, c) + grid.at(r - 1, c + 1)));
-        sites_.push_back(site);
-      }
+    ends_ = {end_row(BoneEnd::kHead, 2 * grid.columns), end_row(BoneEnd::kTail, 2 * grid.columns)};
+    add_columns();
   }
   for (const Site& site : sites_) mean_spacing_ += site.spacing;
   mean_spacing_ /= std::max(1, site_count());
+}
+
+void Refinement::add_rows() {
+  const PatchGrid& grid = grid_;
+  const int before_first = rows_beyond(grid, 0), beyond_last = rows_beyond(grid, 1);
+  for (int r = 0; r < grid.intervals; ++r)
+    for (int c = 0; c < grid.columns; ++c) {
+      Site site;
+      site.row = 2 * r + 1;
+      site.column = c;
+      site.parents = {grid.index(r, c), grid.index(r + 1, c)};
+      const int before = std::min(3, r + 1 + before_first), after = std::min(3, grid.intervals - r + beyond_last);
+      site.predicted = halfway<Vec3>([&](int i) -> const Vec3& { return grid.at(r + i, c); }, before, after);
+      set_frame(site, grid.at(r + 1, c) - grid.at(r, c),
+                (grid.at(r, c + 1) + grid.at(r + 1, c + 1)) - (grid.at(r, c - 1) + grid.at(r + 1, c - 1)));
+      sites_.push_back(site);
+    }
+}
+
+void Refinement::add_columns() {
+  const PatchGrid& grid = grid_;
+  const std::array<std::vector<Vec3>, 2> misses{end_misses(grid, 0, ends_[0]),
+                                                end_misses(grid, grid.intervals, ends_[1])};
+  for (int r = 1; r < grid.intervals; ++r)
+    for (int c = 0; c < grid.columns; ++c) {
+      Site site;
+      site.row = r;
+      site.column = 2 * c + 1;
+      site.parents = {grid.index(r, c), grid.index(r, c + 1)};
+      site.predicted = halfway<Vec3>([&](int i) -> const Vec3& { return grid.at(r, c + i); }, 3, 3);
+      set_frame(site, grid.at(r, c + 1) - grid.at(r, c),
+                (grid.at(r + 1, c) + grid.at(r + 1, c + 1)) - (grid.at(r - 1, c) + grid.at(r - 1, c + 1)));
+      for (const int end : {0, 1}) {
+        if (grid.has_pole[end] || site.spacing == 0) continue;
+        const int row = end == 0 ? 0 : grid.intervals;
+        const Vec3 from_end = 0.5 * (grid.at(r, c) + grid.at(r, c + 1) - grid.at(row, c) - grid.at(row, c + 1));
+        site.predicted += end_share(from_end.squaredNorm(), site.spacing * site.spacing) * misses[end][c];
+      }
+      sites_.push_back(site);
+    }
 }
 
 std::array<int, 4> neighbours_of(int site, int site_columns) {
@@ -114,6 +149,10 @@ PatchGrid Refinement::refined(const std::vector<Vec3>& points) const {
   for (int r = 0; r <= grid_.intervals; ++r)
     for (int c = 0; c < grid_.columns; ++c)
       fine.points[fine.index(refines_rows_ ? 2 * r : r, refines_rows_ ? c : 2 * c)] = grid_.points[grid_.index(r, c)];
+  if (!refines_rows_) {
+    std::copy(ends_[0].begin(), ends_[0].end(), fine.points.begin());
+    std::copy(ends_[1].begin(), ends_[1].end(), fine.points.end() - fine.columns);
+  }
   for (std::size_t i = 0; i < sites_.size(); ++i) fine.points[fine.index(sites_[i].row, sites_[i].column)] = points[i];
   return fine;
 }

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <algorithm>
+#include <functional>
 #include <vector>
 
 #include "skeletex/compact/compact_model.h"
 #include "skeletex/geometry/mesh.h"
+#include "skeletex/skeleton/skeleton.h"
 
 namespace skeletex {
 
@@ -23,6 +25,9 @@ struct PatchGrid {
   }
 };
 
+/// The points of the patch's end at a number of columns.
+using EndRow = std::function<std::vector<Vec3>(BoneEnd end, int columns)>;
+
 /// Where a step expects a new point, and its frame. Exact on every machine that rounds as IEEE 754 says.
 struct Site {
   int row = 0, column = 0;               ///< in the refined grid
@@ -36,21 +41,24 @@ struct Site {
 class Refinement {
  public:
   /// \param grid  must outlive this
-  Refinement(const PatchGrid& grid, bool refines_rows);
+  Refinement(const PatchGrid& grid, bool refines_rows, const EndRow& end_row);
   int site_count() const { return static_cast<int>(sites_.size()); }
   const std::vector<Site>& sites() const { return sites_; }
   double mean_spacing() const { return mean_spacing_; }
   /// How many sites a row has.
   int site_columns() const { return site_columns_; }
-  /// The refined grid without the rows at its ends, which the caller sets where columns double, and with new points
-  /// from `points`, one per site.
+  /// The refined grid with new points from `points`, one per site.
   PatchGrid refined(const std::vector<Vec3>& points) const;
 
  private:
+  void add_rows();
+  void add_columns();
+
   const PatchGrid& grid_;
   bool refines_rows_;
   int site_columns_;
   double mean_spacing_ = 0;
+  std::array<std::vector<Vec3>, 2> ends_;  ///< the refined grid's rows at its ends, where columns double
   std::vector<Site> sites_;
 };
 

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "skeletex/compact/encode/encode_layers.h"
 #include "skeletex/compact/encode/encode_seams.h"
 #include "skeletex/compact/seam_curves.h"
 #include "skeletex/compact/skeleton_code.h"
+#include "skeletex/geometry/parallel.h"
 
 namespace skeletex {
 namespace {
@@ -78,17 +80,20 @@ void set_poles(CompactModel& compact, const SeparationPlanes& separation, const 
     }
 }
 
+/// \param places  per patch, as encode_patch gives them; null: not wanted
 void encode_patches(CompactModel& compact, const SeparationPlanes& separation, const SourceSurface& source,
-                    const ResidualOptions& options) {
+                    const ResidualOptions& options, std::vector<std::vector<Place>>* places) {
   const std::vector<std::array<PatchEnd, 2>> ends = ends_of(compact);
   const SeamCurves seams = decode_seams(compact, separation, 0);
-  for (int bone = 0; bone < static_cast<int>(compact.patches.size()); ++bone) {
+  for_each_block(compact.patches.size(), 1, [&](std::size_t block, std::size_t, std::size_t) {
+    const int bone = static_cast<int>(block);
     const std::array<bool, 2> has_pole{ends[bone][0].arcs.empty(), ends[bone][1].arcs.empty()};
     const EndRow row = [&](BoneEnd end, int columns) {
       return end_row(compact, separation, ends, seams, bone, end, columns);
     };
-    encode_patch(compact, separation, bone, has_pole, row, source.patches[bone], options);
-  }
+    encode_patch(compact, separation, bone, has_pole, row, source.patches[bone], options,
+                 places == nullptr ? nullptr : &(*places)[bone]);
+  });
 }
 
 /// Weights that foretell the offsets best in the least-squares sense, from residuals made with no weights.
@@ -138,9 +143,15 @@ CompactModel encode_compact(const SkeletexModel& model, const SourceSurface& sou
   set_poles(compact, separation, source);
   encode_seams(compact, separation, source, (options.bare_levels + options.residuals.kept_levels + 1) / 2,
                options.residuals.rounding);
-  encode_patches(compact, separation, source, options.residuals);
+  encode_patches(compact, separation, source, options.residuals, nullptr);
   fit_weights(compact);
-  encode_patches(compact, separation, source, options.residuals);
+  if (options.layer_steps == 0) {
+    encode_patches(compact, separation, source, options.residuals, nullptr);
+    return compact;
+  }
+  std::vector<std::vector<Place>> places(compact.patches.size());
+  encode_patches(compact, separation, source, options.residuals, &places);
+  encode_layers(compact, model, places, options.layer_steps, options.residuals.rounding);
   return compact;
 }
 

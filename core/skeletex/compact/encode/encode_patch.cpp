@@ -29,7 +29,7 @@ class PatchEncoder {
         source_(source),
         options_(options) {}
 
-  void run() {
+  void run(std::vector<Place>* places) {
     Traced traced = encode_base();
     const int coded = patch_.step_count - compact_.bare_levels;
     patch_.steps.clear();
@@ -41,9 +41,10 @@ class PatchEncoder {
         traced = encode_step(traced, step, rows);
         set_rows(traced);
       } else {
-        traced.grid = bare_step(traced.grid, rows);
+        traced = bare_step(traced, step, rows, places != nullptr);
       }
     }
+    if (places != nullptr) *places = std::move(traced.places);
   }
 
  private:
@@ -122,7 +123,7 @@ class PatchEncoder {
 
   Residual residual_of(const Site& site, const Traced& traced, const Step& step, int expected,
                        const std::vector<Place>& before) const {
-    const Place a = traced.places[site.parents[0]], b = near(traced.places[site.parents[1]], a), middle = 0.5 * (a + b);
+    const Place middle = middle_of(site, traced);
     Residual residual;
     if (!stays_home(step.number)) {
       const Place reach = options_.reach * Place(row_scale_, column_scale_);
@@ -202,13 +203,12 @@ class PatchEncoder {
   }
 
   Traced encode_step(const Traced& traced, int step, bool rows) {
-    const Refinement refinement(traced.grid, rows);
+    const Refinement refinement(traced.grid, rows, end_row_);
     Step quantization{step, rows, normal_step(compact_.step, step), refinement.mean_spacing(), 0};
     for (const Site& site : refinement.sites())
       quantization.mean_columns += (rows ? site.width : site.spacing) / refinement.site_count();
     const double q = quantization.q;
-    row_scale_ = static_cast<double>(source_.rows - 1) / traced.grid.intervals;
-    column_scale_ = static_cast<double>(source_.columns) / traced.grid.columns;
+    set_scales(traced.grid);
     const int coded = patch_.step_count - compact_.bare_levels;
     const bool is_sparse = step >= coded - options_.kept_levels;
     StepResiduals residuals;
@@ -237,8 +237,12 @@ class PatchEncoder {
       residuals.across.clear();
     }
     patch_.steps.push_back(std::move(residuals));
+    return refined(traced, refinement, rows, points, places);
+  }
+
+  Traced refined(const Traced& traced, const Refinement& refinement, bool rows, const std::vector<Vec3>& points,
+                 const std::vector<Place>& places) const {
     Traced fine{refinement.refined(points), {}};
-    if (!rows) set_ends(fine.grid, end_row_);
     fine.places.resize(fine.grid.points.size());
     for (int r = 0; r <= traced.grid.intervals; ++r)
       for (int c = 0; c < traced.grid.columns; ++c)
@@ -249,13 +253,31 @@ class PatchEncoder {
     return fine;
   }
 
-  PatchGrid bare_step(const PatchGrid& grid, bool rows) const {
-    const Refinement refinement(grid, rows);
+  /// \param wants_places  whether the places of its points are found as well
+  Traced bare_step(const Traced& traced, int number, bool rows, bool wants_places) {
+    const Refinement refinement(traced.grid, rows, end_row_);
     std::vector<Vec3> points;
     for (const Site& site : refinement.sites()) points.push_back(site.predicted);
-    PatchGrid fine = refinement.refined(points);
-    if (!rows) set_ends(fine, end_row_);
-    return fine;
+    if (!wants_places) return {refinement.refined(points), {}};
+    set_scales(traced.grid);
+    std::vector<Place> places;
+    for (const Site& site : refinement.sites()) {
+      const Place middle = middle_of(site, traced), reach = options_.reach * Place(row_scale_, column_scale_);
+      const auto found = meet_line(source_, middle, reach, site.predicted, site.normal,
+                                   tolerance(normal_step(compact_.step, number), site));
+      places.push_back(found ? found->place : middle);
+    }
+    return refined(traced, refinement, rows, points, places);
+  }
+
+  void set_scales(const PatchGrid& grid) {
+    row_scale_ = static_cast<double>(source_.rows - 1) / grid.intervals;
+    column_scale_ = static_cast<double>(source_.columns) / grid.columns;
+  }
+  /// Halfway between the places of a site's parents.
+  Place middle_of(const Site& site, const Traced& traced) const {
+    const Place& a = traced.places[site.parents[0]];
+    return 0.5 * (a + near(traced.places[site.parents[1]], a));
   }
 
   /// The row table from the places of the rows.
@@ -295,8 +317,8 @@ class PatchEncoder {
 
 void encode_patch(CompactModel& compact, const SeparationPlanes& separation, int bone,
                   const std::array<bool, 2>& has_pole, const EndRow& end_row, const SourcePatch& source,
-                  const ResidualOptions& options) {
-  PatchEncoder(compact, separation, bone, has_pole, end_row, source, options).run();
+                  const ResidualOptions& options, std::vector<Place>* places) {
+  PatchEncoder(compact, separation, bone, has_pole, end_row, source, options).run(places);
 }
 
 }  // namespace skeletex

@@ -18,8 +18,9 @@ struct ResidualOptions {
 
 /// Fills a patch's coarse grid and residuals, and its row table.
 /// \param compact  its skeleton, steps, weights and the patch's sizes and poles are set
+/// \param places  where the points of the finest grid were read; null: not wanted
 void encode_patch(CompactModel& compact, const SeparationPlanes& separation, int bone,
                   const std::array<bool, 2>& has_pole, const EndRow& end_row, const SourcePatch& source,
-                  const ResidualOptions& options);
+                  const ResidualOptions& options, std::vector<Place>* places);
 
 }  // namespace skeletex

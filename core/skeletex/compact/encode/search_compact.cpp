@@ -10,6 +10,7 @@
 #include "skeletex/analysis/metro.h"
 #include "skeletex/compact/compact_file.h"
 #include "skeletex/compact/decode_model.h"
+#include "skeletex/compact/encode/encode_layers.h"
 #include "skeletex/math/portable.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
@@ -31,8 +32,20 @@ class Search {
   }
 
   CompactResult run() {
-    if (goal_.quality) return measured(by_quality());
-    return goal_.max_bytes ? by_bytes() : by_error(goal_.max_error.value_or(1e-4));
+    if (goal_.quality) return measured(with_layers(by_quality()));
+    if (!goal_.max_bytes) return measured(with_layers(by_error(goal_.max_error.value_or(1e-4))));
+    // The shape gets what the layers leave of the bytes; how much they take depends a little on the shape.
+    std::size_t for_shape = *goal_.max_bytes;
+    for (int i = 0; i < 4; ++i) {
+      Trial result = with_layers(by_bytes(for_shape));
+      const std::size_t bytes = compact_bytes(result.model).size();
+      if (bytes <= *goal_.max_bytes) return measured(result);
+      if (bytes - *goal_.max_bytes >= for_shape) break;
+      for_shape -= bytes - *goal_.max_bytes;
+    }
+    throw InputError(fmt::format(
+        "the model and its layers do not fit into {} bytes; code the layers in fewer steps, or leave them out",
+        *goal_.max_bytes));
   }
 
  private:
@@ -50,23 +63,30 @@ class Search {
     options.bare_levels = bare_levels;
     return options;
   }
-  MetroReport distance(const CompactModel& compact, int octaves, long samples) {
-    const SkeletexModel decoded = decode_model(compact, octaves);
-    return measure_metro(context_, reference_, reconstruct_bind_mesh(context_, decoded).mesh, {.samples = samples});
+  TriangleMesh mesh_of(const CompactModel& compact, int octaves) {
+    return reconstruct_bind_mesh(context_, decode_model(compact, octaves)).mesh;
   }
   /// What is predicted alone is measured one octave beyond what has residuals; it hardly changes beyond.
   double mean_of(const CompactModel& compact) {
     ++trials_;
-    return symmetric_mean(distance(compact, -std::max(0, (compact.bare_levels - 2) / 2), kTrialSamples));
+    const TriangleMesh mesh = mesh_of(compact, -std::max(0, (compact.bare_levels - 2) / 2));
+    return measure_symmetric_mean(context_, reference_, mesh, kTrialSamples);
   }
   Trial trial(double step, int bare_levels) {
     Trial result{options_of(step, bare_levels), {}, 0, 0};
     result.model = encode_compact(model_, source_, result.options);
     return result;
   }
+  /// The same shape, and the layers of the model.
+  Trial with_layers(Trial trial) {
+    if (goal_.layer_steps == 0 || !has_coded_layers(model_)) return trial;
+    trial.options.layer_steps = goal_.layer_steps;
+    trial.model = encode_compact(model_, source_, trial.options);
+    return trial;
+  }
   CompactResult measured(const Trial& trial) {
     CompactResult result{compact_bytes(trial.model), trial.options, 0, 0, trials_};
-    const MetroReport report = distance(trial.model, 0, kSamples);
+    const MetroReport report = measure_metro(context_, reference_, mesh_of(trial.model, 0), {.samples = kSamples});
     result.mean = symmetric_mean(report);
     result.max = std::max(report.forward.max, report.backward.max);
     return result;
@@ -82,8 +102,10 @@ class Search {
   /// The trial that keeps a value just within what is wanted; nothing where none does.
   /// \param rises  whether the value grows with the step, as errors do, or falls, as sizes do
   /// \param value  of a trial; positive
+  /// \param least_bytes  a trial that still misses and has as many ends the search, as smaller steps have more; 0: none
+  /// does
   std::optional<Trial> largest_step(int bare_levels, double first, double wanted, bool rises,
-                                    const std::function<double(Trial&)>& value) {
+                                    const std::function<double(Trial&)>& value, std::size_t least_bytes = 0) {
     std::optional<Trial> best;
     double log_low = portable::log(kSmallestStep), log_high = portable::log(kLargestStep), at = portable::log(first);
     double last_at = 0, last_value = 0;
@@ -93,6 +115,7 @@ class Search {
       // Above: the step must become smaller where the value rises with it.
       (signed_off > 0 ? log_high : log_low) = at;
       const bool is_good = reached <= 0;
+      if (!is_good && least_bytes > 0 && compact_bytes(now.model).size() >= least_bytes) break;
       if (is_good && (!best || (rises ? now.options.step > best->options.step : now.options.step < best->options.step)))
         best = std::move(now);
       if (is_good && reached > -0.02) break;
@@ -106,12 +129,12 @@ class Search {
     return best;
   }
 
-  CompactResult by_error(double wanted) {
+  Trial by_error(double wanted) {
     std::optional<Trial> best;
     const auto try_levels = [&](int bare) {
       if (bare < 0) return false;
-      std::optional<Trial> found =
-          largest_step(bare, 3 * wanted, wanted, true, [&](Trial& t) { return t.mean = mean_of(t.model); });
+      std::optional<Trial> found = largest_step(
+          bare, 3 * wanted, wanted, true, [&](Trial& t) { return t.mean = mean_of(t.model); }, best ? best->bytes : 0);
       if (!found) return false;
       found->bytes = compact_bytes(found->model).size();
       if (best && found->bytes >= best->bytes) return false;
@@ -136,11 +159,11 @@ class Search {
       while (try_levels(--bare)) {
       }
     }
-    return measured(*best);
+    return *best;
   }
 
-  CompactResult by_bytes() {
-    const auto wanted = static_cast<double>(*goal_.max_bytes);
+  Trial by_bytes(std::size_t most) {
+    const auto wanted = static_cast<double>(most);
     std::optional<Trial> best;
     for (int bare = std::max(0, static_cast<int>(2 * std::log2(goal_.size / 256.0))); bare <= 12; ++bare) {
       std::optional<Trial> found = largest_step(bare, 3e-4, wanted, false, [&](Trial& t) {
@@ -151,8 +174,8 @@ class Search {
       if (best && found->mean >= best->mean) break;
       best = std::move(found);
     }
-    if (!best) throw InputError(fmt::format("the model does not fit into {} bytes", *goal_.max_bytes));
-    return measured(*best);
+    if (!best) throw InputError(fmt::format("the model does not fit into {} bytes", most));
+    return *best;
   }
 
   /// Finest levels are dropped while nearly all of their residuals are 0.

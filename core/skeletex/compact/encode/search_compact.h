@@ -14,6 +14,7 @@ struct CompactGoal {
   std::optional<std::size_t> max_bytes;  ///< of the file
   std::optional<double> quality;         ///< 0 to 100: the step is 10^-(2 + quality / 25) diagonals
   int size = 512;                        ///< about the side of the texture that the file decodes to
+  int layer_steps = 64;                  ///< steps of a layer's range; 0: layers and bone weights are left out
 };
 
 struct CompactResult {
