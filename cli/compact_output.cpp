@@ -75,7 +75,7 @@ bool is_compact_path(const std::string& path) { return has_ending(path, ".skx");
 Json write_compact(ClContext& context, const SkeletexModel& model, const TriangleMesh* reference,
                    const CompactArguments& arguments, const CLI::App& command, int size, const std::string& path) {
   CompactGoal goal;
-  goal.size = size;
+  if (command.count("--size") > 0) goal.size = size;
   goal.layer_steps = arguments.layer_steps;
   if (command.count(kOptions[2]) > 0)
     goal.quality = arguments.quality;
@@ -91,6 +91,7 @@ Json write_compact(ClContext& context, const SkeletexModel& model, const Triangl
           {"bytes", result.bytes.size()},
           {"mean", result.mean},
           {"max", result.max},
+          {"size", result.options.size},
           {"step", result.options.step},
           {"bare_levels", result.options.bare_levels},
           {"trials", result.trials}};

@@ -22,7 +22,7 @@ bool is_compact_path(const std::string& path);
 
 /// Writes a compact file, and warns of what it leaves out of the model.
 /// \param reference  what the error is measured against: search_compact
-/// \param size       of the texture that the file decodes to
+/// \param size       of the texture that the file decodes to, where the command's --size is given
 /// \return for the JSON
 Json write_compact(ClContext& context, const SkeletexModel& model, const TriangleMesh* reference,
                    const CompactArguments& arguments, const CLI::App& command, int size, const std::string& path);

@@ -79,9 +79,13 @@ void add_pack_command(CLI::App& program) {
   declare_output(command, command.add_option("-o,--output", arguments->output, "the compact file: .skx"), {".skx"})
       ->required()
       ->type_name("FILE");
-  command.add_option("--size", arguments->size, "about the side of the texture that the file decodes to, 32 to 4096")
+  command
+      .add_option("--size", arguments->size,
+                  "about the side of the texture that the file decodes to, 32 to 4096 (default: 512, or more where "
+                  "--max-error asks for it)")
       ->check(number_in(32, 4096))
-      ->type_name("N");
+      ->type_name("N")
+      ->default_str("");
   add_compact_options(command, arguments->compact);
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);

@@ -20,12 +20,13 @@ namespace {
 
 /// Trials are measured with so many points per surface, and the result with more.
 constexpr long kTrialSamples = 60'000, kSamples = 400'000;
+constexpr int kSize = 512, kLargestSize = 2048;
 constexpr double kLargestStep = 1e-2, kSmallestStep = 1e-7;
 
 class Search {
  public:
   Search(ClContext& context, const SkeletexModel& model, const TriangleMesh* reference, const CompactGoal& goal)
-      : context_(context), model_(in_unit_frame(model)), goal_(goal) {
+      : context_(context), model_(in_unit_frame(model)), goal_(goal), size_(goal.size.value_or(kSize)) {
     const PreparedModel prepared(model_);
     source_ = source_surface(context, prepared);
     reference_ = reference != nullptr ? *reference : reconstruct_bind_mesh(context, prepared).mesh;
@@ -59,7 +60,7 @@ class Search {
   CompactOptions options_of(double step, int bare_levels) const {
     CompactOptions options;
     options.step = static_cast<float>(step);
-    options.size = goal_.size;
+    options.size = size_;
     options.bare_levels = bare_levels;
     return options;
   }
@@ -130,6 +131,16 @@ class Search {
   }
 
   Trial by_error(double wanted) {
+    for (;; size_ *= 2) {
+      if (const std::optional<Trial> found = fewest_bytes(wanted)) return *found;
+      if (goal_.size || 2 * size_ > kLargestSize) break;
+    }
+    throw InputError(fmt::format("an error of {:g} diagonals is out of reach at {} x {} texels; ask for more{}", wanted,
+                                 size_, size_, goal_.size ? ", or give a larger --size" : ""));
+  }
+
+  /// The trial with the fewest bytes that keeps to an error; nothing where none is found.
+  std::optional<Trial> fewest_bytes(double wanted) {
     std::optional<Trial> best;
     const auto try_levels = [&](int bare) {
       if (bare < 0) return false;
@@ -143,29 +154,27 @@ class Search {
     };
     // Downhill from where the spacing of the residuals suits the error as on the standard models.
     const int first =
-        std::clamp(static_cast<int>(std::lround(2 * std::log2(goal_.size / 128.0) + std::log2(wanted / 1e-4))), 0, 12);
+        std::clamp(static_cast<int>(std::lround(2 * std::log2(size_ / 128.0) + std::log2(wanted / 1e-4))), 0, 12);
     int bare = first;
     while (bare >= 0 && !try_levels(bare)) bare -= 2;
-    if (!best)
-      throw InputError(fmt::format(
-          "an error of {:g} diagonals is out of reach at {} x {} texels; ask for more, or give a larger --size", wanted,
-          goal_.size, goal_.size));
+    // All levels with residuals take more bytes than a larger size does.
+    if (!best && goal_.size) try_levels(0);
     const int start = bare;
-    if (start == first)
+    if (best && start == first)
       while (try_levels(++bare)) {
       }
-    if (bare <= start + 1) {
+    if (best && bare <= start + 1) {
       bare = start;
       while (try_levels(--bare)) {
       }
     }
-    return *best;
+    return best;
   }
 
   Trial by_bytes(std::size_t most) {
     const auto wanted = static_cast<double>(most);
     std::optional<Trial> best;
-    for (int bare = std::max(0, static_cast<int>(2 * std::log2(goal_.size / 256.0))); bare <= 12; ++bare) {
+    for (int bare = std::max(0, static_cast<int>(2 * std::log2(size_ / 256.0))); bare <= 12; ++bare) {
       std::optional<Trial> found = largest_step(bare, 3e-4, wanted, false, [&](Trial& t) {
         return static_cast<double>(t.bytes = compact_bytes(t.model).size());
       });
@@ -200,6 +209,7 @@ class Search {
   ClContext& context_;
   SkeletexModel model_;
   CompactGoal goal_;
+  int size_;  ///< that trials have
   SourceSurface source_;
   TriangleMesh reference_;
   int trials_ = 0;

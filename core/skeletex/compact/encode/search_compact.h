@@ -13,7 +13,9 @@ struct CompactGoal {
   std::optional<double> max_error;       ///< symmetric surface mean over the diagonal
   std::optional<std::size_t> max_bytes;  ///< of the file
   std::optional<double> quality;         ///< 0 to 100: the step is 10^-(2 + quality / 25) diagonals
-  int size = 512;                        ///< about the side of the texture that the file decodes to
+  /// About the side of the texture that the file decodes to; without, 512, or twice or four times that where an error
+  /// asks for it.
+  std::optional<int> size;
   int layer_steps = 64;                  ///< steps of a layer's range; 0: layers and bone weights are left out
 };
 
