@@ -14,7 +14,8 @@ struct PlaneGrid {
   int index(int row, int column) const { return row * columns + column % columns; }
 };
 
-/// The coarse grid. \pre the plane is not empty
+/// The coarse grid.
+/// \pre the plane is not empty
 PlaneGrid coarse_plane(const CompactPatch& patch, const CompactPlane& plane);
 
 /// New values of a step, halfway between their parents: between columns row by row, or rows between rows.

@@ -16,7 +16,7 @@ struct CompactGoal {
   /// About the side of the texture that the file decodes to; without, 512, or twice or four times that where an error
   /// asks for it.
   std::optional<int> size;
-  int layer_steps = 64;                  ///< steps of a layer's range; 0: layers and bone weights are left out
+  int layer_steps = 64;  ///< steps of a layer's range; 0: layers and bone weights are left out
 };
 
 struct CompactResult {
