@@ -175,6 +175,7 @@ constexpr const char* kOutcomes = R"({"name": "e", "limits": {"seconds": 1, "mem
   "sweep": {"how": [
     {"label": "right", "values": {"script": "echo 4"}},
     {"label": "refuses", "values": {"script": "echo no such bone >&2; exit 1"}},
+    {"label": "misuses", "values": {"script": "echo unknown option >&2; exit 2"}},
     {"label": "sleeps", "values": {"script": "sleep 100 | sleep 100"}},
     {"label": "crashes", "values": {"script": "kill -SEGV $$"}},
     {"label": "killed", "values": {"script": "kill -KILL $$"}},
@@ -193,6 +194,7 @@ TEST_F(Runner, CountsHowEachItemEndsWithinItsLimits) {
   }
   EXPECT_EQ(outcomes, (std::map<std::string, std::string>{{"right", "success"},
                                                           {"refuses", "refused"},
+                                                          {"misuses", "wrong"},
                                                           {"sleeps", "out of time"},
                                                           {"crashes", "crashed"},
                                                           {"killed", "out of memory"},
@@ -200,7 +202,7 @@ TEST_F(Runner, CountsHowEachItemEndsWithinItsLimits) {
                                                           {"wrong", "wrong"}}));
   EXPECT_EQ(summary.results.at("outcomes").at("out of memory"), 2);
   EXPECT_EQ(summary.done, 1);
-  EXPECT_EQ(summary.failed, 6);
+  EXPECT_EQ(summary.failed, 7);
   const std::string log = read_file(folder_ / "out/items/refuses.log");
   EXPECT_TRUE(holds(log, "no such bone") && holds(log, "bash -c")) << log;
   EXPECT_TRUE(holds(read_file(folder_ / "out/results.csv"), "v is null, and 4 is right"));

@@ -30,8 +30,10 @@ skeletex::TriangleMesh subdivided_to(skeletex::TriangleMesh mesh, int vertices) 
   return mesh;
 }
 
-/// The mesh with each vertex moved along its normal by up to so many diagonals, at random but the same each time.
-skeletex::TriangleMesh with_noise(skeletex::TriangleMesh mesh, double amplitude) {
+/// Moves each vertex along its normal.
+/// \param offset  of a vertex, by its index, world units
+template <class Offset>
+skeletex::TriangleMesh displaced(skeletex::TriangleMesh mesh, const Offset& offset) {
   using namespace skeletex;
   std::vector<Vec3> normals(mesh.positions.size(), Vec3::Zero());
   for (const Triangle& t : mesh.triangles) {
@@ -39,11 +41,31 @@ skeletex::TriangleMesh with_noise(skeletex::TriangleMesh mesh, double amplitude)
         (mesh.positions[t[1]] - mesh.positions[t[0]]).cross(mesh.positions[t[2]] - mesh.positions[t[0]]);
     for (const int corner : t) normals[corner] += normal;
   }
+  for (std::size_t i = 0; i < normals.size(); ++i) mesh.positions[i] += offset(i) * normals[i].stableNormalized();
+  return mesh;
+}
+
+/// The mesh with each vertex moved along its normal by up to so many diagonals, at random but the same each time.
+skeletex::TriangleMesh with_noise(const skeletex::TriangleMesh& mesh, double amplitude) {
   std::mt19937 random(1);
   const double largest = amplitude * bounding_box(mesh).diagonal();
-  for (std::size_t i = 0; i < normals.size(); ++i)
-    mesh.positions[i] += (2.0 * random() / std::mt19937::max() - 1) * largest * normals[i].stableNormalized();
-  return mesh;
+  return displaced(mesh, [&](std::size_t) { return (2.0 * random() / std::mt19937::max() - 1) * largest; });
+}
+
+/// What a scanner makes of it: every triangle split into four, and bumps of up to so many diagonals, a hundredth of the
+/// diagonal long.
+skeletex::TriangleMesh scanned(const skeletex::TriangleMesh& mesh, double amplitude) {
+  const double diagonal = bounding_box(mesh).diagonal(), wave = 2 * std::numbers::pi / (0.01 * diagonal);
+  const skeletex::TriangleMesh dense = skeletex::subdivided(mesh);
+  return displaced(dense, [&](std::size_t i) {
+    const skeletex::Vec3 phase = wave * dense.positions[i] + skeletex::Vec3(0, 1, 2);
+    return amplitude * diagonal * std::sin(phase.x()) * std::sin(phase.y()) * std::sin(phase.z());
+  });
+}
+
+/// Methods whose --by is an amount of their own.
+bool has_own_amount(const std::string& method) {
+  return method == "noise" || method == "scan" || method == "turn" || method == "scale";
 }
 
 skeletex::TriangleMesh turned(skeletex::TriangleMesh mesh, double degrees) {
@@ -59,10 +81,10 @@ skeletex::TriangleMesh scaled(skeletex::TriangleMesh mesh, double factor) {
 
 /// How many vertices the result is to have.
 int wanted_vertices(const Arguments& arguments, int present) {
-  const bool can_count = arguments.method != "noise" && arguments.method != "turn" && arguments.method != "scale";
   if (!arguments.like.empty()) return static_cast<int>(skeletex::read_mesh(arguments.like).mesh.positions.size());
   if (arguments.vertices > 0) return arguments.vertices;
-  if (can_count && arguments.by > 0) return std::max(4, static_cast<int>(std::lround(arguments.by * present)));
+  if (!has_own_amount(arguments.method) && arguments.by > 0)
+    return std::max(4, static_cast<int>(std::lround(arguments.by * present)));
   return present;
 }
 
@@ -72,6 +94,7 @@ skeletex::TriangleMesh result_of(const Arguments& arguments, const skeletex::Tri
   if (arguments.method == "remesh") return skeletex::remesh(mesh, wanted);
   if (arguments.method == "subdivide") return subdivided_to(mesh, wanted);
   if (arguments.method == "noise") return with_noise(mesh, arguments.by);
+  if (arguments.method == "scan") return scanned(mesh, arguments.by);
   if (arguments.method == "turn") return turned(mesh, arguments.by);
   if (arguments.method == "scale") return scaled(mesh, arguments.by);
   return mesh;
@@ -92,8 +115,7 @@ void run(const Arguments& arguments) {
     throw InputError(
         fmt::format("{} has {} vertices, {} cannot make {}", arguments.mesh, present, arguments.method, wanted));
   const auto begin = std::chrono::steady_clock::now();
-  if (arguments.by == 0 && (arguments.method == "noise" || arguments.method == "turn" || arguments.method == "scale"))
-    throw InputError(arguments.method + " needs --by");
+  if (arguments.by == 0 && has_own_amount(arguments.method)) throw InputError(arguments.method + " needs --by");
   const TriangleMesh result = result_of(arguments, mesh, wanted);
   const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
   write_mesh(arguments.output, result);
@@ -113,12 +135,13 @@ int main(int argc, char** argv) {
                    "peers");
   Arguments arguments;
   program
-      .add_option(
-          "METHOD", arguments.method,
-          "decimate (OpenMesh, quadrics), simplify (meshoptimizer, quadrics), remesh (CGAL, isotropic), "
-          "subdivide (every triangle into four, at least as many as wanted), noise, turn, scale, or copy (as it is)")
+      .add_option("METHOD", arguments.method,
+                  "decimate (OpenMesh, quadrics), simplify (meshoptimizer, quadrics), remesh (CGAL, isotropic), "
+                  "subdivide (every triangle into four, at least as many as wanted), noise, scan (split into four, "
+                  "with bumps), "
+                  "turn, scale, or copy (as it is)")
       ->required()
-      ->check(CLI::IsMember({"decimate", "simplify", "remesh", "subdivide", "noise", "turn", "scale", "copy"}));
+      ->check(CLI::IsMember({"decimate", "simplify", "remesh", "subdivide", "noise", "scan", "turn", "scale", "copy"}));
   program.add_option("MESH", arguments.mesh, "closed triangle mesh")->required();
   program.add_option("-o,--output", arguments.output, "the result: .ply or .obj")->required();
   CLI::Option* vertices =
@@ -127,7 +150,7 @@ int main(int argc, char** argv) {
   program.add_option("--like", arguments.like, "as many vertices as this mesh has")->excludes(vertices);
   program
       .add_option("--by", arguments.by,
-                  "times as many vertices as there are; noise: diagonals; turn: degrees; scale: the factor")
+                  "times as many vertices as there are; noise, scan: diagonals; turn: degrees; scale: the factor")
       ->check(CLI::PositiveNumber)
       ->excludes(vertices);
   program.add_option("--json", arguments.json, "write vertices, triangles, ms, closed_manifold to this file");

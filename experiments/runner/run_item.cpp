@@ -19,6 +19,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Exit code of programs whose command line is not understood.
+constexpr int kUsageError = 2;
+
 std::string program_of(const Step& step, const RunOptions& options) {
   if (step.tool.empty()) return options.program;
   const fs::path beside = fs::path(options.program).parent_path() / step.tool;
@@ -61,6 +64,8 @@ Ending ending_of(const Step& step, const ProcessResult& process, const ItemLimit
   if (process.exit_code == 128 + SIGKILL) return {"out of memory", std::move(reason)};
   if (is_signal) return {"crashed", std::move(reason)};
   if (process.exit_code == 0) return {"wrong", fmt::format("succeeded; exit code {} is right", step.exit_code)};
+  // A mistake in the experiment is no fault of the model.
+  if (process.exit_code == kUsageError) return {"wrong", std::move(reason)};
   return {"refused", std::move(reason)};
 }
 

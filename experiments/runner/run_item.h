@@ -13,7 +13,8 @@ namespace skeletex {
 ///   out of memory  a step said so, or the system ended it
 ///   out of time    the steps took longer than the limit
 ///   crashed        a signal ended a step
-///   wrong          a check does not hold, or a step succeeded that was to be refused
+///   wrong          a check does not hold, a step succeeded that was to be refused, or its command is not understood
+///                  (exit code 2)
 /// Its log, what was called and what it printed to standard error, goes to items/KEY.log in the results.
 /// \param environment  of the processes, on top of this one's own
 /// \return what items/KEY.json holds
