@@ -170,6 +170,6 @@ double tangential_step(double q, int number, double mean_spacing, const Site& si
   return std::clamp(0.25 * std::min(site.spacing, site.width), q / 4, 16 * q);
 }
 
-double normal_step(double q, int number) { return number < 4 ? 0.6 * q : q; }
+double normal_step(double q, int number) { return is_fine(number) ? q : 0.6 * q; }
 
 }  // namespace skeletex

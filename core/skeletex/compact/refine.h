@@ -95,6 +95,8 @@ Point halfway(const At& point, int before, int after) {
 double tangential_step(double q, int number, double mean_spacing, const Site& site);
 /// q of a patch's step.
 double normal_step(double q, int number);
+/// Whether a step comes after those whose offsets have finer steps, see normal_step.
+inline bool is_fine(int number) { return number >= 4; }
 /// Whether a step's points stay at their home places.
 inline bool stays_home(int number) { return number < 2; }
 

@@ -139,6 +139,11 @@ class PatchEncoder {
         return residual;
       }
     }
+    if (is_fine(step.number)) {
+      const Vec3 point = site.predicted + step.q / 64 * expected * site.normal;
+      residual.place = nearest_place(source_, middle, Place(row_scale_, column_scale_), point);
+      if ((source_.at(residual.place) - point).norm() < options_.near_enough * step.q) return residual;
+    }
     return home_residual(site, middle, step, expected);
   }
 

@@ -11,6 +11,9 @@ struct ResidualOptions {
   double rounding = 0.42;  ///< added before rounding down: 0.5 rounds to nearest, less prefers 0
   /// Points nearer to each other than so many steps get no residuals: their normals would follow the rounding.
   double least_spacing = 8;
+  /// A point that cannot be read along the normal stays where it is expected, if that is within so many steps of the
+  /// surface; else it takes its home place, whose numbers along the surface cost three times the bytes.
+  double near_enough = 2;
   /// Residuals below so many steps are dropped in the `kept_levels` finest steps that have some.
   double least_kept = 3;
   int kept_levels = 2;

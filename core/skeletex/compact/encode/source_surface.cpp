@@ -90,4 +90,22 @@ std::optional<Meeting> meet_line(const SourcePatch& patch, const Place& start, c
   return {};
 }
 
+Place nearest_place(const SourcePatch& patch, const Place& start, const Place& reach, const Vec3& point) {
+  constexpr int kRounds = 4, kSide = 3;  // squares of 7 x 7 places, each around the best of the one before
+  Place best = start;
+  double least = (patch.at(start) - point).squaredNorm(), share = 1;
+  for (int round = 0; round < kRounds; ++round, share *= 0.3) {
+    const Place centre = best;
+    for (int i = -kSide; i <= kSide; ++i)
+      for (int k = -kSide; k <= kSide; ++k) {
+        const Place place = centre + share / kSide * Place(i * reach[0], k * reach[1]);
+        const double distance = (patch.at(place) - point).squaredNorm();
+        if (distance >= least) continue;
+        least = distance;
+        best = place;
+      }
+  }
+  return best;
+}
+
 }  // namespace skeletex

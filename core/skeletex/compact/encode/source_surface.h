@@ -41,4 +41,8 @@ struct Meeting {
 std::optional<Meeting> meet_line(const SourcePatch& patch, const Place& start, const Place& reach, const Vec3& origin,
                                  const Vec3& direction, double tolerance);
 
+/// The place of the point of the surface that is nearest to a point, to a hundredth of the reach.
+/// \param reach  in rows and columns around `start`
+Place nearest_place(const SourcePatch& patch, const Place& start, const Place& reach, const Vec3& point);
+
 }  // namespace skeletex
