@@ -11,6 +11,10 @@
 namespace skeletex {
 namespace {
 
+/// In so many finest levels of colours residuals below so many steps are dropped: at edges, where the eye does not see
+/// them.
+constexpr int kSparseLevels = 4, kLeastKept = 3;
+
 /// A layer, or the weights, with the planes that it is made from.
 struct Source {
   CompactLayer layer;
@@ -87,7 +91,8 @@ class PatchValues {
 };
 
 /// \param values  at the finest grid's points, in steps
-CompactPlane encode_plane(const CompactPatch& patch, const std::vector<double>& values, double rounding) {
+CompactPlane encode_plane(const CompactPatch& patch, const std::vector<double>& values, bool is_colour,
+                          double rounding) {
   CompactPlane plane;
   if (std::all_of(values.begin(), values.end(), [](double v) { return std::abs(v) < 0.5; })) return plane;
   const int row_steps = __builtin_popcount(patch.row_steps), column_steps = patch.step_count - row_steps;
@@ -104,11 +109,13 @@ CompactPlane encode_plane(const CompactPatch& patch, const std::vector<double>& 
   for (int step = 0; step < patch.step_count; ++step) {
     const bool rows = (patch.row_steps >> step & 1) != 0;
     (rows ? between_rows : between_columns) /= 2;
+    const int least = is_colour && step >= patch.step_count - kSparseLevels ? kLeastKept : 1;
     std::vector<int> added = halfway_values(grid, rows), residuals(added.size());
     for (std::size_t i = 0; i < added.size(); ++i) {
       const int row = static_cast<int>(i) / grid.columns, column = static_cast<int>(i) % grid.columns;
       const double value = rows ? value_at(2 * row + 1, column) : value_at(row, 2 * column + 1);
       residuals[i] = rounded_towards_zero(value - added[i] / 64.0, rounding);
+      if (std::abs(residuals[i]) < least) residuals[i] = 0;
       added[i] += 64 * residuals[i];
     }
     grid = refined_plane(grid, rows, added);
@@ -133,7 +140,8 @@ void encode_layers(CompactModel& compact, const SkeletexModel& model, const std:
   for_each_block(compact.patches.size(), 1, [&](std::size_t bone, std::size_t, std::size_t) {
     for (const Source& source : sources)
       for (const std::vector<double>& values : PatchValues(model, source, static_cast<int>(bone)).at(places[bone]))
-        compact.patches[bone].planes.push_back(encode_plane(compact.patches[bone], values, rounding));
+        compact.patches[bone].planes.push_back(
+            encode_plane(compact.patches[bone], values, source.layer.is_colour(), rounding));
   });
 }
 
