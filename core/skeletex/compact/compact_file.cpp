@@ -248,6 +248,9 @@ void read_layers(ByteReader& in, CompactModel& model) {
   double planes = 0;
   for (CompactLayer& layer : model.layers) {
     layer.name = in.text(kMostName);
+    if (std::count_if(model.layers.begin(), model.layers.end(),
+                      [&](const CompactLayer& other) { return other.name == layer.name; }) > 1)
+      throw IoError("a layer is named twice");
     layer.planes = static_cast<int>(in.count(kMostBones));
     layer.is_bone_weights = in.byte() != 0;
     layer.offset = in.real();

@@ -222,10 +222,10 @@ std::vector<Layer> layers_of_vertices(const PreparedModel& prepared, const MeshA
 
 void turn_normal_layer(const PreparedModel& prepared, const TriangleMesh& mesh, std::span<const Vec3> positions,
                        SkeletexModel& result) {
-  const auto layer = std::find_if(result.layers.begin(), result.layers.end(),
-                                  [](const Layer& l) { return l.kind == LayerKind::kNormal; });
-  const Layer* const before = find_layer(prepared.model, kNormalLayer);
-  if (layer == result.layers.end() || before == nullptr) return;
+  const auto is_normal = [](const Layer& l) { return l.kind == LayerKind::kNormal; };
+  const auto layer = std::find_if(result.layers.begin(), result.layers.end(), is_normal);
+  const auto before = std::find_if(prepared.model.layers.begin(), prepared.model.layers.end(), is_normal);
+  if (layer == result.layers.end() || before == prepared.model.layers.end()) return;
   const std::vector<Vec3> normals = normals_at(texels_of_vertices(prepared), texel_normals(prepared, *before));
   const std::vector<Vec3> turned = turn_normals(mesh, normals, positions);
   MeshAttributes vertices;
