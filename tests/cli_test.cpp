@@ -326,6 +326,14 @@ TEST_F(Program, BringsNormalsColoursAndNumbersBack) {
   ASSERT_EQ(textured.attributes.materials.size(), 1u);
   EXPECT_FALSE(textured.attributes.materials[0].image.empty());
   EXPECT_EQ(textured.attributes.texture_coordinates.corners.size(), textured.mesh.triangles.size());
+  EXPECT_EQ(run({"pack", "coloured.skx.exr", "-o", "coloured.skx", "--quality", "20", "--size", "64"}).code, 0);
+  EXPECT_EQ(run({"unpack", "coloured.skx", "-o", "unpacked.skx.exr"}).code, 0);
+  const nlohmann::json unpacked = json_of({"inspect", "unpacked.skx.exr"});
+  EXPECT_EQ(unpacked["layers"].size(), 2u);  // all but the normals
+  EXPECT_EQ(unpacked["stance"], header["stance"]);
+  const std::string lost =
+      run({"pack", "coloured.skx.exr", "-o", "bare.skx", "--quality", "20", "--size", "64", "--layer-steps", "0"}).err;
+  EXPECT_NE(lost.find("leaves out: layer \"colour\", layer \"quality\""), std::string::npos) << lost;
   EXPECT_EQ(run({"filter", "coloured.skx.exr", "smooth", "--layer", "colour", "-o", "soft.skx.exr"}).code, 0);
   expect_refused(1, {"filter", "coloured.skx.exr", "smooth", "--layer", "heat", "-o", "none.skx.exr"},
                  {"heat", "normal, colour, quality"});

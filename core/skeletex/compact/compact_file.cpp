@@ -77,6 +77,35 @@ Skeleton read_skeleton(ByteReader& in) {
   return skeleton;
 }
 
+/// An axis of the world: 0 to 5 for x, -x, y, -y, z, -z.
+Vec3 axis_of(int code) { return (code % 2 == 0 ? 1 : -1) * Vec3::Unit(code / 2); }
+constexpr int kNoStance = 0, kAxes = 6, kOtherStance = 255;
+
+void write_stance(ByteWriter& out, const std::optional<Stance>& stance) {
+  if (!stance) return out.byte(kNoStance);
+  for (int code = 0; code < kAxes * kAxes; ++code)
+    if (stance->up == axis_of(code / kAxes) && stance->front == axis_of(code % kAxes)) return out.byte(code + 1);
+  out.byte(kOtherStance);
+  for (const Vec3* direction : {&stance->up, &stance->front})
+    for (int k = 0; k < 3; ++k) out.real((*direction)[k]);
+}
+
+std::optional<Stance> read_stance(ByteReader& in) {
+  const int code = in.byte();
+  if (code == kNoStance) return {};
+  Stance stance;
+  if (code <= kAxes * kAxes) {
+    stance = {axis_of((code - 1) / kAxes), axis_of((code - 1) % kAxes)};
+  } else {
+    for (Vec3* direction : {&stance.up, &stance.front})
+      for (int k = 0; k < 3; ++k) (*direction)[k] = in.real();
+  }
+  const auto is_unit = [](const Vec3& v) { return std::abs(v.norm() - 1) < 1e-6; };
+  if (!(is_unit(stance.up) && is_unit(stance.front) && std::abs(stance.up.dot(stance.front)) < 1e-6))
+    throw IoError("its up and front are not orthogonal directions");
+  return stance;
+}
+
 /// Calls `each` with every end that has a pole.
 template <class Model, class Each>
 void for_each_pole(Model& model, const Each& each) {
@@ -321,6 +350,7 @@ void read_plane_steps(ByteReader& in, CompactPatch& patch, int step) {
 std::string payload_of(const CompactModel& model) {
   ByteWriter out;
   write_skeleton(out, model.skeleton);
+  write_stance(out, model.stance);
   out.real(model.step);
   out.byte(model.bare_levels);
   for (const OffsetWeights& weights : model.weights)
@@ -395,6 +425,7 @@ CompactModel model_of(std::string_view payload, PrefixRule rule) {
   ByteReader in(payload);
   CompactModel model;
   model.skeleton = read_skeleton(in);
+  model.stance = read_stance(in);
   model.step = in.real();
   if (!(model.step > 1e-9 && model.step < 1)) throw IoError("its step is no length");
   model.bare_levels = in.byte();

@@ -2,9 +2,11 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "skeletex/model/texture.h"
 #include "skeletex/skeleton/skeleton.h"
 
 namespace skeletex {
@@ -78,6 +80,7 @@ struct CompactModel {
   std::vector<CompactCorner> corners;
   std::vector<CompactArc> arcs;
   std::vector<CompactLayer> layers;
+  std::optional<Stance> stance;
 };
 
 }  // namespace skeletex

@@ -180,6 +180,7 @@ SkeletexModel decode_model(const CompactModel& compact, int octaves) {
 
   SkeletexModel model;
   model.skeleton = compact.skeleton;
+  model.stance = compact.stance;
   model.diagonal = 1;
   model.ends = ends_of(compact);
   const SeparationPlanes separation(model.skeleton);

@@ -136,6 +136,7 @@ SkeletexModel in_unit_frame(SkeletexModel model) {
 CompactModel encode_compact(const SkeletexModel& model, const SourceSurface& source, const CompactOptions& options) {
   CompactModel compact;
   compact.skeleton = rounded_skeleton(model.skeleton);
+  compact.stance = model.stance;
   compact.step = options.step;
   compact.bare_levels = options.bare_levels;
   set_sizes(compact, model, options.size);
