@@ -80,7 +80,7 @@ struct CompactModel {
   std::vector<CompactCorner> corners;
   std::vector<CompactArc> arcs;
   std::vector<CompactLayer> layers;
-  std::optional<Stance> stance;
+  std::optional<Stance> stance;  ///< none: not known
 };
 
 }  // namespace skeletex

@@ -26,7 +26,7 @@ PlaneGrid refined_plane(const PlaneGrid& grid, bool refines_rows, const std::vec
 /// Adds the layers, and the bone weights, to a model whose patches are those of the compact one, at any size.
 void decode_layers(SkeletexModel& model, const CompactModel& compact);
 
-/// Layers with all planes, and those of the bone weights.
+/// How many planes all layers have, the bone weights among them.
 int plane_count(const CompactModel& compact);
 
 }  // namespace skeletex

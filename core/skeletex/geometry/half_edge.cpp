@@ -42,4 +42,19 @@ HalfEdgeMesh build_half_edges(const TriangleMesh& mesh) {
   return half_edges;
 }
 
+TriangleMesh triangle_mesh_of(const HalfEdgeMesh& half_edges) {
+  TriangleMesh mesh;
+  for (const auto vertex : half_edges.vertices()) {
+    const OpenMesh::Vec3d& p = half_edges.point(vertex);
+    mesh.positions.push_back({p[0], p[1], p[2]});
+  }
+  for (const auto face : half_edges.faces()) {
+    Triangle triangle{};
+    int corner = 0;
+    for (const auto vertex : face.vertices()) triangle[corner++] = vertex.idx();
+    mesh.triangles.push_back(triangle);
+  }
+  return mesh;
+}
+
 }  // namespace skeletex

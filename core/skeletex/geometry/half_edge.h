@@ -16,4 +16,8 @@ using HalfEdgeMesh = OpenMesh::TriMesh_ArrayKernelT<HalfEdgeTraits>;
 /// \throw InputError when OpenMesh cannot link a face
 HalfEdgeMesh build_half_edges(const TriangleMesh& mesh);
 
+/// The indexed mesh of a half-edge mesh, with the same vertex and face indices.
+/// \pre nothing in it is marked as deleted
+TriangleMesh triangle_mesh_of(const HalfEdgeMesh& half_edges);
+
 }  // namespace skeletex

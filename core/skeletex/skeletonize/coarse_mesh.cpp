@@ -19,19 +19,7 @@ TriangleMesh make_coarse_mesh(const TriangleMesh& mesh, int vertices) {
   decimater.initialize();
   decimater.decimate_to(vertices);
   half_edges.garbage_collection();
-
-  TriangleMesh result;
-  for (const auto vertex : half_edges.vertices()) {
-    const OpenMesh::Vec3d& p = half_edges.point(vertex);
-    result.positions.push_back({p[0], p[1], p[2]});
-  }
-  for (const auto face : half_edges.faces()) {
-    Triangle triangle{};
-    int corner = 0;
-    for (const auto vertex : face.vertices()) triangle[corner++] = vertex.idx();
-    result.triangles.push_back(triangle);
-  }
-  return result;
+  return triangle_mesh_of(half_edges);
 }
 
 }  // namespace skeletex

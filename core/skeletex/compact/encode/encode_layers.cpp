@@ -11,8 +11,8 @@
 namespace skeletex {
 namespace {
 
-/// In so many finest levels of colours residuals below so many steps are dropped: at edges, where the eye does not see
-/// them.
+/// Residuals of colours below kLeastKept steps are dropped in the kSparseLevels finest levels. Most of them lie at
+/// edges of the picture, where they are not seen.
 constexpr int kSparseLevels = 4, kLeastKept = 3;
 
 /// A layer, or the weights, with the planes that it is made from.
@@ -69,15 +69,12 @@ class PatchValues {
 
  private:
   double texel(const std::vector<float>& plane, int row, int column) const {
-    return plane[static_cast<std::size_t>(rectangle_.y + row) * width_ + rectangle_.x + column % rectangle_.width];
+    return plane[static_cast<std::size_t>(rectangle_.y + row) * width_ + rectangle_.x + column];
   }
   double sample(const std::vector<float>& plane, const Place& place) const {
-    const double row = std::clamp(place[0], 0.0, rectangle_.height - 1.0),
-                 column = place[1] - rectangle_.width * std::floor(place[1] / rectangle_.width);
-    const int r = std::min(static_cast<int>(row), rectangle_.height - 2), c = static_cast<int>(column);
-    const double s = row - r, t = column - c;
-    return (1 - s) * ((1 - t) * texel(plane, r, c) + t * texel(plane, r, c + 1)) +
-           s * ((1 - t) * texel(plane, r + 1, c) + t * texel(plane, r + 1, c + 1));
+    const auto [r, c, next, s, t] = cell_at(rectangle_.height, rectangle_.width, place);
+    return (1 - s) * ((1 - t) * texel(plane, r, c) + t * texel(plane, r, next)) +
+           s * ((1 - t) * texel(plane, r + 1, c) + t * texel(plane, r + 1, next));
   }
   static void normalize(std::vector<std::vector<double>>& values, std::size_t i) {
     double sum = 0;

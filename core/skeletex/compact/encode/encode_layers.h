@@ -14,6 +14,7 @@ bool has_coded_layers(const SkeletexModel& model);
 /// \param compact  its patches are encoded
 /// \param places   per patch, of its finest grid's points: rows and columns of the model's patch
 /// \param steps    how many steps a layer's range has
+/// \param rounding  see ResidualOptions
 void encode_layers(CompactModel& compact, const SkeletexModel& model, const std::vector<std::vector<Place>>& places,
                    int steps, double rounding);
 

@@ -44,9 +44,10 @@ class Search {
       if (bytes - *goal_.max_bytes >= for_shape) break;
       for_shape -= bytes - *goal_.max_bytes;
     }
-    throw InputError(fmt::format(
-        "the model and its layers do not fit into {} bytes; code the layers in fewer steps, or leave them out",
-        *goal_.max_bytes));
+    throw InputError(
+        fmt::format("the model and its layers do not fit into {} bytes; code the layers in fewer steps "
+                    "(--layer-steps), or leave them out",
+                    *goal_.max_bytes));
   }
 
  private:
@@ -103,8 +104,8 @@ class Search {
   /// The trial that keeps a value just within what is wanted; nothing where none does.
   /// \param rises  whether the value grows with the step, as errors do, or falls, as sizes do
   /// \param value  of a trial; positive
-  /// \param least_bytes  a trial that still misses and has as many ends the search, as smaller steps have more; 0: none
-  /// does
+  /// \param least_bytes  the search ends at a trial that misses and already has so many bytes: smaller steps have more.
+  ///                     0: no limit
   std::optional<Trial> largest_step(int bare_levels, double first, double wanted, bool rises,
                                     const std::function<double(Trial&)>& value, std::size_t least_bytes = 0) {
     std::optional<Trial> best;

@@ -10,12 +10,15 @@
 
 namespace skeletex {
 
-Vec3 SourcePatch::at(const Place& place) const {
+Cell cell_at(int rows, int columns, const Place& place) {
   const double row = std::clamp(place[0], 0.0, rows - 1.0),
                column = place[1] - columns * std::floor(place[1] / columns);
-  const int r = std::min(static_cast<int>(row), rows - 2), c = std::min(static_cast<int>(column), columns - 1),
-            next = c + 1 < columns ? c + 1 : 0;
-  const double s = row - r, t = column - c;
+  const int r = std::min(static_cast<int>(row), rows - 2), c = std::min(static_cast<int>(column), columns - 1);
+  return {r, c, c + 1 < columns ? c + 1 : 0, row - r, column - c};
+}
+
+Vec3 SourcePatch::at(const Place& place) const {
+  const auto [r, c, next, s, t] = cell_at(rows, columns, place);
   const Vec3* upper = points.data() + static_cast<std::size_t>(r) * columns;
   const Vec3* lower = upper + columns;
   return (1 - s) * ((1 - t) * upper[c] + t * upper[next]) + s * ((1 - t) * lower[c] + t * lower[next]);

@@ -12,6 +12,14 @@ namespace skeletex {
 /// A place in a patch: row and column of its texels, not whole.
 using Place = Eigen::Vector2d;
 
+/// The cell of four texels around a place, and the place's shares of its later row and column.
+struct Cell {
+  int row, column, next_column;
+  double row_share, column_share;
+};
+/// \param place  rows are clamped, columns wrap round
+Cell cell_at(int rows, int columns, const Place& place);
+
 /// The bilinear surface of a patch's points.
 struct SourcePatch {
   int rows = 0, columns = 0;
