@@ -82,7 +82,8 @@ void set_poles(CompactModel& compact, const SeparationPlanes& separation, const 
 
 /// \param places  per patch, as encode_patch gives them; null: not wanted
 void encode_patches(CompactModel& compact, const SeparationPlanes& separation, const SourceSurface& source,
-                    const ResidualOptions& options, std::vector<std::vector<Place>>* places) {
+                    const CompactOptions& options, std::vector<std::vector<Place>>* places) {
+  const std::vector<Place> none;
   const std::vector<std::array<PatchEnd, 2>> ends = ends_of(compact);
   const SeamCurves seams = decode_seams(compact, separation, 0);
   for_each_block(compact.patches.size(), 1, [&](std::size_t block, std::size_t, std::size_t) {
@@ -91,7 +92,8 @@ void encode_patches(CompactModel& compact, const SeparationPlanes& separation, c
     const EndRow row = [&](BoneEnd end, int columns) {
       return end_row(compact, separation, ends, seams, bone, end, columns);
     };
-    encode_patch(compact, separation, bone, has_pole, row, source.patches[bone], options,
+    encode_patch(compact, separation, bone, has_pole, row, source.patches[bone], options.residuals,
+                 options.fixed_places.empty() ? none : options.fixed_places[bone],
                  places == nullptr ? nullptr : &(*places)[bone]);
   });
 }
@@ -144,14 +146,18 @@ CompactModel encode_compact(const SkeletexModel& model, const SourceSurface& sou
   set_poles(compact, separation, source);
   encode_seams(compact, separation, source, (options.bare_levels + options.residuals.kept_levels + 1) / 2,
                options.residuals.rounding);
-  encode_patches(compact, separation, source, options.residuals, nullptr);
-  fit_weights(compact);
+  if (options.weights) {
+    compact.weights = *options.weights;
+  } else {
+    encode_patches(compact, separation, source, options, nullptr);
+    fit_weights(compact);
+  }
   if (options.layer_steps == 0) {
-    encode_patches(compact, separation, source, options.residuals, nullptr);
+    encode_patches(compact, separation, source, options, nullptr);
     return compact;
   }
   std::vector<std::vector<Place>> places(compact.patches.size());
-  encode_patches(compact, separation, source, options.residuals, &places);
+  encode_patches(compact, separation, source, options, &places);
   encode_layers(compact, model, places, options.layer_steps, options.residuals.rounding);
   return compact;
 }

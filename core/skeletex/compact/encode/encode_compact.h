@@ -12,7 +12,10 @@ struct CompactOptions {
   int size = 512;       ///< about the side of the texture that the file decodes to
   int bare_levels = 4;  ///< finest steps of every patch without residuals
   ResidualOptions residuals;
-  int layer_steps = 0;  ///< steps of a layer's range; 0: layers and bone weights are left out
+  /// Of the prediction of offsets; none: those that suit the model best.
+  std::optional<std::array<OffsetWeights, 2>> weights;
+  std::vector<std::vector<Place>> fixed_places;  ///< per patch, see encode_patch; empty: none
+  int layer_steps = 0;                           ///< steps of a layer's range; 0: layers and bone weights are left out
 };
 
 /// A compact model of a model, whose surface it follows.

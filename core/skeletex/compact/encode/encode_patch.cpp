@@ -19,7 +19,8 @@ struct Traced {
 class PatchEncoder {
  public:
   PatchEncoder(CompactModel& compact, const SeparationPlanes& separation, int bone, const std::array<bool, 2>& has_pole,
-               const EndRow& end_row, const SourcePatch& source, const ResidualOptions& options)
+               const EndRow& end_row, const SourcePatch& source, const ResidualOptions& options,
+               const std::vector<Place>& fixed_places)
       : compact_(compact),
         patch_(compact.patches[bone]),
         separation_(separation),
@@ -27,7 +28,8 @@ class PatchEncoder {
         has_pole_(has_pole),
         end_row_(end_row),
         source_(source),
-        options_(options) {}
+        options_(options),
+        fixed_places_(fixed_places) {}
 
   void run(std::vector<Place>* places) {
     Traced traced = encode_base();
@@ -118,12 +120,27 @@ class PatchEncoder {
     int number = 0;
     bool is_rows = false;
     double q = 0, mean_spacing = 0;
-    double mean_columns = 0;  ///< distance between columns
+    double mean_columns = 0;     ///< distance between columns
+    std::vector<char> is_fixed;  ///< per site: whether it lies next to a fixed place
   };
+
+  std::vector<char> fixed_sites(const Refinement& refinement, const PatchGrid& grid, bool rows) const {
+    const int intervals = (rows ? 2 : 1) * grid.intervals, columns = (rows ? 1 : 2) * grid.columns;
+    std::vector<char> is_near(static_cast<std::size_t>(intervals + 1) * columns, 0);
+    for (const Place& place : fixed_places_) {
+      const int row = rounded(place[0] * intervals), column = rounded((place[1] - std::floor(place[1])) * columns);
+      for (int r = std::max(0, row - 1); r <= std::min(intervals, row + 1); ++r)
+        for (int c = column - 1; c <= column + 1; ++c) is_near[r * columns + (c + columns) % columns] = 1;
+    }
+    std::vector<char> is_fixed;
+    for (const Site& site : refinement.sites()) is_fixed.push_back(is_near[site.row * columns + site.column]);
+    return is_fixed;
+  }
 
   Residual residual_of(const Site& site, const Traced& traced, const Step& step, int expected,
                        const std::vector<Place>& before) const {
     const Place middle = middle_of(site, traced);
+    if (step.is_fixed[before.size()] != 0) return home_residual(site, middle, step, expected);
     Residual residual;
     if (!stays_home(step.number)) {
       const Place reach = options_.reach * Place(row_scale_, column_scale_);
@@ -209,7 +226,12 @@ class PatchEncoder {
 
   Traced encode_step(const Traced& traced, int step, bool rows) {
     const Refinement refinement(traced.grid, rows, end_row_);
-    Step quantization{step, rows, normal_step(compact_.step, step), refinement.mean_spacing(), 0};
+    Step quantization{step,
+                      rows,
+                      normal_step(compact_.step, step),
+                      refinement.mean_spacing(),
+                      0,
+                      fixed_sites(refinement, traced.grid, rows)};
     for (const Site& site : refinement.sites())
       quantization.mean_columns += (rows ? site.width : site.spacing) / refinement.site_count();
     const double q = quantization.q;
@@ -226,7 +248,8 @@ class PatchEncoder {
       const int expected =
           expected_offset(compact_.weights[rows ? 1 : 0], neighbours_of(i, refinement.site_columns()), offsets);
       Residual r = residual_of(site, traced, quantization, expected, places);
-      if (is_sparse && std::abs(r.normal) < options_.least_kept) r.normal = r.side = r.across = 0;
+      if (is_sparse && quantization.is_fixed[i] == 0 && std::abs(r.normal) < options_.least_kept)
+        r.normal = r.side = r.across = 0;
       offsets[i] = offset_of(r.normal, expected);
       const double tangential = tangential_step(q, step, refinement.mean_spacing(), site);
       points.push_back(site.predicted + q / 64 * offsets[i] * site.normal +
@@ -314,6 +337,7 @@ class PatchEncoder {
   const EndRow& end_row_;
   const SourcePatch& source_;
   const ResidualOptions& options_;
+  const std::vector<Place>& fixed_places_;
   double row_scale_ = 1, column_scale_ = 1;  ///< texels of the source between the grid's rows, and columns
   int row_step_count_ = __builtin_popcount(patch_.row_steps);
 };
@@ -322,8 +346,8 @@ class PatchEncoder {
 
 void encode_patch(CompactModel& compact, const SeparationPlanes& separation, int bone,
                   const std::array<bool, 2>& has_pole, const EndRow& end_row, const SourcePatch& source,
-                  const ResidualOptions& options, std::vector<Place>* places) {
-  PatchEncoder(compact, separation, bone, has_pole, end_row, source, options).run(places);
+                  const ResidualOptions& options, const std::vector<Place>& fixed_places, std::vector<Place>* places) {
+  PatchEncoder(compact, separation, bone, has_pole, end_row, source, options, fixed_places).run(places);
 }
 
 }  // namespace skeletex

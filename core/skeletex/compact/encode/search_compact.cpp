@@ -11,6 +11,7 @@
 #include "skeletex/compact/compact_file.h"
 #include "skeletex/compact/decode_model.h"
 #include "skeletex/compact/encode/encode_layers.h"
+#include "skeletex/compact/encode/reduce_intersections.h"
 #include "skeletex/math/portable.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
@@ -33,12 +34,12 @@ class Search {
   }
 
   CompactResult run() {
-    if (goal_.quality) return measured(with_layers(by_quality()));
-    if (!goal_.max_bytes) return measured(with_layers(by_error(goal_.max_error.value_or(1e-4))));
+    if (goal_.quality) return measured(completed(by_quality()));
+    if (!goal_.max_bytes) return measured(completed(by_error(goal_.max_error.value_or(1e-4))));
     // The shape gets what the layers leave of the bytes; how much they take depends a little on the shape.
     std::size_t for_shape = *goal_.max_bytes;
     for (int i = 0; i < 4; ++i) {
-      Trial result = with_layers(by_bytes(for_shape));
+      Trial result = completed(by_bytes(for_shape));
       const std::size_t bytes = compact_bytes(result.model).size();
       if (bytes <= *goal_.max_bytes) return measured(result);
       if (bytes - *goal_.max_bytes >= for_shape) break;
@@ -79,8 +80,9 @@ class Search {
     result.model = encode_compact(model_, source_, result.options);
     return result;
   }
-  /// The same shape, and the layers of the model.
-  Trial with_layers(Trial trial) {
+  /// A trial with fewer triangles that intersect, and the layers of the model.
+  Trial completed(Trial trial) {
+    reduce_intersections(context_, model_, source_, trial.options, trial.model);
     if (goal_.layer_steps == 0 || !has_coded_layers(model_)) return trial;
     trial.options.layer_steps = goal_.layer_steps;
     trial.model = encode_compact(model_, source_, trial.options);
