@@ -69,10 +69,7 @@ PatchGrid decode_patch(const CompactModel& model, const SeparationPlanes& separa
   PatchGrid grid = empty_grid(patch, has_pole, end_row);
   const std::vector<BaseSite> sites = base_sites(model, separation, bone, end_row);
   const std::array<double, 3> steps = base_steps(model, bone);
-  for (std::size_t i = 0; i < sites.size(); ++i)
-    grid.points[i + patch.columns] = sites[i].predicted + steps[0] * patch.base[3 * i] * sites[i].out +
-                                     steps[1] * patch.base[3 * i + 1] * sites[i].around +
-                                     steps[2] * patch.base[3 * i + 2] * sites[i].along;
+  for (std::size_t i = 0; i < sites.size(); ++i) grid.points[i + patch.columns] = base_point(patch, sites[i], steps, i);
   for (int step = 0; step < step_count; ++step) {
     const bool rows = step_doubles_rows(patch, step);
     const Refinement refinement(grid, rows, end_row);

@@ -20,6 +20,12 @@ inline std::array<double, 3> base_steps(const CompactModel& model, int bone) {
   const double tangential = std::ldexp(model.step, model.patches[bone].base_exponent);
   return {0.6 * model.step, tangential, tangential};
 }
+/// The i-th inner point of the coarse grid.
+inline Vec3 base_point(const CompactPatch& patch, const BaseSite& site, const std::array<double, 3>& steps,
+                       std::size_t i) {
+  return site.predicted + steps[0] * patch.base[3 * i] * site.out + steps[1] * patch.base[3 * i + 1] * site.around +
+         steps[2] * patch.base[3 * i + 2] * site.along;
+}
 /// The coarse grid with its ends and without inner points.
 PatchGrid empty_grid(const CompactPatch& patch, const std::array<bool, 2>& has_pole, const EndRow& end_row);
 

@@ -144,8 +144,7 @@ CompactModel encode_compact(const SkeletexModel& model, const SourceSurface& sou
   set_sizes(compact, model, options.size);
   const SeparationPlanes separation(compact.skeleton);
   set_poles(compact, separation, source);
-  encode_seams(compact, separation, source, (options.bare_levels + options.residuals.kept_levels + 1) / 2,
-               options.residuals.rounding);
+  encode_seams(compact, separation, source, (options.bare_levels + 1) / 2, options.residuals.rounding);
   if (options.weights) {
     compact.weights = *options.weights;
   } else {

@@ -79,18 +79,24 @@ class PatchEncoder {
     }
     patch_.base_exponent =
         std::clamp(rounded(std::log2(std::max(0.03 * radius, 4 * compact_.step) / compact_.step)), 0, 30);
+    set_scales(traced.grid);
+    const Place reach(0.25 * row_scale_, 0.25 * column_scale_);
     const std::array<double, 3> steps = base_steps(compact_, bone_);
     patch_.base.clear();
     for (std::size_t i = 0; i < sites.size(); ++i) {
-      const std::array<Vec3, 3> axes{sites[i].out, sites[i].around, sites[i].along};
-      Vec3& point = traced.grid.points[i + patch_.columns];
-      point = sites[i].predicted;
-      for (int k = 0; k < 3; ++k) {
-        const int value = rounded(offsets[i].dot(axes[k]) / steps[k]);
-        patch_.base.push_back(value);
+      const BaseSite& site = sites[i];
+      Place& place = traced.places[i + patch_.columns];
+      const int around = rounded(offsets[i].dot(site.around) / steps[1]),
+                along = rounded(offsets[i].dot(site.along) / steps[2]);
+      // Rounding moves the point off the surface, to which it then goes back.
+      const Vec3 moved = site.predicted + steps[1] * around * site.around + steps[2] * along * site.along;
+      double out = offsets[i].dot(site.out);
+      if (const auto found = meet_line(source_, place, reach, moved, site.out, 0.05 * steps[0])) {
+        place = found->place;
+        out = found->distance;
       }
-      point = sites[i].predicted + steps[0] * patch_.base[3 * i] * axes[0] +
-              steps[1] * patch_.base[3 * i + 1] * axes[1] + steps[2] * patch_.base[3 * i + 2] * axes[2];
+      patch_.base.insert(patch_.base.end(), {rounded(out / steps[0]), around, along});
+      traced.grid.points[i + patch_.columns] = base_point(patch_, site, steps, i);
     }
     return traced;
   }

@@ -67,15 +67,18 @@ void encode_arc(const CompactModel& compact, CompactArc& arc, const ArcPlane& pl
       double to = places[site.parents[1]];
       if (to <= from) to += period;
       double place = (from + to) / 2, distance = 0;
-      const auto found = meet_line(curve, place, 0.25 * (to - from), site.predicted, site.normal);
+      const double reach = 0.25 * (to - from);
+      auto found = meet_line(curve, place, reach, site.predicted, site.normal);
       int side = 0;
-      if (found.is_found && step > 0) {
-        place = found.place;
-        distance = found.distance;
-      } else {
+      if (!found.is_found || step == 0) {
         const Vec2 offset = curve.at(place) - site.predicted;
         side = rounded(offset.dot(site.side) / (8 * q));
         distance = offset.dot(site.normal);
+        found = meet_line(curve, place, reach, site.predicted + 8 * q * side * site.side, site.normal);
+      }
+      if (found.is_found) {
+        place = found.place;
+        distance = found.distance;
       }
       const int normal = rounded_towards_zero(distance / q, rounding);
       residuals.normal.push_back(normal);
