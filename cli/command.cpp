@@ -207,6 +207,24 @@ Vec3 parse_direction(const char* option, const std::string& text) {
   return v;
 }
 
+std::array<int, 2> parse_size(const std::string& text, int least, int most, std::string_view unit) {
+  std::array<int, 2> size{0, 0};
+  const char* const end = text.data() + text.size();
+  auto [rest, code] = std::from_chars(text.data(), end, size[0]);
+  size[1] = size[0];
+  if (code == std::errc() && rest != end && (*rest == 'x' || *rest == 'X')) {
+    const auto second = std::from_chars(rest + 1, end, size[1]);
+    rest = second.ptr;
+    code = second.ec;
+  }
+  const auto [smaller, larger] = std::minmax(size[0], size[1]);
+  if (code != std::errc() || rest != end || smaller < least || larger > most)
+    throw CLI::ValidationError(
+        "--size", fmt::format("\"{}\" is no size; give N or WIDTHxHEIGHT, {} to {} {}, e.g. 512 or 1200x900", text,
+                              least, most, unit));
+  return size;
+}
+
 Json profile_json(ClContext& context) {
   Json list = Json::array();
   for (const ClProfileEntry& entry : context.profile())

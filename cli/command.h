@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <CLI/CLI.hpp>
+#include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -97,6 +98,11 @@ TriangleTree require_closed(TriangleMesh& mesh);
 /// A direction as an option gives it: x, -y, .. or three numbers with commas between them.
 /// \throw CLI::ValidationError
 Vec3 parse_direction(const char* option, const std::string& text);
+
+/// Width and height that --size gives as N or WIDTHxHEIGHT.
+/// \param unit  what is counted, such as "pixels"
+/// \throw CLI::ValidationError unless both are in the range
+std::array<int, 2> parse_size(const std::string& text, int least, int most, std::string_view unit);
 
 /// Time on the device by kernel, for the JSON.
 Json profile_json(ClContext& context);

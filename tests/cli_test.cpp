@@ -8,7 +8,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <Eigen/Geometry>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -295,6 +297,43 @@ TEST_F(Program, ExportsACoarseMeshWithItsDisplacement) {
   expect_refused(2, {"export", "y.skx.exr", "-o", "no.glb", "--displacement", "no.png"}, {"no.png", ".exr"});
   expect_refused(2, {"export", "y.skx.exr", "-o", "no.glb", "--displacement", "y.skx.exr"}, {"y.skx.exr", "MODEL"});
   for (const char* name : {"rig.glb", "rig.exr"}) fs::remove(folder_ / name);
+}
+
+/// The JSON of a binary glTF file.
+nlohmann::json json_of_glb(const std::string& bytes) {
+  std::uint32_t size = 0;
+  std::memcpy(&size, bytes.data() + 12, 4);
+  return nlohmann::json::parse(bytes.substr(20, size));
+}
+
+TEST_F(Program, ExportsAndShowsAModelAsItStands) {
+  ASSERT_EQ(run({"encode", "y.ply", "y.skeleton.json", "-o", "z.skx.exr", "--size", "64", "--up", "z"}).code, 0);
+  const auto turn_of = [&](const std::string& model, const std::vector<std::string>& options) {
+    std::vector<std::string> arguments{"export", model, "-o", "rig.glb"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    EXPECT_EQ(run(arguments).code, 0);
+    const nlohmann::json armature = json_of_glb(text_of(folder_ / "rig.glb"))["nodes"][1];
+    if (!armature.contains("rotation")) return Eigen::Quaterniond::Identity();
+    const auto r = armature["rotation"].get<std::vector<double>>();
+    return Eigen::Quaterniond(r[3], r[0], r[1], r[2]);
+  };
+  const Eigen::Quaterniond own = turn_of("z.skx.exr", {});
+  EXPECT_LT((own * Vec3::UnitZ() - Vec3::UnitY()).norm(), 1e-6);
+  EXPECT_LT((own * -Vec3::UnitY() - Vec3::UnitZ()).norm(), 1e-6);
+  EXPECT_LT(own.angularDistance(turn_of("z.skx.exr", {"--up", "z"})), 1e-6);
+  EXPECT_LT(turn_of("y.skx.exr", {}).angularDistance(Eigen::Quaterniond::Identity()), 1e-6);
+  EXPECT_LT(turn_of("z.skx.exr", {"--up", "y"}).angularDistance(Eigen::Quaterniond::Identity()), 1e-6);
+  const auto page_of = [&](const std::vector<std::string>& options) {
+    std::vector<std::string> arguments{"view", "z.skx.exr", "-o", "page.html", "--size", "32"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return run(arguments).code == 0 ? text_of(folder_ / "page.html") : "";  // a build without npm makes none
+  };
+  const std::string page = page_of({});
+  if (!page.empty()) {
+    EXPECT_EQ(page, page_of({"--up", "z"}));
+    EXPECT_NE(page, page_of({"--up", "y"}));
+  }
+  for (const char* name : {"z.skx.exr", "rig.glb", "page.html"}) fs::remove(folder_ / name);
 }
 
 TEST_F(Program, BringsNormalsColoursAndNumbersBack) {
@@ -837,7 +876,8 @@ TEST_F(Program, DrawsModelsAndMeshesInEveryMode) {
   expect_refused(2, {"render", "y.ply", "-o", "a.png", "--mode", "segments"}, {"--skeleton"});
   expect_refused(2, {"render", "y.ply", "-o", "a.png", "--mode", "error"}, {"--against"});
   expect_refused(2, {"render", "y.ply", "-o", "a.png", "--mode", "shadde"}, {"did you mean shaded?"});
-  expect_refused(2, {"render", "y.ply", "-o", "a.png", "--size", "64"}, {"1200x900"});
+  expect_refused(2, {"render", "y.ply", "-o", "a.png", "--size", "64x"}, {"1200x900"});
+  expect_refused(2, {"render", "y.ply", "-o", "a.png", "--size", "8"}, {"16 to 8192 pixels"});
   expect_refused(2, {"render", "y.ply", "-o", "a.png", "--background", "whitish"}, {"#rrggbb"});
   expect_refused(2, {"render", "y.ply", "-o", "a.png", "--up", "0,1"}, {"0,1,0"});
   expect_refused(2, {"render", "y.ply", "-o", "a.png", "--up", "1e300,1e300,0"}, {"--up"});

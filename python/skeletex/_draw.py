@@ -80,7 +80,7 @@ def render(
     elevation: float = 15,
     fov: float = 25,
     zoom: float = 1,
-    up: Sequence[float] = (0, 1, 0),
+    up: Optional[Sequence[float]] = None,
     front: Optional[Sequence[float]] = None,
     target: Optional[Sequence[float]] = None,
     eye: Optional[Sequence[float]] = None,
@@ -100,8 +100,8 @@ def render(
     :param azimuth: degrees about the up axis, 0 from the front
     :param elevation: degrees above the horizon
     :param fov: degrees of the shorter side; 0: orthographic
-    :param up: the model's up direction
-    :param front: where it looks; None: z, or -y for a model that stands along z
+    :param up: the model's up direction; None: its own, else y
+    :param front: where it looks; None: its own, or z, or -y for a model that stands along z
     :param target: what is in the middle, in the user's units; None: the model is centred
     :param eye: from where, in the user's units; with it, angles and zoom do not count
     :return: height x width x 3 bytes in sRGB; without a background x 4
@@ -126,6 +126,10 @@ def render(
         paint = _core.bone_colours(len(subject.patches))[numbers]
     if mode == "checker" and isinstance(subject, Model):
         corner_uv = _core.checker(subject._core)
+    if up is None and front is None and isinstance(subject, Model):
+        up, front = subject.up, subject.front
+    if up is None:
+        up = (0, 1, 0)
     view: Dict[str, Any] = {"azimuth": azimuth, "elevation": elevation, "fov": fov, "zoom": zoom, "up": up}
     if front is None:
         along_z = np.abs(np.asarray(up, dtype=np.float64))[:2].sum() == 0
@@ -211,7 +215,7 @@ def view(
     second: Optional[Model] = None,
     *,
     against: Union[Mesh, Model, None] = None,
-    up: str = "y",
+    up: Optional[str] = None,
     size: Optional[int] = None,
     bones: Optional[BonePairs] = None,
     name: str = "model",
@@ -222,7 +226,7 @@ def view(
 
     :param second: what it morphs to and takes bones from; the two must branch alike
     :param against: the page can show the distances to this surface
-    :param up: axis that points up: ``"y"``, with z in front, or ``"z"``, with -y in front
+    :param up: axis that points up: ``"y"``, with z in front, or ``"z"``, with -y in front; None: the model's own
     :param size: texels along the longer side; None: the model's own, at most 512
     :param bones: pairs of bones that must correspond
     :param height: in a notebook, pixels
@@ -235,7 +239,7 @@ def view(
     options = {
         "name": name,
         "second_name": second_name,
-        "up": one_of(up, ("y", "z"), "up"),
+        "up": None if up is None else one_of(up, ("y", "z"), "up"),
         "bones": bone_pairs(bones),
     }
     reference = None if against is None else mesh_of(against)._checked()

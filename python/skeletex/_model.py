@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import os
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -116,6 +116,16 @@ class Model:
     def genus(self) -> int:
         """Number of handles of the surface."""
         return self._core.genus
+
+    @property
+    def up(self) -> Optional[Tuple[float, float, float]]:
+        """The direction that is up; None: not known."""
+        return None if self._core.stance is None else self._core.stance[0]
+
+    @property
+    def front(self) -> Optional[Tuple[float, float, float]]:
+        """Where the model looks; None: not known."""
+        return None if self._core.stance is None else self._core.stance[1]
 
     @property
     def unit(self) -> float:

@@ -124,7 +124,7 @@ std::string page(const Model& model, const std::optional<Model>& second,
   const SkeletexModel given = whole(model);
   PageOptions options;
   options.name = json["name"];
-  options.is_z_up = json["up"] == "z";
+  if (!json["up"].is_null()) options.is_z_up = json["up"] == "z";
   std::optional<TriangleMesh> mesh;
   if (reference) {
     mesh = mesh_of(reference->first, reference->second);

@@ -134,6 +134,14 @@ void bind_model(py::module_& module) {
   py::class_<Model>(module, "Model", "A model; its texels are an array of Python.")
       .def_property_readonly("planes", [](const Model& model) { return model.planes; })
       .def_property_readonly("genus", [](const Model& model) { return model.rest->genus; })
+      .def_property_readonly("stance",
+                             [](const Model& model) -> std::optional<py::tuple> {
+                               const std::optional<Stance>& stance = model.rest->stance;
+                               if (!stance) return std::nullopt;
+                               const auto& [up, front] = *stance;
+                               return py::make_tuple(py::make_tuple(up.x(), up.y(), up.z()),
+                                                     py::make_tuple(front.x(), front.y(), front.z()));
+                             })
       .def_property_readonly("unit", [](const Model& model) { return model.rest->skeleton.frame.scale; })
       .def_property_readonly("diagonal",
                              [](const Model& model) { return model.rest->diagonal * model.rest->skeleton.frame.scale; })

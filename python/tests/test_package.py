@@ -358,6 +358,15 @@ def test_errors_are_python_s_own_kinds_as_well(tmp_path: Path, bear: skeletex.Mo
         assert issubclass(error, skeletex.Error)
 
 
+def test_models_are_shown_as_they_stand(bear: skeletex.Model) -> None:
+    assert bear.up == (0, 1, 0) and bear.front == (0, 0, 1)
+    same = skeletex.render(bear, size=(64, 64))
+    assert np.array_equal(same, skeletex.render(bear, size=(64, 64), up=(0, 1, 0), front=(0, 0, 1)))
+    assert not np.array_equal(same, skeletex.render(bear, size=(64, 64), up=(0, 0, 1)))
+    page = skeletex.view(bear).html
+    assert page == skeletex.view(bear, up="y").html and page != skeletex.view(bear, up="z").html
+
+
 def test_options_out_of_range_are_refused_by_name(bear: skeletex.Model, bear_mesh: skeletex.Mesh) -> None:
     for name, call in {
         "size": lambda: skeletex.encode(bear_mesh, size=2),

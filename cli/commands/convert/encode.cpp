@@ -46,24 +46,6 @@ struct Arguments {
   CompactArguments compact;
 };
 
-/// "512" or "1024x512".
-std::array<int, 2> parse_size(const std::string& text) {
-  std::array<int, 2> size{0, 0};
-  const char* const end = text.data() + text.size();
-  auto [rest, code] = std::from_chars(text.data(), end, size[0]);
-  size[1] = size[0];
-  if (code == std::errc() && rest != end && (*rest == 'x' || *rest == 'X')) {
-    const auto second = std::from_chars(rest + 1, end, size[1]);
-    rest = second.ptr;
-    code = second.ec;
-  }
-  if (code != std::errc() || rest != end || size[0] < 4 || size[1] < 4 || size[0] > 16384 || size[1] > 16384)
-    throw CLI::ValidationError(
-        "--size",
-        "\"" + text + "\" is no texture size; give N or WIDTHxHEIGHT, 4 to 16384 texels, e.g. 512 or 1024x512");
-  return size;
-}
-
 std::vector<std::pair<std::string, Method>> parse_bone_methods(const std::vector<std::string>& texts) {
   std::vector<std::pair<std::string, Method>> methods;
   for (const std::string& text : texts) {
@@ -128,7 +110,7 @@ void set_texel_options(const Arguments& arguments, const CLI::App& command, Enco
 
 EncodeOptions encode_options(const Arguments& arguments, const CLI::App& command) {
   EncodeOptions options;
-  const auto size = parse_size(arguments.size);
+  const auto size = parse_size(arguments.size, 4, 16384, "texels");
   options.width = size[0];
   options.height = size[1];
   options.method = arguments.method == kHybrid ? std::nullopt : std::optional(method_named(arguments.method));
@@ -324,7 +306,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
         context, result.model, input.mesh, input.tree ? *input.tree : build_triangle_tree(input.mesh), input.weights);
   if (is_compact_path(arguments.output)) {
     bar->show("compressing", 0.9);
-    const auto size = parse_size(arguments.size);
+    const auto size = parse_size(arguments.size, 4, 16384, "texels");
     const Json compact = write_compact(context, result.model, &input.mesh, arguments.compact, command,
                                        std::max(size[0], size[1]), arguments.output);
     bar.reset();

@@ -12,6 +12,7 @@
 #include "command.h"
 #include "files.h"
 #include "progress_bar.h"
+#include "skeletex/convert/guess_stance.h"
 #include "skeletex/edit/regular_grid.h"
 #include "skeletex/io/gltf/write_gltf.h"
 #include "skeletex/io/model_file.h"
@@ -27,7 +28,7 @@ namespace {
 constexpr int kBaseSize = 64;  // texels along the longer side of a mesh with a displacement, without --lod
 
 struct Arguments {
-  std::string model, output, displacement, displacement_for = "blender", device, json, up = "y";
+  std::string model, output, displacement, displacement_for = "blender", device, json, up;
   std::vector<std::string> animations;
   int size = 0, level = 0, texture = 0;
 };
@@ -45,9 +46,16 @@ std::vector<NamedAnimation> read_animations(const std::vector<std::string>& path
   return animations;
 }
 
-/// Turns the axis that is up in the model to the y axis. What looks along -y of a z axis that is up then looks along z,
-/// as glTF has it.
-Eigen::Quaterniond placement_of(const std::string& up) {
+/// Turns the model so that it stands along y and looks along z, as glTF has it.
+/// \param up  the axis that is up in the model; what looks along -y of a z axis then looks along z. Empty: as the model
+///            stands
+Eigen::Quaterniond placement_of(const std::string& up, const std::optional<Stance>& own) {
+  if (up.empty()) {
+    const Stance stance = own ? make_stance(own->up, own->front) : Stance{};
+    Eigen::Matrix3d from_scene;
+    from_scene << stance.up.cross(stance.front), stance.up, stance.front;
+    return Eigen::Quaterniond(from_scene.transpose());
+  }
   Vec3 axis = Vec3::Zero();
   axis[up.back() - 'x'] = up.front() == '-' ? -1 : 1;
   if (axis == -Vec3::UnitY()) return Eigen::Quaterniond(0, 1, 0, 0);  // half a turn about x
@@ -101,7 +109,7 @@ void run(const Arguments& arguments) {
         is_in_tangent_space(arguments.displacement_for) ? DisplacementSpace::kTangent : DisplacementSpace::kObject);
   const GltfScene scene = export_rig(context, resized ? *resized : original,
                                      {.name = model_name(arguments.model),
-                                      .placement = placement_of(arguments.up),
+                                      .placement = placement_of(arguments.up, original.stance),
                                       .animations = animations,
                                       .texture_size = arguments.texture,
                                       .original = &original,
@@ -168,7 +176,8 @@ void add_export_command(CLI::App& program) {
                   "by vertex)")
       ->check(number_in(16, 8192))
       ->type_name("N");
-  take_one_of(*command.add_option("--up", arguments->up, "axis of the model that is up; y is in glTF (default: y)"),
+  take_one_of(*command.add_option("--up", arguments->up,
+                                  "axis of the model that is up; y is in glTF (default: the model's own)"),
               {"x", "y", "z", "-x", "-y", "-z"});
   CLI::Option* displacement =
       declare_output(
@@ -192,7 +201,7 @@ void add_export_command(CLI::App& program) {
   command.footer(
       "Examples:\n"
       "  skeletex export bear.skx.exr -o bear.glb --lod 128\n"
-      "  skeletex export man.skx.exr -o man.glb --up z --animation walk.json --animation sit.json\n"
+      "  skeletex export man.skx.exr -o man.glb --animation walk.json --animation sit.json\n"
       "  skeletex export bear.skx.exr -o bear.glb --lod 64 --displacement bear.exr\n"
       "Other programs move the surface by linear blend skinning with the four strongest weights of smooth poses; "
       "`reconstruct --deform linear` shows the same. Each bone is a joint of its own name.");

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-#include <array>
 #include <optional>
 #include <string>
 
@@ -9,9 +8,6 @@
 
 namespace skeletex::cli {
 
-/// Pixels of "1200x900".
-/// \throw CLI::ValidationError
-std::array<int, 2> parse_picture_size(const std::string& text);
 /// White, black, transparent or #rrggbb.
 /// \return linear colour, or nothing for "transparent"
 /// \throw CLI::ValidationError

@@ -345,7 +345,7 @@ void check_turntable(const CLI::App& command, const std::string& output, int cou
 void run(Arguments arguments, const CLI::App& command) {
   const nlohmann::json own_view = resolve_config(arguments, command);
   check_arguments(arguments);
-  const auto [width, height] = parse_picture_size(arguments.size);
+  const auto [width, height] = parse_size(arguments.size, 16, 8192, "pixels");
   const std::optional<LinearRgb> background = parse_background(arguments.background);
   Stopwatch watch;
   if (arguments.mode == "map" || arguments.mode == "layout") {
@@ -449,7 +449,9 @@ void add_render_command(CLI::App& program) {
       ->check(number_in(4, 16384))
       ->type_name("N");
   add_view_options(command, arguments->view);
-  command.add_option("--size", arguments->size, "of one view, pixels (default: 1200x900)")->type_name("WxH");
+  command
+      .add_option("--size", arguments->size, "of one view, pixels: N for N x N, or WIDTHxHEIGHT (default: 1200x900)")
+      ->type_name("N|WxH");
   command.add_option("--samples", arguments->samples, "per pixel and direction, 1 to 8 (default: 2)")
       ->check(number_in(1, 8))
       ->type_name("N");

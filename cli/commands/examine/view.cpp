@@ -22,7 +22,7 @@ constexpr int kLargest = 512;  // texels along the longer side, unless --size sa
 
 struct Arguments {
   std::vector<std::string> models, bones;
-  std::string output, against, device, json, up = "y";
+  std::string output, against, device, json, up;
   int size = 0;
 };
 
@@ -45,7 +45,7 @@ void run(const Arguments& arguments) {
   SkeletexModel model = read_model(arguments.models[0]);
   PageOptions options;
   options.name = name_of(arguments.models[0]);
-  options.is_z_up = arguments.up == "z";
+  if (!arguments.up.empty()) options.is_z_up = arguments.up == "z";
   if (arguments.models.size() == 2) {
     SkeletexModel second = read_model(arguments.models[1]);
     Correspondence correspondence =
@@ -108,7 +108,7 @@ void add_view_command(CLI::App& program) {
       ->type_name("MESH");
   take_one_of(*command.add_option("--up", arguments->up,
                                   "axis that points up in the picture: y, with z in front, or z, with -y in front "
-                                  "(default: y)"),
+                                  "(default: the model's own)"),
               {"y", "z"});
   command.add_option("--bones", arguments->bones, "pairs of bones that must correspond; the rest is found")
       ->delimiter(',')
@@ -119,7 +119,7 @@ void add_view_command(CLI::App& program) {
       "Examples:\n"
       "  skeletex view bear.skx.exr -o bear.html\n"
       "  skeletex view bear.skx.exr -o bear.html --against bear.off\n"
-      "  skeletex view man.skx.exr homer.skx.exr -o morph.html --up z\n"
+      "  skeletex view man.skx.exr homer.skx.exr -o morph.html\n"
       "The page is one file without links. It opens from disk in every browser with WebGL 2.");
   command.callback([arguments] { run(*arguments); });
 }

@@ -208,6 +208,10 @@ Json morph_levels(ClContext& context, PageArrays& arrays, const SkeletexModel& m
   return levels;
 }
 
+bool stands_along_z(const SkeletexModel& model) {
+  return model.stance && std::abs(model.stance->up.z()) > std::abs(model.stance->up.y());
+}
+
 }  // namespace
 
 bool has_page_script() { return !embedded_page_files().front().text.empty(); }
@@ -220,7 +224,7 @@ std::string make_page(ClContext& context, const SkeletexModel& model, const Page
   PageArrays arrays;
   Json json{{"version", 1}, {"name", options.name}};
   json["second"] = options.second ? Json(options.second->name) : Json();
-  json["up"] = options.is_z_up ? "z" : "y";
+  json["up"] = options.is_z_up.value_or(stands_along_z(model)) ? "z" : "y";
   json["diagonal"] = model.diagonal;
   json["origin"] = to_json(model.origin);
   const UnitFrame& frame = model.skeleton.frame;

@@ -24,8 +24,9 @@ struct PageOptions {
   std::string name;  ///< of the model, as the page's title has it
   std::optional<PageSecond> second;
   const TriangleMesh* reference = nullptr;  ///< mesh that errors are measured to; nullptr: none are shown
-  bool is_z_up = false;  ///< how the page stands the model at first: z up and -y in front; else y and z
-  int smallest = 32;     ///< longer side of the coarsest level of detail
+  /// How the page stands the model at first: z up and -y in front, or y and z; none: by the model's own up direction.
+  std::optional<bool> is_z_up;
+  int smallest = 32;  ///< longer side of the coarsest level of detail
 };
 
 /// An HTML page that draws a model in a browser from its texture, without a server or a network. The page holds the
