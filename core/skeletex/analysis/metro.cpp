@@ -245,16 +245,17 @@ std::vector<double> distances_in_order(DistanceSearch& search, std::span<const V
 
 }  // namespace
 
-double measure_symmetric_mean(ClContext& context, const TriangleMesh& a, const TriangleMesh& b, long samples) {
+SymmetricDistance measure_symmetric_distance(ClContext& context, const TriangleMesh& a, const TriangleMesh& b,
+                                             long samples) {
   check_mesh(a, "the first mesh");
   check_mesh(b, "the second mesh");
   DistanceSearch search_a(context, a), search_b(context, b);
   const double diagonal = bounding_box(a).diagonal();
   const SurfaceSamples samples_a(a, search_a.order(), samples, "the first mesh"),
       samples_b(b, search_b.order(), samples, "the second mesh");
-  return (measure_surface(search_b, samples_a, nullptr, nullptr, diagonal).distances.mean +
-          measure_surface(search_a, samples_b, nullptr, nullptr, diagonal).distances.mean) /
-         2;
+  const DistanceStatistics forward = measure_surface(search_b, samples_a, nullptr, nullptr, diagonal).distances,
+                           backward = measure_surface(search_a, samples_b, nullptr, nullptr, diagonal).distances;
+  return {(forward.mean + backward.mean) / 2, std::max(forward.max, backward.max)};
 }
 
 MetroReport measure_metro(ClContext& context, const TriangleMesh& a, const TriangleMesh& b,

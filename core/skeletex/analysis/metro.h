@@ -52,10 +52,15 @@ inline double symmetric_mean(const MetroReport& report) { return (report.forward
 MetroReport measure_metro(ClContext& context, const TriangleMesh& a, const TriangleMesh& b,
                           const MetroOptions& options = {});
 
-/// symmetric_mean of that report alone, without what it costs to compare normals and vertices.
+/// Of both directions, over the diagonal of A.
+struct SymmetricDistance {
+  double mean = 0, max = 0;
+};
+/// The same without what it costs to compare normals and vertices.
 /// \param samples  points on each surface, at least 1
 /// \throw InputError as above
-double measure_symmetric_mean(ClContext& context, const TriangleMesh& a, const TriangleMesh& b, long samples);
+SymmetricDistance measure_symmetric_distance(ClContext& context, const TriangleMesh& a, const TriangleMesh& b,
+                                             long samples);
 
 /// Distance from each point to the nearest point of the mesh, as exact as above, world units. The points may come in
 /// any order.

@@ -22,6 +22,9 @@ namespace {
 /// Trials are measured with so many points per surface, and the result with more.
 constexpr long kTrialSamples = 60'000, kSamples = 400'000;
 constexpr int kSize = 512, kLargestSize = 2048;
+/// A surface that lies further off lacks a part, such as a horn between coarse samples: shares of the diagonal, and of
+/// the wanted mean.
+constexpr double kFurthest = 0.02, kFurthestOfMean = 20;
 constexpr double kLargestStep = 1e-2, kSmallestStep = 1e-7;
 
 class Search {
@@ -55,7 +58,7 @@ class Search {
   struct Trial {
     CompactOptions options;
     CompactModel model;
-    double mean = 0;
+    SymmetricDistance distance;
     std::size_t bytes = 0;
   };
 
@@ -70,13 +73,15 @@ class Search {
     return reconstruct_bind_mesh(context_, decode_model(compact, octaves)).mesh;
   }
   /// What is predicted alone is measured one octave beyond what has residuals; it hardly changes beyond.
-  double mean_of(const CompactModel& compact) {
+  /// \return the mean
+  double measure(Trial& trial) {
     ++trials_;
-    const TriangleMesh mesh = mesh_of(compact, -std::max(0, (compact.bare_levels - 2) / 2));
-    return measure_symmetric_mean(context_, reference_, mesh, kTrialSamples);
+    const TriangleMesh mesh = mesh_of(trial.model, -std::max(0, (trial.model.bare_levels - 2) / 2));
+    trial.distance = measure_symmetric_distance(context_, reference_, mesh, kTrialSamples);
+    return trial.distance.mean;
   }
   Trial trial(double step, int bare_levels) {
-    Trial result{options_of(step, bare_levels), {}, 0, 0};
+    Trial result{options_of(step, bare_levels), {}, {}, 0};
     result.model = encode_compact(model_, source_, result.options);
     return result;
   }
@@ -145,13 +150,19 @@ class Search {
   /// The trial with the fewest bytes that keeps to an error; nothing where none is found.
   std::optional<Trial> fewest_bytes(double wanted) {
     std::optional<Trial> best;
+    const double furthest = std::max(kFurthest, kFurthestOfMean * wanted);
+    const auto lacks_part = [&](const Trial& trial) { return trial.distance.max > furthest; };
+    const auto is_better = [&](const Trial& one, const Trial& other) {
+      return lacks_part(one) == lacks_part(other) ? one.bytes < other.bytes : lacks_part(other);
+    };
     const auto try_levels = [&](int bare) {
       if (bare < 0) return false;
       std::optional<Trial> found = largest_step(
-          bare, 3 * wanted, wanted, true, [&](Trial& t) { return t.mean = mean_of(t.model); }, best ? best->bytes : 0);
+          bare, 3 * wanted, wanted, true, [&](Trial& t) { return measure(t); },
+          best && !lacks_part(*best) ? best->bytes : 0);
       if (!found) return false;
       found->bytes = compact_bytes(found->model).size();
-      if (best && found->bytes >= best->bytes) return false;
+      if (best && !is_better(*found, *best)) return false;
       best = std::move(found);
       return true;
     };
@@ -163,12 +174,12 @@ class Search {
     // All levels with residuals take more bytes than a larger size does.
     if (!best && goal_.size) try_levels(0);
     const int start = bare;
-    if (best && start == first)
+    if (best && start == first && !lacks_part(*best))
       while (try_levels(++bare)) {
       }
     if (best && bare <= start + 1) {
       bare = start;
-      while (try_levels(--bare)) {
+      while (--bare >= 0 && (try_levels(bare) || lacks_part(*best))) {
       }
     }
     return best;
@@ -182,8 +193,7 @@ class Search {
         return static_cast<double>(t.bytes = compact_bytes(t.model).size());
       });
       if (!found) continue;
-      found->mean = mean_of(found->model);
-      if (best && found->mean >= best->mean) break;
+      if (measure(*found); best && found->distance.mean >= best->distance.mean) break;
       best = std::move(found);
     }
     if (!best) throw InputError(fmt::format("the model does not fit into {} bytes", most));
