@@ -12,6 +12,7 @@ namespace skeletex {
 namespace {
 
 constexpr int kRounds = 4;
+constexpr int kLargestSize = 1600;  // larger textures are looked at in a smaller size: their finest levels hardly fold
 /// Fixed places are worth their bytes where they leave at most these shares of the intersections of a patch, and of
 /// all.
 constexpr double kMostLeft = 0.25, kMostLeftOfAll = 0.5;
@@ -23,7 +24,9 @@ struct Intersections {
 };
 
 std::vector<Intersections> intersections_by_patch(ClContext& context, const CompactModel& compact) {
-  const SkeletexModel model = decode_model(compact, 0);
+  int octaves = 0;
+  while (octaves > -8 && decoded_size(compact, octaves) > kLargestSize) --octaves;
+  const SkeletexModel model = decode_model(compact, octaves);
   const PreparedModel prepared(model);
   const TriangleMesh mesh = reconstruct_bind_mesh(context, prepared).mesh;
   const std::vector<int> bones = triangle_bones(prepared.lattice, mesh.triangles);
