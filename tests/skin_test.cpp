@@ -100,12 +100,27 @@ TEST(Skin, WeightsOfAStraightJointAreALogisticFunctionOfTheHeight) {
   const double radius = 0.2;
   const SkeletexModel model = SyntheticSurface(skeleton, radius).model({{24, 11}, {24, 11}});
   const WeightWalks walks = make_weight_walks(model, SeparationPlanes(model.skeleton));
-  std::vector<double> distances;
-  for (const SeamSample& sample : model.arcs[0].samples) distances.push_back(sample.distance);
-  std::sort(distances.begin(), distances.end());
-  const double girth = distances[distances.size() / 2];
+  // By length: half of the seam is nearer to the bones than the girth.
+  const std::vector<SeamSample>& samples = model.arcs[0].samples;
+  std::vector<std::array<double, 3>> pieces;  // distances of the ends, and length
+  double length = 0, nearest = radius;
+  const auto point_of = [&](const SeamSample& s) {
+    return SeparationPlanes(model.skeleton).seam_point(0, BoneEnd::kTail, s.turn, s.distance);
+  };
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const SeamSample &one = samples[i], &other = samples[(i + 1) % samples.size()];
+    pieces.push_back({one.distance, other.distance, (point_of(one) - point_of(other)).norm()});
+    length += pieces.back()[2];
+    nearest = std::min(nearest, one.distance);
+  }
+  double girth = 0, below = 0;
+  for (; below < length / 2; girth += 1e-6 * radius) {
+    below = 0;
+    for (const auto& [first, last, piece] : pieces)
+      below += piece * std::clamp((girth - std::min(first, last)) / std::abs(last - first), 0.0, 1.0);
+  }
   for (const double height : {0.0, 0.03, 0.1}) {
-    const Vec3 point = Vec3(1 + height, 0, 0.9 * distances.front()) - model.origin;  // within the seam's reach
+    const Vec3 point = Vec3(1 + height, 0, 0.9 * nearest) - model.origin;  // within the seam's reach
     const auto weights = by_bone(bone_weights(walks, 1, point));
     const double share = std::exp(-0.8 * 2 * height / girth) - 0.002, own = 1 - 0.002;
     EXPECT_NEAR(weights.at(0), share / (share + own), 1e-5) << height;
@@ -113,6 +128,26 @@ TEST(Skin, WeightsOfAStraightJointAreALogisticFunctionOfTheHeight) {
   }
   // Far along the bone nothing of the other one is left.
   EXPECT_EQ(by_bone(bone_weights(walks, 1, Vec3(2, 0, 0.1) - model.origin)).count(0), 0u);
+}
+
+/// A pose must not depend on how densely which part of a seam is sampled, as textures of other sizes do it.
+TEST(Skin, WeightsDoNotDependOnWhereSeamsAreSampled) {
+  for (const NamedSkeleton& named : all_skeletons()) {
+    SCOPED_TRACE(named.name);
+    SkeletexModel model = SyntheticSurface(named.skeleton, named.radius)
+                              .model(std::vector<std::pair<int, int>>(named.skeleton.bones.size(), {192, 11}));
+    const WeightWalks walks = make_weight_walks(model, SeparationPlanes(model.skeleton));
+    for (SeamArc& arc : model.arcs) {
+      std::vector<SeamSample> fewer;  // every third one of the first half, and all of the second
+      for (std::size_t i = 0; i < arc.samples.size(); ++i)
+        if (2 * i >= arc.samples.size() || i % 3 == 0) fewer.push_back(arc.samples[i]);
+      arc.samples = fewer;
+    }
+    const WeightWalks fewer = make_weight_walks(model, SeparationPlanes(model.skeleton));
+    ASSERT_EQ(walks.steps.size(), fewer.steps.size());
+    for (std::size_t i = 0; i < walks.steps.size(); ++i)
+      EXPECT_NEAR(fewer.steps[i].girth_inverse, walks.steps[i].girth_inverse, 0.002 * walks.steps[i].girth_inverse);
+  }
 }
 
 TEST(Skin, KernelsMoveVerticesAsTheHostDoesInDoublePrecision) {

@@ -13,34 +13,65 @@ namespace {
 constexpr int kMostJoints = 6;            // their weights are far below the cut beyond
 constexpr std::size_t kMostSteps = 1024;  // of one bone; in graphs with many cycles ways get many
 
+/// A straight piece of the seams around a node: the distances of its ends to their bones, the smaller one first, and
+/// its length.
+struct SeamPiece {
+  double nearest = 0, furthest = 0, length = 0;
+};
+
+/// The distance that half of the length does not exceed. Between the ends of a piece it is taken to grow evenly.
+double median_distance(const std::vector<SeamPiece>& pieces) {
+  double low = std::numeric_limits<double>::infinity(), high = 0, half = 0;
+  for (const SeamPiece& piece : pieces) {
+    low = std::min(low, piece.nearest);
+    high = std::max(high, piece.furthest);
+    half += piece.length / 2;
+  }
+  for (int i = 0; i < 40; ++i) {
+    const double middle = (low + high) / 2;
+    double below = 0;
+    for (const SeamPiece& piece : pieces) {
+      const double range = std::max(piece.furthest - piece.nearest, 1e-12 * piece.furthest);
+      below += piece.length * std::clamp((middle - piece.nearest) / range, 0.0, 1.0);
+    }
+    (below < half ? low : high) = middle;
+  }
+  return (low + high) / 2;
+}
+
 /// The size of the seams around each node: the median distance to their bones, and the largest to the node. World
-/// units.
+/// units. The median is one of lengths, so that it hardly depends on where samples lie.
 struct JointSizes {
   std::vector<double> girths, radii;
 };
 
 JointSizes joint_sizes(const SkeletexModel& model, const SeparationPlanes& separation) {
   const Skeleton& skeleton = model.skeleton;
-  std::vector<std::vector<double>> distances(skeleton.nodes.size());
+  std::vector<std::vector<SeamPiece>> pieces(skeleton.nodes.size());
   JointSizes sizes;
   sizes.radii.assign(skeleton.nodes.size(), 0);
-  const auto add = [&](int node, int bone, const SeamSample& sample) {
-    const Vec3 point = separation.seam_point(bone, end_at(skeleton, bone, node), sample.turn, sample.distance);
-    distances[node].push_back(sample.distance);
-    sizes.radii[node] = std::max(sizes.radii[node], (point - skeleton.nodes[node].position).norm());
-  };
-  for (const SeamArc& arc : model.arcs)
-    for (const SeamSample& sample : arc.samples) add(arc.node, arc.bones[0], sample);
-  for (const SeamCorner& corner : model.corners) add(corner.node, corner.bones[0], corner.sample);
-  for (std::vector<double>& list : distances) {
-    double girth = model.diagonal;  // of ends without a seam, which no walk crosses
-    if (!list.empty()) {
-      const auto middle = list.begin() + static_cast<std::ptrdiff_t>(list.size() / 2);
-      std::nth_element(list.begin(), middle, list.end());
-      girth = std::max(*middle, 1e-6 * model.diagonal);
+  for (const SeamArc& arc : model.arcs) {
+    std::vector<std::pair<Vec3, double>> points;  // with their distances
+    const auto add = [&](int bone, const SeamSample& sample) {
+      const BoneEnd end = end_at(skeleton, bone, arc.node);
+      points.emplace_back(separation.seam_point(bone, end, sample.turn, sample.distance), sample.distance);
+    };
+    const auto add_corner = [&](int corner) { add(model.corners[corner].bones[0], model.corners[corner].sample); };
+    if (!arc.is_closed()) add_corner(arc.corners[0]);
+    for (const SeamSample& sample : arc.samples) add(arc.bones[0], sample);
+    if (!arc.is_closed()) add_corner(arc.corners[1]);
+    if (arc.is_closed() && !points.empty()) points.push_back(points.front());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const auto& [point, distance] = points[i];
+      sizes.radii[arc.node] = std::max(sizes.radii[arc.node], (point - skeleton.nodes[arc.node].position).norm());
+      if (i == 0) continue;
+      const auto& [before, distance_before] = points[i - 1];
+      pieces[arc.node].push_back(
+          {std::min(distance_before, distance), std::max(distance_before, distance), (point - before).norm()});
     }
-    sizes.girths.push_back(girth);
   }
+  for (const std::vector<SeamPiece>& list : pieces)  // no walk crosses ends without a seam
+    sizes.girths.push_back(list.empty() ? model.diagonal : std::max(median_distance(list), 1e-6 * model.diagonal));
   return sizes;
 }
 

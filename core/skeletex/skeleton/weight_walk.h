@@ -13,10 +13,10 @@ namespace skeletex {
 ///
 /// A point P belongs to one bone. A walk leads from that bone over joints to other bones, and each joint N adds to the
 /// potential of the bone that it leads to. Let d_i be the unit direction from N along bone i, and g the girth there:
-/// the median distance of the joint's seams to their bones. Going from bone i to bone j adds (P - N).(d_i - d_j) / g,
-/// and the square of how far P lies beyond the seams (skin_weight.h). Weights are exp(-potential), cut below 0.002 of
-/// the largest, and normalised. Around one joint this is the softmax of (P - N).d_i / g: smooth, and the same from both
-/// sides of every separation plane. Where a skeleton has cycles, the walk with the lowest potential counts.
+/// the median distance of the joint's seams to their bones, by length. Going from bone i to bone j adds (P - N).(d_i -
+/// d_j) / g, and the square of how far P lies beyond the seams (skin_weight.h). Weights are exp(-potential), cut below
+/// 0.002 of the largest, and normalised. Around one joint this is the softmax of (P - N).d_i / g: smooth, and the same
+/// from both sides of every separation plane. Where a skeleton has cycles, the walk with the lowest potential counts.
 struct WeightWalks {
   std::vector<WeightStep> steps;  ///< bone by bone, breadth first: up to six joints away, no joint twice
   std::vector<int> first_steps;   ///< per bone the first step of its walk; one more than there are bones
