@@ -181,23 +181,44 @@ export function motions(skeleton, pose) {
 
 const MOST_JOINTS = 6, MOST_STEPS = 1024;
 
+/** The distance that half of the length of the pieces does not exceed, as in weight_walk.cpp. */
+function medianDistance(pieces) {
+  let low = Infinity, high = 0, half = 0;
+  for (const {nearest, furthest, length} of pieces) {
+    low = Math.min(low, nearest);
+    high = Math.max(high, furthest);
+    half += length / 2;
+  }
+  for (let i = 0; i < 40; ++i) {
+    const middle = (low + high) / 2;
+    let below = 0;
+    for (const {nearest, furthest, length} of pieces)
+      below += length * Math.min(1, Math.max(0, (middle - nearest) / Math.max(furthest - nearest, 1e-12 * furthest)));
+    if (below < half) low = middle;
+    else high = middle;
+  }
+  return (low + high) / 2;
+}
+
 /**
  * The walks of weight_walk.h: per bone the steps that lead from it to others.
- * @param {{node: number, distance: number, point: number[]}[]} samples of all seams
+ * @param {{node: number, points: {distance: number, point: number[]}[]}[]} arcs the seams' polylines
  * @returns {{first: number[], steps: {normal: number[], girthInverse: number, joint: number[], seamRadius: number,
  *     bone: number, before: number, same: number}[], longest: number}} first: one more than there are bones
  */
-export function weightWalks(skeleton, samples, diagonal) {
-  const distances = skeleton.nodes.map(() => []), radii = skeleton.nodes.map(() => 0);
-  for (const {node, distance, point} of samples) {
-    distances[node].push(distance);
-    radii[node] = Math.max(radii[node], norm(sub(point, skeleton.nodes[node])));
-  }
-  const girths = distances.map((list) => {
-    if (list.length === 0) return diagonal;
-    const sorted = Float64Array.from(list).sort();
-    return Math.max(sorted[list.length >> 1], 1e-6 * diagonal);
-  });
+export function weightWalks(skeleton, arcs, diagonal) {
+  const pieces = skeleton.nodes.map(() => []), radii = skeleton.nodes.map(() => 0);
+  for (const {node, points} of arcs)
+    points.forEach(({distance, point}, i) => {
+      radii[node] = Math.max(radii[node], norm(sub(point, skeleton.nodes[node])));
+      if (i === 0) return;
+      const before = points[i - 1];
+      pieces[node].push({
+        nearest: Math.min(before.distance, distance), furthest: Math.max(before.distance, distance),
+        length: norm(sub(point, before.point))
+      });
+    });
+  const girths = pieces.map((list) => (list.length === 0 ? diagonal : Math.max(medianDistance(list), 1e-6 * diagonal)));
   const at = endsAtNodes(skeleton), steps = [], first = [0];
   let longest = 0;
   skeleton.bones.forEach((_, own) => {

@@ -157,11 +157,22 @@ export class Surface {
       const at = points.length, there = b.turns[at] - Math.round(b.turns[at] - a.turns[at]);  // the short way round
       const turn = a.turns[at] + share * (there - a.turns[at]), distance = a.distances[at] + share * (b.distances[at] - a.distances[at]);
       const end = this.bind.bones[bone].head === node ? 0 : 1;
-      points.push({node, distance, point: planes.seamPoint(bone, end, turn, distance)});
+      points.push({distance, point: planes.seamPoint(bone, end, turn, distance)});
     };
     for (const arc of stage.arcs) for (let k = 0; k < arc.samples; ++k) addPoint(arc.node, arc.bone);
     for (const corner of stage.corners) addPoint(corner.node, corner.bone);
     return points;
+  }
+
+  /** The seams' polylines, from corner to corner or once round. */
+  seamArcs(points) {
+    const {arcs} = this.stage, firstCorner = arcs.reduce((sum, arc) => sum + arc.samples, 0);
+    let first = 0;
+    return arcs.map(({node, samples, corners}) => {
+      const inner = points.slice(first, first += samples);
+      if (corners[0] < 0) return {node, points: [...inner, ...inner.slice(0, 1)]};
+      return {node, points: [points[firstCorner + corners[0]], ...inner, points[firstCorner + corners[1]]]};
+    });
   }
 
   setTables() {
@@ -169,7 +180,7 @@ export class Surface {
     const rows = rowsAt(level, state.t), transferredRows = level.transfer?.rows;
     const isPosed = [...state.rotations.values()].some((q) => q[3] !== 1);
     const seams = this.seamPoints();
-    const walks = isPosed ? weightWalks(bind, seams, this.model.diagonal) : {first: [0, ...bind.bones.map(() => 0)], steps: []};
+    const walks = isPosed ? weightWalks(bind, this.seamArcs(seams), this.model.diagonal) : {first: [0, ...bind.bones.map(() => 0)], steps: []};
     const values = [], rowValues = [], columnValues = [];
     level.patches.forEach(([x, y, width, height], bone) => {
       const {o, s, b} = planes.bases[bone], head = bind.nodes[bind.bones[bone].head], tail = bind.nodes[bind.bones[bone].tail];

@@ -102,7 +102,8 @@ std::vector<int> differences_of(const std::vector<Triangle>& triangles) {
 Json network_of(const SkeletexModel& model) {
   Json network{{"arcs", Json::array()}, {"corners", Json::array()}};
   for (const SeamArc& arc : model.arcs)
-    network["arcs"].push_back({{"node", arc.node}, {"bone", arc.bones[0]}, {"samples", arc.samples.size()}});
+    network["arcs"].push_back(
+        {{"node", arc.node}, {"bone", arc.bones[0]}, {"samples", arc.samples.size()}, {"corners", arc.corners}});
   for (const SeamCorner& corner : model.corners)
     network["corners"].push_back({{"node", corner.node}, {"bone", corner.bones[0]}});
   return network;

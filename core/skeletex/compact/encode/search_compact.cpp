@@ -193,7 +193,8 @@ class Search {
         return static_cast<double>(t.bytes = compact_bytes(t.model).size());
       });
       if (!found) continue;
-      if (measure(*found); best && found->distance.mean >= best->distance.mean) break;
+      const double mean = measure(*found);
+      if (best && mean >= best->distance.mean) break;
       best = std::move(found);
     }
     if (!best) throw InputError(fmt::format("the model does not fit into {} bytes", most));
