@@ -52,11 +52,11 @@ inline double symmetric_mean(const MetroReport& report) { return (report.forward
 MetroReport measure_metro(ClContext& context, const TriangleMesh& a, const TriangleMesh& b,
                           const MetroOptions& options = {});
 
-/// Of both directions, over the diagonal of A.
+/// The mean of both directions' means, and the larger one of their maxima, over the diagonal of A.
 struct SymmetricDistance {
   double mean = 0, max = 0;
 };
-/// The same without what it costs to compare normals and vertices.
+/// What measure_metro says of the two surfaces' distances, without its normals and vertices.
 /// \param samples  points on each surface, at least 1
 /// \throw InputError as above
 SymmetricDistance measure_symmetric_distance(ClContext& context, const TriangleMesh& a, const TriangleMesh& b,

@@ -59,22 +59,19 @@ void reduce_intersections(ClContext& context, const SkeletexModel& model, const 
   trial.fixed_places.assign(first.size(), {});
   std::vector<std::vector<Place>> best = trial.fixed_places;
   std::vector<Intersections> last = first;
-  std::vector<double> left, wanted;
-  for (const Intersections& patch : first) {
-    left.push_back(patch.pairs);
-    wanted.push_back(kMostLeft * patch.pairs);
-  }
+  std::vector<int> left;
+  for (const Intersections& patch : first) left.push_back(patch.pairs);
   for (int round = 0; round < kRounds && count_of(last) > 0; ++round) {
     for (std::size_t i = 0; i < last.size(); ++i)
       trial.fixed_places[i].insert(trial.fixed_places[i].end(), last[i].places.begin(), last[i].places.end());
     last = intersections_by_patch(context, encode_compact(model, source, trial));
     for (std::size_t i = 0; i < last.size(); ++i) {
-      if (last[i].pairs >= left[i] || last[i].pairs > wanted[i]) continue;
+      if (last[i].pairs >= left[i] || last[i].pairs > kMostLeft * first[i].pairs) continue;
       left[i] = last[i].pairs;
       best[i] = trial.fixed_places[i];
     }
   }
-  if (std::accumulate(left.begin(), left.end(), 0.0) > kMostLeftOfAll * count_of(first)) return;
+  if (std::accumulate(left.begin(), left.end(), 0) > kMostLeftOfAll * count_of(first)) return;
   trial.fixed_places = best;
   compact = encode_compact(model, source, trial);
   options = trial;

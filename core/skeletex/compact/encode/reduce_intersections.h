@@ -5,10 +5,12 @@
 
 namespace skeletex {
 
-/// Encodes a model again where triangles of its mesh intersect: there points do not slide. Keeps that where most of the
-/// intersections go, as it costs bytes.
-/// \param options  of `compact`, also afterwards
-/// \param compact  as encode_compact made it
+/// Encodes a model again where triangles of its mesh intersect: points there are stored at their home places. The new
+/// encoding costs bytes, and is kept only when at least half of the intersections go.
+/// \param model    in its unit frame; its surface is `source`
+/// \param options  those that `compact` was made with; out: those that it is then made with
+/// \param compact  as encode_compact made it; out: the one with fewer intersections, or the same
+/// \throw DeviceError
 void reduce_intersections(ClContext& context, const SkeletexModel& model, const SourceSurface& source,
                           CompactOptions& options, CompactModel& compact);
 

@@ -22,8 +22,8 @@ namespace {
 /// Trials are measured with so many points per surface, and the result with more.
 constexpr long kTrialSamples = 60'000, kSamples = 400'000;
 constexpr int kSize = 512, kLargestSize = 2048;
-/// A surface that lies further off lacks a part, such as a horn between coarse samples: shares of the diagonal, and of
-/// the wanted mean.
+/// A largest error above both, a share of the diagonal and a multiple of the wanted mean, tells of a missing part, such
+/// as a horn between coarse samples.
 constexpr double kFurthest = 0.02, kFurthestOfMean = 20;
 constexpr double kLargestStep = 1e-2, kSmallestStep = 1e-7;
 
