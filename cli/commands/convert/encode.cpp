@@ -410,7 +410,7 @@ void add_file_options(CLI::App& command, Arguments& a) {
                   "nearest ones"),
               {"surface", "nearest"});
   take_one_of(add(command, "File", "--compression", a.compression,
-                  "lossless compression of the file; auto: zip where it saves a sixteenth or more, else none"),
+                  "lossless compression of the file; auto: zip where it saves an eighth or more, else none"),
               {"auto", "none", "zip", "piz"});
 }
 

@@ -19,12 +19,13 @@
 namespace skeletex {
 namespace {
 
-// Closest points are looked for alone as well.
+// Of programs that have a file the first is built, unless another one is there already: closest points are looked for
+// alone as well, and `encode` reads layers at the vertices that its texels make.
 const std::vector<std::vector<std::string_view>> kPrograms{
     {"metro.cl"},
-    {"segment.cl", "vsm.cl", "elimination.cl", "encode.cl", "unfold.cl", "snap.cl", "fit.cl", "lattice.cl", "metro.cl",
-     "spd.cl"},
     {"reconstruct.cl", "pose.cl", "regular_grid.cl", "blend.cl", "transfer.cl"},
+    {"segment.cl", "vsm.cl", "elimination.cl", "encode.cl", "unfold.cl", "snap.cl", "fit.cl", "lattice.cl", "metro.cl",
+     "spd.cl", "reconstruct.cl"},
     {"filter.cl", "orientation.cl"}};
 
 std::string load(std::string_view file) {

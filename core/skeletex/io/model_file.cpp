@@ -180,7 +180,7 @@ struct ExrPart {
   std::vector<std::vector<half>> halves;  ///< what the frame reads, where it is not the model's own planes
 };
 
-/// Whether ZIP takes off a sixteenth or more, by three pieces of its blocks of lines.
+/// Whether ZIP takes off an eighth or more, by three pieces of its blocks of lines.
 bool pays_zip(const ExrPart& part, int width, int height) {
   constexpr int kLines = 16, kBlocks = 3, kColumns = 128;
   if (height < 2 * kLines * kBlocks) return true;
@@ -211,7 +211,7 @@ bool pays_zip(const ExrPart& part, int width, int height) {
   }
   std::size_t plain = 0;
   for (const std::vector<char>& plane : planes) plain += plane.size();
-  return 16 * counted.size() < 15 * plain;
+  return 8 * counted.size() < 7 * plain;
 }
 
 ExrPart make_part(const SkeletexModel& model, const ModelFileOptions& options, const std::string& where) {

@@ -14,6 +14,7 @@ namespace skeletex {
 namespace {
 
 constexpr std::size_t kBlock = 1 << 12;
+constexpr double kNearEnough = 1e-6;  // of the mesh's extent: single precision tells no more
 
 /// The points of all rows of a model, and where each patch begins among them.
 struct RowPoints {
@@ -71,7 +72,7 @@ std::vector<SurfacePoint> find_surface_points(ClContext& context, const Triangle
   points.reserve(probes.size());
   for (const Probe& probe : probes) points.push_back(probe.point);
   std::vector<int> nearest(points.size());
-  NearestSearch(context, mesh, tree).find(points, nearest);
+  NearestSearch(context, mesh, tree).find(points, nearest, {}, static_cast<float>(kNearEnough * tree.scale));
   std::vector<SurfacePoint> found(points.size());
   for_each_block(points.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {

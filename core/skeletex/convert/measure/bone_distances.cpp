@@ -3,12 +3,18 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <limits>
 #include <numeric>
 
 #include "skeletex/geometry/nearest_search.h"
+#include "skeletex/geometry/parallel.h"
+#include "skeletex/geometry/point_triangle.h"
 
 namespace skeletex {
 namespace {
+
+constexpr std::size_t kBlock = 1 << 10;
+constexpr std::size_t kTrianglesPerPoint = 64;  // fewer points are looked for on the host: a mesh takes long to send
 
 /// The points of all bones behind each other. What has no weight counts for the furthest alone.
 struct Samples {
@@ -21,11 +27,15 @@ struct Samples {
   void end_bone() { begins.push_back(points.size()); }
 };
 
-std::vector<BoneDistance> measure(ClContext& context, const Samples& samples, const TriangleMesh& mesh,
+std::vector<float> find_distances(ClContext& context, std::span<const Vec3> points, const TriangleMesh& mesh,
                                   const TriangleTree& tree, double enough) {
-  std::vector<int> triangles(samples.points.size());
-  std::vector<float> distances(samples.points.size());
-  NearestSearch(context, mesh, tree).find(samples.points, triangles, distances, static_cast<float>(enough));
+  std::vector<int> triangles(points.size());
+  std::vector<float> distances(points.size());
+  NearestSearch(context, mesh, tree).find(points, triangles, distances, static_cast<float>(enough));
+  return distances;
+}
+
+std::vector<BoneDistance> summarize(const Samples& samples, std::vector<float> distances) {
   std::vector<BoneDistance> found(samples.begins.size() - 1);
   for (std::size_t bone = 0; bone < found.size(); ++bone) {
     double sum = 0, weight = 0;
@@ -45,7 +55,52 @@ std::vector<BoneDistance> measure(ClContext& context, const Samples& samples, co
   return found;
 }
 
+/// The distance of a point from the nearer one of two triangles that follow each other.
+double distance_from_quad(const TriangleMesh& mesh, int first, const Vec3& point) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const int triangle : {first, first + 1}) {
+    const auto& [a, b, c] = mesh.triangles[triangle];
+    least =
+        std::min(least, offset_from_triangle(point, mesh.positions[a], mesh.positions[b], mesh.positions[c]).norm());
+  }
+  return least;
+}
+
 }  // namespace
+
+std::vector<BoneDistance> vertex_distances(ClContext& context, std::span<const Chart> charts, const TriangleMesh& mesh,
+                                           const TriangleTree& tree, std::span<const std::vector<int>> quads,
+                                           double enough) {
+  Samples samples;
+  for (const Chart& chart : charts) {
+    for (std::size_t i = 0; i < chart.positions.size(); ++i)
+      if (chart.kinds[i] == ChartVertex::kInner) samples.add(chart.positions[i], 1);
+    samples.end_bone();
+  }
+  std::vector<float> distances(samples.points.size(), std::numeric_limits<float>::infinity());
+  std::vector<Vec3> far_points;
+  std::vector<std::size_t> far;
+  for (std::size_t bone = 0; bone < charts.size(); ++bone)
+    for_each_block(quads[bone].size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i)
+        distances[samples.begins[bone] + i] =
+            static_cast<float>(distance_from_quad(mesh, 2 * quads[bone][i], samples.points[samples.begins[bone] + i]));
+    });
+  for (std::size_t i = 0; i < distances.size(); ++i)
+    if (static_cast<double>(distances[i]) > enough) far.push_back(i), far_points.push_back(samples.points[i]);
+  if (far.size() < mesh.triangles.size() / kTrianglesPerPoint) {
+    for_each_block(far.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k) {
+        float& distance = distances[far[k]];
+        distance = static_cast<float>(find_nearest_triangle(mesh, tree, far_points[k], distance).distance);
+      }
+    });
+  } else {
+    const std::vector<float> found = find_distances(context, far_points, mesh, tree, enough);
+    for (std::size_t k = 0; k < far.size(); ++k) distances[far[k]] = found[k];
+  }
+  return summarize(samples, std::move(distances));
+}
 
 std::vector<BoneDistance> distances_from_bones(ClContext& context, std::span<const Chart> charts,
                                                const TriangleMesh& mesh, const TriangleTree& tree, double enough) {
@@ -57,7 +112,7 @@ std::vector<BoneDistance> distances_from_bones(ClContext& context, std::span<con
     for (const Vec3& position : chart.positions) samples.add(position, enough == 0 ? 0 : 1);
     samples.end_bone();
   }
-  return measure(context, samples, mesh, tree, enough);
+  return summarize(samples, find_distances(context, samples.points, mesh, tree, enough));
 }
 
 std::vector<BoneDistance> distances_to_surface(ClContext& context, const SkeletexModel& model, const Lattice& lattice,
@@ -73,7 +128,7 @@ std::vector<BoneDistance> distances_to_surface(ClContext& context, const Skelete
     }
     samples.end_bone();
   }
-  return measure(context, samples, input, tree, 0);
+  return summarize(samples, find_distances(context, samples.points, input, tree, 0));
 }
 
 }  // namespace skeletex

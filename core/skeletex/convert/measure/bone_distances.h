@@ -30,6 +30,16 @@ inline constexpr double kNearEnough = 1e-4;
 std::vector<BoneDistance> distances_from_bones(ClContext& context, std::span<const Chart> charts,
                                                const TriangleMesh& mesh, const TriangleTree& tree, double enough);
 
+/// From the inner vertices of the maps to a lattice, looked for first at their place in the map.
+/// \param mesh    of the lattice
+/// \param tree    of it
+/// \param quads   per chart and inner vertex the lattice's quad at its place; none for height fields
+/// \param enough  distances up to it need not be exact; world units
+/// \return per chart; means and medians are those of vertices
+std::vector<BoneDistance> vertex_distances(ClContext& context, std::span<const Chart> charts, const TriangleMesh& mesh,
+                                           const TriangleTree& tree, std::span<const std::vector<int>> quads,
+                                           double enough);
+
 /// From the parts of that mesh to the input: what the model has and the input has not. The triangles next to seams and
 /// poles are not measured.
 /// \param lattice  numbers of the mesh's triangles

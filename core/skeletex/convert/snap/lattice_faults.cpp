@@ -163,7 +163,7 @@ std::vector<int> highest(const std::vector<Estimate>& estimates) {
 
 OriginalSurface prepare_original(const TriangleMesh& mesh, const TriangleTree& tree, std::span<const Chart> charts,
                                  const LatticeFrame& frame) {
-  OriginalSurface original{mesh, tree, {}, {}, {}};
+  OriginalSurface original{mesh, tree, {}, {}, {}, std::vector<std::vector<int>>(charts.size())};
   int first_point = 0;
   for (std::size_t bone = 0; bone < charts.size(); ++bone) {
     const Patch& patch = frame.model.patches[bone];
@@ -179,8 +179,9 @@ OriginalSurface prepare_original(const TriangleMesh& mesh, const TriangleTree& t
       if (chart.kinds[i] != ChartVertex::kInner) continue;
       const int row = std::clamp(static_cast<int>(rows[i]), 1, r.height - 3),
                 column = wrapped(static_cast<int>(std::floor(chart.v[i] * r.width)), r.width);
-      original.vertices.push_back({first_point + static_cast<int>(i),
-                                   frame.numbers.first_quad[bone] + (row - 1) * r.width + column, chart.positions[i]});
+      const int quad = frame.numbers.first_quad[bone] + (row - 1) * r.width + column;
+      original.vertices.push_back({first_point + static_cast<int>(i), quad, chart.positions[i]});
+      original.quads[bone].push_back(quad);
     }
     first_point += static_cast<int>(chart.positions.size());
   }
