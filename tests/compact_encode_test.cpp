@@ -51,8 +51,8 @@ CompactOptions usual_options() {
 
 TriangleMesh mesh_of(const CompactModel& compact) { return reconstruct_mesh(context(), decode_model(compact)); }
 double mean_distance(const CompactModel& compact) {
-  return measure_symmetric_distance(context(), reconstruct_mesh(context(), bear().model), mesh_of(compact), 100'000)
-      .mean;
+  const TriangleMesh original = reconstruct_mesh(context(), bear().model);
+  return SymmetricMetro(context(), original, 100'000).measure(mesh_of(compact)).mean;
 }
 
 TEST(ReduceIntersections, LeavesFewOfThemAndNoLargerError) {

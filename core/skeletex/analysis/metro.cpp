@@ -245,16 +245,30 @@ std::vector<double> distances_in_order(DistanceSearch& search, std::span<const V
 
 }  // namespace
 
-SymmetricDistance measure_symmetric_distance(ClContext& context, const TriangleMesh& a, const TriangleMesh& b,
-                                             long samples) {
-  check_mesh(a, "the first mesh");
-  check_mesh(b, "the second mesh");
-  DistanceSearch search_a(context, a), search_b(context, b);
-  const double diagonal = bounding_box(a).diagonal();
-  const SurfaceSamples samples_a(a, search_a.order(), samples, "the first mesh"),
-      samples_b(b, search_b.order(), samples, "the second mesh");
-  const DistanceStatistics forward = measure_surface(search_b, samples_a, nullptr, nullptr, diagonal).distances,
-                           backward = measure_surface(search_a, samples_b, nullptr, nullptr, diagonal).distances;
+struct SymmetricMetro::Prepared {
+  DistanceSearch search;
+  SurfaceSamples samples;
+  double diagonal;
+
+  Prepared(ClContext& context, const TriangleMesh& mesh, long count, const char* which)
+      : search(context, mesh), samples(mesh, search.order(), count, which), diagonal(bounding_box(mesh).diagonal()) {}
+};
+
+SymmetricMetro::SymmetricMetro(ClContext& context, const TriangleMesh& surface, long samples)
+    : context_(context), samples_(samples) {
+  check_mesh(surface, "the first mesh");
+  prepared_ = std::make_unique<Prepared>(context, surface, samples, "the first mesh");
+}
+
+SymmetricMetro::~SymmetricMetro() = default;
+
+SymmetricDistance SymmetricMetro::measure(const TriangleMesh& other) {
+  check_mesh(other, "the second mesh");
+  Prepared second(context_, other, samples_, "the second mesh");
+  const auto distances = [&](Prepared& to, const Prepared& from) {
+    return measure_surface(to.search, from.samples, nullptr, nullptr, prepared_->diagonal).distances;
+  };
+  const DistanceStatistics forward = distances(second, *prepared_), backward = distances(*prepared_, second);
   return {(forward.mean + backward.mean) / 2, std::max(forward.max, backward.max)};
 }
 

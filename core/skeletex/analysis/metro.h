@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -56,11 +57,27 @@ MetroReport measure_metro(ClContext& context, const TriangleMesh& a, const Trian
 struct SymmetricDistance {
   double mean = 0, max = 0;
 };
-/// What measure_metro says of the two surfaces' distances, without its normals and vertices.
-/// \param samples  points on each surface, at least 1
-/// \throw InputError as above
-SymmetricDistance measure_symmetric_distance(ClContext& context, const TriangleMesh& a, const TriangleMesh& b,
-                                             long samples);
+/// A surface that others are measured against, prepared once: what measure_metro says of distances, without its normals
+/// and vertices.
+class SymmetricMetro {
+ public:
+  /// \param surface  A of measure_metro; must outlive this
+  /// \param samples  points on each surface, at least 1
+  /// \throw InputError as above
+  SymmetricMetro(ClContext& context, const TriangleMesh& surface, long samples);
+  ~SymmetricMetro();
+  SymmetricMetro(const SymmetricMetro&) = delete;
+  SymmetricMetro& operator=(const SymmetricMetro&) = delete;
+
+  /// \throw InputError as above
+  SymmetricDistance measure(const TriangleMesh& other);
+
+ private:
+  struct Prepared;
+  ClContext& context_;
+  long samples_;
+  std::unique_ptr<Prepared> prepared_;
+};
 
 /// Distance from each point to the nearest point of the mesh, as exact as above, world units. The points may come in
 /// any order.

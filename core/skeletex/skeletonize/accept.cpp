@@ -91,10 +91,11 @@ Acceptance::Trial Acceptance::encode_mesh(const TriangleMesh& mesh, const Triang
     EncodeOptions options;
     options.width = options.height = kTrialSize;
     options.tree = &tree;
+    options.layers.has_normals = false;
     EncodeResult result = encode_model(context_, mesh, named, options);
     result.model.skeleton.frame = {};  // that of surface_.mesh
     const TriangleMesh reconstruction = reconstruct_mesh(context_, result.model);
-    return {symmetric_mean(measure_metro(context_, mesh, reconstruction, {.samples = kTrialSamples})), {}};
+    return {SymmetricMetro(context_, mesh, kTrialSamples).measure(reconstruction).mean, {}};
   } catch (const DeviceError&) {
     throw;
   } catch (const Error& error) {

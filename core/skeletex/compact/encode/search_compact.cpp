@@ -34,6 +34,7 @@ class Search {
     const PreparedModel prepared(model_);
     source_ = source_surface(context, prepared);
     reference_ = reference != nullptr ? *reference : reconstruct_bind_mesh(context, prepared).mesh;
+    metro_.emplace(context, reference_, kTrialSamples);
   }
 
   CompactResult run() {
@@ -77,7 +78,7 @@ class Search {
   double measure(Trial& trial) {
     ++trials_;
     const TriangleMesh mesh = mesh_of(trial.model, -std::max(0, (trial.model.bare_levels - 2) / 2));
-    trial.distance = measure_symmetric_distance(context_, reference_, mesh, kTrialSamples);
+    trial.distance = metro_->measure(mesh);
     return trial.distance.mean;
   }
   Trial trial(double step, int bare_levels) {
@@ -95,9 +96,8 @@ class Search {
   }
   CompactResult measured(const Trial& trial) {
     CompactResult result{compact_bytes(trial.model), trial.options, 0, 0, trials_};
-    const MetroReport report = measure_metro(context_, reference_, mesh_of(trial.model, 0), {.samples = kSamples});
-    result.mean = symmetric_mean(report);
-    result.max = std::max(report.forward.max, report.backward.max);
+    const SymmetricDistance distance = SymmetricMetro(context_, reference_, kSamples).measure(mesh_of(trial.model, 0));
+    result.mean = distance.mean, result.max = distance.max;
     return result;
   }
 
@@ -226,6 +226,7 @@ class Search {
   int size_;  ///< that trials have
   SourceSurface source_;
   TriangleMesh reference_;
+  std::optional<SymmetricMetro> metro_;  // of the reference, for trials
   int trials_ = 0;
 };
 
