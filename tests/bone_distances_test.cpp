@@ -33,6 +33,25 @@ TEST(BoneDistances, AreTheHeightsOfPointsOverAPlane) {
   EXPECT_EQ(distances[1].place, Vec3(0, 0, 3));
 }
 
+TEST(VertexDistances, AreExactWhateverTheQuadsAndWithoutThem) {
+  // Two quads in the plane z = 0: x from -2 to 0, and from 0 to 2.
+  const TriangleMesh plane{{{-2, -1, 0}, {0, -1, 0}, {2, -1, 0}, {-2, 1, 0}, {0, 1, 0}, {2, 1, 0}},
+                           {{0, 1, 4}, {0, 4, 3}, {1, 2, 5}, {1, 5, 4}}};
+  Chart chart;
+  chart.positions = {{-1, 0, 0.25}, {-1, 0.5, 0}, {1, 0, 0.5}, {1, 0, 7}};
+  chart.kinds = {ChartVertex::kInner, ChartVertex::kInner, ChartVertex::kInner, ChartVertex::kHeadPole};
+  const std::vector<Chart> charts{chart, chart, chart};
+  const std::vector<std::vector<int>> quads{{0, 0, 1}, {1, 1, 0}, {}};  // right, wrong, none
+  const auto distances = vertex_distances(charts, plane, build_triangle_tree(plane), quads, 1e-6);
+  ASSERT_EQ(distances.size(), 3u);
+  for (const BoneDistance& distance : distances) {
+    EXPECT_NEAR(distance.mean, 0.25, 1e-6);
+    EXPECT_NEAR(distance.median, 0.25, 1e-6);
+    EXPECT_NEAR(distance.furthest, 0.5, 1e-6);
+    EXPECT_EQ(distance.place, Vec3(1, 0, 0.5));
+  }
+}
+
 TEST(SqueezedParts, AreToldOfByBoneAndPlaceAndKeptByFurtherReweighting) {
   const TestModel model = load_standard_model("bull_16");  // its tail has no bone: it belongs to a thigh
   EncodeOptions options;

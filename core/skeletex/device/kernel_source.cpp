@@ -19,8 +19,8 @@
 namespace skeletex {
 namespace {
 
-// Of programs that have a file the first is built, unless another one is there already: closest points are looked for
-// alone as well, and `encode` reads layers at the vertices that its texels make.
+// A kernel is taken from a program that is built already, else from the first program here that has its file. Some
+// commands need nothing but metro.cl; `encode` needs reconstruct.cl for its layers.
 const std::vector<std::vector<std::string_view>> kPrograms{
     {"metro.cl"},
     {"reconstruct.cl", "pose.cl", "regular_grid.cl", "blend.cl", "transfer.cl"},

@@ -178,8 +178,7 @@ void open_children(const TriangleTree& tree, const OpenNode& node, const Eigen::
 
 NearestTriangle find_nearest_triangle(const TriangleMesh& mesh, const TriangleTree& tree, const Vec3& point,
                                       double bound, const std::function<bool(int triangle)>& counts) {
-  constexpr double kRounding = 1e-6;   // of the tree's units: more than what rounding to float32 moves a point or box
-  constexpr double kLess = 1 - 1e-12;  // boxes far enough away are, whatever rounding
+  constexpr double kRounding = 1e-6;  // of the tree's units: more than what rounding to float32 moves a point or box
   const Eigen::Vector3f place = point_of(tree, point);
   NearestTriangle nearest{-1, bound};
   const auto least_squared = [&] {
@@ -200,7 +199,7 @@ NearestTriangle find_nearest_triangle(const TriangleMesh& mesh, const TriangleTr
       const Triangle& t = mesh.triangles[tree.order[at]];
       const Vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
       const Vec3 gap = (a.cwiseMin(b).cwiseMin(c) - point).cwiseMax(point - a.cwiseMax(b).cwiseMax(c)).cwiseMax(0);
-      if (gap.squaredNorm() * kLess > nearest.distance * nearest.distance) continue;
+      if (gap.squaredNorm() > nearest.distance * nearest.distance) continue;
       const double distance = offset_from_triangle(point, a, b, c).norm();
       if (distance < nearest.distance && (!counts || counts(tree.order[at]))) nearest = {tree.order[at], distance};
     }

@@ -14,7 +14,6 @@ namespace skeletex {
 namespace {
 
 constexpr std::size_t kBlock = 1 << 10;
-constexpr std::size_t kTrianglesPerPoint = 64;  // fewer points are looked for on the host: a mesh takes long to send
 
 /// The points of all bones behind each other. What has no weight counts for the furthest alone.
 struct Samples {
@@ -68,7 +67,7 @@ double distance_from_quad(const TriangleMesh& mesh, int first, const Vec3& point
 
 }  // namespace
 
-std::vector<BoneDistance> vertex_distances(ClContext& context, std::span<const Chart> charts, const TriangleMesh& mesh,
+std::vector<BoneDistance> vertex_distances(std::span<const Chart> charts, const TriangleMesh& mesh,
                                            const TriangleTree& tree, std::span<const std::vector<int>> quads,
                                            double enough) {
   Samples samples;
@@ -77,27 +76,18 @@ std::vector<BoneDistance> vertex_distances(ClContext& context, std::span<const C
       if (chart.kinds[i] == ChartVertex::kInner) samples.add(chart.positions[i], 1);
     samples.end_bone();
   }
-  std::vector<float> distances(samples.points.size(), std::numeric_limits<float>::infinity());
-  std::vector<Vec3> far_points;
-  std::vector<std::size_t> far;
-  for (std::size_t bone = 0; bone < charts.size(); ++bone)
-    for_each_block(quads[bone].size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i)
-        distances[samples.begins[bone] + i] =
-            static_cast<float>(distance_from_quad(mesh, 2 * quads[bone][i], samples.points[samples.begins[bone] + i]));
-    });
-  for (std::size_t i = 0; i < distances.size(); ++i)
-    if (static_cast<double>(distances[i]) > enough) far.push_back(i), far_points.push_back(samples.points[i]);
-  if (far.size() < mesh.triangles.size() / kTrianglesPerPoint) {
-    for_each_block(far.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
-      for (std::size_t k = begin; k < end; ++k) {
-        float& distance = distances[far[k]];
-        distance = static_cast<float>(find_nearest_triangle(mesh, tree, far_points[k], distance).distance);
+  std::vector<float> distances(samples.points.size());
+  for (std::size_t bone = 0; bone < charts.size(); ++bone) {
+    const std::size_t first = samples.begins[bone];
+    for_each_block(samples.begins[bone + 1] - first, kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const Vec3& point = samples.points[first + i];
+        double distance = quads[bone].empty() ? std::numeric_limits<double>::infinity()
+                                              : distance_from_quad(mesh, 2 * quads[bone][i], point);
+        if (distance > enough) distance = find_nearest_triangle(mesh, tree, point, distance).distance;
+        distances[first + i] = static_cast<float>(distance);
       }
     });
-  } else {
-    const std::vector<float> found = find_distances(context, far_points, mesh, tree, enough);
-    for (std::size_t k = 0; k < far.size(); ++k) distances[far[k]] = found[k];
   }
   return summarize(samples, std::move(distances));
 }

@@ -30,13 +30,14 @@ inline constexpr double kNearEnough = 1e-4;
 std::vector<BoneDistance> distances_from_bones(ClContext& context, std::span<const Chart> charts,
                                                const TriangleMesh& mesh, const TriangleTree& tree, double enough);
 
-/// From the inner vertices of the maps to a lattice, looked for first at their place in the map.
-/// \param mesh    of the lattice
-/// \param tree    of it
-/// \param quads   per chart and inner vertex the lattice's quad at its place; none for height fields
-/// \param enough  distances up to it need not be exact; world units
-/// \return per chart; means and medians are those of vertices
-std::vector<BoneDistance> vertex_distances(ClContext& context, std::span<const Chart> charts, const TriangleMesh& mesh,
+/// From the inner vertices of charts to the mesh of a lattice, on the host. Each vertex is compared first with the quad
+/// at its place in the map, which mostly holds it.
+/// \param mesh    of the lattice; triangles 2 q and 2 q + 1 are quad q
+/// \param tree    of that mesh
+/// \param quads   per chart the quads of its inner vertices; empty for a chart whose map is not known
+/// \param enough  a quad so near is taken for the nearest; world units
+/// \return per chart, in world units; means and medians are over vertices
+std::vector<BoneDistance> vertex_distances(std::span<const Chart> charts, const TriangleMesh& mesh,
                                            const TriangleTree& tree, std::span<const std::vector<int>> quads,
                                            double enough);
 

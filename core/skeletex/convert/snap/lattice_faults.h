@@ -22,7 +22,7 @@ struct OriginalSurface {
   std::vector<std::array<Vec3, 3>> map_triangles;  ///< corners, of all VSM patches' maps, see DeviceMaps
   std::vector<Vec3> map_normals;                   ///< unit; 0 of triangles without area
   std::vector<Vertex> vertices;                    ///< inner ones of the maps
-  std::vector<std::vector<int>> quads;             ///< per chart those of its vertices; none for height fields
+  std::vector<std::vector<int>> quads;             ///< per chart those of its inner vertices; none for height fields
 };
 OriginalSurface prepare_original(const TriangleMesh& mesh, const TriangleTree& tree, std::span<const Chart> charts,
                                  const LatticeFrame& frame);

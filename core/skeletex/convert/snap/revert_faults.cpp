@@ -211,8 +211,8 @@ RevertReport revert_faults(ClContext& context, const RevertSources& sources, std
     if (reverted.empty() && with_vertices) break;
     next_pass(context, frame, original, vertex_points, texels, limit, reverted, pass);
   }
-  report.distances = vertex_distances(context, sources.charts, pass.mesh, pass.tree, original.quads,
-                                      kNearEnough * frame.model.diagonal);
+  report.distances =
+      vertex_distances(sources.charts, pass.mesh, pass.tree, original.quads, kNearEnough * frame.model.diagonal);
   return report;
 }
 
