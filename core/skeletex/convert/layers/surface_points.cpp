@@ -14,7 +14,7 @@ namespace skeletex {
 namespace {
 
 constexpr std::size_t kBlock = 1 << 12;
-constexpr double kNearEnough = 1e-6;  // of the diagonal: the resolution of single precision, some rounding errors included
+constexpr double kNearEnough = 1e-6;  // of the diagonal, some rounding errors of single precision
 
 /// The points of all rows of a model, and where each patch begins among them.
 struct RowPoints {
