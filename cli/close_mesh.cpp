@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <array>
 #include <cstdlib>
 #include <filesystem>
+#include <optional>
 #include <type_traits>
 
 #include "files.h"
@@ -13,6 +15,7 @@
 #include "runner/process.h"
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/close/fill_holes.h"
+#include "skeletex/close/untangle.h"
 #include "skeletex/io/gltf/weld.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/model/error.h"
@@ -24,6 +27,9 @@ namespace fs = std::filesystem;
 
 /// Vertices nearer to each other are one where a mesh is not closed; diagonals.
 constexpr double kSameVertex = 1e-6;
+constexpr double kDetail = 0.008;  // of a wrap, diagonals
+constexpr double kCrumb = 0.001;   // of the area
+constexpr double kBody = 0.9;      // of the area: a part that is nearly everything
 
 /// A folder for the files that the two programs exchange.
 class WorkFolder {
@@ -86,56 +92,136 @@ std::string wrap_program() {
   return fs::is_regular_file(beside) ? beside.string() : "skeletex_wrap";
 }
 
-Json wrap(MeshParts& parts, const CloseOptions& options) {
-  const WorkFolder folder;
-  write_mesh(folder / "mesh.ply", parts.mesh);
+/// A wrap of a mesh.
+struct Wrap {
+  double detail = 0;
+  MeshParts parts;  ///< the mesh alone
+  ManifoldReport report;
+  int crumbs = 0;
+};
+
+Wrap wrap_with(double detail, const WorkFolder& folder) {
   ProcessResult result;
   try {
-    result = run_process(wrap_program(),
-                         {(folder / "mesh.ply").string(), "-o", (folder / "wrap.ply").string(), "--detail",
-                          fmt::format("{}", options.detail)},
-                         {}, folder / "errors.txt");
+    result = run_process(
+        wrap_program(),
+        {(folder / "mesh.ply").string(), "-o", (folder / "wrap.ply").string(), "--detail", fmt::format("{}", detail)},
+        {}, folder / "errors.txt");
   } catch (const IoError&) {
     result.exit_code = 127;
   }
   if (result.exit_code == 127)
     throw InputError(
         "--close: the program skeletex_wrap, which wraps such meshes, is neither beside skeletex nor on the PATH; it "
-        "is "
-        "built where CGAL is installed");
+        "is built where CGAL is installed");
   if (result.exit_code != 0) throw InputError(fmt::format("--close: the mesh could not be wrapped: {}", result.errors));
-  TriangleMesh wrapped = read_mesh(folder / "wrap.ply").mesh;
+  Wrap wrap{detail, {read_mesh(folder / "wrap.ply").mesh, {}, {}}, {}, 0};
+  std::vector<int> unused(wrap.parts.mesh.triangles.size());
+  wrap.crumbs = remove_crumbs(wrap.parts.mesh, kCrumb, unused);  // a lone triangle gets a wrap of its own
+  remove_unused_vertices(wrap.parts);
+  wrap.report = measure_manifold(wrap.parts.mesh);
+  return wrap;
+}
+
+/// The wrap of the detail that is given, else that with the fewest handles of a few: parts that nearly touch become
+/// handles at one detail and not at the next.
+/// \param filled  the mesh without the holes that could be filled: a wrap goes in where it is wide enough
+Wrap best_wrap(const TriangleMesh& filled, const CloseOptions& options) {
+  constexpr std::array<double, 5> kDetails{kDetail, 0.75 * kDetail, 1.5 * kDetail, 2.25 * kDetail, 3.4 * kDetail};
+  const WorkFolder folder;
+  write_mesh(folder / "mesh.ply", filled);
+  if (options.detail) return wrap_with(*options.detail, folder);
+  std::optional<Wrap> best;
+  std::string tried;
+  for (const double detail : kDetails) {
+    Wrap wrap = wrap_with(detail, folder);
+    tried += fmt::format("{}{} with a detail of {:.2g}", tried.empty() ? "" : ", ", wrap.report.genus, detail);
+    if (!best || wrap.report.genus < best->report.genus) best = std::move(wrap);
+    if (best->report.genus <= 0) break;
+  }
+  if (best->detail != kDetails[0])
+    spdlog::info("--close: handles of the wrap: {}; the one of {:.2g} is taken", tried, best->detail);
+  return std::move(*best);
+}
+
+Json take_wrap(MeshParts& parts, const TriangleMesh& filled, Wrap wrap) {
+  const TriangleMesh& wrapped = wrap.parts.mesh;
   const double diagonal = bounding_box(parts.mesh).diagonal();
-  const VertexDistances there = vertex_distances(parts.mesh, wrapped), back = vertex_distances(wrapped, parts.mesh);
+  const VertexDistances there = vertex_distances(parts.mesh, wrapped), back = vertex_distances(wrapped, filled);
   CarriedOver carried =
       carry_over(parts.mesh, build_triangle_tree(parts.mesh), parts.attributes, parts.weights, wrapped);
-  const int components = measure_manifold(wrapped).components;
-  warn(
-      fmt::format("wrapped in a closed mesh of {} triangles. Its distance from the file's, in diagonals: {:.2g} mean, "
-                  "{:.2g} at most; vertices of the file are up to {:.2g} away, inner parts among them. A smaller "
-                  "--close-detail (now {:.3g}) comes nearer and takes longer",
-                  wrapped.triangles.size(), back.mean / diagonal, back.largest / diagonal, there.largest / diagonal,
-                  options.detail));
-  if (components > 1)
-    warn(fmt::format("the wrap has {} parts that do not touch; a larger --close-detail joins them", components));
-  parts = {std::move(wrapped), std::move(carried.attributes), std::move(carried.weights)};
+  warn(fmt::format(
+      "wrapped in a closed mesh of {} triangles. Its distance from the file's, in diagonals: {:.2g} mean, "
+      "{:.2g} at most; vertices of the file are up to {:.2g} away, inner parts among them. A smaller "
+      "--close-detail (now {:.3g}) comes nearer and takes longer",
+      wrapped.triangles.size(), back.mean / diagonal, back.largest / diagonal, there.largest / diagonal, wrap.detail));
+  if (wrap.crumbs > 0)
+    warn(fmt::format("{} part{} of the wrap with less than {} % of its area {} left out", wrap.crumbs,
+                     wrap.crumbs == 1 ? "" : "s", 100 * kCrumb, wrap.crumbs == 1 ? "is" : "are"));
+  if (wrap.report.components > 1)
+    warn(fmt::format("the wrap has {} parts that do not touch; a larger --close-detail joins them",
+                     wrap.report.components));
+  parts = {std::move(wrap.parts.mesh), std::move(carried.attributes), std::move(carried.weights)};
   return {{"method", "wrap"},
+          {"detail", wrap.detail},
           {"triangles", parts.mesh.triangles.size()},
-          {"components", components},
+          {"components", wrap.report.components},
+          {"genus", wrap.report.genus},
           {"distance", {{"mean", back.mean / diagonal}, {"max", back.largest / diagonal}}},
           {"distance_of_vertices", {{"mean", there.mean / diagonal}, {"max", there.largest / diagonal}}}};
+}
+
+/// Per new vertex what its original has.
+void copy_vertices(MeshParts& parts, const std::vector<int>& copies) {
+  for (const int v : copies) {
+    if (!parts.weights.empty()) parts.weights.push_back(parts.weights[v]);
+    for (VertexNumbers& numbers : parts.attributes.numbers) numbers.values.push_back(numbers.values[v]);
+  }
+}
+
+/// Takes a mesh whose holes are filled.
+Json take_filled(MeshParts& parts, TriangleMesh filled, const FillResult& filling) {
+  const double diagonal = bounding_box(filled).diagonal();
+  std::string places;
+  std::size_t listed = 0, intersecting = 0;
+  for (const Hole& hole : filling.holes) {
+    intersecting += hole.is_intersecting ? 1 : 0;
+    if (++listed <= 3)
+      places += fmt::format("{}{} edges around {}, {:.1f} % of the diagonal across", places.empty() ? ": " : "; ",
+                            hole.loop.size(), text_of(hole.centre), 100 * hole.size / diagonal);
+  }
+  const std::size_t count = filling.holes.size();
+  spdlog::info("--close: filled {} hole{}{}{}", count, count == 1 ? "" : "s", places, count > 3 ? "; ..." : "");
+  if (intersecting > 0)
+    warn(fmt::format("{} of the fillings intersect{} the surface", intersecting, intersecting == 1 ? "s" : ""));
+  if (filling.removed > 0)
+    warn(
+        fmt::format("{} triangles at edges that more than two share, or that do not agree on what is outside, are "
+                    "taken away",
+                    filling.removed));
+  copy_vertices(parts, filling.copies);
+  std::vector<Triangle> triangles = filled.triangles;  // with the vertices that the attributes know
+  const int known = static_cast<int>(filled.positions.size() - filling.copies.size());
+  for (Triangle& t : triangles)
+    for (int& corner : t)
+      if (corner >= known) corner = filling.copies[corner - known];
+  parts.attributes = with_triangles(parts.attributes, parts.mesh.triangles, triangles, filling.origins);
+  parts.mesh = std::move(filled);
+  remove_unused_vertices(parts);
+  return {{"method", "fill"}, {"holes", count}, {"intersecting", intersecting}};
 }
 
 }  // namespace
 
 void add_close_options(CLI::App& command, CloseOptions& options) {
-  CLI::Option* close = command.add_flag(
-      "--close", options.is_on,
-      "make the mesh closed: small holes are filled; what has large holes or several parts is wrapped");
+  CLI::Option* close =
+      command.add_flag("--close", options.is_on,
+                       "make the mesh closed: holes are filled; sheets, and what has several parts, are wrapped");
   command
       .add_option(
           "--close-detail", options.detail,
-          "hollows narrower than this are not entered by the wrap, in diagonals, 0.0005 to 0.5 (default: 0.008)")
+          "hollows narrower than this are not entered by the wrap, in diagonals, 0.0005 to 0.5 (default: 0.008, or "
+          "0.006 to 0.027 where the wrap then has fewer handles)")
       ->check(number_in(0.0005, 0.5))
       ->type_name("X")
       ->needs(close);
@@ -154,22 +240,22 @@ Json close_mesh(MeshParts& parts, const CloseOptions& options) {
     if (!p.allFinite()) throw InputError("--close: a coordinate is not finite; take such vertices out first");
   weld(parts);
   TriangleMesh filled = parts.mesh;
-  const FillResult result = fill_holes(filled);
-  if (!result.obstacle.empty()) {
-    spdlog::info("--close: {}, so the mesh is wrapped", result.obstacle);
-    return wrap(parts, options);
+  FillResult filling = fill_holes(filled);
+  if (filling.obstacle.empty()) return take_filled(parts, std::move(filled), filling);
+  spdlog::info("--close: {}, so the mesh is wrapped", filling.obstacle);
+  Wrap wrap = best_wrap(filled, options);
+  if (!options.detail && wrap.report.genus > 0) {
+    TriangleMesh body = filled;
+    const double share = keep_largest_part(body, filling.origins);
+    if (share > kBody && measure_manifold(body).genus < wrap.report.genus) {
+      warn(
+          fmt::format("the wrap has {} handles, as parts nearly touch; the largest part, with {:.1f} % of the area, is "
+                      "taken alone instead. Other parts are left out; --close-detail wraps them all",
+                      wrap.report.genus, 100 * share));
+      return take_filled(parts, std::move(body), filling);
+    }
   }
-  std::string places;
-  std::size_t listed = 0;
-  for (const Hole& hole : result.holes)
-    if (++listed <= 3)
-      places += fmt::format("{}{} edges around {}", places.empty() ? "" : ", ", hole.loop.size(), text_of(hole.centre));
-  spdlog::info("--close: filled {} hole{}: {}{}", result.holes.size(), result.holes.size() == 1 ? "" : "s", places,
-               result.holes.size() > 3 ? ", ..." : "");
-  parts.attributes = with_triangles(parts.attributes, parts.mesh.triangles, filled.triangles, result.origins);
-  parts.mesh = std::move(filled);
-  remove_unused_vertices(parts);
-  return {{"method", "fill"}, {"holes", result.holes.size()}};
+  return take_wrap(parts, filled, std::move(wrap));
 }
 
 }  // namespace skeletex::cli

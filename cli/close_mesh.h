@@ -11,7 +11,7 @@ namespace skeletex::cli {
 /// --close and --close-detail.
 struct CloseOptions {
   bool is_on = false;
-  double detail = 0.008;  ///< diagonals
+  std::optional<double> detail;  ///< of a wrap, diagonals
 };
 void add_close_options(CLI::App& command, CloseOptions& options);
 
@@ -21,7 +21,7 @@ struct MeshParts {
   MeshAttributes attributes;
   VertexBoneWeights weights;
 };
-/// Makes a mesh closed and of one part: fills small holes, else wraps it by the program skeletex_wrap, which is beside
+/// Makes a mesh closed and of one part: fills its holes, else wraps it by the program skeletex_wrap, which is beside
 /// this one or on the PATH. Says what it did, and how far the wrap is from the mesh.
 /// \throw InputError when that program is not there, or could not wrap it
 /// \return for the JSON

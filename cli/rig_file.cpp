@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+
 #include "skeletex/analysis/validate_input.h"
 #include "skeletex/model/error.h"
 #include "skeletex/skeletonize/repair_skeleton.h"
@@ -29,6 +31,18 @@ void close_surface(RigFile& file, const CloseOptions& close) {
   }
 }
 
+/// A face alone can have fifty bones: the first changes stand for all.
+void say_changes(const std::string& path, const Skeleton& before, const RepairResult& repaired) {
+  constexpr std::size_t kShown = 3;
+  const std::vector<std::string>& changes = repaired.changes;
+  if (changes.empty()) return;
+  spdlog::info("{}: its skeleton is repaired: {} bones, {} before", path, repaired.skeleton.bones.size(),
+               before.bones.size());
+  for (std::size_t i = 0; i < std::min(kShown, changes.size()); ++i) spdlog::info("{}: {}", path, changes[i]);
+  if (changes.size() > kShown)
+    spdlog::info("{}: and {} more changes (skeletex import --json lists them)", path, changes.size() - kShown);
+}
+
 }  // namespace
 
 RigFile load_rig(const std::filesystem::path& path, const CloseOptions& close) {
@@ -48,22 +62,26 @@ RigFile load_rig(const std::filesystem::path& path, const CloseOptions& close) {
 }
 
 ImportedRig import_rig(ClContext& context, const RigFile& file) {
+  std::vector<std::string> changes;
   const auto repair = [&](const Skeleton& skeleton) {
     TriangleMesh mesh = file.surface.mesh;
     std::optional<TriangleTree> tree;
     if (has_errors(validate_mesh(mesh, &tree))) return skeleton;
     try {
       RepairResult repaired = repair_skeleton(context, mesh, *tree, skeleton);
-      for (const std::string& change : repaired.changes) spdlog::info("{}: {}", file.path, change);
+      say_changes(file.path, skeleton, repaired);
+      changes = std::move(repaired.changes);
       return std::move(repaired.skeleton);
     } catch (const DeviceError&) {
       throw;
-    } catch (const Error&) {  // Whoever validates this skeleton says what is wrong with it.
+    } catch (const Error& error) {  // Whoever validates this skeleton says what is wrong with it.
+      spdlog::info("{}: its skeleton cannot be repaired: {}", file.path, error.what());
       return skeleton;
     }
   };
   ImportedRig rig = skeletex::import_rig(file.scene, file.surface, repair);
   for (const std::string& note : rig.notes) spdlog::info("{}: {}", file.path, note);
+  rig.notes.insert(rig.notes.end(), changes.begin(), changes.end());
   return rig;
 }
 

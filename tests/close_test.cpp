@@ -3,6 +3,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 #include <set>
 
 #include "skeletex/analysis/manifold.h"
@@ -32,7 +34,7 @@ TEST(FillHoles, SmallHolesAreClosedAndNothingElseChanges) {
     TriangleMesh mesh = with_hole(with_hole(whole, count / 3), 2 * count / 3);
     const TriangleMesh open = mesh;
     ASSERT_LT(open.triangles.size(), whole.triangles.size());
-    const FillResult result = fill_holes(mesh, {.largest = 0.25});
+    const FillResult result = fill_holes(mesh);
     EXPECT_EQ(result.obstacle, "");
     EXPECT_EQ(result.holes.size(), 2u);
     const ManifoldReport report = measure_manifold(mesh);
@@ -44,31 +46,137 @@ TEST(FillHoles, SmallHolesAreClosedAndNothingElseChanges) {
   }
 }
 
-TEST(FillHoles, AFlatHoleGetsItsOwnArea) {
-  // A cube without its lid, which has a fold in its boundary.
+/// A cube without its lid, which has a fold in its boundary.
+TriangleMesh open_cube() {
   TriangleMesh mesh;
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
   mesh.triangles = {{0, 2, 1}, {0, 3, 2}, {0, 1, 5}, {0, 5, 4}, {1, 2, 6},
                     {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};
-  EXPECT_NE(fill_holes(mesh).obstacle.find("too large"), std::string::npos);
-  EXPECT_EQ(fill_holes(mesh, {.largest = 1}).obstacle, "");
+  return mesh;
+}
+
+/// Adds a mesh as a part of its own, moved.
+void add_part(const TriangleMesh& part, const Vec3& offset, TriangleMesh& mesh) {
+  const int first = static_cast<int>(mesh.positions.size());
+  for (const Vec3& p : part.positions) mesh.positions.push_back(p + offset);
+  for (const Triangle& t : part.triangles) mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+}
+
+TEST(FillHoles, AWideFlatHoleGetsItsOwnArea) {
+  TriangleMesh mesh = open_cube();
+  const FillResult result = fill_holes(mesh);
+  EXPECT_EQ(result.obstacle, "");
+  ASSERT_EQ(result.holes.size(), 1u);
+  EXPECT_FALSE(result.holes[0].is_intersecting);
   EXPECT_NEAR(surface_area(mesh), 6, 1e-12);
   EXPECT_NEAR(signed_volume(mesh), 1, 1e-12);
+}
+
+TEST(FillHoles, AFillingThatIntersectsIsMarked) {
+  // A second cube stands in the lid.
+  TriangleMesh cube = open_cube();
+  fill_holes(cube);
+  for (Vec3& p : cube.positions) p *= 0.25;
+  TriangleMesh mesh = open_cube();
+  add_part(cube, Vec3(0.4, 0.4, 0.9), mesh);
+  const FillResult result = fill_holes(mesh);
+  ASSERT_EQ(result.holes.size(), 1u);
+  EXPECT_TRUE(result.holes[0].is_intersecting);
+  EXPECT_NE(result.obstacle.find("2 parts"), std::string::npos) << result.obstacle;
+}
+
+TEST(FillHoles, ASheetStaysOpen) {
+  TriangleMesh sheet;
+  const int side = 12;
+  for (int i = 0; i <= side; ++i)
+    for (int j = 0; j <= side; ++j) sheet.positions.emplace_back(i, j, 0.2 * std::sin(1.0 * i) * std::cos(0.7 * j));
+  for (int i = 0; i < side; ++i)
+    for (int j = 0; j < side; ++j) {
+      const int a = i * (side + 1) + j, b = a + side + 1;
+      sheet.triangles.push_back({a, b, b + 1});
+      sheet.triangles.push_back({a, b + 1, a + 1});
+    }
+  const TriangleMesh before = sheet;
+  const FillResult result = fill_holes(sheet);
+  EXPECT_NE(result.obstacle.find("sheet"), std::string::npos) << result.obstacle;
+  EXPECT_EQ(sheet.triangles, before.triangles);
+}
+
+TEST(FillHoles, TanglesAreTakenAwayAndFilled) {
+  for (const NamedShape& shape : all_shapes()) {
+    SCOPED_TRACE(shape.name);
+    TriangleMesh mesh = shape.shape.mesh;
+    const double volume = signed_volume(mesh);
+    // A fin of one triangle at an edge, and a triangle that is turned over.
+    const Triangle at = mesh.triangles[mesh.triangles.size() / 2];
+    mesh.positions.push_back(1.1 * mesh.positions[at[0]]);
+    mesh.triangles.push_back({at[0], at[1], static_cast<int>(mesh.positions.size()) - 1});
+    std::swap(mesh.triangles[mesh.triangles.size() / 4][0], mesh.triangles[mesh.triangles.size() / 4][1]);
+    const FillResult result = fill_holes(mesh);
+    EXPECT_EQ(result.obstacle, "");
+    EXPECT_GT(result.removed, 0);
+    const ManifoldReport report = measure_manifold(mesh);
+    EXPECT_TRUE(report.is_closed_manifold());
+    EXPECT_EQ(report.genus, shape.genus);
+    EXPECT_NEAR(signed_volume(mesh), volume, 0.01 * volume);
+  }
+}
+
+TEST(FillHoles, SheetsThatTouchInAVertexGetOneEach) {
+  // Two bodies that share one vertex, each the other's image in it.
+  const TriangleMesh whole = y_shape().mesh;
+  TriangleMesh mesh = whole;
+  const int vertex = mesh.triangles[200][0];
+  TriangleMesh other = whole;
+  const Vec3 place = mesh.positions[vertex];
+  for (Vec3& p : other.positions) p = 2 * place - p;
+  for (Triangle& t : other.triangles) std::swap(t[1], t[2]);
+  const int first = static_cast<int>(mesh.positions.size());
+  add_part(other, Vec3::Zero(), mesh);
+  for (Triangle& t : mesh.triangles)
+    for (int& corner : t)
+      if (corner == first + vertex) corner = vertex;
+  ASSERT_EQ(measure_manifold(mesh).non_manifold_vertices, std::vector<int>{vertex});
+  const FillResult result = fill_holes(mesh);
+  EXPECT_EQ(result.copies, std::vector<int>{vertex});
+  EXPECT_EQ(mesh.positions.back(), place);
+  EXPECT_TRUE(measure_manifold(mesh).is_closed_manifold());
+  EXPECT_NE(result.obstacle.find("2 parts"), std::string::npos) << result.obstacle;
+}
+
+TEST(KeepLargestPart, KeepsAClosedBodyAlone) {
+  const TriangleMesh torus = torus_shape().mesh;
+  TriangleMesh mesh = y_shape().mesh;
+  for (Vec3& p : mesh.positions) p *= 0.05;
+  const std::size_t small = mesh.triangles.size();
+  add_part(torus, Vec3(10, 0, 0), mesh);
+  std::vector<int> origins(mesh.triangles.size());
+  std::iota(origins.begin(), origins.end(), 0);
+  TriangleMesh open = mesh;
+  std::vector<int> open_origins = origins;
+  open.triangles.pop_back();
+  open_origins.pop_back();
+  EXPECT_EQ(keep_largest_part(open, open_origins), 0);
+  EXPECT_EQ(open.triangles.size(), mesh.triangles.size() - 1);
+  const double area = surface_area(mesh), share = keep_largest_part(mesh, origins);
+  EXPECT_NEAR(share * area, surface_area(torus), 1e-9 * area);
+  EXPECT_EQ(mesh.triangles.size(), torus.triangles.size());
+  EXPECT_EQ(origins.front(), static_cast<int>(small));
+  EXPECT_EQ(measure_manifold(mesh).genus, 1);
 }
 
 TEST(FillHoles, WhatStandsInTheWayIsSaid) {
   const TriangleMesh torus = torus_shape().mesh;
   TriangleMesh two = torus;
-  for (const Vec3& p : torus.positions) two.positions.push_back(p + Vec3(10, 0, 0));
-  for (const Triangle& t : torus.triangles) {
-    const int offset = static_cast<int>(torus.positions.size());
-    two.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
-  }
+  add_part(torus, Vec3(10, 0, 0), two);
   EXPECT_NE(fill_holes(two).obstacle.find("2 parts"), std::string::npos);
-  TriangleMesh fin = torus;
-  fin.positions.push_back(Vec3(0, 0, 3));
-  fin.triangles.push_back({torus.triangles[0][0], torus.triangles[0][1], static_cast<int>(torus.positions.size())});
-  EXPECT_NE(fill_holes(fin).obstacle.find("more than two triangles"), std::string::npos);
+  TriangleMesh fins = torus;
+  for (std::size_t t = 0; t < torus.triangles.size(); t += 10) {
+    fins.positions.push_back(Vec3(0, 0, 3));
+    fins.triangles.push_back(
+        {torus.triangles[t][0], torus.triangles[t][1], static_cast<int>(fins.positions.size()) - 1});
+  }
+  EXPECT_NE(fill_holes(fins).obstacle.find("more than two triangles"), std::string::npos);
 }
 
 TEST(CarryOver, ValuesAreThoseOfTheNearestPoint) {

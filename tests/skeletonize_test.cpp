@@ -294,6 +294,113 @@ TEST(Skeletonize, RepairMakesNoBoneWithoutLength) {
   EXPECT_EQ(errors_of(man.mesh, repaired.skeleton), "");
 }
 
+TEST(Skeletonize, RelaxationTakesWhatMarginsLackAway) {
+  // Every bone is four, as in rigs with many in a thick body.
+  const TestModel bear = load_standard_model("bear");
+  const TriangleTree tree = build_triangle_tree(bear.mesh);
+  const Surface surface(bear.mesh, tree);
+  Skeleton rig = bear.skeleton;
+  for (int round = 0; round < 2; ++round)
+    for (int b = static_cast<int>(rig.bones.size()) - 1; b >= 0; --b) {
+      const std::string number = std::to_string(rig.nodes.size());
+      rig.nodes.push_back(
+          {"middle_" + number, 0.5 * (end_position(rig, b, BoneEnd::kHead) + end_position(rig, b, BoneEnd::kTail))});
+      rig.bones.push_back({"half_" + number, static_cast<int>(rig.nodes.size()) - 1, rig.bones[b].tail, {}});
+      rig.bones[b].tail = static_cast<int>(rig.nodes.size()) - 1;
+    }
+  RandomNumbers random(11);
+  rig = spoilt(rig, 0.015 * surface.diagonal, random);
+  Repair repair(surface, rig, rig);
+  const auto lack = [&] {
+    double sum = 0;
+    for (const BoneMargin& margin : repair.margins()) sum += std::max(0.0, kEnoughMargin - margin.margin);
+    return sum;
+  };
+  const double before = lack();
+  repair.relax();
+  EXPECT_LT(lack(), 0.1 * before);
+  EXPECT_GT(repair.skeleton().bones.size(), 0.6 * static_cast<double>(rig.bones.size()));
+  const std::vector<Node>& nodes = repair.skeleton().nodes;
+  for (const Bone& bone : repair.skeleton().bones)
+    EXPECT_FALSE(surface.is_between(nodes[bone.head].position, nodes[bone.tail].position));
+}
+
+bool has_bone(const Skeleton& skeleton, const std::string& name) {
+  return std::any_of(skeleton.bones.begin(), skeleton.bones.end(), [&](const Bone& b) { return b.name == name; });
+}
+
+TEST(Skeletonize, RepairTakesSmallBonesOutOfACrowdedNodeFirst) {
+  // As the bones of a face, which all begin in one node of a rig.
+  const Shape shape = y_shape();
+  Skeleton rig = shape.skeleton;
+  rig.nodes.push_back({"throat", {0, -0.6, 0}});
+  rig.bones[0].tail = 4;
+  rig.bones.push_back({"neck", 4, 0, {}});
+  for (int i = 0; i < 8; ++i) {
+    const double angle = 0.8 * i;
+    rig.nodes.push_back(
+        {"face_" + std::to_string(i) + "_tip", Vec3(0.3 * std::cos(angle), -0.2, 0.3 * std::sin(angle))});
+    rig.bones.push_back({"face_" + std::to_string(i), 0, static_cast<int>(rig.nodes.size()) - 1, {}});
+  }
+  ASSERT_NE(errors_of(shape.mesh, rig), "");
+  const TriangleTree tree = build_triangle_tree(shape.mesh);
+  const Surface surface(shape.mesh, tree);
+  Repair repair(surface, rig, rig);
+  const auto neck_margin = [&] {
+    for (std::size_t b = 0; b < repair.margins().size(); ++b)
+      if (repair.skeleton().bones[b].name == "neck") return repair.margins()[b].margin;
+    return -99.0;
+  };
+  const double before = neck_margin();
+  repair.drop_minor_limbs();
+  EXPECT_LT(repair.skeleton().bones.size(), rig.bones.size());
+  EXPECT_GT(neck_margin(), before + 0.5);
+  const RepairResult repaired = repair_skeleton(context(), shape.mesh, tree, rig);
+  EXPECT_EQ(errors_of(shape.mesh, repaired.skeleton), "");
+  for (const char* bone : {"stem", "neck", "left", "right"}) {
+    EXPECT_TRUE(has_bone(repair.skeleton(), bone)) << bone;
+    EXPECT_TRUE(has_bone(repaired.skeleton, bone)) << bone;
+  }
+}
+
+TEST(Skeletonize, RepairCutsLimbsThatEndInAnotherPart) {
+  // A hairpin; a bone from one of its legs ends beside the other leg.
+  Skeleton hairpin;
+  hairpin.nodes = {
+      {"a_tip", {0, 3, 0}}, {"a", {0, 0, 0}}, {"bow", {0.7, -0.7, 0}}, {"b", {1.4, 0, 0}}, {"b_tip", {1.4, 3, 0}}};
+  hairpin.bones = {{"a", 0, 1, {}}, {"bow_a", 1, 2, {}}, {"bow_b", 2, 3, {}}, {"b", 3, 4, {}}};
+  const TriangleMesh mesh = thickened(hairpin, {0.4, 0.4, 0.4, 0.4, 0.4}, 0.1, 0.12);
+  Skeleton rig = hairpin;
+  rig.nodes.push_back({"thumb", {0.2, 2.7, 0}});
+  rig.nodes.push_back({"thumb_tip", {0.85, 2.7, 0}});
+  rig.nodes[0].position.y() = 2.5;
+  rig.bones.push_back({"hand", 0, 5, {}});
+  rig.bones.push_back({"thumb", 5, 6, {}});
+  const RepairResult repaired = repair_skeleton(context(), mesh, build_triangle_tree(mesh), rig);
+  EXPECT_EQ(errors_of(mesh, repaired.skeleton), "");
+  for (const Bone& bone : hairpin.bones) EXPECT_TRUE(has_bone(repaired.skeleton, bone.name)) << bone.name;
+  const double diagonal = bounding_box(mesh).diagonal();
+  for (std::size_t n = 0; n < 5; ++n)
+    for (const Node& node : repaired.skeleton.nodes) {
+      if (node.name != rig.nodes[n].name) continue;
+      EXPECT_LT((node.position - rig.nodes[n].position).norm(), 0.03 * diagonal) << node.name;
+    }
+}
+
+TEST(Skeletonize, RepairEndsFreeBonesInsideTheBody) {
+  const Shape shape = y_shape();
+  Skeleton rig = shape.skeleton;
+  const int left = 2;
+  ASSERT_EQ(rig.nodes[left].name, "left");
+  rig.nodes[left].position *= 1.8;  // beyond the end of its limb
+  const RepairResult repaired = repair_skeleton(context(), shape.mesh, build_triangle_tree(shape.mesh), rig);
+  EXPECT_EQ(errors_of(shape.mesh, repaired.skeleton), "");
+  ASSERT_EQ(repaired.skeleton.bones.size(), 3u);
+  const Vec3& end = repaired.skeleton.nodes[left].position;
+  EXPECT_LT(end.cross(rig.nodes[left].position).norm(), 1e-6) << "it left its bone's line";
+  EXPECT_GT(end.norm(), 0.7 * shape.skeleton.nodes[left].position.norm());
+}
+
 TEST(Skeletonize, AGoodSkeletonIsNotChangedByRepair) {
   const Shape shape = y_shape();
   const RepairResult repaired = repair_skeleton(context(), shape.mesh, build_triangle_tree(shape.mesh), shape.skeleton);

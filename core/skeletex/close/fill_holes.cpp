@@ -5,11 +5,17 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <set>
 
 #include "skeletex/analysis/manifold.h"
+#include "skeletex/close/untangle.h"
+#include "skeletex/geometry/self_intersection.h"
+#include "skeletex/geometry/triangle_tree.h"
+#include "skeletex/geometry/union_find.h"
 
 namespace skeletex {
 namespace {
@@ -108,15 +114,15 @@ std::string obstacle_of(const ManifoldReport& report, const std::vector<Hole>& h
   const Hole* widest = nullptr;
   int left = 0;
   for (const Hole& hole : holes)
-    if (!hole.is_filled) {
+    if (!hole.refusal.empty()) {
       ++left;
       if (!widest || hole.size > widest->size) widest = &hole;
     }
   if (widest)
     return fmt::format(
-        "{} holes are too large to fill; the largest has {} edges around {}, {:.1f} % of the diagonal "
-        "across",
-        left, widest->loop.size(), text_of(widest->centre), 100 * widest->size / diagonal);
+        "{} hole{} cannot be filled: the widest, {} edges around {}, {:.1f} % of the diagonal across, {}", left,
+        left == 1 ? "" : "s", widest->loop.size(), text_of(widest->centre), 100 * widest->size / diagonal,
+        widest->refusal);
   if (!report.boundary_edges.empty())
     return fmt::format("{} edges have one triangle only", report.boundary_edges.size());
   if (!report.non_manifold_vertices.empty())
@@ -125,17 +131,28 @@ std::string obstacle_of(const ManifoldReport& report, const std::vector<Hole>& h
   return {};
 }
 
-}  // namespace
+/// Fillings on a mesh: triangles that are in place, and the hole of each.
+struct Fillings {
+  std::vector<Triangle> triangles;
+  std::vector<int> holes;
+  void remove(const std::vector<Hole>& all) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < holes.size(); ++i)
+      if (all[holes[i]].refusal.empty()) triangles[kept] = triangles[i], holes[kept++] = holes[i];
+    triangles.resize(kept);
+    holes.resize(kept);
+  }
+};
 
-FillResult fill_holes(TriangleMesh& mesh, const FillOptions& options) {
-  FillResult result;
-  result.origins = remove_useless(mesh);
-  const double diagonal = bounding_box(mesh).diagonal();
-  ManifoldReport report = measure_manifold(mesh);
-  EdgeSet edges;
-  for (const Triangle& t : mesh.triangles)
-    for (int k = 0; k < 3; ++k) edges.insert({std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])});
-  for (std::vector<int>& loop : boundary_loops(report.boundary_edges)) {
+TriangleMesh with_fillings(const TriangleMesh& mesh, const Fillings& fillings) {
+  TriangleMesh filled = mesh;
+  filled.triangles.insert(filled.triangles.end(), fillings.triangles.begin(), fillings.triangles.end());
+  return filled;
+}
+
+std::vector<Hole> find_holes(const TriangleMesh& mesh, const std::vector<std::array<int, 2>>& boundary_edges) {
+  std::vector<Hole> holes;
+  for (std::vector<int>& loop : boundary_loops(boundary_edges)) {
     Hole hole;
     TriangleMesh points;
     for (const int v : loop) {
@@ -143,21 +160,111 @@ FillResult fill_holes(TriangleMesh& mesh, const FillOptions& options) {
       hole.centre += mesh.positions[v] / static_cast<double>(loop.size());
     }
     hole.size = bounding_box(points).diagonal();
-    if (hole.size <= options.largest * diagonal && static_cast<int>(loop.size()) <= options.most_edges) {
-      const std::vector<Triangle> filling = triangulate(mesh.positions, loop, edges);
-      for (const Triangle& t : filling) {
-        mesh.triangles.push_back(t);
-        result.origins.push_back(-1);
-        for (int k = 0; k < 3; ++k) edges.insert({std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])});
-      }
-      hole.is_filled = !filling.empty();
-    }
     hole.loop = std::move(loop);
-    result.holes.push_back(std::move(hole));
+    holes.push_back(std::move(hole));
   }
-  report = measure_manifold(mesh);
-  result.obstacle = obstacle_of(report, result.holes, diagonal);
+  return holes;
+}
+
+Fillings triangulate_holes(const TriangleMesh& mesh, std::vector<Hole>& holes) {
+  EdgeSet edges;
+  const auto add_edges = [&](const Triangle& t) {
+    for (int k = 0; k < 3; ++k) edges.insert({std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])});
+  };
+  for (const Triangle& t : mesh.triangles) add_edges(t);
+  Fillings fillings;
+  for (int h = 0; h < static_cast<int>(holes.size()); ++h) {
+    Hole& hole = holes[h];
+    if (static_cast<int>(hole.loop.size()) > kMostHoleEdges) {
+      hole.refusal = fmt::format("has more than {} edges", kMostHoleEdges);
+      continue;
+    }
+    const std::vector<Triangle> filling = triangulate(mesh.positions, hole.loop, edges);
+    if (filling.empty()) hole.refusal = "has no triangulation that leaves the mesh a surface";
+    for (const Triangle& t : filling) {
+      fillings.triangles.push_back(t);
+      fillings.holes.push_back(h);
+      add_edges(t);
+    }
+  }
+  return fillings;
+}
+
+/// Marks holes whose fillings intersect the mesh or each other.
+void mark_intersecting(const TriangleMesh& mesh, const Fillings& fillings, std::vector<Hole>& holes) {
+  const TriangleMesh filled = with_fillings(mesh, fillings);
+  const int before = static_cast<int>(mesh.triangles.size());
+  std::vector<int> query(fillings.triangles.size());
+  std::iota(query.begin(), query.end(), before);
+  for (const auto& pair : find_self_intersections(filled, build_triangle_tree(filled), query))
+    for (const int triangle : pair)
+      if (triangle >= before) holes[fillings.holes[triangle - before]].is_intersecting = true;
+}
+
+/// Refuses holes of parts that stay sheets when they are filled.
+void refuse_sheets(const TriangleMesh& mesh, const Fillings& fillings, std::vector<Hole>& holes) {
+  /// Of the 1.5th power of the area; a ball has 0.094, a box of 1 x 1 x 0.01 has 0.0034.
+  constexpr double kLeastVolume = 0.002;
+  const TriangleMesh filled = with_fillings(mesh, fillings);
+  UnionFind parts(static_cast<int>(filled.positions.size()));
+  for (const Triangle& t : filled.triangles) parts.unite(t[0], t[1]), parts.unite(t[0], t[2]);
+  struct Extent {
+    double area = 0, volume = 0;
+  };
+  std::map<int, Extent> extents;
+  const Vec3 origin = bounding_box(mesh).centre();
+  for (const Triangle& t : filled.triangles) {
+    const Vec3 area = area_vector(filled, t);
+    Extent& extent = extents[parts.find(t[0])];
+    extent.area += area.norm();
+    extent.volume += (filled.positions[t[0]] - origin).dot(area) / 3;
+  }
+  for (const int h : fillings.holes) {
+    const Extent& extent = extents.at(parts.find(holes[h].loop[0]));
+    if (std::abs(extent.volume) < kLeastVolume * extent.area * std::sqrt(extent.area))
+      holes[h].refusal = "is the rim of a sheet that encloses nothing";
+  }
+}
+
+}  // namespace
+
+FillResult fill_holes(TriangleMesh& mesh) {
+  FillResult result;
+  result.origins = remove_useless(mesh);
+  result.removed = remove_tangles(mesh, result.origins);
+  const double diagonal = bounding_box(mesh).diagonal();
+  result.holes = find_holes(mesh, measure_manifold(mesh).boundary_edges);
+  Fillings fillings = triangulate_holes(mesh, result.holes);
+  refuse_sheets(mesh, fillings, result.holes);
+  fillings.remove(result.holes);
+  mark_intersecting(mesh, fillings, result.holes);
+  mesh = with_fillings(mesh, fillings);
+  result.copies = split_vertices(mesh);
+  result.origins.resize(mesh.triangles.size(), -1);
+  result.obstacle = obstacle_of(measure_manifold(mesh), result.holes, diagonal);
   return result;
+}
+
+double keep_largest_part(TriangleMesh& mesh, std::vector<int>& origins) {
+  UnionFind parts(static_cast<int>(mesh.positions.size()));
+  for (const Triangle& t : mesh.triangles) parts.unite(t[0], t[1]), parts.unite(t[0], t[2]);
+  std::map<int, double> areas;
+  for (const Triangle& t : mesh.triangles) areas[parts.find(t[0])] += area_vector(mesh, t).norm();
+  const auto largest =
+      std::max_element(areas.begin(), areas.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (largest == areas.end()) return 0;
+  TriangleMesh part{mesh.positions, {}};
+  std::vector<int> kept;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    if (parts.find(mesh.triangles[t][0]) == largest->first) {
+      part.triangles.push_back(mesh.triangles[t]);
+      kept.push_back(origins[t]);
+    }
+  if (!measure_manifold(part).is_closed_manifold()) return 0;
+  const double share = largest->second / surface_area(mesh);
+  mesh = std::move(part);
+  origins = std::move(kept);
+  return share;
 }
 
 }  // namespace skeletex

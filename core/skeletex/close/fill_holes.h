@@ -7,28 +7,37 @@
 
 namespace skeletex {
 
-struct FillOptions {
-  double largest = 0.1;  ///< of a hole's bounding box, diagonals of the mesh
-  int most_edges = 200;  ///< around a hole
-};
-
 /// A hole of a mesh.
 struct Hole {
   std::vector<int> loop;  ///< vertices, in the direction in which a triangle of the hole would run through them
   Vec3 centre = Vec3::Zero();
-  double size = 0;  ///< diagonal of its bounding box, world units
-  bool is_filled = false;
+  double size = 0;               ///< diagonal of its bounding box, world units
+  std::string refusal;           ///< why it is not filled: "has more than 600 edges"; empty: it is filled
+  bool is_intersecting = false;  ///< the filling intersects the mesh or another filling
 };
 
 struct FillResult {
   std::vector<Hole> holes;
   std::vector<int> origins;  ///< per triangle the one that it was before; -1: it fills a hole
-  std::string obstacle;      ///< why the mesh is still not closed; empty: it is closed
+  std::vector<int> copies;   ///< per vertex that was added, at the end, the one that it is a copy of
+  int removed = 0;           ///< triangles at edges where the mesh was no surface
+  std::string obstacle;      ///< why the mesh is still not one closed body; empty: it is
 };
 
-/// Closes a mesh that lacks a few small pieces: each hole gets the triangulation of its boundary with the least area
-/// (Barequet and Sharir, Filling Gaps in the Boundary of a Polyhedron, 1995). Vertices stay as they are; so do
-/// triangles, except that those without area and those that occur twice are left out.
-FillResult fill_holes(TriangleMesh& mesh, const FillOptions& options = {});
+/// Holes with more edges are not filled: the time grows with their third power, to about a second for this many.
+inline constexpr int kMostHoleEdges = 600;
+
+/// Fills the holes of a mesh: each gets the triangulation of its boundary with the least area (Barequet and Sharir,
+/// Filling Gaps in the Boundary of a Polyhedron, 1995). A hole stays open where its part of the mesh is a sheet that
+/// would enclose next to nothing. Before, a few triangles that keep the mesh from being a surface are taken away, those
+/// without area and those that occur twice as well; afterwards sheets that touch in a vertex get one each. All other
+/// vertices and triangles stay as they are.
+/// \pre indices in range, coordinates finite
+FillResult fill_holes(TriangleMesh& mesh);
+
+/// Keeps the part of a mesh with the largest area, if it is a closed body.
+/// \param origins  of its triangles (FillResult)
+/// \return its share of the area; 0: it is not closed, and nothing was changed
+double keep_largest_part(TriangleMesh& mesh, std::vector<int>& origins);
 
 }  // namespace skeletex

@@ -11,12 +11,8 @@
 namespace skeletex {
 namespace {
 
-constexpr double kGoodMargin = 0.25;  // more earns nothing
 constexpr double kReachWeight = 0.05;
 constexpr double kDisplacementWeight = 0.02;  // with 0.1, bones are contracted that moves would save
-constexpr double kNoLimit = std::numeric_limits<double>::infinity();
-constexpr int kAngles = 16;       // of rays while nodes are moved
-constexpr int kFinalAngles = 32;  // to accept
 constexpr int kTrials = 20;
 constexpr int kPatience = 10;           // failed attempts before a bone is contracted
 constexpr double kWorthTrying = -0.2;   // a margin that the segmentation may accept all the same
@@ -98,11 +94,18 @@ bool Repair::is_placed_well(const Skeleton& skeleton, int node, double least_rad
 }
 
 /// What the distance of a node from its original place costs; it is measured in radii of the body.
-double Repair::displacement_cost(int node) const {
-  const auto place = original_places_.find(skeleton_.nodes[node].name);
+double Repair::displacement_cost(const Skeleton& skeleton, int node) const {
+  const auto place = original_places_.find(skeleton.nodes[node].name);
   if (place == original_places_.end()) return 0;
-  return kDisplacementWeight * (skeleton_.nodes[node].position - place->second).squaredNorm() /
+  return kDisplacementWeight * (skeleton.nodes[node].position - place->second).squaredNorm() /
          (radii_[node] * radii_[node]);
+}
+double Repair::displacement_cost(int node) const { return displacement_cost(skeleton_, node); }
+
+double Repair::length_of(const SkeletonLimb& limb) const {
+  double length = 0;
+  for (const int b : limb.bones) length += bone_length(skeleton_, b);
+  return length;
 }
 
 bool Repair::move_node(int node, double step, int trials) {
@@ -161,7 +164,7 @@ int Repair::worst_bone() const {
   return worst;
 }
 
-bool Repair::run() {
+bool Repair::run(bool may_contract) {
   for (;;) {
     const int bone = worst_bone();
     if (bone < 0) return true;
@@ -171,7 +174,7 @@ bool Repair::run() {
     const bool is_patient = measured_ < kMostMeasured && margins_[bone].margin > kHopeless;
     if (failures_[bone] < (is_patient ? kPatience : 1)) continue;
     if (margins_[bone].margin > kWorthTrying) return true;
-    if (!contract(bone)) return false;
+    if (!may_contract || !contract(bone)) return false;
   }
 }
 

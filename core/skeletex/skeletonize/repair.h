@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include <cstdint>
+#include <limits>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "skeletex/analysis/bone_margin.h"
 #include "skeletex/skeletonize/body/surface.h"
+#include "skeletex/skeletonize/limbs.h"
 
 namespace skeletex {
 
@@ -28,9 +31,10 @@ class Repair {
   /// \param original  nodes of the same names stay near their places in it
   Repair(const Surface& surface, Skeleton skeleton, const Skeleton& original = {});
 
-  /// Moves the nodes around the bone of the least margin, over and over; contracts it where that does not help.
+  /// Moves the nodes around the bone of the least margin, over and over; contracts it where that does not help, unless
+  /// it may not.
   /// \return whether all margins are enough now, or so nearly that the segmentation may accept them
-  bool run();
+  bool run(bool may_contract = true);
   /// Moves a node to a place near by that costs little, whatever the margins are: for what the margins do not see.
   void shake(int node);
   /// Takes a bone away: its ends become one node, or an end between two bones is left out. Where that is not possible,
@@ -42,6 +46,14 @@ class Repair {
   /// Contracts the cheapest bones as long as all margins stay enough.
   void thin_out();
 
+  /// Takes limbs that are hardly any away where they crowd a node, as the bones of a face do, until its margins gain
+  /// little by it.
+  void drop_minor_limbs();
+
+  /// Moves all nodes at once, down the gradient of what margins lack, and contracts bones near the worst one as long as
+  /// that helps. What is left is for run(), which looks at one bone after the other.
+  void relax();
+
   /// Moves nodes back towards their original places as far as all margins stay enough.
   void move_back();
 
@@ -49,6 +61,10 @@ class Repair {
   const std::vector<BoneMargin>& margins() const { return margins_; }
 
  private:
+  static constexpr double kGoodMargin = 0.25;  ///< more earns nothing
+  static constexpr int kAngles = 16;           ///< of rays while nodes are moved
+  static constexpr int kFinalAngles = 32;      ///< to accept
+  static constexpr double kNoLimit = std::numeric_limits<double>::infinity();
   struct Merge {
     int bone = -1;
     Vec3 place = Vec3::Zero();
@@ -59,7 +75,12 @@ class Repair {
   double cost(const Skeleton& skeleton, const std::vector<std::vector<BoneAtNode>>& at_nodes,
               const std::vector<int>& bones, double limit) const;
   bool is_placed_well(const Skeleton& skeleton, int node, double least_radius) const;
+  double displacement_cost(const Skeleton& skeleton, int node) const;
   double displacement_cost(int node) const;
+  double total_cost() const;
+  std::vector<Vec3> gradient() const;
+  void descend(int steps);
+  bool merge_near(int bone);
   bool move_node(int node, double step, int trials);
   bool improve(int bone);
   int worst_bone() const;
@@ -69,6 +90,10 @@ class Repair {
   bool is_ring_kept(int bone) const;
   void merge_at(const Merge& merge);
   bool drop_free_end(int bone);
+  double length_of(const SkeletonLimb& limb) const;
+  bool is_minor(const SkeletonLimb& limb) const;
+  double cost_without(int hub, const std::set<int>& gone) const;
+  void drop(const SkeletonLimb& limb);
 
   const Surface& surface_;
   Skeleton skeleton_;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <set>
 #include <span>
 #include <utility>
@@ -31,7 +32,12 @@ class Draft {
     drop_unusable_bones();
     join_parts();
     drop_unused_nodes();
+    std::vector<double> lengths;
+    for (std::size_t b = 0; b < skeleton_.bones.size(); ++b)
+      lengths.push_back(bone_length(skeleton_, static_cast<int>(b)));
+    shorten_free_ends();
     move_inside();
+    cut_stray_limbs(lengths);
     bend_bones();
   }
   Skeleton& skeleton() { return skeleton_; }
@@ -96,6 +102,22 @@ class Draft {
     }
     for (Bone& bone : skeleton_.bones) bone.head = number[bone.head], bone.tail = number[bone.tail];
     skeleton_.nodes = std::move(kept);
+  }
+
+  /// A bone whose free end sticks out of the body ends before it.
+  void shorten_free_ends() {
+    constexpr double kShare = 0.9;  // of the way to the surface
+    const std::span corners(surface_.mesh.triangles.data()->data(), 3 * surface_.mesh.triangles.size());
+    const auto at_nodes = bones_at_nodes(skeleton_);
+    for (std::size_t n = 0; n < at_nodes.size(); ++n) {
+      if (at_nodes[n].size() != 1) continue;
+      Vec3& end = skeleton_.nodes[n].position;
+      const Vec3 start =
+          skeleton_.nodes[end_node(skeleton_, at_nodes[n][0].bone, opposite(at_nodes[n][0].end))].position;
+      const double exit = find_first_hit(surface_.mesh, surface_.tree, start, end - start, 1);
+      if (exit <= 1 && winding_number(surface_.mesh.positions, corners, start) > 0)
+        end = start + kShare * exit * (end - start);
+    }
   }
 
   int nearest_voxel(const Vec3& point) const {
@@ -170,6 +192,42 @@ class Draft {
       if (!is_taken(fmt::format("{}_{}", wish, i))) return fmt::format("{}_{}", wish, i);
   }
 
+  static double length_of(const std::vector<Vec3>& points) {
+    double length = 0;
+    for (std::size_t i = 1; i < points.size(); ++i) length += (points[i] - points[i - 1]).norm();
+    return length;
+  }
+
+  /// From the middle of the body at a point to that at another one, with both points.
+  std::vector<Vec3> way_through_body(const Vec3& head, const Vec3& tail, const std::vector<double>& costs) const {
+    std::vector<Vec3> points{head};
+    // A node that was moved lies in the middle of a voxel, which would make a bone without length.
+    for (const int v : path_between(body_, costs, nearest_voxel(head), nearest_voxel(tail)))
+      if (const Vec3& p = body_.centres[v]; std::min((p - head).norm(), (p - tail).norm()) > 1e-3 * body_.side)
+        points.push_back(p);
+    points.push_back(tail);
+    return points;
+  }
+
+  /// A limb ends where its next bone would be far longer inside the body: its end lies in another part near by.
+  void cut_stray_limbs(const std::vector<double>& lengths) {
+    constexpr double kStray = 3;  // times the bone's length
+    const std::vector<double> costs = middle_costs(body_);
+    std::vector<int> gone;
+    for (const SkeletonLimb& limb : find_limbs(skeleton_)) {
+      const auto strays = [&](int b) {
+        const Vec3 &head = end_position(skeleton_, b, BoneEnd::kHead),
+                   &tail = end_position(skeleton_, b, BoneEnd::kTail);
+        return surface_.is_between(head, tail) &&
+               length_of(way_through_body(head, tail, costs)) > kStray * std::max(lengths[b], body_.side);
+      };
+      gone.insert(gone.end(), std::find_if(limb.bones.begin(), limb.bones.end(), strays), limb.bones.end());
+    }
+    std::sort(gone.rbegin(), gone.rend());
+    for (const int b : gone) skeleton_.bones.erase(skeleton_.bones.begin() + b);
+    drop_unused_nodes();
+  }
+
   /// Bones that leave the body follow it instead.
   void bend_bones() {
     const std::vector<double> costs = middle_costs(body_);
@@ -178,12 +236,7 @@ class Draft {
       const Bone bone = skeleton_.bones[b];
       const Vec3 head = skeleton_.nodes[bone.head].position, tail = skeleton_.nodes[bone.tail].position;
       if (!surface_.is_between(head, tail)) continue;
-      std::vector<Vec3> points{head};
-      // A node that was moved lies in the middle of a voxel, which would make a bone without length.
-      for (const int v : path_between(body_, costs, nearest_voxel(head), nearest_voxel(tail)))
-        if (const Vec3& p = body_.centres[v]; std::min((p - head).norm(), (p - tail).norm()) > 1e-3 * body_.side)
-          points.push_back(p);
-      points.push_back(tail);
+      const std::vector<Vec3> points = way_through_body(head, tail, costs);
       const std::vector<int> kept = straighten(surface_, body_.side, points, 2);
       if (kept.size() < 3) continue;
       int before = bone.head;
@@ -247,6 +300,33 @@ void describe(const Skeleton& before, const Skeleton& after, std::vector<std::st
     if (!bones.contains(bone.name)) changes.push_back(fmt::format("bone \"{}\" taken away", bone.name));
 }
 
+/// Moves nodes; where that is not enough, contracts bones one after the other, or with a look at all of them, whichever
+/// leaves more.
+/// \throw TopologyError when nothing helps
+Skeleton accepted_skeleton(const Acceptance& acceptance, const Repair& start) {
+  std::optional<Skeleton> best;
+  std::string refusal;
+  const auto try_one = [&](Repair repair) {
+    refusal = acceptance.segment(repair);
+    if (!refusal.empty()) return;
+    Skeleton skeleton = repair.skeleton();
+    repair.move_back();
+    if (acceptance.is_accepted(repair.skeleton())) skeleton = repair.skeleton();
+    if (!best || skeleton.bones.size() > best->bones.size()) best = std::move(skeleton);
+  };
+  Repair moved = start;
+  if (moved.run(false)) try_one(std::move(moved));
+  if (best && best->bones.size() == start.skeleton().bones.size()) return std::move(*best);
+  for (const bool is_relaxed : {false, true}) {
+    Repair repair = start;
+    repair.drop_minor_limbs();
+    if (is_relaxed) repair.relax();
+    try_one(std::move(repair));
+  }
+  if (!best) throw TopologyError(refusal);
+  return std::move(*best);
+}
+
 }  // namespace
 
 RepairResult repair_skeleton(ClContext& context, const TriangleMesh& mesh, const TriangleTree& tree,
@@ -274,15 +354,9 @@ RepairResult repair_skeleton(ClContext& context, const TriangleMesh& mesh, const
                     "through every handle, or start from skeletex skeletonize",
                     genus, genus == 1 ? "" : "s", cycles, cycles == 1 ? "" : "s"));
   const Acceptance acceptance(context, surface);
-  Repair repair(surface, draft.skeleton(), named);
   RepairResult result{draft.skeleton(), std::move(draft.changes())};
-  if (!acceptance.is_accepted(result.skeleton)) {
-    const std::string refusal = acceptance.segment(repair);
-    if (!refusal.empty()) throw TopologyError(refusal);
-    result.skeleton = repair.skeleton();
-    repair.move_back();
-    if (acceptance.is_accepted(repair.skeleton())) result.skeleton = repair.skeleton();
-  }
+  if (!acceptance.is_accepted(result.skeleton))
+    result.skeleton = accepted_skeleton(acceptance, Repair(surface, draft.skeleton(), named));
   drop_bad_angles(result.skeleton);
   describe(named, result.skeleton, result.changes);
   result.skeleton = in_frame(std::move(result.skeleton), skeleton.frame);

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/close/untangle.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <set>
+
+#include "skeletex/analysis/manifold.h"
+#include "skeletex/geometry/union_find.h"
+
+namespace skeletex {
+namespace {
+
+constexpr double kMostTangled = 0.02;  // of the triangles
+constexpr std::size_t kFewTangled = 12;
+constexpr double kFin = 0.001;  // of the area
+
+using EdgeSet = std::set<std::array<int, 2>>;
+
+EdgeSet tangled_edges(const TriangleMesh& mesh) {
+  const ManifoldReport report = measure_manifold(mesh);
+  EdgeSet edges;
+  for (const auto* list : {&report.non_manifold_edges, &report.misoriented_edges})
+    for (const auto& [a, b] : *list) edges.insert({std::min(a, b), std::max(a, b)});
+  return edges;
+}
+
+/// Keeps the triangles for which that is so.
+template <typename Keep>
+void keep_triangles(TriangleMesh& mesh, std::vector<int>& origins, const Keep& is_kept) {
+  std::size_t kept = 0;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    if (is_kept(mesh.triangles[t])) {
+      mesh.triangles[kept] = mesh.triangles[t];
+      origins[kept++] = origins[t];
+    }
+  mesh.triangles.resize(kept);
+  origins.resize(kept);
+}
+
+UnionFind parts_of(const TriangleMesh& mesh) {
+  UnionFind parts(static_cast<int>(mesh.positions.size()));
+  for (const Triangle& t : mesh.triangles) parts.unite(t[0], t[1]), parts.unite(t[0], t[2]);
+  return parts;
+}
+
+/// Of each part, by its number.
+std::map<int, double> areas_of(const TriangleMesh& mesh, UnionFind& parts) {
+  std::map<int, double> areas;
+  for (const Triangle& t : mesh.triangles) areas[parts.find(t[0])] += area_vector(mesh, t).norm();
+  return areas;
+}
+
+/// \param triangles  all at the vertex
+/// \param copies  per new vertex the one that it is a copy of
+void split_vertex(int vertex, const std::vector<int>& triangles, TriangleMesh& mesh, std::vector<int>& copies) {
+  UnionFind sheets(static_cast<int>(triangles.size()));
+  std::map<int, int> seen;  // another corner -> a triangle with it
+  for (int i = 0; i < static_cast<int>(triangles.size()); ++i)
+    for (const int corner : mesh.triangles[triangles[i]])
+      if (corner != vertex)
+        if (const auto [at, is_new] = seen.emplace(corner, i); !is_new) sheets.unite(i, at->second);
+  std::map<int, int> vertex_of_sheet{{sheets.find(0), vertex}};
+  for (int i = 0; i < static_cast<int>(triangles.size()); ++i) {
+    const auto [at, is_new] = vertex_of_sheet.emplace(sheets.find(i), static_cast<int>(mesh.positions.size()));
+    if (is_new) {
+      mesh.positions.push_back(mesh.positions[vertex]);
+      copies.push_back(vertex);
+    }
+    std::replace(mesh.triangles[triangles[i]].begin(), mesh.triangles[triangles[i]].end(), vertex, at->second);
+  }
+}
+
+}  // namespace
+
+int remove_tangles(TriangleMesh& mesh, std::vector<int>& origins) {
+  const EdgeSet edges = tangled_edges(mesh);
+  if (edges.empty()) return 0;
+  TriangleMesh rest = mesh;
+  std::vector<int> rest_origins = origins;
+  keep_triangles(rest, rest_origins, [&](const Triangle& t) {
+    for (int k = 0; k < 3; ++k)
+      if (edges.contains({std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])})) return false;
+    return true;
+  });
+  std::set<int> vertices;
+  for (const auto& edge : edges) vertices.insert(edge.begin(), edge.end());
+  UnionFind parts = parts_of(rest);
+  const std::map<int, double> areas = areas_of(rest, parts);
+  std::set<int> fins;
+  for (const int v : vertices)
+    if (const auto part = areas.find(parts.find(v)); part != areas.end() && part->second < kFin * surface_area(rest))
+      fins.insert(part->first);
+  keep_triangles(rest, rest_origins, [&](const Triangle& t) { return !fins.contains(parts.find(t[0])); });
+  const std::size_t removed = mesh.triangles.size() - rest.triangles.size();
+  if (removed > std::max(kFewTangled, static_cast<std::size_t>(kMostTangled * static_cast<double>(origins.size()))))
+    return 0;
+  mesh = std::move(rest);
+  origins = std::move(rest_origins);
+  return static_cast<int>(removed);
+}
+
+std::vector<int> split_vertices(TriangleMesh& mesh) {
+  const std::vector<int> touching = measure_manifold(mesh).non_manifold_vertices;
+  std::map<int, std::vector<int>> triangles_at;
+  for (const int v : touching) triangles_at[v];
+  for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t)
+    for (const int v : mesh.triangles[t])
+      if (const auto found = triangles_at.find(v); found != triangles_at.end()) found->second.push_back(t);
+  std::vector<int> copies;
+  for (const auto& [vertex, triangles] : triangles_at) split_vertex(vertex, triangles, mesh, copies);
+  return copies;
+}
+
+int remove_crumbs(TriangleMesh& mesh, double share, std::vector<int>& origins) {
+  UnionFind parts = parts_of(mesh);
+  std::map<int, double> areas = areas_of(mesh, parts);
+  const double least = share * surface_area(mesh);
+  keep_triangles(mesh, origins, [&](const Triangle& t) { return areas[parts.find(t[0])] >= least; });
+  return static_cast<int>(
+      std::count_if(areas.begin(), areas.end(), [&](const auto& part) { return part.second < least; }));
+}
+
+}  // namespace skeletex
