@@ -109,6 +109,21 @@ TEST(RigImport, AnExportedModelComesBackWithSkeletonWeightsAndPoses) {
   }
 }
 
+TEST(RigImport, AnAnimationThatMakesNoSenseIsLeftOutAndTheRestRead) {
+  const SkeletexModel model = model_of(chain(3), 0.15);
+  PoseAnimation animation;
+  for (unsigned i = 0; i < 3; ++i) animation.frames.push_back({0.5 * i, turned(model.skeleton, i)});
+  GltfScene scene = exported(model, {{"good", animation}, {"backwards", animation}});
+  for (GltfTrack& track : scene.animations.at(1).tracks) std::reverse(track.times.begin(), track.times.end());
+  const ScratchFolder folder;
+  write_gltf(folder / "rig.glb", scene);
+  const GltfScene again = read_gltf(folder / "rig.glb");
+  ASSERT_EQ(again.animations.size(), 1u);
+  EXPECT_EQ(again.animations[0].name, "good");
+  ASSERT_EQ(again.notes.size(), 1u);
+  EXPECT_NE(again.notes[0].find("backwards"), std::string::npos) << again.notes[0];
+}
+
 /// A file as a program writes it whose armature is turned by a quarter and scaled by a hundredth.
 GltfScene in_armature(GltfScene scene, const Eigen::Affine3d& armature) {
   // Bound in the armature's coordinates: those of the file's vertices are larger by its inverse.

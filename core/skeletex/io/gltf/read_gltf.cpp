@@ -9,6 +9,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <stdexcept>
 
 #include "skeletex/io/gltf/accessors.h"
 #include "skeletex/io/read_file.h"
@@ -57,6 +58,14 @@ tinygltf::Model load(const std::filesystem::path& path) {
     error = thrown.what();
   }
   if (!is_read) {
+    // tinygltf stumbles over what these leave out, and names that instead.
+    for (const char* extension : {"KHR_draco_mesh_compression", "EXT_meshopt_compression"})
+      if (bytes.find(extension) != std::string::npos)
+        throw IoError(fmt::format("{}: the file is compressed by {}, which is not read; save it without compression",
+                                  where, extension));
+    constexpr std::size_t kVersion = 4;  // its place in a binary file
+    if (bytes.starts_with("glTF") && bytes.size() > kVersion && bytes[kVersion] == 1)
+      throw IoError(fmt::format("{}: glTF version 1; 2.0 is read", where));
     std::replace(error.begin(), error.end(), '\n', ' ');
     throw IoError(fmt::format("{}: not a glTF 2.0 file, or a damaged one: {}", where, error));
   }
@@ -70,6 +79,11 @@ tinygltf::Model load(const std::filesystem::path& path) {
   return model;
 }
 
+/// An animation makes no sense; the rest of the file may.
+struct AnimationError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 class GltfReader {
  public:
   GltfReader(const tinygltf::Model& model, std::string where)
@@ -80,8 +94,11 @@ class GltfReader {
     link_nodes();
     for (std::size_t i = 0; i < model_.meshes.size(); ++i) scene_.meshes.push_back(read_mesh(static_cast<int>(i)));
     for (const tinygltf::Skin& skin : model_.skins) scene_.skins.push_back(read_skin(skin));
-    for (const tinygltf::Animation& animation : model_.animations)
-      scene_.animations.push_back(read_animation(animation));
+    for (const tinygltf::Animation& animation : model_.animations) try {
+        scene_.animations.push_back(read_animation(animation));
+      } catch (const AnimationError& error) {
+        note(fmt::format("animation \"{}\" is left out: {}", animation.name, error.what()));
+      }
     read_materials();
     for (const auto& [note, count] : notes_)
       scene_.notes.push_back(count > 1 ? fmt::format("{} ({} times)", note, count) : note);
@@ -301,13 +318,12 @@ class GltfReader {
         continue;
       if (channel.sampler < 0 || channel.sampler >= static_cast<int>(from.samplers.size()))
         fail("animation \"" + from.name + "\": a channel without sampler");
-      animation.tracks.push_back(read_track(channel, from.samplers[channel.sampler], from.name));
+      animation.tracks.push_back(read_track(channel, from.samplers[channel.sampler]));
     }
     return animation;
   }
 
-  GltfTrack read_track(const tinygltf::AnimationChannel& channel, const tinygltf::AnimationSampler& sampler,
-                       const std::string& name) const {
+  GltfTrack read_track(const tinygltf::AnimationChannel& channel, const tinygltf::AnimationSampler& sampler) const {
     GltfTrack track;
     track.node = channel.target_node;
     track.path = channel.target_path == "rotation"      ? GltfPath::kRotation
@@ -325,12 +341,12 @@ class GltfReader {
     }
     const std::size_t per_time = track.interpolation == GltfInterpolation::kCubic ? 3 : 1;
     if (track.times.empty() || track.values.size() != per_time * track.times.size())
-      fail(fmt::format("animation \"{}\": {} times, but {} values", name, track.times.size(), track.values.size()));
+      throw AnimationError(fmt::format("{} times, but {} values", track.times.size(), track.values.size()));
     for (std::size_t i = 0; i < track.times.size(); ++i)
       if (!std::isfinite(track.times[i]) || (i > 0 && !(track.times[i] >= track.times[i - 1])))
-        fail(fmt::format("animation \"{}\": times do not grow", name));
+        throw AnimationError("its times do not grow");
     for (const Eigen::Vector4d& value : track.values)
-      if (!value.allFinite()) fail(fmt::format("animation \"{}\": a value is not finite", name));
+      if (!value.allFinite()) throw AnimationError("a value is not finite");
     return track;
   }
 
