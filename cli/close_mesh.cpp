@@ -123,25 +123,22 @@ Wrap wrap_with(double detail, const WorkFolder& folder) {
   return wrap;
 }
 
-/// The wrap of the detail that is given, else that with the fewest handles of a few: parts that nearly touch become
-/// handles at one detail and not at the next.
-/// \param filled  the mesh without the holes that could be filled: a wrap goes in where it is wide enough
-Wrap best_wrap(const TriangleMesh& filled, const CloseOptions& options) {
-  constexpr std::array<double, 5> kDetails{kDetail, 0.75 * kDetail, 1.5 * kDetail, 2.25 * kDetail, 3.4 * kDetail};
-  const WorkFolder folder;
-  write_mesh(folder / "mesh.ply", filled);
-  if (options.detail) return wrap_with(*options.detail, folder);
-  std::optional<Wrap> best;
-  std::string tried;
-  for (const double detail : kDetails) {
+/// Of a few other details the wrap with the fewest handles: parts that nearly touch become handles at one detail, and
+/// not at the next. The coarser, the faster.
+/// \param first  of the usual detail
+Wrap with_fewest_handles(Wrap first, const WorkFolder& folder) {
+  constexpr std::array<double, 4> kOthers{1.5 * kDetail, 2.25 * kDetail, 3.4 * kDetail, 0.75 * kDetail};
+  std::string tried = fmt::format("{} with a detail of {:.2g}", first.report.genus, first.detail);
+  Wrap best = std::move(first);
+  for (const double detail : kOthers) {
+    if (best.report.genus <= 0) break;
     Wrap wrap = wrap_with(detail, folder);
-    tried += fmt::format("{}{} with a detail of {:.2g}", tried.empty() ? "" : ", ", wrap.report.genus, detail);
-    if (!best || wrap.report.genus < best->report.genus) best = std::move(wrap);
-    if (best->report.genus <= 0) break;
+    tried += fmt::format(", {} with a detail of {:.2g}", wrap.report.genus, detail);
+    if (wrap.report.genus < best.report.genus) best = std::move(wrap);
   }
-  if (best->detail != kDetails[0])
-    spdlog::info("--close: handles of the wrap: {}; the one of {:.2g} is taken", tried, best->detail);
-  return std::move(*best);
+  if (best.detail != kDetail)
+    spdlog::info("--close: handles of the wrap: {}; that of {:.2g} is taken", tried, best.detail);
+  return best;
 }
 
 Json take_wrap(MeshParts& parts, const TriangleMesh& filled, Wrap wrap) {
@@ -191,7 +188,11 @@ Json take_filled(MeshParts& parts, TriangleMesh filled, const FillResult& fillin
                             hole.loop.size(), text_of(hole.centre), 100 * hole.size / diagonal);
   }
   const std::size_t count = filling.holes.size();
-  spdlog::info("--close: filled {} hole{}{}{}", count, count == 1 ? "" : "s", places, count > 3 ? "; ..." : "");
+  if (count == 0) spdlog::info("--close: the mesh has no holes once vertices in one place are one");
+  if (count > 0)
+    spdlog::info("--close: filled {} hole{}{}{}", count, count == 1 ? "" : "s", places, count > 3 ? "; ..." : "");
+  if (!filling.copies.empty())
+    spdlog::info("--close: sheets that touch in a vertex got one each, {} more", filling.copies.size());
   if (intersecting > 0)
     warn(fmt::format("{} of the fillings intersect{} the surface", intersecting, intersecting == 1 ? "s" : ""));
   if (filling.removed > 0)
@@ -208,7 +209,11 @@ Json take_filled(MeshParts& parts, TriangleMesh filled, const FillResult& fillin
   parts.attributes = with_triangles(parts.attributes, parts.mesh.triangles, triangles, filling.origins);
   parts.mesh = std::move(filled);
   remove_unused_vertices(parts);
-  return {{"method", "fill"}, {"holes", count}, {"intersecting", intersecting}};
+  return {{"method", "fill"},
+          {"holes", count},
+          {"intersecting", intersecting},
+          {"removed_triangles", filling.removed},
+          {"split_vertices", filling.copies.size()}};
 }
 
 }  // namespace
@@ -243,17 +248,20 @@ Json close_mesh(MeshParts& parts, const CloseOptions& options) {
   FillResult filling = fill_holes(filled);
   if (filling.obstacle.empty()) return take_filled(parts, std::move(filled), filling);
   spdlog::info("--close: {}, so the mesh is wrapped", filling.obstacle);
-  Wrap wrap = best_wrap(filled, options);
+  const WorkFolder folder;
+  write_mesh(folder / "mesh.ply", filled);
+  Wrap wrap = wrap_with(options.detail.value_or(kDetail), folder);
   if (!options.detail && wrap.report.genus > 0) {
     TriangleMesh body = filled;
     const double share = keep_largest_part(body, filling.origins);
     if (share > kBody && measure_manifold(body).genus < wrap.report.genus) {
-      warn(
-          fmt::format("the wrap has {} handles, as parts nearly touch; the largest part, with {:.1f} % of the area, is "
-                      "taken alone instead. Other parts are left out; --close-detail wraps them all",
-                      wrap.report.genus, 100 * share));
+      warn(fmt::format(
+          "the wrap has {} handle{}, as parts nearly touch; the largest part, with {:.1f} % of the area, is "
+          "taken alone instead. Other parts are left out; --close-detail wraps them all",
+          wrap.report.genus, wrap.report.genus == 1 ? "" : "s", 100 * share));
       return take_filled(parts, std::move(body), filling);
     }
+    wrap = with_fewest_handles(std::move(wrap), folder);
   }
   return take_wrap(parts, filled, std::move(wrap));
 }

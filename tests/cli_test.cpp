@@ -1373,6 +1373,43 @@ TEST_F(Program, WarnsOfAMeshThatWasCut) {
   fs::remove(folder_ / "cut.obj");
 }
 
+TEST_F(Program, ClosesAMeshWithAWideHole) {
+  TriangleMesh mesh = y_shape().mesh;
+  const double low = bounding_box(mesh).lower.y();
+  std::erase_if(mesh.triangles, [&](const Triangle& t) {
+    return std::any_of(t.begin(), t.end(), [&](int v) { return mesh.positions[v].y() < low + 0.3; });
+  });
+  write_mesh(folder_ / "open.ply", mesh);
+  expect_refused(1, {"encode", "open.ply", "y.skeleton.json", "-o", "c.skx.exr"}, {"not closed", "--close"});
+  const Outcome closed = run({"encode", "open.ply", "y.skeleton.json", "-o", "c.skx.exr", "--size", "64", "--close"});
+  EXPECT_EQ(closed.code, 0) << closed.err;
+  EXPECT_NE(closed.err.find("filled 1 hole"), std::string::npos) << closed.err;
+  for (const char* name : {"open.ply", "c.skx.exr"}) fs::remove(folder_ / name);
+}
+
+TEST_F(Program, DoesNotCloseTheGapOfAnOpenRing) {
+  if (!fs::exists(fs::path(SKELETEX_PROGRAM).parent_path() / "skeletex_wrap")) GTEST_SKIP() << "built without CGAL";
+  // A ring that is cut through, and a part of its own in it: a wrap of both closes the ring.
+  constexpr int kAlong = 240;
+  TriangleMesh mesh = torus_shape(5, 2, 0.5, kAlong, 16).mesh;
+  std::erase_if(mesh.triangles, [&](const Triangle& t) {
+    const Vec3 centre = (mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]]) / 3;
+    const double angle = std::atan2(centre.y(), centre.x());
+    return angle > 0 && angle < 2 * M_PI / kAlong;
+  });
+  const int first = static_cast<int>(mesh.positions.size());
+  for (const Vec3& p : {Vec3(-2, 0, 0), Vec3(-1.9, 0, 0), Vec3(-2, 0.1, 0), Vec3(-2, 0, 0.1)})
+    mesh.positions.push_back(p);
+  for (const Triangle& t : {Triangle{0, 2, 1}, Triangle{0, 1, 3}, Triangle{1, 2, 3}, Triangle{2, 0, 3}})
+    mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  write_mesh(folder_ / "ring.ply", mesh);
+  const Outcome closed = run({"encode", "ring.ply", "-o", "c.skx.exr", "--size", "64", "--close", "--json", "c.json"});
+  ASSERT_EQ(closed.code, 0) << closed.err;
+  EXPECT_NE(closed.err.find("taken alone"), std::string::npos) << closed.err;
+  EXPECT_EQ(nlohmann::json::parse(text_of(folder_ / "c.json"))["mesh"]["genus"], 0);
+  for (const char* name : {"ring.ply", "c.skx.exr", "c.json"}) fs::remove(folder_ / name);
+}
+
 TEST_F(Program, SaysWhenStandardOutputIsFull) {
   const Outcome outcome = run({"inspect", "y.skx.exr", "--json", "-"}, "/dev/full");
   EXPECT_EQ(outcome.code, 1);
