@@ -9,6 +9,7 @@
 
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/convert/encode_model.h"
+#include "skeletex/convert/layers/surface_points.h"
 #include "skeletex/io/gltf/read_gltf.h"
 #include "skeletex/io/gltf/write_gltf.h"
 #include "skeletex/model/error.h"
@@ -351,6 +352,42 @@ TEST(RigImport, WeightsOfTheRigBecomeThoseOfTheModel) {
   const Skin skin = make_skin(device(), prepared, bind.inner);
   const std::vector<float> last = vertex_weights(skin, 2);
   for (std::size_t v = 0; v < last.size(); ++v) EXPECT_NEAR(last[v], share_at(bind.mesh.positions[v]), 0.02);
+}
+
+TEST(RigImport, AFewTexelsWithTheWeightsOfAnotherPartTakeThoseAround) {
+  const Shape shape = chain_shape(3, 0.4);
+  EncodeOptions options;
+  options.width = options.height = 128;
+  const SkeletexModel model = encode_model(device(), shape.mesh, shape.skeleton, options).model;
+  const TriangleTree tree = build_triangle_tree(shape.mesh);
+  std::vector<std::vector<BoneWeight>> weights;
+  for (const Vec3& p : shape.mesh.positions) {
+    const double share = std::clamp(0.5 + 0.2 * p.z(), 0.0, 1.0);
+    weights.push_back({{0, 1 - share}, {1, share}});
+  }
+  const auto good = weight_planes(device(), model, shape.mesh, tree, weights);
+  // A tiny part beside the middle of the surface, nearer to a texel or two than the mesh and of another bone.
+  TriangleMesh touched = shape.mesh;
+  const int triangle = static_cast<int>(shape.mesh.triangles.size() / 2);
+  const Vec3 a = shape.mesh.positions[shape.mesh.triangles[triangle][0]];
+  const Vec3 outwards = area_vector(shape.mesh, shape.mesh.triangles[triangle]).normalized();
+  const Vec3 along = outwards.unitOrthogonal(), across = outwards.cross(along);
+  const int first = static_cast<int>(touched.positions.size());
+  for (const Vec3& p :
+       {Vec3(a + 0.02 * along), Vec3(a - 0.02 * along + 0.03 * across), Vec3(a - 0.02 * along - 0.03 * across)}) {
+    touched.positions.push_back(p + 1e-6 * outwards);
+    weights.push_back({{2, 1.0}});
+  }
+  touched.triangles.push_back({first, first + 1, first + 2});
+  const TriangleTree with = build_triangle_tree(touched);
+  const PreparedModel prepared(model);
+  const std::vector<SurfacePoint> points = surface_points(device(), prepared, touched, with);
+  ASSERT_TRUE(std::any_of(points.begin(), points.end(), [&](const SurfacePoint& point) {
+    return point.triangle == static_cast<int>(touched.triangles.size()) - 1;
+  })) << "no texel is nearest to it";
+  const auto planes = weight_planes(device(), model, touched, with, weights);
+  for (std::size_t b = 0; b < planes.size(); ++b)
+    for (std::size_t i = 0; i < planes[b].size(); ++i) ASSERT_NEAR(planes[b][i], good[b][i], 0.1) << b << " " << i;
 }
 
 TEST(RigImport, JointsThatMoveAwayFromEachOtherBecomePosesOfNodes) {

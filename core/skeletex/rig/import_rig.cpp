@@ -4,11 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "skeletex/convert/layers/surface_points.h"
+#include "skeletex/geometry/parallel.h"
 #include "skeletex/rig/joint_skeleton.h"
 #include "skeletex/rig/rig_animation.h"
 
@@ -37,6 +40,60 @@ std::vector<std::vector<BoneWeight>> weights_of_bones(const GltfSurface& surface
     for (const auto& [bone, weight] : by_bone) result[v].push_back({bone, weight});
   }
   return result;
+}
+
+using Planes = std::vector<std::vector<float>>;
+
+/// Sum over all bones of the differences between a texel's weights and others; 0 to 2 where both add up to 1.
+double difference(const Planes& planes, std::size_t texel, const std::vector<double>& weights) {
+  double sum = 0;
+  for (std::size_t b = 0; b < planes.size(); ++b) sum += std::abs(planes[b][texel] - weights[b]);
+  return sum;
+}
+
+/// The mean of the four texels around one, so far away; nothing where one of them is outside of the rectangle or they
+/// do not agree.
+std::optional<std::vector<double>> mean_around(const Planes& planes, const Rectangle& r, int width, int x, int y,
+                                               int distance) {
+  constexpr double kAgree = 0.5;
+  if (x - distance < r.x || x + distance >= r.x + r.width || y - distance < r.y || y + distance >= r.y + r.height)
+    return std::nullopt;
+  const int texel = y * width + x;
+  const std::array<int, 4> around{texel - distance, texel + distance, texel - distance * width,
+                                  texel + distance * width};
+  std::vector<double> mean(planes.size(), 0);
+  for (std::size_t b = 0; b < planes.size(); ++b)
+    for (const int other : around) mean[b] += planes[b][other] / 4;
+  for (const int other : around)
+    if (difference(planes, other, mean) > kAgree) return std::nullopt;
+  return mean;
+}
+
+/// Where another part of the mesh touches, the point nearest to a texel may be one of that part, as of a hip beside a
+/// thumb. A texel whose weights have little in common with those of the texels around it, one to three away, which
+/// agree with each other, takes their mean.
+void replace_outliers(const SkeletexModel& model, Planes& planes) {
+  constexpr int kFarthest = 3;
+  constexpr double kDiffers = 1;
+  const Planes before = planes;
+  const int width = model.texture.width;
+  const auto replace = [&](const Rectangle& r, int x, int y) {
+    for (int distance = 1; distance <= kFarthest; ++distance) {
+      const auto mean = mean_around(before, r, width, x, y, distance);
+      if (!mean) continue;
+      const int texel = y * width + x;
+      if (difference(before, texel, *mean) < kDiffers) return;
+      for (std::size_t b = 0; b < planes.size(); ++b) planes[b][texel] = static_cast<float>((*mean)[b]);
+      return;
+    }
+  };
+  for_each_block(model.patches.size(), 1, [&](std::size_t, std::size_t first, std::size_t last) {
+    for (std::size_t p = first; p < last; ++p) {
+      const Rectangle& r = model.patches[p].rectangle;
+      for (int y = r.y; y < r.y + r.height; ++y)
+        for (int x = r.x; x < r.x + r.width; ++x) replace(r, x, y);
+    }
+  });
 }
 
 }  // namespace
@@ -71,7 +128,7 @@ std::vector<std::vector<float>> weight_planes(ClContext& context, const Prepared
                                               const TriangleTree& tree,
                                               std::span<const std::vector<BoneWeight>> weights) {
   const std::vector<SurfacePoint> points = surface_points(context, model, mesh, tree);
-  std::vector<std::vector<float>> planes(model.model.skeleton.bones.size(), std::vector<float>(points.size(), 0.f));
+  Planes planes(model.model.skeleton.bones.size(), std::vector<float>(points.size(), 0.f));
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (points[i].triangle < 0) continue;
     const Triangle& triangle = mesh.triangles[points[i].triangle];
@@ -79,6 +136,7 @@ std::vector<std::vector<float>> weight_planes(ClContext& context, const Prepared
       for (const auto& [bone, weight] : weights[triangle[k]])
         planes[bone][i] += points[i].weights[k] * static_cast<float>(weight);
   }
+  replace_outliers(model.model, planes);
   return planes;
 }
 
