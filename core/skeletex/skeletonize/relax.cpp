@@ -55,8 +55,8 @@ bool Repair::is_minor(const SkeletonLimb& limb) const {
 }
 
 void Repair::drop_minor_limbs() {
-  constexpr double kWorthIt = 0.5;    // a margin that is lacking by 0.7
-  constexpr double kLongerIs = 0.05;  // how much worse it is to lose a limb of two radii than one of one
+  constexpr double kWorthIt = 0.5;        // a margin that is lacking by 0.7
+  constexpr double kLengthWeight = 0.05;  // what it costs to lose a limb of two radii more than one of one
   for (;;) {
     std::map<int, std::vector<SkeletonLimb>> limbs;  // by the node where they begin
     for (SkeletonLimb& limb : find_limbs(skeleton_))
@@ -69,8 +69,8 @@ void Repair::drop_minor_limbs() {
       if (cost_without(hub, {}) - cost_without(hub, all) < kWorthIt) continue;
       for (const SkeletonLimb& limb : at_hub) {
         const double out = std::max(0.0, length_of(limb) / radii_[hub] - 1);
-        const double there =
-            kLongerIs * out * out + cost_without(hub, {limb.bones.begin(), limb.bones.end()}) - cost_without(hub, {});
+        const double there = kLengthWeight * out * out + cost_without(hub, {limb.bones.begin(), limb.bones.end()}) -
+                             cost_without(hub, {});
         if (!cheapest || there < least) cheapest = &limb, least = there;
       }
     }

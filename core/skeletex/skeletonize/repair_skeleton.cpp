@@ -300,8 +300,8 @@ void describe(const Skeleton& before, const Skeleton& after, std::vector<std::st
     if (!bones.contains(bone.name)) changes.push_back(fmt::format("bone \"{}\" taken away", bone.name));
 }
 
-/// Moves nodes; where that is not enough, contracts bones one after the other, or with a look at all of them, whichever
-/// leaves more.
+/// Moves nodes; where that is not enough, contracts bones one after the other, with or without minor limbs, or with a
+/// look at all of them, whichever leaves most.
 /// \throw TopologyError when nothing helps
 Skeleton accepted_skeleton(const Acceptance& acceptance, const Repair& start) {
   std::optional<Skeleton> best;
@@ -317,6 +317,7 @@ Skeleton accepted_skeleton(const Acceptance& acceptance, const Repair& start) {
   Repair moved = start;
   if (moved.run(false)) try_one(std::move(moved));
   if (best && best->bones.size() == start.skeleton().bones.size()) return std::move(*best);
+  try_one(start);
   for (const bool is_relaxed : {false, true}) {
     Repair repair = start;
     repair.drop_minor_limbs();
