@@ -15,7 +15,7 @@
 #include "runner/process.h"
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/close/fill_holes.h"
-#include "skeletex/close/untangle.h"
+#include "skeletex/close/manifold_parts.h"
 #include "skeletex/io/gltf/weld.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/model/error.h"
@@ -27,9 +27,9 @@ namespace fs = std::filesystem;
 
 /// Vertices nearer to each other are one where a mesh is not closed; diagonals.
 constexpr double kSameVertex = 1e-6;
-constexpr double kDetail = 0.008;  // of a wrap, diagonals
-constexpr double kCrumb = 0.001;   // of the area
-constexpr double kBody = 0.9;      // of the area: a part that is nearly everything
+constexpr double kDetail = 0.008;     // of a wrap, diagonals
+constexpr double kSmallPart = 0.001;  // of the area
+constexpr double kBody = 0.9;         // of the area: a part that is nearly everything
 
 /// A folder for the files that the two programs exchange.
 class WorkFolder {
@@ -97,7 +97,7 @@ struct Wrap {
   double detail = 0;
   MeshParts parts;  ///< the mesh alone
   ManifoldReport report;
-  int crumbs = 0;
+  int removed = 0;  ///< components that were next to nothing
 };
 
 Wrap wrap_with(double detail, const WorkFolder& folder) {
@@ -116,8 +116,7 @@ Wrap wrap_with(double detail, const WorkFolder& folder) {
         "is built where CGAL is installed");
   if (result.exit_code != 0) throw InputError(fmt::format("--close: the mesh could not be wrapped: {}", result.errors));
   Wrap wrap{detail, {read_mesh(folder / "wrap.ply").mesh, {}, {}}, {}, 0};
-  std::vector<int> unused(wrap.parts.mesh.triangles.size());
-  wrap.crumbs = remove_crumbs(wrap.parts.mesh, kCrumb, unused);  // a lone triangle gets a wrap of its own
+  wrap.removed = remove_small_components(wrap.parts.mesh, kSmallPart);  // a lone triangle gets a wrap of its own
   remove_unused_vertices(wrap.parts);
   wrap.report = measure_manifold(wrap.parts.mesh);
   return wrap;
@@ -152,9 +151,9 @@ Json take_wrap(MeshParts& parts, const TriangleMesh& filled, Wrap wrap) {
       "{:.2g} at most; vertices of the file are up to {:.2g} away, inner parts among them. A smaller "
       "--close-detail (now {:.3g}) comes nearer and takes longer",
       wrapped.triangles.size(), back.mean / diagonal, back.largest / diagonal, there.largest / diagonal, wrap.detail));
-  if (wrap.crumbs > 0)
-    warn(fmt::format("{} part{} of the wrap with less than {} % of its area {} left out", wrap.crumbs,
-                     wrap.crumbs == 1 ? "" : "s", 100 * kCrumb, wrap.crumbs == 1 ? "is" : "are"));
+  if (wrap.removed > 0)
+    warn(fmt::format("{} part{} of the wrap with less than {} % of its area {} left out", wrap.removed,
+                     wrap.removed == 1 ? "" : "s", 100 * kSmallPart, wrap.removed == 1 ? "is" : "are"));
   if (wrap.report.components > 1)
     warn(fmt::format("the wrap has {} parts that do not touch; a larger --close-detail joins them",
                      wrap.report.components));
@@ -176,9 +175,8 @@ void copy_vertices(MeshParts& parts, const std::vector<int>& copies) {
   }
 }
 
-/// Takes a mesh whose holes are filled.
-Json take_filled(MeshParts& parts, TriangleMesh filled, const FillResult& filling) {
-  const double diagonal = bounding_box(filled).diagonal();
+/// \return fillings that intersect the surface
+std::size_t say_filled(const FillResult& filling, double diagonal) {
   std::string places;
   std::size_t listed = 0, intersecting = 0;
   for (const Hole& hole : filling.holes) {
@@ -192,25 +190,35 @@ Json take_filled(MeshParts& parts, TriangleMesh filled, const FillResult& fillin
   if (count > 0)
     spdlog::info("--close: filled {} hole{}{}{}", count, count == 1 ? "" : "s", places, count > 3 ? "; ..." : "");
   if (!filling.copies.empty())
-    spdlog::info("--close: sheets that touch in a vertex got one each, {} more", filling.copies.size());
+    spdlog::info("--close: {} added where sheets met in one vertex alone",
+                 filling.copies.size() == 1 ? "1 vertex was" : fmt::format("{} vertices were", filling.copies.size()));
   if (intersecting > 0)
     warn(fmt::format("{} of the fillings intersect{} the surface", intersecting, intersecting == 1 ? "s" : ""));
   if (filling.removed > 0)
-    warn(
-        fmt::format("{} triangles at edges that more than two share, or that do not agree on what is outside, are "
-                    "taken away",
-                    filling.removed));
-  copy_vertices(parts, filling.copies);
-  std::vector<Triangle> triangles = filled.triangles;  // with the vertices that the attributes know
-  const int known = static_cast<int>(filled.positions.size() - filling.copies.size());
+    warn(fmt::format("{} triangles at non-manifold or misoriented edges are taken away", filling.removed));
+  return intersecting;
+}
+
+/// Triangles with the vertices that there were before some were copied.
+std::vector<Triangle> with_originals(const TriangleMesh& mesh, const std::vector<int>& copies) {
+  std::vector<Triangle> triangles = mesh.triangles;
+  const int first = static_cast<int>(mesh.positions.size() - copies.size());
   for (Triangle& t : triangles)
     for (int& corner : t)
-      if (corner >= known) corner = filling.copies[corner - known];
-  parts.attributes = with_triangles(parts.attributes, parts.mesh.triangles, triangles, filling.origins);
+      if (corner >= first) corner = copies[corner - first];
+  return triangles;
+}
+
+/// Takes a mesh whose holes are filled.
+Json take_filled(MeshParts& parts, TriangleMesh filled, const FillResult& filling) {
+  const std::size_t intersecting = say_filled(filling, bounding_box(filled).diagonal());
+  copy_vertices(parts, filling.copies);
+  parts.attributes =
+      with_triangles(parts.attributes, parts.mesh.triangles, with_originals(filled, filling.copies), filling.origins);
   parts.mesh = std::move(filled);
   remove_unused_vertices(parts);
   return {{"method", "fill"},
-          {"holes", count},
+          {"holes", filling.holes.size()},
           {"intersecting", intersecting},
           {"removed_triangles", filling.removed},
           {"split_vertices", filling.copies.size()}};
@@ -253,7 +261,7 @@ Json close_mesh(MeshParts& parts, const CloseOptions& options) {
   Wrap wrap = wrap_with(options.detail.value_or(kDetail), folder);
   if (!options.detail && wrap.report.genus > 0) {
     TriangleMesh body = filled;
-    const double share = keep_largest_part(body, filling.origins);
+    const double share = keep_largest_component(body, filling.origins);
     if (share > kBody && measure_manifold(body).genus < wrap.report.genus) {
       warn(fmt::format(
           "the wrap has {} handle{}, as parts nearly touch; the largest part, with {:.1f} % of the area, is "

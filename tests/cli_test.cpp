@@ -1387,6 +1387,41 @@ TEST_F(Program, ClosesAMeshWithAWideHole) {
   for (const char* name : {"open.ply", "c.skx.exr"}) fs::remove(folder_ / name);
 }
 
+TEST_F(Program, SplitsVerticesWhereAMeshTouchesItselfAndKeepsTheirNumbers) {
+  // Dents from both sides of a capsule meet beside its bone; a triangle is missing.
+  const Shape capsule = capsule_shape();
+  TriangleMesh mesh = capsule.mesh;
+  const auto nearest = [&](const Vec3& p) {
+    return std::min_element(mesh.positions.begin(), mesh.positions.end(),
+                            [&](const Vec3& a, const Vec3& b) { return (a - p).norm() < (b - p).norm(); });
+  };
+  const Vec3 meeting(0, 0.3, 0);
+  for (const Vec3& side : {Vec3(0.4, 0.3, 0), Vec3(-0.4, 0.3, 0)}) *nearest(side) = meeting;
+  mesh.triangles.pop_back();
+  std::ofstream file(folder_ / "dented.ply");
+  file << "ply\nformat ascii 1.0\nelement vertex " << mesh.positions.size()
+       << "\nproperty double x\nproperty double y\nproperty double z\nproperty float height\nelement face "
+       << mesh.triangles.size() << "\nproperty list uchar int vertex_indices\nend_header\n";
+  for (const Vec3& p : mesh.positions) file << p.x() << ' ' << p.y() << ' ' << p.z() << ' ' << p.z() + 2 << '\n';
+  for (const Triangle& t : mesh.triangles) file << "3 " << t[0] << ' ' << t[1] << ' ' << t[2] << '\n';
+  file.close();
+  std::ofstream(folder_ / "capsule.skeleton.json") << skeleton_to_json(capsule.skeleton);
+  const Outcome closed =
+      run({"encode", "dented.ply", "capsule.skeleton.json", "-o", "c.skx.exr", "--size", "64", "--close"});
+  ASSERT_EQ(closed.code, 0) << closed.err;
+  EXPECT_NE(closed.err.find("1 vertex was added"), std::string::npos) << closed.err;
+  ASSERT_EQ(run({"reconstruct", "c.skx.exr", "-o", "c.ply"}).code, 0);
+  const MeshFile back = read_mesh(folder_ / "c.ply");
+  const auto& numbers = back.attributes.numbers;
+  const auto height = std::find_if(numbers.begin(), numbers.end(), [](const auto& n) { return n.name == "height"; });
+  ASSERT_NE(height, numbers.end());
+  double largest = 0;
+  for (std::size_t v = 0; v < back.mesh.positions.size(); ++v)
+    largest = std::max(largest, std::abs(height->values[v] - 2 - back.mesh.positions[v].z()));
+  EXPECT_LT(largest, 0.1);
+  for (const char* name : {"dented.ply", "capsule.skeleton.json", "c.skx.exr", "c.ply"}) fs::remove(folder_ / name);
+}
+
 TEST_F(Program, DoesNotCloseTheGapOfAnOpenRing) {
   if (!fs::exists(fs::path(SKELETEX_PROGRAM).parent_path() / "skeletex_wrap")) GTEST_SKIP() << "built without CGAL";
   // A ring that is cut through, and a part of its own in it: a wrap of both closes the ring.

@@ -10,6 +10,7 @@
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/close/carry_over.h"
 #include "skeletex/close/fill_holes.h"
+#include "skeletex/close/manifold_parts.h"
 #include "support/shapes.h"
 
 namespace skeletex {
@@ -102,12 +103,12 @@ TEST(FillHoles, ASheetStaysOpen) {
   EXPECT_EQ(sheet.triangles, before.triangles);
 }
 
-TEST(FillHoles, TanglesAreTakenAwayAndFilled) {
+TEST(FillHoles, NonManifoldEdgesAreTakenAwayAndFilled) {
   for (const NamedShape& shape : all_shapes()) {
     SCOPED_TRACE(shape.name);
     TriangleMesh mesh = shape.shape.mesh;
     const double volume = signed_volume(mesh);
-    // A fin of one triangle at an edge, and a triangle that is turned over.
+    // A dangling triangle at an edge, and one that is turned over.
     const Triangle at = mesh.triangles[mesh.triangles.size() / 2];
     mesh.positions.push_back(1.1 * mesh.positions[at[0]]);
     mesh.triangles.push_back({at[0], at[1], static_cast<int>(mesh.positions.size()) - 1});
@@ -122,7 +123,7 @@ TEST(FillHoles, TanglesAreTakenAwayAndFilled) {
   }
 }
 
-TEST(FillHoles, SheetsThatTouchInAVertexGetOneEach) {
+TEST(FillHoles, NonManifoldVerticesAreSplit) {
   // Two bodies that share one vertex, each the other's image in it.
   const TriangleMesh whole = y_shape().mesh;
   TriangleMesh mesh = whole;
@@ -144,7 +145,7 @@ TEST(FillHoles, SheetsThatTouchInAVertexGetOneEach) {
   EXPECT_NE(result.obstacle.find("2 parts"), std::string::npos) << result.obstacle;
 }
 
-TEST(KeepLargestPart, KeepsAClosedBodyAlone) {
+TEST(KeepLargestComponent, KeepsAClosedBodyAlone) {
   const TriangleMesh torus = torus_shape().mesh;
   TriangleMesh mesh = y_shape().mesh;
   for (Vec3& p : mesh.positions) p *= 0.05;
@@ -156,9 +157,9 @@ TEST(KeepLargestPart, KeepsAClosedBodyAlone) {
   std::vector<int> open_origins = origins;
   open.triangles.pop_back();
   open_origins.pop_back();
-  EXPECT_EQ(keep_largest_part(open, open_origins), 0);
+  EXPECT_EQ(keep_largest_component(open, open_origins), 0);
   EXPECT_EQ(open.triangles.size(), mesh.triangles.size() - 1);
-  const double area = surface_area(mesh), share = keep_largest_part(mesh, origins);
+  const double area = surface_area(mesh), share = keep_largest_component(mesh, origins);
   EXPECT_NEAR(share * area, surface_area(torus), 1e-9 * area);
   EXPECT_EQ(mesh.triangles.size(), torus.triangles.size());
   EXPECT_EQ(origins.front(), static_cast<int>(small));

@@ -94,11 +94,10 @@ void find_components(const TriangleMesh& mesh, const ManifoldReport& report, std
     list += fmt::format("{}{} triangle{} around {}", i ? ", " : "", components[i].triangles,
                         plural(components[i].triangles), text_of(components[i].sum / components[i].triangles));
   if (components.size() > 5) list += ", ...";
-  findings.push_back({Severity::kError, "components",
-                      fmt::format("the mesh has {} components: {}", components.size(), list),
-                      "join them to one body (`encode --close` wraps them in one), or keep the one that the skeleton "
-                      "lies in and remove the "
-                      "others"});
+  findings.push_back(
+      {Severity::kError, "components", fmt::format("the mesh has {} components: {}", components.size(), list),
+       "join them to one body (`encode --close` does where they touch or nearly do), or keep the one that "
+       "the skeleton lies in and remove the others"});
 }
 
 struct EdgeUse {

@@ -12,7 +12,7 @@
 #include <set>
 
 #include "skeletex/analysis/manifold.h"
-#include "skeletex/close/untangle.h"
+#include "skeletex/close/manifold_parts.h"
 #include "skeletex/geometry/self_intersection.h"
 #include "skeletex/geometry/triangle_tree.h"
 #include "skeletex/geometry/union_find.h"
@@ -231,7 +231,7 @@ void refuse_sheets(const TriangleMesh& mesh, const Fillings& fillings, std::vect
 FillResult fill_holes(TriangleMesh& mesh) {
   FillResult result;
   result.origins = remove_useless(mesh);
-  result.removed = remove_tangles(mesh, result.origins);
+  result.removed = remove_non_manifold_edges(mesh, result.origins);
   const double diagonal = bounding_box(mesh).diagonal();
   result.holes = find_holes(mesh, measure_manifold(mesh).boundary_edges);
   Fillings fillings = triangulate_holes(mesh, result.holes);
@@ -239,32 +239,10 @@ FillResult fill_holes(TriangleMesh& mesh) {
   fillings.remove(result.holes);
   mark_intersecting(mesh, fillings, result.holes);
   mesh = with_fillings(mesh, fillings);
-  result.copies = split_vertices(mesh);
+  result.copies = split_non_manifold_vertices(mesh);
   result.origins.resize(mesh.triangles.size(), -1);
   result.obstacle = obstacle_of(measure_manifold(mesh), result.holes, diagonal);
   return result;
-}
-
-double keep_largest_part(TriangleMesh& mesh, std::vector<int>& origins) {
-  UnionFind parts(static_cast<int>(mesh.positions.size()));
-  for (const Triangle& t : mesh.triangles) parts.unite(t[0], t[1]), parts.unite(t[0], t[2]);
-  std::map<int, double> areas;
-  for (const Triangle& t : mesh.triangles) areas[parts.find(t[0])] += area_vector(mesh, t).norm();
-  const auto largest =
-      std::max_element(areas.begin(), areas.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
-  if (largest == areas.end()) return 0;
-  TriangleMesh part{mesh.positions, {}};
-  std::vector<int> kept;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-    if (parts.find(mesh.triangles[t][0]) == largest->first) {
-      part.triangles.push_back(mesh.triangles[t]);
-      kept.push_back(origins[t]);
-    }
-  if (!measure_manifold(part).is_closed_manifold()) return 0;
-  const double share = largest->second / surface_area(mesh);
-  mesh = std::move(part);
-  origins = std::move(kept);
-  return share;
 }
 
 }  // namespace skeletex

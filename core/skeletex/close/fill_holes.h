@@ -20,24 +20,18 @@ struct FillResult {
   std::vector<Hole> holes;
   std::vector<int> origins;  ///< per triangle the one that it was before; -1: it fills a hole
   std::vector<int> copies;   ///< per vertex that was added, at the end, the one that it is a copy of
-  int removed = 0;           ///< triangles at edges where the mesh was no surface
+  int removed = 0;           ///< triangles at non-manifold or misoriented edges
   std::string obstacle;      ///< why the mesh is still not one closed body; empty: it is
 };
 
-/// Holes with more edges are not filled: the time grows with their third power, to about a second for this many.
+/// Holes with more edges are not filled: the time grows with their third power, to some tenths of a second for this many.
 inline constexpr int kMostHoleEdges = 600;
 
 /// Fills the holes of a mesh: each gets the triangulation of its boundary with the least area (Barequet and Sharir,
 /// Filling Gaps in the Boundary of a Polyhedron, 1995). A hole stays open where its part of the mesh is a sheet that
-/// would enclose next to nothing. Before, a few triangles that keep the mesh from being a surface are taken away, those
-/// without area and those that occur twice as well; afterwards sheets that touch in a vertex get one each. All other
-/// vertices and triangles stay as they are.
+/// would enclose next to nothing. Before that, triangles without area, those that occur twice, and a few at
+/// non-manifold edges are taken away; after it, non-manifold vertices are split. All else stays as it is.
 /// \pre indices in range, coordinates finite
 FillResult fill_holes(TriangleMesh& mesh);
-
-/// Keeps the part of a mesh with the largest area, if it is a closed body.
-/// \param origins  of its triangles (FillResult)
-/// \return its share of the area; 0: it is not closed, and nothing was changed
-double keep_largest_part(TriangleMesh& mesh, std::vector<int>& origins);
 
 }  // namespace skeletex

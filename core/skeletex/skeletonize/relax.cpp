@@ -36,14 +36,7 @@ void Repair::drop(const SkeletonLimb& limb) {
   std::sort(bones.rbegin(), bones.rend());
   std::sort(nodes.rbegin(), nodes.rend());
   for (const int bone : bones) skeleton_.bones.erase(skeleton_.bones.begin() + bone);
-  for (const int node : nodes) {
-    skeleton_.nodes.erase(skeleton_.nodes.begin() + node);
-    radii_.erase(radii_.begin() + node);
-    for (Bone& b : skeleton_.bones) {
-      b.head -= b.head > node;
-      b.tail -= b.tail > node;
-    }
-  }
+  for (const int node : nodes) remove_node(node);
   prepare();
 }
 
@@ -80,16 +73,14 @@ void Repair::drop_minor_limbs() {
 }
 
 double Repair::total_cost() const {
-  std::vector<double> costs(skeleton_.bones.size());
-  for_each_block(costs.size(), 4, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t b = begin; b < end; ++b) costs[b] = cost(skeleton_, at_nodes_, {static_cast<int>(b)}, kNoLimit);
-  });
-  double sum = std::accumulate(costs.begin(), costs.end(), 0.0);
-  for (int n = 0; n < static_cast<int>(skeleton_.nodes.size()); ++n) sum += displacement_cost(n);
+  std::vector<int> bones(skeleton_.bones.size());
+  std::iota(bones.begin(), bones.end(), 0);
+  double sum = cost(skeleton_, at_nodes_, bones, kNoLimit);
+  for (int n = 0; n < static_cast<int>(skeleton_.nodes.size()); ++n) sum += displacement_cost(skeleton_, n);
   return sum;
 }
 
-/// Of the cost, per node, by central differences; in radii of the body there.
+/// The gradient of the total cost, per node and radius of the body there, by central differences.
 std::vector<Vec3> Repair::gradient() const {
   constexpr double kStep = 0.03;  // radii
   std::vector<Vec3> result(skeleton_.nodes.size(), Vec3::Zero());

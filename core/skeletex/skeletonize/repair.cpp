@@ -100,7 +100,6 @@ double Repair::displacement_cost(const Skeleton& skeleton, int node) const {
   return kDisplacementWeight * (skeleton.nodes[node].position - place->second).squaredNorm() /
          (radii_[node] * radii_[node]);
 }
-double Repair::displacement_cost(int node) const { return displacement_cost(skeleton_, node); }
 
 double Repair::length_of(const SkeletonLimb& limb) const {
   double length = 0;
@@ -112,7 +111,7 @@ bool Repair::move_node(int node, double step, int trials) {
   std::vector<int> bones = bones_around({node});
   // The worst first: most moves are ruled out by it.
   std::stable_sort(bones.begin(), bones.end(), [&](int a, int b) { return margins_[a].margin < margins_[b].margin; });
-  const double before = displacement_cost(node) + cost(skeleton_, at_nodes_, bones, kNoLimit);
+  const double before = displacement_cost(skeleton_, node) + cost(skeleton_, at_nodes_, bones, kNoLimit);
   double least = before;
   const Vec3 start = skeleton_.nodes[node].position;
   Vec3 best = start;
@@ -122,7 +121,7 @@ bool Repair::move_node(int node, double step, int trials) {
     skeleton_.nodes[node].position = place;
     if (is_placed_well(skeleton_, node, 0.5 * radii_[node])) {
       measured_ += static_cast<long>(bones.size());
-      const double own = displacement_cost(node);
+      const double own = displacement_cost(skeleton_, node);
       const double there = own + cost(skeleton_, at_nodes_, bones, least - own);
       if (there < least) least = there, best = place;
     }
@@ -248,6 +247,16 @@ bool Repair::try_merge(int bone, const Vec3& place, Merge& best) const {
   return true;
 }
 
+/// \pre no bone has it
+void Repair::remove_node(int node) {
+  skeleton_.nodes.erase(skeleton_.nodes.begin() + node);
+  radii_.erase(radii_.begin() + node);
+  for (Bone& bone : skeleton_.bones) {
+    bone.head -= bone.head > node;
+    bone.tail -= bone.tail > node;
+  }
+}
+
 void Repair::merge_at(const Merge& merge) {
   const Bone gone = skeleton_.bones[merge.bone];
   // The node with more bones, or the deeper one, keeps its name.
@@ -255,13 +264,8 @@ void Repair::merge_at(const Merge& merge) {
   const bool is_tail_kept = rank(gone.tail) > rank(gone.head);
   skeleton_ = merged(merge.bone, merge.place);
   if (is_tail_kept) std::swap(skeleton_.nodes[gone.head].name, skeleton_.nodes[gone.tail].name);
-  skeleton_.nodes.erase(skeleton_.nodes.begin() + gone.tail);
   radii_[gone.head] = surface_.radius(merge.place);
-  radii_.erase(radii_.begin() + gone.tail);
-  for (Bone& bone : skeleton_.bones) {
-    bone.head -= bone.head > gone.tail;
-    bone.tail -= bone.tail > gone.tail;
-  }
+  remove_node(gone.tail);
   prepare();
 }
 
@@ -283,12 +287,7 @@ bool Repair::drop_free_end(int bone) {
   const Bone gone = skeleton_.bones[shortest];
   const int node = at_nodes_[gone.head].size() == 1 ? gone.head : gone.tail;
   skeleton_.bones.erase(skeleton_.bones.begin() + shortest);
-  skeleton_.nodes.erase(skeleton_.nodes.begin() + node);
-  radii_.erase(radii_.begin() + node);
-  for (Bone& b : skeleton_.bones) {
-    b.head -= b.head > node;
-    b.tail -= b.tail > node;
-  }
+  remove_node(node);
   prepare();
   return true;
 }

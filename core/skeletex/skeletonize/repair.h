@@ -76,7 +76,6 @@ class Repair {
               const std::vector<int>& bones, double limit) const;
   bool is_placed_well(const Skeleton& skeleton, int node, double least_radius) const;
   double displacement_cost(const Skeleton& skeleton, int node) const;
-  double displacement_cost(int node) const;
   double total_cost() const;
   std::vector<Vec3> gradient() const;
   void descend(int steps);
@@ -88,6 +87,7 @@ class Repair {
   bool try_merge(int bone, const Vec3& place, Merge& best) const;
   Skeleton merged(int bone, const Vec3& place) const;
   bool is_ring_kept(int bone) const;
+  void remove_node(int node);
   void merge_at(const Merge& merge);
   bool drop_free_end(int bone);
   double length_of(const SkeletonLimb& limb) const;

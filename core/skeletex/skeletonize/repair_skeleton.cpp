@@ -104,7 +104,7 @@ class Draft {
     skeleton_.nodes = std::move(kept);
   }
 
-  /// A bone whose free end sticks out of the body ends before it.
+  /// A bone whose free end is outside of the body ends before it leaves the body.
   void shorten_free_ends() {
     constexpr double kShare = 0.9;  // of the way to the surface
     const std::span corners(surface_.mesh.triangles.data()->data(), 3 * surface_.mesh.triangles.size());
@@ -115,8 +115,8 @@ class Draft {
       const Vec3 start =
           skeleton_.nodes[end_node(skeleton_, at_nodes[n][0].bone, opposite(at_nodes[n][0].end))].position;
       const double exit = find_first_hit(surface_.mesh, surface_.tree, start, end - start, 1);
-      if (exit <= 1 && winding_number(surface_.mesh.positions, corners, start) > 0)
-        end = start + kShare * exit * (end - start);
+      const auto is_outside = [&](const Vec3& p) { return winding_number(surface_.mesh.positions, corners, p) <= 0; };
+      if (exit <= 1 && is_outside(end) && !is_outside(start)) end = start + kShare * exit * (end - start);
     }
   }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/close/untangle.h"
+#include "skeletex/close/manifold_parts.h"
 
 #include <algorithm>
 #include <array>
@@ -12,13 +12,9 @@
 namespace skeletex {
 namespace {
 
-constexpr double kMostTangled = 0.02;  // of the triangles
-constexpr std::size_t kFewTangled = 12;
-constexpr double kFin = 0.001;  // of the area
-
 using EdgeSet = std::set<std::array<int, 2>>;
 
-EdgeSet tangled_edges(const TriangleMesh& mesh) {
+EdgeSet bad_edges(const TriangleMesh& mesh) {
   const ManifoldReport report = measure_manifold(mesh);
   EdgeSet edges;
   for (const auto* list : {&report.non_manifold_edges, &report.misoriented_edges})
@@ -39,18 +35,15 @@ void keep_triangles(TriangleMesh& mesh, std::vector<int>& origins, const Keep& i
   origins.resize(kept);
 }
 
-UnionFind parts_of(const TriangleMesh& mesh) {
-  UnionFind parts(static_cast<int>(mesh.positions.size()));
-  for (const Triangle& t : mesh.triangles) parts.unite(t[0], t[1]), parts.unite(t[0], t[2]);
-  return parts;
-}
-
-/// Of each part, by its number.
-std::map<int, double> areas_of(const TriangleMesh& mesh, UnionFind& parts) {
-  std::map<int, double> areas;
-  for (const Triangle& t : mesh.triangles) areas[parts.find(t[0])] += area_vector(mesh, t).norm();
-  return areas;
-}
+/// The connected components of a mesh; a triangle is in that of its first vertex.
+struct Components {
+  UnionFind vertices;
+  std::map<int, double> areas;  ///< by component
+  explicit Components(const TriangleMesh& mesh) : vertices(static_cast<int>(mesh.positions.size())) {
+    for (const Triangle& t : mesh.triangles) vertices.unite(t[0], t[1]), vertices.unite(t[0], t[2]);
+    for (const Triangle& t : mesh.triangles) areas[vertices.find(t[0])] += area_vector(mesh, t).norm();
+  }
+};
 
 /// \param triangles  all at the vertex
 /// \param copies  per new vertex the one that it is a copy of
@@ -74,8 +67,11 @@ void split_vertex(int vertex, const std::vector<int>& triangles, TriangleMesh& m
 
 }  // namespace
 
-int remove_tangles(TriangleMesh& mesh, std::vector<int>& origins) {
-  const EdgeSet edges = tangled_edges(mesh);
+int remove_non_manifold_edges(TriangleMesh& mesh, std::vector<int>& origins) {
+  constexpr double kMost = 0.02;  // of the triangles
+  constexpr std::size_t kFew = 12;
+  constexpr double kDangling = 0.001;  // of the area
+  const EdgeSet edges = bad_edges(mesh);
   if (edges.empty()) return 0;
   TriangleMesh rest = mesh;
   std::vector<int> rest_origins = origins;
@@ -84,24 +80,24 @@ int remove_tangles(TriangleMesh& mesh, std::vector<int>& origins) {
       if (edges.contains({std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])})) return false;
     return true;
   });
-  std::set<int> vertices;
-  for (const auto& edge : edges) vertices.insert(edge.begin(), edge.end());
-  UnionFind parts = parts_of(rest);
-  const std::map<int, double> areas = areas_of(rest, parts);
-  std::set<int> fins;
-  for (const int v : vertices)
-    if (const auto part = areas.find(parts.find(v)); part != areas.end() && part->second < kFin * surface_area(rest))
-      fins.insert(part->first);
-  keep_triangles(rest, rest_origins, [&](const Triangle& t) { return !fins.contains(parts.find(t[0])); });
+  Components components(rest);
+  const double least = kDangling * surface_area(rest);
+  std::set<int> dangling;
+  for (const auto& edge : edges)
+    for (const int v : edge)
+      if (const auto found = components.areas.find(components.vertices.find(v));
+          found != components.areas.end() && found->second < least)
+        dangling.insert(found->first);
+  keep_triangles(rest, rest_origins,
+                 [&](const Triangle& t) { return !dangling.contains(components.vertices.find(t[0])); });
   const std::size_t removed = mesh.triangles.size() - rest.triangles.size();
-  if (removed > std::max(kFewTangled, static_cast<std::size_t>(kMostTangled * static_cast<double>(origins.size()))))
-    return 0;
+  if (removed > std::max(kFew, static_cast<std::size_t>(kMost * static_cast<double>(origins.size())))) return 0;
   mesh = std::move(rest);
   origins = std::move(rest_origins);
   return static_cast<int>(removed);
 }
 
-std::vector<int> split_vertices(TriangleMesh& mesh) {
+std::vector<int> split_non_manifold_vertices(TriangleMesh& mesh) {
   const std::vector<int> touching = measure_manifold(mesh).non_manifold_vertices;
   std::map<int, std::vector<int>> triangles_at;
   for (const int v : touching) triangles_at[v];
@@ -113,13 +109,29 @@ std::vector<int> split_vertices(TriangleMesh& mesh) {
   return copies;
 }
 
-int remove_crumbs(TriangleMesh& mesh, double share, std::vector<int>& origins) {
-  UnionFind parts = parts_of(mesh);
-  std::map<int, double> areas = areas_of(mesh, parts);
+int remove_small_components(TriangleMesh& mesh, double share) {
+  Components components(mesh);
   const double least = share * surface_area(mesh);
-  keep_triangles(mesh, origins, [&](const Triangle& t) { return areas[parts.find(t[0])] >= least; });
-  return static_cast<int>(
-      std::count_if(areas.begin(), areas.end(), [&](const auto& part) { return part.second < least; }));
+  std::erase_if(mesh.triangles,
+                [&](const Triangle& t) { return components.areas.at(components.vertices.find(t[0])) < least; });
+  return static_cast<int>(std::count_if(components.areas.begin(), components.areas.end(),
+                                        [&](const auto& component) { return component.second < least; }));
+}
+
+double keep_largest_component(TriangleMesh& mesh, std::vector<int>& origins) {
+  Components components(mesh);
+  const auto largest = std::max_element(components.areas.begin(), components.areas.end(),
+                                        [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (largest == components.areas.end()) return 0;
+  TriangleMesh part = mesh;
+  std::vector<int> part_origins = origins;
+  keep_triangles(part, part_origins,
+                 [&](const Triangle& t) { return components.vertices.find(t[0]) == largest->first; });
+  if (!measure_manifold(part).is_closed_manifold()) return 0;
+  const double share = largest->second / surface_area(mesh);
+  mesh = std::move(part);
+  origins = std::move(part_origins);
+  return share;
 }
 
 }  // namespace skeletex
