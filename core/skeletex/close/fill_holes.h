@@ -24,7 +24,7 @@ struct FillResult {
   std::string obstacle;      ///< why the mesh is still not one closed body; empty: it is
 };
 
-/// Holes with more edges are not filled: the time grows with their third power, to some tenths of a second for this many.
+/// Holes with more edges are not filled: the time grows with their third power; it is some tenths of a second for these.
 inline constexpr int kMostHoleEdges = 600;
 
 /// Fills the holes of a mesh: each gets the triangulation of its boundary with the least area (Barequet and Sharir,
