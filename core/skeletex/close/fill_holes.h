@@ -24,7 +24,8 @@ struct FillResult {
   std::string obstacle;      ///< why the mesh is still not one closed body; empty: it is
 };
 
-/// Holes with more edges are not filled: the time grows with their third power; it is some tenths of a second for these.
+/// Holes with more edges are not filled. The time grows with their third power; for these it is some tenths of a
+/// second.
 inline constexpr int kMostHoleEdges = 600;
 
 /// Fills the holes of a mesh: each gets the triangulation of its boundary with the least area (Barequet and Sharir,
