@@ -296,6 +296,14 @@ TEST_F(Program, ExportsACoarseMeshWithItsDisplacement) {
   expect_refused(2, {"export", "y.skx.exr", "-o", "no.glb", "--displacement-for", "maya"}, {"--displacement"});
   expect_refused(2, {"export", "y.skx.exr", "-o", "no.glb", "--displacement", "no.png"}, {"no.png", ".exr"});
   expect_refused(2, {"export", "y.skx.exr", "-o", "no.glb", "--displacement", "y.skx.exr"}, {"y.skx.exr", "MODEL"});
+  const std::string by_name = text_of(folder_ / "rig.exr");
+  fs::remove(folder_ / "rig.exr");
+  json_of({"export", "y.skx.exr", "-o", "rig.glb", "--lod", "16", "--format", "base+vdm", "--displacement-for",
+           "materialx"});
+  EXPECT_EQ(text_of(folder_ / "rig.exr"), by_name);
+  expect_refused(2, {"export", "y.skx.exr", "-o", "y.skx.glb", "--format", "base+vdm"},
+                 {"y.skx.exr", "--displacement"});
+  expect_refused(2, {"export", "y.skx.exr", "-o", "no.glb", "--format", "base+vdm", "--texture", "64"}, {"--texture"});
   for (const char* name : {"rig.glb", "rig.exr"}) fs::remove(folder_ / name);
 }
 

@@ -17,6 +17,7 @@
 #include "skeletex/io/gltf/write_gltf.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/pose_file.h"
+#include "skeletex/io/same_file.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/texture/bake_displacement.h"
 #include "skeletex/render/image.h"
@@ -28,7 +29,7 @@ namespace {
 constexpr int kBaseSize = 64;  // texels along the longer side of a mesh with a displacement, without --lod
 
 struct Arguments {
-  std::string model, output, displacement, displacement_for = "blender", device, json, up;
+  std::string model, output, displacement, displacement_for = "blender", format = "rig", device, json, up;
   std::vector<std::string> animations;
   int size = 0, level = 0, texture = 0;
 };
@@ -84,6 +85,18 @@ void write_displacement(const std::string& path, const DisplacementPicture& pict
     image.rgba[4 * i + 3] = 1;
   }
   write_exr_image(path, image);
+}
+
+/// --format base+vdm: the picture beside the mesh, where --displacement names no other place.
+void name_displacement(const CLI::App& command, Arguments& arguments) {
+  if (arguments.format == "base+vdm" && arguments.displacement.empty()) {
+    if (command.count("--texture") > 0) throw CLI::ExcludesError("--format base+vdm", "--texture");
+    arguments.displacement = std::filesystem::path(arguments.output).replace_extension(".exr").string();
+    if (is_same_file(arguments.displacement, arguments.model))
+      throw CLI::ValidationError("--format", arguments.displacement + " is MODEL; name another with --displacement");
+  }
+  if (command.count("--displacement-for") > 0 && arguments.displacement.empty())
+    throw CLI::RequiresError("--displacement-for", "--displacement");
 }
 
 void run(const Arguments& arguments) {
@@ -179,22 +192,23 @@ void add_export_command(CLI::App& program) {
   take_one_of(*command.add_option("--up", arguments->up,
                                   "axis of the model that is up; y is in glTF (default: the model's own)"),
               {"x", "y", "z", "-x", "-y", "-z"});
-  CLI::Option* displacement =
-      declare_output(
-          command,
-          command.add_option("--displacement", arguments->displacement,
-                             "write the mesh coarse (--lod, default 64), and beside it a picture of the vectors to the "
-                             "model's own surface: .exr"),
-          {".exr"})
-          ->type_name("FILE")
-          ->excludes("--texture");
+  declare_output(
+      command,
+      command.add_option("--displacement", arguments->displacement,
+                         "write the mesh coarse (--lod, default 64), and beside it a picture of the vectors to the "
+                         "model's own surface: .exr"),
+      {".exr"})
+      ->type_name("FILE")
+      ->excludes("--texture");
+  take_one_of(*command.add_option("--format", arguments->format,
+                                  "rig: the mesh alone (default); base+vdm: a coarse mesh, and its displacement beside "
+                                  "it, X.exr of X.glb"),
+              {"rig", "base+vdm"});
   take_one_of(
-      *command
-           .add_option("--displacement-for", arguments->displacement_for,
-                       "what the vectors of the picture refer to. blender: object space, z up, as its Displace "
-                       "modifier takes them (default); object: object space, y up; maya, arnold: tangent space, "
-                       "as tangent, normal, bitangent; materialx: tangent space, as tangent, bitangent, normal")
-           ->needs(displacement),
+      *command.add_option("--displacement-for", arguments->displacement_for,
+                          "what the vectors of the picture refer to. blender: object space, z up, as its Displace "
+                          "modifier takes them (default); object: object space, y up; maya, arnold: tangent space, "
+                          "as tangent, normal, bitangent; materialx: tangent space, as tangent, bitangent, normal"),
       {"blender", "object", "maya", "arnold", "materialx"});
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
@@ -202,10 +216,13 @@ void add_export_command(CLI::App& program) {
       "Examples:\n"
       "  skeletex export bear.skx.exr -o bear.glb --lod 128\n"
       "  skeletex export man.skx.exr -o man.glb --animation walk.json --animation sit.json\n"
-      "  skeletex export bear.skx.exr -o bear.glb --lod 64 --displacement bear.exr\n"
+      "  skeletex export bear.skx.exr -o bear.glb --lod 64 --format base+vdm\n"
       "Other programs move the surface by linear blend skinning with the four strongest weights of smooth poses; "
       "`reconstruct --deform linear` shows the same. Each bone is a joint of its own name.");
-  command.callback([arguments] { run(*arguments); });
+  command.callback([arguments, &command] {
+    name_displacement(command, *arguments);
+    run(*arguments);
+  });
 }
 
 }  // namespace skeletex::cli

@@ -2,12 +2,12 @@
 #include "skeletex/io/gltf/accessors.h"
 
 #include <fmt/format.h>
-#include <tiny_gltf.h>
 
 #include <algorithm>
 #include <cstring>
 #include <limits>
 
+#include "skeletex/io/gltf/tinygltf.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {

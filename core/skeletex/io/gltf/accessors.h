@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace tinygltf {
+namespace skeletex_tinygltf {
 class Model;
 }
 
@@ -14,7 +14,7 @@ class GltfAccessors {
  public:
   /// \param where  the file, in messages
   /// \param model  must outlive this
-  GltfAccessors(const tinygltf::Model& model, std::string where) : model_(model), where_(std::move(where)) {}
+  GltfAccessors(const skeletex_tinygltf::Model& model, std::string where) : model_(model), where_(std::move(where)) {}
 
   /// All values of an accessor behind each other: strided, sparse and normalised ones too.
   /// \param components  per element: 1, 2, 3, 4 or 16; 0: as many as it has
@@ -23,7 +23,7 @@ class GltfAccessors {
   int components(int accessor) const;
 
  private:
-  const tinygltf::Model& model_;
+  const skeletex_tinygltf::Model& model_;
   std::string where_;
 };
 

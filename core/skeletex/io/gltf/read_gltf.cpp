@@ -2,7 +2,6 @@
 #include "skeletex/io/gltf/read_gltf.h"
 
 #include <fmt/format.h>
-#include <tiny_gltf.h>
 
 #include <algorithm>
 #include <array>
@@ -12,18 +11,21 @@
 #include <stdexcept>
 
 #include "skeletex/io/gltf/accessors.h"
+#include "skeletex/io/gltf/decompress.h"
+#include "skeletex/io/gltf/tinygltf.h"
 #include "skeletex/io/read_file.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
 namespace {
 
-/// Extensions that a file may need: none of them changes what is read here.
+/// Extensions that a file may need: they are read, or change nothing that is; pictures in other formats are left out.
 constexpr std::array kKnownExtensions{"KHR_mesh_quantization",
-                                      "KHR_materials_unlit",
+                                      "KHR_draco_mesh_compression",
+                                      "EXT_meshopt_compression",
                                       "KHR_texture_transform",
-                                      "KHR_materials_specular",
-                                      "KHR_materials_clearcoat",
+                                      "KHR_texture_basisu",
+                                      "EXT_texture_webp",
                                       "KHR_lights_punctual",
                                       "VRM",
                                       "VRMC_vrm",
@@ -41,7 +43,7 @@ bool load_image(tinygltf::Image* image, const int index, std::string* /*error*/,
 }
 
 tinygltf::Model load(const std::filesystem::path& path) {
-  const std::string where = path.string(), bytes = read_file(path, 0xffffffffU);
+  const std::string where = path.string(), bytes = with_placeholders(read_file(path, 0xffffffffU));
   tinygltf::TinyGLTF loader;
   loader.SetImageLoader(load_image, nullptr);
   tinygltf::Model model;
@@ -58,11 +60,6 @@ tinygltf::Model load(const std::filesystem::path& path) {
     error = thrown.what();
   }
   if (!is_read) {
-    // tinygltf stumbles over what these leave out, and names that instead.
-    for (const char* extension : {"KHR_draco_mesh_compression", "EXT_meshopt_compression"})
-      if (bytes.find(extension) != std::string::npos)
-        throw IoError(fmt::format("{}: the file is compressed by {}, which is not read; save it without compression",
-                                  where, extension));
     constexpr std::size_t kVersion = 4;  // its place in a binary file
     if (bytes.starts_with("glTF") && bytes.size() > kVersion && bytes[kVersion] == 1)
       throw IoError(fmt::format("{}: glTF version 1; 2.0 is read", where));
@@ -72,11 +69,41 @@ tinygltf::Model load(const std::filesystem::path& path) {
   if (!model.asset.version.starts_with("2"))
     throw IoError(fmt::format("{}: glTF version \"{}\"; 2.0 is read", where, model.asset.version));
   for (const std::string& extension : model.extensionsRequired)
-    if (std::find(kKnownExtensions.begin(), kKnownExtensions.end(), extension) == kKnownExtensions.end())
-      throw IoError(fmt::format(
-          "{}: the file needs the extension {}, which is not read; save it without (compression switched off)", where,
-          extension));
+    if (!extension.starts_with("KHR_materials_") &&
+        std::find(kKnownExtensions.begin(), kKnownExtensions.end(), extension) == kKnownExtensions.end())
+      throw IoError(
+          fmt::format("{}: the file needs the extension {}, which is not read; save it without", where, extension));
+  decompress_gltf(model, where);
   return model;
+}
+
+/// Which texture coordinates a picture takes, and what becomes of them before.
+struct TextureTransform {
+  int set = 0;
+  Eigen::Affine2d map = Eigen::Affine2d::Identity();
+};
+
+/// KHR_texture_transform: scaled, turned, moved. The sign of the turn is that of its example and of the viewers; the
+/// matrix in its text has the other one.
+TextureTransform texture_transform(const tinygltf::TextureInfo& texture) {
+  TextureTransform result{.set = texture.texCoord};
+  const auto found = texture.extensions.find("KHR_texture_transform");
+  if (found == texture.extensions.end() || !found->second.IsObject()) return result;
+  const tinygltf::Value& extension = found->second;
+  const auto number = [](const tinygltf::Value& value, double otherwise) {
+    return value.IsNumber() ? value.GetNumberAsDouble() : otherwise;
+  };
+  const auto pair = [&](const char* key, double otherwise) {
+    const bool is_there = extension.Has(key) && extension.Get(key).IsArray() && extension.Get(key).ArrayLen() == 2;
+    return is_there ? Eigen::Vector2d(number(extension.Get(key).Get(0), otherwise),
+                                      number(extension.Get(key).Get(1), otherwise))
+                    : Eigen::Vector2d::Constant(otherwise);
+  };
+  const double turn = extension.Has("rotation") ? number(extension.Get("rotation"), 0) : 0;
+  result.map =
+      Eigen::Translation2d(pair("offset", 0)) * Eigen::Rotation2Dd(-turn) * Eigen::AlignedScaling2d(pair("scale", 1));
+  if (extension.Has("texCoord") && extension.Get("texCoord").IsInt()) result.set = extension.Get("texCoord").Get<int>();
+  return result;
 }
 
 /// An animation makes no sense; the rest of the file may.
@@ -177,8 +204,6 @@ class GltfReader {
       }
     GltfMesh mesh{from.name, {}};
     for (const tinygltf::Primitive& primitive : from.primitives) {
-      if (primitive.extensions.count("KHR_draco_mesh_compression") > 0)
-        fail("the mesh \"" + from.name + "\" is compressed by Draco, which is not read; save it without compression");
       if (primitive.mode >= 0 && primitive.mode < TINYGLTF_MODE_TRIANGLES) {
         note("points and lines of mesh \"" + from.name + "\" are left out");
         continue;
@@ -229,14 +254,14 @@ class GltfReader {
   }
 
   void read_texture_coordinates(const tinygltf::Primitive& from, GltfPrimitive& to) {
-    int set = 0;
+    TextureTransform transform;
     if (from.material >= 0 && from.material < static_cast<int>(model_.materials.size()))
-      set = model_.materials[from.material].pbrMetallicRoughness.baseColorTexture.texCoord;
-    const auto found = from.attributes.find(fmt::format("TEXCOORD_{}", set));
+      transform = texture_transform(model_.materials[from.material].pbrMetallicRoughness.baseColorTexture);
+    const auto found = from.attributes.find(fmt::format("TEXCOORD_{}", transform.set));
     if (found == from.attributes.end()) return;
     const std::vector<double> values = accessors_.read(found->second, 2);
     for (std::size_t i = 0; i + 1 < values.size(); i += 2)
-      to.texture_coordinates.emplace_back(static_cast<float>(values[i]), static_cast<float>(values[i + 1]));
+      to.texture_coordinates.push_back((transform.map * Eigen::Vector2d(values[i], values[i + 1])).cast<float>());
   }
 
   void read_influences(const tinygltf::Primitive& from, GltfPrimitive& to, const std::string& mesh) {

@@ -2,13 +2,13 @@
 #include "skeletex/io/gltf/write_gltf.h"
 
 #include <fmt/format.h>
-#include <tiny_gltf.h>
 
 #include <algorithm>
 #include <cmath>
 #include <sstream>
 
 #include "skeletex/io/atomic_file.h"
+#include "skeletex/io/gltf/tinygltf.h"
 #include "skeletex/io/image_file.h"
 #include "skeletex/model/error.h"
 
