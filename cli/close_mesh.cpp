@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <array>
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
@@ -14,6 +13,7 @@
 #include "program_path.h"
 #include "runner/process.h"
 #include "skeletex/analysis/manifold.h"
+#include "skeletex/close/cut_handles.h"
 #include "skeletex/close/fill_holes.h"
 #include "skeletex/close/manifold_parts.h"
 #include "skeletex/io/gltf/weld.h"
@@ -30,6 +30,7 @@ constexpr double kSameVertex = 1e-6;
 constexpr double kDetail = 0.008;     // of a wrap, diagonals
 constexpr double kSmallPart = 0.001;  // of the area
 constexpr double kBody = 0.9;         // of the area: a part that is nearly everything
+constexpr double kHandles = 0.1;      // of a wrap: longest loop around a handle that is cut, diagonals
 
 /// A folder for the files that the two programs exchange.
 class WorkFolder {
@@ -122,24 +123,6 @@ Wrap wrap_with(double detail, const WorkFolder& folder) {
   return wrap;
 }
 
-/// Of a few other details the wrap with the fewest handles: parts that nearly touch become handles at one detail, and
-/// not at the next. The coarser, the faster.
-/// \param first  of the usual detail
-Wrap with_fewest_handles(Wrap first, const WorkFolder& folder) {
-  constexpr std::array<double, 4> kOthers{1.5 * kDetail, 2.25 * kDetail, 3.4 * kDetail, 0.75 * kDetail};
-  std::string tried = fmt::format("{} with a detail of {:.2g}", first.report.genus, first.detail);
-  Wrap best = std::move(first);
-  for (const double detail : kOthers) {
-    if (best.report.genus <= 0) break;
-    Wrap wrap = wrap_with(detail, folder);
-    tried += fmt::format(", {} with a detail of {:.2g}", wrap.report.genus, detail);
-    if (wrap.report.genus < best.report.genus) best = std::move(wrap);
-  }
-  if (best.detail != kDetail)
-    spdlog::info("--close: handles of the wrap: {}; that of {:.2g} is taken", tried, best.detail);
-  return best;
-}
-
 Json take_wrap(MeshParts& parts, const TriangleMesh& filled, Wrap wrap) {
   const TriangleMesh& wrapped = wrap.parts.mesh;
   const double diagonal = bounding_box(parts.mesh).diagonal();
@@ -224,6 +207,40 @@ Json take_filled(MeshParts& parts, TriangleMesh filled, const FillResult& fillin
           {"split_vertices", filling.copies.size()}};
 }
 
+/// Says which handles were cut.
+/// \return for the JSON
+Json say_cuts(const HandleCuts& cuts, double diagonal, int handles_left) {
+  Json loops = Json::array();
+  std::string places;
+  for (const CutLoop& loop : cuts.loops) {
+    if (loops.size() < 3)
+      places += fmt::format("{}around {}, {:.2g} diagonals long", places.empty() ? "" : "; ", text_of(loop.centre),
+                            loop.length / diagonal);
+    loops.push_back({{"centre", {loop.centre.x(), loop.centre.y(), loop.centre.z()}}, {"length", loop.length}});
+  }
+  const std::size_t count = cuts.loops.size();
+  if (count > 0)
+    warn(fmt::format("{} handle{} cut off and filled: along {}loop{} {}{}; {} left", count,
+                     count == 1 ? " is" : "s are", count == 1 ? "a " : "", count == 1 ? "" : "s", places,
+                     count > 3 ? "; ..." : "", handles_left));
+  if (cuts.is_stuck) warn("a handle could not be cut off, as its rim has no filling");
+  return loops;
+}
+
+/// Cuts handles off a closed mesh of one part.
+Json cut_parts(MeshParts& parts, double longest) {
+  const double diagonal = bounding_box(parts.mesh).diagonal();
+  TriangleMesh cut = parts.mesh;
+  const HandleCuts cuts = cut_handles(cut, longest * diagonal);
+  if (!cuts.loops.empty()) {
+    copy_vertices(parts, cuts.copies);
+    parts.attributes =
+        with_triangles(parts.attributes, parts.mesh.triangles, with_originals(cut, cuts.copies), cuts.origins);
+    parts.mesh = std::move(cut);
+  }
+  return say_cuts(cuts, diagonal, measure_manifold(parts.mesh).genus);
+}
+
 }  // namespace
 
 void add_close_options(CLI::App& command, CloseOptions& options) {
@@ -233,22 +250,24 @@ void add_close_options(CLI::App& command, CloseOptions& options) {
   command
       .add_option(
           "--close-detail", options.detail,
-          "hollows narrower than this are not entered by the wrap, in diagonals, 0.0005 to 0.5 (default: 0.008, or "
-          "0.006 to 0.027 where the wrap then has fewer handles)")
+          "hollows narrower than this are not entered by the wrap, in diagonals, 0.0005 to 0.5 (default: 0.008)")
       ->check(number_in(0.0005, 0.5))
+      ->type_name("X")
+      ->needs(close);
+  command
+      .add_option(
+          "--close-handles", options.handles,
+          "narrow tunnels are plugged, and thin bridges cut, where a loop around them is no longer than this, in "
+          "diagonals, 0 to 2 (default: 0; 0.1 for a wrap)")
+      ->check(number_in(0, 2))
       ->type_name("X")
       ->needs(close);
 }
 
-Json close_mesh(MeshParts& parts, const CloseOptions& options) {
-  const auto is_closed = [&] {
-    const ManifoldReport report = measure_manifold(parts.mesh);
-    return report.is_closed_manifold() && report.components == 1;
-  };
-  if (is_closed()) {
-    spdlog::info("--close: the mesh is closed");
-    return {{"method", "none"}};
-  }
+namespace {
+
+/// Makes it closed and of one part, as far as that goes.
+Json fill_or_wrap(MeshParts& parts, const CloseOptions& options) {
   for (const Vec3& p : parts.mesh.positions)
     if (!p.allFinite()) throw InputError("--close: a coordinate is not finite; take such vertices out first");
   weld(parts);
@@ -269,9 +288,25 @@ Json close_mesh(MeshParts& parts, const CloseOptions& options) {
           wrap.report.genus, wrap.report.genus == 1 ? "" : "s", 100 * share));
       return take_filled(parts, std::move(body), filling);
     }
-    wrap = with_fewest_handles(std::move(wrap), folder);
   }
   return take_wrap(parts, filled, std::move(wrap));
+}
+
+}  // namespace
+
+Json close_mesh(MeshParts& parts, const CloseOptions& options) {
+  const auto is_closed = [&] {
+    const ManifoldReport report = measure_manifold(parts.mesh);
+    return report.is_closed_manifold() && report.components == 1;
+  };
+  Json json{{"method", "none"}};
+  if (is_closed())
+    spdlog::info("--close: the mesh is closed");
+  else
+    json = fill_or_wrap(parts, options);
+  const double longest = options.handles.value_or(json["method"] == "wrap" ? kHandles : 0);
+  json["cut_loops"] = longest > 0 && is_closed() ? cut_parts(parts, longest) : Json::array();
+  return json;
 }
 
 }  // namespace skeletex::cli

@@ -8,10 +8,11 @@
 
 namespace skeletex::cli {
 
-/// --close and --close-detail.
+/// --close, --close-detail and --close-handles.
 struct CloseOptions {
   bool is_on = false;
-  std::optional<double> detail;  ///< of a wrap, diagonals
+  std::optional<double> detail;   ///< of a wrap, diagonals
+  std::optional<double> handles;  ///< those that a loop of that length goes around are cut, diagonals
 };
 void add_close_options(CLI::App& command, CloseOptions& options);
 
@@ -22,7 +23,8 @@ struct MeshParts {
   VertexBoneWeights weights;
 };
 /// Makes a mesh closed and of one part: fills its holes, else wraps it by the program skeletex_wrap, which is beside
-/// this one or on the PATH. Says what it did, and how far the wrap is from the mesh.
+/// this one or on the PATH. Then cuts handles off: of a wrap, and where --close-handles is given. Says what it did, and
+/// how far the wrap is from the mesh.
 /// \throw InputError when that program is not there, or could not wrap it
 /// \return for the JSON
 Json close_mesh(MeshParts& open, const CloseOptions& options);

@@ -1453,6 +1453,37 @@ TEST_F(Program, DoesNotCloseTheGapOfAnOpenRing) {
   for (const char* name : {"ring.ply", "c.skx.exr", "c.json"}) fs::remove(folder_ / name);
 }
 
+TEST_F(Program, CutsHandlesOff) {
+  // Colours of a ring are those of its places afterwards, too.
+  const TriangleMesh mesh = torus_shape(5, 2, 0.3, 80, 16).mesh;
+  std::ofstream file(folder_ / "ring.ply");
+  file << "ply\nformat ascii 1.0\nelement vertex " << mesh.positions.size()
+       << "\nproperty double x\nproperty double y\nproperty double z\nproperty float height\nelement face "
+       << mesh.triangles.size() << "\nproperty list uchar int vertex_indices\nend_header\n";
+  for (const Vec3& p : mesh.positions) file << p.x() << ' ' << p.y() << ' ' << p.z() << ' ' << p.z() << '\n';
+  for (const Triangle& t : mesh.triangles) file << "3 " << t[0] << ' ' << t[1] << ' ' << t[2] << '\n';
+  file.close();
+  const double around = 2 * M_PI * 0.3 / bounding_box(mesh).diagonal();
+  for (const double longest : {0.9 * around, 1.1 * around}) {
+    SCOPED_TRACE(longest);
+    const Outcome cut = run({"encode", "ring.ply", "-o", "c.skx.exr", "--size", "64", "--close", "--close-handles",
+                             std::to_string(longest), "--json", "c.json"});
+    ASSERT_EQ(cut.code, 0) << cut.err;
+    const nlohmann::json json = nlohmann::json::parse(text_of(folder_ / "c.json"));
+    const bool is_cut = longest > around;
+    EXPECT_EQ(json["close"]["cut_loops"].size(), is_cut ? 1u : 0u);
+    EXPECT_EQ(json["mesh"]["genus"], is_cut ? 0 : 1);
+    EXPECT_EQ(cut.err.find("cut off") != std::string::npos, is_cut) << cut.err;
+  }
+  json_of({"reconstruct", "c.skx.exr", "-o", "c.ply"});
+  const MeshFile back = read_mesh(folder_ / "c.ply");
+  ASSERT_EQ(back.attributes.numbers.size(), 1u);
+  for (std::size_t v = 0; v < back.mesh.positions.size(); ++v)
+    EXPECT_NEAR(back.attributes.numbers[0].values[v], back.mesh.positions[v].z(), 0.1);
+  expect_refused(2, {"encode", "ring.ply", "-o", "c.skx.exr", "--close-handles", "0.1"}, {"--close"});
+  for (const char* name : {"ring.ply", "c.skx.exr", "c.json", "c.ply"}) fs::remove(folder_ / name);
+}
+
 TEST_F(Program, SaysWhenStandardOutputIsFull) {
   const Outcome outcome = run({"inspect", "y.skx.exr", "--json", "-"}, "/dev/full");
   EXPECT_EQ(outcome.code, 1);

@@ -4,13 +4,17 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <set>
 
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/close/carry_over.h"
+#include "skeletex/close/cut_handles.h"
 #include "skeletex/close/fill_holes.h"
 #include "skeletex/close/manifold_parts.h"
+#include "skeletex/geometry/self_intersection.h"
+#include "skeletex/geometry/triangle_tree.h"
 #include "support/shapes.h"
 
 namespace skeletex {
@@ -178,6 +182,66 @@ TEST(FillHoles, WhatStandsInTheWayIsSaid) {
         {torus.triangles[t][0], torus.triangles[t][1], static_cast<int>(fins.positions.size()) - 1});
   }
   EXPECT_NE(fill_holes(fins).obstacle.find("more than two triangles"), std::string::npos);
+}
+
+/// Pairs of triangles that intersect, of the mesh as a model has it: in planes that rounding has left, none would be
+/// sure.
+std::size_t intersecting_pairs(const TriangleMesh& mesh) {
+  return find_self_intersections(in_unit_frame(mesh, unit_frame(mesh))).size();
+}
+
+TEST(CutHandles, ATorusIsCutAcrossItsTube) {
+  constexpr double kCore = 2, kTube = 0.4, kAround = 2 * std::numbers::pi * kTube;
+  const TriangleMesh torus = torus_shape(5, kCore, kTube).mesh;
+  TriangleMesh mesh = torus;
+  EXPECT_TRUE(cut_handles(mesh, 0.95 * kAround).loops.empty());
+  EXPECT_EQ(mesh.positions, torus.positions);
+  EXPECT_EQ(mesh.triangles, torus.triangles);
+  const HandleCuts cuts = cut_handles(mesh, 1.1 * kAround);
+  ASSERT_EQ(cuts.loops.size(), 1u);
+  EXPECT_NEAR(cuts.loops[0].length, kAround, 0.05 * kAround);
+  EXPECT_NEAR(cuts.loops[0].centre.norm(), kCore, 0.01 * kCore);
+  const ManifoldReport report = measure_manifold(mesh);
+  EXPECT_TRUE(report.is_closed_manifold());
+  EXPECT_EQ(report.genus, 0);
+  EXPECT_EQ(report.components, 1);
+  EXPECT_EQ(intersecting_pairs(mesh), 0u);
+  EXPECT_NEAR(signed_volume(mesh), signed_volume(torus), 0.02 * signed_volume(torus));
+  // What was there is there still, or a copy of it.
+  ASSERT_EQ(cuts.origins.size(), mesh.triangles.size());
+  ASSERT_EQ(cuts.copies.size(), mesh.positions.size() - torus.positions.size());
+  const int first = static_cast<int>(torus.positions.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (int k = 0; k < 3 && cuts.origins[t] >= 0; ++k) {
+      const int v = mesh.triangles[t][k];
+      EXPECT_EQ(v < first ? v : cuts.copies[v - first], torus.triangles[cuts.origins[t]][k]);
+    }
+}
+
+TEST(CutHandles, ANarrowTunnelIsPlugged) {
+  constexpr double kCore = 1, kTube = 0.85, kAround = 2 * std::numbers::pi * (kCore - kTube);
+  TriangleMesh mesh = torus_shape(5, kCore, kTube, 48, 48).mesh;
+  const double volume = signed_volume(mesh);
+  const HandleCuts cuts = cut_handles(mesh, 1.1 * kAround);
+  ASSERT_EQ(cuts.loops.size(), 1u);
+  EXPECT_NEAR(cuts.loops[0].length, kAround, 0.05 * kAround);
+  EXPECT_LT(cuts.loops[0].centre.norm(), kCore - kTube);
+  EXPECT_EQ(measure_manifold(mesh).genus, 0);
+  EXPECT_EQ(intersecting_pairs(mesh), 0u);
+  EXPECT_NEAR(signed_volume(mesh), volume, 0.01 * volume);
+}
+
+TEST(CutHandles, EveryHandleIsCut) {
+  const TriangleMesh theta = theta_shape().mesh;
+  TriangleMesh mesh = theta;
+  const HandleCuts cuts = cut_handles(mesh, bounding_box(theta).diagonal());
+  EXPECT_EQ(cuts.loops.size(), 2u);
+  EXPECT_FALSE(cuts.is_stuck);
+  const ManifoldReport report = measure_manifold(mesh);
+  EXPECT_TRUE(report.is_closed_manifold());
+  EXPECT_EQ(report.genus, 0);
+  EXPECT_EQ(report.components, 1);
+  EXPECT_NEAR(signed_volume(mesh), signed_volume(theta), 0.05 * signed_volume(theta));
 }
 
 TEST(CarryOver, ValuesAreThoseOfTheNearestPoint) {

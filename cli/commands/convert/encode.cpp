@@ -141,6 +141,7 @@ struct Input {
   VertexBoneWeights weights;  ///< of a rig
   std::optional<TriangleTree> tree;
   Skeleton skeleton;
+  Json closing;  ///< what --close did; null: nothing
 };
 
 /// Replaces the mesh by its Loop subdivision surface. Weights are linear over its triangles, as named numbers are.
@@ -175,10 +176,11 @@ Input read_input(ClContext& context, const Arguments& arguments, const EncodeOpt
     }
     input.mesh = std::move(file.surface.mesh);
     input.attributes = std::move(file.surface.attributes);
+    input.closing = std::move(file.closing);
   } else {
     MeshFile file = load_mesh_file(arguments.mesh);
     MeshParts parts{std::move(file.mesh), std::move(file.attributes), {}};
-    if (arguments.close.is_on) close_mesh(parts, arguments.close);
+    if (arguments.close.is_on) input.closing = close_mesh(parts, arguments.close);
     input.mesh = std::move(parts.mesh);
     input.attributes = std::move(parts.attributes);
   }
@@ -324,6 +326,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
   warn_of_result(result.report);
   const EncodedFile file{arguments.output, options.width, options.height, watch.lap_ms() / 1000};
   Json json = encode_report_json(result.report, file);
+  if (!input.closing.is_null()) json["close"] = input.closing;
   json["kernels"] = profile_json(context);
   print(arguments.json, arguments.is_verbose ? encode_details_text(result.report) : "");
   print(arguments.json, encode_report_text(result.report, file));

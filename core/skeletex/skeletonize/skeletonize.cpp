@@ -36,7 +36,10 @@ constexpr std::array<double, 4> kDetails{0, 1.0 / 3, 2.0 / 3, 1};
 /// a ring meet inside its polygon; the more sides that has, the nearer they meet to the middle of the hole, outside the
 /// body.
 constexpr double kFineBend = 0.05 * kBend;
-constexpr int kMostHandles = 50;                 // a ring of three bones or more around each; more take minutes to fail
+constexpr int kMostHandles = 50;  // a ring of three bones or more around each; more take minutes to fail
+/// What to do about handles that no skeleton has rings for.
+constexpr const char* kHandleRemedy =
+    ". Small handles can be cut off: encode --close --close-handles X, X diagonals the longest loop around them";
 constexpr std::array<int, 2> kEvenRings{5, 10};  // bones
 
 /// The rule of tips at a level of detail from 0 to 1.
@@ -208,6 +211,13 @@ int choose(const std::vector<SkeletonCandidate>& candidates, const SkeletonizeOp
   return best;
 }
 
+/// Why none of the candidates is taken.
+std::string refusal_of(const SkeletonizeResult& result) {
+  const SkeletonCandidate& first = result.candidates.front();
+  return fmt::format("none of {} skeletons works; for \"{}\": {}{}", result.candidates.size(), first.name,
+                     first.refusal, result.genus > 0 ? kHandleRemedy : "");
+}
+
 }  // namespace
 
 SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, const TriangleTree& tree,
@@ -221,8 +231,8 @@ SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, cons
   SkeletonizeResult result;
   result.genus = genus_of(mesh);
   if (result.genus > kMostHandles)
-    throw TopologyError(
-        fmt::format("the mesh has {} handles, and skeletons are found for up to {}", result.genus, kMostHandles));
+    throw TopologyError(fmt::format("the mesh has {} handles, and skeletons are found for up to {}{}", result.genus,
+                                    kMostHandles, kHandleRemedy));
   report("filling the body", 0);
   const VoxelBody body = make_fitting_body(surface, result.genus);
   if (body.size() == 0)
@@ -266,9 +276,7 @@ SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, cons
       if (result.candidates.back().refusal.empty()) break;
     }
   result.chosen = choose(result.candidates, options);
-  if (result.chosen < 0)
-    throw TopologyError(fmt::format("none of {} skeletons works; for \"{}\": {}", levels.size(),
-                                    result.candidates[0].name, result.candidates[0].refusal));
+  if (result.chosen < 0) throw TopologyError(refusal_of(result));
   if (options.purpose == SkeletonPurpose::kPose && !options.most_bones && add_jointed_level(surface, result, levels)) {
     try_level(levels.back());
     if (is_worth_its_joints(result)) result.chosen = static_cast<int>(result.candidates.size()) - 1;

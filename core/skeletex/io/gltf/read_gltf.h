@@ -10,10 +10,12 @@ namespace skeletex {
 bool is_gltf_file(const std::filesystem::path& path);
 
 /// Reads a glTF 2.0 file, binary or text, by its content: nodes, triangles, skins, animations, base colours and
-/// pictures. Primitives are triangle lists afterwards; morph targets are applied with their default weights; what Draco
-/// and meshopt compress is unpacked. What is left out (lines, pictures that cannot be read, animated morph targets) is
-/// in the notes. \throw IoError naming what is wrong: damaged, an index out of range, nodes in a circle, a number that
-/// is not finite, or an extension that is needed and not known
+/// pictures. What Draco and meshopt compress is unpacked, primitives are triangle lists afterwards, and morph targets
+/// are applied with their default weights. The notes say what is left out: lines, pictures that cannot be read,
+/// animated morph targets.
+///
+/// \throw IoError naming what is wrong: damaged, an index out of range, nodes in a circle, a number that is not finite,
+/// or an extension that is needed and not known
 GltfScene read_gltf(const std::filesystem::path& path);
 
 }  // namespace skeletex
