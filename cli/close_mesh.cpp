@@ -30,7 +30,7 @@ constexpr double kSameVertex = 1e-6;
 constexpr double kDetail = 0.008;     // of a wrap, diagonals
 constexpr double kSmallPart = 0.001;  // of the area
 constexpr double kBody = 0.9;         // of the area: a part that is nearly everything
-constexpr double kHandles = 0.1;      // of a wrap: longest loop around a handle that is cut, diagonals
+constexpr double kHandles = 0.2;      // of a wrap: longest loop around a handle that is cut, diagonals
 
 /// A folder for the files that the two programs exchange.
 class WorkFolder {
@@ -258,7 +258,7 @@ void add_close_options(CLI::App& command, CloseOptions& options) {
       .add_option(
           "--close-handles", options.handles,
           "narrow tunnels are plugged, and thin bridges cut, where a loop around them is no longer than this, in "
-          "diagonals, 0 to 2 (default: 0; 0.1 for a wrap)")
+          "diagonals, 0 to 2 (default: 0; 0.2 for a wrap)")
       ->check(number_in(0, 2))
       ->type_name("X")
       ->needs(close);
