@@ -19,7 +19,7 @@ main=(
   ocl-icd-opencl-dev ocl-icd-libopencl1 opencl-headers opencl-clhpp-headers pocl-opencl-icd  # OpenCL, on the CPU
   libopenmesh-dev libeigen3-dev libopenexr-dev libxxhash-dev nlohmann-json3-dev libfmt-dev libsleef-dev  # library
   libpng-dev libturbojpeg0-dev libjpeg62-turbo-dev zlib1g-dev liblzma-dev libtinygltf-dev            # pictures, the page, glTF
-  libdraco-dev libmeshoptimizer-dev libstb-dev                       # glTF that is compressed
+  libdraco-dev libmeshoptimizer-dev libstb-dev libwebp-dev           # glTF that is compressed
   libegl-dev libopengl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libcairo2-dev pkg-config fonts-dejavu-core  # renderer, without a GPU too
   libcli11-dev libspdlog-dev libembree-dev                           # program (bench compares with Embree)
 )

@@ -3,6 +3,7 @@
 #include <draco/compression/expert_encode.h>
 #include <gtest/gtest.h>
 #include <meshoptimizer.h>
+#include <webp/encode.h>
 
 #include <cstring>
 #include <fstream>
@@ -254,6 +255,34 @@ TEST_P(CompressedGltf, SizesThatCannotBeAreRefusedBeforeMemoryIsTaken) {
 
 INSTANTIATE_TEST_SUITE_P(Packers, CompressedGltf, testing::Values(packed_by_draco, packed_by_meshopt),
                          [](const auto& packer) { return packer.index == 0 ? "Draco" : "Meshopt"; });
+
+TEST(Gltf, PicturesAreReadAsWebP) {
+  const ScratchFolder folder;
+  GltfScene scene = sheet();
+  std::mt19937 random(1);
+  for (std::size_t i = 0; i < scene.images[0].rgba.size(); ++i)
+    scene.images[0].rgba[i] = i % 4 == 3 ? 255 : static_cast<std::uint8_t>(random());
+  write_gltf(folder / "plain.glb", scene);
+  Parts parts = read_parts(folder / "plain.glb");
+  std::uint8_t* bytes = nullptr;
+  const ColourImage& picture = scene.images[0];
+  const std::size_t size =
+      WebPEncodeLosslessRGBA(picture.rgba.data(), picture.width, picture.height, 4 * picture.width, &bytes);
+  Json& view = parts.scene["bufferViews"][parts.scene["images"][0]["bufferView"].get<int>()];
+  view["byteOffset"] = parts.bytes.size();
+  view["byteLength"] = size;
+  parts.bytes.append(reinterpret_cast<const char*>(bytes), size);
+  WebPFree(bytes);
+  parts.scene["buffers"][0]["byteLength"] = parts.bytes.size();
+  parts.scene["images"][0]["mimeType"] = "image/webp";
+  parts.scene["textures"][0].erase("source");
+  parts.scene["textures"][0]["extensions"]["EXT_texture_webp"]["source"] = 0;
+  parts.scene["extensionsRequired"] = {"EXT_texture_webp"};
+  write_parts(folder / "webp.glb", parts);
+  const GltfScene read = read_gltf(folder / "webp.glb");
+  EXPECT_EQ(read.images.at(0).rgba, picture.rgba);
+  EXPECT_EQ(read.materials.at(0).image, 0);
+}
 
 TEST(Gltf, ATextureTransformMovesTheCoordinates) {
   const ScratchFolder folder;

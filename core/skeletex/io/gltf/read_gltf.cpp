@@ -2,6 +2,7 @@
 #include "skeletex/io/gltf/read_gltf.h"
 
 #include <fmt/format.h>
+#include <webp/decode.h>
 
 #include <algorithm>
 #include <array>
@@ -33,10 +34,22 @@ constexpr std::array kKnownExtensions{"KHR_mesh_quantization",
                                       "VRMC_springBone",
                                       "VRMC_node_constraint"};
 
+bool load_webp(tinygltf::Image& image, const unsigned char* bytes, std::size_t size) {
+  std::uint8_t* rgba = WebPDecodeRGBA(bytes, size, &image.width, &image.height);
+  if (rgba == nullptr) return false;
+  image.component = 4;
+  image.bits = 8;
+  image.pixel_type = TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE;
+  image.image.assign(rgba, rgba + std::size_t{4} * image.width * image.height);
+  WebPFree(rgba);
+  return true;
+}
+
 /// A picture that cannot be decoded is no reason to refuse the rest.
 bool load_image(tinygltf::Image* image, const int index, std::string* /*error*/, std::string* warning, int width,
                 int height, const unsigned char* bytes, int size, void* /*data*/) {
   std::string ignored;
+  if (load_webp(*image, bytes, static_cast<std::size_t>(size))) return true;
   if (tinygltf::LoadImageData(image, index, &ignored, warning, width, height, bytes, size, nullptr)) return true;
   image->image.clear();
   return true;
@@ -104,6 +117,14 @@ TextureTransform texture_transform(const tinygltf::TextureInfo& texture) {
       Eigen::Translation2d(pair("offset", 0)) * Eigen::Rotation2Dd(-turn) * Eigen::AlignedScaling2d(pair("scale", 1));
   if (extension.Has("texCoord") && extension.Get("texCoord").IsInt()) result.set = extension.Get("texCoord").Get<int>();
   return result;
+}
+
+/// The picture of a texture, in the format of an extension where it has one.
+int picture_of(const tinygltf::Texture& texture) {
+  const auto webp = texture.extensions.find("EXT_texture_webp");
+  if (webp == texture.extensions.end() || !webp->second.Has("source") || !webp->second.Get("source").IsInt())
+    return texture.source;
+  return webp->second.Get("source").Get<int>();
 }
 
 /// An animation makes no sense; the rest of the file may.
@@ -397,7 +418,7 @@ class GltfReader {
         material.base_colour[static_cast<int>(i)] = static_cast<float>(factor[i]);
       const int texture = from.pbrMetallicRoughness.baseColorTexture.index;
       check_index(texture, model_.textures.size(), "texture of material \"" + from.name + '"');
-      if (texture >= 0) material.image = model_.textures[texture].source;
+      if (texture >= 0) material.image = picture_of(model_.textures[texture]);
       check_index(material.image, model_.images.size(), "picture of material \"" + from.name + '"');
       if (material.image >= 0 && scene_.images[material.image].rgba.empty()) material.image = -1;
       scene_.materials.push_back(material);
