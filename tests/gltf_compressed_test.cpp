@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Files packed by KHR_draco_mesh_compression and EXT_meshopt_compression hold the same scene as the plain ones.
 #include <draco/compression/expert_encode.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <meshoptimizer.h>
 #include <webp/encode.h>
@@ -255,6 +256,30 @@ TEST_P(CompressedGltf, SizesThatCannotBeAreRefusedBeforeMemoryIsTaken) {
 
 INSTANTIATE_TEST_SUITE_P(Packers, CompressedGltf, testing::Values(packed_by_draco, packed_by_meshopt),
                          [](const auto& packer) { return packer.index == 0 ? "Draco" : "Meshopt"; });
+
+TEST(Gltf, JointsAndIndicesAreNeitherNegativeNorHuge) {
+  const ScratchFolder folder;
+  write_gltf(folder / "plain.glb", sheet());
+  const Parts plain = read_parts(folder / "plain.glb");
+  for (const char* name : {"JOINTS_0", "indices"})
+    for (const float wrong : {-5.F, 1e10F}) {
+      SCOPED_TRACE(fmt::format("{} {}", name, wrong));
+      Parts parts = plain;
+      Json& primitive = parts.scene["meshes"][0]["primitives"][0];
+      const bool is_joint = primitive["attributes"].contains(name);
+      Json& accessor =
+          parts.scene["accessors"][(is_joint ? primitive["attributes"][name] : primitive[name]).get<int>()];
+      accessor["componentType"] = 5126;  // as no valid file has them
+      const std::vector<float> values(accessor["count"].get<std::size_t>() * (is_joint ? 4 : 1), wrong);
+      Json& view = parts.scene["bufferViews"][accessor["bufferView"].get<int>()];
+      view["byteOffset"] = parts.bytes.size();
+      view["byteLength"] = 4 * values.size();
+      parts.bytes.append(reinterpret_cast<const char*>(values.data()), 4 * values.size());
+      parts.scene["buffers"][0]["byteLength"] = parts.bytes.size();
+      write_parts(folder / "wrong.glb", parts);
+      EXPECT_THROW(read_gltf(folder / "wrong.glb"), IoError);
+    }
+}
 
 TEST(Gltf, PicturesAreReadAsWebP) {
   const ScratchFolder folder;

@@ -56,12 +56,14 @@ bool load_image(tinygltf::Image* image, const int index, std::string* /*error*/,
 }
 
 tinygltf::Model load(const std::filesystem::path& path) {
-  const std::string where = path.string(), bytes = with_placeholders(read_file(path, 0xffffffffU));
+  const std::string where = path.string();
+  std::string bytes = with_placeholders(read_file(path, 0xffffffffU));
   tinygltf::TinyGLTF loader;
   loader.SetImageLoader(load_image, nullptr);
   tinygltf::Model model;
   std::string error, warning;
   const auto size = static_cast<unsigned int>(bytes.size());
+  bytes.append(8, '\0');  // tinygltf 2.7 forgets the header of the second chunk when it checks where that ends
   const std::string folder = path.has_parent_path() ? path.parent_path().string() : ".";
   bool is_read = false;
   try {
@@ -303,7 +305,9 @@ class GltfReader {
         for (int i = 0; i < 4; ++i) {
           const double weight = weights[set][4 * v + i];
           if (!std::isfinite(weight)) fail("mesh \"" + mesh + "\": a weight is not finite");
-          to.joints.push_back(static_cast<int>(joints[set][4 * v + i]));
+          const double joint = joints[set][4 * v + i];
+          if (!(joint >= 0 && joint <= 65535)) fail(fmt::format("mesh \"{}\": there is no joint {}", mesh, joint));
+          to.joints.push_back(static_cast<int>(joint));
           to.weights.push_back(static_cast<float>(std::max(weight, 0.0)));
         }
   }
@@ -313,7 +317,7 @@ class GltfReader {
     std::vector<int> indices;
     if (from.indices >= 0) {
       for (const double index : accessors_.read(from.indices, 1)) {
-        if (!(index < static_cast<double>(count)))
+        if (!(index >= 0 && index < static_cast<double>(count)))
           fail(fmt::format("mesh \"{}\": index {} but {} positions", mesh, index, count));
         indices.push_back(static_cast<int>(index));
       }
