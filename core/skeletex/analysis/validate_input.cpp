@@ -60,10 +60,11 @@ void check_genus(const Skeleton& skeleton, int genus, std::vector<Finding>& find
       {Severity::kError, "genus",
        fmt::format("the mesh has {} handle{} (its genus), but the skeleton has {} independent cycle{} of bones", genus,
                    plural(genus), cycles, plural(cycles)),
-       cycles < genus
-           ? fmt::format("close {} more ring{} of bones, one around every hole of the body", missing, plural(missing))
-           : fmt::format("open {} ring{} of bones: only a hole in the body has one around it", missing,
-                         plural(missing))});
+       cycles < genus ? fmt::format("close {} more ring{} of bones, one around every hole of the body, or cut small "
+                                    "handles off (encode --close --close-handles X)",
+                                    missing, plural(missing))
+                      : fmt::format("open {} ring{} of bones: only a hole in the body has one around it", missing,
+                                    plural(missing))});
 }
 
 }  // namespace
