@@ -30,7 +30,8 @@ constexpr double kSameVertex = 1e-6;
 constexpr double kDetail = 0.008;     // of a wrap, diagonals
 constexpr double kSmallPart = 0.001;  // of the area
 constexpr double kBody = 0.9;         // of the area: a part that is nearly everything
-constexpr double kHandles = 0.2;      // of a wrap: longest loop around a handle that is cut, diagonals
+constexpr int kMostUnited = 300;      // parts
+constexpr double kHandles = 0.2;      // of a wrap or union: longest loop around a handle that is cut, diagonals
 
 /// A folder for the files that the two programs exchange.
 class WorkFolder {
@@ -101,13 +102,15 @@ struct Wrap {
   int removed = 0;  ///< components that were next to nothing
 };
 
-Wrap wrap_with(double detail, const WorkFolder& folder) {
+/// Runs skeletex_wrap on the mesh in the folder.
+/// \return its result; nothing, and what it says, where there is none
+std::optional<TriangleMesh> run_wrap(const WorkFolder& folder, const std::vector<std::string>& options,
+                                     std::string& errors) {
+  std::vector<std::string> arguments{(folder / "mesh.ply").string(), "-o", (folder / "wrap.ply").string()};
+  arguments.insert(arguments.end(), options.begin(), options.end());
   ProcessResult result;
   try {
-    result = run_process(
-        wrap_program(),
-        {(folder / "mesh.ply").string(), "-o", (folder / "wrap.ply").string(), "--detail", fmt::format("{}", detail)},
-        {}, folder / "errors.txt");
+    result = run_process(wrap_program(), arguments, {}, folder / "errors.txt");
   } catch (const IoError&) {
     result.exit_code = 127;
   }
@@ -115,12 +118,51 @@ Wrap wrap_with(double detail, const WorkFolder& folder) {
     throw InputError(
         "--close: the program skeletex_wrap, which wraps such meshes, is neither beside skeletex nor on the PATH; it "
         "is built where CGAL is installed");
-  if (result.exit_code != 0) throw InputError(fmt::format("--close: the mesh could not be wrapped: {}", result.errors));
-  Wrap wrap{detail, {read_mesh(folder / "wrap.ply").mesh, {}, {}}, {}, 0};
+  errors = result.errors;
+  if (result.exit_code != 0) return {};
+  return read_mesh(folder / "wrap.ply").mesh;
+}
+
+Wrap wrap_with(double detail, const WorkFolder& folder) {
+  std::string errors;
+  std::optional<TriangleMesh> mesh = run_wrap(folder, {"--detail", fmt::format("{}", detail)}, errors);
+  if (!mesh) throw InputError(fmt::format("--close: the mesh could not be wrapped: {}", errors));
+  Wrap wrap{detail, {std::move(*mesh), {}, {}}, {}, 0};
   wrap.removed = remove_small_components(wrap.parts.mesh, kSmallPart);  // a lone triangle gets a wrap of its own
   remove_unused_vertices(wrap.parts);
   wrap.report = measure_manifold(wrap.parts.mesh);
   return wrap;
+}
+
+/// Takes the union of closed parts in place of a mesh, where it is one closed body.
+/// \param filled  the mesh with its holes filled
+/// \return for the JSON; null: it is not
+Json take_union(MeshParts& parts, const TriangleMesh& filled, const WorkFolder& folder) {
+  const ManifoldReport before = measure_manifold(filled);
+  if (!before.is_closed_manifold() || before.components > kMostUnited) return {};
+  std::string errors;
+  std::optional<TriangleMesh> mesh = run_wrap(folder, {"--union"}, errors);
+  if (!mesh) {
+    spdlog::info("--close: its parts have no union: {}", errors);
+    return {};
+  }
+  const int left_out = remove_small_components(*mesh, kSmallPart);
+  MeshParts united{std::move(*mesh), {}, {}};
+  remove_unused_vertices(united);
+  const ManifoldReport after = measure_manifold(united.mesh);
+  if (!after.is_closed_manifold() || after.components != 1) {
+    spdlog::info("--close: the union of its parts is no single closed body");
+    return {};
+  }
+  spdlog::info("--close: the {} parts are united in a mesh of {} triangles", before.components,
+               united.mesh.triangles.size());
+  if (left_out > 0)
+    warn(fmt::format("{} part{} with less than {} % of the area {} left out", left_out, left_out == 1 ? "" : "s",
+                     100 * kSmallPart, left_out == 1 ? "is" : "are"));
+  CarriedOver carried =
+      carry_over(parts.mesh, build_triangle_tree(parts.mesh), parts.attributes, parts.weights, united.mesh);
+  parts = {std::move(united.mesh), std::move(carried.attributes), std::move(carried.weights)};
+  return {{"method", "union"}, {"parts", before.components}, {"triangles", parts.mesh.triangles.size()}};
 }
 
 Json take_wrap(MeshParts& parts, const TriangleMesh& filled, Wrap wrap) {
@@ -244,9 +286,9 @@ Json cut_parts(MeshParts& parts, double longest) {
 }  // namespace
 
 void add_close_options(CLI::App& command, CloseOptions& options) {
-  CLI::Option* close =
-      command.add_flag("--close", options.is_on,
-                       "make the mesh closed: holes are filled; sheets, and what has several parts, are wrapped");
+  CLI::Option* close = command.add_flag(
+      "--close", options.is_on,
+      "make the mesh closed: holes are filled, closed parts that overlap are united; all else is wrapped");
   command
       .add_option(
           "--close-detail", options.detail,
@@ -258,7 +300,7 @@ void add_close_options(CLI::App& command, CloseOptions& options) {
       .add_option(
           "--close-handles", options.handles,
           "narrow tunnels are plugged, and thin bridges cut, where a loop around them is no longer than this, in "
-          "diagonals, 0 to 2 (default: 0; 0.2 for a wrap)")
+          "diagonals, 0 to 2 (default: 0; 0.2 for a union or a wrap)")
       ->check(number_in(0, 2))
       ->type_name("X")
       ->needs(close);
@@ -274,9 +316,11 @@ Json fill_or_wrap(MeshParts& parts, const CloseOptions& options) {
   TriangleMesh filled = parts.mesh;
   FillResult filling = fill_holes(filled);
   if (filling.obstacle.empty()) return take_filled(parts, std::move(filled), filling);
-  spdlog::info("--close: {}, so the mesh is wrapped", filling.obstacle);
   const WorkFolder folder;
   write_mesh(folder / "mesh.ply", filled);
+  if (!options.detail)
+    if (Json json = take_union(parts, filled, folder); !json.is_null()) return json;
+  spdlog::info("--close: {}, so the mesh is wrapped", filling.obstacle);
   Wrap wrap = wrap_with(options.detail.value_or(kDetail), folder);
   if (!options.detail && wrap.report.genus > 0) {
     TriangleMesh body = filled;
@@ -304,7 +348,8 @@ Json close_mesh(MeshParts& parts, const CloseOptions& options) {
     spdlog::info("--close: the mesh is closed");
   else
     json = fill_or_wrap(parts, options);
-  const double longest = options.handles.value_or(json["method"] == "wrap" ? kHandles : 0);
+  const bool is_new = json["method"] == "wrap" || json["method"] == "union";
+  const double longest = options.handles.value_or(is_new ? kHandles : 0);
   json["cut_loops"] = longest > 0 && is_closed() ? cut_parts(parts, longest) : Json::array();
   return json;
 }

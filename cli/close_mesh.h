@@ -22,11 +22,10 @@ struct MeshParts {
   MeshAttributes attributes;
   VertexBoneWeights weights;
 };
-/// Makes a mesh closed and of one part: fills its holes, else wraps it by the program skeletex_wrap, which is beside
-/// this one or on the PATH. Then cuts handles off: of a wrap, and where --close-handles is given. Says what it did, and
-/// how far the wrap is from the mesh.
-/// \throw InputError when that program is not there, or could not wrap it
-/// \return for the JSON
+/// Makes a mesh closed and of one part: fills its holes, else unites its parts or wraps it by the program
+/// skeletex_wrap, which is beside this one or on the PATH. Then cuts handles off: of a union or a wrap, and where
+/// --close-handles is given. Says what it did, and how far a wrap is from the mesh. \throw InputError when that program
+/// is not there, or could not wrap it \return for the JSON
 Json close_mesh(MeshParts& open, const CloseOptions& options);
 
 }  // namespace skeletex::cli

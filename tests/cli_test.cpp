@@ -1430,9 +1430,38 @@ TEST_F(Program, SplitsVerticesWhereAMeshTouchesItselfAndKeepsTheirNumbers) {
   for (const char* name : {"dented.ply", "capsule.skeleton.json", "c.skx.exr", "c.ply"}) fs::remove(folder_ / name);
 }
 
+void add_part(const TriangleMesh& part, const Vec3& offset, TriangleMesh& mesh) {
+  const int first = static_cast<int>(mesh.positions.size());
+  for (const Vec3& p : part.positions) mesh.positions.push_back(p + offset);
+  for (const Triangle& t : part.triangles) mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+}
+
+TEST_F(Program, UnitesPartsThatOverlap) {
+  if (!fs::exists(fs::path(SKELETEX_PROGRAM).parent_path() / "skeletex_wrap")) GTEST_SKIP() << "built without CGAL";
+  constexpr double kRadius = 0.5;
+  const TriangleMesh upright = capsule_shape(3, kRadius).mesh;
+  Similarity turn;
+  turn.rotation = Eigen::AngleAxisd(M_PI / 2, Vec3(0.01, 1, 0).normalized()).toRotationMatrix();
+  TriangleMesh cross = upright;
+  add_part(transformed(upright, turn), Vec3(0, 0.01, 0), cross);
+  write_mesh(folder_ / "cross.ply", cross);
+  const Outcome closed =
+      run({"encode", "cross.ply", "-o", "c.skx.exr", "--size", "128", "--close", "--json", "c.json"});
+  ASSERT_EQ(closed.code, 0) << closed.err;
+  const nlohmann::json json = nlohmann::json::parse(text_of(folder_ / "c.json"));
+  EXPECT_EQ(json["close"]["method"], "union") << closed.err;
+  EXPECT_EQ(json["close"]["parts"], 2);
+  EXPECT_LT(json["mesh"]["triangles"].get<std::size_t>(), 1.2 * static_cast<double>(cross.triangles.size()));
+  json_of({"reconstruct", "c.skx.exr", "-o", "c.ply"});
+  const double common = 16.0 / 3 * kRadius * kRadius * kRadius;  // of two cylinders that cross
+  const double volume = 2 * signed_volume(upright) - common;
+  EXPECT_NEAR(signed_volume(read_mesh(folder_ / "c.ply").mesh), volume, 0.02 * volume);
+  for (const char* name : {"cross.ply", "c.skx.exr", "c.json", "c.ply"}) fs::remove(folder_ / name);
+}
+
 TEST_F(Program, DoesNotCloseTheGapOfAnOpenRing) {
   if (!fs::exists(fs::path(SKELETEX_PROGRAM).parent_path() / "skeletex_wrap")) GTEST_SKIP() << "built without CGAL";
-  // A ring that is cut through, and a part of its own in it: a wrap of both closes the ring.
+  // A ring that is cut through, and a part of its own in the middle: a wrap of both closes the ring.
   constexpr int kAlong = 240;
   TriangleMesh mesh = torus_shape(5, 2, 0.5, kAlong, 16).mesh;
   std::erase_if(mesh.triangles, [&](const Triangle& t) {
@@ -1440,11 +1469,7 @@ TEST_F(Program, DoesNotCloseTheGapOfAnOpenRing) {
     const double angle = std::atan2(centre.y(), centre.x());
     return angle > 0 && angle < 2 * M_PI / kAlong;
   });
-  const int first = static_cast<int>(mesh.positions.size());
-  for (const Vec3& p : {Vec3(-2, 0, 0), Vec3(-1.9, 0, 0), Vec3(-2, 0.1, 0), Vec3(-2, 0, 0.1)})
-    mesh.positions.push_back(p);
-  for (const Triangle& t : {Triangle{0, 2, 1}, Triangle{0, 1, 3}, Triangle{1, 2, 3}, Triangle{2, 0, 3}})
-    mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  add_part(capsule_shape(0.2, 0.1).mesh, Vec3::Zero(), mesh);
   write_mesh(folder_ / "ring.ply", mesh);
   const Outcome closed = run({"encode", "ring.ply", "-o", "c.skx.exr", "--size", "64", "--close", "--json", "c.json"});
   ASSERT_EQ(closed.code, 0) << closed.err;
