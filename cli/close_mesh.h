@@ -24,8 +24,10 @@ struct MeshParts {
 };
 /// Makes a mesh closed and of one part: fills its holes, else unites its parts or wraps it by the program
 /// skeletex_wrap, which is beside this one or on the PATH. Then cuts handles off: of a union or a wrap, and where
-/// --close-handles is given. Says what it did, and how far a wrap is from the mesh. \throw InputError when that program
-/// is not there, or could not wrap it \return for the JSON
+/// --close-handles is given. Says what it did, and how far a wrap is from the mesh.
+///
+/// \throw InputError when that program is not there, or could not wrap it
+/// \return for the JSON
 Json close_mesh(MeshParts& open, const CloseOptions& options);
 
 }  // namespace skeletex::cli

@@ -21,9 +21,13 @@ struct HandleCuts {
 
 /// Cuts handles off: wherever a loop shorter than `longest` does not part the surface, the mesh is cut along it, the
 /// two rims are drawn a little apart, and both are filled. A narrow tunnel gets plugged so, a thin bridge goes; the
-/// genus falls by one each. Loops come from trees of shortest paths and their cotrees (Erickson and Whittlesey, Greedy
-/// Optimal Homotopy and Homology Generators, 2005), rooted on loops found before: short ones, though not always the
-/// shortest. \param longest  world units \pre a closed manifold of one component; finite coordinates
+/// genus falls by one each.
+///
+/// Loops come from trees of shortest paths and their cotrees (Erickson and Whittlesey, Greedy Optimal Homotopy and
+/// Homology Generators, 2005), rooted on loops found before: short ones, though not always the shortest.
+///
+/// \param longest  world units
+/// \pre a closed manifold of one component; finite coordinates
 HandleCuts cut_handles(TriangleMesh& mesh, double longest);
 
 }  // namespace skeletex
