@@ -31,7 +31,7 @@ constexpr double kDetail = 0.008;     // of a wrap, diagonals
 constexpr double kSmallPart = 0.001;  // of the area
 constexpr double kBody = 0.9;         // of the area: a part that is nearly everything
 constexpr int kMostUnited = 300;      // parts
-constexpr double kHandles = 0.2;      // of a wrap or union: longest loop around a handle that is cut, diagonals
+constexpr double kHandles = 0.08;     // of a wrap or union: longest loop around a handle that is cut, diagonals
 
 /// A folder for the files that the two programs exchange.
 class WorkFolder {
@@ -261,10 +261,14 @@ Json say_cuts(const HandleCuts& cuts, double diagonal, int handles_left) {
     loops.push_back({{"centre", {loop.centre.x(), loop.centre.y(), loop.centre.z()}}, {"length", loop.length}});
   }
   const std::size_t count = cuts.loops.size();
+  if (cuts.shortest_left > 0)
+    spdlog::info(
+        "--close: {} handle{} left; the shortest loop found around one is {:.2g} diagonals long "
+        "(--close-handles)",
+        handles_left, handles_left == 1 ? " is" : "s are", cuts.shortest_left / diagonal);
   if (count > 0)
-    warn(fmt::format("{} handle{} cut off and filled: along {}loop{} {}{}; {} left", count,
-                     count == 1 ? " is" : "s are", count == 1 ? "a " : "", count == 1 ? "" : "s", places,
-                     count > 3 ? "; ..." : "", handles_left));
+    warn(fmt::format("{} handle{} cut off and filled: along {}loop{} {}{}", count, count == 1 ? " is" : "s are",
+                     count == 1 ? "a " : "", count == 1 ? "" : "s", places, count > 3 ? "; ..." : ""));
   if (cuts.is_stuck) warn("a handle could not be cut off, as its rim has no filling");
   return loops;
 }
@@ -300,7 +304,7 @@ void add_close_options(CLI::App& command, CloseOptions& options) {
       .add_option(
           "--close-handles", options.handles,
           "narrow tunnels are plugged, and thin bridges cut, where a loop around them is no longer than this, in "
-          "diagonals, 0 to 2 (default: 0; 0.2 for a union or a wrap)")
+          "diagonals, 0 to 2 (default: 0; 0.08 for a union or a wrap)")
       ->check(number_in(0, 2))
       ->type_name("X")
       ->needs(close);

@@ -194,13 +194,16 @@ TEST(CutHandles, ATorusIsCutAcrossItsTube) {
   constexpr double kCore = 2, kTube = 0.4, kAround = 2 * std::numbers::pi * kTube;
   const TriangleMesh torus = torus_shape(5, kCore, kTube).mesh;
   TriangleMesh mesh = torus;
-  EXPECT_TRUE(cut_handles(mesh, 0.95 * kAround).loops.empty());
+  const HandleCuts none = cut_handles(mesh, 0.95 * kAround);
+  EXPECT_TRUE(none.loops.empty());
+  EXPECT_NEAR(none.shortest_left, kAround, 0.05 * kAround);
   EXPECT_EQ(mesh.positions, torus.positions);
   EXPECT_EQ(mesh.triangles, torus.triangles);
   const HandleCuts cuts = cut_handles(mesh, 1.1 * kAround);
   ASSERT_EQ(cuts.loops.size(), 1u);
   EXPECT_NEAR(cuts.loops[0].length, kAround, 0.05 * kAround);
   EXPECT_NEAR(cuts.loops[0].centre.norm(), kCore, 0.01 * kCore);
+  EXPECT_EQ(cuts.shortest_left, 0);
   const ManifoldReport report = measure_manifold(mesh);
   EXPECT_TRUE(report.is_closed_manifold());
   EXPECT_EQ(report.genus, 0);

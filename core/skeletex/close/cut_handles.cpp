@@ -184,11 +184,13 @@ bool cut_along(const std::vector<int>& loop, TriangleMesh& mesh, std::vector<int
 }
 
 /// Cuts along loops that have no vertex in common.
-std::vector<CutLoop> cut_short_loops(TriangleMesh& mesh, double longest, std::vector<int>& copies) {
+/// \param loops  of the mesh, the shortest first
+std::vector<CutLoop> cut_short_loops(const std::vector<Loop>& loops, double longest, TriangleMesh& mesh,
+                                     std::vector<int>& copies) {
   std::vector<CutLoop> cuts;
   std::vector<bool> is_taken(mesh.positions.size());
   const TriangleMesh whole = mesh;
-  for (const Loop& loop : LoopSearch(whole).short_loops()) {
+  for (const Loop& loop : loops) {
     if (loop.length > longest) break;
     if (std::ranges::any_of(loop.vertices, [&](int v) { return is_taken[v]; })) continue;
     if (!cut_along(loop.vertices, mesh, copies)) continue;
@@ -211,7 +213,9 @@ HandleCuts cut_handles(TriangleMesh& mesh, double longest) {
   while (measure_manifold(mesh).genus > 0) {
     TriangleMesh cut = mesh;
     std::vector<int> copies;
-    const std::vector<CutLoop> loops = cut_short_loops(cut, longest, copies);
+    const std::vector<Loop> short_loops = LoopSearch(mesh).short_loops();
+    result.shortest_left = short_loops.front().length;
+    const std::vector<CutLoop> loops = cut_short_loops(short_loops, longest, cut, copies);
     if (loops.empty()) break;
     const FillResult filling = fill_holes(cut);
     if (!filling.obstacle.empty() || !filling.copies.empty()) {
@@ -220,6 +224,7 @@ HandleCuts cut_handles(TriangleMesh& mesh, double longest) {
     }
     draw_apart(cut, filling.origins);
     mesh = std::move(cut);
+    result.shortest_left = 0;
     result.loops.insert(result.loops.end(), loops.begin(), loops.end());
     for (const int v : copies) result.copies.push_back(v < before ? v : result.copies[v - before]);
     std::vector<int> origins;

@@ -16,6 +16,7 @@ struct HandleCuts {
   std::vector<CutLoop> loops;
   std::vector<int> origins;  ///< per triangle the one that it was before; -1: it closes a cut
   std::vector<int> copies;   ///< per vertex that was added, at the end, the one that it is a copy of
+  double shortest_left = 0;  ///< of the loops that are left, as far as found, world units; 0: none is left
   bool is_stuck = false;     ///< a rim could not be filled, so some short loops are left
 };
 
