@@ -8,6 +8,8 @@
 #include <set>
 #include <utility>
 
+#include "skeletex/geometry/parallel.h"
+
 namespace skeletex {
 namespace {
 
@@ -112,21 +114,34 @@ bool Repair::move_node(int node, double step, int trials) {
   // The worst first: most moves are ruled out by it.
   std::stable_sort(bones.begin(), bones.end(), [&](int a, int b) { return margins_[a].margin < margins_[b].margin; });
   const double before = displacement_cost(skeleton_, node) + cost(skeleton_, at_nodes_, bones, kNoLimit);
-  double least = before;
   const Vec3 start = skeleton_.nodes[node].position;
-  Vec3 best = start;
-  for (int trial = 0; trial < trials; ++trial) {
-    const Vec3 place = start + random_.in_ball(step);
-    if (surface_.is_between(start, place)) continue;
-    skeleton_.nodes[node].position = place;
-    if (is_placed_well(skeleton_, node, 0.5 * radii_[node])) {
-      measured_ += static_cast<long>(bones.size());
-      const double own = displacement_cost(skeleton_, node);
-      const double there = own + cost(skeleton_, at_nodes_, bones, least - own);
-      if (there < least) least = there, best = place;
+  std::vector<Vec3> places;
+  for (int trial = 0; trial < trials; ++trial) places.push_back(start + random_.in_ball(step));
+  struct Best {
+    double cost;
+    Vec3 place;
+    long measured = 0;  ///< bones
+  };
+  const std::size_t per_block = (places.size() + processor_count() - 1) / processor_count();
+  std::vector<Best> found(block_count(places.size(), per_block), Best{before, start});
+  for_each_block(places.size(), per_block, [&](std::size_t block, std::size_t begin, std::size_t end) {
+    Best& best = found[block];
+    Skeleton skeleton = skeleton_;
+    for (std::size_t trial = begin; trial < end; ++trial) {
+      if (surface_.is_between(start, places[trial])) continue;
+      skeleton.nodes[node].position = places[trial];
+      if (!is_placed_well(skeleton, node, 0.5 * radii_[node])) continue;
+      best.measured += static_cast<long>(bones.size());
+      const double own = displacement_cost(skeleton, node);
+      const double there = own + cost(skeleton, at_nodes_, bones, best.cost - own);
+      if (there < best.cost) best.cost = there, best.place = places[trial];
     }
+  });
+  double least = before;
+  for (const Best& best : found) {
+    measured_ += best.measured;
+    if (best.cost < least) least = best.cost, skeleton_.nodes[node].position = best.place;
   }
-  skeleton_.nodes[node].position = best;
   return least < before;
 }
 
