@@ -32,6 +32,7 @@ constexpr double kSmallPart = 0.001;  // of the area
 constexpr double kBody = 0.9;         // of the area: a part that is nearly everything
 constexpr int kMostUnited = 300;      // parts
 constexpr double kHandles = 0.08;     // of a wrap or union: longest loop around a handle that is cut, diagonals
+constexpr double kRigHandles = 0.3;   // the same of a rig
 
 /// A folder for the files that the two programs exchange.
 class WorkFolder {
@@ -304,7 +305,7 @@ void add_close_options(CLI::App& command, CloseOptions& options) {
       .add_option(
           "--close-handles", options.handles,
           "narrow tunnels are plugged, and thin bridges cut, where a loop around them is no longer than this, in "
-          "diagonals, 0 to 2 (default: 0; 0.08 for a union or a wrap)")
+          "diagonals, 0 to 2 (default: 0; 0.08 for a union or a wrap, 0.3 for a rig)")
       ->check(number_in(0, 2))
       ->type_name("X")
       ->needs(close);
@@ -353,7 +354,7 @@ Json close_mesh(MeshParts& parts, const CloseOptions& options) {
   else
     json = fill_or_wrap(parts, options);
   const bool is_new = json["method"] == "wrap" || json["method"] == "union";
-  const double longest = options.handles.value_or(is_new ? kHandles : 0);
+  const double longest = options.handles.value_or(options.has_rig ? kRigHandles : is_new ? kHandles : 0);
   json["cut_loops"] = longest > 0 && is_closed() ? cut_parts(parts, longest) : Json::array();
   return json;
 }

@@ -13,6 +13,7 @@ struct CloseOptions {
   bool is_on = false;
   std::optional<double> detail;   ///< of a wrap, diagonals
   std::optional<double> handles;  ///< those that a loop of that length goes around are cut, diagonals
+  bool has_rig = false;           ///< whose skeleton has no rings around handles: longer loops are cut then
 };
 void add_close_options(CLI::App& command, CloseOptions& options);
 

@@ -14,7 +14,8 @@ namespace skeletex::cli {
 namespace {
 
 /// The weights of joints travel with the mesh.
-void close_surface(RigFile& file, const CloseOptions& close) {
+void close_surface(RigFile& file, CloseOptions close) {
+  close.has_rig = !file.scene.skins.empty();
   MeshParts parts{std::move(file.surface.mesh), std::move(file.surface.attributes), {}};
   for (const std::vector<JointWeight>& weights : file.surface.weights) {
     parts.weights.emplace_back();

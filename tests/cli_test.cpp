@@ -21,6 +21,7 @@
 #include <thread>
 
 #include "skeletex/device/kernel_source.h"
+#include "skeletex/io/gltf/write_gltf.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/skeleton_file.h"
@@ -1507,6 +1508,48 @@ TEST_F(Program, CutsHandlesOff) {
     EXPECT_NEAR(back.attributes.numbers[0].values[v], back.mesh.positions[v].z(), 0.1);
   expect_refused(2, {"encode", "ring.ply", "-o", "c.skx.exr", "--close-handles", "0.1"}, {"--close"});
   for (const char* name : {"ring.ply", "c.skx.exr", "c.json", "c.ply"}) fs::remove(folder_ / name);
+}
+
+TEST_F(Program, CutsHandlesOfRigsOffByItself) {
+  // A ring whose joints are an open chain.
+  const TriangleMesh ring = torus_shape(5, 2, 0.25, 80, 16).mesh;
+  GltfScene scene;
+  GltfPrimitive primitive;
+  primitive.positions = ring.positions;
+  primitive.triangles = ring.triangles;
+  primitive.influences = 4;
+  for (std::size_t v = 0; v < ring.positions.size(); ++v) {
+    primitive.joints.insert(primitive.joints.end(), {0, 0, 0, 0});
+    primitive.weights.insert(primitive.weights.end(), {1, 0, 0, 0});
+  }
+  scene.meshes.push_back({"ring", {primitive}});
+  scene.nodes.resize(4);
+  scene.nodes[0].mesh = scene.nodes[0].skin = 0;
+  GltfSkin skin;
+  Vec3 before = Vec3::Zero();
+  for (const int joint : {1, 2, 3}) {
+    const Vec3 place = 2 * Vec3(std::cos(joint), std::sin(joint), 0);
+    scene.nodes[joint].name = std::string(1, static_cast<char>('a' + joint));
+    scene.nodes[joint].parent = joint > 1 ? joint - 1 : -1;
+    scene.nodes[joint].translation = place - before;
+    Eigen::Matrix4d& inverse = skin.inverse_binds.emplace_back(Eigen::Matrix4d::Identity());
+    inverse.block<3, 1>(0, 3) = -place;
+    skin.joints.push_back(joint);
+    before = place;
+  }
+  scene.skins.push_back(skin);
+  write_gltf(folder_ / "ring.glb", scene);
+  const auto cut_loops = [&](std::vector<std::string> options) {
+    options.insert(options.begin(), {"import", "ring.glb", "-o", "parts", "--json", "c.json", "--close"});
+    const Outcome outcome = run(options);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return nlohmann::json::parse(text_of(folder_ / "c.json"))["close"]["cut_loops"].size();
+  };
+  EXPECT_EQ(cut_loops({}), 1u);
+  EXPECT_EQ(cut_loops({"--close-handles", "0"}), 0u);
+  fs::remove(folder_ / "c.json");
+  fs::remove(folder_ / "ring.glb");
+  fs::remove_all(folder_ / "parts");
 }
 
 TEST_F(Program, SaysWhenStandardOutputIsFull) {
