@@ -120,6 +120,7 @@ std::optional<TriangleMesh> run_wrap(const WorkFolder& folder, const std::vector
         "--close: the program skeletex_wrap, which wraps such meshes, is neither beside skeletex nor on the PATH; it "
         "is built where CGAL is installed");
   errors = result.errors;
+  if (errors.starts_with("error: ")) errors.erase(0, std::string("error: ").size());
   if (result.exit_code != 0) return {};
   return read_mesh(folder / "wrap.ply").mesh;
 }
@@ -133,6 +134,12 @@ Wrap wrap_with(double detail, const WorkFolder& folder) {
   remove_unused_vertices(wrap.parts);
   wrap.report = measure_manifold(wrap.parts.mesh);
   return wrap;
+}
+
+void warn_of_small_parts(int count) {
+  if (count > 0)
+    warn(fmt::format("{} part{} with less than {} % of the area {} left out", count, count == 1 ? "" : "s",
+                     100 * kSmallPart, count == 1 ? "is" : "are"));
 }
 
 /// Takes the union of closed parts in place of a mesh, where it is one closed body.
@@ -157,9 +164,7 @@ Json take_union(MeshParts& parts, const TriangleMesh& filled, const WorkFolder& 
   }
   spdlog::info("--close: the {} parts are united in a mesh of {} triangles", before.components,
                united.mesh.triangles.size());
-  if (left_out > 0)
-    warn(fmt::format("{} part{} with less than {} % of the area {} left out", left_out, left_out == 1 ? "" : "s",
-                     100 * kSmallPart, left_out == 1 ? "is" : "are"));
+  warn_of_small_parts(left_out);
   CarriedOver carried =
       carry_over(parts.mesh, build_triangle_tree(parts.mesh), parts.attributes, parts.weights, united.mesh);
   parts = {std::move(united.mesh), std::move(carried.attributes), std::move(carried.weights)};
@@ -177,9 +182,7 @@ Json take_wrap(MeshParts& parts, const TriangleMesh& filled, Wrap wrap) {
       "{:.2g} at most; vertices of the file are up to {:.2g} away, inner parts among them. A smaller "
       "--close-detail (now {:.3g}) comes nearer and takes longer",
       wrapped.triangles.size(), back.mean / diagonal, back.largest / diagonal, there.largest / diagonal, wrap.detail));
-  if (wrap.removed > 0)
-    warn(fmt::format("{} part{} of the wrap with less than {} % of its area {} left out", wrap.removed,
-                     wrap.removed == 1 ? "" : "s", 100 * kSmallPart, wrap.removed == 1 ? "is" : "are"));
+  warn_of_small_parts(wrap.removed);
   if (wrap.report.components > 1)
     warn(fmt::format("the wrap has {} parts that do not touch; a larger --close-detail joins them",
                      wrap.report.components));
@@ -259,7 +262,8 @@ Json say_cuts(const HandleCuts& cuts, double diagonal, int handles_left) {
     if (loops.size() < 3)
       places += fmt::format("{}around {}, {:.2g} diagonals long", places.empty() ? "" : "; ", text_of(loop.centre),
                             loop.length / diagonal);
-    loops.push_back({{"centre", {loop.centre.x(), loop.centre.y(), loop.centre.z()}}, {"length", loop.length}});
+    loops.push_back(
+        {{"centre", {loop.centre.x(), loop.centre.y(), loop.centre.z()}}, {"length", loop.length / diagonal}});
   }
   const std::size_t count = cuts.loops.size();
   if (cuts.shortest_left > 0)

@@ -90,7 +90,8 @@ class LoopSearch {
     for (int h = 0; h < static_cast<int>(table_.twins.size()); ++h)
       if (h < table_.twins[h] && !is_on_path(h) && !is_on_path(table_.twins[h]))
         others.emplace_back(paths.distance[origin(h)] + edge_length(h) + paths.distance[target(h)], h);
-    // What is left of the other edges when those of the longest loops have joined all triangles.
+    // Edges off the paths join triangles, those of long loops first, until they form a tree over all triangles. Each
+    // edge that is left closes a loop of the basis.
     std::ranges::sort(others, std::greater<>());
     UnionFind triangles(static_cast<int>(mesh_.triangles.size()));
     std::vector<Loop> loops;

@@ -246,7 +246,7 @@ void fill_indices(nlohmann::json& scene) {
 
 }  // namespace
 
-std::string with_placeholders(std::string file) {
+std::string completed_for_tinygltf(std::string file) {
   if (file.find(kMeshopt) == std::string::npos && file.find(kDraco) == std::string::npos) return file;
   // A binary file: magic, version, length, and chunks of a length, a type and bytes; the first one is the text.
   constexpr std::size_t kHeader = 12, kChunkHeader = 8;

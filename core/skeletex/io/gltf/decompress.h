@@ -10,7 +10,7 @@ namespace skeletex {
 
 /// A glTF file, binary or text, as tinygltf reads it: buffers and indices that compressed files leave empty get some
 /// that decompress_gltf replaces. Other files come back as they are.
-std::string with_placeholders(std::string file);
+std::string completed_for_tinygltf(std::string file);
 
 /// Replaces what KHR_draco_mesh_compression and EXT_meshopt_compression pack by plain buffers and accessors.
 /// \param where  the file, in messages

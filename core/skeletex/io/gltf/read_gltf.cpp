@@ -57,7 +57,7 @@ bool load_image(tinygltf::Image* image, const int index, std::string* /*error*/,
 
 tinygltf::Model load(const std::filesystem::path& path) {
   const std::string where = path.string();
-  std::string bytes = with_placeholders(read_file(path, 0xffffffffU));
+  std::string bytes = completed_for_tinygltf(read_file(path, 0xffffffffU));
   tinygltf::TinyGLTF loader;
   loader.SetImageLoader(load_image, nullptr);
   tinygltf::Model model;
