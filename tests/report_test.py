@@ -33,7 +33,7 @@ window.addEventListener("load", async () => {
   for (const image of images) if (!image.complete || image.naturalWidth === 0) window.problems.push("broken image: " + image.alt);
   for (const link of document.querySelectorAll("a[href^='#']")) if (!document.querySelector(link.hash)) window.problems.push("link to nothing: " + link.hash);
   for (const frame of document.querySelectorAll("iframe")) frame.scrollIntoView();
-  for (let k = 0; k < 100 && window.started < document.querySelectorAll("iframe").length; ++k) await new Promise(done => setTimeout(done, 50));
+  for (let k = 0; k < 800 && window.started < document.querySelectorAll("iframe").length; ++k) await new Promise(done => setTimeout(done, 50));
   const verdict = document.createElement("p");
   verdict.id = "verdict";
   verdict.textContent = JSON.stringify({images: images.length, tables: document.querySelectorAll("table").length, headings: document.querySelectorAll("h2").length,
@@ -87,7 +87,7 @@ def open_page(page):
     if text.count("<body>") != 1:
         fail(f"{page} is not what the probe expects")
     probed.write_text(text.replace("<body>", PROBE + "<body>", 1))
-    process = subprocess.run([BROWSER, "--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1300,1000", "--virtual-time-budget=20000", f"--user-data-dir={WORK / 'browser'}", "--dump-dom",
+    process = subprocess.run([BROWSER, "--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1300,1000", "--virtual-time-budget=60000", f"--user-data-dir={WORK / 'browser'}", "--dump-dom",
                               f"file://{probed.resolve()}"], capture_output=True, text=True, timeout=120)
     found = re.search(r'<p id="verdict">(.*?)</p>', process.stdout)
     if not found:
