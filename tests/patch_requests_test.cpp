@@ -120,6 +120,20 @@ TEST(PatchRequests, OfWhatBendsAroundTheBoneAloneStayNearGirthToLength) {
   EXPECT_TRUE(std::isfinite(requests[0].share) && requests[0].share > 0);
 }
 
+TEST(PatchRequests, OfAMapThatIsSqueezedOutOfTheRangeOfNumbersAreNumbers) {
+  constexpr int kRings = 24, kAround = 12;
+  Chart chart = tube(kRings, kAround, 4, [](double u) { return 0.2 + 0.05 * std::sin(9 * u); });
+  for (std::size_t i = kAround; i < chart.u.size(); ++i) chart.u[i] = std::pow(10, -320 * (1 - chart.u[i]));
+  const RowProfile profile = row_profile(chart);
+  for (const double share : profile.share) EXPECT_TRUE(std::isfinite(share));
+  EXPECT_NEAR(profile.share.back(), 1, 1e-9);
+  const ExpectedError error = expected_error(chart, &profile);
+  const std::vector<PatchRequest> requests =
+      patch_requests(std::vector<PatchSource>{{&error, 528, 5, 4}}, TexelShare::kError);
+  EXPECT_TRUE(std::isfinite(requests[0].share) && requests[0].share > 0);
+  EXPECT_TRUE(std::isfinite(requests[0].columns_per_row) && requests[0].columns_per_row > 0);
+}
+
 TEST(PatchRequests, ByErrorHaveLessOfItThanByTriangles) {
   ClContext context;
   double product = 1;

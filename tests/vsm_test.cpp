@@ -5,9 +5,11 @@
 
 #include <Eigen/Dense>
 #include <filesystem>
+#include <limits>
 #include <numbers>
 #include <numeric>
 
+#include "skeletex/convert/parameterize/direct_map.h"
 #include "skeletex/convert/segment/segment_mesh.h"
 #include "support/load_model.h"
 #include "support/segments.h"
@@ -244,6 +246,39 @@ TEST(Vsm, AnUnfinishedSolutionIsReplacedByADirectOne) {
     twin_vsm(expected, 2, 0.5);
     EXPECT_LT(relative_difference(charts[0], expected), 1e-6);
   }
+}
+
+/// Draws the last triangle out to a finger of `rings` rings of three vertices.
+void draw_finger(TriangleMesh& mesh, int rings) {
+  for (int ring = 0; ring < rings; ++ring) {
+    const Triangle base = mesh.triangles.back();
+    const auto [a, b, c] = base;
+    const Vec3 out = (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]).normalized();
+    const int first = static_cast<int>(mesh.positions.size());
+    for (const int vertex : base) mesh.positions.push_back(mesh.positions[vertex] + 0.05 * out);
+    mesh.triangles.pop_back();
+    for (int i = 0; i < 3; ++i) {
+      const int next = (i + 1) % 3;
+      mesh.triangles.push_back({base[i], base[next], first + next});
+      mesh.triangles.push_back({base[i], first + next, first + i});
+    }
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  }
+}
+
+TEST(Vsm, WhatNoReweightingHelpsKeepsTheMapWithTheFewestFlips) {
+  // Every ring of the finger is a fraction as large in the map as the one below it: soon too small for the numbers.
+  MadeSegment made = revolve(cylinder_profile(9), {.columns = 12});
+  std::swap(made.segment.mesh.triangles[100], made.segment.mesh.triangles.back());
+  draw_finger(made.segment.mesh, 60);
+  int flipped = std::numeric_limits<int>::max();
+  for (const int iterations : {0, 1, 2, 12}) {
+    Chart chart = chart_of(made);
+    EXPECT_LE(map_directly(chart, iterations, 0.5), iterations);
+    EXPECT_LE(count_flipped(chart), flipped);
+    flipped = count_flipped(chart);
+  }
+  EXPECT_GT(flipped, 0);
 }
 
 TEST(Vsm, NoChartsAreNoWork) { EXPECT_TRUE(solve_vsm(context(), {}).empty()); }

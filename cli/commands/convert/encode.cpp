@@ -267,7 +267,10 @@ void warn_of_result(const EncodeReport& report) {
                       bone.name, 100 * bone.excess.mean / report.diagonal, 100 * bone.excess.furthest / report.diagonal,
                       bone.excess.place[0], bone.excess.place[1], bone.excess.place[2]));
     if (bone.flipped_triangles > 0)
-      warn(fmt::format("bone \"{}\": {} triangles are flipped in its map", bone.name, bone.flipped_triangles));
+      warn(fmt::format("bone \"{}\": {} triangles are flipped in its map\n  remedy: {}", bone.name,
+                       bone.flipped_triangles,
+                       is_height_field(bone.method) ? "--method hybrid or vsm"
+                                                    : "bones of their own for parts that stick out far from it"));
     if (is_height_field(bone.method) && bone.unseen_area_fraction > EncodeOptions{}.hybrid_unseen_threshold)
       warn(fmt::format("bone \"{}\": rays do not see {:.1f} % of its surface; --method hybrid or vsm does", bone.name,
                        100 * bone.unseen_area_fraction));

@@ -58,6 +58,7 @@ ExpectedError expected_error(const Chart& chart, const RowProfile* profile) {
     // Of the dihedral angle the chord: the same for small ones, and no function to call.
     const double stretch = (one.area + other.area) / map_area,
                  weight = (one.normal - other.normal).norm() * stretch * stretch / length;
+    if (!std::isfinite(weight)) continue;  // squeezed out of the range of numbers
     error.even += (one.normal - other.normal).norm() * length * surface;
     const double columns = std::abs(column_of(t, to) - column_of(t, from)), along = std::abs(rows[b] - rows[a]);
     error.around += weight * along * along, error.along += weight * columns * columns,

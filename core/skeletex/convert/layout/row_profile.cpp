@@ -86,11 +86,13 @@ std::vector<double> bin_borders(const Chart& chart) {
 
 /// Adds `density` (length per u) times a width over [low, high] that peaks at `middle`.
 void add_hat(Bins& bins, double low, double middle, double high, double area, double density) {
-  if (!(high > low) || !(area > 0) || !std::isfinite(density)) return;
+  if (!(high > low) || !(area > 0)) return;
   std::size_t bin = std::upper_bound(bins.borders.begin(), bins.borders.end(), low) - bins.borders.begin();
   bin = bin == 0 ? 0 : bin - 1;
   const double density_power = power_of(density);
   const Hat hat{low, middle, high, area};
+  // A triangle can be squeezed so much in the map that these leave the range of numbers.
+  if (!std::isfinite(density_power) || !std::isfinite(hat.rise) || !std::isfinite(hat.fall)) return;
   double before = hat.integral_to(bins.borders[bin]);
   for (; bin < bins.length.size() && bins.borders[bin] < high; ++bin) {
     const double after = hat.integral_to(bins.borders[bin + 1]);

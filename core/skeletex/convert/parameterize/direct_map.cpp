@@ -5,6 +5,7 @@
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "skeletex/convert/parameterize/vsm_tables.h"
 #include "skeletex/math/portable.h"
@@ -67,13 +68,11 @@ int map_directly(Chart& chart, int iterations, double alpha) {
   for (std::size_t i = 0; i < unknown.size(); ++i)
     if (chart.kinds[i] == ChartVertex::kInner) unknown[i] = rows++;
   std::vector<double> weights(table.twins.size(), 1);
-  for (int iteration = 0;; ++iteration) {
+  for (int iteration = 0, flipped = 0;; ++iteration) {
     const std::vector<double> u = chart.u, v = chart.v;
     solve(chart, unknown, rows, weights, true, chart.u);
     solve(chart, unknown, rows, weights, false, chart.v);
-    const auto is_finite = [](double x) { return std::isfinite(x); };
-    if (iteration > 0 && !(std::all_of(chart.u.begin(), chart.u.end(), is_finite) &&
-                           std::all_of(chart.v.begin(), chart.v.end(), is_finite))) {
+    if (const int before = std::exchange(flipped, count_flipped(chart)); iteration > 0 && flipped > before) {
       // Triangles so small in the map that the weights have no digits left: the step before is the best there is.
       chart.u = u;
       chart.v = v;

@@ -8,7 +8,7 @@ namespace skeletex {
 /// precision does not do. Fills u and v of all inner vertices. Of a lone bone, whose v is free to turn, any turn will
 /// do.
 /// \param iterations, alpha  see VsmOptions
-/// \return the reweightings of the map: fewer than asked for where a further one would have no digits left
+/// \return the reweightings of the map: fewer than asked for where a further one would flip more triangles
 int map_directly(Chart& chart, int iterations, double alpha);
 
 }  // namespace skeletex
