@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/reconstruct/resample_snapped.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <unordered_map>
@@ -17,6 +18,8 @@ namespace skeletex {
 namespace {
 
 constexpr double kLeastDihedral = 0.004;  // as the encoder's
+/// Radians. Vertices of a model's mesh with less lie within a face or on an edge of the mesh that it was made of.
+constexpr double kLeastSpread = 0.01;
 
 /// New places of old ones, 0 to `last`, and per new one the old one that it reads.
 std::vector<double> read_between(int old_last, int last) {
@@ -91,6 +94,49 @@ std::vector<Vec3> points_at_columns(const EndSeam& seam, std::span<const Vec3> p
     points.push_back((1 - share) * position(k) + share * position(k + 1));
   }
   return points;
+}
+
+/// Per vertex how far the normals of the triangles around it spread in their second direction: the square root of the
+/// middle eigenvalue of their covariance, radians. Along a straight edge, however sharp, they spread in one alone.
+std::vector<double> second_spreads(const Chart& chart) {
+  struct Moments {
+    double area = 0;
+    Vec3 first = Vec3::Zero();
+    Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+  };
+  std::vector<Moments> moments(chart.positions.size());
+  for (const auto& [a, b, c] : chart.triangles) {
+    const Vec3 across = (chart.positions[b] - chart.positions[a]).cross(chart.positions[c] - chart.positions[a]);
+    const double area = across.norm();
+    if (!(area > 0)) continue;
+    for (Moments* const m : {&moments[a], &moments[b], &moments[c]})
+      m->area += area, m->first += across, m->second += across * across.transpose() / area;
+  }
+  std::vector<double> spreads(moments.size(), 0);
+  for (std::size_t i = 0; i < spreads.size(); ++i) {
+    const auto& [area, first, second] = moments[i];
+    if (!(area > 0)) continue;
+    const Vec3 mean = first / area;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(second / area - mean * mean.transpose(),
+                                                                Eigen::EigenvaluesOnly);
+    spreads[i] = std::sqrt(std::max(0.0, solver.eigenvalues()[1]));
+  }
+  return spreads;
+}
+
+/// The features of a model's mesh. Texels lie all over its faces and edges, so the vertices that count are those where
+/// its normals spread in both directions: nearly those of the mesh that the model was made of.
+MapFeatures features_of_model(std::span<const Chart> charts, std::span<const Method> methods) {
+  MapFeatures features = find_features(charts, methods, kLeastDihedral);
+  for (std::size_t bone = 0; bone < charts.size(); ++bone) {
+    const std::vector<double> spreads = second_spreads(charts[bone]);
+    std::erase_if(features.vertices[bone], [&](MapFeatures::Vertex& vertex) {
+      vertex.strength = spreads[vertex.vertex];
+      return vertex.strength < kLeastSpread;
+    });
+  }
+  rank_vertices(features);
+  return features;
 }
 
 /// Builds the chart of one patch from the mesh's triangles.
@@ -309,8 +355,7 @@ void snap_again(ClContext& context, const PreparedModel& prepared, const Triangl
   std::optional<DeviceSnapTables> features;
   if (placing.has_snap)
     features = upload_tables(
-        context, tables_of(place_features(find_features(charts, methods, kLeastDihedral), charts, result.patches),
-                           result.patches));
+        context, tables_of(place_features(features_of_model(charts, methods), charts, result.patches), result.patches));
   const RevertSources revert{result, mesh, tree, charts};
   TexelResult read = read_texels(context, model.skeleton, prepared.separation,
                                  {charts, result.patches, hits, end_points, &revert, features ? &*features : nullptr},

@@ -106,22 +106,26 @@ std::vector<double> rows_of(const std::vector<double>& row_u, std::span<const do
 MapFeatures find_features(std::span<const Chart> charts, std::span<const Method> methods, double least_dihedral) {
   MapFeatures features;
   features.vertices.resize(charts.size()), features.edges.resize(charts.size());
+  for (std::size_t bone = 0; bone < charts.size(); ++bone)
+    if (!is_height_field(methods[bone]))
+      add_features(charts[bone], least_dihedral, features.vertices[bone], features.edges[bone]);
+  rank_vertices(features);
+  return features;
+}
+
+void rank_vertices(MapFeatures& features) {
   struct Strength {
     double strength;
-    int bone, number;
+    std::size_t bone, number;
     auto operator<=>(const Strength&) const = default;
   };
   std::vector<Strength> strengths;
-  for (int bone = 0; bone < static_cast<int>(charts.size()); ++bone) {
-    if (is_height_field(methods[bone])) continue;
-    add_features(charts[bone], least_dihedral, features.vertices[bone], features.edges[bone]);
-    for (const MapFeatures::Vertex& vertex : features.vertices[bone])
-      strengths.push_back({vertex.strength, bone, static_cast<int>(&vertex - features.vertices[bone].data())});
-  }
+  for (std::size_t bone = 0; bone < features.vertices.size(); ++bone)
+    for (std::size_t i = 0; i < features.vertices[bone].size(); ++i)
+      strengths.push_back({features.vertices[bone][i].strength, bone, i});
   std::sort(strengths.begin(), strengths.end());
   for (std::size_t i = 0; i < strengths.size(); ++i)
     features.vertices[strengths[i].bone][strengths[i].number].rank = static_cast<int>(i) + 1;
-  return features;
 }
 
 SnapFeatures place_features(const MapFeatures& features, std::span<const Chart> charts,

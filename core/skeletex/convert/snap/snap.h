@@ -13,7 +13,7 @@ namespace skeletex {
 struct MapFeatures {
   struct Vertex {
     int vertex = -1;      ///< of the chart
-    double strength = 0;  ///< sum over its edges of dihedral angle (radians) x length
+    double strength = 0;  ///< sum over its edges of dihedral angle (radians) x length, or another measure
     int rank = 0;         ///< by strength, from 1, among those of all patches
   };
   struct Edge {
@@ -29,6 +29,8 @@ struct MapFeatures {
 /// \param methods         per chart
 /// \param least_dihedral  radians; flatter edges are left out
 MapFeatures find_features(std::span<const Chart> charts, std::span<const Method> methods, double least_dihedral);
+/// Ranks all vertices by their strength; equal ones by patch and number.
+void rank_vertices(MapFeatures& features);
 
 /// Features where they lie in the cells of their patch: x = v width, unwrapped; y the row, with fractions, by the
 /// patch's row table.
