@@ -218,6 +218,27 @@ TEST(SelfIntersection, OrientationsKnowWhatRoundingHides) {
   EXPECT_EQ(orientation(Vec3(0.1, 0.1, 0.1), Vec3(0.4, 0.2, 0.3), Vec3(0.7, 0.3, 0.5), Vec3(1, 0.4, 0.7)), 0);
 }
 
+TEST(SelfIntersection, TrianglesOfATiltedPlaneMeetNowhereElse) {
+  // A polygon whose corners lie in a plane but for rounding.
+  constexpr int kCorners = 24;
+  TriangleMesh mesh;
+  for (const Eigen::AngleAxisd& tilt :
+       {Eigen::AngleAxisd(0.1, Vec3(1, 2, 3).normalized()), Eigen::AngleAxisd(1.3, Vec3(-2, 1, 0.3).normalized())}) {
+    mesh = {};
+    for (int i = 0; i < kCorners; ++i) {
+      const double angle = 2 * std::numbers::pi * i / kCorners;
+      mesh.positions.push_back(tilt * Vec3(2 + 0.4 * std::cos(angle), 0.4 * std::sin(angle), 0));
+    }
+    for (int i = 1, k = kCorners - 1, turn = 0; k - i > 0; ++turn) {
+      if (turn % 2 == 0)
+        mesh.triangles.push_back({i - 1, i, k}), ++i;
+      else
+        mesh.triangles.push_back({i - 1, k - 1, k}), --k;
+    }
+    EXPECT_EQ(find_self_intersections(mesh).size(), 0u);
+  }
+}
+
 TEST(SelfIntersection, GeneratedShapesHaveNone) {
   for (const NamedShape& shape : all_shapes()) EXPECT_EQ(count_self_intersections(shape.shape.mesh), 0) << shape.name;
 }

@@ -303,8 +303,11 @@ def test_distances_have_their_closed_form(bear_mesh: skeletex.Mesh) -> None:
 def test_findings_are_objects_and_encode_raises_the_same(
     bear_mesh: skeletex.Mesh, bear_skeleton: skeletex.Skeleton
 ) -> None:
-    (crossing,) = skeletex.validate(bear_mesh, bear_skeleton)
-    assert (crossing.severity, crossing.rule) == ("warning", "self-intersection")
+    assert skeletex.validate(bear_mesh, bear_skeleton) == []
+    pierced = bear_mesh.vertices.copy()
+    pierced[0] = 2 * pierced.mean(axis=0) - pierced[0]
+    findings = skeletex.validate(skeletex.Mesh(pierced, bear_mesh.triangles), bear_skeleton)
+    assert ("warning", "self-intersection") in [(f.severity, f.rule) for f in findings]
     nodes = bear_skeleton.nodes.copy()
     ear = bear_skeleton.bones[bear_skeleton.bone("left_ear"), 1]
     nodes[ear] += 10 * bear_mesh.diagonal

@@ -45,20 +45,27 @@ bool do_segments_meet(const Vec2& a, const Vec2& b, const Vec2& c, const Vec2& d
   return do_intervals_meet(a.x(), b.x(), c.x(), d.x()) && do_intervals_meet(a.y(), b.y(), c.y(), d.y());
 }
 
+/// The same of a segment and a triangle as they are drawn.
+bool does_drawn_segment_meet(const Vec3& p, const Vec3& q, const Corners& t, int plane) {
+  const Vec2 a = drawn(t[0], plane), b = drawn(t[1], plane), c = drawn(t[2], plane), from = drawn(p, plane),
+             to = drawn(q, plane);
+  const int way = orientation(a, b, c);
+  if (orientation(a, b, from) * way >= 0 && orientation(b, c, from) * way >= 0 && orientation(c, a, from) * way >= 0)
+    return true;
+  return do_segments_meet(from, to, a, b) || do_segments_meet(from, to, b, c) || do_segments_meet(from, to, c, a);
+}
+
 /// Whether the segment from p to q meets a triangle with area (drawn in `plane`).
 bool does_segment_meet(const Vec3& p, const Vec3& q, const Corners& t, int plane) {
   const int side_p = orientation(t[0], t[1], t[2], p), side_q = orientation(t[0], t[1], t[2], q);
   if (side_p * side_q > 0) return false;
-  if (side_p == 0 && side_q == 0) {
-    const Vec2 a = drawn(t[0], plane), b = drawn(t[1], plane), c = drawn(t[2], plane), from = drawn(p, plane),
-               to = drawn(q, plane);
-    const int way = orientation(a, b, c);
-    if (orientation(a, b, from) * way >= 0 && orientation(b, c, from) * way >= 0 && orientation(c, a, from) * way >= 0)
-      return true;
-    return do_segments_meet(from, to, a, b) || do_segments_meet(from, to, b, c) || do_segments_meet(from, to, c, a);
+  if (side_p != 0 || side_q != 0) {
+    const int ab = orientation(p, q, t[0], t[1]), bc = orientation(p, q, t[1], t[2]),
+              ca = orientation(p, q, t[2], t[0]);
+    if (!(ab >= 0 && bc >= 0 && ca >= 0) && !(ab <= 0 && bc <= 0 && ca <= 0)) return false;
   }
-  const int ab = orientation(p, q, t[0], t[1]), bc = orientation(p, q, t[1], t[2]), ca = orientation(p, q, t[2], t[0]);
-  return (ab >= 0 && bc >= 0 && ca >= 0) || (ab <= 0 && bc <= 0 && ca <= 0);
+  // In one plane this decides; nearly in one plane the signs above may be those of rounding.
+  return does_drawn_segment_meet(p, q, t, plane);
 }
 
 enum class Answer { kNo, kYes, kUnsure };
