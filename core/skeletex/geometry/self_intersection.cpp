@@ -45,7 +45,7 @@ bool do_segments_meet(const Vec2& a, const Vec2& b, const Vec2& c, const Vec2& d
   return do_intervals_meet(a.x(), b.x(), c.x(), d.x()) && do_intervals_meet(a.y(), b.y(), c.y(), d.y());
 }
 
-/// The same of a segment and a triangle as they are drawn.
+/// Whether a segment and a triangle, both projected along the axis of `plane`, meet.
 bool does_drawn_segment_meet(const Vec3& p, const Vec3& q, const Corners& t, int plane) {
   const Vec2 a = drawn(t[0], plane), b = drawn(t[1], plane), c = drawn(t[2], plane), from = drawn(p, plane),
              to = drawn(q, plane);
@@ -64,7 +64,7 @@ bool does_segment_meet(const Vec3& p, const Vec3& q, const Corners& t, int plane
               ca = orientation(p, q, t[2], t[0]);
     if (!(ab >= 0 && bc >= 0 && ca >= 0) && !(ab <= 0 && bc <= 0 && ca <= 0)) return false;
   }
-  // In one plane this decides; nearly in one plane the signs above may be those of rounding.
+  // What meets in space meets here. Near one plane the volumes above can have the sign of rounding errors alone.
   return does_drawn_segment_meet(p, q, t, plane);
 }
 

@@ -18,7 +18,7 @@ namespace skeletex {
 namespace {
 
 constexpr double kLeastDihedral = 0.004;  // as the encoder's
-/// Radians. Vertices of a model's mesh with less lie within a face or on an edge of the mesh that it was made of.
+/// Radians, see second_spreads: vertices of a model's mesh with less lie within a face or on an edge of the original.
 constexpr double kLeastSpread = 0.01;
 
 /// New places of old ones, 0 to `last`, and per new one the old one that it reads.
@@ -124,8 +124,8 @@ std::vector<double> second_spreads(const Chart& chart) {
   return spreads;
 }
 
-/// The features of a model's mesh. Texels lie all over its faces and edges, so the vertices that count are those where
-/// its normals spread in both directions: nearly those of the mesh that the model was made of.
+/// The features of a model's mesh. Its vertices lie all over the faces and edges of the original mesh. Those that count
+/// are where normals spread in two directions: nearly the vertices of the original. Their strength is that spread.
 MapFeatures features_of_model(std::span<const Chart> charts, std::span<const Method> methods) {
   MapFeatures features = find_features(charts, methods, kLeastDihedral);
   for (std::size_t bone = 0; bone < charts.size(); ++bone) {

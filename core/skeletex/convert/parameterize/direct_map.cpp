@@ -73,7 +73,7 @@ int map_directly(Chart& chart, int iterations, double alpha) {
     solve(chart, unknown, rows, weights, true, chart.u);
     solve(chart, unknown, rows, weights, false, chart.v);
     if (const int before = std::exchange(flipped, count_flipped(chart)); iteration > 0 && flipped > before) {
-      // Triangles so small in the map that the weights have no digits left: the step before is the best there is.
+      // Triangles are too small in the map for the precision of the weights: the step before is the best there is.
       chart.u = u;
       chart.v = v;
       return iteration - 1;

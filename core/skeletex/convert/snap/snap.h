@@ -13,7 +13,7 @@ namespace skeletex {
 struct MapFeatures {
   struct Vertex {
     int vertex = -1;      ///< of the chart
-    double strength = 0;  ///< sum over its edges of dihedral angle (radians) x length, or another measure
+    double strength = 0;  ///< how much it counts; see what found it
     int rank = 0;         ///< by strength, from 1, among those of all patches
   };
   struct Edge {
@@ -25,7 +25,9 @@ struct MapFeatures {
   std::vector<std::vector<Edge>> edges;       ///< per patch: inner ones whose dihedral angle is above the least
 };
 
-/// The features of all VSM patches.
+/// The features of all VSM patches. The strength of a vertex is the sum over its edges of dihedral angle (radians) x
+/// length.
+///
 /// \param methods         per chart
 /// \param least_dihedral  radians; flatter edges are left out
 MapFeatures find_features(std::span<const Chart> charts, std::span<const Method> methods, double least_dihedral);
