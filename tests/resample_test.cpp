@@ -259,6 +259,19 @@ TEST(ResampleSnapped, KeepsTheSurfaceAtLargerSizesAndIsAsGoodAsEncodedAtSmallerO
   }
 }
 
+TEST(ResampleSnapped, SnapsToTheVerticesOfTheOriginalAndNotToAllTexels) {
+  const TestModel model = load_standard_model("bear");
+  const auto encoded = [&](int size) {
+    EncodeOptions options;
+    options.width = options.height = size;
+    return encode_model(device(), model.mesh, model.skeleton, options).model;
+  };
+  const auto mean_of = [&](const SkeletexModel& made) {
+    return symmetric_mean(measure_metro(device(), model.mesh, reconstruct_mesh(device(), made)));
+  };
+  EXPECT_LT(mean_of(resample_model(device(), encoded(512), 256)), 1.5 * mean_of(encoded(256)));
+}
+
 TEST(FilterTaps, KeepConstantsAndStraightLines) {
   for (const ResampleFilter filter : kFilters)
     for (const auto& [from, to] : {std::pair{4, 4}, {4, 9}, {9, 4}, {40, 11}, {41, 40}, {40, 41}, {300, 7}, {7, 300}}) {
