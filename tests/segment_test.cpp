@@ -371,6 +371,11 @@ TEST(SegmentRefusal, NamesABoneThatLeavesTheMeshAndThePlace) {
   const Skeleton shortcut{chain.skeleton.nodes,
                           {{"shortcut", chain.skeleton.bones[0].head, chain.skeleton.bones[2].tail, std::nullopt}}};
   EXPECT_TRUE(mentions(refusal(chain.mesh, shortcut), {"bone \"shortcut\" leaves the mesh at (", "move"}));
+  try {
+    segment(chain.mesh, shortcut);
+  } catch (const TopologyError& error) {
+    EXPECT_EQ(error.bone(), 0);
+  }
 }
 
 TEST(SegmentRefusal, NamesTheBoneWhoseSeparationPlanesCross) {

@@ -387,6 +387,35 @@ TEST(Skeletonize, RepairCutsLimbsThatEndInAnotherPart) {
     }
 }
 
+TEST(Skeletonize, ContractionShortensALimbThatCannotBeMadeStraight) {
+  // A hooked limb: its first bone is in the way, and no bone from the hub reaches around the corner.
+  Skeleton hooked;
+  hooked.nodes = {
+      {"hub", {0, 0, 0}}, {"left", {-2.5, 0, 0}}, {"right", {2.5, 0, 0}}, {"knee", {0, 3, 0}}, {"foot", {3, 3, 0}}};
+  hooked.bones = {{"left", 0, 1, {}}, {"right", 0, 2, {}}, {"thigh", 0, 3, {}}, {"shin", 3, 4, {}}};
+  const TriangleMesh mesh = thickened(hooked, {0.4, 0.4, 0.4, 0.4, 0.4}, 0.1, 0.12);
+  const TriangleTree tree = build_triangle_tree(mesh);
+  const Surface surface(mesh, tree);
+  Repair repair(surface, hooked);
+  ASSERT_TRUE(repair.contract(2));
+  for (const char* bone : {"left", "right", "thigh"}) EXPECT_TRUE(has_bone(repair.skeleton(), bone)) << bone;
+  EXPECT_FALSE(has_bone(repair.skeleton(), "shin"));
+}
+
+TEST(Skeletonize, LevelsThatLoseLimbsAreGivenUp) {
+  const TestModel camel = load_standard_model("camel");
+  const SkeletonizeResult result = skeletonized(camel.mesh);
+  const SkeletonCandidate& chosen = result.candidates[result.chosen];
+  const auto given_up =
+      std::count_if(result.candidates.begin(), result.candidates.end(),
+                    [](const SkeletonCandidate& c) { return c.refusal.find("fewer limbs") != std::string::npos; });
+  EXPECT_GE(given_up, 1);
+  for (const SkeletonCandidate& candidate : result.candidates) {
+    if (candidate.refusal.find("fewer limbs") == std::string::npos) continue;
+    EXPECT_LT(candidate.limbs, chosen.limbs) << candidate.name;
+  }
+}
+
 TEST(Skeletonize, RepairEndsFreeBonesInsideTheBody) {
   const Shape shape = y_shape();
   Skeleton rig = shape.skeleton;

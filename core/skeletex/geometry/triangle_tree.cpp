@@ -261,17 +261,34 @@ std::array<float, kWidth> enter_children(const TriangleTree& tree, int level, st
 float hit_block(const TriangleMesh& mesh, const TriangleTree& tree, std::size_t block, const TreeRay& ray,
                 float limit) {
   constexpr float kOver = 1e-6f;
-  const Eigen::Map<const Eigen::Vector3f> from(ray.origin.data()), along(ray.direction.data());
-  const std::size_t end = std::min((block + 1) * kWidth, tree.order.size());
-  for (std::size_t at = block * kWidth; at < end; ++at) {
-    const Triangle& t = mesh.triangles[tree.order[at]];
-    const Eigen::Vector3f corner = tree.points[t[0]], a = tree.points[t[1]] - corner, b = tree.points[t[2]] - corner;
-    const Eigen::Vector3f p = along.cross(b), s = from - corner, q = s.cross(a);
-    const float inverse = 1 / a.dot(p);
-    const float u = s.dot(p) * inverse, v = along.dot(q) * inverse, share = b.dot(q) * inverse;
-    // A determinant of 0 makes u infinite or no number, which fails.
-    if (u >= -kOver && v >= -kOver && u + v <= 1 + kOver && share >= 0) limit = std::min(limit, share);
+  const std::size_t begin = block * kWidth, last = tree.order.size() - 1;
+  // Corner and edges of all triangles first, coordinate by coordinate: the compiler vectorises what follows.
+  std::array<std::array<float, kWidth>, 3> corners, as, bs;
+  for (int k = 0; k < kWidth; ++k) {
+    const Triangle& t = mesh.triangles[tree.order[std::min(begin + k, last)]];
+    for (int d = 0; d < 3; ++d) {
+      corners[d][k] = tree.points[t[0]][d];
+      as[d][k] = tree.points[t[1]][d];
+      bs[d][k] = tree.points[t[2]][d];
+    }
   }
+  const auto [ex, ey, ez] = ray.direction;
+  std::array<float, kWidth> shares;
+  for (int k = 0; k < kWidth; ++k) {
+    const float ax = as[0][k] - corners[0][k], ay = as[1][k] - corners[1][k], az = as[2][k] - corners[2][k];
+    const float bx = bs[0][k] - corners[0][k], by = bs[1][k] - corners[1][k], bz = bs[2][k] - corners[2][k];
+    const float sx = ray.origin[0] - corners[0][k], sy = ray.origin[1] - corners[1][k],
+                sz = ray.origin[2] - corners[2][k];
+    const float px = ey * bz - ez * by, py = ez * bx - ex * bz, pz = ex * by - ey * bx;
+    const float qx = sy * az - sz * ay, qy = sz * ax - sx * az, qz = sx * ay - sy * ax;
+    const float inverse = 1 / (ax * px + ay * py + az * pz);
+    const float u = (sx * px + sy * py + sz * pz) * inverse, v = (ex * qx + ey * qy + ez * qz) * inverse,
+                share = (bx * qx + by * qy + bz * qz) * inverse;
+    // A determinant of 0 makes u infinite or no number, which fails.
+    const bool is_met = (u >= -kOver) & (v >= -kOver) & (u + v <= 1 + kOver) & (share >= 0);
+    shares[k] = is_met ? share : kFarAway;
+  }
+  for (int k = 0; k < kWidth; ++k) limit = std::min(limit, shares[k]);
   return limit;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -18,8 +19,9 @@ class Acceptance {
   Acceptance(ClContext& context, const Surface& surface);
 
   /// Where segmentation refuses, nodes are moved and, when that does not help, bones contracted.
+  /// \param is_enough_left  asked after a contraction; the skeleton is given up where it is not. Default: always enough
   /// \return why the skeleton cannot be used; empty when it can
-  std::string segment(Repair& repair) const;
+  std::string segment(Repair& repair, const std::function<bool(const Skeleton&)>& is_enough_left = {}) const;
 
   /// Whether segmentation takes a skeleton as it is.
   bool is_accepted(const Skeleton& skeleton) const;

@@ -307,6 +307,20 @@ bool Repair::drop_free_end(int bone) {
   return true;
 }
 
+/// Where a bone is part of a limb, takes away what lies beyond it: planes at one end only do not cross.
+bool Repair::drop_beyond(int bone) {
+  for (SkeletonLimb limb : find_limbs(skeleton_)) {
+    const auto at = std::find(limb.bones.begin(), limb.bones.end(), bone);
+    if (at == limb.bones.end() || at + 1 == limb.bones.end()) continue;
+    const std::ptrdiff_t kept = at - limb.bones.begin() + 1;
+    limb.bones.erase(limb.bones.begin(), limb.bones.begin() + kept);
+    limb.nodes.erase(limb.nodes.begin(), limb.nodes.begin() + kept);
+    drop(limb);
+    return true;
+  }
+  return false;
+}
+
 bool Repair::contract(int bone) {
   Merge best;
   const auto try_bone = [&](int b) {
@@ -316,6 +330,7 @@ bool Repair::contract(int bone) {
     for (const Vec3& place : merge_places(b)) try_merge(b, place, best);
   };
   if (skeleton_.bones.size() > 1) try_bone(bone);
+  if (best.bone < 0 && drop_beyond(bone)) return true;
   if (best.bone < 0)
     for (const int node : {skeleton_.bones[bone].head, skeleton_.bones[bone].tail})
       for (const BoneAtNode& at : at_nodes_[node])

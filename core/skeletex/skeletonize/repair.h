@@ -90,6 +90,7 @@ class Repair {
   void remove_node(int node);
   void merge_at(const Merge& merge);
   bool drop_free_end(int bone);
+  bool drop_beyond(int bone);
   double length_of(const SkeletonLimb& limb) const;
   bool is_minor(const SkeletonLimb& limb) const;
   double cost_without(int hub, const std::set<int>& gone) const;

@@ -193,16 +193,35 @@ bool is_worth_its_joints(const SkeletonizeResult& result) {
   return after.refusal.empty() && after.bones > before.bones && after.error <= kJointsMayCost * before.error;
 }
 
-/// Which of the accepted candidates is best; -1: none.
-int choose(const std::vector<SkeletonCandidate>& candidates, const SkeletonizeOptions& options) {
+/// Whether a candidate's limbs are worth its error, when they are what a skeleton is chosen by.
+bool is_fine(const SkeletonCandidate& candidate, double least_error) {
+  return candidate.refusal.empty() && candidate.error <= kLimbsMayCost * least_error;
+}
+
+double least_error(const std::vector<SkeletonCandidate>& candidates) {
   double least = std::numeric_limits<double>::infinity();
   for (const SkeletonCandidate& candidate : candidates)
     if (candidate.refusal.empty()) least = std::min(least, candidate.error);
+  return least;
+}
+
+/// A skeleton with fewer limbs is not chosen beside these candidates.
+int least_limbs(const std::vector<SkeletonCandidate>& candidates, const SkeletonizeOptions& options) {
+  if (options.purpose != SkeletonPurpose::kPose || options.most_bones) return 0;
+  const double least = least_error(candidates);
+  int most = 0;
+  for (const SkeletonCandidate& candidate : candidates)
+    if (is_fine(candidate, least)) most = std::max(most, candidate.limbs);
+  return most;
+}
+
+/// Which of the accepted candidates is best; -1: none.
+int choose(const std::vector<SkeletonCandidate>& candidates, const SkeletonizeOptions& options) {
+  const double least = least_error(candidates);
   const auto rank = [&](const SkeletonCandidate& candidate) {
-    const bool is_fine = candidate.error <= kLimbsMayCost * least;
-    const int first = options.most_bones                                     ? candidate.bones
-                      : options.purpose == SkeletonPurpose::kPose && is_fine ? candidate.limbs + 1
-                                                                             : 0;
+    const int first = options.most_bones                                                       ? candidate.bones
+                      : options.purpose == SkeletonPurpose::kPose && is_fine(candidate, least) ? candidate.limbs + 1
+                                                                                               : 0;
     return std::make_pair(-first, candidate.error);
   };
   int best = -1;
@@ -250,11 +269,17 @@ SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, cons
     while (options.most_bones && static_cast<int>(repair.skeleton().bones.size()) > std::max(1, *options.most_bones) &&
            repair.contract_cheapest()) {
     }
-    SkeletonCandidate candidate{level.name, 0, 0, 0, acceptance.segment(repair)};
+    const auto limbs_of = [&](const Skeleton& skeleton) {
+      return count_limbs(body, limbs, skeleton, kLimbReach * surface.diagonal);
+    };
+    const auto is_enough_left = [&, least = least_limbs(result.candidates, options)](const Skeleton& skeleton) {
+      return limbs_of(skeleton) >= least;
+    };
+    SkeletonCandidate candidate{level.name, 0, 0, 0, acceptance.segment(repair, is_enough_left)};
     level.skeleton = repair.skeleton();
     if (candidate.refusal.empty()) make_symmetric(surface, plane, acceptance, level.skeleton);
     candidate.bones = static_cast<int>(level.skeleton.bones.size());
-    candidate.limbs = count_limbs(body, limbs, level.skeleton, kLimbReach * surface.diagonal);
+    candidate.limbs = limbs_of(level.skeleton);
     if (candidate.refusal.empty()) {
       const Acceptance::Trial trial = acceptance.encode(level.skeleton);
       candidate.error = trial.error;

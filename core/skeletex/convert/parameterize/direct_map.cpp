@@ -4,10 +4,12 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
 #include "skeletex/convert/parameterize/vsm_tables.h"
+#include "skeletex/geometry/parallel.h"
 #include "skeletex/math/portable.h"
 
 namespace skeletex {
@@ -32,8 +34,11 @@ std::vector<Entry> entries_of(const Chart& chart, const std::vector<int>& unknow
   return entries;
 }
 
+using Factorization = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
+
+/// \param solver  of the same chart and coordinate; the pattern of its matrix is analysed in the first call
 void solve(const Chart& chart, const std::vector<int>& unknown, int rows, const std::vector<double>& weights, bool is_u,
-           std::vector<double>& x) {
+           Factorization& solver, std::vector<double>& x) {
   const std::vector<Entry> entries = entries_of(chart, unknown, is_u);
   Eigen::VectorXd diagonal = Eigen::VectorXd::Zero(rows), right = Eigen::VectorXd::Zero(rows);
   for (const Entry& entry : entries) diagonal[entry.row] += weights[entry.half_edge];
@@ -51,7 +56,8 @@ void solve(const Chart& chart, const std::vector<int>& unknown, int rows, const 
   for (int row = 0; row < rows; ++row) triplets.emplace_back(row, row, is_free && row == 0 ? 2.0 : 1.0);
   Eigen::SparseMatrix<double> matrix(rows, rows);
   matrix.setFromTriplets(triplets.begin(), triplets.end());
-  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(matrix);
+  if (solver.rows() == 0) solver.analyzePattern(matrix);
+  solver.factorize(matrix);
   Eigen::VectorXd solution = solver.solve(right);
   solution += solver.solve(right - matrix * solution);
   for (std::size_t i = 0; i < unknown.size(); ++i)
@@ -68,10 +74,12 @@ int map_directly(Chart& chart, int iterations, double alpha) {
   for (std::size_t i = 0; i < unknown.size(); ++i)
     if (chart.kinds[i] == ChartVertex::kInner) unknown[i] = rows++;
   std::vector<double> weights(table.twins.size(), 1);
+  std::array<Factorization, 2> solvers;  // of u and v
   for (int iteration = 0, flipped = 0;; ++iteration) {
     const std::vector<double> u = chart.u, v = chart.v;
-    solve(chart, unknown, rows, weights, true, chart.u);
-    solve(chart, unknown, rows, weights, false, chart.v);
+    for_each_block(2, 1, [&](std::size_t k, std::size_t, std::size_t) {
+      solve(chart, unknown, rows, weights, k == 0, solvers[k], k == 0 ? chart.u : chart.v);
+    });
     if (const int before = std::exchange(flipped, count_flipped(chart)); iteration > 0 && flipped > before) {
       // Triangles are too small in the map for the precision of the weights: the step before is the best there is.
       chart.u = u;
