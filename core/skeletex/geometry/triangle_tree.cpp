@@ -262,23 +262,20 @@ float hit_block(const TriangleMesh& mesh, const TriangleTree& tree, std::size_t 
                 float limit) {
   constexpr float kOver = 1e-6f;
   const std::size_t begin = block * kWidth, last = tree.order.size() - 1;
-  // Corner and edges of all triangles first, coordinate by coordinate: the compiler vectorises what follows.
-  std::array<std::array<float, kWidth>, 3> corners, as, bs;
+  // By corner and coordinate, so that the compiler vectorises what follows.
+  std::array<std::array<std::array<float, kWidth>, 3>, 3> corners;
   for (int k = 0; k < kWidth; ++k) {
     const Triangle& t = mesh.triangles[tree.order[std::min(begin + k, last)]];
-    for (int d = 0; d < 3; ++d) {
-      corners[d][k] = tree.points[t[0]][d];
-      as[d][k] = tree.points[t[1]][d];
-      bs[d][k] = tree.points[t[2]][d];
-    }
+    for (int c = 0; c < 3; ++c)
+      for (int d = 0; d < 3; ++d) corners[c][d][k] = tree.points[t[c]][d];
   }
+  const auto& [x, y, z] = corners[0];
   const auto [ex, ey, ez] = ray.direction;
   std::array<float, kWidth> shares;
   for (int k = 0; k < kWidth; ++k) {
-    const float ax = as[0][k] - corners[0][k], ay = as[1][k] - corners[1][k], az = as[2][k] - corners[2][k];
-    const float bx = bs[0][k] - corners[0][k], by = bs[1][k] - corners[1][k], bz = bs[2][k] - corners[2][k];
-    const float sx = ray.origin[0] - corners[0][k], sy = ray.origin[1] - corners[1][k],
-                sz = ray.origin[2] - corners[2][k];
+    const float ax = corners[1][0][k] - x[k], ay = corners[1][1][k] - y[k], az = corners[1][2][k] - z[k];
+    const float bx = corners[2][0][k] - x[k], by = corners[2][1][k] - y[k], bz = corners[2][2][k] - z[k];
+    const float sx = ray.origin[0] - x[k], sy = ray.origin[1] - y[k], sz = ray.origin[2] - z[k];
     const float px = ey * bz - ez * by, py = ez * bx - ex * bz, pz = ex * by - ey * bx;
     const float qx = sy * az - sz * ay, qy = sz * ax - sx * az, qz = sx * ay - sy * ax;
     const float inverse = 1 / (ax * px + ay * py + az * pz);

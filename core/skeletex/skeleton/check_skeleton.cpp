@@ -152,8 +152,7 @@ void check_bones(const Skeleton& skeleton, std::span<const double> crossings) {
     if (t > 1) continue;
     const Bone& bone = skeleton.bones[b];
     throw TopologyError(fmt::format("bone \"{}\" leaves the mesh at {}, {:.0f} % of the way from node \"{}\" to node "
-                                    "\"{}\"; move one of them, or "
-                                    "bend the bone with a node in between",
+                                    "\"{}\"; move one of them, or bend the bone with a node in between",
                                     bone.name, text_of(skeleton, head + t * (tail - head)), 100 * t,
                                     skeleton.nodes[bone.head].name, skeleton.nodes[bone.tail].name),
                         b, -1);

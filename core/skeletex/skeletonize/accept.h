@@ -19,7 +19,7 @@ class Acceptance {
   Acceptance(ClContext& context, const Surface& surface);
 
   /// Where segmentation refuses, nodes are moved and, when that does not help, bones contracted.
-  /// \param is_enough_left  asked after a contraction; the skeleton is given up where it is not. Default: always enough
+  /// \param is_enough_left  called after each contraction; the skeleton is given up when it returns false
   /// \return why the skeleton cannot be used; empty when it can
   std::string segment(Repair& repair, const std::function<bool(const Skeleton&)>& is_enough_left = {}) const;
 

@@ -193,11 +193,13 @@ bool is_worth_its_joints(const SkeletonizeResult& result) {
   return after.refusal.empty() && after.bones > before.bones && after.error <= kJointsMayCost * before.error;
 }
 
-/// Whether a candidate's limbs are worth its error, when they are what a skeleton is chosen by.
-bool is_fine(const SkeletonCandidate& candidate, double least_error) {
-  return candidate.refusal.empty() && candidate.error <= kLimbsMayCost * least_error;
+/// Whether a candidate is accepted, and its limbs are worth its error.
+/// \param least  error of the accepted candidates
+bool is_fine(const SkeletonCandidate& candidate, double least) {
+  return candidate.refusal.empty() && candidate.error <= kLimbsMayCost * least;
 }
 
+/// Of the accepted candidates.
 double least_error(const std::vector<SkeletonCandidate>& candidates) {
   double least = std::numeric_limits<double>::infinity();
   for (const SkeletonCandidate& candidate : candidates)
@@ -205,7 +207,7 @@ double least_error(const std::vector<SkeletonCandidate>& candidates) {
   return least;
 }
 
-/// A skeleton with fewer limbs is not chosen beside these candidates.
+/// How many limbs a skeleton must reach to be chosen beside these candidates.
 int least_limbs(const std::vector<SkeletonCandidate>& candidates, const SkeletonizeOptions& options) {
   if (options.purpose != SkeletonPurpose::kPose || options.most_bones) return 0;
   const double least = least_error(candidates);
