@@ -14,7 +14,6 @@
 #include "skeletex/edit/transfer/place_part.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
-#include "skeletex/reconstruct/resample.h"
 #include "support/creases.h"
 #include "support/load_model.h"
 #include "support/transfer_twin.h"

@@ -15,7 +15,7 @@
 #include "skeletex/model/encoder_settings.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
-#include "skeletex/reconstruct/resample_snapped.h"
+#include "skeletex/reconstruct/resample/resample_snapped.h"
 
 namespace skeletex {
 namespace {

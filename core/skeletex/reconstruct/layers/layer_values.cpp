@@ -8,7 +8,7 @@
 #include "skeletex/model/octahedral.h"
 #include "skeletex/reconstruct/layers/turn_normals.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
-#include "skeletex/reconstruct/resample.h"
+#include "skeletex/reconstruct/resample/filter_taps.h"
 
 namespace skeletex {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/reconstruct/resample_snapped.h"
+#include "skeletex/reconstruct/resample/resample_snapped.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -218,7 +218,15 @@ bool is_finer(const SkeletexModel& model, const std::vector<Patch>& patches) {
   return true;
 }
 
-std::vector<double> rows_of_finer(int old_height, int height) { return read_between(old_height - 1, height - 1); }
+std::vector<double> rows_of_finer(const PreparedModel& model, int bone, int height) {
+  const auto [head_pole, tail_pole] = model.lattice.poles[bone];
+  const int old_last = model.model.patches[bone].rectangle.height - 1, head = head_pole < 0, tail = tail_pole < 0;
+  std::vector<double> rows = read_between(old_last - head - tail, height - 1 - head - tail);
+  for (double& row : rows) row += head;
+  if (head > 0) rows.insert(rows.begin(), 0);
+  if (tail > 0) rows.push_back(old_last);
+  return rows;
+}
 
 std::vector<double> columns_of_finer(int old_width, int width) {
   std::vector<double> columns = read_between(old_width, width);
@@ -238,7 +246,7 @@ void refine_texels(ClContext& context, const PreparedModel& prepared, SkeletexMo
     begins.push_back(begins.back() + static_cast<std::size_t>(to.width) * to.height);
     std::vector<double>& row_u = result.patches[bone].row_u;
     const std::vector<double>& old_u = model.patches[bone].row_u;
-    const std::vector<double> rows = rows_of_finer(from.height, to.height);
+    const std::vector<double> rows = rows_of_finer(prepared, static_cast<int>(bone), to.height);
     for (int r = 0; r < to.height; ++r) {
       const int below = std::min(static_cast<int>(rows[r]), from.height - 2);
       row_u[r] = old_u[below] + (rows[r] - below) * (old_u[below + 1] - old_u[below]);
@@ -252,7 +260,7 @@ void refine_texels(ClContext& context, const PreparedModel& prepared, SkeletexMo
     const std::size_t first = old_begins[bone];
     const PatchPoints points{old[0].data() + first, old[1].data() + first,   old[2].data() + first, from.width,
                              from.height,           are_first.data() + first};
-    const std::vector<double> rows = rows_of_finer(from.height, to.height),
+    const std::vector<double> rows = rows_of_finer(prepared, static_cast<int>(bone), to.height),
                               columns = columns_of_finer(from.width, to.width);
     std::size_t at = begins[bone];
     for (int r = 0; r < to.height; ++r)

@@ -3,9 +3,6 @@
 #include <array>
 #include <vector>
 
-#include "skeletex/geometry/mesh.h"
-#include "skeletex/model/texture.h"
-
 namespace skeletex {
 
 /// How new samples follow from old ones, along one axis of the lattice.
@@ -26,16 +23,5 @@ struct FilterTaps {
 /// \param is_periodic  sample i lies at i / count and old indices wrap round (they stay below old_count, so do counts);
 ///                     otherwise at i / (count - 1), and the two ends are kept as they are
 FilterTaps filter_taps(int old_count, int new_count, bool is_periodic, ResampleFilter filter, double softness);
-
-/// A polyline with `cells` edges in place of another one. The first and last point of an open one stay; the others are
-/// those of the polyline that is nearest to the given one in the least-squares sense, or as the filter says. A closed
-/// polyline does not repeat its first point, and none of its points stays.
-std::vector<Vec3> resample_polyline(const std::vector<Vec3>& points, bool is_closed, int cells, ResampleFilter filter);
-
-/// The rectangles of a width x height texture scaled to another one: edges keep their places relative to it, to
-/// rounding, so that nothing overlaps and covered stays covered.
-/// \return empty when a rectangle would fall below 4 x 4
-std::vector<Rectangle> scale_rectangles(const std::vector<Patch>& patches, int width, int height, int new_width,
-                                        int new_height);
 
 }  // namespace skeletex

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+#include <vector>
+
+#include "skeletex/geometry/mesh.h"
+#include "skeletex/model/texture.h"
+#include "skeletex/reconstruct/resample/filter_taps.h"
+
+namespace skeletex {
+
+/// A polyline with `cells` edges in place of another one. The first and last point of an open one stay; the others are
+/// those of the polyline that is nearest to the given one in the least-squares sense, or as the filter says. A closed
+/// polyline does not repeat its first point, and none of its points stays.
+std::vector<Vec3> resample_polyline(const std::vector<Vec3>& points, bool is_closed, int cells, ResampleFilter filter);
+
+/// The rectangles of a width x height texture scaled to another one: edges keep their places relative to it, to
+/// rounding, so that nothing overlaps and covered stays covered.
+/// \return empty when a rectangle would fall below 4 x 4
+std::vector<Rectangle> scale_rectangles(const std::vector<Patch>& patches, int width, int height, int new_width,
+                                        int new_height);
+
+}  // namespace skeletex
