@@ -272,6 +272,14 @@ TEST_F(Program, ReconstructsAndReportsWhatTheContractNames) {
     EXPECT_EQ(mesh["genus"], 0);
     EXPECT_EQ(mesh["components"], 1);
   }
+  const nlohmann::json all = json_of({"reconstruct", "y.skx.exr", "-o", "all.ply", "--all-texels"}),
+                       fewer = json_of({"reconstruct", "y.skx.exr", "-o", "again.ply"}),
+                       distance = json_of({"metro", "all.ply", "again.ply"});
+  EXPECT_LT(fewer["vertices"], all["vertices"]);
+  EXPECT_GT(fewer["vertices"].get<int>(), 0.9 * all["vertices"].get<int>());
+  EXPECT_LT(distance["backward"]["max"], 0.005);
+  EXPECT_LT(distance["normals"]["forward"]["shading"]["mean"], 0.5);
+  fs::remove(folder_ / "all.ply");
   EXPECT_EQ(run({"reconstruct", "y.skx.exr", "-o", "again.obj"}).code, 0);
   EXPECT_TRUE(text_of(folder_ / "again.obj").find("\nf ") != std::string::npos);
   fs::remove(folder_ / "again.ply");

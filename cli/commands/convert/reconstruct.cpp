@@ -24,6 +24,7 @@
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/texture/bake_texture.h"
+#include "skeletex/reconstruct/thin_triangles.h"
 
 namespace skeletex::cli {
 namespace {
@@ -33,7 +34,7 @@ struct Arguments {
   int size = 0, level = 0;
   std::optional<double> time, constant_offset;  ///< the offset in diagonals
   std::vector<std::string> bones;
-  bool is_distance_dropped = false, has_no_report = false, is_polished = false;
+  bool is_distance_dropped = false, has_no_report = false, is_polished = false, has_all_texels = false;
 };
 
 /// What a pose does to the surface, in words and for the JSON.
@@ -60,17 +61,26 @@ std::vector<int> bones_by_name(const Skeleton& skeleton, const std::vector<std::
   return bones;
 }
 
+/// The model as it is reconstructed.
+struct Source {
+  ClContext& context;
+  ProgressBar& bar;
+  const PreparedModel prepared;
+  double read_ms = 0, device_ms = 0, resample_ms = 0, reconstruct_ms = 0, reduce_ms = 0;
+  TriangleMesh bind;                   ///< in the user's units
+  std::optional<ReducedMesh> reduced;  ///< of it, without thin triangles
+};
+
 /// The surface in its pose, or at a constant distance from the bones.
-TriangleMesh surface_of(ClContext& context, const PreparedModel& prepared, const std::optional<Skeleton>& posed,
-                        const Arguments& arguments) {
-  const SkeletexModel& model = prepared.model;
+TriangleMesh surface_of(const Source& source, const std::optional<Skeleton>& posed, const Arguments& arguments) {
+  const SkeletexModel& model = source.prepared.model;
   const DistanceRule rule = arguments.is_distance_dropped ? DistanceRule::kFromFoot : DistanceRule::kFromBone;
   if (arguments.constant_offset)
-    return constant_offset_mesh(context, prepared, posed ? *posed : model.skeleton,
+    return constant_offset_mesh(source.context, source.prepared, posed ? *posed : model.skeleton,
                                 bones_by_name(model.skeleton, arguments.bones),
                                 *arguments.constant_offset * model.diagonal, rule);
-  if (posed) return reconstruct_mesh(context, prepared, *posed, {deformation_of(arguments.deform), rule});
-  return reconstruct_mesh(context, prepared);
+  if (posed) return reconstruct_mesh(source.context, source.prepared, *posed, {deformation_of(arguments.deform), rule});
+  return source.bind;
 }
 
 /// The path of a picture as a mesh file names it: from its own folder, where that is possible.
@@ -82,16 +92,14 @@ std::filesystem::path relative_to(const std::string& picture, const std::string&
 }
 
 /// What is written beside the surface; writes the picture, where one is asked for.
-MeshAttributes attributes_of(ClContext& context, const PreparedModel& prepared, bool is_posed, const TriangleMesh& mesh,
-                             const Arguments& arguments, const std::string& output) {
+MeshAttributes attributes_of(const Source& source, bool is_posed, const TriangleMesh& mesh, const Arguments& arguments,
+                             const std::string& output) {
+  const PreparedModel& prepared = source.prepared;
   MeshAttributes attributes = vertex_attributes(prepared);
-  const bool has_texture = !arguments.texture.empty();
-  if (!is_posed && !has_texture) return attributes;
-  const TriangleMesh bind = reconstruct_bind_mesh(context, prepared).mesh;
   if (is_posed && !attributes.normals.empty())
-    attributes.normals.values = turn_normals(bind, attributes.normals.values, mesh.positions);
-  if (!has_texture) return attributes;
-  BakedTexture baked = bake_texture(prepared.model, prepared, bind);
+    attributes.normals.values = turn_normals(source.bind, attributes.normals.values, mesh.positions);
+  if (arguments.texture.empty()) return attributes;
+  BakedTexture baked = bake_texture(prepared.model, prepared, reconstruct_bind_mesh(source.context, prepared).mesh);
   attributes.colours = {};
   attributes.texture_coordinates = std::move(baked.coordinates);
   attributes.materials.emplace_back().image_file = relative_to(arguments.texture, output);
@@ -111,14 +119,6 @@ void check_arguments(const Arguments& arguments) {
   if (!arguments.constant_offset) check_distance_option(arguments.is_distance_dropped, arguments.deform);
 }
 
-/// The model as it is reconstructed.
-struct Source {
-  ClContext& context;
-  ProgressBar& bar;
-  const PreparedModel prepared;
-  double read_ms = 0, device_ms = 0, resample_ms = 0;
-};
-
 std::string text_of(const PolishReport& report, double diagonal) {
   return fmt::format("polish: {} new folds became {}, {} vertices moved by up to {:.2g} diagonals\n",
                      report.folds_before, report.folds_after, report.moved_vertices, report.farthest / diagonal);
@@ -132,41 +132,49 @@ Json json_of(const PolishReport& report, double diagonal) {
           {"farthest", report.farthest / diagonal}};
 }
 
+/// Leaves out what the mesh does without.
+void reduce(const ReducedMesh& reduced, TriangleMesh& mesh, MeshAttributes& attributes) {
+  mesh = {values_of(reduced, mesh.positions), reduced.triangles};
+  if (!attributes.normals.empty()) attributes.normals.values = values_of(reduced, attributes.normals.values);
+  if (!attributes.colours.empty()) attributes.colours.values = values_of(reduced, attributes.colours.values);
+  for (VertexNumbers& numbers : attributes.numbers) numbers.values = values_of(reduced, numbers.values);
+}
+
 /// Writes the surface in one pose, or in none.
 /// \param posed  the skeleton
 /// \param text   what is printed is added to it
 /// \return for the JSON
 Json write_surface(const Source& source, const Arguments& arguments, const std::optional<Skeleton>& posed,
                    const std::string& output, std::string& text) {
-  ClContext& context = source.context;
-  const PreparedModel& prepared = source.prepared;
-  const SkeletexModel& model = prepared.model;
+  const SkeletexModel& model = source.prepared.model;
   Stopwatch watch;
-  source.bar.show("reconstructing", 0.3);
-  TriangleMesh mesh = surface_of(context, prepared, posed, arguments);
+  TriangleMesh mesh = surface_of(source, posed, arguments);
   std::optional<PolishReport> polish_report;
   if (arguments.is_polished) {
     source.bar.show("polishing", 0.5);
-    polish_report = polish_pose(reconstruct_mesh(context, prepared), mesh.positions);
+    polish_report = polish_pose(source.bind, mesh.positions);
   }
-  const MeshAttributes attributes = arguments.constant_offset
-                                        ? MeshAttributes()
-                                        : attributes_of(context, prepared, posed.has_value(), mesh, arguments, output);
-  const double reconstruct_ms = watch.lap_ms();
-  source.bar.show("writing", 0.7);
-  write_mesh(output, mesh, attributes);
-  const double write_ms = watch.lap_ms();
+  MeshAttributes attributes;
+  if (!arguments.constant_offset) attributes = attributes_of(source, posed.has_value(), mesh, arguments, output);
+  const double reconstruct_ms = source.reconstruct_ms + watch.lap_ms();
   std::optional<PoseReport> pose_report;
   if (posed && !arguments.constant_offset && !arguments.has_no_report) {
-    source.bar.show("measuring the pose", 0.8);
-    pose_report = report_pose(reconstruct_mesh(context, prepared), mesh);
+    source.bar.show("measuring the pose", 0.6);
+    pose_report = report_pose(source.bind, mesh);
   }
+  if (source.reduced) reduce(*source.reduced, mesh, attributes);
+  source.bar.show("writing", 0.8);
+  watch.lap_ms();
+  write_mesh(output, mesh, attributes);
+  const double write_ms = watch.lap_ms();
   text += fmt::format(
       "{} vertices, {} triangles from {} x {} texels, on {}\n"
-      "read {:.0f} ms, device {:.0f} ms, resample {:.0f} ms, reconstruct {:.0f} ms, write {:.0f} ms\n{}{}{}\n",
-      mesh.positions.size(), mesh.triangles.size(), model.texture.width, model.texture.height, context.device().name,
-      source.read_ms, source.device_ms, source.resample_ms, reconstruct_ms, write_ms,
-      polish_report ? text_of(*polish_report, model.diagonal) : "", pose_report ? pose_report->text : "", output);
+      "read {:.0f} ms, device {:.0f} ms, resample {:.0f} ms, reconstruct {:.0f} ms, reduce {:.0f} ms, "
+      "write {:.0f} ms\n{}{}{}\n",
+      mesh.positions.size(), mesh.triangles.size(), model.texture.width, model.texture.height,
+      source.context.device().name, source.read_ms, source.device_ms, source.resample_ms, reconstruct_ms,
+      source.reduce_ms, write_ms, polish_report ? text_of(*polish_report, model.diagonal) : "",
+      pose_report ? pose_report->text : "", output);
   Json json{{"vertices", mesh.positions.size()},
             {"triangles", mesh.triangles.size()},
             {"size", {model.texture.width, model.texture.height}},
@@ -175,10 +183,23 @@ Json write_surface(const Source& source, const Arguments& arguments, const std::
               {"device", source.device_ms},
               {"resample", source.resample_ms},
               {"reconstruct", reconstruct_ms},
+              {"reduce", source.reduce_ms},
               {"write", write_ms}}}};
   if (pose_report) json["pose"] = pose_report->json;
   if (polish_report) json["polish"] = json_of(*polish_report, model.diagonal);
   return json;
+}
+
+/// Reconstructs the mesh in its bind pose, and what is left of it without thin triangles.
+void add_bind_mesh(const Arguments& arguments, Source& source) {
+  if (arguments.constant_offset) return;
+  source.bar.show("reconstructing", 0.3);
+  Stopwatch watch;
+  source.bind = reconstruct_mesh(source.context, source.prepared);
+  source.reconstruct_ms = watch.lap_ms();
+  if (arguments.has_all_texels || !arguments.texture.empty()) return;
+  source.reduced = without_thin_triangles(source.bind);
+  source.reduce_ms = watch.lap_ms();
 }
 
 void run(const Arguments& arguments, const CLI::App& command) {
@@ -197,7 +218,8 @@ void run(const Arguments& arguments, const CLI::App& command) {
     model = resample_model(context, model, arguments.size);
   }
   const double resample_ms = watch.lap_ms();
-  const Source source{context, *bar, PreparedModel(model), read_ms, device_ms, resample_ms};
+  Source source{context, *bar, PreparedModel(model), read_ms, device_ms, resample_ms};
+  add_bind_mesh(arguments, source);
   std::string text;
   Json all = Json::array();
   for (std::size_t i = 0; i < outputs.size(); ++i) {
@@ -252,6 +274,9 @@ void add_reconstruct_command(CLI::App& program) {
                                     "colours; an OBJ comes with a material file"),
                  {".png"})
       ->type_name("PNG");
+  command.add_flag("--all-texels", arguments->has_all_texels,
+                   "a vertex for every texel, in their order: keep thin triangles (always with --texture and "
+                   "--constant-offset)");
   command.add_flag("--no-report", arguments->has_no_report, "do not measure what the pose does to the surface")
       ->needs(pose);
   CLI::Option* offset =
