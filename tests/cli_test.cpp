@@ -277,6 +277,8 @@ TEST_F(Program, ReconstructsAndReportsWhatTheContractNames) {
                        distance = json_of({"metro", "all.ply", "again.ply"});
   EXPECT_LT(fewer["vertices"], all["vertices"]);
   EXPECT_GT(fewer["vertices"].get<int>(), 0.9 * all["vertices"].get<int>());
+  EXPECT_LT(json_of({"inspect", "again.ply"})["thin_triangles"].get<double>(),
+            0.5 * json_of({"inspect", "all.ply"})["thin_triangles"].get<double>());
   EXPECT_LT(distance["backward"]["max"], 0.005);
   EXPECT_LT(distance["normals"]["forward"]["shading"]["mean"], 0.5);
   fs::remove(folder_ / "all.ply");
@@ -610,7 +612,7 @@ TEST_F(Program, MeasuresAndReportsWhatTheContractNames) {
 }
 
 TEST_F(Program, MeasuresModelsAsTheMeshesThatTheyReconstructTo) {
-  ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "large.ply", "--size", "96"}).code, 0);
+  ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "large.ply", "--size", "96", "--all-texels"}).code, 0);
   ASSERT_EQ(run({"pack", "y.skx.exr", "-o", "y.skx", "--size", "64", "--quality", "20"}).code, 0);
   const nlohmann::json mesh = json_of({"metro", "y.ply", "large.ply", "--samples", "20000"}),
                        model = json_of({"metro", "y.ply", "y.skx.exr", "--size", "96", "--samples", "20000"}),

@@ -198,7 +198,8 @@ TEST(ResampleSnapped, FinerRowsAndColumnsHaveAllOldOnes) {
   const TestModel bear = load_standard_model("bear");
   EncodeOptions options;
   options.width = options.height = 96;
-  const PreparedModel model(encode_model(device(), bear.mesh, bear.skeleton, options).model);
+  const SkeletexModel encoded = encode_model(device(), bear.mesh, bear.skeleton, options).model;
+  const PreparedModel model(encoded);
   const auto has_all = [](const std::vector<double>& places, int count, int made) {
     EXPECT_EQ(places.size(), static_cast<std::size_t>(made));
     EXPECT_TRUE(std::is_sorted(places.begin(), places.end()));

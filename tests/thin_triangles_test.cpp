@@ -37,9 +37,11 @@ double least_angle(const TriangleMesh& mesh, const Triangle& t) {
 }
 
 double thin_share(const TriangleMesh& mesh) {
-  return static_cast<double>(std::count_if(mesh.triangles.begin(), mesh.triangles.end(),
-                                           [&](const Triangle& t) { return least_angle(mesh, t) < 5; })) /
-         static_cast<double>(mesh.triangles.size());
+  std::vector<int> thin;
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+    if (least_angle(mesh, mesh.triangles[i]) < 5) thin.push_back(static_cast<int>(i));
+  EXPECT_EQ(thin_triangles(mesh), thin);
+  return static_cast<double>(thin.size()) / static_cast<double>(mesh.triangles.size());
 }
 
 /// How far edges may move.

@@ -51,6 +51,7 @@ from ._measure import (
     metro,
     triangle_bones,
     use_device,
+    without_thin_triangles,
 )
 from ._model import Model, Patch, model_levels, write_levels
 
@@ -104,5 +105,6 @@ __all__ = [
     "validate",
     "view",
     "viridis",
+    "without_thin_triangles",
     "write_levels",
 ]

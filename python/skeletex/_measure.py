@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import List, NamedTuple, Union
+from typing import List, NamedTuple, Tuple, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -70,6 +70,19 @@ def distances(mesh: Union[Mesh, Model], points: ArrayLike) -> NDArray[np.float32
     """Distance from each of n x 3 points to the nearest point of a surface, in the user's units."""
     surface = mesh_of(mesh)
     return _core.distances(surface.vertices, surface.triangles, real_array(points, 3, "points"))
+
+
+def without_thin_triangles(mesh: Mesh) -> Tuple[Mesh, NDArray[np.int32]]:
+    """A mesh without triangles that have an angle below 5 degrees, where the surface stays without them.
+
+    ``skeletex reconstruct`` writes such meshes; :func:`reconstruct` gives one vertex per texel. For the same triangles
+    in a pose take ``posed.vertices[vertices]``.
+
+    :return: the mesh, and per vertex its number in the given one
+    :raises InputError: where the mesh is not closed, oriented and 2-manifold
+    """
+    reduced, vertices = _core.without_thin_triangles(*mesh._checked())
+    return Mesh(*reduced), vertices
 
 
 class Deformation(NamedTuple):

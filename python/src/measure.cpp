@@ -6,6 +6,7 @@
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/analysis/metro.h"
 #include "skeletex/reconstruct/prepared_model.h"
+#include "skeletex/reconstruct/thin_triangles.h"
 #include "skeletex/render/scene.h"
 
 namespace skeletex::python {
@@ -45,6 +46,16 @@ py::dict manifold(const Points& vertices, const Indices& triangles) {
   return dict;
 }
 
+py::tuple without_thin_triangles_of(const Points& vertices, const Indices& triangles) {
+  const TriangleMesh mesh = mesh_of(vertices, triangles);
+  ReducedMesh reduced;
+  {
+    const py::gil_scoped_release released;
+    reduced = without_thin_triangles(mesh);
+  }
+  return py::make_tuple(arrays_of({values_of(reduced, mesh.positions), reduced.triangles}), array_of(reduced.vertices));
+}
+
 /// \param bind, posed  vertices of one mesh
 py::dict deformation(const Points& bind, const Indices& triangles, const Points& posed) {
   const TriangleMesh mesh = mesh_of(bind, triangles);
@@ -69,6 +80,7 @@ py::dict deformation(const Points& bind, const Indices& triangles, const Points&
 
 void bind_measure(py::module_& module) {
   module.def("metro", metro);
+  module.def("without_thin_triangles", without_thin_triangles_of);
   module.def("distances", distances);
   module.def("manifold", manifold);
   module.def("deformation", deformation);

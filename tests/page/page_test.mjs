@@ -159,14 +159,14 @@ async function testPlaces() {
   const first = await page.evaluate(async () => (await globalThis.skeletex).firstFrame);
   console.log(`first frame after ${Math.round(first)} ms`);  // told, not judged: other work on the machine counts, too
   check(first > 0, 'there was no first frame');
-  run('reconstruct', at('bear.skx.exr'), '-o', at('bind.ply'));
-  const shown = await drawn(page), bind = readPly(at('bind.ply'));
+  run('reconstruct', at('bear.skx.exr'), '-o', at('bind.ply'), '--all-texels');
+  const shown = await drawn(page), bind = readPly(at('bind.ply'), '--all-texels');
   compare(shown, bind, 'bind pose');
   checkTriangles(shown, bind, 'bind pose');
   checkClosed(shown, 'bind pose');
 
   for (const size of [128, 64, 32]) {
-    run('reconstruct', at('bear.skx.exr'), '-o', at('level.ply'), '--size', String(size));
+    run('reconstruct', at('bear.skx.exr'), '-o', at('level.ply'), '--all-texels', '--size', String(size));
     await page.evaluate(async (wanted) => {
       const page = await globalThis.skeletex;
       page.change({level: page.model.levels.findIndex((level) => level.width === wanted)});
@@ -187,7 +187,7 @@ async function testPlaces() {
     page.turnJoint(page.movable.lastIndexOf(true), 2, 40);
   });
   writeFileSync(at('pose.json'), await page.evaluate(async () => (await globalThis.skeletex).poseJson()));
-  run('reconstruct', at('bear.skx.exr'), '-o', at('posed.ply'), '--pose', at('pose.json'));
+  run('reconstruct', at('bear.skx.exr'), '-o', at('posed.ply'), '--all-texels', '--pose', at('pose.json'));
   const posed = await drawn(page), moved = posed.points.reduce((most, x, i) => Math.max(most, Math.abs(x - shown.points[i])), 0);
   check(moved > 0.05 * posed.diagonal, `the pose moves vertices by ${moved / posed.diagonal} diagonals at most`);
   compare(posed, readPly(at('posed.ply')), 'pose');

@@ -91,21 +91,16 @@ std::filesystem::path relative_to(const std::string& picture, const std::string&
   return relative.empty() ? path : relative;
 }
 
-/// What is written beside the surface; writes the picture, where one is asked for.
-MeshAttributes attributes_of(const Source& source, bool is_posed, const TriangleMesh& mesh, const Arguments& arguments,
-                             const std::string& output) {
+/// Writes the model's colours as a picture, and adds it and its coordinates in place of the vertex colours.
+void add_texture(const Source& source, const Arguments& arguments, const std::string& output,
+                 MeshAttributes& attributes) {
   const PreparedModel& prepared = source.prepared;
-  MeshAttributes attributes = vertex_attributes(prepared);
-  if (is_posed && !attributes.normals.empty())
-    attributes.normals.values = turn_normals(source.bind, attributes.normals.values, mesh.positions);
-  if (arguments.texture.empty()) return attributes;
   BakedTexture baked = bake_texture(prepared.model, prepared, reconstruct_bind_mesh(source.context, prepared).mesh);
   attributes.colours = {};
   attributes.texture_coordinates = std::move(baked.coordinates);
   attributes.materials.emplace_back().image_file = relative_to(arguments.texture, output);
   write_image(arguments.texture, baked.image);
   attributes.materials[0].image = std::move(baked.image);  // a glTF file holds it as well
-  return attributes;
 }
 
 void check_arguments(const Arguments& arguments) {
@@ -132,12 +127,22 @@ Json json_of(const PolishReport& report, double diagonal) {
           {"farthest", report.farthest / diagonal}};
 }
 
-/// Leaves out what the mesh does without.
-void reduce(const ReducedMesh& reduced, TriangleMesh& mesh, MeshAttributes& attributes) {
-  mesh = {values_of(reduced, mesh.positions), reduced.triangles};
-  if (!attributes.normals.empty()) attributes.normals.values = values_of(reduced, attributes.normals.values);
-  if (!attributes.colours.empty()) attributes.colours.values = values_of(reduced, attributes.colours.values);
-  for (VertexNumbers& numbers : attributes.numbers) numbers.values = values_of(reduced, numbers.values);
+/// A surface, the same one in the bind pose, and what is written beside it.
+struct Surface {
+  TriangleMesh mesh, bind;
+  MeshAttributes attributes;
+};
+
+/// Leaves out the vertices that the mesh does without.
+void reduce(const ReducedMesh& reduced, Surface& surface) {
+  for (TriangleMesh* const mesh : {&surface.mesh, &surface.bind})
+    *mesh = {values_of(reduced, mesh->positions), reduced.triangles};
+  const auto reduce = [&](auto& values) {
+    if (!values.empty()) values = values_of(reduced, values);
+  };
+  reduce(surface.attributes.normals.values);
+  reduce(surface.attributes.colours.values);
+  for (VertexNumbers& numbers : surface.attributes.numbers) reduce(numbers.values);
 }
 
 /// Writes the surface in one pose, or in none.
@@ -148,35 +153,37 @@ Json write_surface(const Source& source, const Arguments& arguments, const std::
                    const std::string& output, std::string& text) {
   const SkeletexModel& model = source.prepared.model;
   Stopwatch watch;
-  TriangleMesh mesh = surface_of(source, posed, arguments);
+  Surface surface{surface_of(source, posed, arguments), source.bind, {}};
+  if (!arguments.constant_offset) surface.attributes = vertex_attributes(source.prepared);
+  if (source.reduced) reduce(*source.reduced, surface);
   std::optional<PolishReport> polish_report;
   if (arguments.is_polished) {
     source.bar.show("polishing", 0.5);
-    polish_report = polish_pose(source.bind, mesh.positions);
+    polish_report = polish_pose(surface.bind, surface.mesh.positions);
   }
-  MeshAttributes attributes;
-  if (!arguments.constant_offset) attributes = attributes_of(source, posed.has_value(), mesh, arguments, output);
+  std::vector<Vec3>& normals = surface.attributes.normals.values;
+  if (posed && !normals.empty()) normals = turn_normals(surface.bind, normals, surface.mesh.positions);
+  if (!arguments.texture.empty()) add_texture(source, arguments, output, surface.attributes);
   const double reconstruct_ms = source.reconstruct_ms + watch.lap_ms();
   std::optional<PoseReport> pose_report;
   if (posed && !arguments.constant_offset && !arguments.has_no_report) {
     source.bar.show("measuring the pose", 0.6);
-    pose_report = report_pose(source.bind, mesh);
+    pose_report = report_pose(surface.bind, surface.mesh);
   }
-  if (source.reduced) reduce(*source.reduced, mesh, attributes);
   source.bar.show("writing", 0.8);
   watch.lap_ms();
-  write_mesh(output, mesh, attributes);
+  write_mesh(output, surface.mesh, surface.attributes);
   const double write_ms = watch.lap_ms();
   text += fmt::format(
       "{} vertices, {} triangles from {} x {} texels, on {}\n"
       "read {:.0f} ms, device {:.0f} ms, resample {:.0f} ms, reconstruct {:.0f} ms, reduce {:.0f} ms, "
       "write {:.0f} ms\n{}{}{}\n",
-      mesh.positions.size(), mesh.triangles.size(), model.texture.width, model.texture.height,
+      surface.mesh.positions.size(), surface.mesh.triangles.size(), model.texture.width, model.texture.height,
       source.context.device().name, source.read_ms, source.device_ms, source.resample_ms, reconstruct_ms,
       source.reduce_ms, write_ms, polish_report ? text_of(*polish_report, model.diagonal) : "",
       pose_report ? pose_report->text : "", output);
-  Json json{{"vertices", mesh.positions.size()},
-            {"triangles", mesh.triangles.size()},
+  Json json{{"vertices", surface.mesh.positions.size()},
+            {"triangles", surface.mesh.triangles.size()},
             {"size", {model.texture.width, model.texture.height}},
             {"times_ms",
              {{"read", source.read_ms},

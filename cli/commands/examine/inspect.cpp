@@ -12,6 +12,7 @@
 #include "skeletex/geometry/self_intersection.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/model/error.h"
+#include "skeletex/reconstruct/thin_triangles.h"
 #include "table.h"
 
 namespace skeletex::cli {
@@ -84,6 +85,7 @@ void inspect_mesh(const Arguments& arguments) {
   const BoundingBox box = bounding_box(mesh);
   const bool is_closed = report.is_closed_manifold();
   const double area = surface_area(mesh);
+  const std::size_t thin = thin_triangles(mesh).size();
   Json json{{"vertices", report.vertices},
             {"edges", report.edges},
             {"triangles", report.triangles},
@@ -96,6 +98,7 @@ void inspect_mesh(const Arguments& arguments) {
             {"unreferenced_vertices", report.unreferenced_vertices.size()},
             {"non_finite_vertices", report.non_finite_vertices.size()},
             {"degenerate_triangles", report.degenerate_triangles.size()},
+            {"thin_triangles", thin},
             {"diagonal", box.diagonal()},
             {"lower", {box.lower.x(), box.lower.y(), box.lower.z()}},
             {"upper", {box.upper.x(), box.upper.y(), box.upper.z()}},
@@ -122,6 +125,8 @@ void inspect_mesh(const Arguments& arguments) {
   say(report.unreferenced_vertices.size(), "vertices without a triangle");
   say(report.non_finite_vertices.size(), "vertices that are not finite numbers");
   say(report.degenerate_triangles.size(), "triangles with a vertex twice");
+  text += fmt::format("{} thin triangles, with an angle below 5 degrees ({:.2f} %)\n", thin,
+                      100.0 * static_cast<double>(thin) / static_cast<double>(std::max(report.triangles, 1)));
   if (arguments.has_self_intersections) {
     const long pairs = count_self_intersections(mesh);
     json["self_intersections"] = pairs;

@@ -43,7 +43,7 @@ class ThinTriangles {
     links_.request_vertex_status(), links_.request_edge_status(), links_.request_face_status();
   }
 
-  ReducedMesh run(const std::vector<Face>& thin) {
+  ReducedMesh run(const std::vector<int>& thin) {
     const double cell = std::sqrt(surface_area(mesh_) / static_cast<double>(mesh_.positions.size())),
                  largest = std::min(kTolerance * cell / bounding_box(mesh_).diagonal(), kLargestTolerance) * cell;
     for (const double share : kPasses) {
@@ -54,11 +54,12 @@ class ThinTriangles {
   }
 
  private:
-  void pass(std::vector<Face> thin) {
+  void pass(std::vector<int> thin) {
     for (std::size_t i = 0; i < thin.size(); ++i) {
-      if (links_.status(thin[i]).deleted() || !is_face_thin(thin[i])) continue;
-      for (const Face changed : collapse_edge(thin[i]) ? faces_around(last_kept_) : flip_longest(thin[i]))
-        if (is_face_thin(changed)) thin.push_back(changed);
+      const Face face(thin[i]);
+      if (links_.status(face).deleted() || !is_face_thin(face)) continue;
+      for (const Face changed : collapse_edge(face) ? faces_around(last_kept_) : flip_longest(face))
+        if (is_face_thin(changed)) thin.push_back(changed.idx());
     }
   }
   const Vec3& at(Vertex vertex) const { return mesh_.positions[vertex.idx()]; }
@@ -186,13 +187,15 @@ class ThinTriangles {
 
 }  // namespace
 
-ReducedMesh without_thin_triangles(const TriangleMesh& mesh) {
-  std::vector<Face> thin;
+std::vector<int> thin_triangles(const TriangleMesh& mesh) {
+  std::vector<int> thin;
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const auto [a, b, c] = mesh.triangles[i];
-    if (is_thin(mesh.positions[a], mesh.positions[b], mesh.positions[c])) thin.emplace_back(static_cast<int>(i));
+    if (is_thin(mesh.positions[a], mesh.positions[b], mesh.positions[c])) thin.push_back(static_cast<int>(i));
   }
-  return ThinTriangles(mesh).run(thin);
+  return thin;
 }
+
+ReducedMesh without_thin_triangles(const TriangleMesh& mesh) { return ThinTriangles(mesh).run(thin_triangles(mesh)); }
 
 }  // namespace skeletex
