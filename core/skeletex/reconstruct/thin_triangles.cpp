@@ -120,7 +120,7 @@ class ThinTriangles {
   /// Whether a vertex can lose an edge.
   bool has_room(Vertex vertex) const { return links_.valence(vertex) > 3; }
 
-  /// Collapses the edge of a triangle that costs least. \return whether one may be collapsed
+  /// Collapses the edge of a triangle that costs least; false where none may be collapsed.
   bool collapse_edge(Face face) {
     std::optional<double> least;
     HalfEdge best;
@@ -136,7 +136,7 @@ class ThinTriangles {
     return true;
   }
 
-  /// Flips a triangle's longest edge where the vertex across lies on it. \return the triangles that have changed
+  /// Flips a triangle's longest edge where the vertex across lies on it; gives the triangles that have changed.
   std::vector<Face> flip_longest(Face face) {
     HalfEdge edge;
     double longest2 = 0;

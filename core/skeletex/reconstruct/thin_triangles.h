@@ -19,7 +19,9 @@ struct ReducedMesh {
 /// Takes thin triangles out of a mesh where the surface stays: edges are collapsed to one of their ends, or flipped.
 /// With the mean cell h^2 = area / vertices and the diagonal d, edges that go stay within the smaller of 15 h^2 / d and
 /// h / 20 of the surface. Its normals turn by no more than 20 degrees, and no other triangle gets thin. The mesh stays
-/// closed, oriented, 2-manifold and of its genus. \pre closed, oriented and 2-manifold
+/// closed, oriented, 2-manifold and of its genus.
+///
+/// \pre closed, oriented and 2-manifold
 ReducedMesh without_thin_triangles(const TriangleMesh& mesh);
 
 /// The vertices' values.
