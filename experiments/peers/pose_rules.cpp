@@ -18,6 +18,7 @@
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/skin.h"
+#include "skeletex/reconstruct/thin_triangles.h"
 
 namespace {
 
@@ -85,24 +86,28 @@ Json run(const std::string& model_path, const std::string& pose_path, const std:
   const PoseAnimation animation = read_animation(pose_path, model.skeleton);
   ClContext context(device);
   const PreparedModel prepared(model);
-  const BindSurface bind = make_bind_surface(reconstruct_bind_mesh(context, prepared).mesh);
+  const TriangleMesh all_texels = reconstruct_bind_mesh(context, prepared).mesh;
+  const ReducedMesh written = without_thin_triangles(all_texels);  // as `skeletex reconstruct` writes it
+  const BindSurface bind = make_bind_surface({values_of(written, all_texels.positions), written.triangles});
   const Lattice& lattice = prepared.lattice;
   const int first_seam = lattice.first_sample.empty() ? lattice.first_corner : lattice.first_sample[0];
   std::vector<bool> is_seam;
-  for (const auto& [a, b] : bind.edges.vertices) is_seam.push_back(b >= first_seam);  // vertices of seams come last
+  for (const auto& [a, b] : bind.edges.vertices)
+    is_seam.push_back(written.vertices[b] >= first_seam);  // they come last
 
   std::vector<Rule> rules;
   for (const Deformation deformation : {Deformation::kSmooth, Deformation::kCoordinates, Deformation::kPaper})
-    rules.push_back(
-        {to_string(deformation), [&, deformation](const Skeleton& posed) {
-           return in_frame(reconstruct_mesh(context, prepared, posed, {deformation}), posed.frame).positions;
-         }});
+    rules.push_back({to_string(deformation), [&, deformation](const Skeleton& posed) {
+                       return values_of(
+                           written,
+                           in_frame(reconstruct_mesh(context, prepared, posed, {deformation}), posed.frame).positions);
+                     }});
   rules.push_back({"polished", [&](const Skeleton& posed) {
                      std::vector<Vec3> positions = rules[0].pose(posed);
                      polish_pose(bind.mesh, positions);
                      return positions;
                    }});
-  const std::vector<int> own = own_bones(prepared);
+  const std::vector<int> own = values_of(written, own_bones(prepared));
   const auto weights = [&](double width) {
     return diffused_weights(bind.mesh, own, static_cast<int>(model.skeleton.bones.size()), width * model.diagonal);
   };
