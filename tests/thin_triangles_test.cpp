@@ -116,6 +116,18 @@ TEST(ThinTriangles, GoFromABoxThatKeepsItsEdges) {
   }
 }
 
+TEST(ThinTriangles, AreTheSameAtEveryScale) {
+  const TriangleMesh mesh = crowded_box(300, 7);
+  const ReducedMesh reduced = without_thin_triangles(mesh);
+  for (const double scale : {0x1p-190, 0x1p190}) {
+    TriangleMesh scaled = mesh;
+    for (Vec3& p : scaled.positions) p *= scale;
+    const ReducedMesh same = without_thin_triangles(scaled);
+    EXPECT_EQ(same.vertices, reduced.vertices) << scale;
+    EXPECT_EQ(same.triangles, reduced.triangles) << scale;
+  }
+}
+
 TEST(ThinTriangles, AreHardlyLeftOfModels) {
   for (const auto& [name, limit] : {std::pair{"bear", 0.003}, std::pair{"man", 0.01}, std::pair{"pinion", 0.01}}) {
     const TestModel input = load_standard_model(name);

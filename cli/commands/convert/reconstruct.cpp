@@ -202,11 +202,11 @@ void add_bind_mesh(const Arguments& arguments, Source& source) {
   if (arguments.constant_offset) return;
   source.bar.show("reconstructing", 0.3);
   Stopwatch watch;
-  source.bind = reconstruct_mesh(source.context, source.prepared);
+  source.bind = reconstruct_bind_mesh(source.context, source.prepared).mesh;
   source.reconstruct_ms = watch.lap_ms();
-  if (arguments.has_all_texels || !arguments.texture.empty()) return;
-  source.reduced = without_thin_triangles(source.bind);
+  if (!arguments.has_all_texels && arguments.texture.empty()) source.reduced = without_thin_triangles(source.bind);
   source.reduce_ms = watch.lap_ms();
+  source.bind = in_user_units(std::move(source.bind), source.prepared.model.skeleton.frame);
 }
 
 void run(const Arguments& arguments, const CLI::App& command) {

@@ -26,11 +26,11 @@ constexpr double kTolerance = 15, kLargestTolerance = 0.05;
 /// What costs least goes first.
 constexpr std::array<double, 3> kPasses{0.01, 0.1, 1};
 
-/// The square of the sine of the smallest angle.
+/// The square of the sine of the smallest angle, which lies between the longest sides.
 double least_sine2(const Vec3& a, const Vec3& b, const Vec3& c) {
-  const double x = (b - a).squaredNorm(), y = (c - b).squaredNorm(), z = (a - c).squaredNorm();
-  const double across = (b - a).cross(c - a).squaredNorm();
-  return across > 0 ? across * std::min({x, y, z}) / (x * y * z) : 0;
+  std::array<double, 3> sides{(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()};
+  std::sort(sides.begin(), sides.end());
+  return sides[1] > 0 ? (b - a).cross(c - a).squaredNorm() / (sides[1] * sides[2]) : 0;
 }
 bool is_thin(const Vec3& a, const Vec3& b, const Vec3& c) { return least_sine2(a, b, c) < kThinSine2; }
 
