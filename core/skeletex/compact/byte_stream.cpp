@@ -114,7 +114,8 @@ std::string compress(std::string_view bytes) {
   std::string best;
   for (int lc = 0; lc <= 4; ++lc) {  // lp and pb are 0: the bytes do not come in groups
     std::string packed = static_cast<char>(lc) + compress_with(bytes, lc);
-    if (best.empty() || packed.size() < best.size()) best = std::move(packed);
+    if (!best.empty() && packed.size() >= best.size()) break;  // more bits are worse still
+    best = std::move(packed);
   }
   return best;
 }

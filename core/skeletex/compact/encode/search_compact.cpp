@@ -21,11 +21,15 @@ namespace {
 
 /// Trials are measured with so many points per surface, and the result with more.
 constexpr long kTrialSamples = 60'000, kSamples = 400'000;
+constexpr double kTrialShare = 0.997;  // of a wanted error, for trials
 constexpr int kSize = 512, kLargestSize = 2048;
 /// A largest error above both, a share of the diagonal and a multiple of the wanted mean, tells of a missing part, such
 /// as a horn between coarse samples.
 constexpr double kFurthest = 0.02, kFurthestOfMean = 20;
 constexpr double kLargestStep = 1e-2, kSmallestStep = 1e-7;
+/// The least that the logarithm of the error grows with that of the step while residuals matter, and how much larger
+/// the step of the same error is with residuals in one more level.
+constexpr double kLeastSlope = 0.15, kStepRatio = 1.7;
 
 class Search {
  public:
@@ -39,7 +43,7 @@ class Search {
 
   CompactResult run() {
     if (goal_.quality) return measured(completed(by_quality()));
-    if (!goal_.max_bytes) return measured(completed(by_error(goal_.max_error.value_or(1e-4))));
+    if (!goal_.max_bytes) return within_error(goal_.max_error.value_or(1e-4));
     // The shape gets what the layers leave of the bytes; how much they take depends a little on the shape.
     std::size_t for_shape = *goal_.max_bytes;
     for (int i = 0; i < 4; ++i) {
@@ -60,8 +64,12 @@ class Search {
     CompactOptions options;
     CompactModel model;
     SymmetricDistance distance;
-    std::size_t bytes = 0;
+    std::size_t bytes = 0;  ///< see count_bytes
   };
+  static std::size_t count_bytes(Trial& trial) {
+    if (trial.bytes == 0) trial.bytes = compact_bytes(trial.model).size();
+    return trial.bytes;
+  }
 
   CompactOptions options_of(double step, int bare_levels) const {
     CompactOptions options;
@@ -81,14 +89,17 @@ class Search {
     trial.distance = metro_->measure(mesh);
     return trial.distance.mean;
   }
-  Trial trial(double step, int bare_levels) {
+  /// \param weights  of a trial with as many levels, see CompactOptions; null: this trial's own
+  Trial trial(double step, int bare_levels, const Trial* weights = nullptr) {
     Trial result{options_of(step, bare_levels), {}, {}, 0};
+    if (weights != nullptr) result.options.weights = weights->model.weights;
     result.model = encode_compact(model_, source_, result.options);
     return result;
   }
   /// A trial with fewer triangles that intersect, and the layers of the model.
   Trial completed(Trial trial) {
     reduce_intersections(context_, model_, source_, trial.options, trial.model);
+    trial.bytes = 0;
     if (goal_.layer_steps == 0 || !has_coded_layers(model_)) return trial;
     trial.options.layer_steps = goal_.layer_steps;
     trial.model = encode_compact(model_, source_, trial.options);
@@ -103,30 +114,51 @@ class Search {
 
   /// How the logarithm of a value grows with that of the step: what was measured, within what is usual.
   static double slope_of(bool rises, double step_change, double value_change, bool is_measured) {
-    if (!is_measured || std::abs(step_change) <= 1e-3) return rises ? 0.8 : -0.9;
+    if (!is_measured || std::abs(step_change) <= 1e-3) return rises ? 0.45 : -0.9;
     const double measured = value_change / step_change;
-    return rises ? std::clamp(measured, 0.15, 1.5) : std::clamp(measured, -2.0, -0.2);
+    return rises ? std::clamp(measured, kLeastSlope, 1.5) : std::clamp(measured, -2.0, -0.2);
+  }
+  /// Whether a search for an error leads nowhere: the trial that keeps to it will have more bytes than there may be, or
+  /// the error hardly falls with the step any more, as it is that of what has no residuals. Near the wanted error, the
+  /// logarithm of the bytes falls by half to one and a tenth of what that of the error rises.
+  /// \param most_bytes  0: no limit
+  static bool is_in_vain(Trial& trial, double reached, double step_change, double value_change,
+                         std::size_t most_bytes) {
+    if (most_bytes > 0 &&
+        static_cast<double>(count_bytes(trial)) * portable::exp((reached > 0 ? 0.5 : 1.1) * reached) >=
+            static_cast<double>(most_bytes))
+      return true;
+    return reached > 0 && step_change < 0 && value_change > kLeastSlope * step_change;
+  }
+  /// The step to begin with: that of the best trial so far, with another number of levels.
+  static double first_step(const std::optional<Trial>& best, int bare_levels, double wanted) {
+    return best ? best->options.step * portable::pow(kStepRatio, best->options.bare_levels - bare_levels) : 3 * wanted;
+  }
+
+  /// Whether a good trial comes nearer to what is wanted than the best one so far.
+  static bool is_nearer(const Trial& trial, const std::optional<Trial>& best, bool rises) {
+    if (!best) return true;
+    return rises ? trial.options.step > best->options.step : trial.options.step < best->options.step;
   }
 
   /// The trial that keeps a value just within what is wanted; nothing where none does.
   /// \param rises  whether the value grows with the step, as errors do, or falls, as sizes do
   /// \param value  of a trial; positive
-  /// \param least_bytes  the search ends at a trial that misses and already has so many bytes: smaller steps have more.
-  ///                     0: no limit
+  /// \param most_bytes  where the value is an error: the search ends when it will take more bytes; 0: no limit
   std::optional<Trial> largest_step(int bare_levels, double first, double wanted, bool rises,
-                                    const std::function<double(Trial&)>& value, std::size_t least_bytes = 0) {
-    std::optional<Trial> best;
+                                    const std::function<double(Trial&)>& value, std::size_t most_bytes = 0) {
+    std::optional<Trial> best, before;
     double log_low = portable::log(kSmallestStep), log_high = portable::log(kLargestStep), at = portable::log(first);
     double last_at = 0, last_value = 0;
     for (int i = 0; i < 7; ++i) {
-      Trial now = trial(portable::exp(at), bare_levels);
+      Trial now = trial(portable::exp(at), bare_levels, before ? &*before : nullptr);
+      if (!before) before = now;
       const double reached = portable::log(value(now) / wanted), signed_off = rises ? reached : -reached;
       // Above: the step must become smaller where the value rises with it.
       (signed_off > 0 ? log_high : log_low) = at;
       const bool is_good = reached <= 0;
-      if (!is_good && least_bytes > 0 && compact_bytes(now.model).size() >= least_bytes) break;
-      if (is_good && (!best || (rises ? now.options.step > best->options.step : now.options.step < best->options.step)))
-        best = std::move(now);
+      if (rises && is_in_vain(now, reached, i > 0 ? at - last_at : 0, reached - last_value, most_bytes)) break;
+      if (is_good && is_nearer(now, best, rises)) best = std::move(now);
       if (is_good && reached > -0.02) break;
       const double slope = slope_of(rises, at - last_at, reached - last_value, i > 0);
       last_at = at;
@@ -136,6 +168,17 @@ class Search {
       if (log_high - log_low < 0.01) break;
     }
     return best;
+  }
+
+  /// Trials are measured at fewer points than the result.
+  CompactResult within_error(double wanted) {
+    Trial trial = completed(by_error(kTrialShare * wanted));
+    for (int i = 0; i < 8; ++i) {
+      CompactResult result = measured(trial);
+      if (result.mean <= wanted) return result;
+      trial = completed(this->trial(0.98 * trial.options.step, trial.options.bare_levels, &trial));
+    }
+    return measured(trial);
   }
 
   Trial by_error(double wanted) {
@@ -158,10 +201,10 @@ class Search {
     const auto try_levels = [&](int bare) {
       if (bare < 0) return false;
       std::optional<Trial> found = largest_step(
-          bare, 3 * wanted, wanted, true, [&](Trial& t) { return measure(t); },
+          bare, first_step(best, bare, wanted), wanted, true, [&](Trial& t) { return measure(t); },
           best && !lacks_part(*best) ? best->bytes : 0);
       if (!found) return false;
-      found->bytes = compact_bytes(found->model).size();
+      count_bytes(*found);
       if (best && !is_better(*found, *best)) return false;
       best = std::move(found);
       return true;
@@ -189,9 +232,8 @@ class Search {
     const auto wanted = static_cast<double>(most);
     std::optional<Trial> best;
     for (int bare = std::max(0, static_cast<int>(2 * std::log2(size_ / 256.0))); bare <= 12; ++bare) {
-      std::optional<Trial> found = largest_step(bare, 3e-4, wanted, false, [&](Trial& t) {
-        return static_cast<double>(t.bytes = compact_bytes(t.model).size());
-      });
+      std::optional<Trial> found =
+          largest_step(bare, 3e-4, wanted, false, [&](Trial& t) { return static_cast<double>(count_bytes(t)); });
       if (!found) continue;
       const double mean = measure(*found);
       if (best && mean >= best->distance.mean) break;
