@@ -462,7 +462,7 @@ kernel void move_points(const FitParameters p, global const int* restrict texel_
     area += 0.125f * sqrt(product(n, n));
   }
   const float cell = sqrt(area);
-  const float kept = fmin(1.0f, LARGEST_STEP * cell / sqrt(step2));
+  const float kept = p.share * fmin(1.0f, LARGEST_STEP * cell / sqrt(step2));
   const Point start = point_at(begin, texel);
   const Point total = {from.x - start.x + kept * move.x, from.y - start.y + kept * move.y,
                        from.z - start.z + kept * move.z};

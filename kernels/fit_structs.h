@@ -41,10 +41,11 @@ typedef struct FitParameters {
   int colour;            ///< relax_moves alone, as the rest
   float damping;         ///< share of a texel's mean diagonal entry
   float springs;         ///< the same share
+  float share;           ///< move_points alone: of the moves that is made
 } FitParameters;
 
 #ifndef __OPENCL_C_VERSION__
-static_assert(sizeof(FitParameters) == 36);
+static_assert(sizeof(FitParameters) == 40);
 }  // namespace skeletex
 #endif
 #endif

@@ -446,16 +446,23 @@ TEST(Placing, IsWhatIsExpectedToBeNearestButForTheFitsTime) {
     const TexelPlacing placing = choose_placing(texels, vertices, snap, fit);
     return std::pair{placing.has_snap, placing.fit_steps};
   };
-  EXPECT_EQ(chosen(128 * 128, 40000), std::pair(false, 4));
-  EXPECT_EQ(chosen(128 * 128, 20000), std::pair(true, 4));
-  EXPECT_EQ(chosen(256 * 256, 1000), std::pair(true, 4));
-  EXPECT_EQ(chosen(512 * 512, 14000), std::pair(true, 0));
-  EXPECT_EQ(chosen(512 * 512, 150000), std::pair(true, 4));
-  EXPECT_EQ(chosen(512 * 512, 44000), std::pair(true, 2));
-  EXPECT_EQ(chosen(2048 * 2048, 4000000), std::pair(true, 0));
-  EXPECT_EQ(chosen(512 * 512, 300000, {}, false), std::pair(false, 0));
-  EXPECT_EQ(chosen(512 * 512, 14000, {}, true), std::pair(true, 4));
-  EXPECT_EQ(chosen(512 * 512, 14000, false, {}), std::pair(false, 0));
+  using Chosen = std::pair<bool, double>;
+  EXPECT_EQ(chosen(128 * 128, 40000), Chosen(false, 4));
+  EXPECT_EQ(chosen(128 * 128, 20000), Chosen(true, 4));
+  EXPECT_EQ(chosen(256 * 256, 1000), Chosen(true, 4));
+  EXPECT_EQ(chosen(512 * 512, 14000), Chosen(true, 0));
+  EXPECT_EQ(chosen(512 * 512, 150000), Chosen(true, 4));
+  for (double per_vertex = 4, before = 4; per_vertex < 7.2; per_vertex += 0.1) {
+    const double steps = chosen(512 * 512, static_cast<std::size_t>(512 * 512 / per_vertex)).second;
+    EXPECT_LE(steps, before);
+    EXPECT_GT(steps, before - 0.25);
+    before = steps;
+  }
+  EXPECT_EQ(chosen(512 * 512, 37450), Chosen(true, 0));
+  EXPECT_EQ(chosen(2048 * 2048, 4000000), Chosen(true, 0));
+  EXPECT_EQ(chosen(512 * 512, 300000, {}, false), Chosen(false, 0));
+  EXPECT_EQ(chosen(512 * 512, 14000, {}, true), Chosen(true, 4));
+  EXPECT_EQ(chosen(512 * 512, 14000, false, {}), Chosen(false, 0));
 }
 
 TEST(Placing, IsReportedAndCanBeChosen) {

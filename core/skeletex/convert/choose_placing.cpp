@@ -10,16 +10,19 @@
 namespace skeletex {
 namespace {
 
-constexpr std::size_t kQuickTexels = 256 * 256;    // up to here the fit takes a tenth of a second
-constexpr std::size_t kMostTexels = 1280 * 1280;   // beyond, it takes half a gigabyte and more on the device
-constexpr double kFewTexels = 5, kManyTexels = 7;  // per vertex: with few all steps, with many none
+constexpr std::size_t kQuickTexels = 256 * 256;      // up to here the fit takes a tenth of a second
+constexpr std::size_t kMostTexels = 1280 * 1280;     // beyond, it takes half a gigabyte and more on the device
+constexpr double kFewTexels = 4.5, kManyTexels = 7;  // per vertex: with few all steps, with many none
+constexpr double kRamp = 1.3;                        // between them, so that the error falls with every size
+constexpr double kLeastSteps = 0.05;
 
-int choose_fit_steps(std::size_t texels, double texels_per_vertex) {
-  const int most = FitOptions{}.steps;
+double choose_fit_steps(std::size_t texels, double texels_per_vertex) {
+  const double most = FitOptions{}.steps;
   if (texels <= kQuickTexels) return most;
   if (texels > kMostTexels) return 0;
-  const double share = (kManyTexels - texels_per_vertex) / (kManyTexels - kFewTexels);
-  return static_cast<int>(std::lround(std::clamp(share, 0.0, 1.0) * most));
+  const double share = std::clamp((kManyTexels - texels_per_vertex) / (kManyTexels - kFewTexels), 0.0, 1.0);
+  const double steps = most * portable::pow(share, kRamp);
+  return steps < kLeastSteps ? 0 : steps;
 }
 
 /// The mean distance from the mesh as a share of that of a regular grid.

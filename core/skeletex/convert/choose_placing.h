@@ -8,7 +8,7 @@ namespace skeletex {
 /// Where the texels of VSM patches read, and where their points lie.
 struct TexelPlacing {
   bool has_snap = false;         ///< on vertices and edges of the mesh where they can
-  int fit_steps = 0;             ///< their points are fitted to the mesh in so many steps; 0: they lie on it
+  double fit_steps = 0;          ///< their points are fitted to the mesh in so many steps; 0: they lie on it
   double texels_per_vertex = 0;  ///< of the mesh
   double expected_error = 1;     ///< mean distance from the mesh, share of a regular grid's
   bool is_fitted() const { return fit_steps > 0; }

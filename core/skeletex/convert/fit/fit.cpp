@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/convert/fit/fit.h"
 
+#include <algorithm>
 #include <span>
 
 #include "fit_structs.h"
@@ -28,7 +29,7 @@ FitReport fit_points(ClContext& context, const DeviceLayout& layout, const Devic
   auto numbers = context.allocate<int>(FIT_NUMBER_PLANES * size);
   context.copy(covering, numbers);
   DevicePlanes moves = allocate_planes(context, size);
-  FitParameters parameters{maps.sizes, layout.width, layout.height, 0, 0, options.damping, options.springs};
+  FitParameters parameters{maps.sizes, layout.width, layout.height, 0, 0, options.damping, options.springs, 1};
   const auto launch = [&](const char* kernel, const auto&... arguments) {
     context.launch({"fit.cl", kernel}, layout.range(), parameters, layout.texel_patches, layout.tables.patches,
                    arguments...);
@@ -49,7 +50,7 @@ FitReport fit_points(ClContext& context, const DeviceLayout& layout, const Devic
     if (step > 0 && !(residual < report.residuals.back())) break;
     points = next;
     report.residuals.push_back(residual);
-    if (step == options.steps || residual == 0) break;
+    if (step >= options.steps || residual == 0) break;
 
     parameters.least_residual = static_cast<float>(options.floor * residual);
     launch("assemble", samples, numbers, matched, lattice, system);
@@ -58,6 +59,7 @@ FitReport fit_points(ClContext& context, const DeviceLayout& layout, const Devic
       for (parameters.colour = 0; parameters.colour < kColours; ++parameters.colour)
         launch("relax_moves", system, moves.values);
     next = allocate_planes(context, size);
+    parameters.share = static_cast<float>(std::min(1.0, options.steps - step));
     launch("move_points", start.values, points.values, moves.values, next.values);
   }
   return report;

@@ -8,7 +8,7 @@
 namespace skeletex {
 
 struct FitOptions {
-  int steps = 4;            ///< of Gauss-Newton, at most
+  double steps = 4;         ///< of Gauss-Newton, at most; 2.5: three, of which the third goes half the way
   int sweeps = 4;           ///< of the solver, per step
   float damping = 0.0005f;  ///< of a step, share of a texel's mean diagonal entry
   float springs = 0.001f;   ///< between the steps of neighbouring texels, the same share

@@ -33,7 +33,7 @@ struct TexelSources {
 struct TexelOptions {
   bool has_prefilter = true;  ///< of patches that are neither snapped nor fitted
   bool has_unfold = true;
-  int fit_steps = 0;  ///< so many at most fit points of VSM patches to the mesh, instead of the prefilter
+  double fit_steps = 0;  ///< so many at most fit points of VSM patches to the mesh, instead of the prefilter
   std::optional<DiagonalRule> half_rule =
       {};  ///< inner rows come as half floats, see round_to_half; the rule of the lattice's diagonals
 };
