@@ -8,6 +8,7 @@
 #include "skeletex/compact/compact_file.h"
 #include "skeletex/compact/decode_model.h"
 #include "skeletex/compact/encode/search_compact.h"
+#include "skeletex/convert/encode_model.h"
 #include "skeletex/io/check_model.h"
 #include "skeletex/io/compact/compact_model_file.h"
 #include "skeletex/io/model_file.h"
@@ -18,6 +19,7 @@
 #include "skeletex/reconstruct/skin.h"
 #include "skeletex/skeleton/pose.h"
 #include "support/corrupted.h"
+#include "support/load_model.h"
 #include "support/mesh_topology.h"
 #include "support/scratch.h"
 #include "support/synthetic_model.h"
@@ -189,6 +191,21 @@ INSTANTIATE_TEST_SUITE_P(Skeletons, Compact,
                          });
 
 /// Of values at the vertices, within a step of the range.
+TEST(CompactSearch, NeverExceedsTheWantedError) {
+  const TestModel eight = load_standard_model("eight");
+  EncodeOptions options;
+  options.width = options.height = 256;
+  const SkeletexModel model = encode_model(context(), eight.mesh, eight.skeleton, options).model;
+  for (const double wanted : {1e-3, 3e-4}) {
+    CompactGoal goal;
+    goal.max_error = wanted;
+    goal.size = 256;
+    const CompactResult result = search_compact(context(), model, nullptr, goal);
+    EXPECT_LE(result.mean, wanted);
+    EXPECT_GT(result.mean, 0.9 * wanted);
+  }
+}
+
 TEST(CompactLayers, FollowTheSurface) {
   const SkeletexModel model = decode_model(read_compact(packed(kWithLayers).bytes, "file"));
   const PreparedModel prepared(model);
