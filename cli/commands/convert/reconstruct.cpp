@@ -137,12 +137,12 @@ struct Surface {
 void reduce(const ReducedMesh& reduced, Surface& surface) {
   for (TriangleMesh* const mesh : {&surface.mesh, &surface.bind})
     *mesh = {values_of(reduced, mesh->positions), reduced.triangles};
-  const auto reduce = [&](auto& values) {
+  const auto keep = [&](auto& values) {
     if (!values.empty()) values = values_of(reduced, values);
   };
-  reduce(surface.attributes.normals.values);
-  reduce(surface.attributes.colours.values);
-  for (VertexNumbers& numbers : surface.attributes.numbers) reduce(numbers.values);
+  keep(surface.attributes.normals.values);
+  keep(surface.attributes.colours.values);
+  for (VertexNumbers& numbers : surface.attributes.numbers) keep(numbers.values);
 }
 
 /// Writes the surface in one pose, or in none.
@@ -282,7 +282,7 @@ void add_reconstruct_command(CLI::App& program) {
                  {".png"})
       ->type_name("PNG");
   command.add_flag("--all-texels", arguments->has_all_texels,
-                   "a vertex for every texel, in their order: keep thin triangles (always with --texture and "
+                   "keep thin triangles: a vertex for every texel, by rows and columns (always so with --texture and "
                    "--constant-offset)");
   command.add_flag("--no-report", arguments->has_no_report, "do not measure what the pose does to the surface")
       ->needs(pose);

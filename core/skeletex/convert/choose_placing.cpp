@@ -14,7 +14,7 @@ constexpr std::size_t kQuickTexels = 256 * 256;      // up to here the fit takes
 constexpr std::size_t kMostTexels = 1280 * 1280;     // beyond, it takes half a gigabyte and more on the device
 constexpr double kFewTexels = 4.5, kManyTexels = 7;  // per vertex: with few all steps, with many none
 constexpr double kRamp = 1.3;                        // between them, so that the error falls with every size
-constexpr double kLeastSteps = 0.05;
+constexpr double kLeastSteps = 0.05;                 // fewer would take the time of one for nothing
 
 double choose_fit_steps(std::size_t texels, double texels_per_vertex) {
   const double most = FitOptions{}.steps;

@@ -251,17 +251,7 @@ SeamArc resample_arc(const SkeletexModel& model, const SeparationPlanes& separat
   const int bone = arc.bones[0];
   const BoneEnd end = end_at(model.skeleton, bone, arc.node);
   const Vec3& node = model.skeleton.nodes[arc.node].position;
-  const auto corner_point = [&](int corner) {
-    const SeamCorner& c = model.corners[corner];
-    return separation.seam_point(c.bones[0], end_at(model.skeleton, c.bones[0], c.node), c.sample.turn,
-                                 c.sample.distance);
-  };
-  std::vector<Vec3> points;
-  if (!arc.is_closed()) points.push_back(corner_point(arc.corners[0]));
-  for (const SeamSample& sample : arc.samples)
-    points.push_back(separation.seam_point(bone, end, sample.turn, sample.distance));
-  if (!arc.is_closed()) points.push_back(corner_point(arc.corners[1]));
-
+  const std::vector<Vec3> points = arc_points(model, separation, arc);
   const std::vector<Vec3> fitted = resample_polyline(points, arc.is_closed(), cells, ResampleFilter::kProject);
   const std::vector<Vec3> sampled = resample_polyline(points, arc.is_closed(), cells, ResampleFilter::kSample);
   SeamArc result = arc;

@@ -280,32 +280,38 @@ void refine_texels(ClContext& context, const PreparedModel& prepared, SkeletexMo
   download_texels(context, texels, result.texture);
 }
 
+std::vector<Vec3> arc_points(const SkeletexModel& model, const SeparationPlanes& separation, const SeamArc& arc) {
+  std::vector<Vec3> points;
+  const auto add = [&](int bone, const SeamSample& sample) {
+    points.push_back(separation.seam_point(bone, end_at(model.skeleton, bone, arc.node), sample.turn, sample.distance));
+  };
+  const auto add_corner = [&](int corner) { add(model.corners[corner].bones[0], model.corners[corner].sample); };
+  if (!arc.is_closed()) add_corner(arc.corners[0]);
+  for (const SeamSample& sample : arc.samples) add(arc.bones[0], sample);
+  if (!arc.is_closed()) add_corner(arc.corners[1]);
+  return points;
+}
+
 SeamArc divide_arc(const SkeletexModel& model, const SeparationPlanes& separation, const SeamArc& arc, int parts) {
   const int bone = arc.bones[0];
   const BoneEnd end = end_at(model.skeleton, bone, arc.node);
   const Vec3& node = model.skeleton.nodes[arc.node].position;
-  const auto corner_point = [&](int corner) {
-    const SeamCorner& c = model.corners[corner];
-    return separation.seam_point(c.bones[0], end_at(model.skeleton, c.bones[0], c.node), c.sample.turn,
-                                 c.sample.distance);
-  };
+  const std::vector<Vec3> points = arc_points(model, separation, arc);
   SeamArc divided = arc;
   divided.samples.clear();
-  Vec3 last = arc.is_closed() ? separation.seam_point(bone, end, arc.samples.back().turn, arc.samples.back().distance)
-                              : corner_point(arc.corners[0]);
-  const auto add_between = [&](const Vec3& next) {
+  const auto add_between = [&](const Vec3& last, const Vec3& next) {
     for (int part = 1; part < parts; ++part) {
       const Vec3 point = last + static_cast<double>(part) / parts * (next - last);
       divided.samples.push_back(
           {separation.turn_of(bone, point - node), separation.half_line_distance(bone, end, point)});
     }
-    last = next;
   };
-  for (const SeamSample& sample : arc.samples) {
-    add_between(separation.seam_point(bone, end, sample.turn, sample.distance));
-    divided.samples.push_back(sample);
+  const std::size_t first = arc.is_closed() ? 0 : 1;
+  for (std::size_t i = 0; i < arc.samples.size(); ++i) {
+    add_between(i + first == 0 ? points.back() : points[i + first - 1], points[i + first]);
+    divided.samples.push_back(arc.samples[i]);
   }
-  if (!arc.is_closed()) add_between(corner_point(arc.corners[1]));
+  if (!arc.is_closed()) add_between(points[points.size() - 2], points.back());
   return divided;
 }
 

@@ -26,6 +26,8 @@ std::vector<double> columns_of_finer(int old_width, int width);
 /// \param result  with its patches and seams; its row_u are set too
 void refine_texels(ClContext& context, const PreparedModel& model, SkeletexModel& result);
 
+/// The points of a seam's arc, in the model's frame: its samples, and the corners of an open one at its ends.
+std::vector<Vec3> arc_points(const SkeletexModel& model, const SeparationPlanes& separation, const SeamArc& arc);
 /// The arc with each of its edges divided.
 SeamArc divide_arc(const SkeletexModel& model, const SeparationPlanes& separation, const SeamArc& arc, int parts);
 
