@@ -215,7 +215,9 @@ std::size_t say_filled(const FillResult& filling, double diagonal) {
                             hole.loop.size(), text_of(hole.centre), 100 * hole.size / diagonal);
   }
   const std::size_t count = filling.holes.size();
-  if (count == 0) spdlog::info("--close: the mesh has no holes once vertices in one place are one");
+  if (filling.turned > 0) spdlog::info("--close: triangles turned to agree with most others: {}", filling.turned);
+  if (count == 0 && filling.turned == 0)
+    spdlog::info("--close: the mesh has no holes once vertices in one place are one");
   if (count > 0)
     spdlog::info("--close: filled {} hole{}{}{}", count, count == 1 ? "" : "s", places, count > 3 ? "; ..." : "");
   if (!filling.copies.empty())
@@ -249,6 +251,7 @@ Json take_filled(MeshParts& parts, TriangleMesh filled, const FillResult& fillin
   return {{"method", "fill"},
           {"holes", filling.holes.size()},
           {"intersecting", intersecting},
+          {"turned_triangles", filling.turned},
           {"removed_triangles", filling.removed},
           {"split_vertices", filling.copies.size()}};
 }

@@ -657,6 +657,11 @@ TEST_F(Program, ValidatesWithExitCodesAndFindings) {
   ASSERT_FALSE(json["findings"].empty());
   for (const auto& finding : json["findings"]) expect_keys(finding, {"severity", "rule", "message", "remedy"});
   expect_refused(1, {"encode", "open.ply", "y.skeleton.json", "-o", "a.skx.exr"}, {"error:", "remedy:"});
+  const nlohmann::json mesh_alone = json_of({"validate", "y.ply"});
+  EXPECT_EQ(mesh_alone["valid"], true);
+  EXPECT_FALSE(mesh_alone.contains("bones"));
+  EXPECT_EQ(run({"validate", "open.ply"}).code, 1);
+  expect_refused(2, {"validate", "y.ply", "--repair", "fixed.skeleton.json"}, {"SKELETON"});
   fs::remove(folder_ / "open.ply");
 }
 

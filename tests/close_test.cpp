@@ -127,6 +127,22 @@ TEST(FillHoles, NonManifoldEdgesAreTakenAwayAndFilled) {
   }
 }
 
+TEST(FillHoles, TurnedTrianglesAreTurnedBack) {
+  for (const NamedShape& shape : all_shapes())
+    for (const int step : {3, 40}) {
+      SCOPED_TRACE(shape.name);
+      TriangleMesh mesh = shape.shape.mesh;
+      long turned = 0;
+      for (std::size_t t = 0; t < mesh.triangles.size(); t += step, ++turned)
+        std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);
+      const FillResult result = fill_holes(mesh);
+      EXPECT_EQ(result.obstacle, "");
+      EXPECT_EQ(result.turned, turned);
+      EXPECT_EQ(result.removed, 0);
+      EXPECT_EQ(mesh.triangles, shape.shape.mesh.triangles);
+    }
+}
+
 TEST(FillHoles, NonManifoldVerticesAreSplit) {
   // Two bodies that share one vertex, each the other's image in it.
   const TriangleMesh whole = y_shape().mesh;

@@ -193,12 +193,13 @@ def skeletonize(
     return Skeleton._of(_core.skeletonize(mesh.vertices, mesh.triangles, to_json(options, "options"), progress))
 
 
-def validate(mesh: Mesh, skeleton: Skeleton) -> List[Finding]:
-    """Everything that is wrong with a mesh and a skeleton. Nothing is: the list is empty. Takes any input.
+def validate(mesh: Mesh, skeleton: Optional[Skeleton] = None) -> List[Finding]:
+    """Everything that is wrong with a mesh, and with a skeleton in it. Nothing is: the list is empty. Takes any input.
 
     ``[f for f in validate(mesh, skeleton) if f.severity == "error"]`` is empty where :func:`encode` takes the two.
     """
-    return [Finding(*row) for row in _core.validate(mesh.vertices, mesh.triangles, skeleton._tuple())]
+    rows = _core.validate(mesh.vertices, mesh.triangles, None if skeleton is None else skeleton._tuple())
+    return [Finding(*row) for row in rows]
 
 
 def repair(mesh: Mesh, skeleton: Skeleton) -> Tuple[Skeleton, List[str]]:

@@ -156,9 +156,10 @@ py::tuple make_skeleton(const Points& vertices, const Indices& triangles, const 
   }));
 }
 
-py::list validate(const Points& vertices, const Indices& triangles, const py::tuple& skeleton) {
+py::list validate(const Points& vertices, const Indices& triangles, const std::optional<py::tuple>& skeleton) {
   TriangleMesh mesh = mesh_of(vertices, triangles);
-  const Skeleton given = skeleton_of(skeleton);
+  if (!skeleton) return findings_list(validate_mesh(mesh));
+  const Skeleton given = skeleton_of(*skeleton);
   return findings_list(run([&](ClContext& context) { return validate_input(context, mesh, given); }));
 }
 

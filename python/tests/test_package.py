@@ -336,6 +336,8 @@ def test_findings_are_objects_and_encode_raises_the_same(
 def test_an_open_mesh_is_said_to_be_open(bear_mesh: skeletex.Mesh, bear_skeleton: skeletex.Skeleton) -> None:
     is_open = skeletex.Mesh(bear_mesh.vertices, bear_mesh.triangles[:-1])
     assert "closed" in [f.rule for f in skeletex.validate(is_open, bear_skeleton)]
+    assert [f.rule for f in skeletex.validate(is_open)] == ["closed"]
+    assert skeletex.validate(bear_mesh) == []
     with pytest.raises(skeletex.InvalidInput) as raised:
         skeletex.skeletonize(is_open)
     assert "closed" in [f.rule for f in raised.value.findings]

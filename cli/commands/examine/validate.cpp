@@ -123,30 +123,38 @@ std::string text_of(const Arguments& arguments, const Outcome& outcome, const st
                      : fmt::format("not repaired: {}\n", outcome.refusal));
 }
 
+Outcome check(const Arguments& arguments, TriangleMesh& mesh, const Skeleton& skeleton) {
+  Outcome outcome;
+  if (arguments.skeleton.empty()) {
+    outcome.findings = validate_mesh(mesh);
+    return outcome;
+  }
+  ClContext context(arguments.device);
+  ProgressBar bar(context);
+  bar.show("checking", 0);
+  outcome.findings = validate_input(context, mesh, skeleton);
+  if (has_errors(outcome.findings) && (!arguments.json.empty() || !arguments.repaired.empty())) {
+    bar.show("repairing", 0.3);
+    outcome.repair = try_repair(context, mesh, skeleton, outcome.refusal);
+  } else {
+    outcome.repair = RepairResult{skeleton, {}};
+  }
+  return outcome;
+}
+
 void run(const Arguments& arguments) {
   TriangleMesh mesh = load_mesh(arguments.mesh);
-  const Skeleton skeleton = read_skeleton(arguments.skeleton);
-  ClContext context(arguments.device);
-  Outcome outcome;
-  {
-    ProgressBar bar(context);
-    bar.show("checking", 0);
-    outcome.findings = validate_input(context, mesh, skeleton);
-    if (has_errors(outcome.findings) && (!arguments.json.empty() || !arguments.repaired.empty())) {
-      bar.show("repairing", 0.3);
-      outcome.repair = try_repair(context, mesh, skeleton, outcome.refusal);
-    } else {
-      outcome.repair = RepairResult{skeleton, {}};
-    }
-  }
+  const bool has_skeleton = !arguments.skeleton.empty();
+  const Skeleton skeleton = has_skeleton ? read_skeleton(arguments.skeleton) : Skeleton{};
+  const Outcome outcome = check(arguments, mesh, skeleton);
   const long errors = outcome.errors(), warnings = outcome.warnings();
   const bool is_repaired = !arguments.repaired.empty() && outcome.repair;
   if (is_repaired) write_text_atomically(arguments.repaired, skeleton_to_json(outcome.repair->skeleton).dump(2) + '\n');
-  const std::string verdict =
-      fmt::format("{} triangles, {} bones: {}", mesh.triangles.size(), skeleton.bones.size(),
-                  errors > 0     ? fmt::format("{} error{}; not usable as it is", errors, errors == 1 ? "" : "s")
-                  : warnings > 0 ? fmt::format("usable, {} warning{}", warnings, warnings == 1 ? "" : "s")
-                                 : "usable");
+  const std::string verdict = fmt::format(
+      "{} triangles{}: {}", mesh.triangles.size(), has_skeleton ? fmt::format(", {} bones", skeleton.bones.size()) : "",
+      errors > 0     ? fmt::format("{} error{}; not usable as it is", errors, errors == 1 ? "" : "s")
+      : warnings > 0 ? fmt::format("usable, {} warning{}", warnings, warnings == 1 ? "" : "s")
+                     : "usable");
   print(arguments.json, text_of(arguments, outcome, verdict));
   Json list = Json::array();
   for (const Finding& finding : outcome.findings)
@@ -156,8 +164,8 @@ void run(const Arguments& arguments) {
             {"warnings", warnings},
             {"findings", std::move(list)},
             {"vertices", mesh.positions.size()},
-            {"triangles", mesh.triangles.size()},
-            {"bones", skeleton.bones.size()}};
+            {"triangles", mesh.triangles.size()}};
+  if (has_skeleton) json["bones"] = skeleton.bones.size();
   if (!arguments.repaired.empty()) {
     json["repaired"] = is_repaired ? Json(arguments.repaired) : Json();
     if (is_repaired)
@@ -174,25 +182,28 @@ void run(const Arguments& arguments) {
 void add_validate_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand(
-      "validate", "Say everything that is wrong with a mesh and a skeleton, each with its place and remedy");
+      "validate", "Say everything that is wrong with a mesh, or a mesh and a skeleton, each with its place and remedy");
   declare_input(command, command.add_option("MESH", arguments->mesh, "triangle mesh: .obj, .ply, .off or .stl"))
       ->required();
-  declare_input(command, command.add_option("SKELETON", arguments->skeleton,
-                                            "skeleton: JSON with nodes and bones, in the mesh's coordinates"))
-      ->required();
+  CLI::Option* skeleton = command.add_option(
+      "SKELETON", arguments->skeleton,
+      "skeleton: JSON with nodes and bones, in the mesh's coordinates; without, the mesh alone is checked");
+  declare_input(command, skeleton);
   declare_output(command,
                  command.add_option("--repair", arguments->repaired,
                                     "write a skeleton that is usable: nodes are moved, and what no move mends is bent, "
                                     "contracted or taken away"),
                  {".json"})
-      ->type_name("FILE");
+      ->type_name("FILE")
+      ->needs(skeleton);
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(
       "Examples:\n"
+      "  skeletex validate bear.off\n"
       "  skeletex validate bear.off bear.skeleton.json\n"
       "  skeletex validate bear.off bear.skeleton.json --repair fixed.skeleton.json\n"
-      "Ends with 0 when the two are usable (warnings allowed) or were repaired, else with 1.");
+      "Ends with 0 when all is usable (warnings allowed) or was repaired, else with 1.");
   command.callback([arguments] { run(*arguments); });
 }
 

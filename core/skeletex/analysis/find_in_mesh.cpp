@@ -10,6 +10,7 @@
 #include <tuple>
 
 #include "skeletex/analysis/findings.h"
+#include "skeletex/analysis/orientation.h"
 #include "skeletex/geometry/union_find.h"
 
 namespace skeletex {
@@ -100,94 +101,27 @@ void find_components(const TriangleMesh& mesh, const ManifoldReport& report, std
        "the skeleton lies in and remove the others"});
 }
 
-struct EdgeUse {
-  int smaller, larger, triangle;
-  bool is_forward;
-};
-
-struct NeighbourTriangle {
-  int triangle;
-  bool is_opposed;  ///< it runs through the common edge in the same direction
-};
-
-/// Per triangle those that share an edge with it alone.
-std::vector<std::vector<NeighbourTriangle>> neighbours_of(const TriangleMesh& mesh, const std::vector<bool>& is_bad) {
-  std::vector<EdgeUse> uses;
-  for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t)
-    for (int k = 0; k < 3 && !is_bad[t]; ++k) {
-      const int a = mesh.triangles[t][k], b = mesh.triangles[t][(k + 1) % 3];
-      uses.push_back({std::min(a, b), std::max(a, b), t, a < b});
-    }
-  std::sort(uses.begin(), uses.end(), [](const EdgeUse& a, const EdgeUse& b) {
-    return std::tie(a.smaller, a.larger, a.triangle) < std::tie(b.smaller, b.larger, b.triangle);
-  });
-  std::vector<std::vector<NeighbourTriangle>> neighbours(mesh.triangles.size());
-  for (std::size_t i = 0; i < uses.size();) {
-    std::size_t j = i + 1;
-    while (j < uses.size() && uses[j].smaller == uses[i].smaller && uses[j].larger == uses[i].larger) ++j;
-    if (j - i == 2) {
-      const bool is_opposed = uses[i].is_forward == uses[i + 1].is_forward;
-      neighbours[uses[i].triangle].push_back({uses[i + 1].triangle, is_opposed});
-      neighbours[uses[i + 1].triangle].push_back({uses[i].triangle, is_opposed});
-    }
-    i = j;
-  }
-  return neighbours;
-}
-
-/// Per triangle, whether it must be turned so that all agree with the majority of their component; and whether that is
-/// possible at all.
-std::pair<std::vector<bool>, bool> triangles_to_turn(const TriangleMesh& mesh, const ManifoldReport& report) {
-  std::vector<bool> is_bad(mesh.triangles.size(), false);
-  for (const int t : report.degenerate_triangles) is_bad[t] = true;
-  const std::vector<std::vector<NeighbourTriangle>> neighbours = neighbours_of(mesh, is_bad);
-  std::vector<bool> turn(mesh.triangles.size(), false), is_seen = is_bad;
-  bool is_orientable = true;
-  for (int seed = 0; seed < static_cast<int>(mesh.triangles.size()); ++seed) {
-    if (is_seen[seed]) continue;
-    std::vector<int> part{seed};
-    is_seen[seed] = true;
-    std::size_t turned = 0;
-    for (std::size_t i = 0; i < part.size(); ++i) {
-      turned += turn[part[i]];
-      for (const auto& [other, is_opposed] : neighbours[part[i]]) {
-        const bool wanted = turn[part[i]] != is_opposed;
-        if (is_seen[other]) {
-          is_orientable = is_orientable && turn[other] == wanted;
-          continue;
-        }
-        turn[other] = wanted;
-        is_seen[other] = true;
-        part.push_back(other);
-      }
-    }
-    if (2 * turned > part.size())
-      for (const int t : part) turn[t] = !turn[t];
-  }
-  return {turn, is_orientable};
-}
-
 void find_turned_triangles(const TriangleMesh& mesh, const ManifoldReport& report, std::vector<Finding>& findings) {
   if (report.misoriented_edges.empty()) return;
   const auto& [a, b] = report.misoriented_edges.front();
   const std::string edges = fmt::format("{} edge{}, first between vertices {} and {} at {}",
                                         report.misoriented_edges.size(), plural(report.misoriented_edges.size()), a, b,
                                         text_of(0.5 * (mesh.positions[a] + mesh.positions[b])));
-  const auto [turn, is_orientable] = triangles_to_turn(mesh, report);
-  if (!is_orientable) {
+  const TriangleTurns turns = triangles_to_turn(mesh, report);
+  if (!turns.is_orientable) {
     findings.push_back(
         {Severity::kError, "orientation",
          fmt::format("the surface has one side only, like a Moebius strip: its triangles cannot agree ({})", edges),
-         "cut it open where it runs into its own back, and close the body"});
+         "cut it open where it runs into its own back, and close the body, or let `encode --close` make one of it"});
     return;
   }
-  const auto count = std::count(turn.begin(), turn.end(), true);
-  const int first = static_cast<int>(std::find(turn.begin(), turn.end(), true) - turn.begin());
+  const int first =
+      static_cast<int>(std::find(turns.is_turned.begin(), turns.is_turned.end(), true) - turns.is_turned.begin());
   findings.push_back(
       {Severity::kError, "orientation",
-       fmt::format("{} of {} triangles are turned against their neighbours ({}); the first is triangle {} at {}", count,
-                   mesh.triangles.size(), edges, first, text_of(centre_of(mesh, first))),
-       "turn these triangles, so that all run counter-clockwise seen from outside"});
+       fmt::format("{} of {} triangles are turned against their neighbours ({}); the first is triangle {} at {}",
+                   turns.count, mesh.triangles.size(), edges, first, text_of(centre_of(mesh, first))),
+       "turn these triangles, so that all run counter-clockwise seen from outside, or let `encode --close` do it"});
 }
 
 /// Edges and vertices where more sheets of surface meet than one.
@@ -199,7 +133,8 @@ void find_sheets(const TriangleMesh& mesh, const ManifoldReport& report, std::ve
          fmt::format("{} edge{} more than two triangles; the first runs between vertices {} and {} at {}",
                      report.non_manifold_edges.size(), report.non_manifold_edges.size() == 1 ? " has" : "s have", a, b,
                      text_of(0.5 * (mesh.positions[a] + mesh.positions[b]))),
-         "remove inner faces and doubled triangles, so that two are left at every edge"});
+         "remove inner faces and doubled triangles, so that two are left at every edge, or let `encode --close` wrap "
+         "it"});
   }
   if (!report.non_manifold_vertices.empty()) {
     const int v = report.non_manifold_vertices.front();
@@ -208,7 +143,7 @@ void find_sheets(const TriangleMesh& mesh, const ManifoldReport& report, std::ve
          fmt::format("at {} vert{} several sheets of surface touch in a point; the first is vertex {} at {}",
                      report.non_manifold_vertices.size(), report.non_manifold_vertices.size() == 1 ? "ex" : "ices", v,
                      text_of(mesh.positions[v])),
-         "give every sheet a vertex of its own and move them apart, or join the sheets"});
+         "give every sheet a vertex of its own and move them apart, or let `encode --close` do it"});
   }
 }
 
@@ -280,19 +215,15 @@ void find_in_mesh(const TriangleMesh& mesh, const ManifoldReport& report, std::v
 TriangleMesh usable_surface(const TriangleMesh& mesh, const ManifoldReport& report) {
   TriangleMesh surface;
   surface.positions = mesh.positions;
-  std::vector<bool> turn(mesh.triangles.size(), false);
-  if (!report.misoriented_edges.empty()) {
-    bool is_orientable = true;
-    std::tie(turn, is_orientable) = triangles_to_turn(mesh, report);
-    if (!is_orientable) return {};
-  }
+  const TriangleTurns turns = triangles_to_turn(mesh, report);
+  if (!turns.is_orientable) return {};
   std::vector<bool> is_bad(mesh.triangles.size(), false);
   for (const int t : report.degenerate_triangles) is_bad[t] = true;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     if (is_bad[t]) continue;
     auto [a, b, c] = mesh.triangles[t];
     if (!mesh.positions[a].allFinite() || !mesh.positions[b].allFinite() || !mesh.positions[c].allFinite()) continue;
-    if (turn[t]) std::swap(b, c);
+    if (turns.is_turned[t]) std::swap(b, c);
     surface.triangles.push_back({a, b, c});
   }
   // Others would stretch the bounding box.

@@ -12,6 +12,7 @@
 #include <set>
 
 #include "skeletex/analysis/manifold.h"
+#include "skeletex/analysis/orientation.h"
 #include "skeletex/close/manifold_parts.h"
 #include "skeletex/geometry/self_intersection.h"
 #include "skeletex/geometry/triangle_tree.h"
@@ -103,6 +104,16 @@ std::vector<int> remove_useless(TriangleMesh& mesh) {
   }
   mesh.triangles = std::move(kept);
   return origins;
+}
+
+/// Turns triangles that do not agree with most of their component on what is outside, where that is possible.
+/// \return how many
+long turn_triangles(TriangleMesh& mesh) {
+  const TriangleTurns turns = triangles_to_turn(mesh, measure_manifold(mesh));
+  if (!turns.is_orientable) return 0;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    if (turns.is_turned[t]) std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);
+  return turns.count;
 }
 
 std::string obstacle_of(const ManifoldReport& report, const std::vector<Hole>& holes, double diagonal) {
@@ -231,6 +242,7 @@ void refuse_sheets(const TriangleMesh& mesh, const Fillings& fillings, std::vect
 FillResult fill_holes(TriangleMesh& mesh) {
   FillResult result;
   result.origins = remove_useless(mesh);
+  result.turned = turn_triangles(mesh);
   result.removed = remove_non_manifold_edges(mesh, result.origins);
   const double diagonal = bounding_box(mesh).diagonal();
   result.holes = find_holes(mesh, measure_manifold(mesh).boundary_edges);
