@@ -402,14 +402,16 @@ TEST(Skeletonize, ContractionShortensALimbThatCannotBeMadeStraight) {
   EXPECT_FALSE(has_bone(repair.skeleton(), "shin"));
 }
 
-TEST(Skeletonize, LevelsThatLoseLimbsAreGivenUp) {
+TEST(Skeletonize, LevelsThatLoseLimbsOrTakeTooLongAreGivenUp) {
   const TestModel camel = load_standard_model("camel");
   const SkeletonizeResult result = skeletonized(camel.mesh);
   const SkeletonCandidate& chosen = result.candidates[result.chosen];
-  const auto given_up =
-      std::count_if(result.candidates.begin(), result.candidates.end(),
-                    [](const SkeletonCandidate& c) { return c.refusal.find("fewer limbs") != std::string::npos; });
-  EXPECT_GE(given_up, 1);
+  const auto given_up = [&](const char* reason) {
+    return std::count_if(result.candidates.begin(), result.candidates.end(),
+                         [&](const SkeletonCandidate& c) { return c.refusal.find(reason) != std::string::npos; });
+  };
+  EXPECT_GE(given_up("fewer limbs"), 1);
+  EXPECT_EQ(given_up("takes too long"), 1);  // the most detailed one
   for (const SkeletonCandidate& candidate : result.candidates) {
     if (candidate.refusal.find("fewer limbs") == std::string::npos) continue;
     EXPECT_LT(candidate.limbs, chosen.limbs) << candidate.name;

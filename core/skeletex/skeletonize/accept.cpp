@@ -36,7 +36,7 @@ Acceptance::Acceptance(ClContext& context, const Surface& surface)
   coarse_->tree = build_triangle_tree(coarse_->mesh);
 }
 
-std::string Acceptance::segment(Repair& repair, const std::function<bool(const Skeleton&)>& is_enough_left) const {
+std::string Acceptance::segment(Repair& repair, const std::function<std::string(const Repair&)>& stop) const {
   // Large meshes take long to cut: fewer moves there, and contraction sooner.
   const int moves = std::clamp(
       static_cast<int>(kMoves * 30'000 / std::max<std::size_t>(surface_.mesh.triangles.size(), 1)), 6, kMoves);
@@ -63,7 +63,8 @@ std::string Acceptance::segment(Repair& repair, const std::function<bool(const S
     }
     moved_for_this = 0;
     if (!repair.contract(std::max(bone, 0))) return refusal;
-    if (is_enough_left && !is_enough_left(repair.skeleton())) return "it has fewer limbs left than another skeleton";
+    if (stop)
+      if (std::string reason = stop(repair); !reason.empty()) return reason;
   }
 }
 

@@ -19,9 +19,9 @@ class Acceptance {
   Acceptance(ClContext& context, const Surface& surface);
 
   /// Where segmentation refuses, nodes are moved and, when that does not help, bones contracted.
-  /// \param is_enough_left  called after each contraction; the skeleton is given up when it returns false
+  /// \param stop  called after each contraction; the skeleton is given up for the reason that it returns, unless empty
   /// \return why the skeleton cannot be used; empty when it can
-  std::string segment(Repair& repair, const std::function<bool(const Skeleton&)>& is_enough_left = {}) const;
+  std::string segment(Repair& repair, const std::function<std::string(const Repair&)>& stop = {}) const;
 
   /// Whether segmentation takes a skeleton as it is.
   bool is_accepted(const Skeleton& skeleton) const;

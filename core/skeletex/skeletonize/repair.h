@@ -59,6 +59,7 @@ class Repair {
 
   const Skeleton& skeleton() const { return skeleton_; }
   const std::vector<BoneMargin>& margins() const { return margins_; }
+  long measured() const { return measured_; }  ///< margins of bones, while nodes were moved
 
  private:
   static constexpr double kGoodMargin = 0.25;  ///< more earns nothing

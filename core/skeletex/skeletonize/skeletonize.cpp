@@ -41,6 +41,8 @@ constexpr int kMostHandles = 50;  // a ring of three bones or more around each; 
 constexpr const char* kHandleRemedy =
     ". Small handles can be cut off: encode --close --close-handles X, X diagonals the longest loop around them";
 constexpr std::array<int, 2> kEvenRings{5, 10};  // bones
+/// Beside an accepted skeleton with half of the limbs, repairs end after so many margins; each second has some 130,000.
+constexpr long kMostMeasured = 150'000;
 
 /// The rule of tips at a level of detail from 0 to 1.
 TipRule rule_of(double detail) {
@@ -217,6 +219,18 @@ int least_limbs(const std::vector<SkeletonCandidate>& candidates, const Skeleton
   return most;
 }
 
+/// Why the repair of a candidate is given up; empty: it is not.
+/// \param limbs  that it has left
+/// \param measured  margins in its repair
+/// \param least  limbs that it needs
+/// \param all  limbs of the body
+std::string reason_to_stop(int limbs, long measured, int least, int all) {
+  if (limbs < least) return "it has fewer limbs left than another skeleton";
+  if (measured > kMostMeasured && least > 0 && 2 * least >= all)
+    return "its repair takes too long beside another skeleton";
+  return {};
+}
+
 /// Which of the accepted candidates is best; -1: none.
 int choose(const std::vector<SkeletonCandidate>& candidates, const SkeletonizeOptions& options) {
   const double least = least_error(candidates);
@@ -274,10 +288,10 @@ SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, cons
     const auto limbs_of = [&](const Skeleton& skeleton) {
       return count_limbs(body, limbs, skeleton, kLimbReach * surface.diagonal);
     };
-    const auto is_enough_left = [&, least = least_limbs(result.candidates, options)](const Skeleton& skeleton) {
-      return limbs_of(skeleton) >= least;
+    const auto stop = [&, least = least_limbs(result.candidates, options)](const Repair& tried) {
+      return reason_to_stop(limbs_of(tried.skeleton()), tried.measured(), least, result.limbs);
     };
-    SkeletonCandidate candidate{level.name, 0, 0, 0, acceptance.segment(repair, is_enough_left)};
+    SkeletonCandidate candidate{level.name, 0, 0, 0, acceptance.segment(repair, stop)};
     level.skeleton = repair.skeleton();
     if (candidate.refusal.empty()) make_symmetric(surface, plane, acceptance, level.skeleton);
     candidate.bones = static_cast<int>(level.skeleton.bones.size());
