@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "skeletex/io/image_file.h"
+#include "skeletex/io/mesh/mesh_builder.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/model/error.h"
 #include "support/corrupted.h"
@@ -50,6 +51,21 @@ TEST(MeshAttributes, CornersOfAnObjKeepTheirNormalsAndTextureCoordinatesInTheFan
   ASSERT_EQ(attributes.colours.values.size(), 4u);
   EXPECT_EQ(srgb_bytes(attributes.colours.values[1]), Vec3(0, 255, 0));
   EXPECT_EQ(srgb_bytes(attributes.colours.values[3]), Vec3(255, 255, 255));
+}
+
+TEST(MeshAttributes, ValuesThatNoFaceOfAnObjNamesAreThoseOfTheVerticesOrNone) {
+  const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n", face = "f 1 2 3\n";
+  for (const std::string normal : {"vn 0 0 1\n", "vn 0 0 0\n"}) {
+    const MeshAttributes one = read_obj(vertices + normal + "vt 0 0\n" + face, "one.obj").attributes;
+    EXPECT_TRUE(one.normals.empty());
+    EXPECT_TRUE(one.texture_coordinates.empty());
+  }
+  const MeshAttributes each =
+      read_obj(vertices + "vn 0 0 2\nvn 1 0 0\nvn 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n" + face, "each.obj").attributes;
+  ASSERT_EQ(each.normals.values.size(), 3u);
+  EXPECT_EQ(each.normals.values[0], Vec3(0, 0, 1));
+  EXPECT_TRUE(each.normals.corners.empty());
+  EXPECT_EQ(each.texture_coordinates.values.size(), 3u);
 }
 
 TEST(MeshAttributes, MaterialsOfAnObjComeFromItsFiles) {

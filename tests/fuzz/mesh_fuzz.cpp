@@ -5,6 +5,16 @@
 #include "fuzz.h"
 #include "skeletex/io/mesh/mesh_builder.h"
 
+/// Corners name values that there are; without corners, each vertex has one, or none has.
+template <class T>
+void require_complete(const skeletex::CornerValues<T>& list, const skeletex::TriangleMesh& mesh) {
+  using skeletex::fuzz::require;
+  if (list.corners.empty()) return require(list.empty() || list.values.size() == mesh.positions.size());
+  require(list.corners.size() == mesh.triangles.size());
+  for (const skeletex::Triangle& triangle : list.corners)
+    for (const int value : triangle) require(value < static_cast<int>(list.values.size()));
+}
+
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace skeletex;
   if (size == 0) return 0;
@@ -16,5 +26,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     fuzz::require(file.triangles == static_cast<int>(file.mesh.triangles.size()));
     for (const Triangle& triangle : file.mesh.triangles)
       for (const int vertex : triangle) fuzz::require(vertex >= 0 && vertex < vertices);
+    require_complete(file.attributes.normals, file.mesh);
+    require_complete(file.attributes.colours, file.mesh);
+    require_complete(file.attributes.texture_coordinates, file.mesh);
   });
 }

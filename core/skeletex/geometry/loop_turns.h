@@ -17,17 +17,14 @@ inline double shortest_turn(double turns) { return turns - std::round(turns); }
 /// about the bone, or runs towards it, v follows its length instead, so that no stretch of the seam falls between two
 /// columns.
 /// \param points  once around in the direction of growing angle, the first not repeated
-/// \param turns   their
-/// angles about the bone, in turns, any lift
-/// \return increasing values, the last below the first plus 1; nothing when
-/// the loop does not wind once around the bone
+/// \param turns  their angles about the bone, in turns, any lift
+/// \return increasing values, the last below the first plus 1; nothing when the loop does not wind once around the bone
 std::optional<std::vector<double>> loop_turns(const std::vector<Vec3>& points, const std::vector<double>& turns,
                                               double least_density = 0.4);
 
 /// Shares of the way along an arc between two corners, from 0 to 1: by the angles about a bone, made to grow in the
 /// same way. The bones on both sides see mirrored angles, and give their arc the same shares.
-/// \param points, turns  the
-/// corners included, at least two
+/// \param points, turns  the corners included, at least two
 std::vector<double> arc_shares(const std::vector<Vec3>& points, const std::vector<double>& turns,
                                double least_density = 0.4);
 

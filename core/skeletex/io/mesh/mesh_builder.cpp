@@ -11,6 +11,16 @@
 #include "skeletex/model/error.h"
 
 namespace skeletex {
+namespace {
+
+/// Values that no face names are those of the vertices, if there are as many; others mean nothing.
+template <class T>
+void drop_unnamed(std::size_t vertices, CornerValues<T>& list) {
+  if (list.corners.empty() && list.values.size() != vertices) list.values.clear();
+  if (list.values.empty()) list.corners.clear();
+}
+
+}  // namespace
 
 std::optional<std::string> MeshBuilder::add_face(const FaceCorners& face) {
   const std::span<const int> vertices = face.vertices;
@@ -49,10 +59,7 @@ std::optional<std::string> MeshBuilder::add_face(const FaceCorners& face) {
 
 void MeshBuilder::complete_normals() {
   CornerValues<Vec3>& normals = file_.attributes.normals;
-  if (normals.values.empty()) {
-    normals.corners.clear();
-    return;
-  }
+  if (normals.values.empty()) return;
   std::vector<char> is_normal(normals.values.size());
   for (std::size_t i = 0; i < normals.values.size(); ++i) {
     const double length = normals.values[i].stableNorm();
@@ -92,6 +99,8 @@ MeshFile MeshBuilder::take(const std::string& where, std::vector<std::string> ma
   fill_up(file_.attributes.texture_coordinates.corners);
   if (!file_.attributes.triangle_materials.empty())
     file_.attributes.triangle_materials.resize(file_.mesh.triangles.size(), -1);
+  drop_unnamed(file_.mesh.positions.size(), file_.attributes.normals);
+  drop_unnamed(file_.mesh.positions.size(), file_.attributes.texture_coordinates);
   complete_normals();
   file_.material_files = std::move(material_files);
   return std::move(file_);
