@@ -120,6 +120,24 @@ TEST(PatchRequests, OfWhatBendsAroundTheBoneAloneStayNearGirthToLength) {
   EXPECT_TRUE(std::isfinite(requests[0].share) && requests[0].share > 0);
 }
 
+TEST(PatchRequests, OfAMapThatIsSqueezedToAPointLeaveTheOthersTheirTexels) {
+  const auto profile = [](double u) { return 0.2 + 0.05 * std::sin(9 * u); };
+  const Chart usual = tube(24, 12, 4, profile);
+  const ExpectedError even = expected_error(usual, nullptr);
+  const auto share_of_squeezed = [&](double power) {
+    Chart squeezed = usual;
+    for (double& u : squeezed.u) u = std::pow(u, power);
+    const ExpectedError error = expected_error(squeezed, nullptr);
+    const std::vector<PatchRequest> requests =
+        patch_requests(std::vector<PatchSource>{{&even, 528, 5, 4}, {&error, 528, 5, 4}}, TexelShare::kError);
+    return requests[1].share / (requests[0].share + requests[1].share);
+  };
+  EXPECT_NEAR(share_of_squeezed(1), 0.5, 1e-9);
+  EXPECT_GT(share_of_squeezed(3), 0.6);
+  EXPECT_LT(share_of_squeezed(12), 0.8);
+  EXPECT_NEAR(share_of_squeezed(12), share_of_squeezed(20), 1e-3);
+}
+
 TEST(PatchRequests, OfAMapThatIsSqueezedOutOfTheRangeOfNumbersAreNumbers) {
   constexpr int kRings = 24, kAround = 12;
   Chart chart = tube(kRings, kAround, 4, [](double u) { return 0.2 + 0.05 * std::sin(9 * u); });

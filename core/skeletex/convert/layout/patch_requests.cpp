@@ -10,6 +10,9 @@ namespace {
 
 /// How far a side ratio may leave that of girth to length, as a factor: where a patch bends in one direction alone.
 constexpr double kMostOff = 2;
+/// Of errors that are larger than this many times that of an even map, squared, that counts. No number of texels helps
+/// what a map has squeezed to a point, and the other patches need theirs.
+constexpr double kMostUneven = 10;
 
 /// A triangle on the surface and in the map, whose area is in columns x rows; both areas doubled.
 struct MappedTriangle {
@@ -81,8 +84,8 @@ std::vector<PatchRequest> patch_requests(std::span<const PatchSource> sources, T
     const double usual = requests[i].columns_per_row;
     if (error.around > 0 || error.along > 0)
       requests[i].columns_per_row = std::clamp(error.best_ratio(), usual / kMostOff, usual * kMostOff);
-    const double root = std::sqrt(error.with_ratio(requests[i].columns_per_row));
-    if (std::isfinite(root)) roots[i] = root;
+    roots[i] =
+        std::sqrt(std::min(kMostUneven * kMostUneven * error.even, error.with_ratio(requests[i].columns_per_row)));
   }
   double triangles = 0, root = 0;  // of patches that have both
   for (std::size_t i = 0; i < sources.size(); ++i)

@@ -32,8 +32,7 @@ struct ExpectedError {
 /// The expected error of a chart that is mapped. A surface of triangles bends at its edges: one of length l and
 /// dihedral angle d adds d l h^2, where h is the extent of a cell across it (that of a column plus that of a row, each
 /// as the triangles at the edge are stretched). Triangles at poles do not count.
-/// \param profile  of its rows; null:
-/// they are even in u
+/// \param profile  of its rows; null: they are even in u
 ExpectedError expected_error(const Chart& chart, const RowProfile* profile);
 
 /// One bone's part of the surface.
@@ -44,7 +43,8 @@ struct PatchSource {
 /// The shares and side ratios of patches. By triangles or area their sides have the ratio of girth to length. By error
 /// they have the ratio with the least expected error, and the share is the geometric mean of triangles and the root of
 /// that error: shares by the root have the least error all in all, where errors fall as cells get smaller; but where
-/// texels sit on vertices and edges, what counts is how many there are for each. Height fields keep the ratio of girth
+/// texels sit on vertices and edges, what counts is how many there are for each. Of very uneven maps the root counts as
+/// ten times that of an even one. Height fields keep the ratio of girth
 /// to length, and their share is by triangles.
 std::vector<PatchRequest> patch_requests(std::span<const PatchSource> sources, TexelShare share);
 
