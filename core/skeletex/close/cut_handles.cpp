@@ -31,20 +31,15 @@ class LoopSearch {
 
   /// One short loop for each of a basis, the shortest first.
   std::vector<Loop> short_loops() const {
-    std::map<int, Loop> shortest_by_root;
-    const auto shortest_through = [&](int root) -> const Loop& {
-      const auto [at, is_new] = shortest_by_root.try_emplace(root);
-      if (is_new) at->second = std::ranges::min(loops_through(root), {}, &Loop::length);
-      return at->second;
-    };
     std::vector<Loop> loops;
     for (Loop& wide : loops_through(mesh_.triangles[0][0])) {
       // Its closing edge lies by the handle, however far the root is.
       Loop best = std::move(wide);
       for (int root = best.vertices.front();; root = best.vertices[best.vertices.size() / 2]) {
-        const Loop& other = shortest_through(root);
-        if (!(other.length < best.length)) break;
-        best = other;
+        const std::vector<Loop> others = loops_through(root, best.length);
+        const auto shortest = std::ranges::min_element(others, {}, &Loop::length);
+        if (shortest == others.end() || !(shortest->length < best.length)) break;
+        best = *shortest;
       }
       loops.push_back(std::move(best));
     }
@@ -59,9 +54,9 @@ class LoopSearch {
 
   struct Paths {
     std::vector<double> distance;
-    std::vector<int> entry;  ///< per vertex the half-edge that leads to it; -1: the root
+    std::vector<int> entry;  ///< per vertex the half-edge that leads to it; -1: the root, and beyond the reach
   };
-  Paths shortest_paths(int root) const {
+  Paths shortest_paths(int root, double reach) const {
     Paths paths{std::vector<double>(mesh_.positions.size(), std::numeric_limits<double>::infinity()),
                 std::vector<int>(mesh_.positions.size(), -1)};
     using Reached = std::pair<double, int>;
@@ -74,7 +69,7 @@ class LoopSearch {
       for (int k = table_.begin[v]; k < table_.begin[v + 1]; ++k) {
         const int h = table_.outgoing[k], to = table_.targets[k];
         const double reached = distance + edge_length(h);
-        if (reached >= paths.distance[to]) continue;
+        if (reached >= paths.distance[to] || reached > reach) continue;
         queue.emplace(paths.distance[to] = reached, to);
         paths.entry[to] = h;
       }
@@ -82,18 +77,24 @@ class LoopSearch {
     return paths;
   }
 
-  /// A basis of all loops: each runs along shortest paths from a root, but for the edge that closes it.
-  std::vector<Loop> loops_through(int root) const {
-    const Paths paths = shortest_paths(root);
+  /// A basis of the loops within a reach of a root: each runs along shortest paths from there, but for the edge that
+  /// closes it. All paths beyond the reach would not part what lies there, so none are needed.
+  std::vector<Loop> loops_through(int root, double reach = std::numeric_limits<double>::infinity()) const {
+    const Paths paths = shortest_paths(root, reach);
     const auto is_on_path = [&](int h) { return paths.entry[target(h)] == h; };
+    const auto is_reached = [&](int v) { return paths.distance[v] < std::numeric_limits<double>::infinity(); };
+    UnionFind triangles(static_cast<int>(mesh_.triangles.size()));
     std::vector<std::pair<double, int>> others;
-    for (int h = 0; h < static_cast<int>(table_.twins.size()); ++h)
-      if (h < table_.twins[h] && !is_on_path(h) && !is_on_path(table_.twins[h]))
+    for (int h = 0; h < static_cast<int>(table_.twins.size()); ++h) {
+      if (h > table_.twins[h]) continue;
+      if (!is_reached(origin(h)) || !is_reached(target(h)))
+        triangles.unite(h / 3, table_.twins[h] / 3);
+      else if (!is_on_path(h) && !is_on_path(table_.twins[h]))
         others.emplace_back(paths.distance[origin(h)] + edge_length(h) + paths.distance[target(h)], h);
+    }
     // Edges off the paths join triangles, those of long loops first, until they form a tree over all triangles. Each
     // edge that is left closes a loop of the basis.
     std::ranges::sort(others, std::greater<>());
-    UnionFind triangles(static_cast<int>(mesh_.triangles.size()));
     std::vector<Loop> loops;
     for (const auto& [length, h] : others) {
       if (triangles.find(h / 3) == triangles.find(table_.twins[h] / 3))
