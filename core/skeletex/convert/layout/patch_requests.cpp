@@ -12,7 +12,7 @@ namespace {
 constexpr double kMostOff = 2;
 /// Of errors that are larger than this many times that of an even map, squared, that counts. No number of texels helps
 /// what a map has squeezed to a point, and the other patches need theirs.
-constexpr double kMostUneven = 10;
+constexpr double kMostUneven = 20;
 
 /// A triangle on the surface and in the map, whose area is in columns x rows; both areas doubled.
 struct MappedTriangle {

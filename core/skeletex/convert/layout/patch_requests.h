@@ -44,8 +44,7 @@ struct PatchSource {
 /// they have the ratio with the least expected error, and the share is the geometric mean of triangles and the root of
 /// that error: shares by the root have the least error all in all, where errors fall as cells get smaller; but where
 /// texels sit on vertices and edges, what counts is how many there are for each. Of very uneven maps the root counts as
-/// ten times that of an even one. Height fields keep the ratio of girth
-/// to length, and their share is by triangles.
+/// twenty times that of an even one. Height fields keep the ratio of girth to length, and their share is by triangles.
 std::vector<PatchRequest> patch_requests(std::span<const PatchSource> sources, TexelShare share);
 
 }  // namespace skeletex
