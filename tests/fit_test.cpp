@@ -12,6 +12,7 @@
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/analysis/metro.h"
 #include "skeletex/convert/encode_model.h"
+#include "skeletex/convert/fit/mean_distance.h"
 #include "skeletex/convert/layout/row_profile.h"
 #include "skeletex/geometry/self_intersection.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
@@ -194,6 +195,26 @@ TEST(FitKernels, TheSizeOfWorkGroupsDoesNotShow) {
   EXPECT_EQ(first.numbers, second.numbers);
   EXPECT_EQ(first.system, second.system);
   EXPECT_EQ(first.moves, second.moves);
+}
+
+TEST(MeanDistance, LeavesOutPatchesWhoseMapsAreSqueezed) {
+  // Four patches of ten texels and some texels of none; a texel of the last patch is far away.
+  std::vector<int> patches(44, -1);
+  std::vector<float> costs(patches.size(), 1e9f), areas(patches.size(), 1e9f);
+  for (int t = 0; t < 40; ++t) patches[t] = t / 10, areas[t] = 2, costs[t] = static_cast<float>(1 + t / 10);
+  MeanDistance distance(patches, 4);
+  EXPECT_DOUBLE_EQ(distance.of(costs, areas), 2.5 / 2);
+  costs[39] = 10 * 50;  // its patch: 18 times the median one
+  distance.leave_out_squeezed(costs, areas);
+  EXPECT_NEAR(distance.of(costs, areas), (100 - 40 + 36 + 500) / 80.0, 1e-9);
+  costs[39] = 10 * 5000;
+  distance.leave_out_squeezed(costs, areas);
+  EXPECT_DOUBLE_EQ(distance.of(costs, areas), 2.0 / 2);
+  costs[39] = 10 * 2;  // it stays left out, or steps could not be compared
+  EXPECT_DOUBLE_EQ(distance.of(costs, areas), 2.0 / 2);
+  const std::vector<float> none(patches.size(), 0.f);
+  distance.leave_out_squeezed(none, none);
+  EXPECT_EQ(distance.of(none, none), 0);
 }
 
 TEST(Fit, LowersTheResidualStepByStepAndTheMeanErrorWithIt) {

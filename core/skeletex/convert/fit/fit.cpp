@@ -5,17 +5,12 @@
 #include <span>
 
 #include "fit_structs.h"
+#include "skeletex/convert/fit/mean_distance.h"
 
 namespace skeletex {
 namespace {
 
 constexpr int kColours = 6;
-
-double sum_of(std::span<const float> values) {
-  double sum = 0;
-  for (const float value : values) sum += static_cast<double>(value);
-  return sum;
-}
 
 }  // namespace
 
@@ -37,6 +32,7 @@ FitReport fit_points(ClContext& context, const DeviceLayout& layout, const Devic
   launch("read_samples", maps.triangles, maps.values, positions.offsets, points.values, numbers, samples);
 
   FitReport report;
+  MeanDistance distance(context.download(layout.texel_patches), maps.first_triangle.size() - 1);
   const DevicePlanes start = points;
   DevicePlanes next = points;
   for (int step = 0;; ++step) {
@@ -44,8 +40,10 @@ FitReport fit_points(ClContext& context, const DeviceLayout& layout, const Devic
     launch("match_samples", samples, next.values, numbers, matched);
     launch("match_lattice", maps.triangles, maps.values, numbers, next.values, lattice, matched);
     const ClMapping<float> values = context.map(matched);
-    const double area = sum_of({values.data() + FIT_AREAS * size, size}),
-                 residual = area > 0 ? sum_of({values.data() + FIT_COSTS * size, size}) / area : 0;
+    const std::span<const float> costs(values.data() + FIT_COSTS * size, size),
+        areas(values.data() + FIT_AREAS * size, size);
+    if (step == 0) distance.leave_out_squeezed(costs, areas);
+    const double residual = distance.of(costs, areas);
     // A step that does not help is not taken, and ends the fit.
     if (step > 0 && !(residual < report.residuals.back())) break;
     points = next;

@@ -17,8 +17,10 @@ struct FitOptions {
 
 /// What the fit did.
 struct FitReport {
-  std::vector<double> residuals;  ///< before each step and after the last: mean distance of the samples, world units
-  int reverted_texels = 0;        ///< see revert_faults
+  /// Before each step and after the last: mean distance of the samples, but those of patches with squeezed maps. World
+  /// units.
+  std::vector<double> residuals;
+  int reverted_texels = 0;  ///< see revert_faults
 };
 
 /// Moves the points of VSM patches in space so that the flat triangles between them are nearer to the mesh, in both
