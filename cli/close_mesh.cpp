@@ -55,16 +55,21 @@ class WorkFolder {
   fs::path path_;
 };
 
+/// Values of vertices become those of corners, so that vertices can be joined and split.
+void name_corners(MeshParts& parts) {
+  const auto name = [&](auto& list) {
+    if (!list.empty() && list.corners.empty()) list.corners = parts.mesh.triangles;
+  };
+  name(parts.attributes.normals);
+  name(parts.attributes.colours);
+  name(parts.attributes.texture_coordinates);
+}
+
 /// Vertices in one place become one. Corners keep the values that they have.
 void weld(MeshParts& parts) {
   const std::vector<int> targets =
       weld_targets(parts.mesh.positions, kSameVertex * bounding_box(parts.mesh).diagonal());
-  for (auto* corners : {&parts.attributes.normals.corners, &parts.attributes.colours.corners,
-                        &parts.attributes.texture_coordinates.corners})
-    if (corners->empty()) *corners = parts.mesh.triangles;
-  if (parts.attributes.normals.values.empty()) parts.attributes.normals.corners.clear();
-  if (parts.attributes.colours.values.empty()) parts.attributes.colours.corners.clear();
-  if (parts.attributes.texture_coordinates.values.empty()) parts.attributes.texture_coordinates.corners.clear();
+  name_corners(parts);
   for (Triangle& t : parts.mesh.triangles)
     for (int& corner : t) corner = targets[corner];
 }
@@ -244,8 +249,9 @@ std::vector<Triangle> with_originals(const TriangleMesh& mesh, const std::vector
 Json take_filled(MeshParts& parts, TriangleMesh filled, const FillResult& filling) {
   const std::size_t intersecting = say_filled(filling, bounding_box(filled).diagonal());
   copy_vertices(parts, filling.copies);
-  parts.attributes =
-      with_triangles(parts.attributes, parts.mesh.triangles, with_originals(filled, filling.copies), filling.origins);
+  const std::vector<Triangle> before = std::move(parts.mesh.triangles), after = with_originals(filled, filling.copies);
+  parts.attributes = with_triangles(parts.attributes, before, after, filling.origins);
+  turn_normals(filled, before, after, filling.origins, parts.attributes.normals);
   parts.mesh = std::move(filled);
   remove_unused_vertices(parts);
   return {{"method", "fill"},
@@ -287,6 +293,7 @@ Json cut_parts(MeshParts& parts, double longest) {
   TriangleMesh cut = parts.mesh;
   const HandleCuts cuts = cut_handles(cut, longest * diagonal);
   if (!cuts.loops.empty()) {
+    name_corners(parts);
     copy_vertices(parts, cuts.copies);
     parts.attributes =
         with_triangles(parts.attributes, parts.mesh.triangles, with_originals(cut, cuts.copies), cuts.origins);

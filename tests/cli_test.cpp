@@ -1495,13 +1495,16 @@ TEST_F(Program, DoesNotCloseTheGapOfAnOpenRing) {
 }
 
 TEST_F(Program, CutsHandlesOff) {
-  // Colours of a ring are those of its places afterwards, too.
+  // Numbers and colours of a ring are those of its places afterwards, too.
   const TriangleMesh mesh = torus_shape(5, 2, 0.3, 80, 16).mesh;
   std::ofstream file(folder_ / "ring.ply");
   file << "ply\nformat ascii 1.0\nelement vertex " << mesh.positions.size()
-       << "\nproperty double x\nproperty double y\nproperty double z\nproperty float height\nelement face "
-       << mesh.triangles.size() << "\nproperty list uchar int vertex_indices\nend_header\n";
-  for (const Vec3& p : mesh.positions) file << p.x() << ' ' << p.y() << ' ' << p.z() << ' ' << p.z() << '\n';
+       << "\nproperty double x\nproperty double y\nproperty double z\nproperty float height\n"
+       << "property uchar red\nproperty uchar green\nproperty uchar blue\nelement face " << mesh.triangles.size()
+       << "\nproperty list uchar int vertex_indices\nend_header\n";
+  const auto red = [](double z) { return std::lround(128 + 300 * z); };
+  for (const Vec3& p : mesh.positions)
+    file << p.x() << ' ' << p.y() << ' ' << p.z() << ' ' << p.z() << ' ' << red(p.z()) << " 50 200\n";
   for (const Triangle& t : mesh.triangles) file << "3 " << t[0] << ' ' << t[1] << ' ' << t[2] << '\n';
   file.close();
   const double around = 2 * M_PI * 0.3 / bounding_box(mesh).diagonal();
@@ -1521,6 +1524,12 @@ TEST_F(Program, CutsHandlesOff) {
   ASSERT_EQ(back.attributes.numbers.size(), 1u);
   for (std::size_t v = 0; v < back.mesh.positions.size(); ++v)
     EXPECT_NEAR(back.attributes.numbers[0].values[v], back.mesh.positions[v].z(), 0.1);
+  ASSERT_EQ(back.attributes.colours.values.size(), back.mesh.positions.size());
+  const auto linear = [](long byte) { return std::pow((byte / 255.0 + 0.055) / 1.055, 2.4); };  // of sRGB
+  for (std::size_t v = 0; v < back.mesh.positions.size(); ++v) {
+    EXPECT_NEAR(back.attributes.colours.values[v][0], linear(red(back.mesh.positions[v].z())), 0.12);
+    EXPECT_NEAR(back.attributes.colours.values[v][2], linear(200), 0.02);
+  }
   expect_refused(2, {"encode", "ring.ply", "-o", "c.skx.exr", "--close-handles", "0.1"}, {"--close"});
   for (const char* name : {"ring.ply", "c.skx.exr", "c.json", "c.ply"}) fs::remove(folder_ / name);
 }

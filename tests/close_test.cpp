@@ -301,5 +301,22 @@ TEST(CarryOver, NewTrianglesTakeTheValuesOfTheirNeighbours) {
   EXPECT_EQ(filled.triangle_materials, std::vector<int>(mesh.triangles.size(), 2));
 }
 
+TEST(CarryOver, NormalsOfTurnedTrianglesLookOutwards) {
+  TriangleMesh mesh = torus_shape().mesh;
+  for (std::size_t t = 0; t < mesh.triangles.size(); t += 3) std::swap(mesh.triangles[t][0], mesh.triangles[t][1]);
+  const TriangleMesh before = mesh;
+  CornerValues<Vec3> normals;  // one per triangle, by the order of its corners
+  for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t) {
+    normals.values.push_back(area_vector(mesh, mesh.triangles[t]).normalized());
+    normals.corners.push_back({t, t, t});
+  }
+  const FillResult result = fill_holes(mesh);
+  ASSERT_GT(result.turned, 0);
+  turn_normals(mesh, before.triangles, mesh.triangles, result.origins, normals);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (const int corner : normals.corners[t])
+      EXPECT_GT(normals.values[corner].dot(area_vector(mesh, mesh.triangles[t])), 0);
+}
+
 }  // namespace
 }  // namespace skeletex

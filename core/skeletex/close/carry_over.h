@@ -35,4 +35,11 @@ VertexDistances vertex_distances(const TriangleMesh& mesh, const TriangleMesh& t
 MeshAttributes with_triangles(const MeshAttributes& attributes, std::span<const Triangle> before,
                               std::span<const Triangle> after, std::span<const int> origins);
 
+/// Normals that look inwards at the corners of triangles that were turned look outwards then.
+/// \param mesh  the positions, and the triangles of now
+/// \param before, after, origins  as above
+/// \param normals  of now, by corner
+void turn_normals(const TriangleMesh& mesh, std::span<const Triangle> before, std::span<const Triangle> after,
+                  std::span<const int> origins, CornerValues<Vec3>& normals);
+
 }  // namespace skeletex
