@@ -251,7 +251,7 @@ Json take_filled(MeshParts& parts, TriangleMesh filled, const FillResult& fillin
   copy_vertices(parts, filling.copies);
   const std::vector<Triangle> before = std::move(parts.mesh.triangles), after = with_originals(filled, filling.copies);
   parts.attributes = with_triangles(parts.attributes, before, after, filling.origins);
-  turn_normals(filled, before, after, filling.origins, parts.attributes.normals);
+  if (filling.turned > 0) turn_normals(filled, before, after, filling.origins, parts.attributes.normals);
   parts.mesh = std::move(filled);
   remove_unused_vertices(parts);
   return {{"method", "fill"},

@@ -302,20 +302,26 @@ TEST(CarryOver, NewTrianglesTakeTheValuesOfTheirNeighbours) {
 }
 
 TEST(CarryOver, NormalsOfTurnedTrianglesLookOutwards) {
-  TriangleMesh mesh = torus_shape().mesh;
-  for (std::size_t t = 0; t < mesh.triangles.size(); t += 3) std::swap(mesh.triangles[t][0], mesh.triangles[t][1]);
-  const TriangleMesh before = mesh;
-  CornerValues<Vec3> normals;  // one per triangle, by the order of its corners
-  for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t) {
-    normals.values.push_back(area_vector(mesh, mesh.triangles[t]).normalized());
-    normals.corners.push_back({t, t, t});
-  }
-  const FillResult result = fill_holes(mesh);
-  ASSERT_GT(result.turned, 0);
-  turn_normals(mesh, before.triangles, mesh.triangles, result.origins, normals);
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-    for (const int corner : normals.corners[t])
-      EXPECT_GT(normals.values[corner].dot(area_vector(mesh, mesh.triangles[t])), 0);
+  for (const bool are_most_turned : {false, true})
+    for (const bool follow_winding : {false, true}) {  // or look outwards from the beginning
+      TriangleMesh mesh = torus_shape().mesh;
+      CornerValues<Vec3> normals;  // one per triangle
+      for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t) {
+        Triangle& triangle = mesh.triangles[t];
+        const Vec3 outwards = area_vector(mesh, triangle).normalized();
+        if ((t % 3 == 0) != are_most_turned) std::swap(triangle[0], triangle[1]);
+        normals.values.push_back(follow_winding ? area_vector(mesh, triangle).normalized() : outwards);
+        normals.corners.push_back({t, t, t});
+      }
+      const TriangleMesh before = mesh;
+      const FillResult result = fill_holes(mesh);
+      ASSERT_GT(result.turned, 0);
+      turn_normals(mesh, before.triangles, mesh.triangles, result.origins, normals);
+      const double sign = are_most_turned ? -1 : 1;  // the mesh is inside out then
+      for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+        for (const int corner : normals.corners[t])
+          EXPECT_GT(sign * normals.values[corner].dot(area_vector(mesh, mesh.triangles[t])), 0);
+    }
 }
 
 }  // namespace

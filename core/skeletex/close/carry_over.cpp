@@ -113,14 +113,17 @@ MeshAttributes with_triangles(const MeshAttributes& attributes, std::span<const 
 
 void turn_normals(const TriangleMesh& mesh, std::span<const Triangle> before, std::span<const Triangle> after,
                   std::span<const int> origins, CornerValues<Vec3>& normals) {
+  // Validation will turn a mesh that is inside out; then it is the other triangles that run the other way round.
+  const bool is_inside_out = signed_volume(mesh) < 0;
   for (std::size_t t = 0; t < normals.corners.size(); ++t) {
     if (origins[t] < 0) continue;
     const Triangle& old = before[origins[t]];
     const auto first = std::find(old.begin(), old.end(), after[t][0]) - old.begin();
-    if (old[(first + 1) % 3] == after[t][1]) continue;
+    const bool is_turned = old[(first + 1) % 3] != after[t][1];
+    if (is_turned == is_inside_out) continue;
     const Vec3 area = area_vector(mesh, mesh.triangles[t]);
     for (int& corner : normals.corners[t]) {
-      if (corner < 0 || normals.values[corner].dot(area) >= 0) continue;
+      if (corner < 0 || (normals.values[corner].dot(area) < 0) == is_inside_out) continue;
       normals.values.push_back(-normals.values[corner]);
       corner = static_cast<int>(normals.values.size()) - 1;
     }

@@ -35,8 +35,9 @@ VertexDistances vertex_distances(const TriangleMesh& mesh, const TriangleMesh& t
 MeshAttributes with_triangles(const MeshAttributes& attributes, std::span<const Triangle> before,
                               std::span<const Triangle> after, std::span<const int> origins);
 
-/// Normals that look inwards at the corners of triangles that were turned look outwards then.
-/// \param mesh  the positions, and the triangles of now
+/// Some triangles of a mesh were turned: normals that look inwards at the corners of triangles that ran inside out look
+/// outwards then.
+/// \param mesh  the positions, and the triangles of now, all of which run outwards or all inwards
 /// \param before, after, origins  as above
 /// \param normals  of now, by corner
 void turn_normals(const TriangleMesh& mesh, std::span<const Triangle> before, std::span<const Triangle> after,
