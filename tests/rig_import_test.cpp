@@ -160,6 +160,17 @@ TEST(RigImport, ScaledAndTurnedArmaturesStandWhereTheFileShowsThem) {
                        1e-4 * map.scale * model.diagonal);
 }
 
+TEST(RigImport, TrianglesThatAllVanishAreRefused) {
+  GltfScene scene = exported(model_of(chain(2), 0.15));
+  for (Triangle& triangle : scene.meshes.at(0).primitives.at(0).triangles) triangle[2] = triangle[0];
+  try {
+    gltf_surface(scene, "flat.glb");
+    FAIL() << "was read";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("has an area"), std::string::npos) << error.what();
+  }
+}
+
 TEST(RigImport, MirroredAndUnevenlyScaledArmaturesGiveTheMeshThatIsShown) {
   const SkeletexModel model = model_of(random_tree(9, 3), 0.15);
   for (const Vec3& scale : {Vec3(-1, 1, 1), Vec3(1, 2, 0.5), Vec3(-1, -1, -3)}) {

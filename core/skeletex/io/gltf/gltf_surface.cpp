@@ -68,6 +68,8 @@ class SurfaceBuilder {
     if (surface_.mesh.triangles.empty()) throw InputError(where_ + ": the scene that the file shows has no triangles");
     surface_.vertices_in_file = static_cast<int>(surface_.mesh.positions.size());
     weld();
+    if (surface_.mesh.triangles.empty())
+      throw InputError(fmt::format("{}: none of its {} triangles has an area", where_, surface_.degenerate_triangles));
     finish_attributes();
     return std::move(surface_);
   }
