@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: MIT
 # Fuzzes what reads files, and what edits models, with libFuzzer and the address and undefined-behaviour sanitizers:
 #   [SKELETEX_FUZZ_SEED=1] scripts/fuzz.sh [SECONDS each, 60] [TARGET ..]
-# Without a seed, each run tries other inputs. Targets are tests/fuzz/<target>_fuzz.cpp; without any, all of them. A finding ends with 1; its input stays in
-# build/fuzz/tests/fuzz/faults, and build/fuzz/bin/<target>_fuzz INPUT shows it again.
+# Without a seed, each run tries other inputs. Targets are tests/fuzz/<target>_fuzz.cpp; without any, all of them. A
+# finding ends with 1; its input stays in build/fuzz/tests/fuzz/faults, and build/fuzz/bin/<target>_fuzz INPUT shows it
+# again.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 seconds=${1:-60}
