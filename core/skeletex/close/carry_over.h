@@ -35,8 +35,7 @@ VertexDistances vertex_distances(const TriangleMesh& mesh, const TriangleMesh& t
 MeshAttributes with_triangles(const MeshAttributes& attributes, std::span<const Triangle> before,
                               std::span<const Triangle> after, std::span<const int> origins);
 
-/// Some triangles of a mesh were turned: normals that look inwards at the corners of triangles that ran inside out look
-/// outwards then.
+/// Turns the normals that look inwards at the corners of triangles that ran the other way round than most.
 /// \param mesh  the positions, and the triangles of now, all of which run outwards or all inwards
 /// \param before, after, origins  as above
 /// \param normals  of now, by corner

@@ -78,7 +78,7 @@ class LoopSearch {
   }
 
   /// A basis of the loops within a reach of a root: each runs along shortest paths from there, but for the edge that
-  /// closes it. All paths beyond the reach would not part what lies there, so none are needed.
+  /// closes it. The paths form a tree, which does not part a surface, so its branches beyond the reach are left out.
   std::vector<Loop> loops_through(int root, double reach = std::numeric_limits<double>::infinity()) const {
     const Paths paths = shortest_paths(root, reach);
     const auto is_on_path = [&](int h) { return paths.entry[target(h)] == h; };

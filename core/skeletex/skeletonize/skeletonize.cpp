@@ -41,8 +41,8 @@ constexpr int kMostHandles = 50;  // a ring of three bones or more around each; 
 constexpr const char* kHandleRemedy =
     ". Small handles can be cut off: encode --close --close-handles X, X diagonals the longest loop around them";
 constexpr std::array<int, 2> kEvenRings{5, 10};  // bones
-/// Beside an accepted skeleton with half of the limbs, repairs end after so many margins; each second has some 130,000.
-constexpr long kMostMeasured = 150'000;
+/// Beside an accepted skeleton with half of the limbs, repairs end after so many margins. That is about a second.
+constexpr long kMostMargins = 150'000;
 
 /// The rule of tips at a level of detail from 0 to 1.
 TipRule rule_of(double detail) {
@@ -226,7 +226,7 @@ int least_limbs(const std::vector<SkeletonCandidate>& candidates, const Skeleton
 /// \param all  limbs of the body
 std::string reason_to_stop(int limbs, long measured, int least, int all) {
   if (limbs < least) return "it has fewer limbs left than another skeleton";
-  if (measured > kMostMeasured && least > 0 && 2 * least >= all)
+  if (measured > kMostMargins && least > 0 && 2 * least >= all)
     return "its repair takes too long beside another skeleton";
   return {};
 }

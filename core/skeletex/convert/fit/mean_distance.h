@@ -12,12 +12,12 @@ class MeanDistance {
   MeanDistance(std::vector<int> texel_patches, std::size_t patches);
 
   /// From now on leaves out the patches whose mean is more than 20 times that of the median patch. Their maps are
-  /// squeezed: no step brings their samples near, and beside them it would not count what steps do for the others.
+  /// squeezed: no step brings their samples near, and what steps do for the other patches would not show in the sum.
   /// \param costs  per texel the sum over its samples of distance times area
   /// \param areas  the sums of the areas
   void leave_out_squeezed(std::span<const float> costs, std::span<const float> areas);
 
-  /// \return 0 without samples
+  /// \return in the unit of the distances; 0 without samples
   double of(std::span<const float> costs, std::span<const float> areas) const;
 
  private:

@@ -10,8 +10,8 @@ namespace {
 
 /// How far a side ratio may leave that of girth to length, as a factor: where a patch bends in one direction alone.
 constexpr double kMostOff = 2;
-/// Of errors that are larger than this many times that of an even map, squared, that counts. No number of texels helps
-/// what a map has squeezed to a point, and the other patches need theirs.
+/// The root of a patch's error counts as at most this many times that of an even map. More texels do not help what a
+/// map has squeezed to a point, and the other patches need theirs.
 constexpr double kMostUneven = 20;
 
 /// A triangle on the surface and in the map, whose area is in columns x rows; both areas doubled.
