@@ -51,20 +51,6 @@ void mirror_limb(const SkeletonLimb& from, const SkeletonLimb& to, const MirrorP
   for (std::size_t i = from.bones.size(); i < to.bones.size(); ++i) gone_bones.insert(to.bones[i]);
 }
 
-void drop_bones(const std::set<int>& gone, Skeleton& skeleton) {
-  std::vector<Bone> bones;
-  for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b)
-    if (!gone.contains(b)) bones.push_back(skeleton.bones[b]);
-  skeleton.bones = std::move(bones);
-  std::vector<int> number(skeleton.nodes.size(), -1);
-  for (const Bone& bone : skeleton.bones) number[bone.head] = number[bone.tail] = 0;
-  std::vector<Node> nodes;
-  for (std::size_t n = 0; n < number.size(); ++n)
-    if (number[n] == 0) number[n] = static_cast<int>(nodes.size()), nodes.push_back(skeleton.nodes[n]);
-  for (Bone& bone : skeleton.bones) bone.head = number[bone.head], bone.tail = number[bone.tail];
-  skeleton.nodes = std::move(nodes);
-}
-
 bool is_inside(const Surface& surface, const Skeleton& skeleton) {
   return std::all_of(skeleton.bones.begin(), skeleton.bones.end(), [&](const Bone& bone) {
     const Vec3 &p = skeleton.nodes[bone.head].position, &q = skeleton.nodes[bone.tail].position;
@@ -93,6 +79,20 @@ bool symmetrize_trunk(const Skeleton& skeleton, const std::vector<char>& is_on_l
 }
 
 }  // namespace
+
+void drop_bones(const std::set<int>& gone, Skeleton& skeleton) {
+  std::vector<Bone> bones;
+  for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b)
+    if (!gone.contains(b)) bones.push_back(skeleton.bones[b]);
+  skeleton.bones = std::move(bones);
+  std::vector<int> number(skeleton.nodes.size(), -1);
+  for (const Bone& bone : skeleton.bones) number[bone.head] = number[bone.tail] = 0;
+  std::vector<Node> nodes;
+  for (std::size_t n = 0; n < number.size(); ++n)
+    if (number[n] == 0) number[n] = static_cast<int>(nodes.size()), nodes.push_back(skeleton.nodes[n]);
+  for (Bone& bone : skeleton.bones) bone.head = number[bone.head], bone.tail = number[bone.tail];
+  skeleton.nodes = std::move(nodes);
+}
 
 std::vector<SkeletonLimb> find_limbs(const Skeleton& skeleton) {
   const auto at_nodes = bones_at_nodes(skeleton);

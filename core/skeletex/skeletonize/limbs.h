@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+#include <set>
 #include <vector>
 
 #include "skeletex/skeleton/skeleton.h"
@@ -15,6 +16,9 @@ struct SkeletonLimb {
 
 /// All limbs, in the order of the nodes of their free ends. A skeleton that does not branch has none.
 std::vector<SkeletonLimb> find_limbs(const Skeleton& skeleton);
+
+/// Takes bones away, and the nodes that have none then.
+void drop_bones(const std::set<int>& gone, Skeleton& skeleton);
 
 /// Per limb the one that is its mirror image, itself where it lies in the plane; -1: none.
 /// \param apart  how far the tips may be from each other's images, world units

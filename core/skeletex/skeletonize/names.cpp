@@ -24,7 +24,9 @@ class Namer {
   void run() {
     is_limb_.assign(skeleton_.bones.size(), false);
     sort_limbs();
-    turn_away_from(root());
+    root_ = root();
+    order_ = turn_away_from(root_, skeleton_);
+    at_nodes_ = bones_at_nodes(skeleton_);
     name_limbs();
     name_trunk();
     name_nodes();
@@ -56,25 +58,6 @@ class Namer {
       if (radius > largest) largest = radius, best = n;
     }
     return best;
-  }
-
-  void turn_away_from(int root) {
-    root_ = root;
-    std::vector<char> is_reached(skeleton_.nodes.size(), 0), is_done(skeleton_.bones.size(), 0);
-    std::vector<int> queue{root};
-    is_reached[root] = 1;
-    for (std::size_t i = 0; i < queue.size(); ++i)
-      for (const BoneAtNode& at : at_nodes_[queue[i]]) {
-        if (is_done[at.bone]) continue;
-        is_done[at.bone] = 1;
-        Bone& bone = skeleton_.bones[at.bone];
-        if (bone.head != queue[i]) std::swap(bone.head, bone.tail);
-        order_.push_back(at.bone);
-        if (is_reached[bone.tail]) continue;
-        is_reached[bone.tail] = 1;
-        queue.push_back(bone.tail);
-      }
-    at_nodes_ = bones_at_nodes(skeleton_);
   }
 
   void name_limbs() {
@@ -145,6 +128,25 @@ class Namer {
 };
 
 }  // namespace
+
+std::vector<int> turn_away_from(int node, Skeleton& skeleton) {
+  const auto at_nodes = bones_at_nodes(skeleton);
+  std::vector<char> is_reached(skeleton.nodes.size(), 0), is_done(skeleton.bones.size(), 0);
+  std::vector<int> order, queue{node};
+  is_reached[node] = 1;
+  for (std::size_t i = 0; i < queue.size(); ++i)
+    for (const BoneAtNode& at : at_nodes[queue[i]]) {
+      if (is_done[at.bone]) continue;
+      is_done[at.bone] = 1;
+      Bone& bone = skeleton.bones[at.bone];
+      if (bone.head != queue[i]) std::swap(bone.head, bone.tail);
+      order.push_back(at.bone);
+      if (is_reached[bone.tail]) continue;
+      is_reached[bone.tail] = 1;
+      queue.push_back(bone.tail);
+    }
+  return order;
+}
 
 void name_by_place(const Surface& surface, const std::optional<MirrorPlane>& plane, Skeleton& skeleton) {
   Namer(surface, plane, skeleton).run();

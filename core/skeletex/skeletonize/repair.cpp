@@ -340,6 +340,29 @@ bool Repair::contract(int bone) {
   return true;
 }
 
+bool Repair::split(int bone, const Vec3& place, const std::string& name) {
+  constexpr double kShortestPart = 0.3;  // radii of the body
+  Skeleton skeleton = skeleton_;
+  const int node = static_cast<int>(skeleton.nodes.size());
+  skeleton.nodes.push_back({name, place});
+  skeleton.bones[bone].s.reset();
+  Bone part = skeleton.bones[bone];
+  skeleton.bones[bone].tail = part.head = node;
+  skeleton.bones.push_back(std::move(part));
+  const double radius = surface_.radius(place);
+  for (const int b : {bone, static_cast<int>(skeleton.bones.size()) - 1})
+    if (bone_length(skeleton, b) < kShortestPart * radius) return false;
+  radii_.push_back(radius);
+  std::swap(skeleton_, skeleton);
+  prepare();
+  const std::vector<int> bones = bones_around({node});
+  if (std::all_of(bones.begin(), bones.end(), [&](int b) { return margins_[b].margin >= kEnoughMargin; })) return true;
+  std::swap(skeleton_, skeleton);
+  radii_.pop_back();
+  prepare();
+  return false;
+}
+
 void Repair::thin_out() {
   for (;;) {
     const Skeleton before = skeleton_;

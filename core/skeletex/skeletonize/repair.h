@@ -41,6 +41,9 @@ class Repair {
   /// a bone next to it, else a free end.
   /// \return whether a bone went
   bool contract(int bone);
+  /// Puts a new node on a bone, unless margins would not be enough any more. Both parts of the bone have its name.
+  /// \return whether it was
+  bool split(int bone, const Vec3& place, const std::string& name);
   /// The bone whose loss does the least to margins and shape.
   bool contract_cheapest();
   /// Contracts the cheapest bones as long as all margins stay enough.

@@ -18,6 +18,8 @@
 #include "skeletex/skeletonize/body/body_paths.h"
 #include "skeletex/skeletonize/body/fitting_body.h"
 #include "skeletex/skeletonize/bones.h"
+#include "skeletex/skeletonize/replace_skeleton.h"
+#include "skeletex/skeletonize/skeletonize.h"
 
 namespace skeletex {
 namespace {
@@ -300,23 +302,58 @@ void describe(const Skeleton& before, const Skeleton& after, std::vector<std::st
     if (!bones.contains(bone.name)) changes.push_back(fmt::format("bone \"{}\" taken away", bone.name));
 }
 
+/// A mesh that is to accept a skeleton.
+struct Target {
+  ClContext& context;
+  const TriangleMesh& mesh;
+  const TriangleTree& tree;
+  const Surface& surface;
+};
+
+/// The skeleton that the mesh gets by itself, with the nodes and names of the wanted one.
+/// \return nothing where the mesh gets none
+std::optional<Repair> replacement(const Target& target, const Skeleton& wanted, const Skeleton& original) {
+  try {
+    Skeleton automatic = in_frame(skeletonize(target.context, target.mesh, target.tree).skeleton, target.surface.frame);
+    return with_nodes_of(target.surface, std::move(automatic), wanted, original);
+  } catch (const TopologyError&) {
+    return std::nullopt;
+  }
+}
+
 /// Moves nodes; where that is not enough, contracts bones one after the other, with or without minor limbs, or with a
-/// look at all of them, whichever leaves most.
+/// look at all of them. Where all these lose limbs, takes the skeleton that the mesh gets by itself.
+/// \param original  where the nodes were before they were moved into the body
 /// \throw TopologyError when nothing helps
-Skeleton accepted_skeleton(const Acceptance& acceptance, const Repair& start) {
-  std::optional<Skeleton> best;
+Skeleton accepted_skeleton(const Target& target, const Skeleton& wanted, const Skeleton& original) {
+  constexpr double kFollowedEnough = 0.95, kAsMuch = 0.05;  // shares of the wanted skeleton
+  const Acceptance acceptance(target.context, target.surface);
+  struct Candidate {
+    Skeleton skeleton;
+    double followed = 0;
+  };
+  std::vector<Candidate> candidates;
   std::string refusal;
   const auto try_one = [&](Repair repair) {
     refusal = acceptance.segment(repair);
-    if (!refusal.empty()) return;
+    if (!refusal.empty()) return false;
     Skeleton skeleton = repair.skeleton();
     repair.move_back();
     if (acceptance.is_accepted(repair.skeleton())) skeleton = repair.skeleton();
-    if (!best || skeleton.bones.size() > best->bones.size()) best = std::move(skeleton);
+    const double followed = followed_share(target.surface, wanted, skeleton);
+    candidates.push_back({std::move(skeleton), followed});
+    return true;
   };
+  const auto most_followed = [&] {
+    double most = 0;
+    for (const Candidate& candidate : candidates) most = std::max(most, candidate.followed);
+    return most;
+  };
+  const Repair start(target.surface, wanted, original);
   Repair moved = start;
-  if (moved.run(false)) try_one(std::move(moved));
-  if (best && best->bones.size() == start.skeleton().bones.size()) return std::move(*best);
+  if (moved.run(false) && try_one(std::move(moved)) &&
+      candidates.back().skeleton.bones.size() == wanted.bones.size())
+    return std::move(candidates.back().skeleton);
   try_one(start);
   for (const bool is_relaxed : {false, true}) {
     Repair repair = start;
@@ -324,8 +361,15 @@ Skeleton accepted_skeleton(const Acceptance& acceptance, const Repair& start) {
     if (is_relaxed) repair.relax();
     try_one(std::move(repair));
   }
-  if (!best) throw TopologyError(refusal);
-  return std::move(*best);
+  if (most_followed() < kFollowedEnough)
+    if (std::optional<Repair> repair = replacement(target, wanted, original); repair && try_one(std::move(*repair)))
+      take_bone_names(wanted, candidates.back().skeleton);
+  if (candidates.empty()) throw TopologyError(refusal);
+  const double most = most_followed();
+  std::erase_if(candidates, [&](const Candidate& candidate) { return candidate.followed < most - kAsMuch; });
+  return std::move(std::max_element(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+                     return a.skeleton.bones.size() < b.skeleton.bones.size();
+                   })->skeleton);
 }
 
 }  // namespace
@@ -354,10 +398,9 @@ RepairResult repair_skeleton(ClContext& context, const TriangleMesh& mesh, const
         fmt::format("the mesh has {} handle{} and the skeleton {} ring{} of bones, which no move mends; lay one ring "
                     "through every handle, or start from skeletex skeletonize",
                     genus, genus == 1 ? "" : "s", cycles, cycles == 1 ? "" : "s"));
-  const Acceptance acceptance(context, surface);
   RepairResult result{draft.skeleton(), std::move(draft.changes())};
-  if (!acceptance.is_accepted(result.skeleton))
-    result.skeleton = accepted_skeleton(acceptance, Repair(surface, draft.skeleton(), named));
+  if (!Acceptance(context, surface).is_accepted(result.skeleton))
+    result.skeleton = accepted_skeleton({context, mesh, tree, surface}, draft.skeleton(), named);
   drop_bad_angles(result.skeleton);
   describe(named, result.skeleton, result.changes);
   result.skeleton = in_frame(std::move(result.skeleton), skeleton.frame);

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/skeletonize/replace_skeleton.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "skeletex/skeleton/pose.h"
+#include "skeletex/skeletonize/limbs.h"
+#include "skeletex/skeletonize/names.h"
+
+namespace skeletex {
+namespace {
+
+constexpr int kSamples = 8;  // per bone
+
+/// The nearest bone, and the place on it.
+struct OnBone {
+  int bone = -1;
+  Vec3 place = Vec3::Zero();
+  double distance = std::numeric_limits<double>::infinity();
+};
+
+OnBone nearest_on_bones(const Skeleton& skeleton, const Vec3& point) {
+  OnBone nearest;
+  for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b) {
+    const Vec3& head = end_position(skeleton, b, BoneEnd::kHead);
+    const Vec3 way = end_position(skeleton, b, BoneEnd::kTail) - head;
+    const Vec3 place = head + std::clamp((point - head).dot(way) / way.squaredNorm(), 0.0, 1.0) * way;
+    if (const double distance = (point - place).norm(); distance < nearest.distance) nearest = {b, place, distance};
+  }
+  return nearest;
+}
+
+double followed_length(const Surface& surface, const Skeleton& skeleton, int bone, const Skeleton& other) {
+  constexpr double kReach = 0.06;  // diagonals beside the ball around a bone
+  const Vec3 &head = end_position(skeleton, bone, BoneEnd::kHead), &tail = end_position(skeleton, bone, BoneEnd::kTail);
+  int followed = 0;
+  for (int i = 0; i < kSamples; ++i) {
+    const Vec3 place = head + (i + 0.5) / kSamples * (tail - head);
+    const OnBone nearest = nearest_on_bones(other, place);
+    followed += nearest.distance < surface.radius(nearest.place) + kReach * surface.diagonal &&
+                !surface.is_between(place, nearest.place);
+  }
+  return followed * bone_length(skeleton, bone) / kSamples;
+}
+
+/// Limbs that hardly any bone of the other skeleton is near.
+void drop_other_limbs(const Surface& surface, const Skeleton& wanted, Skeleton& skeleton) {
+  constexpr double kLeastShare = 0.3;
+  std::set<int> gone;
+  for (const SkeletonLimb& limb : find_limbs(skeleton)) {
+    double length = 0, followed = 0;
+    for (const int b : limb.bones) {
+      length += bone_length(skeleton, b);
+      followed += followed_length(surface, skeleton, b, wanted);
+    }
+    if (followed < kLeastShare * length) gone.insert(limb.bones.begin(), limb.bones.end());
+  }
+  drop_bones(gone, skeleton);
+}
+
+int nearest_node(const Skeleton& skeleton, const Vec3& point) {
+  int nearest = 0;
+  for (int n = 1; n < static_cast<int>(skeleton.nodes.size()); ++n)
+    if ((skeleton.nodes[n].position - point).norm() < (skeleton.nodes[nearest].position - point).norm()) nearest = n;
+  return nearest;
+}
+
+/// A name that neither nodes nor bones have.
+std::string free_name(const std::string& wish, std::set<std::string>& taken) {
+  std::string name = wish;
+  for (int i = 2; !taken.insert(name).second; ++i) name = fmt::format("{}_{}", wish, i);
+  return name;
+}
+
+}  // namespace
+
+double followed_share(const Surface& surface, const Skeleton& skeleton, const Skeleton& other) {
+  double length = 0, followed = 0;
+  for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b) {
+    length += bone_length(skeleton, b);
+    followed += followed_length(surface, skeleton, b, other);
+  }
+  return length > 0 ? followed / length : 1;
+}
+
+Repair with_nodes_of(const Surface& surface, Skeleton accepted, const Skeleton& wanted, const Skeleton& original) {
+  drop_other_limbs(surface, wanted, accepted);
+  std::set<std::string> taken;
+  for (const Node& node : wanted.nodes) taken.insert(node.name);
+  std::vector<char> is_placed(wanted.nodes.size(), 0);
+  for (Node& node : accepted.nodes) {
+    const int n = nearest_node(wanted, node.position);
+    const Vec3& place = wanted.nodes[n].position;
+    const double radius = std::max(surface.radius(place), surface.radius(node.position));
+    const bool is_pair = !is_placed[n] && &accepted.nodes[nearest_node(accepted, place)] == &node &&
+                         (place - node.position).norm() < radius && !surface.is_between(node.position, place);
+    node.name = is_pair ? wanted.nodes[n].name : free_name("bend", taken);
+    if (is_pair) is_placed[n] = 1;
+  }
+  Repair repair(surface, std::move(accepted), original);
+  for (std::size_t n = 0; n < wanted.nodes.size(); ++n) {
+    if (is_placed[n]) continue;
+    const Vec3& place = wanted.nodes[n].position;
+    const OnBone at = nearest_on_bones(repair.skeleton(), place);
+    if (at.distance < surface.radius(at.place) && !surface.is_between(place, at.place))
+      repair.split(at.bone, at.place, wanted.nodes[n].name);
+  }
+  return repair;
+}
+
+void take_bone_names(const Skeleton& wanted, Skeleton& skeleton) {
+  turn_away_from(nearest_node(skeleton, wanted.nodes[root_nodes(wanted).front()].position), skeleton);
+  std::map<std::pair<std::string, std::string>, std::string> between;  // names of nodes to that of the bone
+  for (const Bone& bone : wanted.bones)
+    between[std::minmax(wanted.nodes[bone.head].name, wanted.nodes[bone.tail].name)] = bone.name;
+  std::set<std::string> taken;
+  std::vector<int> others;
+  for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b) {
+    Bone& bone = skeleton.bones[b];
+    const auto found = between.find(std::minmax(skeleton.nodes[bone.head].name, skeleton.nodes[bone.tail].name));
+    if (found != between.end() && taken.insert(found->second).second)
+      bone.name = found->second;
+    else
+      others.push_back(b);
+  }
+  for (const int b : others) {
+    const Vec3 middle =
+        0.5 * (end_position(skeleton, b, BoneEnd::kHead) + end_position(skeleton, b, BoneEnd::kTail));
+    const std::string& name = wanted.bones[nearest_on_bones(wanted, middle).bone].name;
+    skeleton.bones[b].name = taken.insert(name).second ? name : free_name(name + "_part", taken);
+  }
+}
+
+}  // namespace skeletex
