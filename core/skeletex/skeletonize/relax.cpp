@@ -30,7 +30,6 @@ double Repair::cost_without(int hub, const std::set<int>& gone) const {
   return cost(rest, bones_at_nodes(rest), left, kNoLimit);
 }
 
-/// Takes the bones of a limb away, and its nodes but the first.
 void Repair::drop(const SkeletonLimb& limb) {
   std::vector<int> bones = limb.bones, nodes(limb.nodes.begin() + 1, limb.nodes.end());
   std::sort(bones.rbegin(), bones.rend());

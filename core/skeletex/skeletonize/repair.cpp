@@ -340,27 +340,52 @@ bool Repair::contract(int bone) {
   return true;
 }
 
-bool Repair::split(int bone, const Vec3& place, const std::string& name) {
-  constexpr double kShortestPart = 0.3;  // radii of the body
-  Skeleton skeleton = skeleton_;
-  const int node = static_cast<int>(skeleton.nodes.size());
-  skeleton.nodes.push_back({name, place});
-  skeleton.bones[bone].s.reset();
-  Bone part = skeleton.bones[bone];
-  skeleton.bones[bone].tail = part.head = node;
-  skeleton.bones.push_back(std::move(part));
-  const double radius = surface_.radius(place);
-  for (const int b : {bone, static_cast<int>(skeleton.bones.size()) - 1})
-    if (bone_length(skeleton, b) < kShortestPart * radius) return false;
-  radii_.push_back(radius);
-  std::swap(skeleton_, skeleton);
+/// Takes a changed skeleton unless its least margin is not enough, and less than before.
+bool Repair::try_skeleton(Skeleton changed, std::vector<double> radii) {
+  const auto least = [&] {
+    double margin = kEnoughMargin;
+    for (const BoneMargin& m : margins_) margin = std::min(margin, m.margin);
+    return margin;
+  };
+  const double before = least();
+  std::swap(skeleton_, changed);
+  std::swap(radii_, radii);
   prepare();
-  const std::vector<int> bones = bones_around({node});
-  if (std::all_of(bones.begin(), bones.end(), [&](int b) { return margins_[b].margin >= kEnoughMargin; })) return true;
-  std::swap(skeleton_, skeleton);
-  radii_.pop_back();
+  if (least() >= before) return true;
+  skeleton_ = std::move(changed);
+  radii_ = std::move(radii);
   prepare();
   return false;
+}
+
+bool Repair::split(int bone, const Vec3& place, const std::string& name) {
+  constexpr double kShortestPart = 0.3;  // radii of the body
+  Skeleton changed = skeleton_;
+  const int node = static_cast<int>(changed.nodes.size());
+  changed.nodes.push_back({name, place});
+  changed.bones[bone].s.reset();
+  Bone part = changed.bones[bone];
+  changed.bones[bone].tail = part.head = node;
+  changed.bones.push_back(std::move(part));
+  std::vector<double> radii = radii_;
+  radii.push_back(surface_.radius(place));
+  for (const int b : {bone, static_cast<int>(changed.bones.size()) - 1})
+    if (bone_length(changed, b) < kShortestPart * radii.back()) return false;
+  return try_skeleton(std::move(changed), std::move(radii));
+}
+
+bool Repair::straighten(int node) {
+  const std::vector<BoneAtNode>& at = at_nodes_[node];
+  if (at.size() != 2) return false;
+  const int from = end_node(skeleton_, at[0].bone, opposite(at[0].end)),
+            to = end_node(skeleton_, at[1].bone, opposite(at[1].end));
+  Skeleton changed = skeleton_;
+  changed.bones[at[0].bone] = {skeleton_.bones[at[0].bone].name, from, to, {}};
+  if (!is_ring_kept(at[0].bone) || !is_placed_well(changed, from, 0)) return false;
+  drop_bones({at[1].bone}, changed);
+  std::vector<double> radii = radii_;
+  radii.erase(radii.begin() + node);
+  return try_skeleton(std::move(changed), std::move(radii));
 }
 
 void Repair::thin_out() {

@@ -42,8 +42,13 @@ class Repair {
   /// \return whether a bone went
   bool contract(int bone);
   /// Puts a new node on a bone, unless margins would not be enough any more. Both parts of the bone have its name.
-  /// \return whether it was
+  /// \return whether it was put there
   bool split(int bone, const Vec3& place, const std::string& name);
+  /// Takes a node between two bones away, which become one, unless margins would not be enough any more.
+  /// \return whether it went
+  bool straighten(int node);
+  /// Takes the bones of a limb away, and its nodes but the first.
+  void drop(const SkeletonLimb& limb);
   /// The bone whose loss does the least to margins and shape.
   bool contract_cheapest();
   /// Contracts the cheapest bones as long as all margins stay enough.
@@ -93,12 +98,12 @@ class Repair {
   bool is_ring_kept(int bone) const;
   void remove_node(int node);
   void merge_at(const Merge& merge);
+  bool try_skeleton(Skeleton changed, std::vector<double> radii);
   bool drop_free_end(int bone);
   bool drop_beyond(int bone);
   double length_of(const SkeletonLimb& limb) const;
   bool is_minor(const SkeletonLimb& limb) const;
   double cost_without(int hub, const std::set<int>& gone) const;
-  void drop(const SkeletonLimb& limb);
 
   const Surface& surface_;
   Skeleton skeleton_;

@@ -310,66 +310,92 @@ struct Target {
   const Surface& surface;
 };
 
-/// The skeleton that the mesh gets by itself, with the nodes and names of the wanted one.
+/// The skeleton that the mesh gets by itself, with the nodes of the wanted one.
+/// \param original  where the nodes were before they were moved into the body
 /// \return nothing where the mesh gets none
 std::optional<Repair> replacement(const Target& target, const Skeleton& wanted, const Skeleton& original) {
   try {
-    Skeleton automatic = in_frame(skeletonize(target.context, target.mesh, target.tree).skeleton, target.surface.frame);
-    return with_nodes_of(target.surface, std::move(automatic), wanted, original);
+    const SkeletonizeResult found = skeletonize(target.context, target.mesh, target.tree);
+    return with_nodes_of(target.surface, in_frame(found.skeleton, target.surface.frame), wanted, original);
   } catch (const TopologyError&) {
     return std::nullopt;
   }
 }
 
-/// Moves nodes; where that is not enough, contracts bones one after the other, with or without minor limbs, or with a
-/// look at all of them. Where all these lose limbs, takes the skeleton that the mesh gets by itself.
-/// \param original  where the nodes were before they were moved into the body
-/// \throw TopologyError when nothing helps
-Skeleton accepted_skeleton(const Target& target, const Skeleton& wanted, const Skeleton& original) {
-  constexpr double kFollowedEnough = 0.95, kAsMuch = 0.05;  // shares of the wanted skeleton
-  const Acceptance acceptance(target.context, target.surface);
-  struct Candidate {
-    Skeleton skeleton;
-    double followed = 0;
-  };
-  std::vector<Candidate> candidates;
-  std::string refusal;
-  const auto try_one = [&](Repair repair) {
-    refusal = acceptance.segment(repair);
-    if (!refusal.empty()) return false;
+/// Skeletons that are accepted, and the choice among them.
+class Candidates {
+ public:
+  Candidates(const Target& target, const Skeleton& wanted)
+      : target_(target), wanted_(wanted), acceptance_(target.context, target.surface) {}
+
+  /// \return whether it is accepted
+  bool add(Repair repair, bool is_replacement = false) {
+    refusal_ = acceptance_.segment(repair);
+    if (!refusal_.empty()) return false;
     Skeleton skeleton = repair.skeleton();
     repair.move_back();
-    if (acceptance.is_accepted(repair.skeleton())) skeleton = repair.skeleton();
-    const double followed = followed_share(target.surface, wanted, skeleton);
-    candidates.push_back({std::move(skeleton), followed});
+    if (acceptance_.is_accepted(repair.skeleton())) skeleton = repair.skeleton();
+    const double followed = followed_share(target_.surface, wanted_, skeleton);
+    most_followed_ = std::max(most_followed_, followed);
+    list_.push_back({std::move(skeleton), followed, is_replacement});
     return true;
+  }
+  /// Whether one of them has all bones.
+  bool is_complete() const { return !list_.empty() && list_.back().skeleton.bones.size() == wanted_.bones.size(); }
+  bool loses_limbs() const { return most_followed_ < kFollowedEnough; }
+
+  /// The one of the most bones among those that follow the wanted one best.
+  /// \throw TopologyError when there is none
+  Skeleton best(std::vector<std::string>& changes) {
+    if (list_.empty()) throw TopologyError(refusal_);
+    std::erase_if(list_, [&](const Candidate& c) { return c.followed < most_followed_ - kAsMuch; });
+    Candidate& chosen = *std::max_element(list_.begin(), list_.end(), [](const Candidate& a, const Candidate& b) {
+      return a.skeleton.bones.size() < b.skeleton.bones.size();
+    });
+    if (chosen.is_replacement) {
+      changes.emplace_back(
+          "limbs would be lost: the skeleton that the mesh gets by itself takes its place, and its names");
+      take_bone_names(wanted_, chosen.skeleton);
+    }
+    return std::move(chosen.skeleton);
+  }
+
+ private:
+  static constexpr double kFollowedEnough = 0.95, kAsMuch = 0.05;  // shares of the wanted skeleton
+  struct Candidate {
+    Skeleton skeleton;
+    double followed = 0;  ///< share of the wanted skeleton
+    bool is_replacement = false;
   };
-  const auto most_followed = [&] {
-    double most = 0;
-    for (const Candidate& candidate : candidates) most = std::max(most, candidate.followed);
-    return most;
-  };
+  const Target& target_;
+  const Skeleton& wanted_;
+  const Acceptance acceptance_;
+  std::vector<Candidate> list_;
+  double most_followed_ = 0;
+  std::string refusal_;
+};
+
+/// Moves nodes; where that is not enough, contracts bones one after the other, with or without minor limbs, or with a
+/// look at all of them. Where all these lose limbs, tries the skeleton that the mesh gets by itself.
+/// \param original  where the nodes were before they were moved into the body
+/// \throw TopologyError when nothing helps
+Skeleton accepted_skeleton(const Target& target, const Skeleton& wanted, const Skeleton& original,
+                           std::vector<std::string>& changes) {
+  Candidates candidates(target, wanted);
   const Repair start(target.surface, wanted, original);
   Repair moved = start;
-  if (moved.run(false) && try_one(std::move(moved)) &&
-      candidates.back().skeleton.bones.size() == wanted.bones.size())
-    return std::move(candidates.back().skeleton);
-  try_one(start);
+  if (moved.run(false)) candidates.add(std::move(moved));
+  if (candidates.is_complete()) return candidates.best(changes);
+  candidates.add(start);
   for (const bool is_relaxed : {false, true}) {
     Repair repair = start;
     repair.drop_minor_limbs();
     if (is_relaxed) repair.relax();
-    try_one(std::move(repair));
+    candidates.add(std::move(repair));
   }
-  if (most_followed() < kFollowedEnough)
-    if (std::optional<Repair> repair = replacement(target, wanted, original); repair && try_one(std::move(*repair)))
-      take_bone_names(wanted, candidates.back().skeleton);
-  if (candidates.empty()) throw TopologyError(refusal);
-  const double most = most_followed();
-  std::erase_if(candidates, [&](const Candidate& candidate) { return candidate.followed < most - kAsMuch; });
-  return std::move(std::max_element(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-                     return a.skeleton.bones.size() < b.skeleton.bones.size();
-                   })->skeleton);
+  if (candidates.loses_limbs())
+    if (std::optional<Repair> repair = replacement(target, wanted, original)) candidates.add(std::move(*repair), true);
+  return candidates.best(changes);
 }
 
 }  // namespace
@@ -400,7 +426,7 @@ RepairResult repair_skeleton(ClContext& context, const TriangleMesh& mesh, const
                     genus, genus == 1 ? "" : "s", cycles, cycles == 1 ? "" : "s"));
   RepairResult result{draft.skeleton(), std::move(draft.changes())};
   if (!Acceptance(context, surface).is_accepted(result.skeleton))
-    result.skeleton = accepted_skeleton({context, mesh, tree, surface}, draft.skeleton(), named);
+    result.skeleton = accepted_skeleton({context, mesh, tree, surface}, draft.skeleton(), named, result.changes);
   drop_bad_angles(result.skeleton);
   describe(named, result.skeleton, result.changes);
   result.skeleton = in_frame(std::move(result.skeleton), skeleton.frame);

@@ -17,7 +17,8 @@
 namespace skeletex {
 namespace {
 
-constexpr int kSamples = 8;  // per bone
+constexpr int kSamples = 8;      // per bone
+constexpr double kReach = 0.06;  // diagonals beside the ball around a bone
 
 /// The nearest bone, and the place on it.
 struct OnBone {
@@ -37,32 +38,21 @@ OnBone nearest_on_bones(const Skeleton& skeleton, const Vec3& point) {
   return nearest;
 }
 
+/// Whether a place belongs to the part of the body around a place on a bone.
+bool is_near(const Surface& surface, const Vec3& place, const Vec3& on_bone) {
+  return (place - on_bone).norm() < surface.radius(on_bone) + kReach * surface.diagonal &&
+         !surface.is_between(place, on_bone);
+}
+
 double followed_length(const Surface& surface, const Skeleton& skeleton, int bone, const Skeleton& other) {
-  constexpr double kReach = 0.06;  // diagonals beside the ball around a bone
   const Vec3 &head = end_position(skeleton, bone, BoneEnd::kHead), &tail = end_position(skeleton, bone, BoneEnd::kTail);
   int followed = 0;
   for (int i = 0; i < kSamples; ++i) {
     const Vec3 place = head + (i + 0.5) / kSamples * (tail - head);
     const OnBone nearest = nearest_on_bones(other, place);
-    followed += nearest.distance < surface.radius(nearest.place) + kReach * surface.diagonal &&
-                !surface.is_between(place, nearest.place);
+    followed += is_near(surface, place, nearest.place);
   }
   return followed * bone_length(skeleton, bone) / kSamples;
-}
-
-/// Limbs that hardly any bone of the other skeleton is near.
-void drop_other_limbs(const Surface& surface, const Skeleton& wanted, Skeleton& skeleton) {
-  constexpr double kLeastShare = 0.3;
-  std::set<int> gone;
-  for (const SkeletonLimb& limb : find_limbs(skeleton)) {
-    double length = 0, followed = 0;
-    for (const int b : limb.bones) {
-      length += bone_length(skeleton, b);
-      followed += followed_length(surface, skeleton, b, wanted);
-    }
-    if (followed < kLeastShare * length) gone.insert(limb.bones.begin(), limb.bones.end());
-  }
-  drop_bones(gone, skeleton);
 }
 
 int nearest_node(const Skeleton& skeleton, const Vec3& point) {
@@ -79,6 +69,21 @@ std::string free_name(const std::string& wish, std::set<std::string>& taken) {
   return name;
 }
 
+/// Limbs of which no node is wanted go.
+/// \param bends  names of the nodes that are not
+void drop_new_limbs(const std::set<std::string>& bends, Repair& repair) {
+  for (;;) {
+    const std::vector<SkeletonLimb> limbs = find_limbs(repair.skeleton());
+    const auto is_new = [&](const SkeletonLimb& limb) {
+      return std::all_of(limb.nodes.begin() + 1, limb.nodes.end(),
+                         [&](int n) { return bends.contains(repair.skeleton().nodes[n].name); });
+    };
+    const auto found = std::find_if(limbs.begin(), limbs.end(), is_new);
+    if (found == limbs.end()) return;
+    repair.drop(*found);
+  }
+}
+
 }  // namespace
 
 double followed_share(const Surface& surface, const Skeleton& skeleton, const Skeleton& other) {
@@ -91,27 +96,32 @@ double followed_share(const Surface& surface, const Skeleton& skeleton, const Sk
 }
 
 Repair with_nodes_of(const Surface& surface, Skeleton accepted, const Skeleton& wanted, const Skeleton& original) {
-  drop_other_limbs(surface, wanted, accepted);
-  std::set<std::string> taken;
+  std::set<std::string> taken, bends;  // names
   for (const Node& node : wanted.nodes) taken.insert(node.name);
   std::vector<char> is_placed(wanted.nodes.size(), 0);
   for (Node& node : accepted.nodes) {
     const int n = nearest_node(wanted, node.position);
     const Vec3& place = wanted.nodes[n].position;
-    const double radius = std::max(surface.radius(place), surface.radius(node.position));
     const bool is_pair = !is_placed[n] && &accepted.nodes[nearest_node(accepted, place)] == &node &&
-                         (place - node.position).norm() < radius && !surface.is_between(node.position, place);
-    node.name = is_pair ? wanted.nodes[n].name : free_name("bend", taken);
-    if (is_pair) is_placed[n] = 1;
+                         is_near(surface, place, node.position);
+    if (is_pair) {
+      node.name = wanted.nodes[n].name;
+      is_placed[n] = 1;
+    } else {
+      node.name = free_name("bend", taken);
+      bends.insert(node.name);
+    }
   }
   Repair repair(surface, std::move(accepted), original);
   for (std::size_t n = 0; n < wanted.nodes.size(); ++n) {
     if (is_placed[n]) continue;
     const Vec3& place = wanted.nodes[n].position;
     const OnBone at = nearest_on_bones(repair.skeleton(), place);
-    if (at.distance < surface.radius(at.place) && !surface.is_between(place, at.place))
-      repair.split(at.bone, at.place, wanted.nodes[n].name);
+    if (is_near(surface, place, at.place)) repair.split(at.bone, at.place, wanted.nodes[n].name);
   }
+  drop_new_limbs(bends, repair);
+  for (int n = static_cast<int>(repair.skeleton().nodes.size()) - 1; n >= 0; --n)
+    if (bends.contains(repair.skeleton().nodes[n].name)) repair.straighten(n);
   return repair;
 }
 
@@ -131,8 +141,7 @@ void take_bone_names(const Skeleton& wanted, Skeleton& skeleton) {
       others.push_back(b);
   }
   for (const int b : others) {
-    const Vec3 middle =
-        0.5 * (end_position(skeleton, b, BoneEnd::kHead) + end_position(skeleton, b, BoneEnd::kTail));
+    const Vec3 middle = 0.5 * (end_position(skeleton, b, BoneEnd::kHead) + end_position(skeleton, b, BoneEnd::kTail));
     const std::string& name = wanted.bones[nearest_on_bones(wanted, middle).bone].name;
     skeleton.bones[b].name = taken.insert(name).second ? name : free_name(name + "_part", taken);
   }

@@ -8,12 +8,13 @@
 
 namespace skeletex {
 
-/// How much of a skeleton another one follows: the share of the length of its bones that is no farther from a bone of
-/// the other than one and a half radii of the body there.
+/// How much of a skeleton another one follows: the share of the length of its bones that lies near a bone of the other,
+/// without the surface between.
 double followed_share(const Surface& surface, const Skeleton& skeleton, const Skeleton& other);
 
-/// Gives an accepted skeleton the nodes of another one: limbs that the other does not follow go, the nodes nearest to
-/// the other's take their names, and bones that pass by the rest are split there, as far as margins stay enough.
+/// Gives an accepted skeleton the nodes of another one: the nodes nearest to the other's take their names, and bones
+/// that pass by the rest are split there. Limbs and bends that the other does not have go. All as far as margins stay
+/// enough.
 /// \param accepted  any names
 /// \param wanted  with names; its nodes lie inside the body
 /// \param original  the places where nodes of those names should be
