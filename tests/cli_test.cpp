@@ -1534,7 +1534,7 @@ TEST_F(Program, CutsHandlesOff) {
   for (const char* name : {"ring.ply", "c.skx.exr", "c.json", "c.ply"}) fs::remove(folder_ / name);
 }
 
-TEST_F(Program, CutsHandlesOfRigsOffByItself) {
+TEST_F(Program, ClosesRigs) {
   // A ring whose joints are an open chain.
   const TriangleMesh ring = torus_shape(5, 2, 0.25, 80, 16).mesh;
   GltfScene scene;
@@ -1571,6 +1571,14 @@ TEST_F(Program, CutsHandlesOfRigsOffByItself) {
   };
   EXPECT_EQ(cut_loops({}), 1u);
   EXPECT_EQ(cut_loops({"--close-handles", "0"}), 0u);
+  // Of a mesh that is open, joints outside are not reported: they are moved once it is closed.
+  scene.meshes[0].primitives[0].triangles.pop_back();
+  scene.skins[0].inverse_binds[2](2, 3) = -1;
+  write_gltf(folder_ / "ring.glb", scene);
+  const Outcome outcome = run({"encode", "ring.glb", "-o", "no.skx.exr"});
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_NE(outcome.err.find("not closed"), std::string::npos) << outcome.err;
+  EXPECT_EQ(outcome.err.find("lies outside"), std::string::npos) << outcome.err;
   fs::remove(folder_ / "c.json");
   fs::remove(folder_ / "ring.glb");
   fs::remove_all(folder_ / "parts");

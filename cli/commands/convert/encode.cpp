@@ -18,6 +18,7 @@
 #include "files.h"
 #include "progress_bar.h"
 #include "rig_file.h"
+#include "skeletex/analysis/validate_input.h"
 #include "skeletex/convert/encode_model.h"
 #include "skeletex/convert/guess_stance.h"
 #include "skeletex/convert/subdivide/loop_surface.h"
@@ -170,6 +171,8 @@ Input read_input(ClContext& context, const Arguments& arguments, const EncodeOpt
   if (is_gltf_file(arguments.mesh)) {
     RigFile file = load_rig(arguments.mesh, arguments.close);
     if (arguments.skeleton.empty()) {
+      // Joints are repaired in a mesh without errors only, so of another one its own errors are what counts.
+      if (TriangleMesh mesh = file.surface.mesh; has_errors(validate_mesh(mesh))) require_closed(mesh);
       ImportedRig rig = import_rig(context, file);
       input.skeleton = std::move(rig.skeleton);
       input.weights = std::move(rig.weights);
