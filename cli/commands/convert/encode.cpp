@@ -171,7 +171,7 @@ Input read_input(ClContext& context, const Arguments& arguments, const EncodeOpt
   if (is_gltf_file(arguments.mesh)) {
     RigFile file = load_rig(arguments.mesh, arguments.close);
     if (arguments.skeleton.empty()) {
-      // Joints are repaired in a mesh without errors only, so of another one its own errors are what counts.
+      // Joints are repaired only where the mesh has no errors. Else they are not worth a message yet.
       if (TriangleMesh mesh = file.surface.mesh; has_errors(validate_mesh(mesh))) require_closed(mesh);
       ImportedRig rig = import_rig(context, file);
       input.skeleton = std::move(rig.skeleton);

@@ -22,6 +22,7 @@
 #include "skeletex/reconstruct/texture/bake_displacement.h"
 #include "skeletex/render/image.h"
 #include "skeletex/rig/export_rig.h"
+#include "skeletex/skeleton/free_name.h"
 
 namespace skeletex::cli {
 namespace {
@@ -39,9 +40,7 @@ std::vector<NamedAnimation> read_animations(const std::vector<std::string>& path
   std::vector<NamedAnimation> animations;
   std::set<std::string> taken;
   for (const std::string& path : paths) {
-    const std::string stem = std::filesystem::path(path).stem().string();
-    std::string name = stem;
-    for (int i = 2; !taken.insert(name).second; ++i) name = fmt::format("{}_{}", stem, i);
+    const std::string name = free_name(std::filesystem::path(path).stem().string(), taken);
     animations.push_back({name, read_animation(path, skeleton)});
   }
   return animations;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/rig/import_rig.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,6 +12,7 @@
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/rig/joint_skeleton.h"
 #include "skeletex/rig/rig_animation.h"
+#include "skeletex/skeleton/free_name.h"
 
 namespace skeletex {
 namespace {
@@ -115,9 +114,7 @@ ImportedRig import_rig(const GltfScene& scene, const GltfSurface& surface,
     RigAnimation read = read_rig_animation(scene, surface, joints, animation);
     rig.notes.insert(rig.notes.end(), read.notes.begin(), read.notes.end());
     if (read.animation.frames.empty()) continue;
-    const std::string wanted = animation.name.empty() ? "animation" : animation.name;
-    std::string name = wanted;
-    for (int i = 2; !taken.insert(name).second; ++i) name = fmt::format("{}_{}", wanted, i);
+    const std::string name = free_name(animation.name.empty() ? "animation" : animation.name, taken);
     rig.animations.push_back({name, std::move(read.animation)});
   }
   rig.skeleton = std::move(joints.skeleton);

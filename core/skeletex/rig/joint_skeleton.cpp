@@ -10,6 +10,7 @@
 #include <set>
 
 #include "skeletex/analysis/surface_probe.h"
+#include "skeletex/skeleton/free_name.h"
 
 namespace skeletex {
 namespace {
@@ -29,13 +30,6 @@ bool has_word(const std::string& name, std::initializer_list<const char*> words)
   const std::string text = lower(name);
   return std::any_of(words.begin(), words.end(),
                      [&](const char* word) { return text.find(word) != std::string::npos; });
-}
-
-std::string free_name(std::string wanted, const std::string& otherwise, std::set<std::string>& taken) {
-  if (wanted.empty()) wanted = otherwise;
-  std::string name = wanted;
-  for (int i = 2; !taken.insert(name).second; ++i) name = fmt::format("{}_{}", wanted, i);
-  return name;
 }
 
 struct Joint {
@@ -306,14 +300,14 @@ class SkeletonBuilder {
           if (sibling != j && is_kept(sibling) && is_here(sibling)) joint.group = joints_[sibling].group;
       if (joint.group >= 0) continue;
       joint.group = static_cast<int>(result_.skeleton.nodes.size());
-      result_.skeleton.nodes.push_back({free_name(joint.name, "", node_names_), joint.position});
+      result_.skeleton.nodes.push_back({free_name(joint.name, node_names_), joint.position});
       result_.node_joint.push_back(joint.node);
     }
   }
 
   void add_bone(int joint, int head, int tail, const std::string& name) {
     Bone bone;
-    bone.name = free_name(name, "bone", bone_names_);
+    bone.name = free_name(name, bone_names_);
     bone.head = head;
     bone.tail = tail;
     bones_of_[joint].push_back(static_cast<int>(result_.skeleton.bones.size()));
@@ -407,7 +401,7 @@ class SkeletonBuilder {
         tip = joint.position + 0.25 * diagonal_ * Vec3::UnitY();
       }
       result_.skeleton.nodes.push_back(
-          {free_name(joint.name + "_tip", "", node_names_), pulled_inside(joint.position, tip)});
+          {free_name(joint.name + "_tip", node_names_), pulled_inside(joint.position, tip)});
       result_.node_joint.push_back(joint.node);
       add_bone(j, joint.group, static_cast<int>(result_.skeleton.nodes.size()) - 1, joint.name);
     }

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/rig/joints.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <set>
 
 #include "skeletex/skeleton/bone_motion.h"
+#include "skeletex/skeleton/free_name.h"
 
 namespace skeletex {
 namespace {
@@ -16,13 +15,6 @@ namespace {
 constexpr double kFramesPerSecond = 30;
 /// Programs that interpolate quaternions linearly are then within 1e-5 radians of those that do it by slerp.
 constexpr double kLargestTurn = 10 * std::numbers::pi / 180;
-
-/// Joint names are those of bones; what else there is must not take one of theirs.
-std::string free_name(const std::string& wanted, std::set<std::string>& taken) {
-  std::string name = wanted;
-  for (int i = 2; !taken.insert(name).second; ++i) name = fmt::format("{}_{}", wanted, i);
-  return name;
-}
 
 /// \param end  of the bone, where the joint lies
 Eigen::Isometry3d bone_frame(const Skeleton& skeleton, const BoneBasis& basis, int bone, BoneEnd end) {

@@ -340,7 +340,7 @@ bool Repair::contract(int bone) {
   return true;
 }
 
-/// Takes a changed skeleton unless its least margin is not enough, and less than before.
+/// Takes a changed skeleton unless its least margin is not enough and less than before.
 bool Repair::try_skeleton(Skeleton changed, std::vector<double> radii) {
   const auto least = [&] {
     double margin = kEnoughMargin;

@@ -14,11 +14,12 @@
 #include "skeletex/geometry/union_find.h"
 #include "skeletex/model/error.h"
 #include "skeletex/skeleton/check_skeleton.h"
+#include "skeletex/skeleton/free_name.h"
 #include "skeletex/skeletonize/accept.h"
 #include "skeletex/skeletonize/body/body_paths.h"
 #include "skeletex/skeletonize/body/fitting_body.h"
 #include "skeletex/skeletonize/bones.h"
-#include "skeletex/skeletonize/replace_skeleton.h"
+#include "skeletex/skeletonize/replacement.h"
 #include "skeletex/skeletonize/skeletonize.h"
 
 namespace skeletex {
@@ -183,15 +184,12 @@ class Draft {
         }
   }
 
-  std::string free_name(const std::string& wish) const {
-    const auto is_taken = [&](const std::string& name) {
-      return std::any_of(skeleton_.nodes.begin(), skeleton_.nodes.end(),
-                         [&](const Node& n) { return n.name == name; }) ||
-             std::any_of(skeleton_.bones.begin(), skeleton_.bones.end(), [&](const Bone& b) { return b.name == name; });
-    };
-    if (!is_taken(wish)) return wish;
-    for (int i = 2;; ++i)
-      if (!is_taken(fmt::format("{}_{}", wish, i))) return fmt::format("{}_{}", wish, i);
+  /// Neither a node nor a bone has it.
+  std::string free_name(const std::string& wanted) const {
+    std::set<std::string> taken;
+    for (const Node& node : skeleton_.nodes) taken.insert(node.name);
+    for (const Bone& bone : skeleton_.bones) taken.insert(bone.name);
+    return skeletex::free_name(wanted, taken);
   }
 
   static double length_of(const std::vector<Vec3>& points) {
@@ -308,11 +306,12 @@ struct Target {
   const TriangleMesh& mesh;
   const TriangleTree& tree;
   const Surface& surface;
+  const Acceptance& acceptance;
 };
 
-/// The skeleton that the mesh gets by itself, with the nodes of the wanted one.
+/// The skeleton that skeletonize makes for the mesh, with the nodes of the wanted one.
 /// \param original  where the nodes were before they were moved into the body
-/// \return nothing where the mesh gets none
+/// \return nothing where it makes none
 std::optional<Repair> replacement(const Target& target, const Skeleton& wanted, const Skeleton& original) {
   try {
     const SkeletonizeResult found = skeletonize(target.context, target.mesh, target.tree);
@@ -325,22 +324,20 @@ std::optional<Repair> replacement(const Target& target, const Skeleton& wanted, 
 /// Skeletons that are accepted, and the choice among them.
 class Candidates {
  public:
-  Candidates(const Target& target, const Skeleton& wanted)
-      : target_(target), wanted_(wanted), acceptance_(target.context, target.surface) {}
+  Candidates(const Target& target, const Skeleton& wanted) : target_(target), wanted_(wanted) {}
 
-  /// \return whether it is accepted
-  bool add(Repair repair, bool is_replacement = false) {
-    refusal_ = acceptance_.segment(repair);
-    if (!refusal_.empty()) return false;
+  /// Adds a skeleton if it can be made acceptable.
+  void add(Repair repair, bool is_replacement = false) {
+    refusal_ = target_.acceptance.segment(repair);
+    if (!refusal_.empty()) return;
     Skeleton skeleton = repair.skeleton();
     repair.move_back();
-    if (acceptance_.is_accepted(repair.skeleton())) skeleton = repair.skeleton();
+    if (target_.acceptance.is_accepted(repair.skeleton())) skeleton = repair.skeleton();
     const double followed = followed_share(target_.surface, wanted_, skeleton);
     most_followed_ = std::max(most_followed_, followed);
     list_.push_back({std::move(skeleton), followed, is_replacement});
-    return true;
   }
-  /// Whether one of them has all bones.
+  /// Whether the last one has all bones.
   bool is_complete() const { return !list_.empty() && list_.back().skeleton.bones.size() == wanted_.bones.size(); }
   bool loses_limbs() const { return most_followed_ < kFollowedEnough; }
 
@@ -354,7 +351,7 @@ class Candidates {
     });
     if (chosen.is_replacement) {
       changes.emplace_back(
-          "limbs would be lost: the skeleton that the mesh gets by itself takes its place, and its names");
+          "limbs would be lost, so the skeleton that skeletonize makes for the mesh takes its place and its names");
       take_bone_names(wanted_, chosen.skeleton);
     }
     return std::move(chosen.skeleton);
@@ -369,14 +366,13 @@ class Candidates {
   };
   const Target& target_;
   const Skeleton& wanted_;
-  const Acceptance acceptance_;
   std::vector<Candidate> list_;
   double most_followed_ = 0;
   std::string refusal_;
 };
 
 /// Moves nodes; where that is not enough, contracts bones one after the other, with or without minor limbs, or with a
-/// look at all of them. Where all these lose limbs, tries the skeleton that the mesh gets by itself.
+/// look at all of them. Where all these lose limbs, tries the skeleton that skeletonize makes.
 /// \param original  where the nodes were before they were moved into the body
 /// \throw TopologyError when nothing helps
 Skeleton accepted_skeleton(const Target& target, const Skeleton& wanted, const Skeleton& original,
@@ -425,8 +421,10 @@ RepairResult repair_skeleton(ClContext& context, const TriangleMesh& mesh, const
                     "through every handle, or start from skeletex skeletonize",
                     genus, genus == 1 ? "" : "s", cycles, cycles == 1 ? "" : "s"));
   RepairResult result{draft.skeleton(), std::move(draft.changes())};
-  if (!Acceptance(context, surface).is_accepted(result.skeleton))
-    result.skeleton = accepted_skeleton({context, mesh, tree, surface}, draft.skeleton(), named, result.changes);
+  const Acceptance acceptance(context, surface);
+  if (!acceptance.is_accepted(result.skeleton))
+    result.skeleton =
+        accepted_skeleton({context, mesh, tree, surface, acceptance}, draft.skeleton(), named, result.changes);
   drop_bad_angles(result.skeleton);
   describe(named, result.skeleton, result.changes);
   result.skeleton = in_frame(std::move(result.skeleton), skeleton.frame);

@@ -18,7 +18,7 @@ struct RepairResult {
 /// Changes a skeleton so that encode_model accepts it with its mesh, and as little as it can: unusable bones go, nodes
 /// outside the body move to the middle of the body near by, bones that leave it get nodes on the way through it, nodes
 /// move until no separation planes cross, and only what is left over then is contracted. Where that would lose limbs,
-/// the skeleton that the mesh gets by itself is taken, with the nodes of the given one as far as they fit. Names stay.
+/// the skeleton that skeletonize makes is taken, with the nodes of the given one as far as they fit. Names stay.
 /// \param tree  of the mesh
 /// \pre the mesh is closed, oriented outwards, 2-manifold and connected
 /// \throw InputError when there is no bone, an index does not exist, a position is not finite, or no node is near the

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/skeletonize/replace_skeleton.h"
+#include "skeletex/skeletonize/replacement.h"
 
 #include <gtest/gtest.h>
 
@@ -60,7 +60,7 @@ Skeleton rig_of_cow() {
 
 }  // namespace
 
-TEST(ReplaceSkeleton, TheShareThatIsFollowedLacksALostLimb) {
+TEST(Replacement, TheShareThatIsFollowedLacksALostLimb) {
   const TestModel cow = load_standard_model("cow");
   const TriangleTree tree = build_triangle_tree(cow.mesh);
   const Surface surface(cow.mesh, tree);
@@ -84,7 +84,7 @@ TEST(ReplaceSkeleton, TheShareThatIsFollowedLacksALostLimb) {
   EXPECT_DOUBLE_EQ(followed_share(surface, three_legged, cow.skeleton), 1);
 }
 
-TEST(ReplaceSkeleton, ARigWhoseRepairWouldLoseLimbsKeepsThemAll) {
+TEST(Replacement, ARigWhoseRepairWouldLoseLimbsKeepsThemAll) {
   ClContext context;
   TestModel cow = load_standard_model("cow");
   const TriangleTree tree = build_triangle_tree(cow.mesh);
@@ -110,7 +110,7 @@ TEST(ReplaceSkeleton, ARigWhoseRepairWouldLoseLimbsKeepsThemAll) {
     EXPECT_TRUE(bones.contains(name));
 }
 
-TEST(ReplaceSkeleton, BonesHaveTheNamesAndDirectionsOfTheWantedOnes) {
+TEST(Replacement, BonesHaveTheNamesAndDirectionsOfTheWantedOnes) {
   Skeleton wanted;
   wanted.nodes = {{"root", {0, 0, 0}}, {"middle", {1, 0, 0}}, {"end", {2, 0, 0}}};
   wanted.bones = {{"first", 0, 1, {}}, {"second", 1, 2, {}}};
@@ -125,7 +125,7 @@ TEST(ReplaceSkeleton, BonesHaveTheNamesAndDirectionsOfTheWantedOnes) {
   for (std::size_t b = 0; b < 3; ++b) EXPECT_EQ(std::pair(skeleton.bones[b].head, skeleton.bones[b].tail), expected[b]);
 }
 
-TEST(ReplaceSkeleton, NodesComeAndGoWhereMarginsStayEnough) {
+TEST(Replacement, NodesComeAndGoWhereMarginsStayEnough) {
   const TestModel cow = load_standard_model("cow");
   const TriangleTree tree = build_triangle_tree(cow.mesh);
   const Surface surface(cow.mesh, tree);

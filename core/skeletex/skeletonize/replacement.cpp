@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/skeletonize/replace_skeleton.h"
-
-#include <fmt/format.h>
+#include "skeletex/skeletonize/replacement.h"
 
 #include <algorithm>
 #include <limits>
@@ -10,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "skeletex/skeleton/free_name.h"
 #include "skeletex/skeleton/pose.h"
 #include "skeletex/skeletonize/limbs.h"
 #include "skeletex/skeletonize/names.h"
@@ -44,6 +43,7 @@ bool is_near(const Surface& surface, const Vec3& place, const Vec3& on_bone) {
          !surface.is_between(place, on_bone);
 }
 
+/// The length of a bone that lies near the bones of another skeleton.
 double followed_length(const Surface& surface, const Skeleton& skeleton, int bone, const Skeleton& other) {
   const Vec3 &head = end_position(skeleton, bone, BoneEnd::kHead), &tail = end_position(skeleton, bone, BoneEnd::kTail);
   int followed = 0;
@@ -62,15 +62,8 @@ int nearest_node(const Skeleton& skeleton, const Vec3& point) {
   return nearest;
 }
 
-/// A name that neither nodes nor bones have.
-std::string free_name(const std::string& wish, std::set<std::string>& taken) {
-  std::string name = wish;
-  for (int i = 2; !taken.insert(name).second; ++i) name = fmt::format("{}_{}", wish, i);
-  return name;
-}
-
-/// Limbs of which no node is wanted go.
-/// \param bends  names of the nodes that are not
+/// Takes away limbs of which no node is wanted.
+/// \param bends  names of the nodes that are not wanted
 void drop_new_limbs(const std::set<std::string>& bends, Repair& repair) {
   for (;;) {
     const std::vector<SkeletonLimb> limbs = find_limbs(repair.skeleton());
@@ -143,7 +136,7 @@ void take_bone_names(const Skeleton& wanted, Skeleton& skeleton) {
   for (const int b : others) {
     const Vec3 middle = 0.5 * (end_position(skeleton, b, BoneEnd::kHead) + end_position(skeleton, b, BoneEnd::kTail));
     const std::string& name = wanted.bones[nearest_on_bones(wanted, middle).bone].name;
-    skeleton.bones[b].name = taken.insert(name).second ? name : free_name(name + "_part", taken);
+    skeleton.bones[b].name = free_name(taken.contains(name) ? name + "_part" : name, taken);
   }
 }
 
