@@ -37,8 +37,8 @@ void say_changes(const std::string& path, const Skeleton& before, const RepairRe
   constexpr std::size_t kShown = 3;
   const std::vector<std::string>& changes = repaired.changes;
   if (changes.empty()) return;
-  spdlog::info("{}: its skeleton is repaired: {} bones, {} before", path, repaired.skeleton.bones.size(),
-               before.bones.size());
+  spdlog::info("{}: its skeleton is repaired: {} bone{}, {} before", path, repaired.skeleton.bones.size(),
+               repaired.skeleton.bones.size() == 1 ? "" : "s", before.bones.size());
   for (std::size_t i = 0; i < std::min(kShown, changes.size()); ++i) spdlog::info("{}: {}", path, changes[i]);
   if (changes.size() > kShown)
     spdlog::info("{}: and {} more changes (skeletex import --json lists them)", path, changes.size() - kShown);

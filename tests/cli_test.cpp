@@ -1579,6 +1579,18 @@ TEST_F(Program, ClosesRigs) {
   EXPECT_EQ(outcome.code, 1);
   EXPECT_NE(outcome.err.find("not closed"), std::string::npos) << outcome.err;
   EXPECT_EQ(outcome.err.find("lies outside"), std::string::npos) << outcome.err;
+  // Without joints there is a mesh, and no complaint about a skeleton.
+  scene.skins.clear();
+  scene.meshes[0].primitives[0].influences = 0;
+  scene.meshes[0].primitives[0].joints.clear();
+  scene.meshes[0].primitives[0].weights.clear();
+  for (GltfNode& node : scene.nodes) node.skin = -1;
+  write_gltf(folder_ / "ring.glb", scene);
+  fs::remove_all(folder_ / "parts");
+  const Outcome bare = run({"import", "ring.glb", "-o", "parts"});
+  EXPECT_EQ(bare.code, 0) << bare.err;
+  EXPECT_NE(bare.out.find("not closed"), std::string::npos) << bare.out;
+  EXPECT_EQ(bare.out.find("skeleton"), std::string::npos) << bare.out;
   fs::remove(folder_ / "c.json");
   fs::remove(folder_ / "ring.glb");
   fs::remove_all(folder_ / "parts");

@@ -309,6 +309,30 @@ TEST(Gltf, PicturesAreReadAsWebP) {
   EXPECT_EQ(read.materials.at(0).image, 0);
 }
 
+TEST(Gltf, TextureCoordinatesMayHaveThreeNumbers) {  // as those that assimp writes have
+  const ScratchFolder folder;
+  write_gltf(folder / "plain.glb", sheet());
+  Parts parts = read_parts(folder / "plain.glb");
+  Json& primitive = parts.scene["meshes"][0]["primitives"][0];
+  primitive["attributes"]["TEXCOORD_0"] = primitive["attributes"]["NORMAL"];
+  write_parts(folder / "three.glb", parts);
+  const GltfPrimitive read = read_gltf(folder / "three.glb").meshes[0].primitives[0];
+  ASSERT_EQ(read.texture_coordinates.size(), read.normals.size());
+  for (std::size_t i = 0; i < read.normals.size(); ++i)
+    EXPECT_EQ(read.texture_coordinates[i], read.normals[i].head<2>().cast<float>()) << i;
+}
+
+TEST(Gltf, APictureThatIsMissingIsNamedAndTheRestRead) {
+  const ScratchFolder folder;
+  write_gltf(folder / "plain.glb", sheet());
+  Parts parts = read_parts(folder / "plain.glb");
+  parts.scene["images"][0] = {{"uri", "skin.png"}};
+  write_parts(folder / "bare.glb", parts);
+  const GltfScene read = read_gltf(folder / "bare.glb");
+  EXPECT_EQ(read.meshes.size(), 1u);
+  EXPECT_EQ(read.notes, std::vector<std::string>{"picture \"skin.png\" cannot be read, so its colours are left out"});
+}
+
 TEST(Gltf, ATextureTransformMovesTheCoordinates) {
   const ScratchFolder folder;
   write_gltf(folder / "plain.glb", sheet());

@@ -20,6 +20,7 @@
 #include "skeletex/skeletonize/body/curve_graph.h"
 #include "skeletex/skeletonize/body/fitting_body.h"
 #include "skeletex/skeletonize/body/thinning.h"
+#include "skeletex/skeletonize/body/tips.h"
 #include "skeletex/skeletonize/bones.h"
 #include "skeletex/skeletonize/coarse_mesh.h"
 #include "skeletex/skeletonize/repair.h"
@@ -161,6 +162,63 @@ TEST(Skeletonize, EveryLimbOfACreatureHasABoneAndTheSameBytesComeAgain) {
     EXPECT_LT(least, 0.08 * diagonal) << shape.skeleton.nodes[n].name;
   }
   EXPECT_EQ(skeleton_to_json(result.skeleton), skeleton_to_json(skeletonized(shape.mesh).skeleton));
+}
+
+TEST(Skeletonize, EveryLegOfASpiderAndItsAbdomenHaveBones) {
+  // The deepest place is in the abdomen, behind the body that all legs grow from; feet are near to the next ones.
+  Skeleton made;
+  std::vector<double> radii;
+  const auto node = [&](const Vec3& position, double radius) {
+    radii.push_back(radius);
+    made.nodes.push_back({"", position});
+    return static_cast<int>(made.nodes.size()) - 1;
+  };
+  const auto bone = [&](int head, int tail) { made.bones.push_back({"", head, tail, {}}); };
+  const int body = node({0, 0, 0}, 0.5), waist = node({-0.9, 0, 0.1}, 0.25), abdomen = node({-2.4, 0, 0.4}, 1.0);
+  bone(body, waist);
+  bone(waist, abdomen);
+  std::vector<Vec3> ends{made.nodes[abdomen].position};
+  for (const double side : {-1.0, 1.0})
+    for (const double along : {-0.35, 0.0, 0.35}) {
+      const int knee = node({2.2 * along, 1.5 * side, 0.8}, 0.16);
+      ends.emplace_back(1.9 * along, 2.4 * side, -1.2);
+      bone(body, knee);
+      bone(knee, node(ends.back(), 0.14));
+    }
+  const TriangleMesh mesh = thickened(made, radii, 0.1, 0.14);
+  const SkeletonizeResult result = skeletonized(mesh);
+  EXPECT_EQ(result.limbs, 7);
+  EXPECT_EQ(result.candidates[result.chosen].limbs, 7);
+  for (std::size_t e = 0; e < ends.size(); ++e) {
+    double least = std::numeric_limits<double>::infinity();
+    for (const Node& other : result.skeleton.nodes) least = std::min(least, (other.position - ends[e]).norm());
+    EXPECT_LT(least, e == 0 ? 0.9 : 0.4) << e;
+  }
+}
+
+TEST(Skeletonize, ALegIsNotReachedByTheBonesOfTheNextOne) {
+  Skeleton made;
+  made.nodes = {{"", {0, 0, 0}}, {"", {-0.25, 0, -3}}, {"", {0.25, 0, -3}}, {"", {-0.8, 0, 0}}, {"", {0.8, 0, 0}}};
+  made.bones = {{"", 3, 0, {}}, {"", 0, 4, {}}, {"", 3, 1, {}}, {"", 4, 2, {}}};
+  const TriangleMesh mesh = thickened(made, {0.3, 0.12, 0.12, 0.3, 0.3}, 0.05, 0.08);
+  const TriangleTree tree = build_triangle_tree(mesh);
+  const Surface surface(mesh, tree);
+  const VoxelBody body = make_fitting_body(surface, 0);
+  std::vector<int> tips;
+  for (const int foot : {1, 2}) {
+    const auto distance = [&](const Vec3& centre) { return (centre - made.nodes[foot].position).norm(); };
+    const auto nearest = std::min_element(body.centres.begin(), body.centres.end(),
+                                          [&](const Vec3& a, const Vec3& b) { return distance(a) < distance(b); });
+    tips.push_back(static_cast<int>(nearest - body.centres.begin()));
+  }
+  const std::vector<LimbTip> feet = places_near(body, tips, 0.6);
+  EXPECT_EQ(count_reached(feet, made), 2);
+  made.bones.pop_back();
+  made.nodes.erase(made.nodes.begin() + 2);
+  for (Bone& bone : made.bones)
+    for (int* node : {&bone.head, &bone.tail})
+      if (*node > 2) --*node;
+  EXPECT_EQ(count_reached(feet, made), 1) << "the foot left is 0.5 away, but not through the body";
 }
 
 TEST(Skeletonize, StretchedArmsHaveElbows) {

@@ -240,8 +240,8 @@ Skeleton make_skeleton(ClContext& context, const Input& input, ProgressBar& bar)
   };
   SkeletonizeResult result = skeletonize(context, input.mesh, *input.tree, options);
   bar.show("reading and checking the input", 0);
-  spdlog::info("no skeleton was given: made one of {} bones (skeletex skeletonize has options for it)",
-               result.skeleton.bones.size());
+  spdlog::info("no skeleton was given: made one of {} bone{} (skeletex skeletonize has options for it)",
+               result.skeleton.bones.size(), result.skeleton.bones.size() == 1 ? "" : "s");
   result.skeleton.frame = input.skeleton.frame;  // of the mesh that it was made for
   return std::move(result.skeleton);
 }

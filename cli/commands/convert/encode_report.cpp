@@ -59,7 +59,7 @@ std::string placing_text(const TexelPlacing& placing) {
   const char* const what = placing.has_snap      ? placing.is_fitted() ? "snapped and fitted" : "snapped"
                            : placing.is_fitted() ? "fitted"
                                                  : "on a regular grid";
-  return fmt::format("texels: {}, as there are {:.2g} per vertex; expected error {:.2g} of a regular grid's\n", what,
+  return fmt::format("texels: {}, as there are {:.1f} per vertex; expected error {:.2g} of a regular grid's\n", what,
                      placing.texels_per_vertex, placing.expected_error);
 }
 

@@ -64,7 +64,8 @@ std::vector<VertexColour> vertex_colours(const TriangleMesh& mesh, const MeshAtt
 std::pair<std::string, Json> findings_of(TriangleMesh mesh, const Skeleton& skeleton) {
   std::string text;
   Json list = Json::array();
-  for (const Finding& finding : validate_before_segmentation(mesh, skeleton)) {
+  for (const Finding& finding :
+       skeleton.bones.empty() ? validate_mesh(mesh) : validate_before_segmentation(mesh, skeleton)) {
     const bool is_error = finding.severity == Severity::kError;
     text += fmt::format("{}: {}\n{}", is_error ? "error" : "note", finding.message,
                         finding.remedy.empty() ? "" : fmt::format("  remedy: {}\n", finding.remedy));

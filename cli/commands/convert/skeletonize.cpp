@@ -79,8 +79,9 @@ void run(const Arguments& arguments, const CLI::App& command) {
   write_text_atomically(arguments.output, skeleton_to_json(result.skeleton).dump(2) + '\n');
   const double seconds = watch.lap_ms() / 1000;
   print(arguments.json,
-        text_of(result) + fmt::format("{}: {} bones, {} nodes; {:.1f} s\n", arguments.output,
-                                      result.skeleton.bones.size(), result.skeleton.nodes.size(), seconds));
+        text_of(result) + fmt::format("{}: {} bone{}, {} nodes; {:.1f} s\n", arguments.output,
+                                      result.skeleton.bones.size(), result.skeleton.bones.size() == 1 ? "" : "s",
+                                      result.skeleton.nodes.size(), seconds));
   write_json(arguments.json, json_of(result, arguments.output, seconds));
 }
 

@@ -32,6 +32,7 @@ constexpr double kLimbReach = 0.1;  // a node so near to a tip reaches it; diago
 constexpr double kLimbsMayCost = 3;
 constexpr double kJointsMayCost = 1.25;  // times the error, of joints in long limbs
 constexpr std::array<double, 4> kDetails{0, 1.0 / 3, 2.0 / 3, 1};
+constexpr double kLimbDetail = kDetails[1];  // that of the limbs which a skeleton should reach
 /// Where no skeleton of a body with handles works, its rings are tried with many short bones. The separation planes of
 /// a ring meet inside its polygon; the more sides that has, the nearer they meet to the middle of the hole, outside the
 /// body.
@@ -93,9 +94,28 @@ CurveGraph curves_of(const Surface& surface, const VoxelBody& body, const std::v
   return graph;
 }
 
-/// Where limbs begin: at the deepest voxel, or on the curves around the handles.
-std::vector<int> roots_of(const VoxelBody& body, int genus) {
-  if (genus == 0) return {deepest_voxel(body)};
+/// Where the ways from all tips to the one root come together; the root itself where there are fewer than two.
+int branch_of(const BodyPaths& paths, const std::vector<int>& tips) {
+  const int root = paths.roots.front();
+  if (tips.size() < 2) return root;
+  std::vector<std::size_t> passed(paths.parents.size(), 0);
+  for (const int tip : tips)
+    for (int at = tip; at != root; at = paths.parents[at]) ++passed[at];
+  int at = tips.front();
+  while (at != root && passed[at] < tips.size()) at = paths.parents[at];
+  return at;
+}
+
+/// Where limbs begin: at the deepest voxel, or on the curves around the handles. Where the deepest voxel lies in a limb
+/// itself, as in the abdomen of a spider, limbs begin where all others meet.
+std::vector<int> roots_of(const VoxelBody& body, double diagonal, int genus) {
+  if (genus == 0) {
+    const int deepest = deepest_voxel(body);
+    const BodyPaths paths = find_paths(body, {deepest});
+    const int branch = branch_of(paths, find_tips(body, paths, rule_of(kLimbDetail), diagonal));
+    const bool is_in_limb = (body.centres[branch] - body.centres[deepest]).norm() > body.radii[deepest];
+    return {is_in_limb ? branch : deepest};
+  }
   const std::vector<char> is_left = thin_body(body, {});
   std::vector<int> roots;
   for (int v = 0; v < body.size(); ++v)
@@ -147,15 +167,6 @@ std::vector<Level> make_levels(const Surface& surface, const VoxelBody& body, co
     levels.back().repair = std::make_unique<Repair>(surface, single_bone(body));
   }
   return levels;
-}
-
-/// Limbs that a skeleton reaches.
-int count_limbs(const VoxelBody& body, const std::vector<int>& tips, const Skeleton& skeleton, double reach) {
-  return static_cast<int>(std::count_if(tips.begin(), tips.end(), [&](int tip) {
-    return std::any_of(skeleton.nodes.begin(), skeleton.nodes.end(), [&](const Node& node) {
-      return (node.position - body.centres[tip]).norm() < reach + body.radii[tip];
-    });
-  }));
 }
 
 /// Takes the symmetric skeleton next to one where the body has a mirror plane and that one is accepted as well.
@@ -274,9 +285,10 @@ SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, cons
     throw TopologyError(
         "the body is too thin for a skeleton: no point was found that is well inside; give the mesh some thickness");
   report("finding limbs", 0.15);
-  const BodyPaths paths = find_paths(body, roots_of(body, result.genus));
-  const std::vector<int> limbs = find_tips(body, paths, rule_of(kDetails[1]), surface.diagonal);
-  result.limbs = static_cast<int>(limbs.size());
+  const BodyPaths paths = find_paths(body, roots_of(body, surface.diagonal, result.genus));
+  const std::vector<int> tips = find_tips(body, paths, rule_of(kLimbDetail), surface.diagonal);
+  const std::vector<LimbTip> limbs = places_near(body, tips, kLimbReach * surface.diagonal);
+  result.limbs = static_cast<int>(tips.size());
   std::vector<Level> levels = make_levels(surface, body, paths, result.genus, options);
   const Acceptance acceptance(context, surface);
   const std::optional<MirrorPlane> plane = find_mirror_plane(surface, body);
@@ -285,17 +297,14 @@ SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, cons
     while (options.most_bones && static_cast<int>(repair.skeleton().bones.size()) > std::max(1, *options.most_bones) &&
            repair.contract_cheapest()) {
     }
-    const auto limbs_of = [&](const Skeleton& skeleton) {
-      return count_limbs(body, limbs, skeleton, kLimbReach * surface.diagonal);
-    };
     const auto stop = [&, least = least_limbs(result.candidates, options)](const Repair& tried) {
-      return reason_to_stop(limbs_of(tried.skeleton()), tried.measured(), least, result.limbs);
+      return reason_to_stop(count_reached(limbs, tried.skeleton()), tried.measured(), least, result.limbs);
     };
     SkeletonCandidate candidate{level.name, 0, 0, 0, acceptance.segment(repair, stop)};
     level.skeleton = repair.skeleton();
     if (candidate.refusal.empty()) make_symmetric(surface, plane, acceptance, level.skeleton);
     candidate.bones = static_cast<int>(level.skeleton.bones.size());
-    candidate.limbs = limbs_of(level.skeleton);
+    candidate.limbs = count_reached(limbs, level.skeleton);
     if (candidate.refusal.empty()) {
       const Acceptance::Trial trial = acceptance.encode(level.skeleton);
       candidate.error = trial.error;

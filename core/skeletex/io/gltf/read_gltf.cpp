@@ -282,8 +282,10 @@ class GltfReader {
       transform = texture_transform(model_.materials[from.material].pbrMetallicRoughness.baseColorTexture);
     const auto found = from.attributes.find(fmt::format("TEXCOORD_{}", transform.set));
     if (found == from.attributes.end()) return;
-    const std::vector<double> values = accessors_.read(found->second, 2);
-    for (std::size_t i = 0; i + 1 < values.size(); i += 2)
+    const std::size_t components = accessors_.components(found->second);  // 2; assimp writes 3
+    if (components < 2) fail("texture coordinates have one number per vertex; two are needed");
+    const std::vector<double> values = accessors_.read(found->second, 0);
+    for (std::size_t i = 0; i + 1 < values.size(); i += components)
       to.texture_coordinates.push_back((transform.map * Eigen::Vector2d(values[i], values[i + 1])).cast<float>());
   }
 
@@ -400,21 +402,25 @@ class GltfReader {
     return track;
   }
 
-  void read_materials() {
-    for (const tinygltf::Image& from : model_.images) {
-      ColourImage image{from.width, from.height, {}};
-      const bool is_usable = from.width > 0 && from.height > 0 && from.component == 4 &&
-                             (from.bits == 8 || from.bits == 16) &&
-                             from.image.size() == static_cast<std::size_t>(from.width) * from.height * from.bits / 2;
-      if (is_usable && from.bits == 8) image.rgba = from.image;
-      if (is_usable && from.bits == 16)
-        for (std::size_t i = 1; i < from.image.size(); i += 2) image.rgba.push_back(from.image[i]);
-      if (!is_usable) {
-        image = {};
-        note("a picture cannot be read, so its colours are left out");
-      }
-      scene_.images.push_back(std::move(image));
+  ColourImage read_image(const tinygltf::Image& from) {
+    ColourImage image{from.width, from.height, {}};
+    const bool is_usable = from.width > 0 && from.height > 0 && from.component == 4 &&
+                           (from.bits == 8 || from.bits == 16) &&
+                           from.image.size() == static_cast<std::size_t>(from.width) * from.height * from.bits / 2;
+    if (!is_usable) {
+      const std::string& name = from.uri.empty() ? from.name : from.uri;
+      note(fmt::format("{} cannot be read, so its colours are left out",
+                       name.empty() ? "a picture" : "picture \"" + name + '"'));
+      return {};
     }
+    if (from.bits == 8) image.rgba = from.image;
+    if (from.bits == 16)
+      for (std::size_t i = 1; i < from.image.size(); i += 2) image.rgba.push_back(from.image[i]);
+    return image;
+  }
+
+  void read_materials() {
+    for (const tinygltf::Image& from : model_.images) scene_.images.push_back(read_image(from));
     for (const tinygltf::Material& from : model_.materials) {
       GltfMaterial material{from.name, Eigen::Vector4f::Ones(), -1};
       const std::vector<double>& factor = from.pbrMetallicRoughness.baseColorFactor;

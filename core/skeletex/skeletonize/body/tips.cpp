@@ -43,6 +43,36 @@ std::vector<int> find_tips(const VoxelBody& body, const BodyPaths& paths, const 
   return tips;
 }
 
+/// A way through the body may be longer than the straight one by so much: limbs are bent, and ways go from voxel to
+/// voxel.
+constexpr double kDetour = 1.5;
+
+std::vector<LimbTip> places_near(const VoxelBody& body, const std::vector<int>& tips, double reach) {
+  std::vector<LimbTip> result;
+  for (const int tip : tips) {
+    const PathSource source{tip, 0};
+    result.push_back({body.centres[tip], reach + body.radii[tip], {}, body.side});
+    const double longest = kDetour * result.back().reach;
+    const std::vector<double> distances = distances_through(body, {&source, 1}, {}, longest);
+    for (int v = 0; v < body.size(); ++v)
+      if (distances[v] <= longest) result.back().places.push_back(body.centres[v]);
+  }
+  return result;
+}
+
+int count_reached(const std::vector<LimbTip>& tips, const Skeleton& skeleton) {
+  constexpr double kSidesAround = 1.5;  // the voxel around a node, or one beside it, has its centre so near
+  const auto is_near = [&](const LimbTip& tip, const Vec3& node) {
+    return (node - tip.position).norm() < tip.reach &&
+           std::any_of(tip.places.begin(), tip.places.end(),
+                       [&](const Vec3& place) { return (node - place).norm() < kSidesAround * tip.voxel_side; });
+  };
+  return static_cast<int>(std::count_if(tips.begin(), tips.end(), [&](const LimbTip& tip) {
+    return std::any_of(skeleton.nodes.begin(), skeleton.nodes.end(),
+                       [&](const Node& node) { return is_near(tip, node.position); });
+  }));
+}
+
 std::vector<int> find_ends(const VoxelBody& body) {
   const auto farthest_from = [&](int voxel) {
     const PathSource source{voxel, 0};
