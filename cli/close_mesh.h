@@ -8,6 +8,8 @@
 
 namespace skeletex::cli {
 
+inline constexpr double kLongestHandleLoop = 2;  ///< diagonals: every handle has a loop around it that is no longer
+
 /// --close, --close-detail and --close-handles.
 struct CloseOptions {
   bool is_on = false;

@@ -1534,6 +1534,54 @@ TEST_F(Program, CutsHandlesOff) {
   for (const char* name : {"ring.ply", "c.skx.exr", "c.json", "c.ply"}) fs::remove(folder_ / name);
 }
 
+/// A plate of cubes with holes in a grid.
+TriangleMesh plate_with_holes(int columns, int rows) {
+  TriangleMesh mesh;
+  const auto is_solid = [&](int x, int y, int z) {
+    return x >= 0 && x <= 2 * columns && y >= 0 && y <= 2 * rows && z == 0 && !(x % 2 == 1 && y % 2 == 1);
+  };
+  std::map<std::array<int, 3>, int> vertices;
+  const auto vertex = [&](std::array<int, 3> place) {
+    const auto [found, is_new] = vertices.emplace(place, static_cast<int>(mesh.positions.size()));
+    if (is_new) mesh.positions.emplace_back(place[0], place[1], place[2]);
+    return found->second;
+  };
+  for (int x = 0; x <= 2 * columns; ++x)
+    for (int y = 0; y <= 2 * rows; ++y)
+      for (int axis = 0; axis < 3; ++axis)
+        for (const int side : {0, 1}) {
+          std::array<int, 3> beside{x, y, 0};
+          beside[axis] += side == 1 ? 1 : -1;
+          if (!is_solid(x, y, 0) || is_solid(beside[0], beside[1], beside[2])) continue;
+          const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+          std::array<int, 4> corners{};
+          for (int k = 0; k < 4; ++k) {
+            std::array<int, 3> place{x, y, 0};
+            place[axis] += side;
+            place[u] += k == 1 || k == 2 ? 1 : 0;
+            place[v] += k >= 2 ? 1 : 0;
+            corners[k] = vertex(place);
+          }
+          if (side == 0) std::swap(corners[1], corners[3]);
+          mesh.triangles.push_back({corners[0], corners[1], corners[2]});
+          mesh.triangles.push_back({corners[0], corners[2], corners[3]});
+        }
+  return mesh;
+}
+
+TEST_F(Program, CutsAllHandlesOffWhereNoSkeletonWorksWithThem) {
+  write_mesh(folder_ / "plate.ply", plate_with_holes(17, 3));  // 51 handles, one more than skeletons are tried for
+  expect_refused(1, {"encode", "plate.ply", "-o", "p.skx.exr"}, {"51 handles", "--close"});
+  expect_refused(1, {"encode", "plate.ply", "-o", "p.skx.exr", "--close", "--close-handles", "0"}, {"51 handles"});
+  const Outcome cut = run({"encode", "plate.ply", "-o", "p.skx.exr", "--size", "64", "--close", "--json", "p.json"});
+  ASSERT_EQ(cut.code, 0) << cut.err;
+  EXPECT_NE(cut.err.find("no skeleton works with the 51 handles"), std::string::npos) << cut.err;
+  const nlohmann::json json = nlohmann::json::parse(text_of(folder_ / "p.json"));
+  EXPECT_EQ(json["close"]["cut_loops"].size(), 51u);
+  EXPECT_EQ(json["mesh"]["genus"], 0);
+  for (const char* name : {"plate.ply", "p.skx.exr", "p.json"}) fs::remove(folder_ / name);
+}
+
 TEST_F(Program, ClosesRigs) {
   // A ring whose joints are an open chain.
   const TriangleMesh ring = torus_shape(5, 2, 0.25, 80, 16).mesh;

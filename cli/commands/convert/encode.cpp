@@ -18,6 +18,7 @@
 #include "files.h"
 #include "progress_bar.h"
 #include "rig_file.h"
+#include "skeletex/analysis/manifold.h"
 #include "skeletex/analysis/validate_input.h"
 #include "skeletex/convert/encode_model.h"
 #include "skeletex/convert/guess_stance.h"
@@ -246,6 +247,24 @@ Skeleton make_skeleton(ClContext& context, const Input& input, ProgressBar& bar)
   return std::move(result.skeleton);
 }
 
+/// Makes a skeleton. Where none works because of handles, `--close` cuts all of them off unless it was told which.
+void add_skeleton(ClContext& context, const Arguments& arguments, const EncodeOptions& options, ProgressBar& bar,
+                  Input& input) {
+  try {
+    input.skeleton = make_skeleton(context, input, bar);
+  } catch (const TopologyError&) {
+    const int handles = measure_manifold(input.mesh).genus;
+    if (!arguments.close.is_on || arguments.close.handles || handles == 0) throw;
+    warn(fmt::format(
+        "no skeleton works with the {} handle{} of the mesh, so all are cut off, as --close-handles {} does", handles,
+        handles == 1 ? "" : "s", kLongestHandleLoop));
+    Arguments again = arguments;
+    again.close.handles = kLongestHandleLoop;
+    input = read_input(context, again, options);
+    input.skeleton = make_skeleton(context, input, bar);
+  }
+}
+
 ExrCompression compression_of(const std::string& name) {
   return name == "none"  ? ExrCompression::kNone
          : name == "zip" ? ExrCompression::kZip
@@ -296,7 +315,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
   if (!is_gltf_file(arguments.mesh)) context.prepare({"encode.cl", "read_surface"});
   Input input = reading.get();
   if (input.skeleton.bones.empty()) {
-    input.skeleton = make_skeleton(context, input, *bar);
+    add_skeleton(context, arguments, options, *bar, input);
     check_bone_names(arguments, options, input.skeleton);
   }
   options.attributes = &input.attributes;

@@ -40,7 +40,7 @@ constexpr double kFineBend = 0.05 * kBend;
 constexpr int kMostHandles = 50;  // a ring of three bones or more around each; more take minutes to fail
 /// What to do about handles that no skeleton has rings for.
 constexpr const char* kHandleRemedy =
-    ". Small handles can be cut off: encode --close --close-handles X, X diagonals the longest loop around them";
+    ". `encode --close` cuts handles off: all, or those that a loop of --close-handles X diagonals goes around";
 constexpr std::array<int, 2> kEvenRings{5, 10};  // bones
 /// Beside an accepted skeleton with half of the limbs, repairs end after so many margins. That is about a second.
 constexpr long kMostMargins = 150'000;
