@@ -319,9 +319,7 @@ void add_close_options(CLI::App& command, CloseOptions& options) {
       .add_option(
           "--close-handles", options.handles,
           "narrow tunnels are plugged, and thin bridges cut, where a loop around them is no longer than this, in "
-          "diagonals, 0 to 2 (default: 0; 0.08 for a union or a wrap, 0.3 for a rig; `encode` goes up to 2 where else "
-          "no "
-          "skeleton works)")
+          "diagonals, 0 to 2 (default: 0; 0.08 for a union or a wrap, 0.3 for a rig; 2 where no skeleton works)")
       ->check(number_in(0, kLongestHandleLoop))
       ->type_name("X")
       ->needs(close);
