@@ -85,6 +85,11 @@ Shape two_bones() {
 
 }  // namespace
 
+TEST(Validate, SharesOfTheDiagonalAreWrittenWithoutExponent) {
+  EXPECT_EQ(text_of_distance(2.5, 2), "2.5 (125 % of the diagonal)");
+  EXPECT_EQ(text_of_distance(0.05, 2), "0.05 (2.5 % of the diagonal)");
+}
+
 TEST(Validate, GeneratedShapesHaveNothingWrong) {
   EXPECT_EQ(text_of(validated(two_bones().mesh, two_bones().skeleton)), "");
   for (const NamedShape& shape : all_shapes())

@@ -250,7 +250,9 @@ std::string name_of_bone(const Skeleton& skeleton, int b) {
 }
 
 std::string text_of_distance(double distance, double diagonal) {
-  return fmt::format("{:.4g} ({:.2g} % of the diagonal)", distance, diagonal > 0 ? 100 * distance / diagonal : 0);
+  const double percent = diagonal > 0 ? 100 * distance / diagonal : 0;
+  const std::string share = percent < 10 ? fmt::format("{:.2g}", percent) : fmt::format("{:.0f}", percent);
+  return fmt::format("{:.4g} ({} % of the diagonal)", distance, share);
 }
 
 int count_cycles(const Skeleton& skeleton) {

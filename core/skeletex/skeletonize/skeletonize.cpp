@@ -40,7 +40,8 @@ constexpr double kFineBend = 0.05 * kBend;
 constexpr int kMostHandles = 50;  // a ring of three bones or more around each; more take minutes to fail
 /// What to do about handles that no skeleton has rings for.
 constexpr const char* kHandleRemedy =
-    ". `encode --close` cuts handles off: all, or those that a loop of --close-handles X diagonals goes around";
+    ". `encode --close` cuts them off; with --close-handles X, only those with a loop of at most X diagonals around "
+    "them";
 constexpr std::array<int, 2> kEvenRings{5, 10};  // bones
 /// Beside an accepted skeleton with half of the limbs, repairs end after so many margins. That is about a second.
 constexpr long kMostMargins = 150'000;
@@ -106,21 +107,21 @@ int branch_of(const BodyPaths& paths, const std::vector<int>& tips) {
   return at;
 }
 
-/// Where limbs begin: at the deepest voxel, or on the curves around the handles. Where the deepest voxel lies in a limb
-/// itself, as in the abdomen of a spider, limbs begin where all others meet.
-std::vector<int> roots_of(const VoxelBody& body, double diagonal, int genus) {
-  if (genus == 0) {
-    const int deepest = deepest_voxel(body);
-    const BodyPaths paths = find_paths(body, {deepest});
-    const int branch = branch_of(paths, find_tips(body, paths, rule_of(kLimbDetail), diagonal));
-    const bool is_in_limb = (body.centres[branch] - body.centres[deepest]).norm() > body.radii[deepest];
-    return {is_in_limb ? branch : deepest};
+/// The ways to where limbs begin: the deepest voxel, or the curves around the handles. Where the deepest voxel lies in
+/// a limb itself, as in the abdomen of a spider, limbs begin where all others meet.
+BodyPaths paths_of(const VoxelBody& body, double diagonal, int genus) {
+  if (genus > 0) {
+    const std::vector<char> is_left = thin_body(body, {});
+    std::vector<int> roots;
+    for (int v = 0; v < body.size(); ++v)
+      if (is_left[v]) roots.push_back(v);
+    return find_paths(body, std::move(roots));
   }
-  const std::vector<char> is_left = thin_body(body, {});
-  std::vector<int> roots;
-  for (int v = 0; v < body.size(); ++v)
-    if (is_left[v]) roots.push_back(v);
-  return roots;
+  const int deepest = deepest_voxel(body);
+  BodyPaths paths = find_paths(body, {deepest});
+  const int branch = branch_of(paths, find_tips(body, paths, rule_of(kLimbDetail), diagonal));
+  const bool is_in_limb = (body.centres[branch] - body.centres[deepest]).norm() > body.radii[deepest];
+  return is_in_limb ? find_paths(body, {branch}) : paths;
 }
 
 /// Tips of a level; the ends of the body where it has no limb and no handle.
@@ -285,7 +286,7 @@ SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, cons
     throw TopologyError(
         "the body is too thin for a skeleton: no point was found that is well inside; give the mesh some thickness");
   report("finding limbs", 0.15);
-  const BodyPaths paths = find_paths(body, roots_of(body, surface.diagonal, result.genus));
+  const BodyPaths paths = paths_of(body, surface.diagonal, result.genus);
   const std::vector<int> tips = find_tips(body, paths, rule_of(kLimbDetail), surface.diagonal);
   const std::vector<LimbTip> limbs = places_near(body, tips, kLimbReach * surface.diagonal);
   result.limbs = static_cast<int>(tips.size());

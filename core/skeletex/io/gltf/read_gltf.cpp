@@ -282,7 +282,7 @@ class GltfReader {
       transform = texture_transform(model_.materials[from.material].pbrMetallicRoughness.baseColorTexture);
     const auto found = from.attributes.find(fmt::format("TEXCOORD_{}", transform.set));
     if (found == from.attributes.end()) return;
-    const std::size_t components = accessors_.components(found->second);  // 2; assimp writes 3
+    const std::size_t components = accessors_.components(found->second);  // two, or three as assimp writes them
     if (components < 2) fail("texture coordinates have one number per vertex; two are needed");
     const std::vector<double> values = accessors_.read(found->second, 0);
     for (std::size_t i = 0; i + 1 < values.size(); i += components)
