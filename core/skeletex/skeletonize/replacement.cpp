@@ -62,16 +62,22 @@ int nearest_node(const Skeleton& skeleton, const Vec3& point) {
   return nearest;
 }
 
-/// Takes away limbs of which no node is wanted.
+/// Takes away limbs of which no node is wanted, as ears, but those whose free ends are far from all wanted bones: a rig
+/// that was made for another animal can lack a leg.
 /// \param bends  names of the nodes that are not wanted
-void drop_new_limbs(const std::set<std::string>& bends, Repair& repair) {
+void drop_new_limbs(const Surface& surface, const Skeleton& wanted, const std::set<std::string>& bends,
+                    Repair& repair) {
   for (;;) {
-    const std::vector<SkeletonLimb> limbs = find_limbs(repair.skeleton());
-    const auto is_new = [&](const SkeletonLimb& limb) {
-      return std::all_of(limb.nodes.begin() + 1, limb.nodes.end(),
-                         [&](int n) { return bends.contains(repair.skeleton().nodes[n].name); });
+    const Skeleton& skeleton = repair.skeleton();
+    const std::vector<SkeletonLimb> limbs = find_limbs(skeleton);
+    const auto is_unwanted = [&](const SkeletonLimb& limb) {
+      if (!std::all_of(limb.nodes.begin() + 1, limb.nodes.end(),
+                       [&](int n) { return bends.contains(skeleton.nodes[n].name); }))
+        return false;
+      const OnBone nearest = nearest_on_bones(wanted, skeleton.nodes[limb.nodes.back()].position);
+      return nearest.distance < surface.radius(nearest.place) + kReach * surface.diagonal;
     };
-    const auto found = std::find_if(limbs.begin(), limbs.end(), is_new);
+    const auto found = std::find_if(limbs.begin(), limbs.end(), is_unwanted);
     if (found == limbs.end()) return;
     repair.drop(*found);
   }
@@ -112,7 +118,7 @@ Repair with_nodes_of(const Surface& surface, Skeleton accepted, const Skeleton& 
     const OnBone at = nearest_on_bones(repair.skeleton(), place);
     if (is_near(surface, place, at.place)) repair.split(at.bone, at.place, wanted.nodes[n].name);
   }
-  drop_new_limbs(bends, repair);
+  drop_new_limbs(surface, wanted, bends, repair);
   for (int n = static_cast<int>(repair.skeleton().nodes.size()) - 1; n >= 0; --n)
     if (bends.contains(repair.skeleton().nodes[n].name)) repair.straighten(n);
   return repair;

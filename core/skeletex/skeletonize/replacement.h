@@ -11,8 +11,8 @@ namespace skeletex {
 double followed_share(const Surface& surface, const Skeleton& skeleton, const Skeleton& other);
 
 /// Gives an accepted skeleton the nodes of another one. A node that lies next to one of the other's takes its name, and
-/// bones that pass by the rest are split there. Limbs and bends that the other does not have go. Separation planes stay
-/// as far apart as they have to be.
+/// bones that pass by the rest are split there. Bends that the other does not have go, and so do limbs whose free ends
+/// are near its bones. Separation planes stay as far apart as they have to be.
 /// \param accepted  a skeleton with any names
 /// \param wanted  a skeleton with names whose nodes lie inside the body
 /// \param original  the places where nodes of those names should be
