@@ -41,7 +41,7 @@ void say_changes(const std::string& path, const Skeleton& before, const RepairRe
                repaired.skeleton.bones.size() == 1 ? "" : "s", before.bones.size());
   for (std::size_t i = 0; i < std::min(kShown, changes.size()); ++i) spdlog::info("{}: {}", path, changes[i]);
   if (changes.size() > kShown)
-    spdlog::info("{}: and {} more changes (skeletex import --json lists them)", path, changes.size() - kShown);
+    spdlog::info("{}: further changes: {} (skeletex import --json lists them)", path, changes.size() - kShown);
 }
 
 }  // namespace

@@ -1639,6 +1639,15 @@ TEST_F(Program, ClosesRigs) {
   EXPECT_EQ(bare.code, 0) << bare.err;
   EXPECT_NE(bare.out.find("not closed"), std::string::npos) << bare.out;
   EXPECT_EQ(bare.out.find("skeleton"), std::string::npos) << bare.out;
+  // A mesh that is inside out is written the right way round.
+  std::vector<Triangle>& triangles = scene.meshes[0].primitives[0].triangles;
+  triangles = ring.triangles;
+  for (Triangle& t : triangles) std::swap(t[1], t[2]);
+  write_gltf(folder_ / "ring.glb", scene);
+  const Outcome turned = run({"import", "ring.glb", "-o", "parts"});
+  EXPECT_EQ(turned.code, 0) << turned.err;
+  EXPECT_NE(turned.out.find("all its triangles were turned"), std::string::npos) << turned.out;
+  EXPECT_GT(signed_volume(read_mesh(folder_ / "parts" / "mesh.ply").mesh), 0);
   fs::remove(folder_ / "c.json");
   fs::remove(folder_ / "ring.glb");
   fs::remove_all(folder_ / "parts");

@@ -59,9 +59,9 @@ std::vector<VertexColour> vertex_colours(const TriangleMesh& mesh, const MeshAtt
   return colours;
 }
 
-/// What stands in the way of encoding it.
+/// What stands in the way of encoding it. A mesh that is inside out is turned.
 /// \return in words and for the JSON
-std::pair<std::string, Json> findings_of(TriangleMesh mesh, const Skeleton& skeleton) {
+std::pair<std::string, Json> findings_of(const Skeleton& skeleton, TriangleMesh& mesh) {
   std::string text;
   Json list = Json::array();
   for (const Finding& finding :
@@ -81,11 +81,12 @@ void run(const Arguments& arguments) {
   std::optional<ProgressBar> bar(std::in_place, context);
   bar->show("importing", 0.2);
   const ImportedRig rig = import_rig(context, file);
-  const TriangleMesh& mesh = file.surface.mesh;
+  const std::vector<VertexColour> colours = vertex_colours(file.surface.mesh, file.surface.attributes);
+  TriangleMesh mesh = file.surface.mesh;
+  auto [findings_text, findings] = findings_of(rig.skeleton, mesh);
   const fs::path folder = arguments.output;
   make_folder(folder);
   std::vector<std::string> written{(folder / "mesh.ply").string()};
-  const std::vector<VertexColour> colours = vertex_colours(mesh, file.surface.attributes);
   WrittenAttributes attributes;
   attributes.vertex_colours = colours;
   write_mesh(written.back(), mesh, attributes);
@@ -104,7 +105,6 @@ void run(const Arguments& arguments) {
                           {"seconds", named.animation.frames.back().time}});
   }
   const ManifoldReport report = measure_manifold(mesh);
-  auto [findings_text, findings] = findings_of(mesh, rig.skeleton);
   std::string text =
       fmt::format("{} vertices, {} triangles, {} component{}, {}; {} joints became {} bones; {} animation{}\n",
                   mesh.positions.size(), mesh.triangles.size(), report.components, report.components == 1 ? "" : "s",

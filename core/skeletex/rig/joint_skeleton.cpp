@@ -434,12 +434,13 @@ class SkeletonBuilder {
       std::vector<std::string> first(names.begin(), names.begin() + std::min<std::ptrdiff_t>(5, std::ssize(names)));
       return fmt::format("{}{}", fmt::join(first, ", "), names.size() > 5 ? ", ..." : "");
     };
+    const auto joints = [](std::size_t count) { return fmt::format("{} joint{}", count, count == 1 ? "" : "s"); };
     if (!unneeded.empty())
       result_.notes.push_back(
-          fmt::format("{} joints move nothing and are no bones of their own: {}", unneeded.size(), list(unneeded)));
+          fmt::format("{} without a bone, as nothing moves with them: {}", joints(unneeded.size()), list(unneeded)));
     if (!merged_.empty())
       result_.notes.push_back(
-          fmt::format("{} joints lie along a bone and are merged into it: {}", merged_.size(), list(merged_)));
+          fmt::format("{} along a bone, merged into it: {}", joints(merged_.size()), list(merged_)));
     if (!joined_.empty())
       result_.notes.push_back(fmt::format("the skeleton has several roots; joined {}", list(joined_)));
   }
