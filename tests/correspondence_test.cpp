@@ -100,6 +100,24 @@ TEST(Correspondence, PairsThemWithoutNamesToo) {
   }
 }
 
+TEST(Correspondence, OfAStarOfManyBonesIsFoundAmongAllPermutations) {
+  constexpr int kBones = 14;
+  Skeleton star;
+  star.nodes.push_back({"hub", Vec3::Zero()});
+  for (int i = 0; i < kBones; ++i) {  // spread over the sphere along a spiral
+    const double z = 1 - (2 * i + 1.0) / kBones, angle = 2.4 * i, r = std::sqrt(1 - z * z);
+    star.nodes.push_back(
+        {"tip_" + std::to_string(i), (1 + 0.05 * i) * Vec3(r * std::cos(angle), r * std::sin(angle), z)});
+    star.bones.push_back({"arm_" + std::to_string(i), 0, i + 1, {}});
+  }
+  std::vector<int> bones;
+  std::vector<bool> reversed;
+  const Skeleton other = disguised(star, 3, bones, reversed);
+  const Correspondence found = find_correspondence(star, other);
+  expect_isomorphism(star, other, found);
+  EXPECT_EQ(found.bones, bones);
+}
+
 TEST(Correspondence, ObeysTheUsersPairs) {
   const Skeleton eight = standard("eight");
   const Correspondence found = find_correspondence(eight, eight, {{{"left_outer", "right_outer"}}});

@@ -178,6 +178,32 @@ TEST(Layers, OtherSizesHaveTheSameValues) {
   }
 }
 
+TEST(Layers, StepsStayBetweenTheirValuesAtOtherSizes) {
+  const Shape shape = creature_shape();
+  const MeshAttributes attributes = linear_attributes(shape.mesh);
+  EncodeOptions options;
+  options.width = options.height = 64;
+  options.has_snap = options.has_fit = false;
+  options.attributes = &attributes;
+  SkeletexModel model = encode_model(device(), shape.mesh, shape.skeleton, options).model;
+  std::vector<float> steps(64 * 64);
+  for (std::size_t i = 0; i < steps.size(); ++i) steps[i] = i / 4 % 2 == 0 ? 1.f : 0.f;
+  const auto layer = std::find_if(model.layers.begin(), model.layers.end(),
+                                  [](const Layer& l) { return l.kind == LayerKind::kNumber; });
+  ASSERT_NE(layer, model.layers.end());
+  layer->planes = {steps};
+  model.bone_weights.assign(model.skeleton.bones.size(), steps);
+  for (const int size : {40, 150}) {
+    const SkeletexModel other = resample_model(device(), model, size);
+    for (const std::vector<float>& plane : {find_layer(other, layer->name)->planes[0], other.bone_weights[0]}) {
+      const auto [least, most] = std::minmax_element(plane.begin(), plane.end());
+      EXPECT_GE(*least, -1e-6f) << size;
+      EXPECT_LE(*most, 1 + 1e-6f) << size;
+      EXPECT_GT(*most, 0.9f) << size;
+    }
+  }
+}
+
 TEST(Layers, AMorphHasItsModelsValuesAtItsEnds) {
   const Shape shape = creature_shape();
   const SkeletexModel a = encode(shape, 96);

@@ -83,6 +83,26 @@ TEST(LoopSurface, CarriesAttributesLinearly) {
   }
 }
 
+TEST(LoopSurface, FacesWithoutTextureCoordinatesStaySo) {
+  const TriangleMesh mesh = octahedron();
+  MeshAttributes attributes;
+  attributes.texture_coordinates.values.assign(3, {0.25f, 0.5f});
+  attributes.texture_coordinates.corners.assign(8, {-1, -1, -1});
+  attributes.texture_coordinates.corners[5] = {0, 1, 2};
+  attributes.texture_coordinates.corners[6] = {0, -1, 1};
+  const AttributedMesh fine = loop_surface(mesh, attributes, 1);
+  const CornerValues<Eigen::Vector2f>& coordinates = fine.attributes.texture_coordinates;
+  ASSERT_EQ(coordinates.corners.size(), 32u);
+  for (int t = 0; t < 32; ++t)
+    for (const int corner : coordinates.corners[t]) {
+      if (t / 4 != 6) EXPECT_EQ(corner >= 0, t / 4 == 5) << t;
+      EXPECT_LT(corner, static_cast<int>(coordinates.values.size()));
+    }
+  const std::array<int, 4> missing{1, 3, 1, 2};  // corners of the quarters of triangle 6
+  for (int i = 0; i < 4; ++i)
+    EXPECT_EQ(std::count(coordinates.corners[24 + i].begin(), coordinates.corners[24 + i].end(), -1), missing[i]) << i;
+}
+
 TEST(LoopSurface, ComesBackSmootherThanItsMeshWithMoreTexels) {
   ClContext context;
   const TestModel model = load_standard_model("triceratops");

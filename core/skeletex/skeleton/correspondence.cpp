@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -125,6 +126,9 @@ std::vector<NeighbourInterval> neighbour_order(const Skeleton& skeleton, BoneAtN
 namespace {
 
 constexpr double kImpossible = std::numeric_limits<double>::infinity();
+/// Neighbours that share less than this part of a turn of a bone's boundary may fall in another order: separation
+/// planes of nearly co-circular directions meet in slivers.
+constexpr double kSliver = 0.03;
 
 /// One skeleton with what the search asks of it again and again.
 struct Side {
@@ -151,15 +155,13 @@ struct Side {
 /// directed bones; a subtree's best assignment does not depend on what lies before it, so trees are solved by memo.
 class Search {
  public:
-  Search(const Side& a, const Side& b, const CorrespondenceOptions& options, const std::vector<int>& given)
-      : a_(a), b_(b), options_(options), given_(given) {
+  Search(const Side& a, const Side& b, const std::vector<int>& given) : a_(a), b_(b), given_(given) {
     is_tree_ = a.count() + 1 == static_cast<int>(a.skeleton->nodes.size());
   }
 
   std::optional<Correspondence> run(const Eigen::Matrix3d& rotation) {
     rotation_ = rotation;
     memo_.clear();
-    // Start at the bone of A that looks like the fewest bones of B: any will do, an end is cheapest.
     const BoneAtNode start{0, BoneEnd::kHead};
     std::optional<Correspondence> best;
     for (int j = 0; j < b_.count(); ++j)
@@ -216,10 +218,7 @@ class Search {
   /// Bone x with its end matches bone y with its end.
   bool assign_bone(State& s, BoneAtNode x, BoneAtNode y) const {
     if (s.bones[x.bone] == y.bone) return s.is_reversed[x.bone] == (x.end != y.end);
-    if (s.bones[x.bone] >= 0 || s.is_taken[y.bone]) return false;
-    if (given_[x.bone] >= 0 ? given_[x.bone] != y.bone
-                            : std::find(given_.begin(), given_.end(), y.bone) != given_.end())
-      return false;
+    if (s.bones[x.bone] >= 0 || s.is_taken[y.bone] || !may_become(x, y)) return false;
     if (!assign_node(s, a_.node(x), b_.node(y)) ||
         !assign_node(s, a_.node({x.bone, opposite(x.end)}), b_.node({y.bone, opposite(y.end)})))
       return false;
@@ -238,6 +237,7 @@ class Search {
   }
 
   /// Do the neighbours of x follow each other as those of y do, but for slivers on either side?
+  /// \param bones  what bones become; others are left out
   bool keeps_order(BoneAtNode x, BoneAtNode y, const std::map<int, int>& bones) const {
     const auto& from = a_.order[x.bone][static_cast<int>(x.end)];
     const auto& to = b_.order[y.bone][static_cast<int>(y.end)];
@@ -248,15 +248,16 @@ class Search {
       return turns;
     };
     std::vector<int> left, right;
-    for (const NeighbourInterval& i : from)
-      if (i.turns >= options_.sliver_turn && turns_of(to, bones.at(i.bone)) >= options_.sliver_turn)
-        left.push_back(bones.at(i.bone));
+    for (const NeighbourInterval& i : from) {
+      const auto target = bones.find(i.bone);
+      if (i.turns >= kSliver && target != bones.end() && turns_of(to, target->second) >= kSliver)
+        left.push_back(target->second);
+    }
     for (const NeighbourInterval& i : to) {
       int source = -1;
       for (const auto& [p, q] : bones)
         if (q == i.bone) source = p;
-      if (i.turns >= options_.sliver_turn && source >= 0 && turns_of(from, source) >= options_.sliver_turn)
-        right.push_back(i.bone);
+      if (i.turns >= kSliver && source >= 0 && turns_of(from, source) >= kSliver) right.push_back(i.bone);
     }
     if (left.size() != right.size()) return false;
     if (left.empty()) return true;
@@ -267,15 +268,26 @@ class Search {
     return false;
   }
 
-  bool node_keeps_order(int node, int to, const std::map<int, BoneAtNode>& targets) const {
+  /// \param targets  some bones at a node, and what they become
+  bool node_keeps_order(const std::map<int, BoneAtNode>& targets, int node) const {
     std::map<int, int> bones;
     for (const auto& [bone, target] : targets) bones[bone] = target.bone;
-    for (const BoneAtNode& x : a_.at[node])
-      if (!keeps_order(x, targets.at(x.bone), bones)) return false;
-    return b_.at[to].size() == a_.at[node].size();
+    return std::all_of(a_.at[node].begin(), a_.at[node].end(), [&](const BoneAtNode& x) {
+      const auto y = targets.find(x.bone);
+      return y == targets.end() || keeps_order(x, y->second, bones);
+    });
   }
 
-  /// Calls `visit` with every assignment of the bones at a node, given some of them, that keeps the order.
+  /// Whether bone x may become bone y: pairs that are given, and the number of bones at the other ends.
+  bool may_become(BoneAtNode x, BoneAtNode y) const {
+    if (given_[x.bone] >= 0 ? given_[x.bone] != y.bone
+                            : std::find(given_.begin(), given_.end(), y.bone) != given_.end())
+      return false;
+    return a_.at[a_.node({x.bone, opposite(x.end)})].size() == b_.at[b_.node({y.bone, opposite(y.end)})].size();
+  }
+
+  /// Calls `visit` with every assignment of the bones at a node, given some of them, that keeps the order. Bones are
+  /// assigned one after the other, as most of the k! assignments of k bones fail at the fourth.
   template <class Visit>
   void for_each_assignment(int node, int to, std::map<int, BoneAtNode> known, Visit&& visit) const {
     std::vector<BoneAtNode> free_from, free_to;
@@ -284,14 +296,20 @@ class Search {
     for (const BoneAtNode& y : b_.at[to])
       if (std::none_of(known.begin(), known.end(), [&](const auto& k) { return k.second.bone == y.bone; }))
         free_to.push_back(y);
-    if (free_from.size() != free_to.size()) return;
-    std::vector<int> permutation(free_to.size());
-    for (std::size_t i = 0; i < permutation.size(); ++i) permutation[i] = static_cast<int>(i);
-    do {
-      for (std::size_t i = 0; i < permutation.size(); ++i)
-        known.insert_or_assign(free_from[i].bone, free_to[permutation[i]]);
-      if (node_keeps_order(node, to, known)) visit(free_from, known);
-    } while (std::next_permutation(permutation.begin(), permutation.end()));
+    if (free_from.size() != free_to.size() || !node_keeps_order(known, node)) return;
+    std::vector<char> is_used(free_to.size(), 0);
+    const std::function<void(std::size_t)> assign_from = [&](std::size_t i) {
+      if (i == free_from.size()) return visit(free_from, known);
+      for (std::size_t j = 0; j < free_to.size(); ++j) {
+        if (is_used[j] || !may_become(free_from[i], free_to[j])) continue;
+        known.insert_or_assign(free_from[i].bone, free_to[j]);
+        is_used[j] = 1;
+        if (node_keeps_order(known, node)) assign_from(i + 1);
+        is_used[j] = 0;
+        known.erase(free_from[i].bone);
+      }
+    };
+    assign_from(0);
   }
 
   /// Cheapest cost of everything behind the node at x's end, when x becomes y. Trees.
@@ -307,9 +325,6 @@ class Search {
             double cost = 0;
             for (const BoneAtNode& child : free) {
               const BoneAtNode target = targets.at(child.bone);
-              if (given_[child.bone] >= 0 ? given_[child.bone] != target.bone
-                                          : std::find(given_.begin(), given_.end(), target.bone) != given_.end())
-                return;
               cost += bone_cost(child, target) +
                       subtree_cost({child.bone, opposite(child.end)}, {target.bone, opposite(target.end)});
               if (cost >= best) return;
@@ -365,7 +380,6 @@ class Search {
 
   const Side& a_;
   const Side& b_;
-  const CorrespondenceOptions& options_;
   const std::vector<int>& given_;
   bool is_tree_ = true;
   Eigen::Matrix3d rotation_ = Eigen::Matrix3d::Identity();
@@ -456,7 +470,7 @@ std::optional<Correspondence> cheapest_isomorphism(const Side& left, const Side&
       if (!best || found->cost < best->cost - 1e-12) best = found;
       rotation = best_rotation(left, right, *found);
     }
-    if (!best) break;  // no isomorphism under any rotation
+    if (!best || best->cost < 1e-12) break;  // no isomorphism under any rotation, or none that is cheaper
   }
   return best;
 }
@@ -468,12 +482,11 @@ Correspondence find_correspondence(const Skeleton& a, const Skeleton& b, const C
   std::vector<int> given(a.bones.size(), -1);
   for (const auto& [from, to] : options.given) given[index_of(a, from, "first")] = index_of(b, to, "second");
   if (left.count() == right.count() && a.nodes.size() == b.nodes.size() && left.count() > 0) {
-    Search search(left, right, options, given);
+    Search search(left, right, given);
     if (const std::optional<Correspondence> best = cheapest_isomorphism(left, right, search)) return *best;
   }
   if (!options.given.empty()) {
-    const CorrespondenceOptions free{{}, options.sliver_turn};
-    find_correspondence(a, b, free);  // throws when there is none at all
+    find_correspondence(a, b);  // throws when there is none at all
     throw InputError(fmt::format(
         "no correspondence of the skeletons holds the pair {}={}; the bones around them are joined differently",
         options.given.front().first, options.given.front().second));

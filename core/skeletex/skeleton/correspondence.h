@@ -27,9 +27,6 @@ Correspondence composed(const Correspondence& a_to_b, const Correspondence& b_to
 struct CorrespondenceOptions {
   /// Pairs (name in A, name in B) that must correspond; the rest is found.
   std::vector<std::pair<std::string, std::string>> given;
-  /// Neighbours that share less than this part of a turn of a bone's boundary may fall in another order (separation
-  /// planes of nearly co-circular directions meet in slivers).
-  double sliver_turn = 0.03;
 };
 
 /// Finds the isomorphism of two skeletons' graphs that keeps the cyclic order of the neighbours around every bone's end

@@ -62,13 +62,15 @@ void append_quarters(const Triangle& corners, const Triangle& middles, std::vect
   triangles.insert(triangles.end(), {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
 }
 
-/// Values at corners, divided; those at the middles of edges are means, once for each pair of values.
+/// Values at corners, divided; those at the middles of edges are means, once for each pair of values. Next to a corner
+/// without a value there is none.
 template <class T>
 void divide(const std::vector<Triangle>& triangles, CornerValues<T>& values) {
   if (values.empty()) return;
   if (values.corners.empty()) values.corners = triangles;
   std::unordered_map<std::uint64_t, int> middles;
   const auto middle = [&](int a, int b) {
+    if (a < 0 || b < 0) return -1;
     const std::uint64_t pair =
         static_cast<std::uint64_t>(std::min(a, b)) << 32 | static_cast<std::uint64_t>(std::max(a, b));
     const auto [it, is_new] = middles.try_emplace(pair, static_cast<int>(values.values.size()));

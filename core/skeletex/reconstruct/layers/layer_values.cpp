@@ -237,17 +237,14 @@ void turn_normal_layer(const PreparedModel& prepared, const TriangleMesh& mesh, 
       for (int k = 0; k < 2; ++k) layer->planes[k][i] = made[0].planes[k][i];
 }
 
-namespace {
-
-/// A plane of the texture at another size: linear between texels where it gets finer, averaged where it gets coarser.
-std::vector<float> filter_plane(std::span<const float> values, const SkeletexModel& model,
-                                const SkeletexModel& result) {
+std::vector<float> resample_plane(std::span<const float> values, const SkeletexModel& model,
+                                  const SkeletexModel& result) {
   std::vector<float> filtered(static_cast<std::size_t>(result.texture.width) * result.texture.height, 0.f);
   for_each_block(model.patches.size(), 1, [&](std::size_t bone, std::size_t, std::size_t) {
     const Rectangle &from = model.patches[bone].rectangle, &to = result.patches[bone].rectangle;
     const auto taps = [](int old_count, int new_count, bool is_periodic) {
       return filter_taps(old_count, new_count, is_periodic,
-                         new_count < old_count ? ResampleFilter::kAverage : ResampleFilter::kSample, 0);
+                         new_count < old_count ? ResampleFilter::kAverage : ResampleFilter::kLinear, 0);
     };
     const FilterTaps rows = taps(from.height, to.height, false), columns = taps(from.width, to.width, true);
     std::vector<float> line(from.width);  // a new row of old columns
@@ -268,13 +265,11 @@ std::vector<float> filter_plane(std::span<const float> values, const SkeletexMod
   return filtered;
 }
 
-}  // namespace
-
 void resample_layers(const PreparedModel& prepared, SkeletexModel& result) {
   const PreparedModel made(result);
   for (Layer& layer : result.layers) {
     if (layer.kind != LayerKind::kNormal) {
-      for (std::vector<float>& plane : layer.planes) plane = filter_plane(plane, prepared.model, result);
+      for (std::vector<float>& plane : layer.planes) plane = resample_plane(plane, prepared.model, result);
       continue;
     }
     const std::vector<Eigen::Vector3f> old = texel_normals(prepared, layer);
@@ -282,7 +277,7 @@ void resample_layers(const PreparedModel& prepared, SkeletexModel& result) {
     std::vector<float> plane(old.size());
     for (int axis = 0; axis < 3; ++axis) {
       for (std::size_t i = 0; i < old.size(); ++i) plane[i] = old[i][axis];
-      const std::vector<float> filtered = filter_plane(plane, prepared.model, result);
+      const std::vector<float> filtered = resample_plane(plane, prepared.model, result);
       for (std::size_t i = 0; i < normals.size(); ++i) normals[i][axis] = filtered[i];
     }
     layer.planes = normal_layer(made, normals).planes;

@@ -38,8 +38,13 @@ std::vector<Layer> layers_of_texels(const PreparedModel& model, const MeshAttrib
 /// Layers from values per vertex: the inverse of vertex_attributes. Rows 0 and height-1 follow the seams and poles.
 std::vector<Layer> layers_of_vertices(const PreparedModel& model, const MeshAttributes& vertices);
 
-/// Sets the layers of a model that has another size: linear between texels where it gets finer, averaged where it gets
-/// coarser. Normals are averaged as directions in space.
+/// A plane of one value per texel at another size: linear between texels of the same patch where it gets finer,
+/// averaged where it gets coarser.
+/// \param result  of the same patches
+std::vector<float> resample_plane(std::span<const float> values, const SkeletexModel& model,
+                                  const SkeletexModel& result);
+/// Sets the layers of a model that has another size, as resample_plane does. Normals are averaged as directions in
+/// space.
 /// \param result  of the same patches; its layers are those of `model`
 void resample_layers(const PreparedModel& model, SkeletexModel& result);
 

@@ -120,13 +120,13 @@ FilterTaps filter_taps(int old_count, int new_count, bool is_periodic, ResampleF
   FilterTaps taps;
   const double spacing =
       is_periodic ? static_cast<double>(old_count) / new_count : static_cast<double>(old_count - 1) / (new_count - 1);
-  const Interpolant interpolant{spacing < 1, softness};
+  const Interpolant interpolant{spacing < 1 && filter != ResampleFilter::kLinear, softness};
   for (int i = 0; i < new_count; ++i) {
     OpenWeights open;
     const double x = is_periodic || i + 1 < new_count ? i * spacing : old_count - 1;
     if (!is_periodic && (i == 0 || i + 1 == new_count)) {
       open.add(i == 0 ? 0 : old_count - 1, 1);
-    } else if (filter == ResampleFilter::kSample) {
+    } else if (filter == ResampleFilter::kSample || filter == ResampleFilter::kLinear) {
       open.add_at(interpolant, x, 1);
     } else if (filter == ResampleFilter::kAverage) {
       open.add_tent(interpolant, x, spacing, 1);

@@ -7,7 +7,8 @@ namespace skeletex {
 
 /// How new samples follow from old ones, along one axis of the lattice.
 enum class ResampleFilter {
-  kSample,   ///< the polygon through the old samples, read at the new places
+  kSample,   ///< the curve through the old samples (see softness), read at the new places
+  kLinear,   ///< the polygon through the old samples, read at the new places: values stay between the old ones
   kAverage,  ///< a tent over the new cells: smooths, and shrinks what is convex
   kProject,  ///< the polygon over the new samples that is nearest to the old one in the least-squares sense
 };

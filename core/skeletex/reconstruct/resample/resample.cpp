@@ -80,7 +80,7 @@ std::vector<Vec3> resample_polyline(const std::vector<Vec3>& points, bool is_clo
   std::vector<Vec3> samples, averages;
   polyline.sample(cells, count, samples, averages);
   if (!is_closed) samples[cells] = points.back();
-  if (filter == ResampleFilter::kSample) return samples;
+  if (filter == ResampleFilter::kSample || filter == ResampleFilter::kLinear) return samples;
   const int first = is_closed ? 0 : 1;
   std::vector<Vec3> result = samples;
   if (filter == ResampleFilter::kAverage) {
@@ -281,39 +281,28 @@ SeamArc resample_arc(const PreparedModel& prepared, const SkeletexModel& result,
                       std::max(arc.is_closed() ? 3 : 2, static_cast<int>(std::lround(old_cells * ratio))));
 }
 
-/// `count` places from 0 on, evenly spaced.
-std::vector<double> evenly(int count, double step) {
-  std::vector<double> places(count);
-  for (int i = 0; i < count; ++i) places[i] = i * step;
-  return places;
-}
-
-/// A plane of one value per texel at another size, linear between texels of the same patch.
-/// \param keeps_texels  each of the old ones is one of the new ones
-std::vector<float> resample_plane(const std::vector<float>& values, const PreparedModel& prepared,
-                                  const SkeletexModel& result, bool keeps_texels) {
+/// A plane of one value per texel at a size that keeps all texels, linear between texels of the same patch.
+std::vector<float> refine_plane(const std::vector<float>& values, const PreparedModel& prepared,
+                                const SkeletexModel& result) {
   const SkeletexModel& model = prepared.model;
-  std::vector<float> resampled(static_cast<std::size_t>(result.texture.width) * result.texture.height, 0.f);
+  std::vector<float> refined(static_cast<std::size_t>(result.texture.width) * result.texture.height, 0.f);
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
     const Rectangle &from = model.patches[bone].rectangle, &to = result.patches[bone].rectangle;
     const auto value = [&](int row, int column) {
       return values[static_cast<std::size_t>(from.y + row) * model.texture.width + from.x + column % from.width];
     };
-    const std::vector<double> rows = keeps_texels
-                                         ? rows_of_finer(prepared, static_cast<int>(bone), to.height)
-                                         : evenly(to.height, static_cast<double>(from.height - 1) / (to.height - 1)),
-                              columns = keeps_texels ? columns_of_finer(from.width, to.width)
-                                                     : evenly(to.width, static_cast<double>(from.width) / to.width);
+    const std::vector<double> rows = rows_of_finer(prepared, static_cast<int>(bone), to.height),
+                              columns = columns_of_finer(from.width, to.width);
     for (int row = 0; row < to.height; ++row)
       for (int column = 0; column < to.width; ++column) {
         const int r = std::min(static_cast<int>(rows[row]), from.height - 2), c = static_cast<int>(columns[column]);
         const double v = rows[row] - r, u = columns[column] - c;
-        resampled[static_cast<std::size_t>(to.y + row) * result.texture.width + to.x + column] =
+        refined[static_cast<std::size_t>(to.y + row) * result.texture.width + to.x + column] =
             static_cast<float>((1 - v) * ((1 - u) * value(r, c) + u * value(r, c + 1)) +
                                v * ((1 - u) * value(r + 1, c) + u * value(r + 1, c + 1)));
       }
   }
-  return resampled;
+  return refined;
 }
 
 }  // namespace
@@ -347,7 +336,7 @@ SkeletexModel resample_model(ClContext& context, const PreparedModel& prepared, 
     result.sampling = {.is_prefiltered = true, .is_snapped = false, .is_fitted = false};
   }
   for (std::vector<float>& weights : result.bone_weights)
-    weights = resample_plane(weights, prepared, result, keeps_texels);
+    weights = keeps_texels ? refine_plane(weights, prepared, result) : resample_plane(weights, model, result);
   if (has_own_places)
     result.layers = read_layers_of(context, model, result);
   else if (!result.layers.empty())
