@@ -412,9 +412,10 @@ void add_texel_options(CLI::App& command, Arguments& a) {
                 "prefilter (default: where it is expected to lower the error, from about 0.6 texels per vertex on)")
       ->group("Texels");
   command
-      .add_flag("--fit,!--no-fit", a.is_fitted,
-                "their points move so that the triangles between them are nearer to the mesh; instead of the prefilter "
-                "(default: up to 256 x 256 texels, and below 7 texels per vertex)")
+      .add_flag(
+          "--fit,!--no-fit", a.is_fitted,
+          "their points move so that the triangles between them are nearer to the mesh; instead of the prefilter "
+          "(default: up to 256 x 256 texels; up to 1280 x 1280 below 7 texels per vertex, in fewer steps from 4.5 on)")
       ->group("Texels");
   take_one_of(add(command, "Texels", "--diagonals", a.diagonals,
                   "how the decoder cuts quads: nearest to the surface that texels around foretell, or smooth, going on "
@@ -423,8 +424,10 @@ void add_texel_options(CLI::App& command, Arguments& a) {
               {"nearest", "smooth"});
   command
       .add_flag("--paper-recipe", a.is_paper_recipe,
-                "as the paper: --rows uniform --share triangles --alpha 0 --iterations 1 --no-unfold --no-prefilter "
-                "--no-snap --no-fit (unfold and prefilter stay off, the others can still be given)")
+                "as close to the paper as the options allow (one reweighting, as it gives no number, and shares by "
+                "triangles instead of lengths of bones): --rows uniform --share triangles --alpha 0 --iterations 1 "
+                "--no-unfold --no-prefilter --no-snap --no-fit (unfold and prefilter stay off, the others can still be "
+                "given)")
       ->group("Texels");
 }
 

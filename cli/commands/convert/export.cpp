@@ -163,7 +163,7 @@ void add_export_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand(
       "export", "Write a model as a rigged character for other programs: mesh, skeleton, skin and animations as glTF");
-  declare_input(command, command.add_option("MODEL", arguments->model, "model: .skx.exr"))->required();
+  declare_input(command, command.add_option("MODEL", arguments->model, "model: .skx.exr or .skx"))->required();
   declare_output(command, command.add_option("-o,--output", arguments->output, "glTF 2.0, binary: .glb"), {".glb"})
       ->required()
       ->type_name("FILE");

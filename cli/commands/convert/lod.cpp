@@ -79,7 +79,7 @@ void add_lod_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command =
       *program.add_subcommand("lod", "Make a smaller model of a model, or a file of all its levels of detail");
-  declare_input(command, command.add_option("MODEL", arguments->model, "model: .skx.exr"))->required();
+  declare_input(command, command.add_option("MODEL", arguments->model, "model: .skx.exr or .skx"))->required();
   add_result_option(command, arguments->output);
   CLI::Option* size = command.add_option("--size", arguments->size, "texels along the longer side, 4 to 16384")
                           ->check(number_in(4, 16384))

@@ -249,7 +249,7 @@ void add_reconstruct_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command =
       *program.add_subcommand("reconstruct", "Turn a model back into a closed mesh, at any resolution and in any pose");
-  declare_input(command, command.add_option("MODEL", arguments->model, "model: .skx.exr"))->required();
+  declare_input(command, command.add_option("MODEL", arguments->model, "model: .skx.exr or .skx"))->required();
   declare_output(command,
                  command.add_option("-o,--output", arguments->output, "mesh: .ply, .stl (binary), .obj or .glb"),
                  {".ply", ".obj", ".stl", ".glb"})

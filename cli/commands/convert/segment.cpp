@@ -84,7 +84,8 @@ void run(const Arguments& arguments) {
 void add_segment_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("segment", "Cut a mesh into one piece per bone and colour the pieces");
-  declare_input(command, command.add_option("MESH", arguments->mesh, "closed triangle mesh: .obj, .ply, .off or .stl"))
+  declare_input(command, command.add_option("MESH", arguments->mesh,
+                                            "closed triangle mesh: .obj, .ply, .off, .stl, .glb, .gltf or .vrm"))
       ->required();
   declare_input(command, command.add_option("SKELETON", arguments->skeleton,
                                             "skeleton: JSON with nodes and bones, in the mesh's coordinates"))

@@ -90,12 +90,13 @@ void run(const Arguments& arguments, const CLI::App& command) {
 void add_skeletonize_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("skeletonize", "Make a skeleton for a closed mesh");
-  declare_input(command, command.add_option("MESH", arguments->mesh, "closed triangle mesh: .obj, .ply, .off or .stl"))
+  declare_input(command, command.add_option("MESH", arguments->mesh,
+                                            "closed triangle mesh: .obj, .ply, .off, .stl, .glb, .gltf or .vrm"))
       ->required();
   declare_output(command, command.add_option("-o,--output", arguments->output, "the skeleton"), {".json"})
       ->required()
       ->type_name("FILE");
-  command.add_option("--bones", arguments->bones, "at most so many bones, and as many of them as work")
+  command.add_option("--bones", arguments->bones, "the largest number of bones that works, at most N")
       ->type_name("N")
       ->check(number_in(1, 500));
   command

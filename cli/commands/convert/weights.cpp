@@ -51,7 +51,7 @@ void add_weights_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand(
       "weights", "Store how much each bone moves each texel in a smooth pose, as layers to paint on");
-  declare_input(command, command.add_option("MODEL", arguments->model, "model: .skx.exr"))->required();
+  declare_input(command, command.add_option("MODEL", arguments->model, "model: .skx.exr or .skx"))->required();
   declare_output(command,
                  command.add_option("-o,--output", arguments->output,
                                     "the model with a layer \"weights.BONE\" per bone: .skx.exr"),

@@ -45,7 +45,8 @@ void run(const Arguments& arguments) {
 void add_correspond_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("correspond", "Which bone of one skeleton becomes which of another");
-  declare_input(command, command.add_option("A", arguments->a, "model (.skx.exr) or skeleton (.json)"))->required();
+  declare_input(command, command.add_option("A", arguments->a, "model (.skx.exr, .skx) or skeleton (.json)"))
+      ->required();
   declare_input(command, command.add_option("B", arguments->b, "another one"))->required();
   command.add_option("--bones", arguments->bones, "pairs that must hold; the rest is found")
       ->delimiter(',')

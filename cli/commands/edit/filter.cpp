@@ -195,7 +195,7 @@ void add_filter_command(CLI::App& program) {
   Arguments& a = *arguments;
   CLI::App& command =
       *program.add_subcommand("filter", "Smooth a model, enhance its detail, add noise, or measure its curvature");
-  declare_input(command, command.add_option("MODEL", a.model, "model: .skx.exr"))->required();
+  declare_input(command, command.add_option("MODEL", a.model, "model: .skx.exr or .skx"))->required();
   take_one_of(*command.add_option("FILTER", a.filter, "what to do")->required(),
               {"smooth", "enhance", "noise", "curvature"});
   add_result_option(command, a.output);

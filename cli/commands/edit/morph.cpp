@@ -181,7 +181,7 @@ void add_morph_command(CLI::App& program) {
   CLI::App& command = *program.add_subcommand("morph", "In-between models of two models or more");
   declare_input(command,
                 command.add_option("MODEL", arguments->models,
-                                   "models (.skx.exr) whose skeletons correspond: two, or more with --weights"))
+                                   "models (.skx.exr, .skx) whose skeletons correspond: two, or more with --weights"))
       ->required();
   add_result_option(command, arguments->output);
   CLI::Option* times =
@@ -213,10 +213,12 @@ void add_morph_command(CLI::App& program) {
   command.add_option("--size", arguments->size, "texels along the longer side (default: the largest model's)")
       ->check(number_in(4, 16384))
       ->type_name("N");
-  command.add_flag("--creases", arguments->has_creases,
-                   "leave creases where bones of different turns meet: the texels' means alone, as at frame rates");
+  command.add_flag(
+      "--creases", arguments->has_creases,
+      "skip the step that removes creases between bones that turn by different angles; live morphs skip it too");
   command.add_flag("--regular-grid", arguments->has_regular_grid,
-                   "texels of snapped models on regular grids at the ends too, where they are else the models' own");
+                   "keep snapped models on regular grids at t = 0 and t = 1 as well; by default the ends have the "
+                   "models' own texels");
   add_device_option(command, arguments->device);
   add_json_option(command, arguments->json);
   command.footer(

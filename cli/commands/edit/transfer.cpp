@@ -139,7 +139,8 @@ void add_transfer_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand(
       "transfer", "Replace the surface of bones by that of another model's, or of others of the same");
-  declare_input(command, command.add_option("SOURCE", arguments->source, "model (.skx.exr) to take from"))->required();
+  declare_input(command, command.add_option("SOURCE", arguments->source, "model (.skx.exr, .skx) to take from"))
+      ->required();
   declare_input(command, command.add_option("TARGET", arguments->target, "model to put it on; may be the same"))
       ->required();
   command.add_option("--bones", arguments->bones, "pairs of bones: SOURCE's=TARGET's")
@@ -171,7 +172,9 @@ void add_transfer_command(CLI::App& program) {
       ->type_name("auto|S");
   command.add_flag("--creases", arguments->has_creases,
                    "join each column by itself, within the first bone, which may leave creases");
-  command.add_option("--share", arguments->share, "how far the target goes towards that, texel by texel (default: 1)")
+  command
+      .add_option("--share", arguments->share,
+                  "weight of the result: 0 keeps the target, 1 (default) gives the transfer")
       ->check(number_in(0.0, 1.0));
   add_result_option(command, arguments->output);
   add_device_option(command, arguments->device);

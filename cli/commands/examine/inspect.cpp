@@ -159,7 +159,8 @@ void add_inspect_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("inspect", "Say what a model, or a mesh, consists of");
   declare_input(command,
-                command.add_option("FILE", arguments->file, "model (.skx.exr), or mesh (.obj, .ply, .off, .stl)"))
+                command.add_option("FILE", arguments->file,
+                                   "model (.skx.exr, .skx), or mesh (.obj, .ply, .off, .stl, .glb, .gltf, .vrm)"))
       ->required();
   command.add_flag("--self-intersections", arguments->has_self_intersections,
                    "of a mesh: count the pairs of triangles that intersect");
@@ -169,8 +170,8 @@ void add_inspect_command(CLI::App& program) {
       "  skeletex inspect bear.skx.exr\n"
       "  skeletex inspect bear.skx.exr --json - | jq '.patches[0]'\n"
       "  skeletex inspect bear.ply\n"
-      "The JSON of a model is its header as it stands in the file (docs/file-formats.md); texels are not read. Lengths "
-      "are in the mesh's units.");
+      "The JSON of a model is its header as it stands in the file (docs/file-formats.md); the whole file is "
+      "read and checked. Lengths are in the mesh's units.");
   command.callback([arguments] { run(*arguments); });
 }
 

@@ -411,9 +411,10 @@ void add_pose_options(CLI::App& command, Arguments& arguments) {
 void add_render_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("render", "Draw a model or a mesh to a picture");
-  declare_input(command, command.add_option(
-                             "MODEL|MESH", arguments->input,
-                             "model (.skx.exr), mesh, or .json that names mesh, skeleton and view (configs/models)"))
+  declare_input(
+      command,
+      command.add_option("MODEL|MESH", arguments->input,
+                         "model (.skx.exr, .skx), mesh, or .json that names mesh, skeleton and view (configs/models)"))
       ->required();
   declare_output(command,
                  command.add_option("-o,--output", arguments->output, "picture: .png, or .exr for linear floats"),

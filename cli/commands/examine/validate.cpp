@@ -183,7 +183,8 @@ void add_validate_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand(
       "validate", "Say everything that is wrong with a mesh, or a mesh and a skeleton, each with its place and remedy");
-  declare_input(command, command.add_option("MESH", arguments->mesh, "triangle mesh: .obj, .ply, .off or .stl"))
+  declare_input(command, command.add_option("MESH", arguments->mesh,
+                                            "triangle mesh: .obj, .ply, .off, .stl, .glb, .gltf or .vrm"))
       ->required();
   CLI::Option* skeleton = command.add_option(
       "SKELETON", arguments->skeleton,

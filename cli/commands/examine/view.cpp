@@ -91,7 +91,7 @@ void add_view_command(CLI::App& program) {
   CLI::App& command = *program.add_subcommand(
       "view", "Write a page that shows a model in a browser: to turn, pose, morph and transfer");
   declare_input(command, command.add_option("MODEL", arguments->models,
-                                            "model (.skx.exr), and one that it morphs to and takes bones from"))
+                                            "model (.skx.exr, .skx), and one that it morphs to and takes bones from"))
       ->required()
       ->type_name("MODEL [MODEL_B]");
   declare_output(command, command.add_option("-o,--output", arguments->output, "the page: .html"), {".html"})
