@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <array>
 
+#include "command.h"
 #include "files.h"
 #include "skeletex/io/pose_file.h"
+#include "skeletex/io/suggestion.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex::cli {
@@ -30,6 +32,10 @@ std::optional<Skeleton> posed_skeleton(const Skeleton& bind, const std::string& 
                                        const std::optional<double>& time) {
   if (pose.empty()) return std::nullopt;
   const PoseAnimation animation = read_animation(pose, bind);
+  const double first = animation.frames.front().time, last = animation.frames.back().time;
+  if (time && animation.frames.size() > 1 && !(*time >= first && *time <= last))
+    warn(fmt::format("--time {}: {} runs from {} to {}; its {} frame is shown", *time, pose, first, last,
+                     *time < first ? "first" : "last"));
   return apply_pose(bind, pose_at(bind, animation, time.value_or(animation.frames.front().time)));
 }
 
@@ -61,8 +67,12 @@ void check_distance_option(bool is_distance_dropped, const std::string& word) {
 int bone_by_name(const Skeleton& skeleton, const std::string& name) {
   const auto found =
       std::find_if(skeleton.bones.begin(), skeleton.bones.end(), [&](const Bone& bone) { return bone.name == name; });
-  if (found == skeleton.bones.end())
-    throw InputError(fmt::format("the skeleton has no bone \"{}\"; `skeletex inspect` lists them", name));
+  if (found == skeleton.bones.end()) {
+    std::vector<std::string> names;
+    for (const Bone& bone : skeleton.bones) names.push_back(bone.name);
+    throw InputError(fmt::format("the skeleton has no bone \"{}\"; `skeletex inspect` lists them{}", name,
+                                 did_you_mean(name, names)));
+  }
   return static_cast<int>(found - skeleton.bones.begin());
 }
 

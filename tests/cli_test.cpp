@@ -422,7 +422,9 @@ TEST_F(Program, ReconstructsInPosesAndAnimations) {
   EXPECT_GT(difference(positions("posed.ply"), positions("bind.ply")), 0.1);
   for (const auto& [time, same] :
        {std::pair{"0", "bind.ply"}, {"-1", "bind.ply"}, {"2", "posed.ply"}, {"7.5", "posed.ply"}}) {
-    ASSERT_EQ(run({"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "animation.json", "--time", time}).code, 0);
+    const Outcome at = run({"reconstruct", "y.skx.exr", "-o", "again.ply", "--pose", "animation.json", "--time", time});
+    ASSERT_EQ(at.code, 0);
+    EXPECT_EQ(at.err.find("runs from 0 to 2") != std::string::npos, time[0] == '-' || time[0] == '7') << at.err;
     EXPECT_LT(difference(positions("again.ply"), positions(same)), 1e-5) << time;
   }
   const nlohmann::json polished =
@@ -449,6 +451,10 @@ TEST_F(Program, ReconstructsInPosesAndAnimations) {
 
   expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--no-distance"}, {"--pose"});
   expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--time", "1"}, {"--pose"});
+  expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--pose", "y.skeleton.json"}, {"a skeleton"});
+  std::ofstream(folder_ / "rig.glb") << "glTF and more";
+  expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--pose", "rig.glb"}, {"skeletex import"});
+  fs::remove(folder_ / "rig.glb");
   std::ofstream(folder_ / "pose.json") << nlohmann::json{{"roll", {{bone + "x", 10}}}};
   expect_refused(1, {"reconstruct", "y.skx.exr", "-o", "a.ply", "--pose", "pose.json"},
                  {"pose.json", "no bone \"" + bone + "x\"", "did you mean " + bone + "?"});

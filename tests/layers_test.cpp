@@ -6,6 +6,7 @@
 #include <numbers>
 #include <random>
 
+#include "skeletex/close/carry_over.h"
 #include "skeletex/convert/encode_model.h"
 #include "skeletex/convert/guess_stance.h"
 #include "skeletex/edit/filter/filter.h"
@@ -202,6 +203,40 @@ TEST(Layers, StepsStayBetweenTheirValuesAtOtherSizes) {
       EXPECT_GT(*most, 0.9f) << size;
     }
   }
+}
+
+TEST(Layers, AMeshInPlaceOfAnotherOneHasThePictureOfThatOne) {
+  const Shape shape = creature_shape();
+  MeshAttributes attributes;  // a picture of stripes that are narrower than triangles
+  Material material;
+  material.image = {32, 1, {}};
+  for (int i = 0; i < 32; ++i)
+    for (int channel = 0; channel < 4; ++channel)
+      material.image.rgba.push_back(static_cast<std::uint8_t>(channel == 3 || i / 4 % 2 == 0 ? 255 : 0));
+  attributes.materials = {material};
+  attributes.triangle_materials.assign(shape.mesh.triangles.size(), 0);
+  for (const Vec3& p : shape.mesh.positions)
+    attributes.texture_coordinates.values.emplace_back(static_cast<float>(p.x() + 0.3 * p.z()), 0.5f);
+  // Moved and scaled, as the frame in which models are encoded is not the user's.
+  TriangleMesh user = shape.mesh;
+  const UnitFrame frame{Vec3(5, 6, 7), 3};
+  for (Vec3& p : user.positions) p = frame.to_user(p);
+  const CarriedOver carried = carry_over(user, build_triangle_tree(user), attributes, {}, user);
+  std::array<SkeletexModel, 2> models;
+  for (int i = 0; i < 2; ++i) {
+    EncodeOptions options;
+    options.width = options.height = 96;
+    options.attributes = i == 0 ? &attributes : &carried.attributes;
+    Skeleton skeleton = shape.skeleton;
+    skeleton.frame = frame;
+    models[i] = encode_model(device(), shape.mesh, skeleton, options).model;
+  }
+  const std::vector<float>&red = find_layer(models[0], kColourLayer)->planes[0],
+        &carried_red = find_layer(models[1], kColourLayer)->planes[0];
+  EXPECT_GT(*std::max_element(red.begin(), red.end()), 0.9f);
+  double difference = 0;
+  for (std::size_t i = 0; i < red.size(); ++i) difference += std::abs(red[i] - carried_red[i]);
+  EXPECT_LT(difference / static_cast<double>(red.size()), 1e-3);
 }
 
 TEST(Layers, AMorphHasItsModelsValuesAtItsEnds) {

@@ -287,6 +287,9 @@ TEST(ModelFile, LayersComeBackUnderTheirNames) {
   bad = model;
   bad.layers[1].name = "normal";
   EXPECT_THROW(write_model(scratch / "bad.skx.exr", bad), IoError);
+  bad = model;
+  bad.layers.push_back({"paint", LayerKind::kColour, {plane(2), plane(3), plane(4)}});  // a second layer of colours
+  EXPECT_THROW(write_model(scratch / "bad.skx.exr", bad), IoError);
   EXPECT_FALSE(std::filesystem::exists(scratch / "bad.skx.exr"));
 }
 

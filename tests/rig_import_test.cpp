@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
 
@@ -158,6 +159,85 @@ TEST(RigImport, ScaledAndTurnedArmaturesStandWhereTheFileShowsThem) {
   expect_same_skeleton(apply_pose(model.skeleton, animation.frames[1].pose),
                        apply_pose(rig.skeleton, rig.animations.at(0).animation.frames.back().pose), map,
                        1e-4 * map.scale * model.diagonal);
+}
+
+TEST(RigImport, WholeMeshesBelowJointsMoveWithThemThoughNoneHasTheSkin) {
+  const SkeletexModel model = model_of(chain(3), 0.2);
+  GltfScene scene = exported(model);
+  const int joint = scene.skins[0].joints[1];
+  const GltfPrimitive primitive = scene.meshes[0].primitives[0];
+  for (GltfNode& node : scene.nodes) {
+    if (node.mesh < 0) continue;
+    node.mesh = node.skin = -1;
+  }
+  GltfPrimitive plain;
+  plain.positions = primitive.positions;
+  plain.triangles = primitive.triangles;
+  scene.meshes = {{"part", {plain}}};
+  GltfNode part;
+  part.name = "part";
+  part.mesh = 0;
+  part.parent = joint;
+  part.translation = Vec3(0, 0.5, 0);
+  scene.nodes.push_back(part);
+  const GltfSurface surface = gltf_surface(scene, "test");
+  const Eigen::Affine3d place = node_transforms(scene.nodes).back();
+  for (std::size_t v = 0; v < plain.positions.size(); ++v) {
+    EXPECT_LT((surface.mesh.positions[v] - place * plain.positions[v]).norm(), 1e-6 * model.diagonal);
+    ASSERT_EQ(surface.weights[v].size(), 1u);
+    EXPECT_EQ(surface.weights[v][0].node, joint);
+  }
+  EXPECT_FALSE(imported(scene).skeleton.bones.empty());
+}
+
+/// A file of one triangle with a morph target of weight 1/2.
+std::string with_morph_target(bool has_normals) {
+  std::string data;
+  const auto add = [&](const std::vector<float>& values) {
+    data.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float));
+  };
+  add({0, 0, 0, 1, 0, 0, 0, 1, 0});                          // positions
+  add({0, 0, 1, 0, 0, 1, 0, 0, 1});                          // normals
+  add({0, 0, 2, 0, 0, 0, 0, 0, 0});                          // changes of positions
+  add({-0.5f, -0.5f, 0, -0.5f, -0.5f, 0, -0.5f, -0.5f, 0});  // of normals
+  nlohmann::json json = {{"asset", {{"version", "2.0"}}}, {"scene", 0}, {"scenes", {{{"nodes", {0}}}}}};
+  json["nodes"] = {{{"mesh", 0}}};
+  json["buffers"] = {{{"byteLength", data.size()}}};
+  for (int i = 0; i < 4; ++i) {
+    json["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", 36 * i}, {"byteLength", 36}});
+    json["accessors"].push_back({{"bufferView", i}, {"componentType", 5126}, {"count", 3}, {"type", "VEC3"}});
+  }
+  json["accessors"][0]["min"] = {0, 0, 0};
+  json["accessors"][0]["max"] = {1, 1, 0};
+  nlohmann::json target = {{"POSITION", 2}};
+  if (has_normals) target["NORMAL"] = 3;
+  nlohmann::json primitive = {{"attributes", {{"POSITION", 0}, {"NORMAL", 1}}}};
+  primitive["targets"].push_back(target);
+  nlohmann::json mesh;
+  mesh["primitives"].push_back(primitive);
+  mesh["weights"].push_back(0.5);
+  json["meshes"].push_back(mesh);
+  std::string text = json.dump();
+  text.resize((text.size() + 3) / 4 * 4, ' ');
+  const auto number = [](std::size_t n) {
+    std::string bytes;
+    for (int i = 0; i < 4; ++i) bytes += static_cast<char>(n >> (8 * i) & 255);
+    return bytes;
+  };
+  return "glTF" + number(2) + number(28 + text.size() + data.size()) + number(text.size()) + "JSON" + text +
+         number(data.size()) + std::string("BIN\0", 4) + data;
+}
+
+TEST(RigImport, MorphTargetsTurnNormals) {
+  const ScratchFolder folder;
+  for (const bool has_normals : {true, false}) {
+    std::ofstream(folder / "m.glb", std::ios::binary) << with_morph_target(has_normals);
+    const GltfScene scene = read_gltf(folder / "m.glb");
+    const GltfPrimitive& primitive = scene.meshes.at(0).primitives.at(0);
+    EXPECT_EQ(primitive.positions[0], Vec3(0, 0, 1));
+    ASSERT_EQ(primitive.normals.size(), has_normals ? 3u : 0u);
+    if (has_normals) EXPECT_LT((primitive.normals[0] - Vec3(-0.25, -0.25, 1)).norm(), 1e-6);
+  }
 }
 
 TEST(RigImport, TrianglesThatAllVanishAreRefused) {

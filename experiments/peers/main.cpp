@@ -143,7 +143,7 @@ int main(int argc, char** argv) {
       ->required()
       ->check(CLI::IsMember({"decimate", "simplify", "remesh", "subdivide", "noise", "scan", "turn", "scale", "copy"}));
   program.add_option("MESH", arguments.mesh, "closed triangle mesh")->required();
-  program.add_option("-o,--output", arguments.output, "the result: .ply or .obj")->required();
+  program.add_option("-o,--output", arguments.output, "the result: .ply, .obj, .stl or .glb")->required();
   CLI::Option* vertices =
       program.add_option("--vertices", arguments.vertices, "how many vertices (default: as many as there are)")
           ->check(CLI::Range(4, 100000000));

@@ -110,7 +110,7 @@ def encode(
     paper_recipe: bool = False,
     progress: Optional[Progress] = None,
 ) -> Model:
-    """Turns a closed mesh and its skeleton into a model. The options are those of ``skeletex encode``.
+    """Turns a closed mesh and its skeleton into a model. Options have the meaning of those of ``skeletex encode``.
 
     :param skeleton: in the mesh's coordinates; None: one is made
     :param size: texels, N or (width, height)

@@ -27,14 +27,18 @@
 namespace skeletex {
 namespace {
 
-constexpr double kHardlyWorse = 1.1;      // hybrid: of a distance, for SPD
-constexpr double kLeastDihedral = 0.004;  // radians: flatter edges are no creases to snap to
+constexpr double kHardlyWorse = 1.1;           // hybrid: of a distance, for SPD
+constexpr double kMostFitted = 8192.0 * 8192;  // texels: the fit counts numbers of them with 32 bits
+constexpr double kLeastDihedral = 0.004;       // radians: flatter edges are no creases to snap to
 
 void check_options(const EncodeOptions& options, const Skeleton& skeleton) {
   if (options.vsm.iterations < 0 || options.vsm.iterations > 100)
     throw InputError(fmt::format("{} VSM iterations; give 0 to 100", options.vsm.iterations));
   if (!(options.vsm.alpha >= 0 && options.vsm.alpha <= 1))
     throw InputError(fmt::format("VSM alpha is {}; give 0 to 1", options.vsm.alpha));
+  if (options.has_fit.value_or(false) && static_cast<double>(options.width) * options.height > kMostFitted)
+    throw InputError(fmt::format("the fit takes at most 8192 x 8192 texels, not {} x {}; leave it out, or take fewer",
+                                 options.width, options.height));
   if (!(options.hybrid_unseen_threshold >= 0))
     throw InputError("the hybrid threshold is negative; give a share of area, such as 0.01");
   for (const auto& override : options.hybrid_overrides)
@@ -46,10 +50,10 @@ void check_options(const EncodeOptions& options, const Skeleton& skeleton) {
 
 /// What encoding takes at its peak, as measured, less a tenth.
 double estimated_bytes(const EncodeOptions& options, const TriangleMesh& mesh) {
-  constexpr double kPerTexel = 380, kPerRay = 80, kPerTriangle = 600;
+  constexpr double kPerTexel = 380, kPerFitted = 416, kPerRay = 80, kPerTriangle = 600;
   const bool has_maps = !options.method || !is_height_field(*options.method);
-  return (has_maps ? kPerTexel : kPerRay) * options.width * options.height +
-         kPerTriangle * static_cast<double>(mesh.triangles.size());
+  const double per_texel = has_maps ? kPerTexel + (options.has_fit.value_or(false) ? kPerFitted : 0) : kPerRay;
+  return per_texel * options.width * options.height + kPerTriangle * static_cast<double>(mesh.triangles.size());
 }
 
 /// SPD patches are neither snapped nor fitted; without the prefilter texels stay on the mesh unless the fit is asked
@@ -292,8 +296,8 @@ BothDistances measure_both(const EncodeJob& job, const SkeletexModel& model, con
 }
 
 /// Each bone takes SPD where its rays see enough, and the result is hardly further from the input than that of VSM,
-/// which is measured with models of either. If the mixed model is worse than the better of these, that is taken.
-/// \param surface  mapped by VSM; the methods are those of the result then
+/// which is measured with models of either. If the mixed model is a tenth worse than the better of these, that is
+/// taken. \param surface  mapped by VSM; the methods are those of the result then
 Encoding encode_hybrid(const EncodeJob& job, const SkeletexModel& start, MappedSurface& surface) {
   const EncodeOptions& options = job.options;
   const std::size_t count = surface.methods.size();
@@ -311,6 +315,7 @@ Encoding encode_hybrid(const EncodeJob& job, const SkeletexModel& start, MappedS
     for (std::size_t bone = 0; bone < count; ++bone)
       if (start.skeleton.bones[bone].name == name) surface.methods[bone] = method;
   if (surface.methods == by_vsm.methods && spd.mean >= vsm.mean) return by_vsm;
+  if (surface.methods == by_spd.methods) return by_spd;
   Encoding mixed = encode_surface(job, start, surface);
   if (!options.hybrid_overrides.empty()) return mixed;
   const bool is_spd_better = spd.mean < vsm.mean;

@@ -67,7 +67,7 @@ struct BoneReport {
   double unseen_area_fraction = 0;
   int flipped_triangles = 0;             ///< of the map
   double sampled_triangle_fraction = 0;  ///< share of the segment's triangles that a texel reads
-  int missed_texels = 0;                 ///< SPD rays that hit nothing, filled from their neighbours
+  int missed_texels = 0;                 ///< filled from their neighbours, see TexelReport
   BoneDistance distance;  ///< of its surface to the decoded mesh, in the unit frame; its place is the user's
   /// Of height fields: of the decoded mesh to the surface, likewise.
   BoneDistance excess;

@@ -12,7 +12,7 @@ struct HalfEdgeTraits : OpenMesh::DefaultTraits {
 using HalfEdgeMesh = OpenMesh::TriMesh_ArrayKernelT<HalfEdgeTraits>;
 
 /// The half-edge mesh (OpenMesh) of an indexed one, with the same vertex and face indices (paper, Table 1: t_OM).
-/// \pre closed, oriented and 2-manifold (see measure_manifold)
+/// \pre oriented and 2-manifold, with or without boundary (see measure_manifold)
 /// \throw InputError when OpenMesh cannot link a face
 HalfEdgeMesh build_half_edges(const TriangleMesh& mesh);
 

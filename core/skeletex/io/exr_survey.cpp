@@ -186,7 +186,8 @@ std::vector<ExrSurvey> survey_exr(const std::filesystem::path& path, int max_siz
   constexpr std::uint32_t kLongNames = 0x400, kSeveralParts = 0x1000;
   Reader in(path);
   constexpr std::string_view kMagic("\x76\x2f\x31\x01", 4);
-  if (in.size() < 8 || in.bytes(4) != kMagic) in.fail("not an OpenEXR file, which a model is (.skx.exr)");
+  if (in.size() < 8 || in.bytes(4) != kMagic)
+    in.fail("not an OpenEXR file, which a model is (.skx.exr); `skeletex encode` makes one of a mesh");
   const auto version = in.number<std::uint32_t>();
   if ((version & 0xff) != 2 || (version & ~(0xffu | kLongNames | kSeveralParts)) != 0)
     in.fail("a tiled or deep OpenEXR file; a model is a scanline image");

@@ -298,6 +298,9 @@ NamedLayers layers_from_json(const json& root, const std::string& where) {
     if (!has_planes_of(layer.kind, names.size())) channels.fail("a layer of this kind has another number of channels");
     if (std::any_of(named.layers.begin(), named.layers.end(), [&](const Layer& l) { return l.name == layer.name; }))
       name.fail("the layer is named twice");
+    if (layer.kind != LayerKind::kNumber &&
+        std::any_of(named.layers.begin(), named.layers.end(), [&](const Layer& l) { return l.kind == layer.kind; }))
+      kind.fail("a model has one layer of this kind");
     layer.planes.resize(names.size());
     named.layers.push_back(std::move(layer));
     named.channels.push_back(std::move(names));
@@ -356,11 +359,16 @@ json model_to_json(const SkeletexModel& model, const std::string& where) {
   const std::vector<std::vector<std::string>> channels = layer_channels(model.layers);
   for (std::size_t i = 0; i < model.layers.size(); ++i) {
     const Layer& layer = model.layers[i];
+    const auto is_double = [&](const Layer& other) {
+      return &other != &layer &&
+             (other.name == layer.name || (layer.kind != LayerKind::kNumber && other.kind == layer.kind));
+    };
     if (layer.name.empty() || !has_planes_of(layer.kind, layer.planes.size()) ||
-        std::count_if(model.layers.begin(), model.layers.end(), [&](const Layer& l) { return l.name == layer.name; }) >
-            1)
-      throw IoError(fmt::format("{}: layer \"{}\" of kind {} has {} planes, or the name of another one", where,
-                                layer.name, to_string(layer.kind), layer.planes.size()));
+        std::any_of(model.layers.begin(), model.layers.end(), is_double))
+      throw IoError(
+          fmt::format("{}: layer \"{}\" of kind {} has {} planes, or the name of another one; normals and "
+                      "colours have one layer each",
+                      where, layer.name, to_string(layer.kind), layer.planes.size()));
     result["layers"].push_back({{"name", layer.name}, {"kind", to_string(layer.kind)}, {"channels", channels[i]}});
   }
   if (model.stance) {

@@ -120,6 +120,8 @@ Pose pose_from_json(const nlohmann::json& json, const Skeleton& skeleton, const 
 }  // namespace
 
 PoseAnimation animation_from_json(const nlohmann::json& json, const Skeleton& skeleton, const std::string& where) {
+  if (json.is_object() && json.contains("bones"))
+    throw IoError(where + ": a skeleton, where a pose is expected; a pose has \"rotations\" or \"nodes\"");
   if (!json.is_object() || !json.contains("frames")) return {{PoseFrame{0, pose_from_json(json, skeleton, where)}}};
   check_keys(json, {"frames"}, where);
   PoseAnimation animation;
@@ -142,7 +144,11 @@ PoseAnimation animation_from_json(const nlohmann::json& json, const Skeleton& sk
 }
 
 PoseAnimation read_animation(const std::filesystem::path& path, const Skeleton& skeleton) {
-  return animation_from_json(parse_json(read_file(path, kMaxBytes), path.string()), skeleton, path.string());
+  const std::string text = read_file(path, kMaxBytes);
+  if (text.starts_with("glTF"))
+    throw IoError(path.string() +
+                  ": a rig, where a pose is expected; `skeletex import` writes its animations as poses");
+  return animation_from_json(parse_json(text, path.string()), skeleton, path.string());
 }
 
 nlohmann::json pose_to_json(const Pose& pose, const Skeleton& skeleton) {

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -38,6 +39,8 @@ struct VertexNumbers {
   std::vector<float> values;
 };
 
+struct ColourSource;  // convert/layers/colour_source.h
+
 /// What a mesh has beside its geometry. All of it can be empty.
 struct MeshAttributes {
   CornerValues<Vec3> normals;  ///< unit
@@ -47,6 +50,8 @@ struct MeshAttributes {
   std::vector<Material> materials;
   std::vector<int> triangle_materials;  ///< per triangle; -1: none
   std::vector<VertexNumbers> numbers;
+  /// Of a mesh in place of another one: the other one, which has the colours that the vertices here have samples of.
+  std::shared_ptr<const ColourSource> colour_source;
 };
 
 /// Whether there are colours: of vertices, of pictures that are read, or of materials that differ.

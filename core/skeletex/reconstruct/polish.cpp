@@ -9,6 +9,7 @@
 
 #include "skeletex/analysis/deformation.h"
 #include "skeletex/geometry/self_intersection.h"
+#include "skeletex/geometry/union_find.h"
 #include "skeletex/model/error.h"
 
 namespace skeletex {
@@ -52,17 +53,14 @@ void smooth(const SurfaceEdges& edges, const std::vector<double>& weights, const
 /// Per vertex the connected part of the moved surface that it belongs to, -1 where it has not moved.
 std::vector<int> moved_parts(const SurfaceEdges& edges, const std::vector<Vec3>& posed,
                              const std::vector<Vec3>& positions) {
-  std::vector<int> part(posed.size(), -1);
-  for (std::size_t v = 0; v < posed.size(); ++v)
-    if (positions[v] != posed[v]) part[v] = static_cast<int>(v);
-  const auto root = [&](int v) {
-    while (part[v] != v) v = part[v] = part[part[v]];
-    return v;
-  };
+  const int count = static_cast<int>(posed.size());
+  const auto is_moved = [&](int v) { return positions[v] != posed[v]; };
+  UnionFind parts(count);
   for (const auto& [a, b] : edges.vertices)
-    if (part[a] >= 0 && part[b] >= 0) part[root(a)] = root(b);
-  for (std::size_t v = 0; v < posed.size(); ++v)
-    if (part[v] >= 0) part[v] = root(static_cast<int>(v));
+    if (is_moved(a) && is_moved(b)) parts.unite(a, b);
+  std::vector<int> part(posed.size(), -1);
+  for (int v = 0; v < count; ++v)
+    if (is_moved(v)) part[v] = parts.find(v);
   return part;
 }
 

@@ -89,14 +89,13 @@ void store_texels(ClContext& context, const PreparedModel& prepared, std::span<c
   keep_moved(stored[2], result.out);
 }
 
-/// The point in the separation plane through `node` with unit normal `separation plane` that p comes to by the shortest
-/// way in its tangent plane. The way is h / sin of the angle between the two planes; below some 18 degrees it turns
-/// towards the separation plane.
-Vec3 slide_to_separation_plane(const Vec3& p, const Vec3& normal, const Vec3& node, const Vec3& separation_plane) {
-  const double cosine = normal.dot(separation_plane);
+/// The point in the separation plane through `node` with unit normal `plane_normal` that p comes to by the shortest way
+/// in its tangent plane. The way is h / sin of the angle between the two planes; below some 18 degrees it turns towards
+/// the separation plane.
+Vec3 slide_to_separation_plane(const Vec3& p, const Vec3& normal, const Vec3& node, const Vec3& plane_normal) {
+  const double cosine = normal.dot(plane_normal);
   const double share = std::min(1.0, 0.9 / std::max(cosine * cosine, 1e-9));
-  return p -
-         separation_plane.dot(p - node) / (1 - share * cosine * cosine) * (separation_plane - share * cosine * normal);
+  return p - plane_normal.dot(p - node) / (1 - share * cosine * cosine) * (plane_normal - share * cosine * normal);
 }
 
 /// The point of the ray from `node` in a unit direction that lies in p's tangent plane, where they meet at more than
@@ -158,11 +157,11 @@ void slide_to_separation(const PreparedModel& prepared, std::span<const Vec3> no
     const auto away = [&](int bone) {
       return direction_from(model.skeleton, {bone, end_at(model.skeleton, bone, arc.node)});
     };
-    const Vec3 separation_plane = (away(arc.bones[0]) - away(arc.bones[1])).normalized();
+    const Vec3 plane_normal = (away(arc.bones[0]) - away(arc.bones[1])).normalized();
     for (std::size_t i = 0; i < arc.samples.size(); ++i) {
       const std::size_t vertex = lattice.first_sample[a] + i;
       positions[vertex] = slide_to_separation_plane(positions[vertex], normals[vertex],
-                                                    model.skeleton.nodes[arc.node].position, separation_plane);
+                                                    model.skeleton.nodes[arc.node].position, plane_normal);
     }
   }
   for (std::size_t i = 0; i < model.corners.size(); ++i) {

@@ -286,30 +286,53 @@ class Search {
     return a_.at[a_.node({x.bone, opposite(x.end)})].size() == b_.at[b_.node({y.bone, opposite(y.end)})].size();
   }
 
-  /// Calls `visit` with every assignment of the bones at a node, given some of them, that keeps the order. Bones are
-  /// assigned one after the other, as most of the k! assignments of k bones fail at the fourth.
-  template <class Visit>
-  void for_each_assignment(int node, int to, std::map<int, BoneAtNode> known, Visit&& visit) const {
+  /// Calls visit(free, targets, cost) with assignments of the bones at a node, given some of them, that keep the order
+  /// and cost less than the limit: branch and bound, as k bones have k! of them.
+  /// \param cost_of  of a free bone and its target
+  /// \param limit  returns what is too much by now
+  template <class Cost, class Limit, class Visit>
+  void for_each_assignment(int node, int to, std::map<int, BoneAtNode> known, const Cost& cost_of, const Limit& limit,
+                           const Visit& visit) const {
     std::vector<BoneAtNode> free_from, free_to;
     for (const BoneAtNode& x : a_.at[node])
       if (!known.contains(x.bone)) free_from.push_back(x);
     for (const BoneAtNode& y : b_.at[to])
       if (std::none_of(known.begin(), known.end(), [&](const auto& k) { return k.second.bone == y.bone; }))
         free_to.push_back(y);
-    if (free_from.size() != free_to.size() || !node_keeps_order(known, node)) return;
-    std::vector<char> is_used(free_to.size(), 0);
-    const std::function<void(std::size_t)> assign_from = [&](std::size_t i) {
-      if (i == free_from.size()) return visit(free_from, known);
-      for (std::size_t j = 0; j < free_to.size(); ++j) {
-        if (is_used[j] || !may_become(free_from[i], free_to[j])) continue;
+    const std::size_t count = free_from.size();
+    if (free_to.size() != count) return;
+    std::vector<std::vector<double>> costs(count, std::vector<double>(count, kImpossible));
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t j = 0; j < count; ++j)
+        if (may_become(free_from[i], free_to[j])) costs[i][j] = cost_of(free_from[i], free_to[j]);
+    std::vector<char> is_used(count, 0);
+    const auto least_of_rest = [&](std::size_t first) {
+      double sum = 0;
+      for (std::size_t i = first; i < count; ++i) {
+        double least = kImpossible;
+        for (std::size_t j = 0; j < count; ++j)
+          if (!is_used[j]) least = std::min(least, costs[i][j]);
+        sum += least;
+      }
+      return sum;
+    };
+    const std::function<void(std::size_t, double)> assign_from = [&](std::size_t i, double cost) {
+      if (cost + least_of_rest(i) >= limit() || !node_keeps_order(known, node)) return;
+      if (i == count) return visit(free_from, known, cost);
+      std::vector<std::size_t> targets;  // the cheapest first
+      for (std::size_t j = 0; j < count; ++j)
+        if (!is_used[j]) targets.push_back(j);
+      std::stable_sort(targets.begin(), targets.end(),
+                       [&](std::size_t a, std::size_t b) { return costs[i][a] < costs[i][b]; });
+      for (const std::size_t j : targets) {
         known.insert_or_assign(free_from[i].bone, free_to[j]);
         is_used[j] = 1;
-        if (node_keeps_order(known, node)) assign_from(i + 1);
+        assign_from(i + 1, cost + costs[i][j]);
         is_used[j] = 0;
-        known.erase(free_from[i].bone);
       }
+      known.erase(free_from[i].bone);
     };
-    assign_from(0);
+    assign_from(0, 0);
   }
 
   /// Cheapest cost of everything behind the node at x's end, when x becomes y. Trees.
@@ -318,17 +341,15 @@ class Search {
     if (const auto it = memo_.find(key); it != memo_.end()) return it->second.first;
     double best = kImpossible;
     std::map<int, BoneAtNode> best_targets;
+    const auto cost_of = [&](BoneAtNode child, BoneAtNode target) {
+      return bone_cost(child, target) +
+             subtree_cost({child.bone, opposite(child.end)}, {target.bone, opposite(target.end)});
+    };
     const int node = a_.node(x), to = b_.node(y);
     if (a_.at[node].size() == b_.at[to].size())
       for_each_assignment(
-          node, to, {{x.bone, y}}, [&](const std::vector<BoneAtNode>& free, const std::map<int, BoneAtNode>& targets) {
-            double cost = 0;
-            for (const BoneAtNode& child : free) {
-              const BoneAtNode target = targets.at(child.bone);
-              cost += bone_cost(child, target) +
-                      subtree_cost({child.bone, opposite(child.end)}, {target.bone, opposite(target.end)});
-              if (cost >= best) return;
-            }
+          node, to, {{x.bone, y}}, cost_of, [&] { return best; },
+          [&](const std::vector<BoneAtNode>&, const std::map<int, BoneAtNode>& targets, double cost) {
             best = cost;
             best_targets = targets;
           });
@@ -361,20 +382,20 @@ class Search {
       if (state.bones[x.bone] >= 0)
         known.emplace(x.bone, BoneAtNode{state.bones[x.bone], state.is_reversed[x.bone] ? opposite(x.end) : x.end});
     std::optional<std::pair<double, State>> best;
-    for_each_assignment(node, to, known,
-                        [&](const std::vector<BoneAtNode>& free, const std::map<int, BoneAtNode>& targets) {
-                          State next = state;
-                          auto next_open = open;
-                          double next_cost = cost;
-                          for (const BoneAtNode& child : free) {
-                            const int far = a_.node({child.bone, opposite(child.end)});
-                            const bool is_new = next.nodes[far] < 0;
-                            if (!assign_bone(next, child, targets.at(child.bone))) return;
-                            next_cost += bone_cost(child, targets.at(child.bone));
-                            if (is_new) next_open.emplace_back(far, next.nodes[far]);
-                          }
-                          if (auto found = expand_graph(next, std::move(next_open), next_cost)) best = std::move(found);
-                        });
+    for_each_assignment(
+        node, to, known, [&](BoneAtNode child, BoneAtNode target) { return bone_cost(child, target); },
+        [&] { return bound_ - cost; },
+        [&](const std::vector<BoneAtNode>& free, const std::map<int, BoneAtNode>& targets, double added) {
+          State next = state;
+          auto next_open = open;
+          for (const BoneAtNode& child : free) {
+            const int far = a_.node({child.bone, opposite(child.end)});
+            const bool is_new = next.nodes[far] < 0;
+            if (!assign_bone(next, child, targets.at(child.bone))) return;
+            if (is_new) next_open.emplace_back(far, next.nodes[far]);
+          }
+          if (auto found = expand_graph(next, std::move(next_open), cost + added)) best = std::move(found);
+        });
     return best;
   }
 

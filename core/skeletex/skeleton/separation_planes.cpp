@@ -39,27 +39,27 @@ double meet(const Vec3& normal, const Vec3& radial, const Vec3& o) { return -rad
 }  // namespace
 
 double SeparationPlanes::slope(int bone, BoneEnd end, double turn) const {
-  const auto& separation = normals_[bone][static_cast<int>(end)];
-  if (separation.empty()) return 0;
+  const auto& neighbours = normals_[bone][static_cast<int>(end)];
+  if (neighbours.empty()) return 0;
   const Vec3 direction = radial(bone, turn);
-  double best = meet(separation[0].normal, direction, bases_[bone].o);
-  for (const Neighbour& separation_plane : separation) {
-    const double x = meet(separation_plane.normal, direction, bases_[bone].o);
+  double best = meet(neighbours[0].normal, direction, bases_[bone].o);
+  for (const Neighbour& neighbour : neighbours) {
+    const double x = meet(neighbour.normal, direction, bases_[bone].o);
     best = end == BoneEnd::kHead ? std::max(best, x) : std::min(best, x);
   }
   return best;
 }
 
 int SeparationPlanes::neighbour(int bone, BoneEnd end, double turn) const {
-  const auto& separation = normals_[bone][static_cast<int>(end)];
+  const auto& neighbours = normals_[bone][static_cast<int>(end)];
   const Vec3 direction = radial(bone, turn);
   int found = -1;
   double best = 0;
-  for (const Neighbour& separation_plane : separation) {
-    const double x = meet(separation_plane.normal, direction, bases_[bone].o);
+  for (const Neighbour& neighbour : neighbours) {
+    const double x = meet(neighbour.normal, direction, bases_[bone].o);
     if (found < 0 || (end == BoneEnd::kHead ? x > best : x < best)) {
       best = x;
-      found = separation_plane.bone;
+      found = neighbour.bone;
     }
   }
   return found;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "skeletex/convert/layers/colour_source.h"
 #include "skeletex/geometry/half_edge_table.h"
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/reconstruct/layers/layer_values.h"
@@ -94,6 +95,23 @@ void for_each_point(std::span<const SurfacePoint> points, const Act& act) {
     for (std::size_t i = begin; i < end; ++i)
       if (points[i].triangle >= 0) act(i, points[i]);
   });
+}
+
+/// Of the surface that the mesh stands for.
+/// \param frame  of the mesh
+std::vector<Colour> read_source_colours(const ColourSource& source, const TriangleMesh& mesh, const UnitFrame& frame,
+                                        std::span<const SurfacePoint> points) {
+  const SurfaceColours colours(source.mesh, source.attributes);
+  std::vector<Colour> values(points.size(), Colour(0, 0, 0, 1));
+  for_each_point(points, [&](std::size_t i, const SurfacePoint& point) {
+    const Triangle& t = mesh.triangles[point.triangle];
+    Vec3 place = Vec3::Zero();
+    for (int k = 0; k < 3; ++k) place += static_cast<double>(point.weights[k]) * mesh.positions[t[k]];
+    place = frame.to_user(place);
+    const int nearest = find_nearest_triangle(source.mesh, source.tree, place).triangle;
+    values[i] = colours.at(nearest_in_triangle(source.mesh, nearest, place));
+  });
+  return values;
 }
 
 std::vector<float> read_numbers(const TriangleMesh& mesh, const VertexNumbers& numbers,
@@ -198,7 +216,10 @@ ReadLayers read_layers(ClContext& context, const PreparedModel& model, const Tri
       attributes.numbers.push_back(numbers);
   }
   const std::vector<SurfacePoint> points = surface_points(context, model, mesh, tree);
-  result.layers = layers_of_texels(model, attributes_at(mesh, attributes, points, options));
+  MeshAttributes texels = attributes_at(mesh, attributes, points, options);
+  if (options.has_colours && given.colour_source)
+    texels.colours.values = read_source_colours(*given.colour_source, mesh, model.model.skeleton.frame, points);
+  result.layers = layers_of_texels(model, texels);
   return result;
 }
 

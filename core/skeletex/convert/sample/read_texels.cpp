@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/convert/sample/read_texels.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <limits>
 
@@ -128,15 +127,13 @@ SnapReport report_snap(int vertices, int edges, int reverted, const std::vector<
   report.vertices = vertices;
   report.edges = edges;
   report.reverted_texels = reverted;
-  // Signs, as 0 and -1.
-  const Eigen::Map<const Eigen::ArrayXi> numbers(anchors.data(), static_cast<Eigen::Index>(anchors.size()));
-  report.snapped_vertices = -(-numbers).shiftRight<31>().sum(),
-  report.texels_on_edges = -numbers.shiftRight<31>().sum();
-  // Without branches, which std::max is here: what holds a texel follows no pattern. The first flag is that of texels
-  // on no edge.
-  std::vector<char> has_texel(edges + 1, 0);
-  for (const int anchor : anchors) has_texel[-anchor & (anchor >> 31)] = 1;
-  report.snapped_edges = static_cast<int>(std::count(has_texel.begin() + 1, has_texel.end(), 1));
+  std::vector<char> has_texel(edges + 1, 0);  // per edge, from 1 on
+  for (const int anchor : anchors) {
+    report.snapped_vertices += anchor > 0;
+    report.texels_on_edges += anchor < 0;
+    if (anchor < 0) has_texel[-anchor] = 1;
+  }
+  report.snapped_edges = static_cast<int>(std::count(has_texel.begin(), has_texel.end(), 1));
   return report;
 }
 

@@ -48,7 +48,9 @@ struct SnapReport {
 
 struct TexelReport {
   std::vector<double> sampled_triangle_fractions;  ///< per bone: share of the chart's triangles that a texel reads
-  std::vector<int> missed_texels;                  ///< per bone: filled from neighbours along the column
+  /// Per bone: texels that take what they lack from a neighbour, as no SPD ray hits (along the column) or no triangle
+  /// of the map covers them (along the row).
+  std::vector<int> missed_texels;
   std::optional<SnapReport> snap;
   std::optional<UnfoldReport> unfold;
   std::optional<FitReport> fit;

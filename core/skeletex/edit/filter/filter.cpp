@@ -59,7 +59,7 @@ std::vector<float> inside_region(const SkeletexModel& model, const Lattice& latt
 std::vector<float> weigh_region(ClContext& context, const SurfaceOperator& laplace, std::vector<float> inside,
                                 double falloff, SolveReport& report) {
   if (std::find(inside.begin(), inside.end(), 0.f) == inside.end() || falloff == 0) return inside;
-  const DeviceField masses{1, context.upload(context.download(laplace.mass))};
+  const DeviceField masses{1, laplace.mass};
   SolveResult solved =
       solve_diffusion(context, laplace, static_cast<float>(falloff * falloff), context.upload(inside), masses);
   add_solve(solved.report, report);

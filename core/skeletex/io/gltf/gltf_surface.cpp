@@ -115,13 +115,23 @@ class SurfaceBuilder {
     return placed;
   }
 
+  /// Whether a node is a joint, or is below one.
+  bool hangs_on(int node, const GltfSkin& skin) const {
+    for (; node >= 0; node = scene_.nodes[node].parent)
+      if (std::find(skin.joints.begin(), skin.joints.end(), node) != skin.joints.end()) return true;
+    return false;
+  }
+
   void place_skins() {
     for (int s = 0; s < static_cast<int>(scene_.skins.size()); ++s) {
-      const bool is_used = std::any_of(scene_.nodes.begin(), scene_.nodes.end(),
-                                       [s](const GltfNode& node) { return node.skin == s && node.mesh >= 0; });
       const GltfSkin& skin = scene_.skins[s];
-      if (!is_used || skin.joints.empty()) continue;
-      const bool has_binds = !skin.inverse_binds.empty();
+      const bool moves_vertices = std::any_of(scene_.nodes.begin(), scene_.nodes.end(),
+                                              [s](const GltfNode& node) { return node.skin == s && node.mesh >= 0; });
+      bool moves_meshes = false;  // whole ones: machines are made so
+      for (int node = 0; node < static_cast<int>(scene_.nodes.size()) && !moves_meshes; ++node)
+        moves_meshes = scene_.nodes[node].mesh >= 0 && scene_.nodes[node].skin < 0 && hangs_on(node, skin);
+      if ((!moves_vertices && !moves_meshes) || skin.joints.empty()) continue;
+      const bool has_binds = moves_vertices && !skin.inverse_binds.empty();
       const Affine3d placement = has_binds ? placement_of(skin, extent_of(s)) : Affine3d::Identity();
       for (std::size_t j = 0; j < skin.joints.size(); ++j) {
         const int node = skin.joints[j];

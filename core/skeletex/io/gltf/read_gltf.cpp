@@ -255,6 +255,15 @@ class GltfReader {
       const std::vector<Vec3> moves = vectors(found->second);
       check_count(moves.size(), "a morph target");
       for (std::size_t v = 0; v < count; ++v) to.positions[v] += morph[t] * moves[v];
+      if (to.normals.empty()) continue;
+      const auto turns = from.targets[t].find("NORMAL");
+      if (turns == from.targets[t].end()) {
+        to.normals.clear();  // those of the file are not those of this shape
+        continue;
+      }
+      const std::vector<Vec3> changes = vectors(turns->second);
+      check_count(changes.size(), "a morph target's NORMAL");
+      for (std::size_t v = 0; v < count; ++v) to.normals[v] += morph[t] * changes[v];
     }
     for (const Vec3& p : to.positions)
       if (!p.allFinite()) fail("mesh \"" + mesh + "\": a position is not finite");
