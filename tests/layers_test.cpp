@@ -205,9 +205,9 @@ TEST(Layers, StepsStayBetweenTheirValuesAtOtherSizes) {
   }
 }
 
-TEST(Layers, AMeshInPlaceOfAnotherOneHasThePictureOfThatOne) {
+TEST(Layers, AMeshInPlaceOfAnotherOneHasThePictureAndTheNormalsOfThatOne) {
   const Shape shape = creature_shape();
-  MeshAttributes attributes;  // a picture of stripes that are narrower than triangles
+  MeshAttributes attributes;  // normals that lean, and a picture of stripes that are narrower than triangles
   Material material;
   material.image = {32, 1, {}};
   for (int i = 0; i < 32; ++i)
@@ -217,6 +217,8 @@ TEST(Layers, AMeshInPlaceOfAnotherOneHasThePictureOfThatOne) {
   attributes.triangle_materials.assign(shape.mesh.triangles.size(), 0);
   for (const Vec3& p : shape.mesh.positions)
     attributes.texture_coordinates.values.emplace_back(static_cast<float>(p.x() + 0.3 * p.z()), 0.5f);
+  for (const Vec3& normal : vertex_normals(shape.mesh))
+    attributes.normals.values.push_back((normal + Vec3(0.2, 0.1, 0)).normalized());
   // Moved and scaled, as the frame in which models are encoded is not the user's.
   TriangleMesh user = shape.mesh;
   const UnitFrame frame{Vec3(5, 6, 7), 3};
@@ -237,6 +239,8 @@ TEST(Layers, AMeshInPlaceOfAnotherOneHasThePictureOfThatOne) {
   double difference = 0;
   for (std::size_t i = 0; i < red.size(); ++i) difference += std::abs(red[i] - carried_red[i]);
   EXPECT_LT(difference / static_cast<double>(red.size()), 1e-3);
+  // But for texels on edges and where normals lean too far from their triangles.
+  EXPECT_LT(mean_degrees(vertex_attributes(models[0]).normals.values, vertex_attributes(models[1]).normals.values), 2);
 }
 
 TEST(Layers, AMorphHasItsModelsValuesAtItsEnds) {

@@ -356,7 +356,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
   json["kernels"] = profile_json(context);
   print(arguments.json, arguments.is_verbose ? encode_details_text(result.report) : "");
   print(arguments.json, encode_report_text(result.report, file));
-  const bool is_guess = arguments.up.empty() && arguments.front.empty();
+  const bool is_guess = arguments.up.empty() && arguments.front.empty() && !is_gltf_file(arguments.mesh);
   print(arguments.json,
         fmt::format("up is {}, front is {}{}\n", name_of(result.model.stance->up), name_of(result.model.stance->front),
                     is_guess ? " (a guess; --up and --front say otherwise)" : ""));

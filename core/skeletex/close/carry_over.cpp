@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <map>
 
-#include "skeletex/convert/layers/colour_source.h"
+#include "skeletex/convert/layers/original_surface.h"
 #include "skeletex/convert/layers/read_layers.h"
 #include "skeletex/geometry/parallel.h"
 
@@ -31,12 +31,9 @@ CarriedOver carry_over(const TriangleMesh& from, const TriangleTree& tree, const
   const std::size_t count = to.positions.size();
   CarriedOver result;
   const bool has_colours = has_colour(attributes);
-  if (has_colours) {
-    result.attributes.colours.values.resize(count);
-    result.attributes.colour_source = attributes.colour_source;
-    if (!attributes.colour_source)
-      result.attributes.colour_source = std::make_shared<const ColourSource>(from, tree, attributes);
-  }
+  if (has_colours) result.attributes.colours.values.resize(count);
+  result.attributes.original =
+      attributes.original ? attributes.original : std::make_shared<const OriginalSurface>(from, tree, attributes);
   for (const VertexNumbers& numbers : attributes.numbers)
     result.attributes.numbers.push_back({numbers.name, std::vector<float>(count)});
   if (!weights.empty()) result.weights.resize(count);

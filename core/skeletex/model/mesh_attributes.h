@@ -39,7 +39,7 @@ struct VertexNumbers {
   std::vector<float> values;
 };
 
-struct ColourSource;  // convert/layers/colour_source.h
+struct OriginalSurface;  // convert/layers/original_surface.h
 
 /// What a mesh has beside its geometry. All of it can be empty.
 struct MeshAttributes {
@@ -50,8 +50,8 @@ struct MeshAttributes {
   std::vector<Material> materials;
   std::vector<int> triangle_materials;  ///< per triangle; -1: none
   std::vector<VertexNumbers> numbers;
-  /// Of a mesh in place of another one: the other one, which has the colours that the vertices here have samples of.
-  std::shared_ptr<const ColourSource> colour_source;
+  /// Of a mesh in place of another one: the other one, whose colours and normals count where it has some.
+  std::shared_ptr<const OriginalSurface> original;
 };
 
 /// Whether there are colours: of vertices, of pictures that are read, or of materials that differ.

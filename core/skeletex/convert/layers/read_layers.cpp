@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "skeletex/convert/layers/colour_source.h"
+#include "skeletex/convert/layers/original_surface.h"
 #include "skeletex/geometry/half_edge_table.h"
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/reconstruct/layers/layer_values.h"
@@ -97,21 +97,36 @@ void for_each_point(std::span<const SurfacePoint> points, const Act& act) {
   });
 }
 
-/// Of the surface that the mesh stands for.
+/// Takes colours and normals from the nearest points of the surface that the mesh stands for.
 /// \param frame  of the mesh
-std::vector<Colour> read_source_colours(const ColourSource& source, const TriangleMesh& mesh, const UnitFrame& frame,
-                                        std::span<const SurfacePoint> points) {
-  const SurfaceColours colours(source.mesh, source.attributes);
-  std::vector<Colour> values(points.size(), Colour(0, 0, 0, 1));
+/// \param attributes  those at the points of the mesh
+void take_from_original(const OriginalSurface& original, const TriangleMesh& mesh, const UnitFrame& frame,
+                        std::span<const SurfacePoint> points, MeshAttributes& attributes) {
+  constexpr float kOnEdge = 1e-3f;
+  constexpr double kSameSide = 0.5, kFlat = 0.9;  // cosines
+  const bool has_colours = !attributes.colours.empty() && has_colour(original.attributes),
+             has_normals = !attributes.normals.empty() && !original.attributes.normals.empty();
+  if (!has_colours && !has_normals) return;
+  const SurfaceColours colours(original.mesh, original.attributes);
   for_each_point(points, [&](std::size_t i, const SurfacePoint& point) {
     const Triangle& t = mesh.triangles[point.triangle];
     Vec3 place = Vec3::Zero();
     for (int k = 0; k < 3; ++k) place += static_cast<double>(point.weights[k]) * mesh.positions[t[k]];
     place = frame.to_user(place);
-    const int nearest = find_nearest_triangle(source.mesh, source.tree, place).triangle;
-    values[i] = colours.at(nearest_in_triangle(source.mesh, nearest, place));
+    const SurfacePoint nearest =
+        nearest_in_triangle(original.mesh, find_nearest_triangle(original.mesh, original.tree, place).triangle, place);
+    if (has_colours) attributes.colours.values[i] = colours.at(nearest);
+    if (!has_normals) return;
+    const Vec3 facing = area_vector(mesh, t).normalized();
+    // On a sharp edge the normal stands for both sides, of which the original's is one.
+    if (point.weights.minCoeff() < kOnEdge && attributes.normals.values[i].dot(facing) < kFlat) return;
+    const Triangle& corners = original.attributes.normals.of(original.mesh, nearest.triangle);
+    Vec3 normal = Vec3::Zero();
+    for (int k = 0; k < 3; ++k)
+      normal += static_cast<double>(nearest.weights[k]) * original.attributes.normals.values[corners[k]];
+    const double cosine = normal.normalized().dot(facing);
+    if (std::abs(cosine) > kSameSide) attributes.normals.values[i] = (cosine < 0 ? -1 : 1) * normal.normalized();
   });
-  return values;
 }
 
 std::vector<float> read_numbers(const TriangleMesh& mesh, const VertexNumbers& numbers,
@@ -217,8 +232,7 @@ ReadLayers read_layers(ClContext& context, const PreparedModel& model, const Tri
   }
   const std::vector<SurfacePoint> points = surface_points(context, model, mesh, tree);
   MeshAttributes texels = attributes_at(mesh, attributes, points, options);
-  if (options.has_colours && given.colour_source)
-    texels.colours.values = read_source_colours(*given.colour_source, mesh, model.model.skeleton.frame, points);
+  if (given.original) take_from_original(*given.original, mesh, model.model.skeleton.frame, points, texels);
   result.layers = layers_of_texels(model, texels);
   return result;
 }

@@ -34,7 +34,7 @@ struct ReadLayers {
 };
 /// Reads normals, colours and numbers of a mesh at the surface point of every texel.
 /// \param mesh  closed, outward
-/// \param attributes  of the mesh; its pictures are read, see read_materials. Colours are those of its source, if any
+/// \param attributes  of the mesh; its pictures are read, see read_materials. Those of the original come first
 /// \throw DeviceError
 ReadLayers read_layers(ClContext& context, const PreparedModel& model, const TriangleMesh& mesh,
                        const TriangleTree& tree, const MeshAttributes& attributes, const LayerOptions& options = {});

@@ -5,8 +5,8 @@
 
 namespace skeletex {
 
-/// A surface whose colours are those of a mesh near by: of the nearest point.
-struct ColourSource {
+/// The surface that a mesh near by stands for, with its colours and normals.
+struct OriginalSurface {
   TriangleMesh mesh;  ///< in the user's units
   TriangleTree tree;  ///< of the mesh
   MeshAttributes attributes;
