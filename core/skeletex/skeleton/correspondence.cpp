@@ -151,6 +151,40 @@ struct Side {
   const std::string& node_name(int node) const { return skeleton->nodes[node].name; }
 };
 
+/// What each of some bones costs as each of as many targets, of which some are taken.
+class CostTable {
+ public:
+  explicit CostTable(std::size_t count) : count_(count), costs_(count * count, kImpossible), is_taken_(count, 0) {}
+  double& of(std::size_t bone, std::size_t target) { return costs_[bone * count_ + target]; }
+  void take(std::size_t target, bool is_taken) { is_taken_[target] = is_taken; }
+
+  /// A lower bound of what this bone and those after it cost.
+  double least_from(std::size_t bone) const {
+    double sum = 0;
+    for (; bone < count_; ++bone) {
+      double least = kImpossible;
+      for (std::size_t j = 0; j < count_; ++j)
+        if (!is_taken_[j]) least = std::min(least, costs_[bone * count_ + j]);
+      sum += least;
+    }
+    return sum;
+  }
+  /// The targets that are not taken.
+  std::vector<std::size_t> cheapest_first(std::size_t bone) const {
+    std::vector<std::size_t> targets;
+    for (std::size_t j = 0; j < count_; ++j)
+      if (!is_taken_[j]) targets.push_back(j);
+    const double* row = costs_.data() + bone * count_;
+    std::stable_sort(targets.begin(), targets.end(), [row](std::size_t a, std::size_t b) { return row[a] < row[b]; });
+    return targets;
+  }
+
+ private:
+  std::size_t count_;
+  std::vector<double> costs_;
+  std::vector<char> is_taken_;
+};
+
 /// Search for the cheapest isomorphism under a fixed rotation of A onto B. Partial assignments grow from a pair of
 /// directed bones; a subtree's best assignment does not depend on what lies before it, so trees are solved by memo.
 class Search {
@@ -301,34 +335,18 @@ class Search {
         free_to.push_back(y);
     const std::size_t count = free_from.size();
     if (free_to.size() != count) return;
-    std::vector<std::vector<double>> costs(count, std::vector<double>(count, kImpossible));
+    CostTable costs(count);
     for (std::size_t i = 0; i < count; ++i)
       for (std::size_t j = 0; j < count; ++j)
-        if (may_become(free_from[i], free_to[j])) costs[i][j] = cost_of(free_from[i], free_to[j]);
-    std::vector<char> is_used(count, 0);
-    const auto least_of_rest = [&](std::size_t first) {
-      double sum = 0;
-      for (std::size_t i = first; i < count; ++i) {
-        double least = kImpossible;
-        for (std::size_t j = 0; j < count; ++j)
-          if (!is_used[j]) least = std::min(least, costs[i][j]);
-        sum += least;
-      }
-      return sum;
-    };
+        if (may_become(free_from[i], free_to[j])) costs.of(i, j) = cost_of(free_from[i], free_to[j]);
     const std::function<void(std::size_t, double)> assign_from = [&](std::size_t i, double cost) {
-      if (cost + least_of_rest(i) >= limit() || !node_keeps_order(known, node)) return;
+      if (cost + costs.least_from(i) >= limit() || !node_keeps_order(known, node)) return;
       if (i == count) return visit(free_from, known, cost);
-      std::vector<std::size_t> targets;  // the cheapest first
-      for (std::size_t j = 0; j < count; ++j)
-        if (!is_used[j]) targets.push_back(j);
-      std::stable_sort(targets.begin(), targets.end(),
-                       [&](std::size_t a, std::size_t b) { return costs[i][a] < costs[i][b]; });
-      for (const std::size_t j : targets) {
+      for (const std::size_t j : costs.cheapest_first(i)) {
         known.insert_or_assign(free_from[i].bone, free_to[j]);
-        is_used[j] = 1;
-        assign_from(i + 1, cost + costs[i][j]);
-        is_used[j] = 0;
+        costs.take(j, true);
+        assign_from(i + 1, cost + costs.of(i, j));
+        costs.take(j, false);
       }
       known.erase(free_from[i].bone);
     };
