@@ -16,6 +16,7 @@
 
 #include "skeletex/geometry/best_rotation.h"
 #include "skeletex/model/error.h"
+#include "skeletex/skeleton/cost_table.h"
 #include "skeletex/skeleton/separation_planes.h"
 
 namespace skeletex {
@@ -149,40 +150,6 @@ struct Side {
   int node(BoneAtNode bone) const { return end_node(*skeleton, bone.bone, bone.end); }
   const std::string& bone_name(int bone) const { return skeleton->bones[bone].name; }
   const std::string& node_name(int node) const { return skeleton->nodes[node].name; }
-};
-
-/// What each of some bones costs as each of as many targets, of which some are taken.
-class CostTable {
- public:
-  explicit CostTable(std::size_t count) : count_(count), costs_(count * count, kImpossible), is_taken_(count, 0) {}
-  double& of(std::size_t bone, std::size_t target) { return costs_[bone * count_ + target]; }
-  void take(std::size_t target, bool is_taken) { is_taken_[target] = is_taken; }
-
-  /// A lower bound of what this bone and those after it cost.
-  double least_from(std::size_t bone) const {
-    double sum = 0;
-    for (; bone < count_; ++bone) {
-      double least = kImpossible;
-      for (std::size_t j = 0; j < count_; ++j)
-        if (!is_taken_[j]) least = std::min(least, costs_[bone * count_ + j]);
-      sum += least;
-    }
-    return sum;
-  }
-  /// The targets that are not taken.
-  std::vector<std::size_t> cheapest_first(std::size_t bone) const {
-    std::vector<std::size_t> targets;
-    for (std::size_t j = 0; j < count_; ++j)
-      if (!is_taken_[j]) targets.push_back(j);
-    const double* row = costs_.data() + bone * count_;
-    std::stable_sort(targets.begin(), targets.end(), [row](std::size_t a, std::size_t b) { return row[a] < row[b]; });
-    return targets;
-  }
-
- private:
-  std::size_t count_;
-  std::vector<double> costs_;
-  std::vector<char> is_taken_;
 };
 
 /// Search for the cheapest isomorphism under a fixed rotation of A onto B. Partial assignments grow from a pair of
@@ -482,10 +449,6 @@ std::string first_difference(const Side& a, const Side& b) {
           a.node_name(left[i]), b.node_name(right[i]));
   return "their bones are joined differently";
 }
-
-}  // namespace
-
-namespace {
 
 int index_of(const Skeleton& skeleton, const std::string& name, const char* which) {
   for (std::size_t i = 0; i < skeleton.bones.size(); ++i)
