@@ -32,8 +32,9 @@ CarriedOver carry_over(const TriangleMesh& from, const TriangleTree& tree, const
   CarriedOver result;
   const bool has_colours = has_colour(attributes);
   if (has_colours) result.attributes.colours.values.resize(count);
-  result.attributes.original =
-      attributes.original ? attributes.original : std::make_shared<const OriginalSurface>(from, tree, attributes);
+  result.attributes.original = attributes.original
+                                   ? attributes.original
+                                   : std::make_shared<const OriginalSurface>(OriginalSurface{from, tree, attributes});
   for (const VertexNumbers& numbers : attributes.numbers)
     result.attributes.numbers.push_back({numbers.name, std::vector<float>(count)});
   if (!weights.empty()) result.weights.resize(count);

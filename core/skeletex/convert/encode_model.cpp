@@ -296,8 +296,8 @@ BothDistances measure_both(const EncodeJob& job, const SkeletexModel& model, con
 }
 
 /// Each bone takes SPD where its rays see enough, and the result is hardly further from the input than that of VSM,
-/// which is measured with models of either. If the mixed model is a tenth worse than the better of these, that is
-/// taken. \param surface  mapped by VSM; the methods are those of the result then
+/// which is measured with models of either. The better of these is taken if the mixed model is a tenth worse.
+/// \param surface  mapped by VSM; the methods are those of the result then
 Encoding encode_hybrid(const EncodeJob& job, const SkeletexModel& start, MappedSurface& surface) {
   const EncodeOptions& options = job.options;
   const std::size_t count = surface.methods.size();
