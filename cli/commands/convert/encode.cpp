@@ -218,7 +218,7 @@ Input read_input(ClContext& context, const Arguments& arguments, const EncodeOpt
 /// As given, else guessed.
 Stance stance_of(const Arguments& arguments, const Input& input) {
   // glTF says: up is y, and front is z.
-  const Stance guess = is_gltf_file(arguments.mesh) ? Stance{} : guess_stance(input.mesh, input.skeleton);
+  Stance guess = is_gltf_file(arguments.mesh) ? Stance{} : guess_stance(input.mesh, input.skeleton);
   if (arguments.up.empty() && arguments.front.empty()) return guess;
   std::optional<Vec3> front;
   if (!arguments.front.empty()) front = parse_direction("--front", arguments.front);
