@@ -249,22 +249,7 @@ class GltfReader {
       to.normals = vectors(found->second);
       check_count(to.normals.size(), "NORMAL");
     }
-    for (std::size_t t = 0; t < from.targets.size() && t < morph.size(); ++t) {
-      const auto found = from.targets[t].find("POSITION");
-      if (morph[t] == 0 || found == from.targets[t].end()) continue;
-      const std::vector<Vec3> moves = vectors(found->second);
-      check_count(moves.size(), "a morph target");
-      for (std::size_t v = 0; v < count; ++v) to.positions[v] += morph[t] * moves[v];
-      if (to.normals.empty()) continue;
-      const auto turns = from.targets[t].find("NORMAL");
-      if (turns == from.targets[t].end()) {
-        to.normals.clear();  // those of the file are not those of this shape
-        continue;
-      }
-      const std::vector<Vec3> changes = vectors(turns->second);
-      check_count(changes.size(), "a morph target's NORMAL");
-      for (std::size_t v = 0; v < count; ++v) to.normals[v] += morph[t] * changes[v];
-    }
+    apply_targets(from, morph, mesh, to);
     for (const Vec3& p : to.positions)
       if (!p.allFinite()) fail("mesh \"" + mesh + "\": a position is not finite");
     read_texture_coordinates(from, to);
@@ -283,6 +268,28 @@ class GltfReader {
     to.material = from.material;
     check_index(from.material, model_.materials.size(), "material of mesh \"" + mesh + '"');
     return to;
+  }
+
+  /// Moves positions and normals by morph targets.
+  /// \param morph  weights of the targets
+  void apply_targets(const tinygltf::Primitive& from, const std::vector<double>& morph, const std::string& mesh,
+                     GltfPrimitive& to) {
+    const auto add = [&](int accessor, double weight, std::vector<Vec3>& values) {
+      const std::vector<Vec3> changes = vectors(accessor);
+      if (changes.size() != values.size())
+        fail(fmt::format("mesh \"{}\": {} positions, but {} values of a morph target", mesh, values.size(),
+                         changes.size()));
+      for (std::size_t v = 0; v < values.size(); ++v) values[v] += weight * changes[v];
+    };
+    for (std::size_t t = 0; t < from.targets.size() && t < morph.size(); ++t) {
+      const auto moves = from.targets[t].find("POSITION"), turns = from.targets[t].find("NORMAL");
+      if (morph[t] == 0 || moves == from.targets[t].end()) continue;
+      add(moves->second, morph[t], to.positions);
+      if (turns == from.targets[t].end())
+        to.normals.clear();  // those of the file are not those of this shape
+      else if (!to.normals.empty())
+        add(turns->second, morph[t], to.normals);
+    }
   }
 
   void read_texture_coordinates(const tinygltf::Primitive& from, GltfPrimitive& to) {
