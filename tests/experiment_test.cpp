@@ -171,7 +171,7 @@ TEST_F(Runner, ResumesWhatIsDoneUnlessCommitCommandsOrInputsChanged) {
 }
 
 /// Items that end in every way; {json} stands for a way to write the step's JSON without braces.
-constexpr const char* kOutcomes = R"({"name": "e", "limits": {"seconds": 1, "memory_mb": 400},
+constexpr const char* kOutcomes = R"({"name": "e", "limits": {"seconds": 3, "memory_mb": 400},
   "sweep": {"how": [
     {"label": "right", "values": {"script": "echo 4"}},
     {"label": "refuses", "values": {"script": "echo no such bone >&2; exit 1"}},
