@@ -23,6 +23,10 @@ for ending in h cpp; do
   done < <(git ls-files "core/**/*.$ending" | xargs -n 1 dirname | sort | uniq -c)
 done
 
+# The linker takes the functions of two types of one name for the same.
+doubles=$(git ls-files 'core/**/*.h' | xargs grep -hoE '^(struct|class) \w+ *(final *)?[:{]' | awk '{print $2}' | sort | uniq -d)
+[ -z "$doubles" ] || { echo "two types are called" $doubles >&2; status=1; }
+
 # Each entry of a docstring has a line of its own, also after clang-format has filled lines.
 ! grep -nE '///<? .*\S.*\\(param|returns?|throws?|pre)\b|///.*\\(param|return|throw|pre)\s*$' $(git ls-files 'c*/*.h' 'c*/*.cpp') || status=1
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <map>
 
-#include "skeletex/convert/layers/original_surface.h"
 #include "skeletex/convert/layers/read_layers.h"
 #include "skeletex/geometry/parallel.h"
 
@@ -34,7 +33,7 @@ CarriedOver carry_over(const TriangleMesh& from, const TriangleTree& tree, const
   if (has_colours) result.attributes.colours.values.resize(count);
   result.attributes.original = attributes.original
                                    ? attributes.original
-                                   : std::make_shared<const OriginalSurface>(OriginalSurface{from, tree, attributes});
+                                   : std::make_shared<const AttributedMesh>(AttributedMesh{from, attributes});
   for (const VertexNumbers& numbers : attributes.numbers)
     result.attributes.numbers.push_back({numbers.name, std::vector<float>(count)});
   if (!weights.empty()) result.weights.resize(count);

@@ -13,7 +13,7 @@ using VertexBoneWeights = std::vector<std::vector<BoneWeight>>;
 
 /// A mesh in place of another one near by.
 struct CarriedOver {
-  MeshAttributes attributes;  ///< per vertex: colours (of pictures too) and numbers; and the original
+  MeshAttributes attributes;  ///< per vertex: colours (of pictures too) and numbers; and the other mesh
   VertexBoneWeights weights;  ///< per vertex, where the other mesh has some
 };
 /// Per vertex of a mesh what another mesh has at its nearest point.

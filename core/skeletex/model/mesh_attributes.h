@@ -39,7 +39,7 @@ struct VertexNumbers {
   std::vector<float> values;
 };
 
-struct OriginalSurface;  // convert/layers/original_surface.h
+struct AttributedMesh;
 
 /// What a mesh has beside its geometry. All of it can be empty.
 struct MeshAttributes {
@@ -50,8 +50,14 @@ struct MeshAttributes {
   std::vector<Material> materials;
   std::vector<int> triangle_materials;  ///< per triangle; -1: none
   std::vector<VertexNumbers> numbers;
-  /// Of a mesh in place of another one: the other one, whose colours and normals count where it has some.
-  std::shared_ptr<const OriginalSurface> original;
+  /// Of a closed mesh in place of a file's: that of the file, in the user's units. Its colours and normals come first.
+  std::shared_ptr<const AttributedMesh> original;
+};
+
+/// A mesh, and what it has beside its geometry.
+struct AttributedMesh {
+  TriangleMesh mesh;
+  MeshAttributes attributes;
 };
 
 /// Whether there are colours: of vertices, of pictures that are read, or of materials that differ.

@@ -10,7 +10,7 @@
 
 namespace skeletex {
 
-Cell cell_at(int rows, int columns, const Place& place) {
+GridCell cell_at(int rows, int columns, const Place& place) {
   const double row = std::clamp(place[0], 0.0, rows - 1.0),
                column = place[1] - columns * std::floor(place[1] / columns);
   const int r = std::min(static_cast<int>(row), rows - 2), c = std::min(static_cast<int>(column), columns - 1);

@@ -13,12 +13,12 @@ namespace skeletex {
 using Place = Eigen::Vector2d;
 
 /// The cell of four texels around a place, and the place's shares of its later row and column.
-struct Cell {
+struct GridCell {
   int row, column, next_column;
   double row_share, column_share;
 };
 /// \param place  rows are clamped, columns wrap round
-Cell cell_at(int rows, int columns, const Place& place);
+GridCell cell_at(int rows, int columns, const Place& place);
 
 /// The bilinear surface of a patch's points.
 struct SourcePatch {

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "skeletex/convert/layers/original_surface.h"
 #include "skeletex/geometry/half_edge_table.h"
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/reconstruct/layers/layer_values.h"
@@ -97,38 +96,6 @@ void for_each_point(std::span<const SurfacePoint> points, const Act& act) {
   });
 }
 
-/// Takes colours and normals from the nearest points of the surface that the mesh stands for.
-/// \param frame  of the mesh
-/// \param attributes  those at the points of the mesh
-void take_from_original(const OriginalSurface& original, const TriangleMesh& mesh, const UnitFrame& frame,
-                        std::span<const SurfacePoint> points, MeshAttributes& attributes) {
-  constexpr float kOnEdge = 1e-3f;
-  constexpr double kSameSide = 0.5, kFlat = 0.9;  // cosines
-  const bool has_colours = !attributes.colours.empty() && has_colour(original.attributes),
-             has_normals = !attributes.normals.empty() && !original.attributes.normals.empty();
-  if (!has_colours && !has_normals) return;
-  const SurfaceColours colours(original.mesh, original.attributes);
-  for_each_point(points, [&](std::size_t i, const SurfacePoint& point) {
-    const Triangle& t = mesh.triangles[point.triangle];
-    Vec3 place = Vec3::Zero();
-    for (int k = 0; k < 3; ++k) place += static_cast<double>(point.weights[k]) * mesh.positions[t[k]];
-    place = frame.to_user(place);
-    const SurfacePoint nearest =
-        nearest_in_triangle(original.mesh, find_nearest_triangle(original.mesh, original.tree, place).triangle, place);
-    if (has_colours) attributes.colours.values[i] = colours.at(nearest);
-    if (!has_normals) return;
-    const Vec3 facing = area_vector(mesh, t).normalized();
-    // On a sharp edge the normal stands for both sides, of which the original's is one.
-    if (point.weights.minCoeff() < kOnEdge && attributes.normals.values[i].dot(facing) < kFlat) return;
-    const Triangle& corners = original.attributes.normals.of(original.mesh, nearest.triangle);
-    Vec3 normal = Vec3::Zero();
-    for (int k = 0; k < 3; ++k)
-      normal += static_cast<double>(nearest.weights[k]) * original.attributes.normals.values[corners[k]];
-    const double cosine = normal.normalized().dot(facing);
-    if (std::abs(cosine) > kSameSide) attributes.normals.values[i] = (cosine < 0 ? -1 : 1) * normal.normalized();
-  });
-}
-
 std::vector<float> read_numbers(const TriangleMesh& mesh, const VertexNumbers& numbers,
                                 std::span<const SurfacePoint> points) {
   std::vector<float> values(points.size(), 0.f);
@@ -213,6 +180,48 @@ MeshAttributes attributes_at(const TriangleMesh& mesh, const MeshAttributes& att
   return at;
 }
 
+namespace {
+
+/// Takes colours and normals from the nearest points of the file's surface, on the side where the mesh looks.
+/// \param points  of the mesh, as `attributes`
+/// \param frame  of the mesh
+void take_from_original(ClContext& context, const AttributedMesh& original, const TriangleMesh& mesh,
+                        const UnitFrame& frame, std::span<const SurfacePoint> points, MeshAttributes& attributes) {
+  constexpr double kReach = 0.005;  // diagonals: for the other side of a thin part
+  constexpr float kOnEdge = 1e-3f;
+  constexpr double kSameSide = 0.5, kFlat = 0.9;  // cosines
+  LayerOptions options;
+  options.has_normals = !attributes.normals.empty() && !original.attributes.normals.empty();
+  options.has_colours = !attributes.colours.empty();
+  options.has_numbers = false;
+  const TriangleMesh surface = in_frame(original.mesh, frame);
+  const double reach = kReach * bounding_box(mesh).diagonal();
+  const auto facing = [&](const SurfacePoint& point) { return area_vector(mesh, mesh.triangles[point.triangle]); };
+  std::vector<Probe> probes(points.size());
+  for_each_point(points, [&](std::size_t i, const SurfacePoint& point) {
+    const Triangle& t = mesh.triangles[point.triangle];
+    for (int k = 0; k < 3; ++k) probes[i].point += static_cast<double>(point.weights[k]) * mesh.positions[t[k]];
+    probes[i].outward = facing(point);
+    probes[i].reach = reach;
+  });
+  std::vector<SurfacePoint> found = find_surface_points(context, surface, build_triangle_tree(surface), probes);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (points[i].triangle < 0) found[i].triangle = -1;
+  MeshAttributes those = attributes_at(surface, original.attributes, found, options);
+  if (!those.colours.empty()) attributes.colours = std::move(those.colours);
+  if (!options.has_normals) return;
+  for_each_point(points, [&](std::size_t i, const SurfacePoint& point) {
+    const Vec3 outward = facing(point).normalized();
+    Vec3& normal = attributes.normals.values[i];
+    // On a sharp edge the normal stands for both sides, of which the file's is one.
+    if (point.weights.minCoeff() < kOnEdge && normal.dot(outward) < kFlat) return;
+    const double cosine = those.normals.values[i].dot(outward);
+    if (std::abs(cosine) > kSameSide) normal = (cosine < 0 ? -1 : 1) * those.normals.values[i];
+  });
+}
+
+}  // namespace
+
 ReadLayers read_layers(ClContext& context, const PreparedModel& model, const TriangleMesh& mesh,
                        const TriangleTree& tree, const MeshAttributes& given, const LayerOptions& options) {
   ReadLayers result;
@@ -232,7 +241,7 @@ ReadLayers read_layers(ClContext& context, const PreparedModel& model, const Tri
   }
   const std::vector<SurfacePoint> points = surface_points(context, model, mesh, tree);
   MeshAttributes texels = attributes_at(mesh, attributes, points, options);
-  if (given.original) take_from_original(*given.original, mesh, model.model.skeleton.frame, points, texels);
+  if (given.original) take_from_original(context, *given.original, mesh, model.model.skeleton.frame, points, texels);
   result.layers = layers_of_texels(model, texels);
   return result;
 }

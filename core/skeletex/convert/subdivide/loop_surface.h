@@ -5,12 +5,6 @@
 
 namespace skeletex {
 
-/// A mesh, and what it has beside its geometry.
-struct AttributedMesh {
-  TriangleMesh mesh;
-  MeshAttributes attributes;
-};
-
 /// The Loop subdivision surface of a mesh (Loop 1987), as triangles: each is divided into four `rounds` times, by
 /// OpenMesh, and then all vertices move to their limit positions. Triangle t becomes 4^rounds t and those after it.
 /// Colours, texture coordinates and numbers are linear over the mesh's own triangles; normals are left out, as those of
