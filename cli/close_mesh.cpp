@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <optional>
 #include <type_traits>
@@ -12,6 +11,7 @@
 #include "files.h"
 #include "program_path.h"
 #include "runner/process.h"
+#include "runner/work_folder.h"
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/close/cut_handles.h"
 #include "skeletex/close/fill_holes.h"
@@ -28,32 +28,11 @@ namespace fs = std::filesystem;
 /// Vertices nearer to each other are one where a mesh is not closed; diagonals.
 constexpr double kSameVertex = 1e-6;
 constexpr double kDetail = 0.008;     // of a wrap, diagonals
-constexpr double kSmallPart = 0.001;  // of the area
+constexpr double kSmallPart = 0.005;  // of the area
 constexpr double kBody = 0.9;         // of the area: a part that is nearly everything
 constexpr int kMostUnited = 300;      // parts
 constexpr double kHandles = 0.08;     // of a wrap or union: longest loop around a handle that is cut, diagonals
 constexpr double kRigHandles = 0.3;   // the same of a rig
-
-/// A folder for the files that the two programs exchange.
-class WorkFolder {
- public:
-  WorkFolder() {
-    std::string pattern = (fs::temp_directory_path() / "skeletex-close-XXXXXX").string();
-    if (::mkdtemp(pattern.data()) == nullptr)
-      throw IoError(fmt::format("no folder for temporary files can be made in {}", fs::temp_directory_path().string()));
-    path_ = pattern;
-  }
-  ~WorkFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  WorkFolder(const WorkFolder&) = delete;
-  WorkFolder& operator=(const WorkFolder&) = delete;
-  fs::path operator/(const char* name) const { return path_ / name; }
-
- private:
-  fs::path path_;
-};
 
 /// Values of vertices become those of corners, so that vertices can be joined and split.
 void name_corners(MeshParts& parts) {
@@ -112,11 +91,12 @@ struct Wrap {
 /// \return its result; nothing, and what it says, where there is none
 std::optional<TriangleMesh> run_wrap(const WorkFolder& folder, const std::vector<std::string>& options,
                                      std::string& errors) {
-  std::vector<std::string> arguments{(folder / "mesh.ply").string(), "-o", (folder / "wrap.ply").string()};
+  std::vector<std::string> arguments{(folder.path() / "mesh.ply").string(), "-o",
+                                     (folder.path() / "wrap.ply").string()};
   arguments.insert(arguments.end(), options.begin(), options.end());
   ProcessResult result;
   try {
-    result = run_process(wrap_program(), arguments, {}, folder / "errors.txt");
+    result = run_process(wrap_program(), arguments, {}, folder.path() / "errors.txt");
   } catch (const IoError&) {
     result.exit_code = 127;
   }
@@ -127,7 +107,7 @@ std::optional<TriangleMesh> run_wrap(const WorkFolder& folder, const std::vector
   errors = result.errors;
   if (errors.starts_with("error: ")) errors.erase(0, std::string("error: ").size());
   if (result.exit_code != 0) return {};
-  return read_mesh(folder / "wrap.ply").mesh;
+  return read_mesh(folder.path() / "wrap.ply").mesh;
 }
 
 Wrap wrap_with(double detail, const WorkFolder& folder) {
@@ -336,7 +316,7 @@ Json fill_or_wrap(MeshParts& parts, const CloseOptions& options) {
   FillResult filling = fill_holes(filled);
   if (filling.obstacle.empty()) return take_filled(parts, std::move(filled), filling);
   const WorkFolder folder;
-  write_mesh(folder / "mesh.ply", filled);
+  write_mesh(folder.path() / "mesh.ply", filled);
   if (!options.detail)
     if (Json json = take_union(parts, filled, folder); !json.is_null()) return json;
   spdlog::info("--close: {}, so the mesh is wrapped", filling.obstacle);

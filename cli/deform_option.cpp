@@ -11,6 +11,7 @@
 #include "skeletex/io/pose_file.h"
 #include "skeletex/io/suggestion.h"
 #include "skeletex/model/error.h"
+#include "skeletex/skeleton/find_bone.h"
 
 namespace skeletex::cli {
 namespace {
@@ -65,15 +66,11 @@ void check_distance_option(bool is_distance_dropped, const std::string& word) {
 }
 
 int bone_by_name(const Skeleton& skeleton, const std::string& name) {
-  const auto found =
-      std::find_if(skeleton.bones.begin(), skeleton.bones.end(), [&](const Bone& bone) { return bone.name == name; });
-  if (found == skeleton.bones.end()) {
-    std::vector<std::string> names;
-    for (const Bone& bone : skeleton.bones) names.push_back(bone.name);
-    throw InputError(fmt::format("the skeleton has no bone \"{}\"; `skeletex inspect` lists them{}", name,
-                                 did_you_mean(name, names)));
-  }
-  return static_cast<int>(found - skeleton.bones.begin());
+  if (const std::optional<int> bone = find_bone(skeleton, name)) return *bone;
+  std::vector<std::string> names;
+  for (const Bone& bone : skeleton.bones) names.push_back(bone.name);
+  throw InputError(
+      fmt::format("the skeleton has no bone \"{}\"; `skeletex inspect` lists them{}", name, did_you_mean(name, names)));
 }
 
 Deformation deformation_of(const std::string& word) {

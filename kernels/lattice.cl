@@ -6,7 +6,6 @@
 #include "skeletex_structs.h"
 #include "texel_structs.h"
 
-#define BAND_COLUMNS 64  // of a band that a group is at
 #define BAND_LINE (BAND_COLUMNS + 2)
 
 // left, right, beyond: the columns of the 4 x 4 vertices around the quad beside the texel's own, from this one.

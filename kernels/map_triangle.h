@@ -8,8 +8,6 @@
 #include "planes.h"
 #include "texel_structs.h"
 
-#define NO_TRIANGLE 0x7fffffff
-
 // The maps of all VSM patches. Vertices are relative to the model's origin; row_high, row_low: u of the rows of all
 // patches.
 typedef struct Maps {

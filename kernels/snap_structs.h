@@ -7,6 +7,8 @@
 namespace skeletex {
 #endif
 
+#define SNAP_BIN_WIDTH 8  // columns: a float8 of them
+
 /// A vertex of the mesh, where it lies in the cells of its patch.
 typedef struct SnapVertex {
   float x, y;  ///< x unwrapped

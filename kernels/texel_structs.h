@@ -11,6 +11,9 @@
 #define MAP_PATCHES 10
 #define MAP_TRIANGLE_PLANES 11
 
+#define NO_TRIANGLE 0x7fffffff  // of a map that a texel is in
+#define BAND_COLUMNS 64         // of a band of rows that a group of choose_diagonals takes
+
 /// What find_folds and relax_folds count.
 #define FOLD_QUADS 0     // quads that are listed
 #define FOLD_FOUND 1     // folded quads

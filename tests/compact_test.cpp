@@ -146,6 +146,12 @@ TEST_P(Compact, ReadsPrefixesAsCoarserModels) {
     last = off;
   }
   EXPECT_LT(last, 1e-10);
+  try {
+    read_compact(std::string_view(bytes).substr(0, 60), "file", PrefixRule::kPrefix);
+    ADD_FAILURE() << "60 bytes are read";
+  } catch (const IoError& error) {
+    EXPECT_NE(std::string(error.what()).find("take more bytes"), std::string::npos) << error.what();
+  }
 }
 
 /// Whatever is changed is refused; and where nothing is checked, it gives a sound model or is refused.

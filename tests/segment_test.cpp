@@ -155,7 +155,7 @@ void expect_sound(const TriangleMesh& mesh, const Skeleton& skeleton, const Segm
   std::vector<std::set<int>> nodes_at(s.cut_mesh.positions.size());
   for (const Arc& arc : s.arcs)
     for (const int v : arc.vertices) nodes_at[v].insert(arc.node);
-  const std::vector<NodeCells> cells = node_cells(skeleton, SegmentOptions().perturbation_rel_diag * diagonal);
+  const std::vector<NodeCells> cells = node_cells(skeleton, kMostPerturbation * diagonal);
   for (std::size_t t = 0; t < s.cut_mesh.triangles.size(); ++t) {
     const auto [a, b, c] = s.cut_mesh.triangles[t];
     if (nodes_at[a].empty() && nodes_at[b].empty() && nodes_at[c].empty()) continue;

@@ -507,6 +507,17 @@ TEST(Skeletonize, AThinShellWithHandlesGetsASkeleton) {
   EXPECT_EQ(errors_of(mesh, skeleton), "");
 }
 
+/// Rings of fewer bones can give a smaller error.
+TEST(Skeletonize, RingsAreTriedWithFewerBones) {
+  const TriangleMesh mesh = read_mesh(SKELETEX_SOURCE_DIR "/build/meshes/eight.off").mesh;
+  const SkeletonizeResult result = skeletonized(mesh);
+  const SkeletonCandidate &first = result.candidates.front(), &chosen = result.candidates[result.chosen];
+  EXPECT_LT(chosen.bones, first.bones);
+  EXPECT_LT(chosen.error, 0.95 * first.error);
+  EXPECT_EQ(result.skeleton.bones.size() - result.skeleton.nodes.size() + 1, 2u);
+  EXPECT_EQ(errors_of(mesh, result.skeleton), "");
+}
+
 TEST(Skeletonize, LargeMeshesAreTriedCoarseAndAcceptedWhole) {
   const TriangleMesh mesh = capsule_shape(2, 0.5, 500, 360).mesh;
   ASSERT_GT(mesh.triangles.size(), 350'000u);

@@ -14,7 +14,7 @@ namespace skeletex {
 namespace fs = std::filesystem;
 
 WorkFolder::WorkFolder() {
-  std::string pattern = (fs::temp_directory_path() / "skeletex-run-XXXXXX").string();
+  std::string pattern = (fs::temp_directory_path() / "skeletex-XXXXXX").string();
   if (!::mkdtemp(pattern.data()))
     throw IoError(
         fmt::format("{}: no folder for intermediate files can be made there", fs::temp_directory_path().string()));

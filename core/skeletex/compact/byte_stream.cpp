@@ -78,7 +78,7 @@ void ByteWriter::text(std::string_view value) {
 }
 
 int ByteReader::byte() {
-  if (at_ >= bytes_.size()) throw IoError("it ends too early");
+  if (at_ >= bytes_.size()) throw IoError(kEndsTooEarly);
   return static_cast<unsigned char>(bytes_[at_++]);
 }
 std::uint64_t ByteReader::count(std::uint64_t most) {
@@ -105,7 +105,7 @@ double ByteReader::real() {
 }
 std::string ByteReader::text(std::size_t most) {
   const std::size_t size = count(most);
-  if (size > left()) throw IoError("it ends too early");
+  if (size > left()) throw IoError(kEndsTooEarly);
   at_ += size;
   return std::string(bytes_.substr(at_ - size, size));
 }
@@ -121,7 +121,7 @@ std::string compress(std::string_view bytes) {
 }
 
 std::string decompress(std::string_view compressed, std::size_t size, bool is_prefix) {
-  if (compressed.empty()) throw IoError("it ends too early");
+  if (compressed.empty()) throw IoError(kEndsTooEarly);
   const int settings = static_cast<unsigned char>(compressed[0]);
   if (settings % 5 + settings / 5 % 5 > 4 || settings / 25 > 4) throw IoError("its settings of LZMA do not exist");
   lzma_options_lzma options = options_of(settings);

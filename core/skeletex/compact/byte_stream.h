@@ -6,6 +6,9 @@
 
 namespace skeletex {
 
+/// What is wrong with bytes that are too few.
+inline constexpr const char* kEndsTooEarly = "it ends too early";
+
 /// Appends numbers to bytes: whole numbers in groups of 7 bits, the lowest first; signed ones as 0, -1, 1, -2, ...
 class ByteWriter {
  public:

@@ -21,7 +21,7 @@ namespace {
 constexpr std::string_view kMagic = "\x8fSKX";
 constexpr std::size_t kHeader = 13;  // magic, version, checksum
 /// Limits of what a file may hold: every size is checked against them before memory is taken.
-constexpr std::uint64_t kMostBones = 4096, kMostName = 4096, kMostSteps = 28, kMostLayers = 1024,
+constexpr std::uint64_t kMostListed = 4096, kMostName = 4096, kMostSteps = 28, kMostLayers = 1024,
                         kMostPayload = std::uint64_t{1} << 30;
 constexpr std::int64_t kMostPosition = std::int64_t{1} << 40, kMostInteger = 1 << 24;
 constexpr double kMostPoints = 16384.0 * 16384.0;
@@ -54,17 +54,17 @@ Skeleton read_skeleton(ByteReader& in) {
   for (int k = 0; k < 3; ++k) frame.mantissa |= static_cast<std::uint32_t>(in.byte()) << (8 * k);
   for (std::int64_t& offset : frame.offset) offset = in.number(kMostPosition);
   skeleton.frame = frame_of_code(frame);
-  skeleton.nodes.resize(in.count(kMostBones + 1));
+  skeleton.nodes.resize(in.count(kMostListed + 1));
   for (Node& node : skeleton.nodes) node.name = in.text(kMostName);
   for (Node& node : skeleton.nodes)
     for (int k = 0; k < 3; ++k) node.position[k] = static_cast<double>(in.number(kMostPosition)) * kNodeStep;
-  skeleton.bones.resize(in.count(kMostBones));
+  skeleton.bones.resize(in.count(kMostListed));
   if (skeleton.bones.empty()) throw IoError("it has no bone");
   for (Bone& bone : skeleton.bones) bone.name = in.text(kMostName);
   for (std::size_t i = 0; i < skeleton.bones.size(); ++i) {
     Bone& bone = skeleton.bones[i];
-    bone.head = static_cast<int>(in.count(kMostBones));
-    bone.tail = static_cast<int>(in.count(kMostBones));
+    bone.head = static_cast<int>(in.count(kMostListed));
+    bone.tail = static_cast<int>(in.count(kMostListed));
     const int low = in.byte(), angle = low + 256 * in.byte();
     const int nodes = static_cast<int>(skeleton.nodes.size());
     if (bone.head >= nodes || bone.tail >= nodes || bone.head == bone.tail)
@@ -157,10 +157,10 @@ void check_at(const CompactModel& model, int bone, int node) {
 }
 
 void read_seams(ByteReader& in, CompactModel& model) {
-  model.corners.resize(in.count(8 * kMostBones));
+  model.corners.resize(in.count(8 * kMostListed));
   for (CompactCorner& corner : model.corners) {
     corner.node = read_index(in, model.skeleton.nodes.size());
-    corner.bones.resize(in.count(kMostBones));
+    corner.bones.resize(in.count(kMostListed));
     if (corner.bones.size() < 3) throw IoError("three or more bones meet at a corner");
     for (int& bone : corner.bones) {
       bone = read_index(in, model.skeleton.bones.size());
@@ -170,7 +170,7 @@ void read_seams(ByteReader& in, CompactModel& model) {
     corner.turn = low + 256 * in.byte();
     corner.distance = static_cast<int>(in.count(kMostInteger));
   }
-  model.arcs.resize(in.count(8 * kMostBones));
+  model.arcs.resize(in.count(8 * kMostListed));
   for (CompactArc& arc : model.arcs) {
     arc.node = read_index(in, model.skeleton.nodes.size());
     for (int& bone : arc.bones) {
@@ -230,7 +230,7 @@ StepResiduals read_step(ByteReader& in, std::size_t sites, bool has_across) {
   StepResiduals step;
   const int flag = in.byte();
   if (flag > 1) throw IoError("the head of a step is damaged");
-  if (sites > in.left()) throw IoError("it ends too early");
+  if (sites > in.left()) throw IoError(kEndsTooEarly);
   step.normal.resize(sites);
   if (flag == 1) step.side.resize(sites);
   if (flag == 1 && has_across) step.across.resize(sites);
@@ -280,7 +280,7 @@ void read_layers(ByteReader& in, CompactModel& model) {
     if (std::count_if(model.layers.begin(), model.layers.end(),
                       [&](const CompactLayer& other) { return other.name == layer.name; }) > 1)
       throw IoError("a layer is named twice");
-    layer.planes = static_cast<int>(in.count(kMostBones));
+    layer.planes = static_cast<int>(in.count(kMostListed));
     layer.is_bone_weights = in.byte() != 0;
     layer.offset = in.real();
     layer.step = in.real();
@@ -341,7 +341,7 @@ void read_plane_steps(ByteReader& in, CompactPatch& patch, int step) {
     std::vector<int>& residuals = plane.steps.emplace_back();
     if (in.byte() == 0) continue;
     const std::size_t count = value_count(patch, step);
-    if (count > in.left()) throw IoError("it ends too early");
+    if (count > in.left()) throw IoError(kEndsTooEarly);
     residuals.resize(count);
     for (int& residual : residuals) residual = in.residual();
   }
@@ -463,7 +463,7 @@ std::string compact_bytes(const CompactModel& model) {
 CompactModel read_compact(std::string_view bytes, const std::string& where, PrefixRule rule) {
   try {
     if (!is_compact(bytes)) throw IoError("it is no compact model (.skx)");
-    if (bytes.size() <= kHeader) throw IoError("it ends too early");
+    if (bytes.size() <= kHeader) throw IoError(kEndsTooEarly);
     const int version = static_cast<unsigned char>(bytes[kMagic.size()]);
     if (version != kCompactVersion)
       throw IoError(fmt::format("it is written in version {} of the format, this program reads version {}; {}", version,
@@ -481,7 +481,9 @@ CompactModel read_compact(std::string_view bytes, const std::string& where, Pref
     const std::size_t size = head.count(kMostPayload);
     return model_of(decompress(rest.substr(rest.size() - head.left()), size, rule == PrefixRule::kPrefix), rule);
   } catch (const Error& error) {
-    throw IoError(fmt::format("{}: {}", where, error.what()));
+    const bool is_short = rule == PrefixRule::kPrefix && std::string_view(error.what()) == kEndsTooEarly;
+    throw IoError(fmt::format("{}: {}{}", where, error.what(),
+                              is_short ? "; the skeleton and the coarsest level come first: take more bytes" : ""));
   }
 }
 

@@ -17,11 +17,10 @@ constexpr double kRamp = 1.3;                        // between them, so that th
 constexpr double kLeastSteps = 0.05;                 // fewer would take the time of one for nothing
 
 double choose_fit_steps(std::size_t texels, double texels_per_vertex) {
-  const double most = FitOptions{}.steps;
-  if (texels <= kQuickTexels) return most;
+  if (texels <= kQuickTexels) return kMostFitSteps;
   if (texels > kMostTexels) return 0;
   const double share = std::clamp((kManyTexels - texels_per_vertex) / (kManyTexels - kFewTexels), 0.0, 1.0);
-  const double steps = most * portable::pow(share, kRamp);
+  const double steps = kMostFitSteps * portable::pow(share, kRamp);
   return steps < kLeastSteps ? 0 : steps;
 }
 
@@ -39,7 +38,7 @@ TexelPlacing choose_placing(std::size_t texels, std::size_t vertices, std::optio
   TexelPlacing placing;
   const double per_vertex = static_cast<double>(texels) / static_cast<double>(std::max<std::size_t>(1, vertices));
   placing.texels_per_vertex = per_vertex;
-  if (has_fit.value_or(true)) placing.fit_steps = has_fit ? FitOptions{}.steps : choose_fit_steps(texels, per_vertex);
+  if (has_fit.value_or(true)) placing.fit_steps = has_fit ? kMostFitSteps : choose_fit_steps(texels, per_vertex);
   const bool is_fitted = placing.is_fitted();
   placing.has_snap =
       has_snap.value_or(expected_error(true, is_fitted, per_vertex) < expected_error(false, is_fitted, per_vertex));

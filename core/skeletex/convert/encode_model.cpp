@@ -23,6 +23,7 @@
 #include "skeletex/reconstruct/prepared_model.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/skeleton/check_skeleton.h"
+#include "skeletex/skeleton/find_bone.h"
 
 namespace skeletex {
 namespace {
@@ -42,8 +43,7 @@ void check_options(const EncodeOptions& options, const Skeleton& skeleton) {
   if (!(options.hybrid_unseen_threshold >= 0))
     throw InputError("the hybrid threshold is negative; give a share of area, such as 0.01");
   for (const auto& override : options.hybrid_overrides)
-    if (std::none_of(skeleton.bones.begin(), skeleton.bones.end(),
-                     [&](const Bone& bone) { return bone.name == override.first; }))
+    if (!find_bone(skeleton, override.first))
       throw InputError(
           fmt::format("a method is given for bone \"{}\", which the skeleton does not have", override.first));
 }
@@ -312,8 +312,7 @@ Encoding encode_hybrid(const EncodeJob& job, const SkeletexModel& start, MappedS
                                 ? Method::kSpd
                                 : Method::kVsm;
   for (const auto& [name, method] : options.hybrid_overrides)
-    for (std::size_t bone = 0; bone < count; ++bone)
-      if (start.skeleton.bones[bone].name == name) surface.methods[bone] = method;
+    surface.methods[find_bone(start.skeleton, name).value()] = method;
   if (surface.methods == by_vsm.methods && spd.mean >= vsm.mean) return by_vsm;
   if (surface.methods == by_spd.methods) return by_spd;
   Encoding mixed = encode_surface(job, start, surface);

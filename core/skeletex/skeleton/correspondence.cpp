@@ -17,6 +17,7 @@
 #include "skeletex/geometry/best_rotation.h"
 #include "skeletex/model/error.h"
 #include "skeletex/skeleton/cost_table.h"
+#include "skeletex/skeleton/find_bone.h"
 #include "skeletex/skeleton/separation_planes.h"
 
 namespace skeletex {
@@ -451,8 +452,7 @@ std::string first_difference(const Side& a, const Side& b) {
 }
 
 int index_of(const Skeleton& skeleton, const std::string& name, const char* which) {
-  for (std::size_t i = 0; i < skeleton.bones.size(); ++i)
-    if (skeleton.bones[i].name == name) return static_cast<int>(i);
+  if (const std::optional<int> bone = find_bone(skeleton, name)) return *bone;
   throw InputError(fmt::format("the {} skeleton has no bone \"{}\"", which, name));
 }
 

@@ -43,6 +43,7 @@ constexpr const char* kHandleRemedy =
     ". `encode --close` cuts them off; with --close-handles X, only those with a loop of at most X diagonals around "
     "them";
 constexpr std::array<int, 2> kEvenRings{5, 10};  // bones
+constexpr int kMostWorse = 2;                    // rings of fewer bones that are tried in a row without a gain
 /// Beside an accepted skeleton with half of the limbs, repairs end after so many margins. That is about a second.
 constexpr long kMostMargins = 150'000;
 
@@ -258,6 +259,27 @@ int choose(const std::vector<SkeletonCandidate>& candidates, const SkeletonizeOp
   return best;
 }
 
+/// Tries the chosen rings with ever fewer bones, which can give a smaller error, and chooses again.
+void try_shorter_rings(std::vector<Level>& levels, SkeletonizeResult& result, const SkeletonizeOptions& options,
+                       const std::function<void(Level&)>& try_level) {
+  auto repair = std::make_unique<Repair>(*levels[result.chosen].repair);
+  const auto shorten = [&] {
+    const std::size_t before = repair->skeleton().bones.size(), wanted = before - std::max<std::size_t>(1, before / 6);
+    while (repair->skeleton().bones.size() > wanted && repair->contract_cheapest()) {
+    }
+    return repair->skeleton().bones.size() < before;
+  };
+  for (int worse = 0; worse < kMostWorse && shorten(); ++worse) {
+    levels.push_back({fmt::format("handles, {} bones", repair->skeleton().bones.size()), {}, std::move(repair), {}});
+    try_level(levels.back());
+    if (!result.candidates.back().refusal.empty()) break;
+    repair = std::make_unique<Repair>(*levels.back().repair);
+    const int best = choose(result.candidates, options);
+    if (best != result.chosen) worse = -1;
+    result.chosen = best;
+  }
+}
+
 /// Why none of the candidates is taken.
 std::string refusal_of(const SkeletonizeResult& result) {
   const SkeletonCandidate& first = result.candidates.front();
@@ -327,6 +349,10 @@ SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, cons
       if (result.candidates.back().refusal.empty()) break;
     }
   result.chosen = choose(result.candidates, options);
+  if (result.chosen == 0 && result.genus > 0 && !options.most_bones) {
+    report("trying rings of fewer bones", 0.97);
+    try_shorter_rings(levels, result, options, try_level);
+  }
   if (result.chosen < 0) throw TopologyError(refusal_of(result));
   if (options.purpose == SkeletonPurpose::kPose && !options.most_bones && add_jointed_level(surface, result, levels)) {
     try_level(levels.back());

@@ -11,12 +11,16 @@ namespace skeletex {
 namespace {
 
 constexpr int kColours = 6;
+constexpr int kSweeps = 4;           // of the solver, per step
+constexpr float kDamping = 0.0005f;  // of a step, share of a texel's mean diagonal entry
+constexpr float kSprings = 0.001f;   // between the steps of neighbouring texels, the same share
+constexpr double kFloor = 1;         // added to |residual| in the weights, share of the mean one
 
 }  // namespace
 
 FitReport fit_points(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps,
                      const ClBuffer<int>& covering, const ReadingPositions& positions, DevicePlanes& points,
-                     const FitOptions& options) {
+                     double steps) {
   const std::size_t size = layout.size();
   const auto planes = [&](std::size_t count) { return context.allocate<float>(count * size); };
   auto samples = planes(FIT_SAMPLES * SAMPLE_PLANES), matched = planes(FIT_MATCHED_PLANES);
@@ -24,7 +28,7 @@ FitReport fit_points(ClContext& context, const DeviceLayout& layout, const Devic
   auto numbers = context.allocate<int>(FIT_NUMBER_PLANES * size);
   context.copy(covering, numbers);
   DevicePlanes moves = allocate_planes(context, size);
-  FitParameters parameters{maps.sizes, layout.width, layout.height, 0, 0, options.damping, options.springs, 1};
+  FitParameters parameters{maps.sizes, layout.width, layout.height, 0, 0, kDamping, kSprings, 1};
   const auto launch = [&](const char* kernel, const auto&... arguments) {
     context.launch({"fit.cl", kernel}, layout.range(), parameters, layout.texel_patches, layout.tables.patches,
                    arguments...);
@@ -48,16 +52,16 @@ FitReport fit_points(ClContext& context, const DeviceLayout& layout, const Devic
     if (step > 0 && !(residual < report.residuals.back())) break;
     points = next;
     report.residuals.push_back(residual);
-    if (step >= options.steps || residual == 0) break;
+    if (step >= steps || residual == 0) break;
 
-    parameters.least_residual = static_cast<float>(options.floor * residual);
+    parameters.least_residual = static_cast<float>(kFloor * residual);
     launch("assemble", samples, numbers, matched, lattice, system);
     context.fill(moves.values, 0.f);
-    for (int sweep = 0; sweep < options.sweeps; ++sweep)
+    for (int sweep = 0; sweep < kSweeps; ++sweep)
       for (parameters.colour = 0; parameters.colour < kColours; ++parameters.colour)
         launch("relax_moves", system, moves.values);
     next = allocate_planes(context, size);
-    parameters.share = static_cast<float>(std::min(1.0, options.steps - step));
+    parameters.share = static_cast<float>(std::min(1.0, steps - step));
     launch("move_points", start.values, points.values, moves.values, next.values);
   }
   return report;

@@ -7,13 +7,7 @@
 
 namespace skeletex {
 
-struct FitOptions {
-  double steps = 4;         ///< of Gauss-Newton, at most; 2.5: three, of which the third goes half the way
-  int sweeps = 4;           ///< of the solver, per step
-  float damping = 0.0005f;  ///< of a step, share of a texel's mean diagonal entry
-  float springs = 0.001f;   ///< between the steps of neighbouring texels, the same share
-  float floor = 1;          ///< added to |residual| in the weights, share of the mean one
-};
+inline constexpr double kMostFitSteps = 4;
 
 /// What the fit did.
 struct FitReport {
@@ -28,8 +22,9 @@ struct FitReport {
 /// four points of the mesh per quad of the lattice and the middle of each of its triangles. End rows stay; no point
 /// moves by more than a quarter of a cell in a step and a cell in all. See docs/steps/snap.md.
 /// \param covering  per texel the triangle of the map that covers its place, as encode.cl's cover_texels leaves it
+/// \param steps  of Gauss-Newton, at most; 2.5: three, of which the third goes half the way
 FitReport fit_points(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps,
                      const ClBuffer<int>& covering, const ReadingPositions& positions, DevicePlanes& points,
-                     const FitOptions& options = {});
+                     double steps = kMostFitSteps);
 
 }  // namespace skeletex

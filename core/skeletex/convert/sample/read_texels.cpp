@@ -2,15 +2,14 @@
 #include "skeletex/convert/sample/read_texels.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "skeletex/geometry/parallel.h"
 
 namespace skeletex {
 namespace {
 
-constexpr int kNoTriangle = std::numeric_limits<int>::max();  // as in encode.cl
-constexpr int kIsKept = 1, kNoneIsKept = 0;                   // what keeps a texel from being filtered
+constexpr int kNoTriangle = NO_TRIANGLE;
+constexpr int kIsKept = 1, kNoneIsKept = 0;  // what keeps a texel from being filtered
 
 /// Fills what is below 0 of a line of values: by the mean of the nearest known ones, weighted by nearness.
 /// \param known  places of the known ones, in order
@@ -327,7 +326,7 @@ ReadTexels place_texels(const TexelStage& stage, const TexelOptions& options, co
   ReadTexels texels = sources.features ? snap(stage, regular) : copy_of(stage, regular);
   if (options.fit_steps > 0)
     report.fit = fit_points(context, stage.layout, stage.maps, texels.map_triangles, texels.positions, texels.points,
-                            {.steps = options.fit_steps});
+                            options.fit_steps);
   // What is snapped or fitted is not filtered as well: only SPD patches are.
   if (options.has_prefilter && has_spd(sources.patches))
     texels.points =

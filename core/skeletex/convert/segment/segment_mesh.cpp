@@ -33,10 +33,9 @@ struct HalfEdgeLoop {
 
 class Segmenter {
  public:
-  Segmenter(ClContext& context, CutMesh mesh, const Skeleton& skeleton, const SegmentOptions& options)
+  Segmenter(ClContext& context, CutMesh mesh, const Skeleton& skeleton)
       : context_(context),
         skeleton_(skeleton),
-        options_(options),
         separation_(skeleton),
         mesh_(std::move(mesh)),
         genus_(1 - (static_cast<int>(mesh_.positions.size()) - mesh_.triangle_count() / 2) / 2) {}
@@ -86,7 +85,6 @@ class Segmenter {
 
   ClContext& context_;
   const Skeleton& skeleton_;
-  const SegmentOptions& options_;
   SeparationPlanes separation_;
   CutMesh mesh_;
   int genus_;  // Euler's formula for a closed triangle mesh: edges are 3/2 of the triangles
@@ -124,7 +122,7 @@ void Segmenter::cut() {
     box.lower = box.lower.cwiseMin(p);
     box.upper = box.upper.cwiseMax(p);
   }
-  const std::vector<NodeCells> nodes = node_cells(skeleton_, options_.perturbation_rel_diag * box.diagonal());
+  const std::vector<NodeCells> nodes = node_cells(skeleton_, kMostPerturbation * box.diagonal());
   const std::vector<std::uint8_t> labels_at_nodes = classify_points(context_, mesh_.positions, nodes);
   const std::size_t input_count = mesh_.positions.size();
   std::vector<std::uint8_t> labels;
@@ -480,13 +478,13 @@ void Segmenter::build_segments() {
 
 }  // namespace
 
-Segmentation segment_mesh(ClContext& context, CutMesh mesh, const Skeleton& skeleton, const SegmentOptions& options) {
+Segmentation segment_mesh(ClContext& context, CutMesh mesh, const Skeleton& skeleton) {
   if (skeleton.bones.empty()) throw InputError("the skeleton has no bones; give it at least one");
   if (mesh.origins.empty()) throw InputError("the mesh has no triangles");
   for (std::size_t v = 0; v < mesh.positions.size(); ++v)
     if (!std::isfinite(mesh.positions[v].squaredNorm()))
       throw InputError(fmt::format("vertex {} of the mesh has no finite position; remove it", v));
-  return Segmenter(context, std::move(mesh), skeleton, options).run();
+  return Segmenter(context, std::move(mesh), skeleton).run();
 }
 
 }  // namespace skeletex

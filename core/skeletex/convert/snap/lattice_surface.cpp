@@ -54,7 +54,7 @@ void for_each_inner_row(const SkeletexModel& model, const Lattice& lattice, cons
 
 ClBuffer<int> choose_diagonals(ClContext& context, DiagonalRule rule, const std::vector<LatticeRow>& rows,
                                const ClBuffer<PatchRecord>& records, int texture_width, const DevicePlanes& points) {
-  constexpr int kBandRows = 16, kBandColumns = 64;  // of a group; columns as in lattice.cl
+  constexpr int kBandRows = 16, kBandColumns = BAND_COLUMNS;  // of a group
   const int count = static_cast<int>(rows.size());
   ClRange groups = row_range(context, (count + kBandRows - 1) / kBandRows);
   groups.global[1] = (texture_width + kBandColumns - 1) / kBandColumns;

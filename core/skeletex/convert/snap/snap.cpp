@@ -16,7 +16,7 @@
 namespace skeletex {
 namespace {
 
-constexpr int kBinWidth = 8;  // as in snap.cl
+constexpr int kBinWidth = SNAP_BIN_WIDTH;
 constexpr int kBinHeight =
     2;  // an edge is listed in fewer of them, and they list hardly more edges than bins of one row would
 

@@ -11,6 +11,7 @@
 #include "skeletex/edit/regular_grid.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/layers/layer_values.h"
+#include "skeletex/skeleton/find_bone.h"
 
 namespace skeletex {
 namespace {
@@ -39,10 +40,9 @@ struct FilterJob {
 std::vector<float> inside_region(const SkeletexModel& model, const Lattice& lattice, const FilterRegion& region) {
   std::vector<bool> is_chosen(model.patches.size(), region.bones.empty());
   for (const std::string& name : region.bones) {
-    const auto& bones = model.skeleton.bones;
-    const auto found = std::find_if(bones.begin(), bones.end(), [&](const Bone& bone) { return bone.name == name; });
-    if (found == bones.end()) throw InputError(fmt::format("the skeleton has no bone \"{}\" to filter", name));
-    is_chosen[found - bones.begin()] = true;
+    const std::optional<int> bone = find_bone(model.skeleton, name);
+    if (!bone) throw InputError(fmt::format("the skeleton has no bone \"{}\" to filter", name));
+    is_chosen[*bone] = true;
   }
   std::vector<float> inside(lattice.vertex_count, 0.f);
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {

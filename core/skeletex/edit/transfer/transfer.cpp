@@ -13,6 +13,7 @@
 #include "skeletex/edit/transfer/transfer_layers.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
+#include "skeletex/skeleton/find_bone.h"
 
 namespace skeletex {
 namespace {
@@ -31,8 +32,7 @@ void check_options(const TransferOptions& options) {
 }
 
 int bone_by_name(const Skeleton& skeleton, const std::string& name, const char* which) {
-  for (std::size_t i = 0; i < skeleton.bones.size(); ++i)
-    if (skeleton.bones[i].name == name) return static_cast<int>(i);
+  if (const std::optional<int> bone = find_bone(skeleton, name)) return *bone;
   throw InputError(fmt::format("the {} has no bone \"{}\"", which, name));
 }
 
