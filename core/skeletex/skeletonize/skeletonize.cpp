@@ -31,7 +31,7 @@ constexpr double kLimbReach = 0.1;  // a node so near to a tip reaches it; diago
 /// Of the least error: more than so many times that is too much for a limb. Corners and rims look like limbs too.
 constexpr double kLimbsMayCost = 3;
 constexpr double kJointsMayCost = 1.25;  // times the error, of joints in long limbs
-constexpr std::array<double, 4> kDetails{0, 1.0 / 3, 2.0 / 3, 1};
+constexpr std::array<double, 4> kDetails{0, 1.0 / 3, 0.5, 2.0 / 3};
 constexpr double kLimbDetail = kDetails[1];  // that of the limbs which a skeleton should reach
 /// Where no skeleton of a body with handles works, its rings are tried with many short bones. The separation planes of
 /// a ring meet inside its polygon; the more sides that has, the nearer they meet to the middle of the hole, outside the
@@ -192,22 +192,6 @@ std::optional<Level> make_fine_level(const Surface& surface, double voxel_side, 
   return level;
 }
 
-/// Adds the chosen skeleton with joints in its long limbs.
-/// \return whether there are any
-bool add_jointed_level(const Surface& surface, const SkeletonizeResult& result, std::vector<Level>& levels) {
-  const Level& chosen = levels[result.chosen];
-  Skeleton jointed = with_joints(surface, chosen.skeleton);
-  if (jointed.bones.size() == chosen.skeleton.bones.size()) return false;
-  levels.push_back({chosen.name + ", joints", {}, std::make_unique<Repair>(surface, std::move(jointed)), {}});
-  return true;
-}
-
-/// Of the last candidate, which is the chosen one with joints.
-bool is_worth_its_joints(const SkeletonizeResult& result) {
-  const SkeletonCandidate &before = result.candidates[result.chosen], &after = result.candidates.back();
-  return after.refusal.empty() && after.bones > before.bones && after.error <= kJointsMayCost * before.error;
-}
-
 /// Whether a candidate is accepted, and its limbs are worth its error.
 /// \param least  error of the accepted candidates
 bool is_fine(const SkeletonCandidate& candidate, double least) {
@@ -280,6 +264,42 @@ void try_shorter_rings(std::vector<Level>& levels, SkeletonizeResult& result, co
   }
 }
 
+/// Tries joints in the long limbs of the chosen skeleton, then of others with as many limbs, which must be better.
+void try_joints(const Surface& surface, std::vector<Level>& levels, SkeletonizeResult& result,
+                const std::function<void(Level&)>& try_level) {
+  const SkeletonCandidate chosen = result.candidates[result.chosen];
+  const auto try_with_joints = [&](std::size_t l, double most_error) {
+    const std::size_t bones = levels[l].skeleton.bones.size();
+    Skeleton jointed = with_joints(surface, levels[l].skeleton);
+    if (jointed.bones.size() == bones) return;
+    levels.push_back({levels[l].name + ", joints", {}, std::make_unique<Repair>(surface, std::move(jointed)), {}});
+    try_level(levels.back());
+    const SkeletonCandidate& after = result.candidates.back();
+    if (after.refusal.empty() && after.bones > static_cast<int>(bones) && after.error <= most_error)
+      result.chosen = static_cast<int>(result.candidates.size()) - 1;
+  };
+  const std::size_t first = result.chosen, count = levels.size();
+  try_with_joints(first, kJointsMayCost * chosen.error);
+  for (std::size_t l = 0; l < count; ++l) {
+    const SkeletonCandidate& before = result.candidates[l];
+    if (l != first && before.refusal.empty() && before.limbs == chosen.limbs &&
+        before.error <= kJointsMayCost * chosen.error)
+      try_with_joints(l, result.candidates[result.chosen].error);
+  }
+}
+
+/// Tries rings of many short bones where no skeleton of a body with handles works.
+void try_fine_rings(const Surface& surface, double voxel_side, std::vector<Level>& levels, SkeletonizeResult& result,
+                    const std::function<void(Level&)>& try_level) {
+  for (const bool is_thinned : {true, false}) {
+    std::optional<Level> level = make_fine_level(surface, voxel_side, levels[0], is_thinned);
+    if (!level) return;
+    levels.push_back(std::move(*level));
+    try_level(levels.back());
+    if (result.candidates.back().refusal.empty()) return;
+  }
+}
+
 /// Why none of the candidates is taken.
 std::string refusal_of(const SkeletonizeResult& result) {
   const SkeletonCandidate& first = result.candidates.front();
@@ -339,25 +359,17 @@ SkeletonizeResult skeletonize(ClContext& context, const TriangleMesh& mesh, cons
     report("trying skeletons", 0.4 + 0.6 * static_cast<double>(l) / static_cast<double>(levels.size()));
     try_level(levels[l]);
   }
-  if (result.genus > 0 && choose(result.candidates, options) < 0)
-    for (const bool is_thinned : {true, false}) {
-      report("trying finer rings", 0.95);
-      std::optional<Level> level = make_fine_level(surface, body.side, levels[0], is_thinned);
-      if (!level) break;
-      levels.push_back(std::move(*level));
-      try_level(levels.back());
-      if (result.candidates.back().refusal.empty()) break;
-    }
+  if (result.genus > 0 && choose(result.candidates, options) < 0) {
+    report("trying finer rings", 0.95);
+    try_fine_rings(surface, body.side, levels, result, try_level);
+  }
   result.chosen = choose(result.candidates, options);
   if (result.chosen == 0 && result.genus > 0 && !options.most_bones) {
     report("trying rings of fewer bones", 0.97);
     try_shorter_rings(levels, result, options, try_level);
   }
   if (result.chosen < 0) throw TopologyError(refusal_of(result));
-  if (options.purpose == SkeletonPurpose::kPose && !options.most_bones && add_jointed_level(surface, result, levels)) {
-    try_level(levels.back());
-    if (is_worth_its_joints(result)) result.chosen = static_cast<int>(result.candidates.size()) - 1;
-  }
+  if (options.purpose == SkeletonPurpose::kPose && !options.most_bones) try_joints(surface, levels, result, try_level);
   result.skeleton = std::move(levels[result.chosen].skeleton);
   name_by_place(surface, plane, result.skeleton);
   result.skeleton = in_frame(std::move(result.skeleton), {});
