@@ -373,13 +373,13 @@ kernel void place_on_edges(const SnapParameters p, global const int* restrict ro
             first = (patch->y + row) * texture_width + patch->x;
   const int odd = first + ((width + 1) >> 1);
   relax_row(patch, texture_width, row, anchors, offset_x, offset_y);
-  for (int column = 8 * get_local_id(0), bin = rows[4 * k + 2] + get_local_id(0); column < width;
-       column += 8 * ROW_ITEMS, bin += ROW_ITEMS) {
+  for (int column = SNAP_BIN_WIDTH * get_local_id(0), bin = rows[4 * k + 2] + get_local_id(0); column < width;
+       column += SNAP_BIN_WIDTH * ROW_ITEMS, bin += ROW_ITEMS) {
     // Even columns, then odd ones. The last texels of a row are fewer than eight: each lane beyond them looks at the
     // last one.
     const int8 columns = min(column + (int8)(0, 2, 4, 6, 1, 3, 5, 7), (int8)(width - 1));
     const int8 texels = (columns >> 1) + ((columns & 1) == 0 ? (int8)(first) : (int8)(odd));
-    const int is_whole = column + 8 <= width, at_even = first + column / 2, at_odd = odd + column / 2;
+    const int is_whole = column + SNAP_BIN_WIDTH <= width, at_even = first + column / 2, at_odd = odd + column / 2;
     if (p.is_again && is_whole && !any(loaded_ints(candidates, at_even, at_odd) != NONE)) continue;
     const float8 x = is_whole ? loaded(offset_x, at_even, at_odd) : gathered(texels, offset_x);
     const float8 y = is_whole ? loaded(offset_y, at_even, at_odd) : gathered(texels, offset_y);

@@ -518,6 +518,15 @@ TEST(Skeletonize, RingsAreTriedWithFewerBones) {
   EXPECT_EQ(errors_of(mesh, result.skeleton), "");
 }
 
+/// A candidate that is not the best without joints can be the best with them.
+TEST(Skeletonize, JointsAreTriedInMoreThanOneCandidate) {
+  const SkeletonizeResult result = skeletonized(load_standard_model("triceratops").mesh);
+  const SkeletonCandidate& chosen = result.candidates[result.chosen];
+  EXPECT_NE(chosen.name.find(", joints"), std::string::npos) << chosen.name;
+  for (const SkeletonCandidate& candidate : result.candidates)
+    if (candidate.refusal.empty()) EXPECT_GE(candidate.error, chosen.error) << candidate.name;
+}
+
 TEST(Skeletonize, LargeMeshesAreTriedCoarseAndAcceptedWhole) {
   const TriangleMesh mesh = capsule_shape(2, 0.5, 500, 360).mesh;
   ASSERT_GT(mesh.triangles.size(), 350'000u);

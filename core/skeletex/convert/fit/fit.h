@@ -7,6 +7,7 @@
 
 namespace skeletex {
 
+/// Steps of a fit where texels are few, or where one is asked for.
 inline constexpr double kMostFitSteps = 4;
 
 /// What the fit did.
@@ -25,6 +26,6 @@ struct FitReport {
 /// \param steps  of Gauss-Newton, at most; 2.5: three, of which the third goes half the way
 FitReport fit_points(ClContext& context, const DeviceLayout& layout, const DeviceMaps& maps,
                      const ClBuffer<int>& covering, const ReadingPositions& positions, DevicePlanes& points,
-                     double steps = kMostFitSteps);
+                     double steps);
 
 }  // namespace skeletex
