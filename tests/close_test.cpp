@@ -287,6 +287,34 @@ TEST(CarryOver, ValuesAreThoseOfTheNearestPoint) {
   EXPECT_LT(distances.largest, 0.03);
 }
 
+TEST(CarryOver, PartsOfTheFileThatAreInsideOutAreTurned) {
+  // A torus outwards; one inside out whose normals follow its triangles; one that is open and inside out, whose normals
+  // look outwards. One normal per corner.
+  const TriangleMesh torus = torus_shape().mesh;
+  const int count = static_cast<int>(torus.positions.size());
+  TriangleMesh outwards;
+  MeshAttributes attributes;
+  for (const int part : {0, 1, 2}) {
+    for (const Vec3& p : torus.positions) outwards.positions.emplace_back(p + Vec3(part * 20, 0, 0));
+    for (const Triangle& t : part == 2 ? with_hole(torus, 100).triangles : torus.triangles)
+      outwards.triangles.push_back({t[0] + part * count, t[1] + part * count, t[2] + part * count});
+  }
+  TriangleMesh file = outwards;
+  for (Triangle& t : file.triangles) {
+    const int part = t[0] / count, first = static_cast<int>(attributes.normals.values.size());
+    const Vec3 normal = area_vector(outwards, t).normalized();
+    if (part > 0) std::swap(t[1], t[2]);
+    attributes.normals.values.insert(attributes.normals.values.end(), 3, part == 1 ? Vec3(-normal) : normal);
+    attributes.normals.corners.push_back({first, first + 1, first + 2});
+  }
+  const CarriedOver result = carry_over(file, build_triangle_tree(file), attributes, {}, torus);
+  ASSERT_TRUE(result.attributes.original);
+  EXPECT_EQ(result.attributes.original->mesh.triangles, outwards.triangles);
+  const std::vector<Triangle>& corners = result.attributes.original->attributes.normals.corners;
+  for (std::size_t t = 0; t < corners.size(); ++t)
+    EXPECT_EQ(corners[t][1] > corners[t][2], outwards.triangles[t][0] >= count);
+}
+
 TEST(CarryOver, NewTrianglesTakeTheValuesOfTheirNeighbours) {
   const TriangleMesh whole = torus_shape().mesh;
   const TriangleMesh open = with_hole(whole, 100);

@@ -6,6 +6,7 @@
 
 #include "skeletex/convert/layers/read_layers.h"
 #include "skeletex/geometry/parallel.h"
+#include "skeletex/geometry/union_find.h"
 
 namespace skeletex {
 namespace {
@@ -23,6 +24,53 @@ std::vector<BoneWeight> mixed(const TriangleMesh& mesh, const VertexBoneWeights&
   return result;
 }
 
+/// Per triangle, whether its part of the mesh is inside out: a closed one by its volume, an open one by its normals.
+std::vector<bool> is_inside_out(const TriangleMesh& mesh, const CornerValues<Vec3>& normals) {
+  struct Part {
+    bool is_open = false;
+    double volume = 0, towards_normals = 0;
+  };
+  UnionFind vertices(static_cast<int>(mesh.positions.size()));
+  std::vector<std::pair<int, int>> edges;
+  for (const Triangle& t : mesh.triangles)
+    for (int k = 0; k < 3; ++k) {
+      vertices.unite(t[k], t[(k + 1) % 3]);
+      edges.emplace_back(t[k], t[(k + 1) % 3]);
+    }
+  std::sort(edges.begin(), edges.end());
+  std::map<int, Part> parts;
+  const Vec3 origin = bounding_box(mesh).centre();
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const Triangle& t = mesh.triangles[i];
+    Part& part = parts[vertices.find(t[0])];
+    const Vec3 area = area_vector(mesh, t);
+    part.volume += (mesh.positions[t[0]] - origin).dot(area) / 3;
+    for (int k = 0; k < 3; ++k) {
+      const std::pair twin(t[(k + 1) % 3], t[k]);
+      if (!std::binary_search(edges.begin(), edges.end(), twin)) part.is_open = true;
+      if (normals.empty()) continue;
+      const int corner = normals.of(mesh, i)[k];
+      if (corner >= 0) part.towards_normals += normals.values[corner].dot(area);
+    }
+  }
+  std::vector<bool> result;
+  for (const Triangle& t : mesh.triangles) {
+    const Part& part = parts[vertices.find(t[0])];
+    result.push_back((part.is_open ? part.towards_normals : part.volume) < 0);
+  }
+  return result;
+}
+
+/// A mesh whose triangles run outwards, so that the sides of its thin parts are known by where they look.
+AttributedMesh turned_outwards(const TriangleMesh& mesh, const MeshAttributes& attributes) {
+  AttributedMesh result{mesh, attributes};
+  const std::vector<bool> is_turned = is_inside_out(mesh, attributes.normals);
+  for (std::size_t t = 0; t < is_turned.size(); ++t)
+    if (is_turned[t]) std::swap(result.mesh.triangles[t][1], result.mesh.triangles[t][2]);
+  turn_over(result.attributes, is_turned);
+  return result;
+}
+
 }  // namespace
 
 CarriedOver carry_over(const TriangleMesh& from, const TriangleTree& tree, const MeshAttributes& attributes,
@@ -33,7 +81,7 @@ CarriedOver carry_over(const TriangleMesh& from, const TriangleTree& tree, const
   if (has_colours) result.attributes.colours.values.resize(count);
   result.attributes.original = attributes.original
                                    ? attributes.original
-                                   : std::make_shared<const AttributedMesh>(AttributedMesh{from, attributes});
+                                   : std::make_shared<const AttributedMesh>(turned_outwards(from, attributes));
   for (const VertexNumbers& numbers : attributes.numbers)
     result.attributes.numbers.push_back({numbers.name, std::vector<float>(count)});
   if (!weights.empty()) result.weights.resize(count);

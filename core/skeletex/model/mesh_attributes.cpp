@@ -24,9 +24,10 @@ bool has_colour(const MeshAttributes& attributes) {
   });
 }
 
-void turn_over(MeshAttributes& attributes) {
-  const auto turn = [](std::vector<Triangle>& corners) {
-    for (Triangle& t : corners) std::swap(t[1], t[2]);
+void turn_over(MeshAttributes& attributes, const std::vector<bool>& is_turned) {
+  const auto turn = [&](std::vector<Triangle>& corners) {
+    for (std::size_t t = 0; t < corners.size(); ++t)
+      if (is_turned.empty() || is_turned[t]) std::swap(corners[t][1], corners[t][2]);
   };
   turn(attributes.normals.corners);
   turn(attributes.colours.corners);

@@ -63,7 +63,8 @@ struct AttributedMesh {
 /// Whether there are colours: of vertices, of pictures that are read, or of materials that differ.
 bool has_colour(const MeshAttributes& attributes);
 /// Follows a mesh whose triangles are turned over: swaps the corners 1 and 2 of each. Normals stay as they are.
-void turn_over(MeshAttributes& attributes);
+/// \param is_turned  per triangle; empty: all are
+void turn_over(MeshAttributes& attributes, const std::vector<bool>& is_turned = {});
 
 /// The same surface with a vertex for each set of values, so that normals, colours and texture coordinates are by
 /// vertex.
