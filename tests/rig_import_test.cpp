@@ -437,12 +437,42 @@ TEST(RigImport, WeightsOfTheRigBecomeThoseOfTheModel) {
   const BoundingBox box = bounding_box(shape.mesh);
   const auto share_at = [&](const Vec3& p) { return (p.x() - box.lower.x()) / (box.upper.x() - box.lower.x()); };
   for (const Vec3& p : shape.mesh.positions) weights.push_back({{0, 1 - share_at(p)}, {2, share_at(p)}});
-  model.bone_weights = weight_planes(device(), model, shape.mesh, build_triangle_tree(shape.mesh), weights);
+  model.bone_weights = weight_planes(device(), model, shape.mesh, build_triangle_tree(shape.mesh), nullptr, weights);
   const PreparedModel prepared(model);
   const BindMesh bind = reconstruct_bind_mesh(device(), prepared);
   const Skin skin = make_skin(device(), prepared, bind.inner);
   const std::vector<float> last = vertex_weights(skin, 2);
   for (std::size_t v = 0; v < last.size(); ++v) EXPECT_NEAR(last[v], share_at(bind.mesh.positions[v]), 0.02);
+}
+
+TEST(RigImport, WeightsOfPartsDoNotBlendInTheirUnion) {
+  const Shape shape = chain_shape(3, 0.4);
+  EncodeOptions options;
+  options.width = options.height = 64;
+  SkeletexModel model = encode_model(device(), shape.mesh, shape.skeleton, options).model;
+  // The file has two parts that meet in the middle, each moved by one bone; the mesh is both of them in one.
+  const double middle = bounding_box(shape.mesh).centre().x();
+  AttributedMesh file;
+  for (const Triangle& t : shape.mesh.triangles) {
+    const std::array<Vec3, 3> corners{shape.mesh.positions[t[0]], shape.mesh.positions[t[1]],
+                                      shape.mesh.positions[t[2]]};
+    const int bone = (corners[0] + corners[1] + corners[2]).x() / 3 < middle ? 0 : 2;
+    const int first = static_cast<int>(file.mesh.positions.size());
+    file.mesh.triangles.push_back({first, first + 1, first + 2});
+    for (const Vec3& p : corners) {
+      file.mesh.positions.push_back(p);
+      file.weights.push_back({{bone, 1.0}});
+    }
+  }
+  const auto planes = weight_planes(device(), model, shape.mesh, build_triangle_tree(shape.mesh), &file, file.weights);
+  int first = 0, last = 0;
+  for (std::size_t i = 0; i < planes[0].size(); ++i) {
+    if (planes[0][i] + planes[2][i] == 0) continue;  // between rectangles
+    ASSERT_NEAR(std::max(planes[0][i], planes[2][i]), 1, 1e-6) << i;
+    ++(planes[0][i] > 0.5f ? first : last);
+  }
+  EXPECT_GT(first, 1000);
+  EXPECT_GT(last, 1000);
 }
 
 TEST(RigImport, AFewTexelsWithTheWeightsOfAnotherPartTakeThoseAround) {
@@ -456,7 +486,7 @@ TEST(RigImport, AFewTexelsWithTheWeightsOfAnotherPartTakeThoseAround) {
     const double share = std::clamp(0.5 + 0.2 * p.z(), 0.0, 1.0);
     weights.push_back({{0, 1 - share}, {1, share}});
   }
-  const auto good = weight_planes(device(), model, shape.mesh, tree, weights);
+  const auto good = weight_planes(device(), model, shape.mesh, tree, nullptr, weights);
   // A tiny part beside the middle of the surface, nearer to a texel or two than the mesh and of another bone.
   TriangleMesh touched = shape.mesh;
   const int triangle = static_cast<int>(shape.mesh.triangles.size() / 2);
@@ -476,7 +506,7 @@ TEST(RigImport, AFewTexelsWithTheWeightsOfAnotherPartTakeThoseAround) {
   ASSERT_TRUE(std::any_of(points.begin(), points.end(), [&](const SurfacePoint& point) {
     return point.triangle == static_cast<int>(touched.triangles.size()) - 1;
   })) << "no texel is nearest to it";
-  const auto planes = weight_planes(device(), model, touched, with, weights);
+  const auto planes = weight_planes(device(), model, touched, with, nullptr, weights);
   for (std::size_t b = 0; b < planes.size(); ++b)
     for (std::size_t i = 0; i < planes[b].size(); ++i) ASSERT_NEAR(planes[b][i], good[b][i], 0.1) << b << " " << i;
 }

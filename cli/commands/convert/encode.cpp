@@ -140,25 +140,28 @@ void check_bone_names(const Arguments& arguments, const EncodeOptions& options, 
 struct Input {
   TriangleMesh mesh;
   MeshAttributes attributes;
-  VertexBoneWeights weights;  ///< of a rig
+  VertexBoneWeights weights;  ///< of a rig, see ImportedRig
   std::optional<TriangleTree> tree;
   Skeleton skeleton;
   Json closing;  ///< what --close did; null: nothing
 };
 
-/// Replaces the mesh by its Loop subdivision surface. Weights are linear over its triangles, as named numbers are.
+/// Replaces the mesh by its Loop subdivision surface. Its weights are linear over its triangles, as named numbers are.
 void subdivide(Input& input, int rounds) {
   std::vector<VertexNumbers>& numbers = input.attributes.numbers;
   const std::size_t own_numbers = numbers.size();
-  for (std::size_t bone = 0; bone < input.skeleton.bones.size() && !input.weights.empty(); ++bone)
-    numbers.push_back({"", std::vector<float>(input.weights.size(), 0.f)});
-  for (std::size_t v = 0; v < input.weights.size(); ++v)
-    for (const auto& [bone, weight] : input.weights[v])
-      numbers[own_numbers + bone].values[v] = static_cast<float>(weight);
+  const bool has_weights = !input.weights.empty() && !weighted_original(input.attributes);
+  if (has_weights) {
+    for (std::size_t bone = 0; bone < input.skeleton.bones.size(); ++bone)
+      numbers.push_back({"", std::vector<float>(input.weights.size(), 0.f)});
+    for (std::size_t v = 0; v < input.weights.size(); ++v)
+      for (const auto& [bone, weight] : input.weights[v])
+        numbers[own_numbers + bone].values[v] = static_cast<float>(weight);
+  }
   AttributedMesh smooth = loop_surface(input.mesh, input.attributes, rounds);
   input.mesh = std::move(smooth.mesh);
   input.attributes = std::move(smooth.attributes);
-  if (input.weights.empty()) return;
+  if (!has_weights) return;
   input.weights.assign(input.mesh.positions.size(), {});
   for (std::size_t bone = 0; own_numbers + bone < numbers.size(); ++bone)
     for (std::size_t v = 0; v < input.weights.size(); ++v)
@@ -330,8 +333,9 @@ void run(const Arguments& arguments, const CLI::App& command) {
   };
   EncodeResult result = encode_model(context, input.mesh, input.skeleton, options);
   if (!input.weights.empty())
-    result.model.bone_weights = weight_planes(
-        context, result.model, input.mesh, input.tree ? *input.tree : build_triangle_tree(input.mesh), input.weights);
+    result.model.bone_weights =
+        weight_planes(context, result.model, input.mesh, input.tree ? *input.tree : build_triangle_tree(input.mesh),
+                      weighted_original(input.attributes), input.weights);
   if (is_compact_path(arguments.output)) {
     bar->show("compressing", 0.9);
     const auto size = parse_size(arguments.size, 4, 16384, "texels");

@@ -62,9 +62,8 @@ std::vector<bool> is_inside_out(const TriangleMesh& mesh, const CornerValues<Vec
 }
 
 /// A mesh whose triangles run outwards, so that the sides of its thin parts are known by where they look.
-AttributedMesh turned_outwards(const TriangleMesh& mesh, const MeshAttributes& attributes) {
-  AttributedMesh result{mesh, attributes};
-  const std::vector<bool> is_turned = is_inside_out(mesh, attributes.normals);
+AttributedMesh turned_outwards(AttributedMesh result) {
+  const std::vector<bool> is_turned = is_inside_out(result.mesh, result.attributes.normals);
   for (std::size_t t = 0; t < is_turned.size(); ++t)
     if (is_turned[t]) std::swap(result.mesh.triangles[t][1], result.mesh.triangles[t][2]);
   turn_over(result.attributes, is_turned);
@@ -79,9 +78,9 @@ CarriedOver carry_over(const TriangleMesh& from, const TriangleTree& tree, const
   CarriedOver result;
   const bool has_colours = has_colour(attributes);
   if (has_colours) result.attributes.colours.values.resize(count);
-  result.attributes.original = attributes.original
-                                   ? attributes.original
-                                   : std::make_shared<const AttributedMesh>(turned_outwards(from, attributes));
+  result.attributes.original =
+      attributes.original ? attributes.original
+                          : std::make_shared<const AttributedMesh>(turned_outwards({from, attributes, weights}));
   for (const VertexNumbers& numbers : attributes.numbers)
     result.attributes.numbers.push_back({numbers.name, std::vector<float>(count)});
   if (!weights.empty()) result.weights.resize(count);

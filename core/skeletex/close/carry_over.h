@@ -9,11 +9,10 @@
 
 namespace skeletex {
 
-using VertexBoneWeights = std::vector<std::vector<BoneWeight>>;
-
 /// A mesh in place of another one near by.
 struct CarriedOver {
-  MeshAttributes attributes;  ///< per vertex: colours (of pictures too) and numbers; and the other mesh
+  /// Per vertex: colours (of pictures too) and numbers; and the other mesh with its weights, all its parts outwards.
+  MeshAttributes attributes;
   VertexBoneWeights weights;  ///< per vertex, where the other mesh has some
 };
 /// Per vertex of a mesh what another mesh has at its nearest point.

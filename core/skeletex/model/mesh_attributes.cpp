@@ -16,6 +16,11 @@ float power(float x, double exponent) { return static_cast<float>(portable::pow(
 float linear_from_srgb(float x) { return x <= 0.04045f ? x / 12.92f : power((x + 0.055f) / 1.055f, 2.4); }
 float srgb_from_linear(float x) { return x <= 0.0031308f ? 12.92f * x : 1.055f * power(x, 1 / 2.4) - 0.055f; }
 
+const AttributedMesh* weighted_original(const MeshAttributes& attributes) {
+  const AttributedMesh* original = attributes.original.get();
+  return original != nullptr && !original->weights.empty() ? original : nullptr;
+}
+
 bool has_colour(const MeshAttributes& attributes) {
   // Many files give every mesh one plain material, which says nothing of its surface.
   const std::vector<Material>& materials = attributes.materials;

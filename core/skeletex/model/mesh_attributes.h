@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "skeletex/geometry/mesh.h"
+#include "skeletex/skeleton/bone_motion.h"
 
 namespace skeletex {
 
@@ -50,7 +51,8 @@ struct MeshAttributes {
   std::vector<Material> materials;
   std::vector<int> triangle_materials;  ///< per triangle; -1: none
   std::vector<VertexNumbers> numbers;
-  /// Of a closed mesh in place of a file's: that of the file, in the user's units. Its colours and normals come first.
+  /// Of a closed mesh in place of a file's: that of the file, in the user's units. Its colours, normals and weights
+  /// come first.
   std::shared_ptr<const AttributedMesh> original;
 };
 
@@ -58,8 +60,11 @@ struct MeshAttributes {
 struct AttributedMesh {
   TriangleMesh mesh;
   MeshAttributes attributes;
+  VertexBoneWeights weights = {};  ///< of a rig, whose joints stand for bones; empty: none
 };
 
+/// The original of a closed mesh where it has weights; else null.
+const AttributedMesh* weighted_original(const MeshAttributes& attributes);
 /// Whether there are colours: of vertices, of pictures that are read, or of materials that differ.
 bool has_colour(const MeshAttributes& attributes);
 /// Follows a mesh whose triangles are turned over: swaps the corners 1 and 2 of each. Normals stay as they are.

@@ -19,22 +19,24 @@ namespace {
 
 /// The weights of joints as weights of bones. A joint with several bones shares its weight among them by how near they
 /// are: in its own poses they move alike.
-std::vector<std::vector<BoneWeight>> weights_of_bones(const GltfSurface& surface, const JointSkeleton& joints) {
-  std::vector<std::vector<BoneWeight>> result(surface.weights.size());
+/// \param weights  per vertex: joints with their weights
+template <class Weight>
+VertexBoneWeights weights_of_bones(const TriangleMesh& mesh, const std::vector<std::vector<Weight>>& weights,
+                                   const JointSkeleton& joints) {
+  VertexBoneWeights result(weights.size());
   for (std::size_t v = 0; v < result.size(); ++v) {
     std::map<int, double> by_bone;
-    for (const JointWeight& weight : surface.weights[v]) {
-      const std::vector<int>& bones = joints.bones_of_joint[weight.node];
+    for (const auto& [joint, weight] : weights[v]) {
+      const std::vector<int>& bones = joints.bones_of_joint[joint];
       std::vector<double> shares;
       double sum = 0;
       for (const int bone : bones) {
-        const double distance =
-            distance_to_bone(surface.mesh.positions[v], end_position(joints.skeleton, bone, BoneEnd::kHead),
-                             end_position(joints.skeleton, bone, BoneEnd::kTail));
+        const double distance = distance_to_bone(mesh.positions[v], end_position(joints.skeleton, bone, BoneEnd::kHead),
+                                                 end_position(joints.skeleton, bone, BoneEnd::kTail));
         shares.push_back(1 / std::max(std::pow(distance, 4), 1e-60));
         sum += shares.back();
       }
-      for (std::size_t i = 0; i < bones.size(); ++i) by_bone[bones[i]] += weight.weight * shares[i] / sum;
+      for (std::size_t i = 0; i < bones.size(); ++i) by_bone[bones[i]] += weight * shares[i] / sum;
     }
     for (const auto& [bone, weight] : by_bone) result[v].push_back({bone, weight});
   }
@@ -108,7 +110,9 @@ ImportedRig import_rig(const GltfScene& scene, const GltfSurface& surface,
   rig.notes.insert(rig.notes.end(), joints.notes.begin(), joints.notes.end());
   if (joints.skeleton.bones.empty()) return rig;
   if (repair) joints = with_skeleton(joints, repair(joints.skeleton));
-  rig.weights = weights_of_bones(surface, joints);
+  const AttributedMesh* original = weighted_original(surface.attributes);
+  rig.weights = original ? weights_of_bones(original->mesh, original->weights, joints)
+                         : weights_of_bones(surface.mesh, surface.weights, joints);
   std::set<std::string> taken;
   for (const GltfAnimation& animation : scene.animations) {
     RigAnimation read = read_rig_animation(scene, surface, joints, animation);
@@ -122,13 +126,16 @@ ImportedRig import_rig(const GltfScene& scene, const GltfSurface& surface,
 }
 
 std::vector<std::vector<float>> weight_planes(ClContext& context, const PreparedModel& model, const TriangleMesh& mesh,
-                                              const TriangleTree& tree,
-                                              std::span<const std::vector<BoneWeight>> weights) {
-  const std::vector<SurfacePoint> points = surface_points(context, model, mesh, tree);
+                                              const TriangleTree& tree, const AttributedMesh* original,
+                                              const VertexBoneWeights& weights) {
+  std::vector<SurfacePoint> points = surface_points(context, model, mesh, tree);
+  if (original)
+    points = points_on_original(context, in_frame(original->mesh, model.model.skeleton.frame), mesh, points);
+  const std::vector<Triangle>& triangles = original ? original->mesh.triangles : mesh.triangles;
   Planes planes(model.model.skeleton.bones.size(), std::vector<float>(points.size(), 0.f));
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (points[i].triangle < 0) continue;
-    const Triangle& triangle = mesh.triangles[points[i].triangle];
+    const Triangle& triangle = triangles[points[i].triangle];
     for (int k = 0; k < 3; ++k)
       for (const auto& [bone, weight] : weights[triangle[k]])
         planes[bone][i] += points[i].weights[k] * static_cast<float>(weight);

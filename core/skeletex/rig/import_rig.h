@@ -16,8 +16,9 @@ namespace skeletex {
 
 /// What a character of another program has beside its surface.
 struct ImportedRig {
-  Skeleton skeleton;                             ///< without bones where the file has no skin
-  std::vector<std::vector<BoneWeight>> weights;  ///< per vertex, of bones; empty where the file has no skin
+  Skeleton skeleton;  ///< without bones where the file has no skin
+  /// Per vertex of the surface, or of its weighted_original; empty where the file has no skin.
+  VertexBoneWeights weights;
   std::vector<NamedAnimation> animations;
   int joints_in_file = 0;
   std::vector<std::string> notes;  ///< what was merged, left out or only approximated
@@ -32,13 +33,14 @@ struct ImportedRig {
 ImportedRig import_rig(const GltfScene& scene, const GltfSurface& surface,
                        const std::function<Skeleton(const Skeleton&)>& repair = {});
 
-/// Per bone a plane of texels as SkeletexModel::bone_weights has them: the weights of the mesh's vertices where the
+/// Per bone a plane of texels as SkeletexModel::bone_weights has them: the weights of a mesh's vertices where the
 /// texels lie on it.
-/// \param weights  per vertex of the mesh
 /// \param tree  of the mesh
+/// \param original  weighted_original of the mesh; null: none
+/// \param weights  per vertex of the original, else of the mesh
 /// \throw DeviceError
 std::vector<std::vector<float>> weight_planes(ClContext& context, const PreparedModel& model, const TriangleMesh& mesh,
-                                              const TriangleTree& tree,
-                                              std::span<const std::vector<BoneWeight>> weights);
+                                              const TriangleTree& tree, const AttributedMesh* original,
+                                              const VertexBoneWeights& weights);
 
 }  // namespace skeletex

@@ -28,6 +28,8 @@ struct BoneWeight {
   int bone = -1;
   double weight = 0;
 };
+/// Per vertex of a mesh.
+using VertexBoneWeights = std::vector<std::vector<BoneWeight>>;
 
 /// A point moved by blended dual quaternions (Kavan et al., Geometric Skinning with Approximate Dual Quaternion
 /// Blending, 2008).

@@ -187,7 +187,6 @@ namespace {
 /// \param frame  of the mesh
 void take_from_original(ClContext& context, const AttributedMesh& original, const TriangleMesh& mesh,
                         const UnitFrame& frame, std::span<const SurfacePoint> points, MeshAttributes& attributes) {
-  constexpr double kReach = 0.005;  // diagonals: for the other side of a thin part
   constexpr float kOnEdge = 1e-3f;
   constexpr double kSameSide = 0.5, kFlat = 0.9;  // cosines
   LayerOptions options;
@@ -195,23 +194,12 @@ void take_from_original(ClContext& context, const AttributedMesh& original, cons
   options.has_colours = !attributes.colours.empty();
   options.has_numbers = false;
   const TriangleMesh surface = in_frame(original.mesh, frame);
-  const double reach = kReach * bounding_box(mesh).diagonal();
-  const auto facing = [&](const SurfacePoint& point) { return area_vector(mesh, mesh.triangles[point.triangle]); };
-  std::vector<Probe> probes(points.size());
-  for_each_point(points, [&](std::size_t i, const SurfacePoint& point) {
-    const Triangle& t = mesh.triangles[point.triangle];
-    for (int k = 0; k < 3; ++k) probes[i].point += static_cast<double>(point.weights[k]) * mesh.positions[t[k]];
-    probes[i].outward = facing(point);
-    probes[i].reach = reach;
-  });
-  std::vector<SurfacePoint> found = find_surface_points(context, surface, build_triangle_tree(surface), probes);
-  for (std::size_t i = 0; i < points.size(); ++i)
-    if (points[i].triangle < 0) found[i].triangle = -1;
-  MeshAttributes those = attributes_at(surface, original.attributes, found, options);
+  MeshAttributes those =
+      attributes_at(surface, original.attributes, points_on_original(context, surface, mesh, points), options);
   if (!those.colours.empty()) attributes.colours = std::move(those.colours);
   if (!options.has_normals) return;
   for_each_point(points, [&](std::size_t i, const SurfacePoint& point) {
-    const Vec3 outward = facing(point).normalized();
+    const Vec3 outward = area_vector(mesh, mesh.triangles[point.triangle]).normalized();
     Vec3& normal = attributes.normals.values[i];
     // On a sharp edge the normal stands for both sides, of which the file's is one.
     if (point.weights.minCoeff() < kOnEdge && normal.dot(outward) < kFlat) return;

@@ -89,6 +89,24 @@ std::vector<SurfacePoint> find_surface_points(ClContext& context, const Triangle
   return found;
 }
 
+std::vector<SurfacePoint> points_on_original(ClContext& context, const TriangleMesh& original, const TriangleMesh& mesh,
+                                             std::span<const SurfacePoint> points) {
+  constexpr double kReach = 0.005;  // diagonals: for the other side of a thin part
+  const double reach = kReach * bounding_box(mesh).diagonal();
+  std::vector<Probe> probes(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (points[i].triangle < 0) continue;
+    const Triangle& t = mesh.triangles[points[i].triangle];
+    for (int k = 0; k < 3; ++k) probes[i].point += static_cast<double>(points[i].weights[k]) * mesh.positions[t[k]];
+    probes[i].outward = area_vector(mesh, t);
+    probes[i].reach = reach;
+  }
+  std::vector<SurfacePoint> found = find_surface_points(context, original, build_triangle_tree(original), probes);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (points[i].triangle < 0) found[i].triangle = -1;
+  return found;
+}
+
 std::vector<SurfacePoint> surface_points(ClContext& context, const PreparedModel& prepared, const TriangleMesh& mesh,
                                          const TriangleTree& tree) {
   const SkeletexModel& model = prepared.model;

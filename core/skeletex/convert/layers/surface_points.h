@@ -31,7 +31,13 @@ struct Probe {
 /// \param tree  of the mesh
 std::vector<SurfacePoint> find_surface_points(ClContext& context, const TriangleMesh& mesh, const TriangleTree& tree,
                                               std::span<const Probe> probes);
-/// The same per texel of a model; of texels between rectangles none (triangle -1).
+/// Points of a closed mesh on the mesh of the file that it stands for, on the side where it looks.
+/// \param original  in the frame of `mesh`
+/// \param points  of `mesh`; their triangles may be -1
+/// \return of `original`; triangle -1 as there
+std::vector<SurfacePoint> points_on_original(ClContext& context, const TriangleMesh& original, const TriangleMesh& mesh,
+                                             std::span<const SurfacePoint> points);
+/// The points of a mesh nearest to the texels of a model; to those between rectangles none (triangle -1).
 std::vector<SurfacePoint> surface_points(ClContext& context, const PreparedModel& model, const TriangleMesh& mesh,
                                          const TriangleTree& tree);
 
