@@ -1533,7 +1533,9 @@ TEST_F(Program, CutsHandlesOff) {
   for (std::size_t v = 0; v < back.mesh.positions.size(); ++v)
     EXPECT_NEAR(back.attributes.numbers[0].values[v], back.mesh.positions[v].z(), 0.1);
   ASSERT_EQ(back.attributes.colours.values.size(), back.mesh.positions.size());
-  const auto linear = [](long byte) { return std::pow((byte / 255.0 + 0.055) / 1.055, 2.4); };  // of sRGB
+  const auto linear = [](long byte) {
+    return std::pow((static_cast<double>(byte) / 255 + 0.055) / 1.055, 2.4);
+  };  // of sRGB
   for (std::size_t v = 0; v < back.mesh.positions.size(); ++v) {
     EXPECT_NEAR(back.attributes.colours.values[v][0], linear(red(back.mesh.positions[v].z())), 0.12);
     EXPECT_NEAR(back.attributes.colours.values[v][2], linear(200), 0.02);

@@ -109,7 +109,7 @@ Solved solve(const RandomPatch& patch, int sweeps, std::size_t group, float damp
   auto lattice = c.allocate<float>(2 * LATTICE_PLANES * size), system = c.allocate<float>(SYSTEM_STRIDE * size);
   auto moves = allocate_planes(c, size);
   c.fill(numbers, 0), c.fill(matched, 0.f), c.fill(lattice, 0.f), c.fill(system, 0.f), c.fill(moves.values, 0.f);
-  FitParameters parameters{{}, kTextureWidth, kTextureHeight, least_residual, 0, damping, springs};
+  FitParameters parameters{{}, kTextureWidth, kTextureHeight, least_residual, 0, damping, springs, 0};
   const auto launch = [&](const char* kernel, const auto&... arguments) {
     c.launch({"fit.cl", kernel}, ClRange({kTextureWidth, kTextureHeight}, {group, 1}), parameters, layout.texel_patches,
              layout.tables.patches, arguments...);
@@ -315,7 +315,7 @@ TEST(Fit, LeavesALatticeAloneThatIsTheMesh) {
   const std::vector<SpdHits> hits(1);
   const auto read = [&](bool has_fit) {
     return read_texels(device(), skeleton, SeparationPlanes(skeleton), {charts, patches, hits, ends}, 24, 12,
-                       Vec3::Zero(), {.has_prefilter = false, .fit_steps = has_fit ? 4 : 0});
+                       Vec3::Zero(), {.has_prefilter = false, .fit_steps = has_fit ? 4.0 : 0.0});
   };
   const TexelResult plain = read(false), fitted = read(true);
   EXPECT_LT(fitted.report.fit->residuals.front(), 1e-6);

@@ -95,7 +95,9 @@ TEST(LoopSurface, FacesWithoutTextureCoordinatesStaySo) {
   ASSERT_EQ(coordinates.corners.size(), 32u);
   for (int t = 0; t < 32; ++t)
     for (const int corner : coordinates.corners[t]) {
-      if (t / 4 != 6) EXPECT_EQ(corner >= 0, t / 4 == 5) << t;
+      if (t / 4 != 6) {
+        EXPECT_EQ(corner >= 0, t / 4 == 5) << t;
+      }
       EXPECT_LT(corner, static_cast<int>(coordinates.values.size()));
     }
   const std::array<int, 4> missing{1, 3, 1, 2};  // corners of the quarters of triangle 6

@@ -217,10 +217,18 @@ TEST(ResampleSnapped, FinerRowsAndColumnsHaveAllOldOnes) {
       EXPECT_EQ(rows.back(), height - 1);
       EXPECT_LT(columns.back(), width);
       const auto [head, tail] = model.lattice.poles[bone];
-      if (head < 0) EXPECT_EQ(rows[1], 1);
-      if (tail < 0) EXPECT_EQ(rows[rows_made - 2], height - 2);
-      if (numerator == 7 && head >= 0) EXPECT_LT(rows[1], 1);
-      if (numerator == 7 && tail >= 0) EXPECT_GT(rows[rows_made - 2], height - 2);
+      if (head < 0) {
+        EXPECT_EQ(rows[1], 1);
+      }
+      if (tail < 0) {
+        EXPECT_EQ(rows[rows_made - 2], height - 2);
+      }
+      if (numerator == 7 && head >= 0) {
+        EXPECT_LT(rows[1], 1);
+      }
+      if (numerator == 7 && tail >= 0) {
+        EXPECT_GT(rows[rows_made - 2], height - 2);
+      }
       seams += (head < 0) + (tail < 0), poles += (head >= 0) + (tail >= 0);
     }
   }

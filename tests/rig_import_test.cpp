@@ -236,7 +236,9 @@ TEST(RigImport, MorphTargetsTurnNormals) {
     const GltfPrimitive& primitive = scene.meshes.at(0).primitives.at(0);
     EXPECT_EQ(primitive.positions[0], Vec3(0, 0, 1));
     ASSERT_EQ(primitive.normals.size(), has_normals ? 3u : 0u);
-    if (has_normals) EXPECT_LT((primitive.normals[0] - Vec3(-0.25, -0.25, 1)).norm(), 1e-6);
+    if (has_normals) {
+      EXPECT_LT((primitive.normals[0] - Vec3(-0.25, -0.25, 1)).norm(), 1e-6);
+    }
   }
 }
 

@@ -524,7 +524,9 @@ TEST(Skeletonize, JointsAreTriedInMoreThanOneCandidate) {
   const SkeletonCandidate& chosen = result.candidates[result.chosen];
   EXPECT_NE(chosen.name.find(", joints"), std::string::npos) << chosen.name;
   for (const SkeletonCandidate& candidate : result.candidates)
-    if (candidate.refusal.empty()) EXPECT_GE(candidate.error, chosen.error) << candidate.name;
+    if (candidate.refusal.empty()) {
+      EXPECT_GE(candidate.error, chosen.error) << candidate.name;
+    }
 }
 
 TEST(Skeletonize, LargeMeshesAreTriedCoarseAndAcceptedWhole) {

@@ -67,8 +67,8 @@ struct Source {
   ProgressBar& bar;
   const PreparedModel prepared;
   double read_ms = 0, device_ms = 0, resample_ms = 0, reconstruct_ms = 0, reduce_ms = 0;
-  TriangleMesh bind;                   ///< in the user's units
-  std::optional<ReducedMesh> reduced;  ///< of it, without thin triangles
+  TriangleMesh bind = {};                   ///< in the user's units
+  std::optional<ReducedMesh> reduced = {};  ///< of it, without thin triangles
 };
 
 /// The surface in its pose, or at a constant distance from the bones.

@@ -243,7 +243,7 @@ void add_materials(const GltfScene& scene, tinygltf::Model& model) {
 
 SurfacePrimitive primitive_of(const TriangleMesh& mesh, const MeshAttributes& attributes) {
   const std::vector<Vec3> smooth = attributes.normals.empty() ? vertex_normals(mesh) : std::vector<Vec3>();
-  MeshAttributes given{attributes.normals, attributes.colours, attributes.texture_coordinates, {}, {}, {}};
+  MeshAttributes given{attributes.normals, attributes.colours, attributes.texture_coordinates, {}, {}, {}, {}};
   if (!smooth.empty()) given.normals.values = smooth;
   SplitMesh split = split_vertices(mesh, given);
   SurfacePrimitive result;
