@@ -89,6 +89,7 @@ Json write_compact(ClContext& context, const SkeletexModel& model, const Triangl
   return {{"path", path},
           {"kind", "compact model"},
           {"bytes", result.bytes.size()},
+          {"layer_bytes", result.layer_bytes},
           {"mean", result.mean},
           {"max", result.max},
           {"size", result.options.size},
@@ -98,9 +99,11 @@ Json write_compact(ClContext& context, const SkeletexModel& model, const Triangl
 }
 
 std::string compact_text(const Json& json) {
-  return fmt::format("{}: {} bytes; distance / diagonal, both ways: mean {:.3g}, max {:.3g}\n",
-                     json["path"].get<std::string>(), json["bytes"].get<std::size_t>(), json["mean"].get<double>(),
-                     json["max"].get<double>());
+  const auto layer_bytes = json["layer_bytes"].get<std::size_t>();
+  return fmt::format("{}: {} bytes{}; distance / diagonal, both ways: mean {:.3g}, max {:.3g}\n",
+                     json["path"].get<std::string>(), json["bytes"].get<std::size_t>(),
+                     layer_bytes > 0 ? fmt::format(", {} of them for layers", layer_bytes) : "",
+                     json["mean"].get<double>(), json["max"].get<double>());
 }
 
 }  // namespace skeletex::cli

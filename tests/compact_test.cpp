@@ -243,7 +243,9 @@ TEST(CompactLayers, FollowTheSurface) {
 
 TEST(CompactLayers, AreLeftOutWhenAskedAndCountAsBytes) {
   const CompactResult without = pack(kWithLayers, 3e-4, 0, 128, 0);
-  EXPECT_LT(without.bytes.size(), packed(kWithLayers).bytes.size());
+  EXPECT_EQ(without.layer_bytes, 0u);
+  EXPECT_EQ(without.bytes.size() + packed(kWithLayers).layer_bytes, packed(kWithLayers).bytes.size());
+  EXPECT_GT(packed(kWithLayers).layer_bytes, 100u);
   const SkeletexModel model = decode_model(read_compact(without.bytes, "file"));
   EXPECT_TRUE(model.layers.empty());
   EXPECT_TRUE(model.bone_weights.empty());

@@ -106,7 +106,14 @@ class Search {
     return trial;
   }
   CompactResult measured(const Trial& trial) {
-    CompactResult result{compact_bytes(trial.model), trial.options, 0, 0, trials_};
+    CompactResult result{compact_bytes(trial.model), 0, trial.options, 0, 0, trials_};
+    if (!trial.model.layers.empty()) {
+      CompactModel shape = trial.model;
+      shape.layers.clear();
+      for (CompactPatch& patch : shape.patches) patch.planes.clear();
+      const std::size_t without = compact_bytes(shape).size();
+      result.layer_bytes = result.bytes.size() - std::min(without, result.bytes.size());
+    }
     const SymmetricDistance distance = SymmetricMetro(context_, reference_, kSamples).measure(mesh_of(trial.model, 0));
     result.mean = distance.mean, result.max = distance.max;
     return result;
