@@ -5,10 +5,11 @@
 // Rows and launches as in reconstruct.cl: a table of lattice rows, four ints each (patch, row, number of its first
 // vertex, unused), one work-group per row, work-items take columns in turn, plain scalars and selects so that the loop
 // over columns becomes vector instructions on a CPU.
-//   rows, bind_columns              tables of the bind pose; columns as four planes: cosine, sine, slope_head,
-//   slope_tail patches, posed_rows, columns    of the pose; columns as four planes: roll_head, roll_tail, slope_head,
-//   slope_tail texels                          planes along, around, out points                          planes x, y,
-//   z, relative to the origin of the posed patch records
+// In:   rows, bind_columns: tables of the bind pose; columns as four planes: cosine, sine, slope_head, slope_tail.
+//       patches, posed_rows, columns: tables of the pose; columns as four planes: roll_head, roll_tail, slope_head,
+//       slope_tail.
+//       texels: planes along, around, out.
+// Out:  points: planes x, y, z, relative to the origin of the posed patch records.
 #include "capsule.h"
 #include "planes.h"
 #include "pose_math.h"

@@ -155,8 +155,7 @@ __kernel void filter_rows(const ResampleParameters p, __global const int* restri
 
 // The other axis: columns, which wrap round.
 // in   taps: per new column of all patches, in the order of the column table, four ints: (first old column, count,
-// first
-//      weight, unused), the first in [0, old width) and the count at most the old width. The rest as above
+//      first weight, unused), the first in [0, old width) and the count at most the old width. The rest as above
 // out  points in rows as wide as the patches
 __kernel void filter_columns(const ResampleParameters p, __global const int* restrict lattice_rows,
                              __global const PatchRecord* restrict patches, __global const int* restrict widths,
