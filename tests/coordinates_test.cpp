@@ -26,24 +26,6 @@ constexpr double kPi = std::numbers::pi;
 constexpr std::array kRules{DistanceRule::kFromBone, DistanceRule::kFromFoot};
 constexpr int kWidth = 20, kHeight = 11;
 
-struct NamedSkeleton {
-  const char* name;
-  Skeleton skeleton;
-  double radius;
-};
-
-std::vector<NamedSkeleton> all_skeletons() {
-  return {{"lone bone", lone_bone(), 0.3},
-          {"chain of two", chain(2), 0.2},
-          {"chain of five", chain(5), 0.2},
-          {"Y", y_branch(), 0.25},
-          {"cross of 4", cross(4), 0.3},
-          {"cross of 6", cross(6), 0.3},
-          {"ring of 7", ring(7), 0.2},
-          {"ring with an arm", ring_with_arm(6), 0.2},
-          {"tree of 12", random_tree(12, 3), 0.15}};
-}
-
 bool is_tree(const Skeleton& skeleton) { return skeleton.nodes.size() == skeleton.bones.size() + 1; }
 
 Eigen::Quaterniond random_rotation(std::mt19937& random, double largest) {

@@ -23,26 +23,6 @@ ClContext& device() {
   return context;
 }
 
-struct NamedSkeleton {
-  const char* name;
-  Skeleton skeleton;
-  double radius;
-};
-
-std::vector<NamedSkeleton> all_skeletons() {
-  return {{"lone bone", lone_bone(), 0.3},
-          {"chain of two", chain(2), 0.2},
-          {"chain of five", chain(5), 0.2},
-          {"Y", y_branch(), 0.25},
-          {"cross of 4", cross(4), 0.3},
-          {"cross of 6", cross(6), 0.3},
-          {"cross of 11", cross(11), 0.3},
-          {"ring of 3", ring(3), 0.2},
-          {"ring of 7", ring(7), 0.2},
-          {"ring with an arm", ring_with_arm(6), 0.2},
-          {"tree of 12", random_tree(12, 3), 0.15}};
-}
-
 std::vector<std::pair<int, int>> same_sizes(const Skeleton& skeleton, int width, int height) {
   return std::vector<std::pair<int, int>>(skeleton.bones.size(), {width, height});
 }
@@ -143,7 +123,7 @@ TEST(Reconstruct, TrianglesOfAPlainRingOfBonesAllFaceOutward) {
     const TriangleMesh mesh = reconstruct_mesh(device(), surface.model(same_sizes(surface.skeleton(), width, height)));
     for (const Triangle& t : mesh.triangles) {
       const Vec3 centre = (mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]]) / 3;
-      Vec3 foot;
+      Vec3 foot = Vec3::Zero();
       double nearest = 1e9;
       for (int bone = 0; bone < 7; ++bone) {
         const Vec3 head = end_position(surface.skeleton(), bone, BoneEnd::kHead),

@@ -20,23 +20,6 @@
 namespace skeletex {
 namespace {
 
-struct NamedSkeleton {
-  const char* name;
-  Skeleton skeleton;
-  double radius;
-};
-
-std::vector<NamedSkeleton> all_skeletons() {
-  return {{"lone bone", lone_bone(), 0.3},
-          {"chain of two", chain(2), 0.2},
-          {"chain of nine", chain(9), 0.2},
-          {"Y", y_branch(), 0.25},
-          {"cross of 6", cross(6), 0.3},
-          {"ring of 3", ring(3), 0.2},
-          {"ring with an arm", ring_with_arm(6), 0.2},
-          {"tree of 12", random_tree(12, 3), 0.15}};
-}
-
 SkeletexModel model_of(const NamedSkeleton& named) {
   const SyntheticSurface surface(named.skeleton, named.radius);
   return surface.model(std::vector<std::pair<int, int>>(named.skeleton.bones.size(), {24, 11}));

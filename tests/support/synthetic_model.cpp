@@ -319,6 +319,21 @@ Skeleton random_tree(int bones, unsigned seed) {
   return skeleton;
 }
 
+std::vector<NamedSkeleton> all_skeletons() {
+  return {{"lone bone", lone_bone(), 0.3},
+          {"chain of two", chain(2), 0.2},
+          {"chain of five", chain(5), 0.2},
+          {"chain of nine", chain(9), 0.2},
+          {"Y", y_branch(), 0.25},
+          {"cross of 4", cross(4), 0.3},
+          {"cross of 6", cross(6), 0.3},
+          {"cross of 11", cross(11), 0.3},
+          {"ring of 3", ring(3), 0.2},
+          {"ring of 7", ring(7), 0.2},
+          {"ring with an arm", ring_with_arm(6), 0.2},
+          {"tree of 12", random_tree(12, 3), 0.15}};
+}
+
 std::vector<std::pair<int, int>> random_sizes(int count, int smallest, int largest, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_int_distribution<int> size(smallest, largest);

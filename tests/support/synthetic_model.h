@@ -48,6 +48,14 @@ Skeleton ring_with_arm(int bones);  ///< cyclic with a branch node
 /// A random tree whose bones turn away from each other, as far as the seed allows.
 Skeleton random_tree(int bones, unsigned seed);
 
+struct NamedSkeleton {
+  const char* name;
+  Skeleton skeleton;
+  double radius;  ///< of a surface around it that its separation planes cut well
+};
+/// Some of each kind.
+std::vector<NamedSkeleton> all_skeletons();
+
 /// Rectangle sizes between `smallest` and `largest`, both ways.
 std::vector<std::pair<int, int>> random_sizes(int count, int smallest, int largest, unsigned seed);
 
