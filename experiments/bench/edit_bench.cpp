@@ -5,7 +5,6 @@
 #include "stage_benchmarks.h"
 
 namespace skeletex {
-namespace {
 
 void register_all() {
   for (const auto& [a, b] : {std::pair<std::string, std::string>{"bear", "bear_bis"}, {"man", "homer"}})
@@ -19,10 +18,4 @@ void register_all() {
     }
 }
 
-}  // namespace
 }  // namespace skeletex
-
-int main(int argc, char** argv) {
-  skeletex::register_all();
-  return skeletex::run_benchmarks(argc, argv);
-}

@@ -8,7 +8,6 @@
 #include "stage_benchmarks.h"
 
 namespace skeletex {
-namespace {
 
 void register_all() {
   const std::string program = std::filesystem::read_symlink("/proc/self/exe").replace_filename("skeletex");
@@ -22,10 +21,4 @@ void register_all() {
                      [=] { return snap_stage(bench_mesh(name), size, program); });
 }
 
-}  // namespace
 }  // namespace skeletex
-
-int main(int argc, char** argv) {
-  skeletex::register_all();
-  return skeletex::run_benchmarks(argc, argv);
-}

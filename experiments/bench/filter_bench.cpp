@@ -46,6 +46,8 @@ Stage noise_stage(TextureInputPointer input) {
   return stage;
 }
 
+}  // namespace
+
 void register_all() {
   for (const std::string name : {"bunny00", "armadillo", "armadillo_fine"})
     for (const int size : {256, 512, 1024, 2048, 4096}) {
@@ -56,10 +58,4 @@ void register_all() {
     }
 }
 
-}  // namespace
 }  // namespace skeletex
-
-int main(int argc, char** argv) {
-  skeletex::register_all();
-  return skeletex::run_benchmarks(argc, argv);
-}

@@ -30,6 +30,8 @@ void manifold(benchmark::State& state, const std::string& name) {
   report_triangles(state, *input);
 }
 
+}  // namespace
+
 void register_all() {
   for (const std::string name : {"bunny00", "armadillo", "armadillo_fine"}) {
     // The last part of the name is the points' distance from the surface: 10^-n diagonals.
@@ -45,10 +47,4 @@ void register_all() {
   }
 }
 
-}  // namespace
 }  // namespace skeletex
-
-int main(int argc, char** argv) {
-  skeletex::register_all();
-  return skeletex::run_benchmarks(argc, argv);
-}

@@ -21,6 +21,8 @@ void resample(benchmark::State& state, const std::string& name, int size, int ne
     benchmark::DoNotOptimize(resample_model(bench_device(), input->model, new_size).texture.out.data());
 }
 
+}  // namespace
+
 void register_all() {
   for (const std::string name : {"bunny00", "armadillo", "armadillo_fine"})
     for (const int size : {256, 512, 1024, 2048, 4096}) {
@@ -40,10 +42,4 @@ void register_all() {
         ->Unit(benchmark::kMillisecond);
 }
 
-}  // namespace
 }  // namespace skeletex
-
-int main(int argc, char** argv) {
-  skeletex::register_all();
-  return skeletex::run_benchmarks(argc, argv);
-}

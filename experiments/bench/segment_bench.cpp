@@ -14,6 +14,8 @@ void half_edges(benchmark::State& state, const std::string& name) {
   for (auto _ : state) benchmark::DoNotOptimize(build_half_edges(input->mesh).n_edges());
 }
 
+}  // namespace
+
 void register_all() {
   for (const std::string name : {"bunny00", "armadillo", "armadillo_fine"}) {
     register_stage(fmt::format("segment/{}", name), [=] { return segment_stage(bench_device(), bench_mesh(name)); });
@@ -23,10 +25,4 @@ void register_all() {
   }
 }
 
-}  // namespace
 }  // namespace skeletex
-
-int main(int argc, char** argv) {
-  skeletex::register_all();
-  return skeletex::run_benchmarks(argc, argv);
-}

@@ -21,6 +21,8 @@ void unseen(benchmark::State& state, const std::string& name) {
                                                      benchmark::Counter::kIsIterationInvariantRate);
 }
 
+}  // namespace
+
 void register_all() {
   for (const std::string name : {"bunny00", "armadillo", "bear", "armadillo_fine"}) {
     for (const int size : {512, 2048})
@@ -32,10 +34,4 @@ void register_all() {
   }
 }
 
-}  // namespace
 }  // namespace skeletex
-
-int main(int argc, char** argv) {
-  skeletex::register_all();
-  return skeletex::run_benchmarks(argc, argv);
-}

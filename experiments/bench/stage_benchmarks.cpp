@@ -59,16 +59,16 @@ void register_stage(const std::string& name, std::function<Stage()> make) {
   benchmark::RegisterBenchmark(name.c_str(), run)->UseManualTime()->Unit(benchmark::kMillisecond);
 }
 
-int run_benchmarks(int argc, char** argv) {
+}  // namespace skeletex
+
+int main(int argc, char** argv) {
+  skeletex::register_all();
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
-  const OrderedJson record = describe_build_and_machine("");
+  const skeletex::OrderedJson record = skeletex::describe_build_and_machine("");
   for (const char* key : {"name", "driver"})
     benchmark::AddCustomContext(std::string("device_") + key, record.at("device").at(key).get<std::string>());
   benchmark::AddCustomContext("compiler", record.at("compiler").get<std::string>());
   benchmark::AddCustomContext("git", record.at("git").dump());
   benchmark::RunSpecifiedBenchmarks();
-  return 0;
 }
-
-}  // namespace skeletex

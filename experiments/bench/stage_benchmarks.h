@@ -20,7 +20,7 @@ TextureInputPointer bench_texture(const std::string& name, int size);
 /// the stage's details. The stage is made when its turn comes.
 void register_stage(const std::string& name, std::function<Stage()> make);
 
-/// main() of a benchmark program: context (device, driver, compiler, git), then what is registered.
-int run_benchmarks(int argc, char** argv);
+/// Each benchmark program registers its stages; main() adds the context (device, driver, compiler, git) and runs them.
+void register_all();
 
 }  // namespace skeletex

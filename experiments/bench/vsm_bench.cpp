@@ -6,7 +6,6 @@
 #include "stage_benchmarks.h"
 
 namespace skeletex {
-namespace {
 
 void register_all() {
   for (const std::string name : {"bunny00", "armadillo", "bear", "man", "armadillo_fine"}) {
@@ -16,10 +15,4 @@ void register_all() {
   }
 }
 
-}  // namespace
 }  // namespace skeletex
-
-int main(int argc, char** argv) {
-  skeletex::register_all();
-  return skeletex::run_benchmarks(argc, argv);
-}
