@@ -69,6 +69,6 @@ int main(int argc, char** argv) {
   for (const char* key : {"name", "driver"})
     benchmark::AddCustomContext(std::string("device_") + key, record.at("device").at(key).get<std::string>());
   benchmark::AddCustomContext("compiler", record.at("compiler").get<std::string>());
-  benchmark::AddCustomContext("git", record.at("git").dump());
+  benchmark::AddCustomContext("git", skeletex::describe_checkout().dump());
   benchmark::RunSpecifiedBenchmarks();
 }
