@@ -282,6 +282,9 @@ TEST(CarryOver, ValuesAreThoseOfTheNearestPoint) {
     ASSERT_EQ(result.weights[v].size(), 2u);
     EXPECT_NEAR(result.weights[v][0].weight, expected, 0.01);
   }
+  ASSERT_TRUE(result.attributes.original);
+  ASSERT_EQ(result.attributes.original->weights.size(), weights.size());
+  EXPECT_EQ(result.attributes.original->weights[7][0].weight, weights[7][0].weight);
   const VertexDistances distances = vertex_distances(to, from);
   EXPECT_NEAR(distances.mean, 0.02, 0.005);
   EXPECT_LT(distances.largest, 0.03);

@@ -447,6 +447,23 @@ TEST(RigImport, WeightsOfTheRigBecomeThoseOfTheModel) {
   for (std::size_t v = 0; v < last.size(); ++v) EXPECT_NEAR(last[v], share_at(bind.mesh.positions[v]), 0.02);
 }
 
+TEST(RigImport, WeightsAreThoseOfTheOriginalOfAClosedMesh) {
+  const GltfScene scene = exported(model_of(chain(3), 0.15));
+  GltfSurface surface = gltf_surface(scene, "test");
+  const int joint = scene.skins.at(0).joints.at(1);
+  AttributedMesh file{surface.mesh, {}, {}};
+  file.mesh.positions.emplace_back(surface.mesh.positions[0]);
+  file.weights.assign(file.mesh.positions.size(), {{joint, 1.0}});
+  surface.attributes.original = std::make_shared<const AttributedMesh>(file);
+  const ImportedRig rig = import_rig(scene, surface);
+  ASSERT_EQ(rig.weights.size(), file.weights.size());
+  for (const std::vector<BoneWeight>& weights : rig.weights) {
+    ASSERT_EQ(weights.size(), 1u);
+    EXPECT_EQ(weights[0].bone, rig.weights[0][0].bone);
+    EXPECT_NEAR(weights[0].weight, 1, 1e-12);
+  }
+}
+
 TEST(RigImport, WeightsOfPartsDoNotBlendInTheirUnion) {
   const Shape shape = chain_shape(3, 0.4);
   EncodeOptions options;

@@ -30,13 +30,10 @@ std::vector<bool> is_inside_out(const TriangleMesh& mesh, const CornerValues<Vec
     bool is_open = false;
     double volume = 0, towards_normals = 0;
   };
-  UnionFind vertices(static_cast<int>(mesh.positions.size()));
+  UnionFind vertices = connected_vertices(mesh);
   std::vector<std::pair<int, int>> edges;
   for (const Triangle& t : mesh.triangles)
-    for (int k = 0; k < 3; ++k) {
-      vertices.unite(t[k], t[(k + 1) % 3]);
-      edges.emplace_back(t[k], t[(k + 1) % 3]);
-    }
+    for (int k = 0; k < 3; ++k) edges.emplace_back(t[k], t[(k + 1) % 3]);
   std::sort(edges.begin(), edges.end());
   std::map<int, Part> parts;
   const Vec3 origin = bounding_box(mesh).centre();
@@ -61,13 +58,13 @@ std::vector<bool> is_inside_out(const TriangleMesh& mesh, const CornerValues<Vec
   return result;
 }
 
-/// A mesh whose triangles run outwards, so that the sides of its thin parts are known by where they look.
-AttributedMesh turned_outwards(AttributedMesh result) {
-  const std::vector<bool> is_turned = is_inside_out(result.mesh, result.attributes.normals);
+/// A mesh with its triangles turned outwards, so that both sides of a thin part can be told apart.
+AttributedMesh turned_outwards(AttributedMesh mesh) {
+  const std::vector<bool> is_turned = is_inside_out(mesh.mesh, mesh.attributes.normals);
   for (std::size_t t = 0; t < is_turned.size(); ++t)
-    if (is_turned[t]) std::swap(result.mesh.triangles[t][1], result.mesh.triangles[t][2]);
-  turn_over(result.attributes, is_turned);
-  return result;
+    if (is_turned[t]) std::swap(mesh.mesh.triangles[t][1], mesh.mesh.triangles[t][2]);
+  turn_over(mesh.attributes, is_turned);
+  return mesh;
 }
 
 }  // namespace

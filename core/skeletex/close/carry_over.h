@@ -11,7 +11,8 @@ namespace skeletex {
 
 /// A mesh in place of another one near by.
 struct CarriedOver {
-  /// Per vertex: colours (of pictures too) and numbers; and the other mesh with its weights, all its parts outwards.
+  /// Per vertex: colours (of pictures too) and numbers. Their original is the other mesh with its weights, all its
+  /// triangles turned outwards.
   MeshAttributes attributes;
   VertexBoneWeights weights;  ///< per vertex, where the other mesh has some
 };

@@ -126,8 +126,7 @@ class LoopSearch {
 };
 
 bool is_connected(const TriangleMesh& mesh) {
-  UnionFind parts(static_cast<int>(mesh.positions.size()));
-  for (const Triangle& t : mesh.triangles) parts.unite(t[0], t[1]), parts.unite(t[0], t[2]);
+  UnionFind parts = connected_vertices(mesh);
   return std::ranges::all_of(mesh.triangles,
                              [&](const Triangle& t) { return parts.find(t[0]) == parts.find(mesh.triangles[0][0]); });
 }

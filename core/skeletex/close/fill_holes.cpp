@@ -217,8 +217,7 @@ void refuse_sheets(const TriangleMesh& mesh, const Fillings& fillings, std::vect
   /// Of the 1.5th power of the area; a ball has 0.094, a box of 1 x 1 x 0.01 has 0.0034.
   constexpr double kLeastVolume = 0.002;
   const TriangleMesh filled = with_fillings(mesh, fillings);
-  UnionFind parts(static_cast<int>(filled.positions.size()));
-  for (const Triangle& t : filled.triangles) parts.unite(t[0], t[1]), parts.unite(t[0], t[2]);
+  UnionFind parts = connected_vertices(filled);
   struct Extent {
     double area = 0, volume = 0;
   };

@@ -39,8 +39,7 @@ void keep_triangles(TriangleMesh& mesh, std::vector<int>& origins, const Keep& i
 struct Components {
   UnionFind vertices;
   std::map<int, double> areas;  ///< by component
-  explicit Components(const TriangleMesh& mesh) : vertices(static_cast<int>(mesh.positions.size())) {
-    for (const Triangle& t : mesh.triangles) vertices.unite(t[0], t[1]), vertices.unite(t[0], t[2]);
+  explicit Components(const TriangleMesh& mesh) : vertices(connected_vertices(mesh)) {
     for (const Triangle& t : mesh.triangles) areas[vertices.find(t[0])] += area_vector(mesh, t).norm();
   }
 };

@@ -4,6 +4,8 @@
 #include <numeric>
 #include <vector>
 
+#include "skeletex/geometry/mesh.h"
+
 namespace skeletex {
 
 /// Disjoint sets of the numbers from 0 on. A set is known by its smallest member.
@@ -30,5 +32,12 @@ class UnionFind {
  private:
   std::vector<int> parents_;
 };
+
+/// The vertices of a mesh, joined by its triangles: a set is a connected part.
+inline UnionFind connected_vertices(const TriangleMesh& mesh) {
+  UnionFind vertices(static_cast<int>(mesh.positions.size()));
+  for (const Triangle& t : mesh.triangles) vertices.unite(t[0], t[1]), vertices.unite(t[0], t[2]);
+  return vertices;
+}
 
 }  // namespace skeletex

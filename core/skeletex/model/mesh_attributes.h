@@ -60,7 +60,7 @@ struct MeshAttributes {
 struct AttributedMesh {
   TriangleMesh mesh;
   MeshAttributes attributes;
-  VertexBoneWeights weights = {};  ///< of a rig, whose joints stand for bones; empty: none
+  VertexBoneWeights weights = {};  ///< of the joints of a rig, in place of bones; empty: none
 };
 
 /// The original of a closed mesh where it has weights; else null.

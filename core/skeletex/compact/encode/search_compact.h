@@ -21,7 +21,7 @@ struct CompactGoal {
 
 struct CompactResult {
   std::string bytes;            ///< of the file
-  std::size_t layer_bytes = 0;  ///< those that the file is larger by for its layers
+  std::size_t layer_bytes = 0;  ///< of them, those that a file without layers would lack
   CompactOptions options;
   double mean = 0, max = 0;  ///< symmetric surface mean, and the largest distance of both directions, over the diagonal
   int trials = 0;

@@ -31,10 +31,11 @@ struct Probe {
 /// \param tree  of the mesh
 std::vector<SurfacePoint> find_surface_points(ClContext& context, const TriangleMesh& mesh, const TriangleTree& tree,
                                               std::span<const Probe> probes);
-/// Points of a closed mesh on the mesh of the file that it stands for, on the side where it looks.
+/// The points of the file's mesh nearest to those of the closed mesh in its place, on the side that faces the same way.
 /// \param original  in the frame of `mesh`
 /// \param points  of `mesh`; their triangles may be -1
-/// \return of `original`; triangle -1 as there
+/// \return of `original`, one for each; triangle -1 as there
+/// \throw DeviceError
 std::vector<SurfacePoint> points_on_original(ClContext& context, const TriangleMesh& original, const TriangleMesh& mesh,
                                              std::span<const SurfacePoint> points);
 /// The points of a mesh nearest to the texels of a model; to those between rectangles none (triangle -1).
