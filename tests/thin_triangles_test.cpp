@@ -140,7 +140,7 @@ TEST(ThinTriangles, AreHardlyLeftOfModels) {
     EXPECT_GT(thin_share(mesh), 0.015);
     EXPECT_LT(thin_share(reduced), limit) << name;
     const MetroReport moved = measure_metro(device(), mesh, reduced);
-    EXPECT_LT(std::max(moved.forward.max, moved.backward.max) * moved.diagonal, 2.5 * tolerance(mesh)) << name;
+    EXPECT_LT(std::max(moved.forward.max, moved.backward.max) * moved.diagonal, 3 * tolerance(mesh)) << name;
     // It costs less accuracy than the same number of vertices is worth anywhere else.
     const double before = symmetric_mean(measure_metro(device(), input.mesh, mesh)),
                  after = symmetric_mean(measure_metro(device(), input.mesh, reduced));

@@ -100,6 +100,7 @@ Json report_json(const EncodeReport& report) {
                      {"furthest_distance", bone.distance.furthest / report.diagonal}});
   return {{"vertices", report.vertices},
           {"triangles", report.triangles},
+          {"split_triangles", report.split_triangles},
           {"genus", report.genus},
           {"bones", std::move(bones)},
           {"used_fraction", report.used_fraction},

@@ -71,6 +71,7 @@ Json encode_report_json(const EncodeReport& report, const EncodedFile& file) {
   Json json{{"mesh",
              {{"vertices", report.vertices},
               {"triangles", report.triangles},
+              {"split_triangles", report.split_triangles},
               {"diagonal", report.scale * report.diagonal},
               {"genus", report.genus}}},
             {"bones", std::move(bones)},
@@ -115,8 +116,11 @@ std::string encode_report_text(const EncodeReport& report, const EncodedFile& fi
   std::string text = fmt::format("{}: {} x {} texels, {:.1f} MiB, {:.1f} s on {}\n", file.path, file.width, file.height,
                                  static_cast<double>(std::filesystem::file_size(file.path, ignored)) / (1 << 20),
                                  file.seconds, report.device);
-  text += fmt::format("mesh: {} vertices, {} triangles, genus {}; texels lie in {:.0f} % of the triangles",
-                      report.vertices, report.triangles, report.genus, read_percent(report));
+  text += fmt::format(
+      "mesh: {} vertices, {} triangles{}, genus {}; texels lie in {:.0f} % of the triangles", report.vertices,
+      report.triangles,
+      report.split_triangles > 0 ? fmt::format(" (split into {}, as some are large)", report.split_triangles) : "",
+      report.genus, read_percent(report));
   if (report.snap)
     text +=
         fmt::format(" and on {:.1f} % of the vertices", percent(report.snap->snapped_vertices, report.snap->vertices));

@@ -16,6 +16,7 @@
 #include "skeletex/convert/map_surface.h"
 #include "skeletex/convert/sample/sample_seams.h"
 #include "skeletex/convert/segment/segment_mesh.h"
+#include "skeletex/convert/subdivide/split_edges.h"
 #include "skeletex/device/stopwatch.h"
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/model/error.h"
@@ -31,6 +32,10 @@ namespace {
 constexpr double kHardlyWorse = 1.1;           // hybrid: of a distance, for SPD
 constexpr double kMostFitted = 8192.0 * 8192;  // texels: the fit counts numbers of them with 32 bits
 constexpr double kLeastDihedral = 0.004;       // radians: flatter edges are no creases to snap to
+// Edges of large triangles are split where they are longer: the map is linear on every triangle, and on few large ones
+// it cannot be even. Thin triangles are left alone, as vertices in them would take the texels of others.
+constexpr double kLongestEdge = 16;     // texels
+constexpr double kLeastSplitArea = 80;  // of a large triangle, texels
 
 void check_options(const EncodeOptions& options, const Skeleton& skeleton) {
   if (options.vsm.iterations < 0 || options.vsm.iterations > 100)
@@ -210,7 +215,7 @@ std::vector<std::array<std::vector<Vec3>, 2>> find_end_points(const SkeletexMode
   return end_points;
 }
 
-/// The input, and what is made of it once, whatever the methods.
+/// The input with its long edges split, and what is made of it once, whatever the methods.
 struct EncodeJob {
   ClContext& context;
   const TriangleMesh& mesh;
@@ -327,8 +332,6 @@ Encoding encode_hybrid(const EncodeJob& job, const SkeletexModel& start, MappedS
 void report_result(const EncodeJob& job, const Encoding& encoding, const MappedSurface& surface, EncodeReport& report) {
   const SkeletexModel& model = encoding.model;
   const TexelReport& texels = encoding.texels;
-  report.vertices = static_cast<int>(job.mesh.positions.size());
-  report.triangles = static_cast<int>(job.mesh.triangles.size());
   report.genus = model.genus;
   report.diagonal = model.diagonal;
   report.scale = model.skeleton.frame.scale;
@@ -377,24 +380,31 @@ void report_result(const EncodeJob& job, const Encoding& encoding, const MappedS
 
 }  // namespace
 
-EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Skeleton& skeleton,
+EncodeResult encode_model(ClContext& context, const TriangleMesh& input, const Skeleton& skeleton,
                           const EncodeOptions& options) {
   check_options(options, skeleton);
   check_size(skeleton.nodes.size(), skeleton.bones.size());
-  if (options.tree && options.tree->order.size() != mesh.triangles.size())
+  if (options.tree && options.tree->order.size() != input.triangles.size())
     throw InputError(fmt::format("the tree is of {} triangles, the mesh has {}; give the mesh's own, or none",
-                                 options.tree->order.size(), mesh.triangles.size()));
-  require_memory(estimated_bytes(options, mesh), fmt::format("encoding {} triangles to {} x {} texels",
-                                                             mesh.triangles.size(), options.width, options.height));
+                                 options.tree->order.size(), input.triangles.size()));
+  require_memory(estimated_bytes(options, input), fmt::format("encoding {} triangles to {} x {} texels",
+                                                              input.triangles.size(), options.width, options.height));
   const auto progress = [&](const char* stage, double done) {
     if (options.progress && !options.progress(stage, done)) throw Error("cancelled");
   };
   EncodeReport report;
-  const SkeletexModel model = start_model(mesh, skeleton);
+  const SkeletexModel model = start_model(input, skeleton);
   const SeparationPlanes separation(model.skeleton);  // refers to it
   Stopwatch watch;
 
   progress("half edges", 0);
+  const double texel_area = surface_area(input) / (static_cast<double>(options.width) * options.height);
+  const std::optional<TriangleMesh> split =
+      split_long_edges(input, kLongestEdge * std::sqrt(texel_area), kLeastSplitArea * texel_area);
+  const TriangleMesh& mesh = split ? *split : input;
+  report.vertices = static_cast<int>(input.positions.size());
+  report.triangles = static_cast<int>(input.triangles.size());
+  if (split) report.split_triangles = static_cast<int>(split->triangles.size());
   CutMesh half_edges = cut_mesh_of(mesh);
   report.half_edge_ms = watch.lap_ms();
   progress("segmentation", 0.05);
@@ -409,7 +419,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
 
   progress("encoding", 0.6);
   std::optional<TriangleTree> own_tree;
-  if (!options.tree) own_tree = build_triangle_tree(mesh);
+  if (split || !options.tree) own_tree = build_triangle_tree(mesh);
   const EncodeJob job{context, mesh, own_tree ? *own_tree : *options.tree, separation, options};
   Encoding encoding = options.method ? encode_surface(job, model, surface) : encode_hybrid(job, model, surface);
   nlohmann::json settings = settings_json(options, encoding.placing, surface.unseen);
@@ -422,7 +432,10 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& mesh, const Sk
   const MeshAttributes& attributes = options.attributes ? *options.attributes : none;
   if (has_layers(attributes, options.layers)) {
     progress("layers", 0.95);
-    ReadLayers layers = read_layers(context, encoding.model, mesh, job.tree, attributes, options.layers);
+    std::optional<TriangleTree> input_tree;
+    if (split && !options.tree) input_tree = build_triangle_tree(input);
+    const TriangleTree& tree = input_tree ? *input_tree : options.tree ? *options.tree : *own_tree;
+    ReadLayers layers = read_layers(context, encoding.model, input, tree, attributes, options.layers);
     encoding.model.layers = std::move(layers.layers);
     report.layer_notes = std::move(layers.notes);
     report.layers_ms = watch.lap_ms();

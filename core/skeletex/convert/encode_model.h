@@ -85,7 +85,8 @@ inline bool lacks_part(const BoneReport& bone, double diagonal) {
 inline bool has_false_surface(const BoneReport& bone, double diagonal) { return bone.excess.mean > 0.003 * diagonal; }
 
 struct EncodeReport {
-  int vertices = 0, triangles = 0, genus = 0;
+  int vertices = 0, triangles = 0, genus = 0;  ///< of the mesh
+  int split_triangles = 0;                     ///< of the mesh after its long edges were split; 0: none were
   double diagonal = 0;  ///< of the mesh in the frame of the model, as are the lengths of the reports below
   double scale = 1;     ///< of that frame
   std::vector<BoneReport> bones;

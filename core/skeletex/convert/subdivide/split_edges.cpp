@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+#include "skeletex/convert/subdivide/split_edges.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+
+namespace skeletex {
+namespace {
+
+/// The middles of split edges by their ends, the smaller number first.
+using Middles = std::map<std::pair<int, int>, int>;
+
+Middles split(double longest, double least_area, TriangleMesh& mesh) {
+  Middles middles;
+  for (const Triangle& t : mesh.triangles) {
+    if (area_vector(mesh, t).norm() < least_area) continue;
+    for (int k = 0; k < 3; ++k) {
+      const int a = std::min(t[k], t[(k + 1) % 3]), b = std::max(t[k], t[(k + 1) % 3]);
+      if ((mesh.positions[b] - mesh.positions[a]).norm() <= longest) continue;
+      if (!middles.try_emplace({a, b}, static_cast<int>(mesh.positions.size())).second) continue;
+      mesh.positions.push_back(0.5 * (mesh.positions[a] + mesh.positions[b]));
+    }
+  }
+  return middles;
+}
+
+/// The parts of a triangle. Where two edges are split, the quad that is left is cut along its shorter diagonal.
+void append_parts(const TriangleMesh& mesh, const Triangle& triangle, const Middles& middles,
+                  std::vector<Triangle>& parts) {
+  const auto middle_of = [&](int k) {
+    const int a = triangle[k], b = triangle[(k + 1) % 3];
+    const auto found = middles.find({std::min(a, b), std::max(a, b)});
+    return found == middles.end() ? -1 : found->second;
+  };
+  const std::array<int, 3> middle{middle_of(0), middle_of(1), middle_of(2)};
+  const auto count = std::count_if(middle.begin(), middle.end(), [](int m) { return m >= 0; });
+  if (count == 0) {
+    parts.push_back(triangle);
+    return;
+  }
+  // The first corner is that before the only split edge, or that between both.
+  int first = 0;
+  while (count == 1 ? middle[first] < 0 : count == 2 && middle[(first + 1) % 3] >= 0) ++first;
+  const int a = triangle[first], b = triangle[(first + 1) % 3], c = triangle[(first + 2) % 3];
+  const int ab = middle[first], bc = middle[(first + 1) % 3], ca = middle[(first + 2) % 3];
+  if (count == 1) {
+    parts.insert(parts.end(), {{a, ab, c}, {ab, b, c}});
+    return;
+  }
+  parts.push_back({a, ab, ca});
+  if (count == 3) {
+    parts.insert(parts.end(), {{ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
+    return;
+  }
+  const auto distance = [&](int i, int j) { return (mesh.positions[i] - mesh.positions[j]).squaredNorm(); };
+  if (distance(ab, c) < distance(b, ca))
+    parts.insert(parts.end(), {{ab, b, c}, {ab, c, ca}});
+  else
+    parts.insert(parts.end(), {{ab, b, ca}, {b, c, ca}});
+}
+
+}  // namespace
+
+std::optional<TriangleMesh> split_long_edges(const TriangleMesh& mesh, double longest, double least_area) {
+  std::optional<TriangleMesh> result;
+  while (true) {
+    TriangleMesh finer = result ? *result : mesh;
+    const Middles middles = split(longest, least_area, finer);
+    if (middles.empty()) return result;
+    const std::vector<Triangle> whole = std::move(finer.triangles);
+    finer.triangles.clear();
+    for (const Triangle& triangle : whole) append_parts(finer, triangle, middles, finer.triangles);
+    result = std::move(finer);
+  }
+}
+
+}  // namespace skeletex
