@@ -203,6 +203,21 @@ TEST_F(Program, RefusesSizesThatAreNone) {
     expect_refused(2, {"reconstruct", "y.skx.exr", "-o", "a.ply", std::string("--size=") + size}, {"--size"});
 }
 
+TEST_F(Program, SaysIntoHowManyTrianglesItSplitsLargeOnes) {
+  const TriangleMesh mesh = read_mesh(folder_ / "y.ply").mesh;
+  for (const bool is_large : {false, true}) {
+    const Outcome encoded = run({"encode", "y.ply", "y.skeleton.json", "-o", "split.skx.exr", "--size",
+                                 is_large ? "1024" : "64", "--json", "split.json"});
+    ASSERT_EQ(encoded.code, 0) << encoded.err;
+    const nlohmann::json counts = nlohmann::json::parse(text_of(folder_ / "split.json"))["mesh"];
+    EXPECT_EQ(counts["triangles"], mesh.triangles.size());
+    EXPECT_EQ(counts["split_triangles"].get<std::size_t>() > mesh.triangles.size(), is_large);
+    const std::string said = "split into " + counts["split_triangles"].dump();
+    EXPECT_EQ(encoded.out.find(said) != std::string::npos, is_large) << encoded.out;
+  }
+  for (const char* name : {"split.skx.exr", "split.json"}) fs::remove(folder_ / name);
+}
+
 TEST_F(Program, EncodesAndReportsWhatTheContractNames) {
   const nlohmann::json json = json_of(
       {"encode", "y.ply", "y.skeleton.json", "-o", "contract.skx.exr", "--method", "hybrid", "--size", "96x64"});

@@ -33,7 +33,7 @@ constexpr double kHardlyWorse = 1.1;           // hybrid: of a distance, for SPD
 constexpr double kMostFitted = 8192.0 * 8192;  // texels: the fit counts numbers of them with 32 bits
 constexpr double kLeastDihedral = 0.004;       // radians: flatter edges are no creases to snap to
 // Edges of large triangles are split where they are longer: the map is linear on every triangle, and on few large ones
-// it cannot be even. Thin triangles are left alone, as vertices in them would take the texels of others.
+// it cannot be even. Small ones keep their edges, as more vertices would need the texels of others.
 constexpr double kLongestEdge = 16;     // texels
 constexpr double kLeastSplitArea = 80;  // of a large triangle, texels
 
@@ -418,9 +418,11 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& input, const S
   report.parameterization_ms = watch.lap_ms();
 
   progress("encoding", 0.6);
-  std::optional<TriangleTree> own_tree;
-  if (split || !options.tree) own_tree = build_triangle_tree(mesh);
-  const EncodeJob job{context, mesh, own_tree ? *own_tree : *options.tree, separation, options};
+  std::optional<TriangleTree> own_tree, split_tree;
+  if (!options.tree) own_tree = build_triangle_tree(input);
+  if (split) split_tree = build_triangle_tree(*split);
+  const TriangleTree& input_tree = own_tree ? *own_tree : *options.tree;
+  const EncodeJob job{context, mesh, split_tree ? *split_tree : input_tree, separation, options};
   Encoding encoding = options.method ? encode_surface(job, model, surface) : encode_hybrid(job, model, surface);
   nlohmann::json settings = settings_json(options, encoding.placing, surface.unseen);
   add_results(encoding.texels, encoding.model.diagonal, settings);
@@ -432,10 +434,7 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& input, const S
   const MeshAttributes& attributes = options.attributes ? *options.attributes : none;
   if (has_layers(attributes, options.layers)) {
     progress("layers", 0.95);
-    std::optional<TriangleTree> input_tree;
-    if (split && !options.tree) input_tree = build_triangle_tree(input);
-    const TriangleTree& tree = input_tree ? *input_tree : options.tree ? *options.tree : *own_tree;
-    ReadLayers layers = read_layers(context, encoding.model, input, tree, attributes, options.layers);
+    ReadLayers layers = read_layers(context, encoding.model, input, input_tree, attributes, options.layers);
     encoding.model.layers = std::move(layers.layers);
     report.layer_notes = std::move(layers.notes);
     report.layers_ms = watch.lap_ms();

@@ -8,18 +8,18 @@
 namespace skeletex {
 namespace {
 
-/// The middles of split edges by their ends, the smaller number first.
+/// The vertices in the middle of split edges by the ends of those, the smaller number first.
 using Middles = std::map<std::pair<int, int>, int>;
 
-Middles split(double longest, double least_area, TriangleMesh& mesh) {
+/// Numbers them, behind the mesh's vertices.
+Middles number_middles(const TriangleMesh& mesh, double longest, double least_area) {
   Middles middles;
   for (const Triangle& t : mesh.triangles) {
     if (area_vector(mesh, t).norm() < least_area) continue;
     for (int k = 0; k < 3; ++k) {
       const int a = std::min(t[k], t[(k + 1) % 3]), b = std::max(t[k], t[(k + 1) % 3]);
-      if ((mesh.positions[b] - mesh.positions[a]).norm() <= longest) continue;
-      if (!middles.try_emplace({a, b}, static_cast<int>(mesh.positions.size())).second) continue;
-      mesh.positions.push_back(0.5 * (mesh.positions[a] + mesh.positions[b]));
+      if ((mesh.positions[b] - mesh.positions[a]).norm() > longest)
+        middles.try_emplace({a, b}, static_cast<int>(mesh.positions.size() + middles.size()));
     }
   }
   return middles;
@@ -39,7 +39,7 @@ void append_parts(const TriangleMesh& mesh, const Triangle& triangle, const Midd
     parts.push_back(triangle);
     return;
   }
-  // The first corner is that before the only split edge, or that between both.
+  // Of one split edge, begin with its first end; of two, with the corner where they meet.
   int first = 0;
   while (count == 1 ? middle[first] < 0 : count == 2 && middle[(first + 1) % 3] >= 0) ++first;
   const int a = triangle[first], b = triangle[(first + 1) % 3], c = triangle[(first + 2) % 3];
@@ -65,12 +65,14 @@ void append_parts(const TriangleMesh& mesh, const Triangle& triangle, const Midd
 std::optional<TriangleMesh> split_long_edges(const TriangleMesh& mesh, double longest, double least_area) {
   std::optional<TriangleMesh> result;
   while (true) {
-    TriangleMesh finer = result ? *result : mesh;
-    const Middles middles = split(longest, least_area, finer);
+    const TriangleMesh& coarse = result ? *result : mesh;
+    const Middles middles = number_middles(coarse, longest, least_area);
     if (middles.empty()) return result;
-    const std::vector<Triangle> whole = std::move(finer.triangles);
-    finer.triangles.clear();
-    for (const Triangle& triangle : whole) append_parts(finer, triangle, middles, finer.triangles);
+    TriangleMesh finer{coarse.positions, {}};
+    finer.positions.resize(coarse.positions.size() + middles.size());
+    for (const auto& [ends, middle] : middles)
+      finer.positions[middle] = 0.5 * (coarse.positions[ends.first] + coarse.positions[ends.second]);
+    for (const Triangle& triangle : coarse.triangles) append_parts(finer, triangle, middles, finer.triangles);
     result = std::move(finer);
   }
 }

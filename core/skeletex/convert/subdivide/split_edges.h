@@ -6,10 +6,10 @@
 
 namespace skeletex {
 
-/// The same surface with shorter edges: those of large triangles are split in the middle where they are long, until no
-/// large triangle has a long edge. The map of a chart is linear on every triangle; on few large ones it cannot be even.
-/// \param longest  no edge of a large triangle stays longer, world units
-/// \param least_area  of a large triangle, square world units
+/// The same surface with shorter edges: long edges of large triangles are split in the middle, until there are none.
+/// The map of a chart is linear on every triangle; on few large ones it cannot be even.
+/// \param longest  edges that are longer are split, world units
+/// \param least_area  triangles of at least this area are large, square world units
 /// \return nothing where no edge is split
 /// \pre longest > 0
 std::optional<TriangleMesh> split_long_edges(const TriangleMesh& mesh, double longest, double least_area);
