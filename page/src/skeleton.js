@@ -52,8 +52,8 @@ export function endsAtNodes(skeleton) {
   return at;
 }
 
-const nodeOf = (skeleton, bone, end) => (end === 0 ? skeleton.bones[bone].head : skeleton.bones[bone].tail);
-const directionFrom = (skeleton, [bone, end]) =>
+export const nodeOf = (skeleton, bone, end) => (end === 0 ? skeleton.bones[bone].head : skeleton.bones[bone].tail);
+export const directionFrom = (skeleton, [bone, end]) =>
   unit(sub(skeleton.nodes[nodeOf(skeleton, bone, 1 - end)], skeleton.nodes[nodeOf(skeleton, bone, end)]));
 
 /** Separation planes as they are seen from each bone. */
@@ -81,6 +81,12 @@ export class SeparationPlanes {
   radial(bone, turn) {
     const angle = 2 * Math.PI * turn, {s, b} = this.bases[bone];
     return add(scaled(s, Math.cos(angle)), scaled(b, Math.sin(angle)));
+  }
+
+  /** The angle of an offset from a bone's node, in turns from 0 to 1. */
+  turnOf(bone, offset) {
+    const {s, b} = this.bases[bone], turn = Math.atan2(dot(offset, b), dot(offset, s)) / (2 * Math.PI);
+    return turn - Math.floor(turn);
   }
 
   slope(bone, end, turn) {

@@ -4,6 +4,7 @@
 import capsule from '../../kernels/capsule.h';
 import skinWeight from '../../kernels/skin_weight.h';
 import {blendedTexels} from './blend.js';
+import {CompactSource} from './compact/texels.js';
 import {array, unpackKeys, unpackSteps, unpackTexels} from './data.js';
 import {makeLattice} from './lattice.js';
 import {SeparationPlanes, axialOf, hierarchy, interval, motions, posed, skeletonAt, weightWalks} from './skeleton.js';
@@ -40,6 +41,7 @@ export class Surface {
     this.arrays = arrays;
     this.state = {level: 0, t: 0, rotations: new Map(), transferred: new Set()};
     this.links = hierarchy(skeletonAt(model, 0), model.roots);
+    this.compact = model.compact ? new CompactSource(model, array(arrays, model.compact.payload)) : null;
     this.stage = null;
     this.lattice = null;
     this.textures = {};
@@ -97,8 +99,8 @@ export class Surface {
     const {second, transfer, blend} = level;
     for (const texture of [level, second, transfer]) {
       if (!texture) continue;
-      texture.values = unpackTexels(this.arrays, texture);
       texture.rows = array(this.arrays, texture.rows);
+      texture.values = this.compact ? this.compact.texels(texture) : unpackTexels(this.arrays, texture);
     }
     for (const stage of level.stages) unpackKeys(this.arrays, stage.keys, ['turns', 'distances']);
     if (!second) return;

@@ -10,7 +10,9 @@
 #include "command.h"
 #include "files.h"
 #include "progress_bar.h"
+#include "skeletex/compact/decode_model.h"
 #include "skeletex/io/atomic_file.h"
+#include "skeletex/io/compact/compact_model_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/page/page.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
@@ -34,6 +36,17 @@ std::string name_of(const std::string& path) {
 
 int longer_side(const SkeletexModel& model) { return std::max(model.texture.width, model.texture.height); }
 
+/// The model that the page shows. Of a compact one by itself the page holds the numbers, at a size that they decode to.
+SkeletexModel read_first(const Arguments& arguments, PageOptions& options) {
+  const std::string& path = arguments.models[0];
+  if (arguments.models.size() > 1 || !is_compact_file(path)) return read_model(path);
+  options.compact.emplace(PageCompact{read_compact_file(path)});
+  const CompactModel& compact = options.compact->model;
+  const int size = arguments.size > 0 ? arguments.size : std::min(kLargest, decoded_size(compact, 0));
+  options.compact->octaves = octaves_for(compact, size);
+  return read_compact_model(path, {.bytes = {}, .size = size});
+}
+
 void run(const Arguments& arguments) {
   if (arguments.models.size() > 2)
     throw CLI::ValidationError(
@@ -42,8 +55,8 @@ void run(const Arguments& arguments) {
     throw CLI::ValidationError("--bones", "pairs the bones of two models");
   const BonePairs given = parse_bone_pairs(arguments.bones);
   Stopwatch total;
-  SkeletexModel model = read_model(arguments.models[0]);
   PageOptions options;
+  SkeletexModel model = read_first(arguments, options);
   options.name = name_of(arguments.models[0]);
   if (!arguments.up.empty()) options.is_z_up = arguments.up == "z";
   if (arguments.models.size() == 2) {
@@ -60,8 +73,12 @@ void run(const Arguments& arguments) {
   const bool has_own_weights = !model.bone_weights.empty();
   ClContext context(arguments.device);
   std::string page;
-  const int size = arguments.size > 0 ? arguments.size : std::min(kLargest, longer_side(model));
-  const bool is_reduced = arguments.size == 0 && size < longer_side(model);
+  int size = longer_side(model);
+  bool is_reduced = options.compact && options.compact->octaves < 0;
+  if (!options.compact) {
+    is_reduced = kLargest < size;
+    size = arguments.size > 0 ? arguments.size : std::min(kLargest, size);
+  }
   {
     ProgressBar bar(context);
     bar.show("resampling", 0.1);
@@ -71,7 +88,8 @@ void run(const Arguments& arguments) {
     bar.show("writing", 0.95);
     write_text_atomically(arguments.output, page);
   }
-  if (is_reduced) warn(fmt::format("the page holds {} texels along the longer side; --size takes more", size));
+  if (is_reduced && arguments.size == 0)
+    warn(fmt::format("the page holds {} texels along the longer side; --size takes more", size));
   if (has_own_weights) warn("the page poses with weights in closed form; those that the model brings are left out");
   print(arguments.json,
         fmt::format("{}: {:.2f} MB, {} x {} texels\n", arguments.output, 1e-6 * static_cast<double>(page.size()),
@@ -100,7 +118,10 @@ void add_view_command(CLI::App& program) {
   command
       .add_option(
           "--size", arguments->size,
-          fmt::format("texels along the longer side, 4 to 2048 (default: the model's own size, at most {})", kLargest))
+          fmt::format(
+              "texels along the longer side, 4 to 2048 (default: the model's own size, at most {}); of a compact "
+              "file at least that many",
+              kLargest))
       ->check(number_in(4, 2048))
       ->type_name("N");
   declare_input(command, command.add_option("--against", arguments->against,

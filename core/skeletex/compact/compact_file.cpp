@@ -448,6 +448,8 @@ CompactModel model_of(std::string_view payload, PrefixRule rule) {
 
 bool is_compact(std::string_view first_bytes) { return first_bytes.substr(0, kMagic.size()) == kMagic; }
 
+std::string compact_payload(const CompactModel& model) { return payload_of(model); }
+
 std::string compact_bytes(const CompactModel& model) {
   const std::string payload = payload_of(model);
   ByteWriter body;

@@ -12,6 +12,8 @@ inline constexpr int kCompactVersion = 2;
 
 /// The bytes of a compact file (docs/compact.md).
 std::string compact_bytes(const CompactModel& model);
+/// Its payload: what LZMA compresses.
+std::string compact_payload(const CompactModel& model);
 
 /// Whether a file's first bytes are those of a compact file.
 bool is_compact(std::string_view first_bytes);

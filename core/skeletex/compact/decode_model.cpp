@@ -171,6 +171,13 @@ int decoded_size(const CompactModel& compact, int octaves) {
   return std::max(width, height);
 }
 
+int octaves_for(const CompactModel& compact, int size) {
+  int octaves = 0;
+  while (octaves < 8 && decoded_size(compact, octaves) < size) ++octaves;
+  while (octaves > -8 && decoded_size(compact, octaves - 1) >= size) --octaves;
+  return octaves;
+}
+
 SkeletexModel decode_model(const CompactModel& compact, int octaves) {
   std::vector<Rectangle> rectangles = rectangles_of(compact, octaves);
   double texels = 0;

@@ -12,5 +12,7 @@ SkeletexModel decode_model(const CompactModel& compact, int octaves = 0);
 
 /// The longer side of the texture that decode_model gives.
 int decoded_size(const CompactModel& compact, int octaves);
+/// The fewest octaves, from -8 to 8, at which it is at least `size`.
+int octaves_for(const CompactModel& compact, int size);
 
 }  // namespace skeletex

@@ -9,6 +9,9 @@
 #include <numeric>
 
 #include "skeletex/analysis/metro.h"
+#include "skeletex/compact/compact_file.h"
+#include "skeletex/compact/decode_model.h"
+#include "skeletex/compact/seam_curves.h"
 #include "skeletex/device/kernel_source.h"
 #include "skeletex/edit/morph/morph.h"
 #include "skeletex/edit/transfer/transfer.h"
@@ -107,8 +110,8 @@ std::vector<float> rows_of(const SkeletexModel& model) {
   return rows;
 }
 
-Json texture_json(PageArrays& arrays, const SkeletexModel& model) {
-  Json json = add_texels(arrays, model.texture, model.patches, kTexelStep * model.diagonal);
+Json rectangles_json(const SkeletexModel& model) {
+  Json json;
   json["width"] = model.texture.width;
   json["height"] = model.texture.height;
   json["patches"] = Json::array();
@@ -116,6 +119,12 @@ Json texture_json(PageArrays& arrays, const SkeletexModel& model) {
     const auto [x, y, width, height] = patch.rectangle;
     json["patches"].push_back({x, y, width, height});
   }
+  return json;
+}
+
+Json texture_json(PageArrays& arrays, const SkeletexModel& model) {
+  Json json = add_texels(arrays, model.texture, model.patches, kTexelStep * model.diagonal);
+  json.update(rectangles_json(model));
   return json;
 }
 
@@ -170,7 +179,8 @@ Json error_json(ClContext& context, PageArrays& arrays, const SkeletexModel& mod
 /// One level of detail.
 Json level_json(ClContext& context, PageArrays& arrays, std::span<const PageKey> keys, const PageOptions& options) {
   const SkeletexModel& first = keys.front().model;
-  Json level = texture_json(arrays, first);
+  const bool is_decoded = options.compact && !options.second;
+  Json level = is_decoded ? rectangles_json(first) : texture_json(arrays, first);
   level["rows"] = arrays.add(rows_of(first));
   level["stages"] = Json::array();
   for (std::size_t begin = 0; begin < keys.size();) {
@@ -208,6 +218,38 @@ Json morph_levels(ClContext& context, PageArrays& arrays, const SkeletexModel& m
   return levels;
 }
 
+/// What the page's script decodes: the payload of the compact model's file without layers, and how the patches' ends
+/// run through the arcs, [arc, whether it is reversed] each.
+Json compact_json(PageArrays& arrays, CompactModel compact) {
+  compact.layers.clear();
+  for (CompactPatch& patch : compact.patches) patch.planes.clear();
+  const std::string payload = compact_payload(compact);
+  Json ends = Json::array();
+  for (const std::array<PatchEnd, 2>& both : ends_of(compact)) {
+    Json bone = Json::array();
+    for (const PatchEnd& end : both) {
+      Json arcs = Json::array();
+      for (const ArcUse& use : end.arcs) arcs.push_back({use.arc, use.is_reversed});
+      bone.push_back(arcs);
+    }
+    ends.push_back(bone);
+  }
+  return {{"payload", arrays.add(std::span(reinterpret_cast<const unsigned char*>(payload.data()), payload.size()))},
+          {"ends", ends}};
+}
+
+/// The sizes of a compact model from that of the page down.
+std::vector<SkeletexModel> compact_levels(const PageCompact& compact, const SkeletexModel& model, int smallest) {
+  std::vector<SkeletexModel> levels{model};
+  int octaves = compact.octaves, size = decoded_size(compact.model, octaves);
+  for (;;) {
+    const int next = decoded_size(compact.model, --octaves);
+    if (next < smallest || next > 0.75 * size) return levels;  // coarse grids halve no more
+    levels.push_back(decode_model(compact.model, octaves));
+    size = next;
+  }
+}
+
 bool stands_along_z(const SkeletexModel& model) {
   return model.stance && std::abs(model.stance->up.z()) > std::abs(model.stance->up.y());
 }
@@ -236,7 +278,9 @@ std::string make_page(ClContext& context, const SkeletexModel& model, const Page
     json["skeleton"] = skeleton;
   } else {
     json["levels"] = Json::array();
-    for (const SkeletexModel& level : make_levels(context, model, options.smallest)) {
+    if (options.compact) json["compact"] = compact_json(arrays, options.compact->model);
+    for (const SkeletexModel& level : options.compact ? compact_levels(*options.compact, model, options.smallest)
+                                                      : make_levels(context, model, options.smallest)) {
       const std::vector<PageKey> keys{{0, level, {}, {}}};
       if (json["levels"].empty()) json["skeleton"] = skeleton_json(keys, options);
       json["levels"].push_back(level_json(context, arrays, keys, options));

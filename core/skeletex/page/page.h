@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "skeletex/compact/compact_model.h"
 #include "skeletex/device/context.h"
 #include "skeletex/geometry/mesh.h"
 #include "skeletex/model/texture.h"
@@ -20,8 +21,17 @@ struct PageSecond {
   Correspondence correspondence;  ///< from the first model's bones
 };
 
+/// What a page's model was decoded from.
+struct PageCompact {
+  CompactModel model;
+  int octaves = 0;  ///< as decode_model took them
+};
+
 struct PageOptions {
   std::string name;  ///< of the model, as the page's title has it
+  /// With it, and without a second model, the page holds the numbers of the compact model instead of texels, and
+  /// decodes them.
+  std::optional<PageCompact> compact;
   std::optional<PageSecond> second;
   const TriangleMesh* reference = nullptr;  ///< mesh that errors are measured to; nullptr: none are shown
   /// How the page stands the model at first: z up and -y in front, or y and z; none: by the model's own up direction.

@@ -22,19 +22,18 @@ bool is_compact_file(const std::filesystem::path& path) {
   return file.gcount() == static_cast<std::streamsize>(first.size()) && is_compact({first.data(), first.size()});
 }
 
+CompactModel read_compact_file(const std::filesystem::path& path) {
+  return read_compact(read_file(path), path.string());
+}
+
 SkeletexModel read_compact_model(const std::filesystem::path& path, const CompactFileOptions& options) {
   const std::string where = path.string();
   std::string bytes = read_file(path);
   const PrefixRule rule = options.bytes ? PrefixRule::kPrefix : PrefixRule::kWhole;
   if (options.bytes && *options.bytes < bytes.size()) bytes.resize(*options.bytes);
   const CompactModel compact = read_compact(bytes, where, rule);
-  int octaves = 0;
-  if (options.size) {
-    while (octaves < 8 && decoded_size(compact, octaves) < *options.size) ++octaves;
-    while (octaves > -8 && decoded_size(compact, octaves - 1) >= *options.size) --octaves;
-  }
   try {
-    SkeletexModel model = decode_model(compact, octaves);
+    SkeletexModel model = decode_model(compact, options.size ? octaves_for(compact, *options.size) : 0);
     check_model(model, where);
     return model;
   } catch (const IoError&) {
