@@ -68,6 +68,23 @@ TEST(SplitLongEdges, DoesNothingToShortEdgesAndSmallTriangles) {
   for (const Triangle& t : split->triangles) EXPECT_LT(area_vector(*split, t).norm(), least_area);
 }
 
+TEST(SplitLongEdges, SaysWhatShareOfTheSurfaceItSplits) {
+  // A triangle of area 2, one of area 1/2.
+  const TriangleMesh mesh{{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}}, {{0, 1, 2}, {3, 4, 5}}};
+  EXPECT_DOUBLE_EQ(share_to_split(mesh, 1, 1), 0.8);
+  EXPECT_DOUBLE_EQ(share_to_split(mesh, 1, 0.1), 1);
+  EXPECT_DOUBLE_EQ(share_to_split(mesh, 2, 0.1), 0.8);
+  EXPECT_DOUBLE_EQ(share_to_split(mesh, 3, 0.1), 0);
+  EXPECT_DOUBLE_EQ(share_to_split(mesh, 1, 3), 0);
+}
+
+// Denser vertices around a few large triangles would move the map of the rest.
+TEST(SplitLongEdges, LeavesAMeshOfWhichFewTrianglesAreLarge) {
+  const TestModel model = load_standard_model("bull");  // 38 % of the surface lie in large triangles at 512
+  ClContext context;
+  EXPECT_EQ(encode_model(context, model.mesh, model.skeleton, {}).report.split_triangles, 0);
+}
+
 // The map of a few large triangles cannot be even: without splits the mean distance is 9e-7 of the diagonal.
 TEST(SplitLongEdges, BringTheModelOfASparseMeshNearer) {
   const TestModel sparse = load_standard_model("eight");

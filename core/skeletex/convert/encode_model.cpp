@@ -33,9 +33,11 @@ constexpr double kHardlyWorse = 1.1;           // hybrid: of a distance, for SPD
 constexpr double kMostFitted = 8192.0 * 8192;  // texels: the fit counts numbers of them with 32 bits
 constexpr double kLeastDihedral = 0.004;       // radians: flatter edges are no creases to snap to
 // Edges of large triangles are split where they are longer: the map is linear on every triangle, and on few large ones
-// it cannot be even. Small ones keep their edges, as more vertices would need the texels of others.
-constexpr double kLongestEdge = 16;     // texels
-constexpr double kLeastSplitArea = 80;  // of a large triangle, texels
+// it cannot be even. Small ones keep their edges, as more vertices would need the texels of others; so do all where the
+// large ones are few, as vertices there would be denser than around them.
+constexpr double kLongestEdge = 16;       // texels
+constexpr double kLeastSplitArea = 80;    // of a large triangle, texels
+constexpr double kLeastSplitShare = 0.5;  // of the surface
 
 void check_options(const EncodeOptions& options, const Skeleton& skeleton) {
   if (options.vsm.iterations < 0 || options.vsm.iterations > 100)
@@ -399,8 +401,10 @@ EncodeResult encode_model(ClContext& context, const TriangleMesh& input, const S
 
   progress("half edges", 0);
   const double texel_area = surface_area(input) / (static_cast<double>(options.width) * options.height);
-  const std::optional<TriangleMesh> split =
-      split_long_edges(input, kLongestEdge * std::sqrt(texel_area), kLeastSplitArea * texel_area);
+  const double longest_edge = kLongestEdge * std::sqrt(texel_area), least_area = kLeastSplitArea * texel_area;
+  std::optional<TriangleMesh> split;
+  if (share_to_split(input, longest_edge, least_area) >= kLeastSplitShare)
+    split = split_long_edges(input, longest_edge, least_area);
   const TriangleMesh& mesh = split ? *split : input;
   report.vertices = static_cast<int>(input.positions.size());
   report.triangles = static_cast<int>(input.triangles.size());

@@ -8,6 +8,10 @@
 namespace skeletex {
 namespace {
 
+double edge_length(const TriangleMesh& mesh, const Triangle& t, int k) {
+  return (mesh.positions[t[(k + 1) % 3]] - mesh.positions[t[k]]).norm();
+}
+
 /// The vertices in the middle of split edges by the ends of those, the smaller number first.
 using Middles = std::map<std::pair<int, int>, int>;
 
@@ -16,11 +20,10 @@ Middles number_middles(const TriangleMesh& mesh, double longest, double least_ar
   Middles middles;
   for (const Triangle& t : mesh.triangles) {
     if (area_vector(mesh, t).norm() < least_area) continue;
-    for (int k = 0; k < 3; ++k) {
-      const int a = std::min(t[k], t[(k + 1) % 3]), b = std::max(t[k], t[(k + 1) % 3]);
-      if ((mesh.positions[b] - mesh.positions[a]).norm() > longest)
-        middles.try_emplace({a, b}, static_cast<int>(mesh.positions.size() + middles.size()));
-    }
+    for (int k = 0; k < 3; ++k)
+      if (edge_length(mesh, t, k) > longest)
+        middles.try_emplace(std::minmax(t[k], t[(k + 1) % 3]),
+                            static_cast<int>(mesh.positions.size() + middles.size()));
   }
   return middles;
 }
@@ -75,6 +78,18 @@ std::optional<TriangleMesh> split_long_edges(const TriangleMesh& mesh, double lo
     for (const Triangle& triangle : coarse.triangles) append_parts(finer, triangle, middles, finer.triangles);
     result = std::move(finer);
   }
+}
+
+double share_to_split(const TriangleMesh& mesh, double longest, double least_area) {
+  double share = 0, all = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const double area = area_vector(mesh, t).norm();
+    const bool is_split = area >= least_area && std::max({edge_length(mesh, t, 0), edge_length(mesh, t, 1),
+                                                          edge_length(mesh, t, 2)}) > longest;
+    all += area;
+    share += is_split ? area : 0;
+  }
+  return all > 0 ? share / all : 0;
 }
 
 }  // namespace skeletex

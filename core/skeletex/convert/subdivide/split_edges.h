@@ -14,4 +14,7 @@ namespace skeletex {
 /// \pre longest > 0
 std::optional<TriangleMesh> split_long_edges(const TriangleMesh& mesh, double longest, double least_area);
 
+/// The share of the surface in triangles of which it splits edges.
+double share_to_split(const TriangleMesh& mesh, double longest, double least_area);
+
 }  // namespace skeletex
