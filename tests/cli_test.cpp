@@ -655,6 +655,16 @@ TEST_F(Program, FindsNoDistanceFromAMeshToItself) {
   EXPECT_LT(json["vertex"]["max"].get<double>(), 1e-6);
 }
 
+TEST_F(Program, SaysWhichMeshIsInsideOutWhereNormalsPointOppositeWays) {
+  TriangleMesh turned = read_mesh(folder_ / "y.ply").mesh;
+  for (Triangle& t : turned.triangles) std::swap(t[1], t[2]);
+  write_mesh(folder_ / "turned.ply", turned);
+  EXPECT_NE(run({"metro", "y.ply", "turned.ply", "--samples", "5000"}).err.find("B is inside out"), std::string::npos);
+  EXPECT_NE(run({"metro", "turned.ply", "y.ply", "--samples", "5000"}).err.find("A is inside out"), std::string::npos);
+  EXPECT_EQ(run({"metro", "y.ply", "y.ply", "--samples", "5000"}).err, "");
+  fs::remove(folder_ / "turned.ply");
+}
+
 TEST_F(Program, ColoursEachBonesSegmentAndSaysWhichColourIsWhose) {
   const nlohmann::json json = json_of({"segment", "y.ply", "y.skeleton.json", "-o", "s.ply"});
   std::set<std::string> colours;

@@ -118,6 +118,9 @@ void run(const Arguments& arguments) {
         context, surface_a.mesh, surface_b.mesh,
         {.samples = arguments.samples, .normals_a = own_normals(surface_a), .normals_b = own_normals(surface_b)});
   }
+  if (std::min(report.forward_normals.surface.mean, report.backward_normals.surface.mean) > 90)
+    warn(fmt::format("the normals of A and B point opposite ways: {} is inside out; reverse the order of its triangles",
+                     signed_volume(surface_a.mesh) < 0 ? "A" : "B"));
   const TriangleMesh& a = surface_a.mesh;
   if (!arguments.csv.empty()) write_csv(arguments.csv, a, report.vertex_distances);
   const double scale =

@@ -38,7 +38,7 @@ class Sites {
       return length > 0;
     };
     if (!set(side, x, y, z)) side[3 * i] = 1;
-    if ((spacing > 0 && set(normal, y * c - z * b, z * a - x * c, x * b - y * a))) return;
+    if (set(normal, y * c - z * b, z * a - x * c, x * b - y * a)) return;
     const s = side.subarray(3 * i, 3 * i + 3), axis = Math.abs(s[0]) < 0.5 ? [1, 0, 0] : [0, 1, 0];
     set(normal, ...cross(s, axis));
   }
