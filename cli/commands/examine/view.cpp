@@ -36,7 +36,8 @@ std::string name_of(const std::string& path) {
 
 int longer_side(const SkeletexModel& model) { return std::max(model.texture.width, model.texture.height); }
 
-/// The model that the page shows. Of a compact one by itself the page holds the numbers, at a size that they decode to.
+/// The first model. One of a compact file is read at the page's size, and where it is the only one the page holds the
+/// numbers of the file.
 SkeletexModel read_first(const Arguments& arguments, PageOptions& options) {
   const std::string& path = arguments.models[0];
   if (arguments.models.size() > 1 || !is_compact_file(path)) return read_model(path);
@@ -73,12 +74,9 @@ void run(const Arguments& arguments) {
   const bool has_own_weights = !model.bone_weights.empty();
   ClContext context(arguments.device);
   std::string page;
-  int size = longer_side(model);
-  bool is_reduced = options.compact && options.compact->octaves < 0;
-  if (!options.compact) {
-    is_reduced = kLargest < size;
-    size = arguments.size > 0 ? arguments.size : std::min(kLargest, size);
-  }
+  const int own_size = longer_side(model), wanted = arguments.size > 0 ? arguments.size : std::min(kLargest, own_size);
+  const int size = options.compact ? own_size : wanted;  // a compact model was read at the page's size
+  const bool is_reduced = options.compact ? options.compact->octaves < 0 : size < own_size;
   {
     ProgressBar bar(context);
     bar.show("resampling", 0.1);

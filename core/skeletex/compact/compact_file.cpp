@@ -347,37 +347,6 @@ void read_plane_steps(ByteReader& in, CompactPatch& patch, int step) {
   }
 }
 
-std::string payload_of(const CompactModel& model) {
-  ByteWriter out;
-  write_skeleton(out, model.skeleton);
-  write_stance(out, model.stance);
-  out.real(model.step);
-  out.byte(model.bare_levels);
-  for (const OffsetWeights& weights : model.weights)
-    for (const int weight : weights) out.byte(weight + 128);
-  write_sides(out, model);
-  write_layers(out, model);
-  for_each_pole(model, [&](const std::array<int, 3>& pole) {
-    for (const int value : pole) out.number(value);
-  });
-  for (const CompactArc& arc : model.arcs) {
-    for (const int value : arc.base) out.number(value);
-    for (const StepResiduals& step : arc.steps) write_step(out, step);
-  }
-  for (const CompactPatch& patch : model.patches)
-    for (std::size_t k = 0; k < 3; ++k)
-      for (std::size_t i = k; i < patch.base.size(); i += 3) out.residual(patch.base[i] - expected_base(patch, i));
-  write_base_planes(out, model);
-  for_each_step(model, [&](const CompactPatch& patch, int step, bool is_layers) {
-    if (is_layers)
-      write_plane_steps(out, patch, step);
-    else
-      write_step(out, patch.steps[step]);
-    return true;
-  });
-  return out.bytes();
-}
-
 /// The seams and the coarse grids.
 void read_coarse(ByteReader& in, CompactModel& model) {
   for (CompactArc& arc : model.arcs) {
@@ -448,10 +417,39 @@ CompactModel model_of(std::string_view payload, PrefixRule rule) {
 
 bool is_compact(std::string_view first_bytes) { return first_bytes.substr(0, kMagic.size()) == kMagic; }
 
-std::string compact_payload(const CompactModel& model) { return payload_of(model); }
+std::string compact_payload(const CompactModel& model) {
+  ByteWriter out;
+  write_skeleton(out, model.skeleton);
+  write_stance(out, model.stance);
+  out.real(model.step);
+  out.byte(model.bare_levels);
+  for (const OffsetWeights& weights : model.weights)
+    for (const int weight : weights) out.byte(weight + 128);
+  write_sides(out, model);
+  write_layers(out, model);
+  for_each_pole(model, [&](const std::array<int, 3>& pole) {
+    for (const int value : pole) out.number(value);
+  });
+  for (const CompactArc& arc : model.arcs) {
+    for (const int value : arc.base) out.number(value);
+    for (const StepResiduals& step : arc.steps) write_step(out, step);
+  }
+  for (const CompactPatch& patch : model.patches)
+    for (std::size_t k = 0; k < 3; ++k)
+      for (std::size_t i = k; i < patch.base.size(); i += 3) out.residual(patch.base[i] - expected_base(patch, i));
+  write_base_planes(out, model);
+  for_each_step(model, [&](const CompactPatch& patch, int step, bool is_layers) {
+    if (is_layers)
+      write_plane_steps(out, patch, step);
+    else
+      write_step(out, patch.steps[step]);
+    return true;
+  });
+  return out.bytes();
+}
 
 std::string compact_bytes(const CompactModel& model) {
-  const std::string payload = payload_of(model);
+  const std::string payload = compact_payload(model);
   ByteWriter body;
   body.count(payload.size());
   const std::string rest = body.bytes() + compress(payload);

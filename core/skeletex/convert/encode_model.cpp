@@ -33,8 +33,8 @@ constexpr double kHardlyWorse = 1.1;           // hybrid: of a distance, for SPD
 constexpr double kMostFitted = 8192.0 * 8192;  // texels: the fit counts numbers of them with 32 bits
 constexpr double kLeastDihedral = 0.004;       // radians: flatter edges are no creases to snap to
 // Edges of large triangles are split where they are longer: the map is linear on every triangle, and on few large ones
-// it cannot be even. Small ones keep their edges, as more vertices would need the texels of others; so do all where the
-// large ones are few, as vertices there would be denser than around them.
+// it cannot be even. Small triangles keep their edges, as more vertices would need the texels of others. Where large
+// triangles are a smaller share of the surface nothing is split, as vertices would be denser there than around them.
 constexpr double kLongestEdge = 16;       // texels
 constexpr double kLeastSplitArea = 80;    // of a large triangle, texels
 constexpr double kLeastSplitShare = 0.5;  // of the surface

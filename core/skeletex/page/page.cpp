@@ -244,7 +244,7 @@ std::vector<SkeletexModel> compact_levels(const PageCompact& compact, const Skel
   int octaves = compact.octaves, size = decoded_size(compact.model, octaves);
   for (;;) {
     const int next = decoded_size(compact.model, --octaves);
-    if (next < smallest || next > 0.75 * size) return levels;  // coarse grids halve no more
+    if (next < smallest || next > 0.75 * size) return levels;  // the coarsest grids cannot be halved
     levels.push_back(decode_model(compact.model, octaves));
     size = next;
   }

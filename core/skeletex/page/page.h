@@ -29,7 +29,7 @@ struct PageCompact {
 
 struct PageOptions {
   std::string name;  ///< of the model, as the page's title has it
-  /// With it, and without a second model, the page holds the numbers of the compact model instead of texels, and
+  /// Where it is given, and no second model, the page holds the numbers of the compact model instead of texels and
   /// decodes them.
   std::optional<PageCompact> compact;
   std::optional<PageSecond> second;

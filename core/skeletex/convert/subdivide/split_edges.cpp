@@ -15,7 +15,7 @@ double edge_length(const TriangleMesh& mesh, const Triangle& t, int k) {
 /// The vertices in the middle of split edges by the ends of those, the smaller number first.
 using Middles = std::map<std::pair<int, int>, int>;
 
-/// Numbers them, behind the mesh's vertices.
+/// Numbers those vertices from the mesh's last one on.
 Middles number_middles(const TriangleMesh& mesh, double longest, double least_area) {
   Middles middles;
   for (const Triangle& t : mesh.triangles) {

@@ -14,7 +14,7 @@ namespace skeletex {
 /// \pre longest > 0
 std::optional<TriangleMesh> split_long_edges(const TriangleMesh& mesh, double longest, double least_area);
 
-/// The share of the surface in triangles of which it splits edges.
+/// The share of the surface that lies in triangles whose edges split_long_edges splits, from 0 to 1.
 double share_to_split(const TriangleMesh& mesh, double longest, double least_area);
 
 }  // namespace skeletex
