@@ -4,7 +4,6 @@
 // angle. So casting a ray against triangles becomes casting it against segments in the plane, and as the rays of a
 // column fan out without crossing, each point of the plane lies between two neighbouring rows.
 //   cast_rays       per column, its list of triangles -> per texel the triangle that its ray meets, and the distance
-//   find_hidden     per triangle, the list of triangles at its centre's angle -> whether one lies before it
 // Coordinates are those of each bone: x along s, y along b, z along o, from the head, world units. `points` holds nine
 // of them per triangle. Lists of triangles are compressed rows: list i is list_triangles[list_begins[i] ..
 // list_begins[i+1]), with triangle numbers over all charts, increasing. Both triangles at an edge compute the same
@@ -154,39 +153,4 @@ kernel void cast_rays(const CastParameters p, global const SpdPatch* restrict pa
       }
     }
   }
-}
-
-// NDRange (triangles). Lists are by sector and by slab: slab k of a sector holds the triangles with points at a height
-// z in [k, k + 1) slab_height above the chart's lowest point. `spheres` hold each triangle: centre x, y, z and radius.
-kernel void find_hidden(const HideParameters parameters, global const SpdSightLine* restrict lines,
-                        global const int* restrict list_begins, global const int* restrict list_triangles,
-                        global const float* restrict spheres, global const float* restrict points,
-                        global int* restrict is_hidden) {
-  const int triangle = (int)get_global_id(0);
-  if (triangle >= parameters.triangle_count) return;
-  const SpdSightLine line = lines[triangle];
-  const float nearer = line.distance * (1.0f - 1e-5f);
-  const float dx = line.out * line.cosine, dy = line.out * line.sine, dz = line.along;
-  int found = line.distance < 0.0f;
-  for (int i = list_begins[line.first_list]; !found && i < list_begins[line.last_list + 1]; ++i) {
-    const int other = list_triangles[i];
-    // Most of the list is nowhere near.
-    const float x = spheres[4 * other], y = spheres[4 * other + 1], z = spheres[4 * other + 2] - line.foot,
-                radius = spheres[4 * other + 3];
-    const float along = x * dx + y * dy + z * dz;
-    const float rx = x - along * dx, ry = y - along * dy, rz = z - along * dz;
-    if (rx * rx + ry * ry + rz * rz > radius * radius || along - radius > nearer || along + radius < 0.0f ||
-        other == triangle)
-      continue;
-    Section s;
-    if (!slice_triangle(points, other, line.cosine, line.sine, &s)) continue;
-    const float side_a = line.out * (s.za - line.foot) - line.along * s.xa,
-                side_b = line.out * (s.zb - line.foot) - line.along * s.xb;
-    if ((side_a < 0.0f) == (side_b < 0.0f)) continue;
-    const float t_a = line.out * s.xa + line.along * (s.za - line.foot),
-                t_b = line.out * s.xb + line.along * (s.zb - line.foot);
-    const float t = t_a + side_a / (side_a - side_b) * (t_b - t_a);
-    found = t >= 0.0f && t < nearer;
-  }
-  is_hidden[triangle] = found;
 }

@@ -27,15 +27,6 @@ typedef struct SpdPatch {
   float guesses_per_mark;
 } SpdPatch;
 
-/// One ray that starts on the bone's axis: towards the centre of a triangle.
-typedef struct SpdSightLine {
-  float cosine, sine;  ///< s' = cosine s + sine b: the half-plane that holds the ray
-  float foot;          ///< of W, along the bone from the head, world units
-  float out, along;    ///< the ray's unit direction: along s', along o
-  float distance;      ///< of the triangle's centre from W; negative: the centre has no ray, the triangle is unseen
-  int first_list, last_list;  ///< the lists of triangles at this angle, from the foot's height to the centre's
-} SpdSightLine;
-
 typedef struct CastParameters {
   int column_count;  ///< of all patches
   int tile_rows;     ///< rows that a work-item takes
@@ -44,14 +35,9 @@ typedef struct CastParameters {
   int list_begins;   ///< in `tables`, per column and one more: its list of triangles
 } CastParameters;
 
-typedef struct HideParameters {
-  int triangle_count;
-} HideParameters;
-
 #ifndef __OPENCL_C_VERSION__
 static_assert(sizeof(CastParameters) == 20);
 static_assert(sizeof(SpdPatch) == 56);
-static_assert(sizeof(SpdSightLine) == 32);
 }  // namespace skeletex
 #endif
 #endif

@@ -15,8 +15,7 @@ void unseen(benchmark::State& state, const std::string& name) {
   const MeshInputPointer input = bench_mesh(name);
   const std::vector<Chart> charts = charts_of(bench_device(), *input).charts;
   const SeparationPlanes separation(input->skeleton);
-  for (auto _ : state)
-    benchmark::DoNotOptimize(unseen_area_fractions(bench_device(), input->skeleton, separation, charts).data());
+  for (auto _ : state) benchmark::DoNotOptimize(unseen_area_fractions(input->skeleton, separation, charts).data());
   state.counters["triangles/s"] = benchmark::Counter(static_cast<double>(input->mesh.triangles.size()),
                                                      benchmark::Counter::kIsIterationInvariantRate);
 }

@@ -64,7 +64,7 @@ MappedSurface map_surface(ClContext& context, Segmentation segmentation, std::ve
   for_each_block(count, 1, [&](std::size_t i, std::size_t, std::size_t) {
     surface.charts[i] = make_chart(surface.segmentation.segments[i], skeleton, separation);
   });
-  surface.unseen = unseen_area_fractions(context, skeleton, separation, surface.charts);
+  surface.unseen = unseen_area_fractions(skeleton, separation, surface.charts);
   surface.reports = map_charts(context, surface.methods, surface.charts, {options.vsm});
   for_each_block(count, 1, [&](std::size_t i, std::size_t, std::size_t) {
     if (!is_height_field(surface.methods[i])) judge_map(options, i, surface);

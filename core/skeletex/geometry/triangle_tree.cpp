@@ -258,8 +258,8 @@ std::array<float, kWidth> enter_children(const TriangleTree& tree, int level, st
 
 /// The least share at which a ray meets a triangle of a block (Moeller and Trumbore 1997); `limit` without any.
 /// Triangles are a little larger than they are, so that no ray slips between two.
-float hit_block(const TriangleMesh& mesh, const TriangleTree& tree, std::size_t block, const TreeRay& ray,
-                float limit) {
+float hit_block(const TriangleMesh& mesh, const TriangleTree& tree, std::size_t block, const TreeRay& ray, float limit,
+                int skipped) {
   constexpr float kOver = 1e-6f;
   const std::size_t begin = block * kWidth, last = tree.order.size() - 1;
   // By corner and coordinate, so that the compiler vectorises what follows.
@@ -285,14 +285,15 @@ float hit_block(const TriangleMesh& mesh, const TriangleTree& tree, std::size_t 
     const bool is_met = (u >= -kOver) & (v >= -kOver) & (u + v <= 1 + kOver) & (share >= 0);
     shares[k] = is_met ? share : kFarAway;
   }
-  for (int k = 0; k < kWidth; ++k) limit = std::min(limit, shares[k]);
+  for (int k = 0; k < kWidth; ++k)
+    if (shares[k] < limit && tree.order[std::min(begin + k, last)] != skipped) limit = shares[k];
   return limit;
 }
 
 }  // namespace
 
 double find_first_hit(const TriangleMesh& mesh, const TriangleTree& tree, const Vec3& origin, const Vec3& direction,
-                      double limit) {
+                      double limit, int skipped) {
   TreeRay ray;
   for (int d = 0; d < 3; ++d) {
     ray.origin[d] = static_cast<float>((origin[d] - tree.origin[d]) / tree.scale);
@@ -313,7 +314,7 @@ double find_first_hit(const TriangleMesh& mesh, const TriangleTree& tree, const 
     const Open node = open[--count];
     if (node.enter >= least) continue;
     if (node.level == 0) {
-      least = hit_block(mesh, tree, node.index, ray, least);
+      least = hit_block(mesh, tree, node.index, ray, least, skipped);
       continue;
     }
     const std::array<float, kWidth> enter = enter_children(tree, node.level, node.index, ray, least);

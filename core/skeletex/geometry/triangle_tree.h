@@ -59,9 +59,10 @@ void for_each_triangle_near(const TriangleTree& tree, const Vec3& lower, const V
                             const std::function<void(int triangle)>& visit);
 
 /// Where a ray first meets the mesh, in single precision: origin + share * direction. Triangles count from both sides.
-/// \param limit  hits at larger shares are left out
+/// \param limit    hits at larger shares are left out
+/// \param skipped  so is this triangle
 /// \return the share; infinity without a hit
 double find_first_hit(const TriangleMesh& mesh, const TriangleTree& tree, const Vec3& origin, const Vec3& direction,
-                      double limit = std::numeric_limits<double>::infinity());
+                      double limit = std::numeric_limits<double>::infinity(), int skipped = -1);
 
 }  // namespace skeletex

@@ -4,10 +4,11 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <cstdint>
 #include <numbers>
 
 #include "skeletex/geometry/parallel.h"
+#include "skeletex/geometry/triangle_tree.h"
 #include "skeletex/math/portable.h"
 #include "spd_structs.h"
 
@@ -19,10 +20,6 @@ constexpr int kWorkGroup = 32;
 constexpr int kTileRowsGpu = 64;
 // The pole's ray leans this much towards its column, so that it meets what holds the axis whatever rounding does there.
 constexpr double kPoleCosine = 1e-6;
-// Lists of triangles for sight lines: per turn, and along the bone.
-constexpr int kSightSectors = 128;
-constexpr int kSightSlabs = 64;
-constexpr double kSightTriangles = 4096;  // of a chart, up to which so many sectors and slabs will do
 
 /// The triangles of all charts in the coordinates of their bones.
 struct LocalTriangles {
@@ -96,17 +93,15 @@ struct Lists {
   std::vector<int> triangles;
 };
 
-/// Calls visit(index) for every one of `count` angles (j / count) or sectors ([j, j + 1) / count) that a triangle
-/// covers.
-enum class AngleCell { kAngle, kSector };
+/// Calls visit(j) for every one of `count` angles j / count that a triangle covers.
 template <class Visit>
-void for_each_angle(const LocalTriangles& local, int triangle, int count, AngleCell cell, Visit&& visit) {
+void for_each_angle(const LocalTriangles& local, int triangle, int count, Visit&& visit) {
   // Slack for the rounding of angles in single precision, here and on the device.
   constexpr double kSlack = 4e-7;
   int first = 0, last = count - 1;
   if (local.last_turn[triangle] - local.first_turn[triangle] < 1) {
     const double low = (static_cast<double>(local.first_turn[triangle]) - kSlack) * count;
-    first = static_cast<int>(cell == AngleCell::kAngle ? std::ceil(low) : std::floor(low));
+    first = static_cast<int>(std::ceil(low));
     last = static_cast<int>(std::floor((static_cast<double>(local.last_turn[triangle]) + kSlack) * count));
     last = std::min(last, first + count - 1);
   }
@@ -181,106 +176,18 @@ struct RayTables {
   }
 };
 
-/// Each chart cut into sectors about its bone and slabs along it: as many as leave lists as long as in small charts,
-/// however fine the mesh.
-struct SightGrid {
-  int sectors = 0, slabs = 0;
-  int first_list = 0;
-  float lowest = 0, slabs_per_height = 0;
-
-  int slab_of(float z) const { return std::clamp(static_cast<int>((z - lowest) * slabs_per_height), 0, slabs - 1); }
-};
-
-std::vector<SightGrid> make_sight_grids(const LocalTriangles& local, std::span<const Chart> charts) {
-  std::vector<SightGrid> grids(charts.size());
-  int lists = 0;
-  for (std::size_t i = 0; i < charts.size(); ++i) {
-    SightGrid& grid = grids[i];
-    const double finer = std::max(1.0, std::sqrt(static_cast<double>(charts[i].triangles.size()) / kSightTriangles));
-    grid.sectors = static_cast<int>(finer * kSightSectors);
-    grid.slabs = static_cast<int>(finer * kSightSlabs);
-    grid.first_list = lists;
-    lists += grid.sectors * grid.slabs;
-    grid.lowest = std::numeric_limits<float>::max();
-    float high = std::numeric_limits<float>::lowest();
-    for (int p = 3 * local.begins[i]; p < 3 * local.begins[i + 1]; ++p) {
-      grid.lowest = std::min(grid.lowest, local.points[3 * static_cast<std::size_t>(p) + 2]);
-      high = std::max(high, local.points[3 * static_cast<std::size_t>(p) + 2]);
-    }
-    grid.slabs_per_height = high > grid.lowest ? static_cast<float>(grid.slabs) / (high - grid.lowest) : 0;
-  }
-  return grids;
-}
-
-Lists list_by_sight_grid(const LocalTriangles& local, std::span<const SightGrid> grids) {
-  const int count = grids.empty() ? 0 : grids.back().first_list + grids.back().sectors * grids.back().slabs;
-  return fill_lists(count, grids.size(), [&](std::size_t i, auto&& visit) {
-    const SightGrid& grid = grids[i];
-    for (int t = local.begins[i]; t < local.begins[i + 1]; ++t) {
-      const float* p = &local.points[9 * static_cast<std::size_t>(t)];
-      const int first = grid.slab_of(std::min({p[2], p[5], p[8]})), last = grid.slab_of(std::max({p[2], p[5], p[8]}));
-      for_each_angle(local, t, grid.sectors, AngleCell::kSector, [&](int sector) {
-        for (int slab = first; slab <= last; ++slab) visit(grid.first_list + sector * grid.slabs + slab, t);
-      });
-    }
-  });
-}
-
-/// The ray from the bone's axis to a triangle's centre.
-SpdSightLine sight_line_to(const Skeleton& skeleton, const SeparationPlanes& separation, const Chart& chart,
-                           const Triangle& triangle, const SightGrid& grid) {
-  const BoneBasis& basis = separation.bases()[chart.bone];
-  const Vec3 centre = (chart.positions[triangle[0]] + chart.positions[triangle[1]] + chart.positions[triangle[2]]) / 3;
-  const SpdCoordinates at = spd_coordinates(skeleton, separation, chart.bone, centre);
-  const Vec3 offset = centre - end_position(skeleton, chart.bone, BoneEnd::kHead);
-  const double x = offset.dot(basis.s), y = offset.dot(basis.b), r = std::hypot(x, y);
-  SpdSightLine none{};
-  none.distance = -1;
-  if (!(at.u >= 0 && at.u <= 1 && r > 0)) return none;
-  const Axial axial =
-      axial_of(at.u, separation.is_free(chart.bone, BoneEnd::kHead), separation.is_free(chart.bone, BoneEnd::kTail));
-  const double foot = axial.axial * bone_length(skeleton, chart.bone);
-  const double z = offset.dot(basis.o) - foot, distance = std::hypot(r, z);
-  const double slack = 1e-6 * (std::abs(foot) + std::abs(z) + distance);
-  const int sector = std::min(grid.sectors - 1, static_cast<int>(at.turn * grid.sectors));
-  const int list = grid.first_list + sector * grid.slabs;
-  return {static_cast<float>(x / r),
-          static_cast<float>(y / r),
-          static_cast<float>(foot),
-          static_cast<float>(r / distance),
-          static_cast<float>(z / distance),
-          static_cast<float>(distance),
-          list + grid.slab_of(static_cast<float>(foot + std::min(z, 0.0) - slack)),
-          list + grid.slab_of(static_cast<float>(foot + std::max(z, 0.0) + slack))};
-}
-
-/// Spheres around all triangles: centre and radius.
-std::vector<float> bounding_spheres(const LocalTriangles& local) {
-  const float radius_slack = static_cast<float>(1e-6 * local.extent);
-  std::vector<float> spheres(4 * static_cast<std::size_t>(local.count()));
-  for_each_block(local.count(), 1024, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) {
-      const Eigen::Map<const Eigen::Matrix3f> corners(&local.points[9 * t]);
-      const Eigen::Vector3f middle = corners.rowwise().mean();
-      const float radius = std::sqrt((corners.colwise() - middle).colwise().squaredNorm().maxCoeff());
-      Eigen::Map<Eigen::Vector4f>(&spheres[4 * t]) << middle, radius + radius_slack;
-    }
-  });
-  return spheres;
-}
-
-/// The share of a chart's area that is hidden.
-/// \param is_hidden  per triangle
-double hidden_fraction(const Chart& chart, std::span<const int> is_hidden) {
-  double unseen = 0, area = 0;
-  for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
-    const Triangle& triangle = chart.triangles[t];
-    const Vec3& p = chart.positions[triangle[0]];
-    const double a = 0.5 * (chart.positions[triangle[1]] - p).cross(chart.positions[triangle[2]] - p).norm();
-    area += a;
-    if (is_hidden[t]) unseen += a;
-  }
-  return area > 0 ? unseen / area : 0;
+/// Whether the ray from the bone's axis to a triangle's centre meets another triangle first, or there is no such ray.
+bool is_hidden(const Skeleton& skeleton, const SeparationPlanes& separation, const TriangleMesh& mesh,
+               const TriangleTree& tree, int bone, int t) {
+  const Triangle& triangle = mesh.triangles[t];
+  const Vec3 centre = (mesh.positions[triangle[0]] + mesh.positions[triangle[1]] + mesh.positions[triangle[2]]) / 3;
+  const double u = spd_coordinates(skeleton, separation, bone, centre).u;
+  if (!(u >= 0 && u <= 1)) return true;
+  const Axial axial = axial_of(u, separation.is_free(bone, BoneEnd::kHead), separation.is_free(bone, BoneEnd::kTail));
+  const Vec3 foot = end_position(skeleton, bone, BoneEnd::kHead) +
+                    axial.axial * bone_length(skeleton, bone) * separation.bases()[bone].o;
+  constexpr double kNearer = 1 - 1e-5;  // than the centre, in single precision
+  return std::isfinite(find_first_hit(mesh, tree, foot, centre - foot, kNearer, t));
 }
 
 /// Appends tables behind each other.
@@ -302,8 +209,7 @@ std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton,
   const int columns = static_cast<int>(rays.columns.size());
   const Lists lists = fill_lists(columns, charts.size(), [&](std::size_t i, auto&& visit) {
     for (int t = local.begins[i]; t < local.begins[i + 1]; ++t)
-      for_each_angle(local, t, rays.patches[i].width, AngleCell::kAngle,
-                     [&](int j) { visit(rays.patches[i].column_begin + j, t); });
+      for_each_angle(local, t, rays.patches[i].width, [&](int j) { visit(rays.patches[i].column_begin + j, t); });
   });
   const int tile_rows = context.device().type == "cpu" ? std::max(rays.tallest, 1) : kTileRowsGpu;
   const std::size_t tiles = (rays.tallest + tile_rows - 1) / tile_rows;
@@ -331,29 +237,26 @@ std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton,
   return hits;
 }
 
-std::vector<double> unseen_area_fractions(ClContext& context, const Skeleton& skeleton,
-                                          const SeparationPlanes& separation, std::span<const Chart> charts) {
-  const LocalTriangles local = localize(skeleton, separation, charts);
-  const std::vector<SightGrid> grids = make_sight_grids(local, charts);
-  const Lists lists = list_by_sight_grid(local, grids);
-  std::vector<SpdSightLine> lines(local.count());
-  for (std::size_t i = 0; i < charts.size(); ++i)
-    for_each_block(charts[i].triangles.size(), 1024, [&](std::size_t, std::size_t begin, std::size_t end) {
-      for (std::size_t t = begin; t < end; ++t)
-        lines[local.begins[i] + t] = sight_line_to(skeleton, separation, charts[i], charts[i].triangles[t], grids[i]);
-    });
-  auto is_hidden = context.allocate<int>(lines.size());
-  const ClKernelName kernel{"spd.cl", "find_hidden"};
-  context.launch(kernel, ClRange({lines.size(), 1}, {context.work_group_size(kernel, kWorkGroup), 1}),
-                 HideParameters{local.count()}, context.upload(lines), context.upload(lists.begins),
-                 context.upload(lists.triangles), context.upload(bounding_spheres(local)), context.upload(local.points),
-                 is_hidden);
-  const std::vector<int> hidden = context.download(is_hidden);
-
+std::vector<double> unseen_area_fractions(const Skeleton& skeleton, const SeparationPlanes& separation,
+                                          std::span<const Chart> charts) {
   std::vector<double> fractions(charts.size(), 0);
-  for_each_block(charts.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-    fractions[i] = hidden_fraction(charts[i], std::span(hidden).subspan(local.begins[i]));
-  });
+  for (std::size_t i = 0; i < charts.size(); ++i) {
+    const TriangleMesh mesh{charts[i].positions, charts[i].triangles};
+    if (mesh.triangles.empty()) continue;
+    const TriangleTree tree = build_triangle_tree(mesh);
+    std::vector<std::uint8_t> hidden(mesh.triangles.size());
+    for_each_block(hidden.size(), 256, [&](std::size_t, std::size_t begin, std::size_t end) {
+      for (std::size_t t = begin; t < end; ++t)
+        hidden[t] = is_hidden(skeleton, separation, mesh, tree, charts[i].bone, static_cast<int>(t));
+    });
+    double unseen = 0, area = 0;
+    for (std::size_t t = 0; t < hidden.size(); ++t) {
+      const double a = area_vector(mesh, mesh.triangles[t]).norm();
+      area += a;
+      if (hidden[t]) unseen += a;
+    }
+    if (area > 0) fractions[i] = unseen / area;
+  }
   return fractions;
 }
 

@@ -28,9 +28,9 @@ std::vector<SpdHits> cast_spd_rays(ClContext& context, const Skeleton& skeleton,
                                    std::span<const Chart> charts, std::span<const Patch> patches, SpdHit which);
 
 /// Share of each chart's surface area that SPD cannot see: of a triangle with centre P, the ray from W(u(P)) through P
-/// hits the segment before P. Evaluated on the device, every triangle of every chart against those at its angle.
-std::vector<double> unseen_area_fractions(ClContext& context, const Skeleton& skeleton,
-                                          const SeparationPlanes& separation, std::span<const Chart> charts);
+/// hits another triangle of the chart before P. On the host, through a tree over the chart's triangles.
+std::vector<double> unseen_area_fractions(const Skeleton& skeleton, const SeparationPlanes& separation,
+                                          std::span<const Chart> charts);
 
 /// Map coordinates (u, turn) of a point under SPD; outside the cell u leaves [0,1].
 struct SpdCoordinates {
