@@ -159,7 +159,8 @@ Json take_union(MeshParts& parts, const TriangleMesh& filled, const WorkFolder& 
 Json take_wrap(MeshParts& parts, const TriangleMesh& filled, Wrap wrap) {
   const TriangleMesh& wrapped = wrap.parts.mesh;
   const double diagonal = bounding_box(parts.mesh).diagonal();
-  const VertexDistances there = vertex_distances(parts.mesh, wrapped), back = vertex_distances(wrapped, filled);
+  const VertexDistances there = distances_of_vertices(parts.mesh, wrapped),
+                        back = distances_of_vertices(wrapped, filled);
   CarriedOver carried =
       carry_over(parts.mesh, build_triangle_tree(parts.mesh), parts.attributes, parts.weights, wrapped);
   warn(fmt::format(
@@ -231,7 +232,7 @@ Json take_filled(MeshParts& parts, TriangleMesh filled, const FillResult& fillin
   copy_vertices(parts, filling.copies);
   const std::vector<Triangle> before = std::move(parts.mesh.triangles), after = with_originals(filled, filling.copies);
   parts.attributes = with_triangles(parts.attributes, before, after, filling.origins);
-  if (filling.turned > 0) turn_normals(filled, before, after, filling.origins, parts.attributes.normals);
+  if (filling.turned > 0) flip_inward_normals(filled, before, after, filling.origins, parts.attributes.normals);
   parts.mesh = std::move(filled);
   remove_unused_vertices(parts);
   return {{"method", "fill"},

@@ -285,7 +285,7 @@ TEST(CarryOver, ValuesAreThoseOfTheNearestPoint) {
   ASSERT_TRUE(result.attributes.original);
   ASSERT_EQ(result.attributes.original->weights.size(), weights.size());
   EXPECT_EQ(result.attributes.original->weights[7][0].weight, weights[7][0].weight);
-  const VertexDistances distances = vertex_distances(to, from);
+  const VertexDistances distances = distances_of_vertices(to, from);
   EXPECT_NEAR(distances.mean, 0.02, 0.005);
   EXPECT_LT(distances.largest, 0.03);
 }
@@ -347,7 +347,7 @@ TEST(CarryOver, NormalsOfTurnedTrianglesLookOutwards) {
       const TriangleMesh before = mesh;
       const FillResult result = fill_holes(mesh);
       ASSERT_GT(result.turned, 0);
-      turn_normals(mesh, before.triangles, mesh.triangles, result.origins, normals);
+      flip_inward_normals(mesh, before.triangles, mesh.triangles, result.origins, normals);
       const double sign = are_most_turned ? -1 : 1;  // the mesh is inside out then
       for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
         for (const int corner : normals.corners[t])

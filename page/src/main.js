@@ -95,7 +95,7 @@ class Page {
     element('up').addEventListener('click', () => this.setUp(this.orbit.up === 'y' ? 'z' : 'y'));
     element('save').addEventListener('click', () => this.savePicture());
     element('skeleton').setAttribute('aria-pressed', shown.hasSkeleton);
-    if (!this.movable.includes(true)) element('pose-hint').textContent = 'The bones form cycles, so they cannot be turned here.';
+    if (!this.movable.includes(true)) element('pose-hint').textContent = 'All bones are in cycles, so they cannot be turned here.';
     const texture = element('texture');
     texture.addEventListener('pointermove', (event) => this.pointAtTexel(...this.textureView.texelAt(event)));
     texture.addEventListener('pointerdown', (event) => this.pointAtTexel(...this.textureView.texelAt(event)));

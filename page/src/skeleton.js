@@ -120,29 +120,45 @@ export function axialOf(u, isHeadFree, isTailFree) {
 
 /**
  * The hierarchy that poses turn: bones in breadth-first order from each root.
- * @returns {{bone: number, before: number, pivot: number, isPosable: boolean}[]} pivot: the end nearer to the root
+ * @returns {{bone: number, before: number, pivot: number, closesCycle: boolean, isPosable: boolean}[]} pivot: the end
+ *     nearer to the root; isPosable: the bone is in no cycle
  */
 export function hierarchy(skeleton, roots) {
   const at = endsAtNodes(skeleton), all = [];
   for (const root of roots) {
     const entry = new Map([[root, -1]]), done = new Set(), queue = [root], links = [];
-    let hasCycle = false;
     for (let i = 0; i < queue.length; ++i)
       for (const [bone, end] of at[queue[i]]) {
         if (done.has(bone)) continue;
         done.add(bone);
-        links.push({bone, before: entry.get(queue[i]), pivot: end});
-        const next = nodeOf(skeleton, bone, 1 - end);
-        if (entry.has(next)) {
-          hasCycle = true;
-        } else {
-          entry.set(next, bone);
-          queue.push(next);
-        }
+        const next = nodeOf(skeleton, bone, 1 - end), closesCycle = entry.has(next);
+        links.push({bone, before: entry.get(queue[i]), pivot: end, closesCycle, isPosable: true});
+        if (closesCycle) continue;
+        entry.set(next, bone);
+        queue.push(next);
       }
-    for (const link of links) all.push({...link, isPosable: !hasCycle});
+    markCycles(skeleton, links);
+    all.push(...links);
   }
   return all;
+}
+
+/** Takes isPosable from the bones of cycles: those that close one, and those on the ways from their ends to where these meet. */
+function markCycles(skeleton, links) {
+  const placeOf = new Map(links.map((link, place) => [link.bone, place]));
+  const entry = new Map(links.filter((link) => !link.closesCycle).map((link) => [nodeOf(skeleton, link.bone, 1 - link.pivot), link]));
+  for (const closing of links.filter((link) => link.closesCycle)) {
+    closing.isPosable = false;
+    let [a, b] = [0, 1].map((end) => nodeOf(skeleton, closing.bone, end));
+    while (a !== b) {
+      // The node that was reached later goes towards the root.
+      const [placeA, placeB] = [a, b].map((node) => (entry.has(node) ? placeOf.get(entry.get(node).bone) : -1));
+      if (placeB > placeA) [a, b] = [b, a];
+      const link = entry.get(a);
+      link.isPosable = false;
+      a = nodeOf(skeleton, link.bone, link.pivot);
+    }
+  }
 }
 
 /**
@@ -152,10 +168,10 @@ export function hierarchy(skeleton, roots) {
  */
 export function posed(skeleton, links, rotations) {
   const nodes = skeleton.nodes.map((node) => node), turned = skeleton.bones.map(() => IDENTITY);
-  for (const {bone, before, pivot, isPosable} of links) {
-    if (!isPosable) continue;
+  for (const {bone, before, pivot, closesCycle, isPosable} of links) {
     const carried = before < 0 ? IDENTITY : turned[before];
-    turned[bone] = normalized(times(carried, rotations.get(bone) ?? IDENTITY));
+    turned[bone] = normalized(times(carried, (isPosable && rotations.get(bone)) || IDENTITY));
+    if (closesCycle) continue;
     const fixed = nodeOf(skeleton, bone, pivot), moved = nodeOf(skeleton, bone, 1 - pivot);
     nodes[moved] = add(nodes[fixed], rotate(turned[bone], sub(skeleton.nodes[moved], skeleton.nodes[fixed])));
   }

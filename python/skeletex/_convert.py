@@ -253,9 +253,10 @@ def pose(model: Model, pose: Pose, *, time: Optional[float] = None) -> Skeleton:
 
 
 def random_pose(model: Model, degrees: float, seed: int = 0) -> Dict[str, Any]:
-    """A pose in which every bone but those at the root turns by up to so many degrees. The same seed, the same pose.
+    """A pose in which every bone but those at the root and in cycles turns by up to so many degrees. The same seed, the
+    same pose.
 
-    :raises InputError: where the skeleton has cycles
+    :raises InputError: where all bones are in cycles
     """
     largest = math.radians(number(degrees, "degrees", 0, 180))
     return dict(json.loads(_core.random_pose(model._core, largest, whole(seed, "seed", 0, 2**63))))

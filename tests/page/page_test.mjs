@@ -148,7 +148,8 @@ for (const name of Object.keys(models)) {
 }
 run('view', at('bear.skx.exr'), '-o', at('bear.html'), '--against', join(source, 'build/meshes/bear.off'));
 // At twice the size of the file, so that steps without residuals are tried, too.
-const compact = {bear: join(source, 'build/meshes/bear.off'), eight: join(source, 'build/meshes/eight.off')};
+// Two rings of bones and one between them.
+const compact = {bear: join(source, 'build/meshes/bear.off'), eight_dumbbell: join(source, 'build/meshes/eight.off')};
 for (const [name, mesh] of Object.entries(compact)) {
   run('encode', mesh, join(source, 'configs/skeletons', `${name}.skeleton.json`), '-o', at(`${name}.skx`), '--size', '128', '--max-error', '1e-3');
   run('view', at(`${name}.skx`), '-o', at(`${name}-compact.html`), '--size', '200');
@@ -222,6 +223,17 @@ async function testCompact(name) {
     compare(shown, readPly(at('unpacked.ply')), `compact ${name} at ${size}`, 1e-5);
     checkClosed(shown, `compact ${name} at ${size}`);
   }
+  // Bones that are in no cycle turn.
+  const bind = await drawn(page);
+  await page.evaluate(async () => {
+    const page = await globalThis.skeletex;
+    page.turnJoint(page.movable.lastIndexOf(true), 2, 40);
+  });
+  writeFileSync(at('pose.json'), await page.evaluate(async () => (await globalThis.skeletex).poseJson()));
+  run('reconstruct', at('unpacked.skx.exr'), '-o', at('posed.ply'), '--all-texels', '--pose', at('pose.json'));
+  const posed = await drawn(page), moved = posed.points.reduce((most, x, i) => Math.max(most, Math.abs(x - bind.points[i])), 0);
+  check(moved > 0.05 * posed.diagonal, `the pose moves vertices by ${moved / posed.diagonal} diagonals at most`);
+  compare(posed, readPly(at('posed.ply')), `compact ${name} in a pose`);
   check(page.said.length === 0, `the page says: ${page.said.join('; ')}`);
   await page.close();
 }

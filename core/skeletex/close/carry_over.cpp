@@ -99,7 +99,7 @@ CarriedOver carry_over(const TriangleMesh& from, const TriangleTree& tree, const
   return result;
 }
 
-VertexDistances vertex_distances(const TriangleMesh& mesh, const TriangleMesh& to) {
+VertexDistances distances_of_vertices(const TriangleMesh& mesh, const TriangleMesh& to) {
   const TriangleTree tree = build_triangle_tree(to);
   std::vector<bool> is_used(mesh.positions.size(), false);
   for (const Triangle& t : mesh.triangles)
@@ -158,8 +158,8 @@ MeshAttributes with_triangles(const MeshAttributes& attributes, std::span<const 
   return result;
 }
 
-void turn_normals(const TriangleMesh& mesh, std::span<const Triangle> before, std::span<const Triangle> after,
-                  std::span<const int> origins, CornerValues<Vec3>& normals) {
+void flip_inward_normals(const TriangleMesh& mesh, std::span<const Triangle> before, std::span<const Triangle> after,
+                         std::span<const int> origins, CornerValues<Vec3>& normals) {
   // Validation will turn a mesh that is inside out; then it is the other triangles that run the other way round.
   const bool is_inside_out = signed_volume(mesh) < 0;
   for (std::size_t t = 0; t < normals.corners.size(); ++t) {

@@ -25,7 +25,7 @@ CarriedOver carry_over(const TriangleMesh& from, const TriangleTree& tree, const
 struct VertexDistances {
   double mean = 0, largest = 0;
 };
-VertexDistances vertex_distances(const TriangleMesh& mesh, const TriangleMesh& to);
+VertexDistances distances_of_vertices(const TriangleMesh& mesh, const TriangleMesh& to);
 
 /// The attributes of a mesh whose triangles have changed: those of new triangles are what other triangles have at the
 /// same vertices.
@@ -39,7 +39,7 @@ MeshAttributes with_triangles(const MeshAttributes& attributes, std::span<const 
 /// \param mesh  the positions, and the triangles of now, all of which run outwards or all inwards
 /// \param before, after, origins  as above
 /// \param normals  of now, by corner
-void turn_normals(const TriangleMesh& mesh, std::span<const Triangle> before, std::span<const Triangle> after,
-                  std::span<const int> origins, CornerValues<Vec3>& normals);
+void flip_inward_normals(const TriangleMesh& mesh, std::span<const Triangle> before, std::span<const Triangle> after,
+                         std::span<const int> origins, CornerValues<Vec3>& normals);
 
 }  // namespace skeletex

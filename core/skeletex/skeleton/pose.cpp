@@ -26,12 +26,13 @@ struct Link {
   int before;     ///< -1 at the root
   BoneEnd pivot;  ///< its end nearer to the root
   int depth;      ///< 0 at the root
+  bool closes_cycle = false;
 };
 
 struct Component {
   std::vector<Link> links;  ///< every bone once
   int nodes = 1;
-  int first_cycle_bone = -1;  ///< the first bone that closes a cycle; -1: a tree
+  bool has_cycle = false;  ///< else a tree
 };
 
 int other_end(const Skeleton& skeleton, BoneAtNode at) { return end_node(skeleton, at.bone, opposite(at.end)); }
@@ -49,10 +50,11 @@ Component walk_from(const Skeleton& skeleton, const std::vector<std::vector<Bone
     for (const BoneAtNode bone : at[node]) {
       if (is_done[bone.bone]) continue;
       is_done[bone.bone] = true;
-      component.links.push_back({bone.bone, entry[node], bone.end, depth[node]});
       const int next = other_end(skeleton, bone);
-      if (entry[next] != -2) {
-        if (component.first_cycle_bone < 0) component.first_cycle_bone = bone.bone;
+      const bool closes_cycle = entry[next] != -2;
+      component.links.push_back({bone.bone, entry[node], bone.end, depth[node], closes_cycle});
+      if (closes_cycle) {
+        component.has_cycle = true;
         continue;
       }
       ++component.nodes;
@@ -169,23 +171,40 @@ void spread_twist(const Skeleton& bind, const Skeleton& posed, const std::vector
   }
 }
 
-/// Turns the bones of a hierarchy, each about its end nearer to the root and together with all behind it.
-/// \throw InputError when a bone of a component with a cycle is to be turned
-void turn_bones(const Skeleton& bind, const Pose& pose, const Component& component, Skeleton& posed,
-                std::vector<Quaterniond>& rotations) {
+/// Turns the bones of a hierarchy, each about its end nearer to the root and together with all behind it. Bones of a
+/// cycle all follow the bone before it, so that it stays closed.
+/// \throw InputError when a bone of a cycle is to be turned
+void turn_bones(const Skeleton& bind, const Pose& pose, const Component& component,
+                const std::vector<bool>& is_in_cycle, Skeleton& posed, std::vector<Quaterniond>& rotations) {
   for (const Link& link : component.links) {
-    if (component.first_cycle_bone >= 0) {
-      if (pose.rotations[link.bone].isApprox(Quaterniond::Identity(), 0)) continue;
+    if (is_in_cycle[link.bone] && !pose.rotations[link.bone].isApprox(Quaterniond::Identity(), 0))
       throw InputError(
-          fmt::format("bone \"{}\" cannot be turned: bone \"{}\" closes a cycle, so there is no hierarchy to turn; "
-                      "give node positions",
-                      bind.bones[link.bone].name, bind.bones[component.first_cycle_bone].name));
-    }
+          fmt::format("bone \"{}\" cannot be turned, as it is in a cycle of bones; turn bones outside of it, or give "
+                      "node positions",
+                      bind.bones[link.bone].name));
     rotations[link.bone] =
         ((link.before < 0 ? Quaterniond::Identity() : rotations[link.before]) * pose.rotations[link.bone]).normalized();
+    if (link.closes_cycle) continue;
     const int pivot = end_node(bind, link.bone, link.pivot), moved = other_end(bind, {link.bone, link.pivot});
     posed.nodes[moved].position =
         posed.nodes[pivot].position + rotations[link.bone] * (bind.nodes[moved].position - bind.nodes[pivot].position);
+  }
+}
+
+/// Marks the bones that close a cycle, and those on the ways from their ends to where these meet.
+void mark_cycles(const Skeleton& skeleton, const Component& component, std::vector<bool>& is_in_cycle) {
+  std::vector<const Link*> entry(skeleton.nodes.size(), nullptr);  // by which a node was reached
+  for (const Link& link : component.links)
+    if (!link.closes_cycle) entry[other_end(skeleton, {link.bone, link.pivot})] = &link;
+  for (const Link& link : component.links) {
+    if (!link.closes_cycle) continue;
+    is_in_cycle[link.bone] = true;
+    int a = end_node(skeleton, link.bone, link.pivot), b = other_end(skeleton, {link.bone, link.pivot});
+    while (a != b) {
+      if (entry[a] == nullptr || (entry[b] != nullptr && entry[b]->depth > entry[a]->depth)) std::swap(a, b);
+      is_in_cycle[entry[a]->bone] = true;
+      a = end_node(skeleton, entry[a]->bone, entry[a]->pivot);
+    }
   }
 }
 
@@ -221,6 +240,18 @@ std::vector<int> root_nodes(const Skeleton& skeleton) {
   return roots;
 }
 
+std::vector<bool> bones_in_cycles(const Skeleton& skeleton) {
+  const auto at = bones_at_nodes(skeleton);
+  std::vector<bool> is_in_cycle(skeleton.bones.size(), false), is_done(skeleton.bones.size(), false);
+  for (std::size_t first = 0; first < is_done.size(); ++first) {
+    if (is_done[first]) continue;
+    const Component component = walk_from(skeleton, at, skeleton.bones[first].head);
+    for (const Link& link : component.links) is_done[link.bone] = true;
+    if (component.has_cycle) mark_cycles(skeleton, component, is_in_cycle);
+  }
+  return is_in_cycle;
+}
+
 Skeleton apply_pose(const Skeleton& bind, const Pose& pose) {
   check_size(pose.rotations, bind.bones.size(), "rotations");
   check_size(pose.nodes, bind.nodes.size(), "nodes");
@@ -238,13 +269,15 @@ Skeleton apply_pose(const Skeleton& bind, const Pose& pose) {
     check_lengths(posed);
     for (const int root : root_nodes(bind)) {
       const Component component = walk_from(bind, at, root);
-      if (component.first_cycle_bone < 0)
+      if (!component.has_cycle)
         follow_nodes(bind, posed, walk_from(bind, at, central_node(bind, at, root)), rotations);
       else
         spread_twist(bind, posed, at, component, rotations);
     }
   } else if (!pose.rotations.empty()) {
-    for (const int root : root_nodes(bind)) turn_bones(bind, pose, walk_from(bind, at, root), posed, rotations);
+    const std::vector<bool> is_in_cycle = bones_in_cycles(bind);
+    for (const int root : root_nodes(bind))
+      turn_bones(bind, pose, walk_from(bind, at, root), is_in_cycle, posed, rotations);
   }
   for (Node& node : posed.nodes) node.position += pose.translation;
   const std::vector<BoneBasis> bases = bone_bases(bind);
@@ -258,18 +291,20 @@ Skeleton apply_pose(const Skeleton& bind, const Pose& pose) {
 }
 
 Pose make_random_pose(const Skeleton& skeleton, double largest, std::uint64_t seed) {
-  if (skeleton.nodes.size() != skeleton.bones.size() + root_nodes(skeleton).size())
-    throw InputError("the skeleton has a cycle, so its bones cannot be turned; random poses are for trees");
+  const std::vector<bool> is_in_cycle = bones_in_cycles(skeleton);
+  if (std::find(is_in_cycle.begin(), is_in_cycle.end(), false) == is_in_cycle.end())
+    throw InputError("all bones of the skeleton are in cycles, so none can be turned");
   std::mt19937_64 random(seed);
   // The library's distributions differ from system to system: 53 bits in [0, 1).
   const auto uniform = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
   const std::vector<int> roots = root_nodes(skeleton);
   const auto is_root = [&](int node) { return std::find(roots.begin(), roots.end(), node) != roots.end(); };
   Pose pose;
-  for (const Bone& bone : skeleton.bones) {
+  for (std::size_t i = 0; i < skeleton.bones.size(); ++i) {
+    const Bone& bone = skeleton.bones[i];
     const double z = 2 * uniform() - 1, around = 2 * std::numbers::pi * uniform(), angle = largest * uniform();
     const double radius = std::sqrt(std::max(0.0, 1 - z * z));
-    const bool is_still = is_root(bone.head) || is_root(bone.tail);
+    const bool is_still = is_in_cycle[i] || is_root(bone.head) || is_root(bone.tail);
     pose.rotations.push_back(is_still ? Quaterniond::Identity()
                                       : Quaterniond(Eigen::AngleAxisd(
                                             angle, Vec3(radius * std::cos(around), radius * std::sin(around), z))));
