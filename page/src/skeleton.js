@@ -132,33 +132,27 @@ export function hierarchy(skeleton, roots) {
         if (done.has(bone)) continue;
         done.add(bone);
         const next = nodeOf(skeleton, bone, 1 - end), closesCycle = entry.has(next);
-        links.push({bone, before: entry.get(queue[i]), pivot: end, closesCycle, isPosable: true});
+        links.push({bone, before: entry.get(queue[i]), pivot: end, closesCycle, isPosable: !isInCycle(skeleton, at, bone)});
         if (closesCycle) continue;
         entry.set(next, bone);
         queue.push(next);
       }
-    markCycles(skeleton, links);
     all.push(...links);
   }
   return all;
 }
 
-/** Takes isPosable from the bones of cycles: those that close one, and those on the ways from their ends to where these meet. */
-function markCycles(skeleton, links) {
-  const placeOf = new Map(links.map((link, place) => [link.bone, place]));
-  const entry = new Map(links.filter((link) => !link.closesCycle).map((link) => [nodeOf(skeleton, link.bone, 1 - link.pivot), link]));
-  for (const closing of links.filter((link) => link.closesCycle)) {
-    closing.isPosable = false;
-    let [a, b] = [0, 1].map((end) => nodeOf(skeleton, closing.bone, end));
-    while (a !== b) {
-      // The node that was reached later goes towards the root.
-      const [placeA, placeB] = [a, b].map((node) => (entry.has(node) ? placeOf.get(entry.get(node).bone) : -1));
-      if (placeB > placeA) [a, b] = [b, a];
-      const link = entry.get(a);
-      link.isPosable = false;
-      a = nodeOf(skeleton, link.bone, link.pivot);
+/** Whether a bone's ends still hang together without it. */
+function isInCycle(skeleton, at, without) {
+  const queue = [skeleton.bones[without].head], reached = new Set(queue);
+  for (let i = 0; i < queue.length; ++i)
+    for (const [bone, end] of at[queue[i]]) {
+      const next = nodeOf(skeleton, bone, 1 - end);
+      if (bone === without || reached.has(next)) continue;
+      reached.add(next);
+      queue.push(next);
     }
-  }
+  return reached.has(skeleton.bones[without].tail);
 }
 
 /**

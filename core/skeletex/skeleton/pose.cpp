@@ -191,23 +191,6 @@ void turn_bones(const Skeleton& bind, const Pose& pose, const Component& compone
   }
 }
 
-/// Marks the bones that close a cycle, and those on the ways from their ends to where these meet.
-void mark_cycles(const Skeleton& skeleton, const Component& component, std::vector<bool>& is_in_cycle) {
-  std::vector<const Link*> entry(skeleton.nodes.size(), nullptr);  // by which a node was reached
-  for (const Link& link : component.links)
-    if (!link.closes_cycle) entry[other_end(skeleton, {link.bone, link.pivot})] = &link;
-  for (const Link& link : component.links) {
-    if (!link.closes_cycle) continue;
-    is_in_cycle[link.bone] = true;
-    int a = end_node(skeleton, link.bone, link.pivot), b = other_end(skeleton, {link.bone, link.pivot});
-    while (a != b) {
-      if (entry[a] == nullptr || (entry[b] != nullptr && entry[b]->depth > entry[a]->depth)) std::swap(a, b);
-      is_in_cycle[entry[a]->bone] = true;
-      a = end_node(skeleton, entry[a]->bone, entry[a]->pivot);
-    }
-  }
-}
-
 template <class T>
 void check_size(const std::vector<T>& values, std::size_t size, const char* what) {
   if (!values.empty() && values.size() != size)
@@ -242,12 +225,19 @@ std::vector<int> root_nodes(const Skeleton& skeleton) {
 
 std::vector<bool> bones_in_cycles(const Skeleton& skeleton) {
   const auto at = bones_at_nodes(skeleton);
-  std::vector<bool> is_in_cycle(skeleton.bones.size(), false), is_done(skeleton.bones.size(), false);
-  for (std::size_t first = 0; first < is_done.size(); ++first) {
-    if (is_done[first]) continue;
-    const Component component = walk_from(skeleton, at, skeleton.bones[first].head);
-    for (const Link& link : component.links) is_done[link.bone] = true;
-    if (component.has_cycle) mark_cycles(skeleton, component, is_in_cycle);
+  std::vector<bool> is_in_cycle;
+  for (int without = 0; without < static_cast<int>(skeleton.bones.size()); ++without) {
+    std::vector<bool> is_reached(skeleton.nodes.size(), false);
+    std::vector<int> queue{skeleton.bones[without].head};
+    is_reached[queue[0]] = true;
+    for (std::size_t i = 0; i < queue.size(); ++i)
+      for (const BoneAtNode bone : at[queue[i]]) {
+        const int next = other_end(skeleton, bone);
+        if (bone.bone == without || is_reached[next]) continue;
+        is_reached[next] = true;
+        queue.push_back(next);
+      }
+    is_in_cycle.push_back(is_reached[skeleton.bones[without].tail]);
   }
   return is_in_cycle;
 }

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "skeletex/skeleton/pose.h"
 #include "skeletex/skeletonize/limbs.h"
 
 namespace skeletex {
@@ -84,27 +85,13 @@ class Namer {
     }
   }
 
-  /// Whether a bone lies on a cycle: its ends hang together without it.
-  bool is_on_ring(int bone) const {
-    std::vector<char> is_reached(skeleton_.nodes.size(), 0);
-    std::vector<int> queue{skeleton_.bones[bone].head};
-    is_reached[queue[0]] = 1;
-    for (std::size_t i = 0; i < queue.size(); ++i)
-      for (const BoneAtNode& at : at_nodes_[queue[i]]) {
-        const int other = end_node(skeleton_, at.bone, opposite(at.end));
-        if (at.bone == bone || is_reached[other]) continue;
-        is_reached[other] = 1;
-        queue.push_back(other);
-      }
-    return is_reached[skeleton_.bones[bone].tail];
-  }
-
   void name_trunk() {
     int spine = 0, ring = 0;
+    const std::vector<bool> is_in_cycle = bones_in_cycles(skeleton_);
     for (const int bone : order_)
       if (!is_limb_[bone])
         skeleton_.bones[bone].name =
-            is_on_ring(bone) ? fmt::format("ring_{}", ++ring) : fmt::format("spine_{}", ++spine);
+            is_in_cycle[bone] ? fmt::format("ring_{}", ++ring) : fmt::format("spine_{}", ++spine);
   }
 
   /// A node has the name of the bone that arrives there.
