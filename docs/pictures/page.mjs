@@ -11,7 +11,7 @@ const browser = await chromium.launch({
 const [width, height] = size.split('x').map(Number);
 const page = await browser.newPage({viewport: {width, height}, colorScheme});
 await page.goto(`file://${resolve(path)}${hash}`);
-await page.evaluate(() => globalThis.skeletex.then(() => 0));
+await page.evaluate(() => globalThis.skeletex.then((shown) => shown.whole));
 await page.mouse.move(0.3 * width, 0.4 * height);
 await page.waitForTimeout(500);
 await page.screenshot({path: picture});

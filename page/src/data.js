@@ -13,16 +13,33 @@ function bytesOf(base64) {
   return bytes;
 }
 
-/**
- * @param {string} base64 the length of the JSON in four bytes, the JSON, and from the next multiple of 8 bytes on the arrays
- * @returns {Promise<{model: any, arrays: ArrayBuffer}>}
- */
-export async function unpack(base64) {
-  const stream = new Blob([bytesOf(base64)]).stream().pipeThrough(new DecompressionStream('deflate'));
-  const all = await new Response(stream).arrayBuffer();
-  const length = new DataView(all).getUint32(0, true);
-  const model = JSON.parse(new TextDecoder().decode(new Uint8Array(all, 4, length)));
-  return {model, arrays: all.slice(Math.ceil((4 + length) / 8) * 8)};
+/** The parts of the page's data, which come while the page is loaded: JSON first, then the arrays of each level. */
+export class Parts {
+  constructor() {
+    this.texts = [];
+    this.wake = () => {};
+    globalThis.addPart = (base64) => {
+      this.texts.push(base64);
+      this.wake();
+    };
+    addEventListener('load', () => {
+      this.isLoaded = true;
+      this.wake();
+    });
+  }
+
+  /** Whether the next part is there. */
+  get hasNext() { return this.texts.length > 0; }
+
+  /** Waits for the next part. @returns {Promise<ArrayBuffer>} */
+  async next() {
+    while (!this.hasNext) {
+      if (this.isLoaded) throw new Error('its end is missing. Load it again.');
+      await new Promise((resolve) => { this.wake = resolve; });
+    }
+    const stream = new Blob([bytesOf(this.texts.shift())]).stream().pipeThrough(new DecompressionStream('deflate'));
+    return new Response(stream).arrayBuffer();
+  }
 }
 
 /** @param {ArrayBuffer} arrays @param {Place} place */

@@ -2,7 +2,7 @@
 // The page that `skeletex view` writes: what is shown, and the controls.
 import {Vector3} from 'three';
 import {boneColour, css} from './colours.js';
-import {unpack} from './data.js';
+import {Parts} from './data.js';
 import {Gestures} from './gestures.js';
 import {bindKeys} from './keys.js';
 import {Orbit} from './orbit.js';
@@ -20,8 +20,10 @@ const element = (id) => document.getElementById(id);
 const MODE_NAMES = {shaded: 'Shaded', segments: 'Segments', checker: 'Checker', error: 'Error', normals: 'Normals'};
 
 class Page {
+  /** @param {any} model @param {ArrayBuffer} arrays those of the coarsest level; finer ones follow (load) */
   constructor(model, arrays) {
     this.model = model;
+    this.finest = model.levels.length - 1;
     this.picture = new Picture(element('picture'), model.skeleton.bones.length);
     this.surface = new Surface(this.picture.gl, model, arrays);
     this.orbit = new Orbit(this.picture.camera, model.diagonal);
@@ -133,16 +135,18 @@ class Page {
     this.canTake = (bone) => !refused.has(bone);
   }
 
-  /** Changes what the surface depends on: level, t, rotations, transferred. */
+  /**
+   * Changes what the surface depends on: level, t, rotations, transferred. A level that is not loaded yet is shown when
+   * it comes, and until then the finest one that is there.
+   */
   change(change, isFirst = false) {
-    const {shown, surface, model} = this;
-    const isTextureNew = isFirst || ['level', 't', 'transferred'].some((key) => key in change && change[key] !== shown[key]);
+    const {shown, surface, model} = this, before = {...surface.state};
     Object.assign(shown, change);
-    const isNewLattice = surface.update(change);
+    const isNewLattice = surface.update({...change, level: Math.max(shown.level, this.finest)});
     if (isNewLattice) this.picture.setLattice(surface);
-    if (isTextureNew) this.textureView.draw(surface);
+    if (isFirst || ['level', 't', 'transferred'].some((key) => surface.state[key] !== before[key])) this.textureView.draw(surface);
     const level = surface.level, {triangles} = surface.lattice;
-    element('level').value = model.levels.length - 1 - shown.level;
+    element('level').value = model.levels.length - 1 - surface.state.level;
     element('level').setAttribute('aria-valuetext', `${level.width} by ${level.height} texels`);
     element('level-value').textContent = `${level.width} × ${level.height}`;
     element('facts').textContent = `${level.width} × ${level.height} texels · ${(triangles.length / 3).toLocaleString('en')} triangles`;
@@ -197,6 +201,22 @@ class Page {
     this.orbit.up = this.shown.up = up;
     element('up').textContent = `Up: ${up}`;
     this.resetView(true);
+  }
+
+  /** Shows finer levels as they come. @param {Parts} parts @param {Uint8Array} arrays @param {number} at bytes that are there */
+  async load(parts, arrays, at) {
+    while (this.finest > 0) {
+      do {
+        const part = await parts.next();
+        arrays.set(new Uint8Array(part), at);
+        at += part.byteLength;
+        --this.finest;
+      } while (parts.hasNext && this.finest > 0);
+      if (this.surface.state.level <= this.shown.level) continue;
+      this.change({});
+      if (!this.shown.view) this.orbit.fit(this.surface.positions());
+    }
+    this.draw();
   }
 
   resetView(isRefit = false) {
@@ -411,16 +431,22 @@ class Page {
   }
 }
 
+const parts = new Parts();
+
+/** Shows the coarsest level as soon as it is loaded. `whole` is kept when the finest one is. */
 async function open() {
-  const {model, arrays} = await unpack(element('data').textContent);
-  element('data').remove();
-  const page = new Page(model, arrays);
+  const model = JSON.parse(new TextDecoder().decode(await parts.next())), arrays = new Uint8Array(model.bytes);
+  const coarsest = new Uint8Array(await parts.next());
+  arrays.set(coarsest);
+  const page = new Page(model, arrays.buffer);
   page.start();
   page.draw();
+  page.whole = page.load(parts, arrays, coarsest.length);
+  page.whole.catch((error) => page.say(`This page is shown as far as it was loaded: ${error.message}`));
   return page;
 }
 
-/** What tests and scripts of a page can use: the page once it is shown. */
+/** What tests and scripts of a page can use: the page once its coarsest level is shown. */
 globalThis.skeletex = open().catch((error) => {
   element('message').textContent = `This page cannot be shown: ${error.message}`;
   element('message').hidden = false;

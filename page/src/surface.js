@@ -4,7 +4,7 @@
 import capsule from '../../kernels/capsule.h';
 import skinWeight from '../../kernels/skin_weight.h';
 import {blendedTexels} from './blend.js';
-import {CompactSource} from './compact/texels.js';
+import {compactTexels} from './compact/texels.js';
 import {array, unpackKeys, unpackSteps, unpackTexels} from './data.js';
 import {makeLattice} from './lattice.js';
 import {SeparationPlanes, axialOf, hierarchy, interval, motions, posed, skeletonAt, weightWalks} from './skeleton.js';
@@ -33,7 +33,7 @@ function bonesOfSeams(stage, planes) {
 export class Surface {
   /**
    * @param {WebGL2RenderingContext} gl
-   * @param {any} model @param {ArrayBuffer} arrays
+   * @param {any} model @param {ArrayBuffer} arrays of the levels that are loaded, the coarsest first
    */
   constructor(gl, model, arrays) {
     this.gl = gl;
@@ -41,7 +41,6 @@ export class Surface {
     this.arrays = arrays;
     this.state = {level: 0, t: 0, rotations: new Map(), transferred: new Set()};
     this.links = hierarchy(skeletonAt(model, 0), model.roots);
-    this.compact = model.compact ? new CompactSource(model, array(arrays, model.compact.payload)) : null;
     this.stage = null;
     this.lattice = null;
     this.textures = {};
@@ -92,6 +91,18 @@ export class Surface {
       gl.texParameteri(gl.TEXTURE_2D, key, value);
   }
 
+  /** The payload of a compact model as far as a level needs it. */
+  payload(level) {
+    const {levels} = this.model, pieces = levels.slice(levels.indexOf(level)).reverse().map(({payload}) => array(this.arrays, payload));
+    const bytes = new Uint8Array(pieces.reduce((sum, piece) => sum + piece.length, 0));
+    let at = 0;
+    for (const piece of pieces) {
+      bytes.set(piece, at);
+      at += piece.length;
+    }
+    return bytes;
+  }
+
   /** Unpacks a level when it is first shown. */
   unpack(level) {
     if (level.isUnpacked) return;
@@ -100,7 +111,7 @@ export class Surface {
     for (const texture of [level, second, transfer]) {
       if (!texture) continue;
       texture.rows = array(this.arrays, texture.rows);
-      texture.values = this.compact ? this.compact.texels(texture) : unpackTexels(this.arrays, texture);
+      texture.values = this.model.ends ? compactTexels(this.model, this.payload(level), texture) : unpackTexels(this.arrays, texture);
     }
     for (const stage of level.stages) unpackKeys(this.arrays, stage.keys, ['turns', 'distances']);
     if (!second) return;

@@ -6,6 +6,7 @@
 // Ends with 77 where there is no browser, and with 1 and the reasons where something is wrong.
 import {execFileSync} from 'node:child_process';
 import {existsSync, mkdirSync, readFileSync, statSync, writeFileSync} from 'node:fs';
+import {createServer} from 'node:http';
 import {createRequire} from 'node:module';
 import {join} from 'node:path';
 
@@ -134,7 +135,7 @@ async function open(browser, path, hash = '', options = {}) {
   page.on('console', (message) => ['error', 'warning'].includes(message.type()) && !/GPU stall|ReadPixels/.test(message.text()) && said.push(message.text()));
   page.on('request', (request) => !/^(file|data|blob):/.test(request.url()) && said.push(`asks for ${request.url()}`));
   await page.goto(`file://${path}${hash}`);
-  await page.evaluate(() => globalThis.skeletex.then(() => 0));
+  await page.evaluate(() => globalThis.skeletex.then((shown) => shown.whole));
   page.said = said;
   return page;
 }
@@ -238,6 +239,44 @@ async function testCompact(name) {
   await page.close();
 }
 
+/** A page shows its coarsest level while the rest is loaded, and says so where the rest is missing. */
+async function testLoading() {
+  const text = readFileSync(at('bear-compact.html'), 'latin1');
+  let cut = -1;
+  for (let part = 0; part < 3; ++part) cut = text.indexOf('<script>addPart(', cut + 1);  // behind the JSON and one level
+  let sendRest;
+  const server = createServer((_, answer) => {
+    answer.writeHead(200, {'content-type': 'text/html'});
+    answer.write(text.slice(0, cut), 'latin1');
+    sendRest = () => answer.end(text.slice(cut), 'latin1');
+  });
+  await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
+  const page = await browser.newPage({viewport: {width: 1000, height: 700}});
+  await page.goto(`http://127.0.0.1:${server.address().port}/`, {waitUntil: 'commit'});
+  await page.waitForFunction(() => document.getElementById('facts')?.textContent, null, {timeout: 20000});
+  const sizes = await page.evaluate(async () => (await globalThis.skeletex).model.levels.map((level) => Math.max(level.width, level.height)));
+  const matches = async (size, what) => {
+    run('unpack', at('bear.skx'), '-o', at('unpacked.skx.exr'), '--size', String(size));
+    run('reconstruct', at('unpacked.skx.exr'), '-o', at('unpacked.ply'), '--all-texels');
+    compare(await drawn(page), readPly(at('unpacked.ply')), what, 1e-5);
+    check((await picture(page)).colours > 20, `${what}: nothing is drawn`);
+  };
+  await matches(sizes.at(-1), 'while the page is loaded');
+  sendRest();
+  await page.evaluate(() => globalThis.skeletex.then((shown) => shown.whole));
+  await matches(sizes[0], 'after the page is loaded');
+  await page.close();
+  server.close();
+
+  writeFileSync(at('cut.html'), text.slice(0, cut + 1000), 'latin1');
+  const part = await browser.newPage({viewport: {width: 1000, height: 700}});
+  await part.goto(`file://${at('cut.html')}`);
+  const isSaid = await part.waitForFunction(() => /end is missing/.test(document.getElementById('message').textContent), null, {timeout: 10000}).catch(() => false);
+  check(isSaid && await part.isVisible('#message'), 'a page without its end does not say so');
+  check((await picture(part)).colours > 20, 'a page without its end shows nothing');
+  await part.close();
+}
+
 async function testMorph() {
   const page = await open(browser, at('morph.html'));
   for (const t of [0, 0.25, 0.4375, 0.4, 1]) {
@@ -323,6 +362,7 @@ async function testControls() {
 try {
   await testPlaces();
   for (const name of Object.keys(compact)) await testCompact(name);
+  await testLoading();
   await testMorph();
   await testControls();
 } catch (error) {

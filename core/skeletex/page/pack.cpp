@@ -67,16 +67,22 @@ nlohmann::ordered_json PageArrays::add(std::span<const unsigned char> values) {
   return add("byte", values.data(), values.size(), 1);
 }
 
-std::string PageArrays::text(const nlohmann::ordered_json& json) const {
-  const std::string header = json.dump();
-  const auto length = static_cast<std::uint32_t>(header.size());
-  std::vector<unsigned char> all((4 + header.size() + 7) / 8 * 8);
-  std::memcpy(all.data(), &length, 4);
-  std::memcpy(all.data() + 4, header.data(), header.size());
-  all.insert(all.end(), bytes_.begin(), bytes_.end());
-  uLongf size = compressBound(all.size());
+void PageArrays::end_part() { part_ends_.push_back(bytes_.size()); }
+
+std::vector<std::string> PageArrays::texts() const {
+  std::vector<std::string> texts;
+  std::size_t begin = 0;
+  for (const std::size_t end : part_ends_) {
+    texts.push_back(compressed_text(std::span(bytes_).subspan(begin, end - begin)));
+    begin = end;
+  }
+  return texts;
+}
+
+std::string compressed_text(std::span<const unsigned char> bytes) {
+  uLongf size = compressBound(bytes.size());
   std::vector<unsigned char> compressed(size);
-  if (compress2(compressed.data(), &size, all.data(), all.size(), Z_BEST_COMPRESSION) != Z_OK)
+  if (compress2(compressed.data(), &size, bytes.data(), bytes.size(), Z_BEST_COMPRESSION) != Z_OK)
     throw Error("zlib cannot compress the page's data; there is too little memory");
   return base64(std::span(compressed).first(size));
 }

@@ -9,21 +9,28 @@
 
 namespace skeletex {
 
-/// Arrays behind each other, as the page's script finds them: little-endian, each from a multiple of 8 bytes on.
+/// Arrays behind each other, as the page's script finds them: little-endian, each from a multiple of 8 bytes on. They
+/// are cut into parts, so that the page can show a coarse level before the finer ones are loaded.
 class PageArrays {
  public:
   /// \return what the script finds the array by: [type, first byte, number of values]
   nlohmann::ordered_json add(std::span<const float> values);
   nlohmann::ordered_json add(std::span<const int> values);
   nlohmann::ordered_json add(std::span<const unsigned char> values);
-  /// The length of the JSON in four bytes, the JSON, and the arrays from the next multiple of 8 bytes on: compressed
-  /// (zlib), in base64.
-  std::string text(const nlohmann::ordered_json& json) const;
+  /// Ends a part: the arrays that were added since the last one.
+  void end_part();
+  std::size_t size() const { return bytes_.size(); }
+  /// The parts in their order, each compressed (zlib) and in base64.
+  std::vector<std::string> texts() const;
 
  private:
   nlohmann::ordered_json add(const char* type, const void* values, std::size_t count, std::size_t size);
   std::vector<unsigned char> bytes_;
+  std::vector<std::size_t> part_ends_;
 };
+
+/// Text or bytes compressed (zlib), in base64.
+std::string compressed_text(std::span<const unsigned char> bytes);
 
 /// Adds numbers as whole steps, as differences from the array before: from one key of a morph to the next they are
 /// small.

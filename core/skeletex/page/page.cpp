@@ -7,6 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <ranges>
 
 #include "skeletex/analysis/metro.h"
 #include "skeletex/compact/compact_file.h"
@@ -36,7 +37,7 @@ constexpr double kTexelStep = 5e-6;  // diagonals
 constexpr int kKeys = 16;            // intervals of a morph
 constexpr double kSwitch = 1e-4;     // where the seams of a morph change, it is found to this part of the way
 constexpr double kNearEnd = 1e-7;    // where the tables of a model without weight are taken
-constexpr const char* kPlaceOfData = "<!-- skeletex data -->";
+constexpr std::string_view kPlaceOfData = "<!-- skeletex data -->";
 
 Json to_json(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -176,7 +177,7 @@ Json error_json(ClContext& context, PageArrays& arrays, const SkeletexModel& mod
   return {{"scale", std::max(*at, 1e-12f)}, {"highest", highest}, {"low", arrays.add(low)}, {"high", arrays.add(high)}};
 }
 
-/// One level of detail.
+/// One level of detail, whose arrays are a part of the page.
 Json level_json(ClContext& context, PageArrays& arrays, std::span<const PageKey> keys, const PageOptions& options) {
   const SkeletexModel& first = keys.front().model;
   const bool is_decoded = options.compact && !options.second;
@@ -193,37 +194,43 @@ Json level_json(ClContext& context, PageArrays& arrays, std::span<const PageKey>
   return level;
 }
 
+/// The levels of a morph, the finest first. Their arrays are added in the other order.
 Json morph_levels(ClContext& context, PageArrays& arrays, const SkeletexModel& model, const PageOptions& options,
                   Json& skeleton) {
   Json levels = Json::array();
   const PageSecond& second = *options.second;
-  for (int size = std::max(model.texture.width, model.texture.height); size >= std::max(4, options.smallest);
-       size /= 2) {
+  std::vector<int> sizes{std::max(model.texture.width, model.texture.height)};
+  while (sizes.back() / 2 >= std::max(4, options.smallest)) sizes.push_back(sizes.back() / 2);
+  for (const int size : std::views::reverse(sizes)) {
     try {
       const Morph morph(context, {model, second.model}, std::span(&second.correspondence, 1),
                         {.layout = 0, .size = size, .has_own_texels = false, .is_smooth = false});
       const std::vector<PageKey> keys = morph_keys(morph);
-      if (levels.empty()) skeleton = skeleton_json(keys, options);
-      levels.push_back(level_json(context, arrays, keys, options));
+      skeleton = skeleton_json(keys, options);
+      Json level = level_json(context, arrays, keys, options);
       const SkeletexModel& source = morph.models()[1];
-      levels.back()["second"] = texture_json(arrays, source);
-      levels.back()["second"]["rows"] = arrays.add(rows_of(keys.back().model));
-      levels.back()["blend"] = add_blend(arrays, morph, keys);
-      levels.back()["transfer"] = transfer_json(context, arrays, source, keys.front().model, second.correspondence);
+      level["second"] = texture_json(arrays, source);
+      level["second"]["rows"] = arrays.add(rows_of(keys.back().model));
+      level["blend"] = add_blend(arrays, morph, keys);
+      level["transfer"] = transfer_json(context, arrays, source, keys.front().model, second.correspondence);
+      arrays.end_part();
+      levels.insert(levels.begin(), std::move(level));
     } catch (const InputError&) {
-      if (levels.empty()) throw;
-      break;  // too small for the number of bones
+      if (size == sizes.front()) throw;  // a coarser one is too small for the number of bones
     }
   }
   return levels;
 }
 
-/// What the page's script decodes: the payload of the compact model's file without layers, and how the patches' ends
-/// run through the arcs, [arc, whether it is reversed] each.
-Json compact_json(PageArrays& arrays, CompactModel compact) {
+/// The compact model without what the page's script does not decode.
+CompactModel without_layers(CompactModel compact) {
   compact.layers.clear();
   for (CompactPatch& patch : compact.patches) patch.planes.clear();
-  const std::string payload = compact_payload(compact);
+  return compact;
+}
+
+/// How the patches' ends run through the arcs of a compact model, [arc, whether it is reversed] each.
+Json ends_json(const CompactModel& compact) {
   Json ends = Json::array();
   for (const std::array<PatchEnd, 2>& both : ends_of(compact)) {
     Json bone = Json::array();
@@ -234,11 +241,10 @@ Json compact_json(PageArrays& arrays, CompactModel compact) {
     }
     ends.push_back(bone);
   }
-  return {{"payload", arrays.add(std::span(reinterpret_cast<const unsigned char*>(payload.data()), payload.size()))},
-          {"ends", ends}};
+  return ends;
 }
 
-/// The sizes of a compact model from that of the page down.
+/// The sizes of a compact model from that of the page down, each with half the rows and columns of the one before.
 std::vector<SkeletexModel> compact_levels(const PageCompact& compact, const SkeletexModel& model, int smallest) {
   std::vector<SkeletexModel> levels{model};
   int octaves = compact.octaves, size = decoded_size(compact.model, octaves);
@@ -249,6 +255,42 @@ std::vector<SkeletexModel> compact_levels(const PageCompact& compact, const Skel
     size = next;
   }
 }
+
+std::span<const unsigned char> bytes_of(std::string_view text) {
+  return {reinterpret_cast<const unsigned char*>(text.data()), text.size()};
+}
+
+/// The levels of one model, the finest first. Their arrays are added in the other order. Levels of a compact model hold
+/// what its payload adds to that of the coarser ones.
+Json model_levels(ClContext& context, PageArrays& arrays, const SkeletexModel& model, const PageOptions& options) {
+  const std::vector<SkeletexModel> levels = options.compact ? compact_levels(*options.compact, model, options.smallest)
+                                                            : make_levels(context, model, options.smallest);
+  CompactModel compact;
+  std::string payload;
+  if (options.compact) {
+    compact = without_layers(options.compact->model);
+    payload = compact_payload(compact);
+  }
+  const int bare_levels = compact.bare_levels;
+  std::size_t sent = 0;
+  Json json = Json::array();
+  for (int i = static_cast<int>(levels.size()) - 1; i >= 0; --i) {
+    const std::vector<PageKey> keys{{0, levels[i], {}, {}}};
+    Json level = level_json(context, arrays, keys, options);
+    if (options.compact) {
+      compact.bare_levels = std::max(bare_levels, 2 * (i - options.compact->octaves));
+      const std::size_t end = compact_payload(compact).size();
+      level["payload"] = arrays.add(bytes_of(payload).subspan(sent, end - sent));
+      sent = end;
+    }
+    arrays.end_part();
+    json.insert(json.begin(), std::move(level));
+  }
+  return json;
+}
+
+/// Gives the page's script a part of its data as soon as the browser has read it.
+std::string data_script(std::string_view text) { return fmt::format("<script>addPart(\"{}\")</script>\n", text); }
 
 bool stands_along_z(const SkeletexModel& model) {
   return model.stance && std::abs(model.stance->up.z()) > std::abs(model.stance->up.y());
@@ -277,21 +319,17 @@ std::string make_page(ClContext& context, const SkeletexModel& model, const Page
     json["levels"] = morph_levels(context, arrays, model, options, skeleton);
     json["skeleton"] = skeleton;
   } else {
-    json["levels"] = Json::array();
-    if (options.compact) json["compact"] = compact_json(arrays, options.compact->model);
-    for (const SkeletexModel& level : options.compact ? compact_levels(*options.compact, model, options.smallest)
-                                                      : make_levels(context, model, options.smallest)) {
-      const std::vector<PageKey> keys{{0, level, {}, {}}};
-      if (json["levels"].empty()) json["skeleton"] = skeleton_json(keys, options);
-      json["levels"].push_back(level_json(context, arrays, keys, options));
-    }
+    json["skeleton"] = skeleton_json(std::vector<PageKey>{{0, model, {}, {}}}, options);
+    if (options.compact) json["ends"] = ends_json(options.compact->model);
+    json["levels"] = model_levels(context, arrays, model, options);
   }
+  json["bytes"] = arrays.size();
+  std::string data = data_script(compressed_text(bytes_of(json.dump())));
+  for (const std::string& part : arrays.texts()) data += data_script(part);
   std::string page(embedded_page_files().front().text);
   const std::size_t place = page.find(kPlaceOfData);
   if (place == std::string::npos) throw InputError("the page's script has no place for data; build again");
-  page.replace(place, std::string_view(kPlaceOfData).size(),
-               fmt::format("<script id=\"data\" type=\"text/plain\">{}</script>", arrays.text(json)));
-  return page;
+  return page.replace(place, kPlaceOfData.size(), data);
 }
 
 }  // namespace skeletex

@@ -50,6 +50,7 @@ class Reader {
     for (let i = 0; i < count; ++i) values[i] = this.residual();
     return values;
   }
+  get isAtEnd() { return this.at >= this.bytes.length; }
   each(read) { return Array.from({length: this.count()}, read); }
 }
 
@@ -112,7 +113,7 @@ function readPatch(reader) {
 }
 
 /**
- * @param {Uint8Array} payload without layers
+ * @param {Uint8Array} payload without layers; steps of the finer levels may be missing
  * @param {import('../skeleton.js').SeparationPlanes} planes
  * @returns {Compact}
  */
@@ -142,7 +143,7 @@ export function readCompact(payload, planes) {
   }
   for (const patch of patches) patch.base = readBase(reader, patch);
   const most = Math.max(...patches.map((patch) => patch.stepCount));
-  for (let level = most - 1; level >= bareLevels; --level)
+  for (let level = most - 1; level >= bareLevels && !reader.isAtEnd; --level)
     for (const patch of patches) {
       const number = patch.stepCount - 1 - level;
       if (number >= 0) patch.steps.push(readStep(reader, siteCount(patch, number), true));

@@ -20,50 +20,41 @@ function columnFrames(planes, bone, count) {
   });
 }
 
-/** A compact model, ready to give the texels of any level. */
-export class CompactSource {
-  /**
-   * @param {any} model the page's, with `compact`: per bone and end the arcs around, [arc, whether it is reversed]
-   * @param {Uint8Array} payload
-   */
-  constructor(model, payload) {
-    this.planes = new SeparationPlanes(skeletonAt(model, 0));
-    this.compact = readCompact(payload, this.planes);
-    const seams = seamsOf(this.compact, this.planes);
-    this.ends = model.compact.ends.map((uses, bone) =>
-      [0, 1].map((end) => patchEnd(this.compact, this.planes, seams, bone, end, uses[end])));
-  }
-
-  /**
-   * @param {{width: number, height: number, patches: number[][], rows: Float32Array}} level
-   * @returns {Float32Array} four floats a texel: along, around, out, 0
-   */
-  texels(level) {
-    const texels = new Float32Array(4 * level.width * level.height);
-    let firstRow = 0;
-    level.patches.forEach((rectangle, bone) => {
-      const [, , width, height] = rectangle, grid = patchGrid(this.compact, this.planes, bone, this.ends[bone], height, width);
-      this.store(level, bone, rectangle, grid, level.rows.subarray(firstRow, firstRow += height), texels);
-    });
-    return texels;
-  }
-
-  store(level, bone, [x, y, width, height], grid, rows, texels) {
-    const {planes} = this, {o} = planes.bases[bone], {nodes} = planes.skeleton;
-    const [head, tail] = [0, 1].map((end) => nodes[nodeOf(planes.skeleton, bone, end)]);
-    const columns = columnFrames(planes, bone, width);
-    for (let row = 0; row < height; ++row) {
-      const {axial, latitude} = axialOf(rows[row], planes.isFree(bone, 0), planes.isFree(bone, 1));
-      const cosine = Math.cos(latitude), sine = Math.sin(latitude), foot = mix(head, tail, axial);
-      for (let column = 0; column < width; ++column) {
-        const {radial, around, slopes} = columns[column], k = (1 - axial) * slopes[0] + axial * slopes[1];
-        const out = unit(add(scaled(radial, cosine), scaled(o, cosine * k + sine))), along = cross(out, around);
-        const at = 3 * (row * width + column), point = grid.points.subarray(at, at + 3);
-        const offset = sub(point, foot), length = norm(offset);
-        const scale = length > 0 ? distanceToBone(point, head, tail) / length : 0;
-        texels.set([scale * dot(offset, along), scale * dot(offset, around), scale * dot(offset, out)],
-                   4 * ((y + row) * level.width + x + column));
-      }
+/** Stores the texels of a patch's grid of points. */
+function store(planes, level, bone, [x, y, width, height], grid, rows, texels) {
+  const {o} = planes.bases[bone], {nodes} = planes.skeleton;
+  const [head, tail] = [0, 1].map((end) => nodes[nodeOf(planes.skeleton, bone, end)]);
+  const columns = columnFrames(planes, bone, width);
+  for (let row = 0; row < height; ++row) {
+    const {axial, latitude} = axialOf(rows[row], planes.isFree(bone, 0), planes.isFree(bone, 1));
+    const cosine = Math.cos(latitude), sine = Math.sin(latitude), foot = mix(head, tail, axial);
+    for (let column = 0; column < width; ++column) {
+      const {radial, around, slopes} = columns[column], k = (1 - axial) * slopes[0] + axial * slopes[1];
+      const out = unit(add(scaled(radial, cosine), scaled(o, cosine * k + sine))), along = cross(out, around);
+      const at = 3 * (row * width + column), point = grid.points.subarray(at, at + 3);
+      const offset = sub(point, foot), length = norm(offset);
+      const scale = length > 0 ? distanceToBone(point, head, tail) / length : 0;
+      texels.set([scale * dot(offset, along), scale * dot(offset, around), scale * dot(offset, out)],
+                 4 * ((y + row) * level.width + x + column));
     }
   }
+}
+
+/**
+ * @param {any} model the page's, with `ends`: per bone and end the arcs around, [arc, whether it is reversed]
+ * @param {Uint8Array} payload of a compact model, as far as the level needs it
+ * @param {{width: number, height: number, patches: number[][], rows: Float32Array}} level
+ * @returns {Float32Array} four floats a texel: along, around, out, 0
+ */
+export function compactTexels(model, payload, level) {
+  const planes = new SeparationPlanes(skeletonAt(model, 0)), compact = readCompact(payload, planes);
+  const seams = seamsOf(compact, planes), texels = new Float32Array(4 * level.width * level.height);
+  let firstRow = 0;
+  level.patches.forEach((rectangle, bone) => {
+    const [, , width, height] = rectangle;
+    const ends = [0, 1].map((end) => patchEnd(compact, planes, seams, bone, end, model.ends[bone][end]));
+    const grid = patchGrid(compact, planes, bone, ends, height, width);
+    store(planes, level, bone, rectangle, grid, level.rows.subarray(firstRow, firstRow += height), texels);
+  });
+  return texels;
 }
