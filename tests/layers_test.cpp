@@ -366,6 +366,27 @@ TEST(Layers, ABakedPictureHasTheColoursOfTheSurfaceAlsoAcrossSeams) {
   EXPECT_THROW(bake_texture(bare, model, mesh), InputError);
 }
 
+TEST(Stance, FollowsTheSidesThatBonesAreNamedAfter) {
+  Skeleton body;
+  for (const Vec3& p : {Vec3(0, 1, 0), Vec3(-0.3, 0, 0), Vec3(0.3, 0.1, 0), Vec3(0, 0, 1)})
+    body.nodes.push_back({"", p});
+  TriangleMesh box;
+  box.positions = {Vec3(-0.5, -0.1, -0.2), Vec3(0.5, 1.1, 0.2)};
+  const auto front = [&](const std::string& first, const std::string& second, int second_tail = 2) {
+    body.bones = {{first, 0, 1, {}}, {second, 0, second_tail, {}}};
+    return guess_stance(box, body).front;
+  };
+  const Vec3 z = Vec3::UnitZ();
+  EXPECT_EQ(front("right_leg", "left_leg"), z);
+  EXPECT_EQ(front("left_leg", "right_leg"), -z);
+  EXPECT_EQ(front("Leg.L", "Leg.R"), -z);
+  EXPECT_EQ(front("LeftLeg", "RightLeg"), -z);
+  EXPECT_EQ(front("hip_L_knee_L", "hip_R_knee_R"), -z);
+  EXPECT_EQ(front("left_leg", "right_arm"), z) << "no pair";
+  EXPECT_EQ(front("cleft_leg", "bright_leg"), z) << "no sides";
+  EXPECT_EQ(front("left_leg", "right_leg", 3), z) << "the sides lie too far along the line of sight";
+}
+
 TEST(Stance, IsGuessedFromTheWayABodyStands) {
   const Shape shape = creature_shape();
   EXPECT_EQ(guess_stance(shape.mesh, shape.skeleton).up, Vec3(Vec3::UnitY()));
@@ -373,7 +394,7 @@ TEST(Stance, IsGuessedFromTheWayABodyStands) {
   Skeleton walker;
   for (const Vec3& p : {Vec3(0, 0, 1), Vec3(0, 0, 2), Vec3(-0.3, 0, 0), Vec3(0.3, 0, 0)})
     walker.nodes.push_back({"", p});
-  walker.bones = {{"spine", 0, 1, {}}, {"left", 0, 2, {}}, {"right", 0, 3, {}}};
+  walker.bones = {{"spine", 0, 1, {}}, {"leg_1", 0, 2, {}}, {"leg_2", 0, 3, {}}};
   TriangleMesh box;
   box.positions = {Vec3(-0.5, -0.2, -0.1), Vec3(0.5, 0.2, 2.2)};
   EXPECT_EQ(guess_stance(box, walker).up, Vec3(Vec3::UnitZ()));

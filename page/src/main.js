@@ -26,7 +26,7 @@ class Page {
     this.finest = model.levels.length - 1;
     this.picture = new Picture(element('picture'), model.skeleton.bones.length);
     this.surface = new Surface(this.picture.gl, model, arrays);
-    this.orbit = new Orbit(this.picture.camera, model.diagonal);
+    this.orbit = new Orbit(this.picture.camera, model.diagonal, model.front);
     this.overlay = new Overlay(element('overlay'), this.picture.camera);
     this.textureView = new TextureView(element('texture'), element('marks'));
     this.shown = read(model, location.hash);

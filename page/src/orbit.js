@@ -5,12 +5,15 @@ import {Matrix4, Vector3} from 'three';
 const FIT = 1.12;
 
 export class Orbit {
-  /** @param {import('three').PerspectiveCamera} camera @param {number} size diagonal of what is shown */
-  constructor(camera, size) {
+  /**
+   * @param {import('three').PerspectiveCamera} camera @param {number} size diagonal of what is shown
+   * @param {number} front angle about up that shows its front
+   */
+  constructor(camera, size, front) {
     this.camera = camera;
     this.size = size;
     this.up = 'y';
-    this.home = {azimuth: 0.45, elevation: 0.16, distance: 1, target: [0, 0, 0]};
+    this.home = {azimuth: front + 0.45, elevation: 0.16, distance: 1, target: [0, 0, 0]};
     Object.assign(this, structuredClone(this.home));
   }
 

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numeric>
-#include <ranges>
 
 #include "skeletex/analysis/metro.h"
 #include "skeletex/compact/compact_file.h"
@@ -199,9 +198,10 @@ Json morph_levels(ClContext& context, PageArrays& arrays, const SkeletexModel& m
                   Json& skeleton) {
   Json levels = Json::array();
   const PageSecond& second = *options.second;
-  std::vector<int> sizes{std::max(model.texture.width, model.texture.height)};
-  while (sizes.back() / 2 >= std::max(4, options.smallest)) sizes.push_back(sizes.back() / 2);
-  for (const int size : std::views::reverse(sizes)) {
+  const int finest = std::max(model.texture.width, model.texture.height);
+  std::vector<int> sizes{finest};  // the coarsest first
+  while (sizes.front() / 2 >= std::max(4, options.smallest)) sizes.insert(sizes.begin(), sizes.front() / 2);
+  for (const int size : sizes) {
     try {
       const Morph morph(context, {model, second.model}, std::span(&second.correspondence, 1),
                         {.layout = 0, .size = size, .has_own_texels = false, .is_smooth = false});
@@ -216,7 +216,7 @@ Json morph_levels(ClContext& context, PageArrays& arrays, const SkeletexModel& m
       arrays.end_part();
       levels.insert(levels.begin(), std::move(level));
     } catch (const InputError&) {
-      if (size == sizes.front()) throw;  // a coarser one is too small for the number of bones
+      if (size == finest) throw;  // a coarser one is too small for the number of bones
     }
   }
   return levels;
@@ -296,6 +296,13 @@ bool stands_along_z(const SkeletexModel& model) {
   return model.stance && std::abs(model.stance->up.z()) > std::abs(model.stance->up.y());
 }
 
+/// The angle of the model's front about up, from z, or from -y where up is z.
+double front_angle(const SkeletexModel& model, bool is_z_up) {
+  if (!model.stance || is_z_up != stands_along_z(model)) return 0;
+  const Vec3& front = model.stance->front;
+  return std::atan2(front.x(), is_z_up ? -front.y() : front.z());
+}
+
 }  // namespace
 
 bool has_page_script() { return !embedded_page_files().front().text.empty(); }
@@ -308,7 +315,9 @@ std::string make_page(ClContext& context, const SkeletexModel& model, const Page
   PageArrays arrays;
   Json json{{"version", 1}, {"name", options.name}};
   json["second"] = options.second ? Json(options.second->name) : Json();
-  json["up"] = options.is_z_up.value_or(stands_along_z(model)) ? "z" : "y";
+  const bool is_z_up = options.is_z_up.value_or(stands_along_z(model));
+  json["up"] = is_z_up ? "z" : "y";
+  json["front"] = front_angle(model, is_z_up);
   json["diagonal"] = model.diagonal;
   json["origin"] = to_json(model.origin);
   const UnitFrame& frame = model.skeleton.frame;
