@@ -4,7 +4,7 @@
 import capsule from '../../kernels/capsule.h';
 import skinWeight from '../../kernels/skin_weight.h';
 import {blendedTexels} from './blend.js';
-import {compactTexels} from './compact/texels.js';
+import {decodeLevel} from './compact/level.js';
 import {array, unpackKeys, unpackSteps, unpackTexels} from './data.js';
 import {makeLattice} from './lattice.js';
 import {SeparationPlanes, axialOf, hierarchy, interval, motions, posed, skeletonAt, weightWalks} from './skeleton.js';
@@ -108,12 +108,19 @@ export class Surface {
     if (level.isUnpacked) return;
     level.isUnpacked = true;
     const {second, transfer, blend} = level;
+    if (level.payload) {
+      decodeLevel(this.model, this.payload(level), level);
+      return;
+    }
     for (const texture of [level, second, transfer]) {
       if (!texture) continue;
       texture.rows = array(this.arrays, texture.rows);
-      texture.values = this.model.ends ? compactTexels(this.model, this.payload(level), texture) : unpackTexels(this.arrays, texture);
+      texture.values = unpackTexels(this.arrays, texture);
     }
-    for (const stage of level.stages) unpackKeys(this.arrays, stage.keys, ['turns', 'distances']);
+    for (const stage of level.stages) {
+      unpackKeys(this.arrays, stage.keys, ['turns', 'distances']);
+      stage.diagonals = array(this.arrays, stage.diagonals);
+    }
     if (!second) return;
     transfer.values = transfer.values.map((value, i) => value - level.values[i]);  // what it moves
     transfer.rows = transfer.rows.map((u, i) => u - level.rows[i]);

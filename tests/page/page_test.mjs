@@ -90,13 +90,13 @@ function checkClosed(shown, what) {
   check(open === 0 && edges.size > 0, `${what}: ${open} edges are not shared by two triangles`);
 }
 
-/** The drawn triangles are the library's, whatever corner each begins with. */
-function checkTriangles(shown, ply, what) {
+/** The drawn triangles are the library's, whatever corner each begins with, but for a share of them. */
+function checkTriangles(shown, ply, what, share = 0) {
   const key = ([a, b, c]) => (a < b && a < c ? [a, b, c] : b < c ? [b, c, a] : [c, a, b]).join(' ');
   const own = new Set();
   for (let t = 0; t < shown.triangles.length; t += 3) own.add(key([0, 1, 2].map((k) => shown.vertices[shown.triangles[t + k]])));
   const missing = ply.triangles.filter((triangle) => !own.has(key(triangle))).length;
-  check(missing === 0 && own.size === ply.triangles.length, `${what}: ${missing} of ${ply.triangles.length} triangles are not the library's`);
+  check(missing <= share * ply.triangles.length && own.size === ply.triangles.length, `${what}: ${missing} of ${ply.triangles.length} triangles are not the library's`);
 }
 
 const picture = (page) => page.evaluate(async () => {
@@ -214,14 +214,15 @@ async function testPlaces() {
 async function testCompact(name) {
   const path = at(`${name}-compact.html`), page = await open(browser, path);
   const sizes = await page.evaluate(async () => (await globalThis.skeletex).model.levels.map((level) => Math.max(level.width, level.height)));
-  check(statSync(path).size <= 0.75e6, `the page of the compact file has ${statSync(path).size} bytes`);
+  check(statSync(path).size <= 0.65e6, `the page of the compact file has ${statSync(path).size} bytes`);
   check(sizes.length >= 3, `the page of the compact file has ${sizes.length} levels`);
   for (const [level, size] of sizes.entries()) {
     run('unpack', at(`${name}.skx`), '-o', at('unpacked.skx.exr'), '--size', String(size));
     run('reconstruct', at('unpacked.skx.exr'), '-o', at('unpacked.ply'), '--all-texels');
     await page.evaluate(async (to) => (await globalThis.skeletex).change({level: to}), level);
-    const shown = await drawn(page);
-    compare(shown, readPly(at('unpacked.ply')), `compact ${name} at ${size}`, 1e-5);
+    const shown = await drawn(page), ply = readPly(at('unpacked.ply'));
+    compare(shown, ply, `compact ${name} at ${size}`, 1e-5);
+    checkTriangles(shown, ply, `compact ${name} at ${size}`, 2e-3);  // diagonals that are as near
     checkClosed(shown, `compact ${name} at ${size}`);
   }
   // Bones that are in no cycle turn.

@@ -11,7 +11,6 @@
 #include "skeletex/analysis/metro.h"
 #include "skeletex/compact/compact_file.h"
 #include "skeletex/compact/decode_model.h"
-#include "skeletex/compact/seam_curves.h"
 #include "skeletex/device/kernel_source.h"
 #include "skeletex/edit/morph/morph.h"
 #include "skeletex/edit/transfer/transfer.h"
@@ -181,12 +180,12 @@ Json level_json(ClContext& context, PageArrays& arrays, std::span<const PageKey>
   const SkeletexModel& first = keys.front().model;
   const bool is_decoded = options.compact && !options.second;
   Json level = is_decoded ? rectangles_json(first) : texture_json(arrays, first);
-  level["rows"] = arrays.add(rows_of(first));
+  if (!is_decoded) level["rows"] = arrays.add(rows_of(first));
   level["stages"] = Json::array();
   for (std::size_t begin = 0; begin < keys.size();) {
     std::size_t end = begin + 1;
     while (end < keys.size() && has_same_seams(keys[begin].model, keys[end].model)) ++end;
-    level["stages"].push_back(add_stage(context, arrays, keys.subspan(begin, end - begin)));
+    level["stages"].push_back(add_stage(context, arrays, keys.subspan(begin, end - begin), is_decoded));
     begin = end;
   }
   if (options.reference) level["error"] = error_json(context, arrays, first, *options.reference);
@@ -229,21 +228,6 @@ CompactModel without_layers(CompactModel compact) {
   return compact;
 }
 
-/// How the patches' ends run through the arcs of a compact model, [arc, whether it is reversed] each.
-Json ends_json(const CompactModel& compact) {
-  Json ends = Json::array();
-  for (const std::array<PatchEnd, 2>& both : ends_of(compact)) {
-    Json bone = Json::array();
-    for (const PatchEnd& end : both) {
-      Json arcs = Json::array();
-      for (const ArcUse& use : end.arcs) arcs.push_back({use.arc, use.is_reversed});
-      bone.push_back(arcs);
-    }
-    ends.push_back(bone);
-  }
-  return ends;
-}
-
 /// The sizes of a compact model from that of the page down, each with half the rows and columns of the one before.
 std::vector<SkeletexModel> compact_levels(const PageCompact& compact, const SkeletexModel& model, int smallest) {
   std::vector<SkeletexModel> levels{model};
@@ -280,6 +264,7 @@ Json model_levels(ClContext& context, PageArrays& arrays, const SkeletexModel& m
     if (options.compact) {
       compact.bare_levels = std::max(bare_levels, 2 * (i - options.compact->octaves));
       const std::size_t end = compact_payload(compact).size();
+      level["octaves"] = options.compact->octaves - i;
       level["payload"] = arrays.add(bytes_of(payload).subspan(sent, end - sent));
       sent = end;
     }
@@ -329,7 +314,6 @@ std::string make_page(ClContext& context, const SkeletexModel& model, const Page
     json["skeleton"] = skeleton;
   } else {
     json["skeleton"] = skeleton_json(std::vector<PageKey>{{0, model, {}, {}}}, options);
-    if (options.compact) json["ends"] = ends_json(options.compact->model);
     json["levels"] = model_levels(context, arrays, model, options);
   }
   json["bytes"] = arrays.size();

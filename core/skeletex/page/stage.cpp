@@ -2,7 +2,7 @@
 #include "skeletex/page/stage.h"
 
 #include <algorithm>
-#include <unordered_map>
+#include <cmath>
 
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 
@@ -12,66 +12,58 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kColumnStep = 1.0 / 4096;
+constexpr double kPlaceStep = 1.0 / 64;  // texels, of the columns of seams, which are pictures only
 constexpr double kTurnStep = 1.0 / (1 << 19);
 constexpr double kSlopeStep = 1e-5;
 constexpr double kStep = 2e-6;  // diagonals
 
-/// The vertices around the patches' ends as the page has them, and the triangles there.
-struct EndCopies {
-  std::vector<int> sources;    ///< vertices of the lattice behind the inner ones, from 0 on
-  std::vector<int> counts;     ///< per end
-  std::vector<float> columns;  ///< in texels, not wrapped
-  std::vector<Triangle> triangles;
+/// The triangles between seams and the rows beside them, end by end.
+struct Strips {
+  Json starts = Json::array();       ///< per end, of the first triangle: vertex of the seam and column of the row
+  std::vector<unsigned char> steps;  ///< one bit per triangle: it has an edge of the seam, not one of the row
+  std::size_t step_count = 0;
+  std::vector<float>
+      columns;  ///< per vertex of a seam, in texels from the one before, in the first of a ring from 0 on
+
+  void add_step(bool is_along_seam) {
+    if (step_count % 8 == 0) steps.push_back(0);
+    steps.back() |= static_cast<unsigned char>(static_cast<unsigned>(is_along_seam) << step_count % 8);
+    ++step_count;
+  }
 };
 
-void append_pole_copies(const Lattice& lattice, int pole, int width, EndCopies& copies) {
-  copies.counts.push_back(width);
-  for (int column = 0; column < width; ++column) {
-    copies.sources.push_back(pole - lattice.inner_count);
-    copies.columns.push_back(static_cast<float>(column) + 0.5f);
-  }
-}
-
-void append_seam_copies(const Lattice& lattice, const EndSeam& seam, int width, EndCopies& copies) {
-  copies.counts.push_back(static_cast<int>(seam.ring.vertices.size()));
-  for (std::size_t i = 0; i < seam.ring.vertices.size(); ++i) {
-    copies.sources.push_back(seam.ring.vertices[i] - lattice.inner_count);
-    copies.columns.push_back(static_cast<float>(seam.turns[i] * width));
-  }
-}
-
-void append_end(const PreparedModel& prepared, std::span<const Vec3> positions, int bone, BoneEnd end,
-                EndCopies& copies) {
+/// Adds the strip at an end of a patch. A triangle goes on from where the one before has ended, so that one bit says
+/// where its third corner is.
+void append_strip(const PreparedModel& prepared, std::span<const Vec3> positions, int bone, BoneEnd end,
+                  Strips& strips) {
   const Lattice& lattice = prepared.lattice;
-  const int width = prepared.model.patches[bone].rectangle.width, pole = lattice.poles[bone][static_cast<int>(end)];
-  const int first = lattice.inner_count + static_cast<int>(copies.sources.size());
+  const int width = prepared.model.patches[bone].rectangle.width;
   const EndSeam seam = end_seam(prepared.model, prepared.separation, lattice, positions, bone, end);
+  if (seam.ring.vertices.empty()) {
+    strips.starts.push_back({0, 0});
+    return;
+  }
   std::vector<Triangle> triangles;
   append_end_triangles(prepared.model, lattice, positions, seam, bone, end, triangles);
-  std::unordered_map<int, int> copy_of;  // of a seam's vertices
-  if (pole >= 0) {
-    append_pole_copies(lattice, pole, width, copies);
-  } else {
-    append_seam_copies(lattice, seam, width, copies);
-    for (std::size_t i = 0; i < seam.ring.vertices.size(); ++i)
-      copy_of[seam.ring.vertices[i]] = first + static_cast<int>(i);
-  }
-  for (std::size_t t = 0; t < triangles.size(); ++t) {
-    Triangle& triangle = triangles[t];
-    const auto inner =
-        std::find_if(triangle.begin(), triangle.end(), [&](int vertex) { return vertex < lattice.inner_count; });
-    std::rotate(triangle.begin(), inner + 1, triangle.end());
-    for (int& vertex : triangle)
-      if (vertex >= lattice.inner_count) vertex = pole >= 0 ? first + static_cast<int>(t) : copy_of.at(vertex);
-    copies.triangles.push_back(triangle);
+  const int at_seam = end == BoneEnd::kHead ? 0 : 2;  // the corner of the first triangle that lies on the seam
+  const auto start = std::find(seam.ring.vertices.begin(), seam.ring.vertices.end(), triangles[0][at_seam]);
+  strips.starts.push_back({start - seam.ring.vertices.begin(),
+                           (triangles[0][2 - at_seam] - end_row(prepared.model, lattice, bone, end).front()) % width});
+  for (const Triangle& triangle : triangles)
+    strips.add_step(std::ranges::count_if(triangle, [&](int v) { return v >= lattice.inner_count; }) == 2);
+  double before = 0;
+  for (const double turn : seam.turns) {
+    const double column = kPlaceStep * std::round(turn * width / kPlaceStep);
+    strips.columns.push_back(static_cast<float>(column - before));
+    before = column;
   }
 }
 
-EndCopies end_copies(const PreparedModel& prepared, std::span<const Vec3> positions) {
-  EndCopies copies;
+Strips strips_of(const PreparedModel& prepared, std::span<const Vec3> positions) {
+  Strips strips;
   for (int bone = 0; bone < static_cast<int>(prepared.model.patches.size()); ++bone)
-    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) append_end(prepared, positions, bone, end, copies);
-  return copies;
+    for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) append_strip(prepared, positions, bone, end, strips);
+  return strips;
 }
 
 /// One bit per quad: it takes the second diagonal. Quads are the lattice's, patch by patch, row by row.
@@ -88,24 +80,22 @@ std::vector<unsigned char> second_diagonals(const PreparedModel& prepared, std::
   return bits;
 }
 
-/// Differences between corners of triangles that follow each other: small numbers, which compress.
-std::vector<int> differences_of(const std::vector<Triangle>& triangles) {
-  std::vector<int> differences;
-  Triangle before{0, 0, 0};
-  for (const Triangle& triangle : triangles) {
-    for (int i = 0; i < 3; ++i) differences.push_back(triangle[i] - before[i]);
-    before = triangle;
-  }
-  return differences;
-}
-
 Json network_of(const SkeletexModel& model) {
-  Json network{{"arcs", Json::array()}, {"corners", Json::array()}};
+  Json network{{"arcs", Json::array()}, {"corners", Json::array()}, {"ends", Json::array()}};
   for (const SeamArc& arc : model.arcs)
     network["arcs"].push_back(
         {{"node", arc.node}, {"bone", arc.bones[0]}, {"samples", arc.samples.size()}, {"corners", arc.corners}});
   for (const SeamCorner& corner : model.corners)
     network["corners"].push_back({{"node", corner.node}, {"bone", corner.bones[0]}});
+  for (const std::array<PatchEnd, 2>& ends : model.ends) {
+    Json bone = Json::array();
+    for (const PatchEnd& end : ends) {
+      Json arcs = Json::array();
+      for (const ArcUse& use : end.arcs) arcs.push_back({use.arc, use.is_reversed});
+      bone.push_back(arcs);
+    }
+    network["ends"].push_back(bone);
+  }
   return network;
 }
 
@@ -137,16 +127,16 @@ bool has_same_seams(const SkeletexModel& a, const SkeletexModel& b) {
   return std::ranges::equal(a.arcs, b.arcs, same_arcs) && std::ranges::equal(a.corners, b.corners, same_corners);
 }
 
-Json add_stage(ClContext& context, PageArrays& arrays, std::span<const PageKey> keys) {
+Json add_stage(ClContext& context, PageArrays& arrays, std::span<const PageKey> keys, bool is_decoded) {
   const PreparedModel prepared(keys.front().model);
   const TriangleMesh mesh = reconstruct_bind_mesh(context, prepared).mesh;  // in the model's frame
-  const EndCopies copies = end_copies(prepared, mesh.positions);
+  const Strips strips = strips_of(prepared, mesh.positions);
   Json stage = network_of(prepared.model);
-  stage["copies"] = copies.counts;
-  stage["sources"] = arrays.add(copies.sources);
+  stage["starts"] = strips.starts;
+  stage["strips"] = arrays.add(strips.steps);
   std::vector<int> none;
-  stage["columns"] = add_steps(arrays, copies.columns, kColumnStep, none);
-  stage["triangles"] = arrays.add(differences_of(copies.triangles));
+  stage["columns"] = add_steps(arrays, strips.columns, kPlaceStep, none);
+  if (is_decoded) return stage;
   stage["diagonals"] = arrays.add(second_diagonals(prepared, mesh.triangles));
   stage["keys"] = Json::array();
   std::vector<int> turns, distances;  // of the key before

@@ -25,11 +25,10 @@ bool has_same_seams(const SkeletexModel& a, const SkeletexModel& b);
 /// Adds what the page needs of the seams of consecutive keys, and of the triangles that do not follow from the numbers
 /// of rows and columns.
 ///
-/// The page draws more vertices than the lattice has: around each end it repeats the seam's vertices, or the pole once
-/// per column, so that each has one column in the texture. These copies follow the inner vertices, bone by bone, head
-/// before tail. The last corner of every triangle is an inner vertex, which says the bone.
 /// \param keys  with the same seams
-nlohmann::ordered_json add_stage(ClContext& context, PageArrays& arrays, std::span<const PageKey> keys);
+/// \param is_decoded  whether the page decodes the seams and chooses the diagonals of quads itself
+nlohmann::ordered_json add_stage(ClContext& context, PageArrays& arrays, std::span<const PageKey> keys,
+                                 bool is_decoded);
 
 /// Adds what blends the texels of two models at every key (kernels/blend.cl).
 nlohmann::ordered_json add_blend(PageArrays& arrays, const Morph& morph, std::span<const PageKey> keys);

@@ -5,7 +5,7 @@
 /**
  * @typedef {{normal: Int32Array, side: Int32Array?, across: Int32Array?}} Step residuals of the points that a step adds
  * @typedef {{columns: number, intervals: number, stepCount: number, baseExponent: number, rowSteps: number,
- *     base: Int32Array, poles: number[][], steps: Step[]}} CompactPatch
+ *     knots: number[], *     base: Int32Array, poles: number[][], steps: Step[]}} CompactPatch
  * @typedef {{node: number, bones: number[], corners: number[], stepCount: number, base: number[], steps: Step[]}} CompactArc
  * @typedef {{step: number, weights: number[][], patches: CompactPatch[], arcs: CompactArc[],
  *     corners: {node: number, bone: number, turn: number, distance: number}[]}} Compact
@@ -108,8 +108,8 @@ function readBase(reader, patch) {
 function readPatch(reader) {
   const [columns, intervals, stepCount, baseExponent] = Array.from({length: 4}, () => reader.byte());
   const rowSteps = reader.count();
-  reader.skip(3);  // the rows, which each level has as a table
-  return {columns, intervals, stepCount, baseExponent, rowSteps, base: new Int32Array(0), poles: [[], []], steps: []};
+  const knots = [reader.byte(), reader.byte(), reader.byte()].map((x) => x / 256);
+  return {columns, intervals, stepCount, baseExponent, rowSteps, knots, base: new Int32Array(0), poles: [[], []], steps: []};
 }
 
 /**

@@ -29,7 +29,7 @@ function arcPlane(planes, {node, bones}) {
   return {node: planes.skeleton.nodes[node], x, y: cross(normal, x)};
 }
 
-const endAt = (skeleton, bone, node) => (skeleton.bones[bone].head === node ? 0 : 1);
+export const endAt = (skeleton, bone, node) => (skeleton.bones[bone].head === node ? 0 : 1);
 
 /** A curve with a further point halfway between each two. */
 function refinedCurve(points, isClosed, q, step) {
@@ -57,8 +57,8 @@ function refinedCurve(points, isClosed, q, step) {
   return fine;
 }
 
-/** Corners, and the points of every arc between its corners, at the size of the file. */
-export function seamsOf(compact, planes) {
+/** Corners, and the points of every arc between its corners. @param {number} octaves halvings beyond the size of the file */
+export function seamsOf(compact, planes, octaves) {
   const {step: q, arcs} = compact;
   const corners = compact.corners.map(({node, bone, turn, distance}) =>
     planes.seamPoint(bone, endAt(planes.skeleton, bone, node), turn, distance));
@@ -67,7 +67,7 @@ export function seamsOf(compact, planes) {
     const coordinates = (p) => [dot(sub(p, plane.node), plane.x), dot(sub(p, plane.node), plane.y)];
     let curve = isClosed ? [0, 1, 2, 3].map((i) => [q * arc.base[2 * i], q * arc.base[2 * i + 1]])
       : arc.corners.map((corner) => coordinates(corners[corner]));
-    for (let step = 0; step < Math.max(isClosed ? 0 : 1, arc.stepCount); ++step)
+    for (let step = 0; step < Math.max(isClosed ? 0 : 1, arc.stepCount + octaves); ++step)
       curve = refinedCurve(curve, isClosed, q, arc.steps[step]);
     const inner = isClosed ? curve : curve.slice(1, -1);
     return inner.map(([x, y]) => add(plane.node, add(scaled(plane.x, x), scaled(plane.y, y))));
