@@ -268,21 +268,6 @@ Json say_cuts(const HandleCuts& cuts, double diagonal, int handles_left) {
   return loops;
 }
 
-/// Cuts handles off a closed mesh of one part.
-Json cut_parts(MeshParts& parts, double longest) {
-  const double diagonal = bounding_box(parts.mesh).diagonal();
-  TriangleMesh cut = parts.mesh;
-  const HandleCuts cuts = cut_handles(cut, longest * diagonal);
-  if (!cuts.loops.empty()) {
-    name_corners(parts);
-    copy_vertices(parts, cuts.copies);
-    parts.attributes =
-        with_triangles(parts.attributes, parts.mesh.triangles, with_originals(cut, cuts.copies), cuts.origins);
-    parts.mesh = std::move(cut);
-  }
-  return say_cuts(cuts, diagonal, measure_manifold(parts.mesh).genus);
-}
-
 }  // namespace
 
 void add_close_options(CLI::App& command, CloseOptions& options) {
@@ -338,6 +323,20 @@ Json fill_or_wrap(MeshParts& parts, const CloseOptions& options) {
 
 }  // namespace
 
+Json cut_handles_off(MeshParts& parts, double longest) {
+  const double diagonal = bounding_box(parts.mesh).diagonal();
+  TriangleMesh cut = parts.mesh;
+  const HandleCuts cuts = cut_handles(cut, longest * diagonal);
+  if (!cuts.loops.empty()) {
+    name_corners(parts);
+    copy_vertices(parts, cuts.copies);
+    parts.attributes =
+        with_triangles(parts.attributes, parts.mesh.triangles, with_originals(cut, cuts.copies), cuts.origins);
+    parts.mesh = std::move(cut);
+  }
+  return say_cuts(cuts, diagonal, measure_manifold(parts.mesh).genus);
+}
+
 Json close_mesh(MeshParts& parts, const CloseOptions& options) {
   const auto is_closed = [&] {
     const ManifoldReport report = measure_manifold(parts.mesh);
@@ -350,7 +349,7 @@ Json close_mesh(MeshParts& parts, const CloseOptions& options) {
     json = fill_or_wrap(parts, options);
   const bool is_new = json["method"] == "wrap" || json["method"] == "union";
   const double longest = options.handles.value_or(options.has_rig ? kRigHandles : is_new ? kHandles : 0);
-  json["cut_loops"] = longest > 0 && is_closed() ? cut_parts(parts, longest) : Json::array();
+  json["cut_loops"] = longest > 0 && is_closed() ? cut_handles_off(parts, longest) : Json::array();
   return json;
 }
 

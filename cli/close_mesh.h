@@ -33,4 +33,9 @@ struct MeshParts {
 /// \return for the JSON
 Json close_mesh(MeshParts& open, const CloseOptions& options);
 
+/// Cuts handles off a closed mesh of one part, and says which.
+/// \param longest  the loops around them, diagonals
+/// \return for the JSON: these loops
+Json cut_handles_off(MeshParts& parts, double longest);
+
 }  // namespace skeletex::cli

@@ -1121,7 +1121,7 @@ TEST_F(Program, CorrespondsModelsAndSkeletonFiles) {
                  {first + "x", "did you mean " + first});
   std::ofstream(folder_ / "two.json")
       << R"({"nodes":[{"name":"p","position":[0,0,0]},{"name":"q","position":[1,0,0]}],"bones":[{"name":"b","head":0,"tail":1}]})";
-  expect_refused(1, {"correspond", "y.skx.exr", "two.json"}, {"y.skx.exr", "two.json", "joins"});
+  expect_refused(1, {"correspond", "y.skx.exr", "two.json"}, {"y.skx.exr", "two.json", "number of bones"});
 }
 
 TEST_F(Program, MorphsToModelsAndMeshes) {

@@ -170,6 +170,16 @@ void subdivide(Input& input, int rounds) {
   numbers.resize(own_numbers);
 }
 
+void move_to_unit_frame(Input& input) {
+  const UnitFrame frame = unit_frame(input.mesh);
+  input.mesh = in_unit_frame(std::move(input.mesh), frame);
+  input.skeleton = in_unit_frame(std::move(input.skeleton), frame);
+  if (input.tree) {  // what it holds is in this frame already
+    input.tree->origin = Vec3::Zero();
+    input.tree->scale = 1;
+  }
+}
+
 Input read_input(ClContext& context, const Arguments& arguments, const EncodeOptions& options) {
   Input input;
   if (is_gltf_file(arguments.mesh)) {
@@ -208,13 +218,7 @@ Input read_input(ClContext& context, const Arguments& arguments, const EncodeOpt
     else
       require_valid(input.mesh, input.skeleton, &input.tree);
   }
-  const UnitFrame frame = unit_frame(input.mesh);
-  input.mesh = in_unit_frame(std::move(input.mesh), frame);
-  input.skeleton = in_unit_frame(std::move(input.skeleton), frame);
-  if (input.tree) {  // what it holds is in this frame already
-    input.tree->origin = Vec3::Zero();
-    input.tree->scale = 1;
-  }
+  move_to_unit_frame(input);
   return input;
 }
 
@@ -252,8 +256,7 @@ Skeleton make_skeleton(ClContext& context, const Input& input, ProgressBar& bar)
 }
 
 /// Makes a skeleton. Where none works because of handles, `--close` cuts all of them off unless it was told which.
-void add_skeleton(ClContext& context, const Arguments& arguments, const EncodeOptions& options, ProgressBar& bar,
-                  Input& input) {
+void add_skeleton(ClContext& context, const Arguments& arguments, ProgressBar& bar, Input& input) {
   try {
     input.skeleton = make_skeleton(context, input, bar);
   } catch (const TopologyError&) {
@@ -262,9 +265,14 @@ void add_skeleton(ClContext& context, const Arguments& arguments, const EncodeOp
     warn(fmt::format(
         "no skeleton works with the {} handle{} of the mesh, so all are cut off, as --close-handles {} does", handles,
         handles == 1 ? "" : "s", kLongestHandleLoop));
-    Arguments again = arguments;
-    again.close.handles = kLongestHandleLoop;
-    input = read_input(context, again, options);
+    MeshParts parts{in_user_units(std::move(input.mesh), input.skeleton.frame), std::move(input.attributes),
+                    std::move(input.weights)};
+    for (Json& loop : cut_handles_off(parts, kLongestHandleLoop)) input.closing["cut_loops"].push_back(std::move(loop));
+    input.mesh = std::move(parts.mesh);
+    input.attributes = std::move(parts.attributes);
+    input.weights = std::move(parts.weights);
+    input.tree = require_closed(input.mesh);
+    move_to_unit_frame(input);
     input.skeleton = make_skeleton(context, input, bar);
   }
 }
@@ -319,7 +327,7 @@ void run(const Arguments& arguments, const CLI::App& command) {
   if (!is_gltf_file(arguments.mesh)) context.prepare({"encode.cl", "read_surface"});
   Input input = reading.get();
   if (input.skeleton.bones.empty()) {
-    add_skeleton(context, arguments, options, *bar, input);
+    add_skeleton(context, arguments, *bar, input);
     check_bone_names(arguments, options, input.skeleton);
   }
   options.attributes = &input.attributes;

@@ -432,14 +432,14 @@ std::string first_difference(const Side& a, const Side& b) {
   for (std::size_t n = 0; n < a.skeleton->nodes.size(); ++n) {
     const auto it = named.find(a.node_name(static_cast<int>(n)));
     if (it != named.end() && a.at[n].size() != b.at[it->second].size())
-      return fmt::format("node \"{}\" joins {} bones in the first and {} in the second", it->first, a.at[n].size(),
-                         b.at[it->second].size());
+      return fmt::format("the number of bones at node \"{}\" is {} in the first and {} in the second", it->first,
+                         a.at[n].size(), b.at[it->second].size());
   }
   // Without names: degrees along a breadth-first walk from the busiest nodes.
   const std::vector<int> left = walk_from_busiest(a), right = walk_from_busiest(b);
   for (std::size_t i = 0; i < std::min(left.size(), right.size()); ++i)
     if (a.at[left[i]].size() != b.at[right[i]].size())
-      return fmt::format("node \"{}\" of the first joins {} bones, node \"{}\" of the second joins {}",
+      return fmt::format("the number of bones at node \"{}\" of the first is {}, at node \"{}\" of the second {}",
                          a.node_name(left[i]), a.at[left[i]].size(), b.node_name(right[i]), b.at[right[i]].size());
   if (a.count() != b.count()) return fmt::format("the first has {} bones, the second {}", a.count(), b.count());
   // Same degrees: the order around some node differs.

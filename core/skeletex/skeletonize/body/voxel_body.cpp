@@ -254,16 +254,15 @@ std::vector<unsigned> find_crossed_links(const Surface& surface, const VoxelBody
   for_each_block(crossed.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) {
       if (!surface.is_near(body.centres[v], std::sqrt(3.0) * body.side)) continue;
-      const int self = static_cast<int>(v);
-      for (int place = 0; place < kVoxelPlaces; ++place) {
-        const int other = body.neighbours[v][place];
-        if (other < 0 || place == kOwnPlace) continue;
-        // Both ways, so that both voxels agree.
-        if (surface.is_between(body.centres[std::min(self, other)], body.centres[std::max(self, other)]))
+      for (int place = kOwnPlace + 1; place < kVoxelPlaces; ++place)
+        if (const int other = body.neighbours[v][place];
+            other >= 0 && surface.is_between(body.centres[v], body.centres[other]))
           crossed[v] |= 1u << place;
-      }
     }
   });
+  for (int v = 0; v < body.size(); ++v)
+    for (int place = kOwnPlace + 1; place < kVoxelPlaces; ++place)
+      if (crossed[v] >> place & 1) crossed[body.neighbours[v][place]] |= 1u << (kVoxelPlaces - 1 - place);
   return crossed;
 }
 
