@@ -20,6 +20,7 @@
 #include "skeletex/reconstruct/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/texture/bake_texture.h"
+#include "skeletex/skeletonize/names.h"
 #include "support/picture_at.h"
 #include "support/shapes.h"
 
@@ -385,6 +386,59 @@ TEST(Stance, FollowsTheSidesThatBonesAreNamedAfter) {
   EXPECT_EQ(front("left_leg", "right_arm"), z) << "no pair";
   EXPECT_EQ(front("cleft_leg", "bright_leg"), z) << "no sides";
   EXPECT_EQ(front("left_leg", "right_leg", 3), z) << "the sides lie too far along the line of sight";
+}
+
+/// A flat patch of surface of area 1e-4.
+void add_patch(TriangleMesh& mesh, const Vec3& at) {
+  const int first = static_cast<int>(mesh.positions.size());
+  for (const Vec3& corner : {Vec3(0, 0, 0), Vec3(0.02, 0, 0), Vec3(0, 0, 0.01)}) mesh.positions.push_back(at + corner);
+  mesh.triangles.push_back({first, first + 1, first + 2});
+}
+
+/// A person, as far as a guess goes: a body 2 high, ankles, and soles that are off them.
+TriangleMesh standing(double soles) {
+  TriangleMesh mesh;
+  mesh.positions = {Vec3(-0.5, 0, -0.3), Vec3(0.5, 2, 0.3)};
+  for (const double x : {-0.2, 0.2}) {
+    add_patch(mesh, {x, 0.2, 0});
+    add_patch(mesh, {x, 0.02, soles});
+  }
+  return mesh;
+}
+
+TEST(Stance, FollowsTheFeetOfAnUprightBodyAndTheHeadOfALongOne) {
+  const auto front = [](const TriangleMesh& mesh) { return guess_stance(mesh, {}).front; };
+  const Vec3 z = Vec3::UnitZ();
+  EXPECT_EQ(front(standing(0.12)), z);
+  EXPECT_EQ(front(standing(-0.12)), -z);
+  EXPECT_EQ(front(standing(-0.04)), z) << "too little to tell";
+  const auto walking = [](double head) {
+    TriangleMesh mesh;
+    mesh.positions = {Vec3(-0.3, 0, -1), Vec3(0.3, 1, 1)};
+    for (const double at : {-0.8, -0.4, 0.0, 0.4, 0.8}) add_patch(mesh, {0, 0.5, at});
+    add_patch(mesh, {0, 0.95, head});
+    return mesh;
+  };
+  EXPECT_EQ(front(walking(0.9)), z);
+  EXPECT_EQ(front(walking(-0.9)), -z);
+  EXPECT_EQ(front(walking(-0.3)), z) << "too little to tell";
+  EXPECT_EQ(front(TriangleMesh{{Vec3(0, 0, 0), Vec3(1, 2, 1)}, {}}), z) << "nothing to tell by";
+}
+
+TEST(Stance, SaysWhichLimbsOfAMadeSkeletonAreLeft) {
+  Skeleton body;
+  for (const Vec3& p : {Vec3(0, 1.4, 0), Vec3(0, 1.9, 0), Vec3(-0.4, 1, 0), Vec3(0.4, 1, 0)})
+    body.nodes.push_back({"", p});
+  body.bones = {{"", 0, 1, {}}, {"", 0, 2, {}}, {"", 0, 3, {}}};
+  for (const double soles : {0.12, -0.12}) {
+    const TriangleMesh mesh = standing(soles);
+    const TriangleTree tree = build_triangle_tree(mesh);
+    Skeleton named = body;
+    name_by_place(Surface(mesh, tree), MirrorPlane{Vec3(0, 1, 0), Vec3::UnitX()}, named);
+    EXPECT_TRUE(named.bones[2].name.starts_with(soles > 0 ? "left_" : "right_")) << named.bones[2].name;
+    EXPECT_TRUE(named.bones[1].name.starts_with(soles > 0 ? "right_" : "left_")) << named.bones[1].name;
+    EXPECT_EQ(guess_stance(mesh, named).front, guess_stance(mesh, body).front) << "names and shape agree";
+  }
 }
 
 TEST(Stance, IsGuessedFromTheWayABodyStands) {

@@ -2,8 +2,11 @@
 #include "skeletex/convert/guess_stance.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -43,6 +46,43 @@ Vec3 named_left(const Skeleton& skeleton) {
   return sum;
 }
 
+/// Shares of the height.
+struct Slice {
+  double from, to;
+};
+
+/// The centroid of the part of a surface in a slice, by the middles of its triangles; none where there is no such part.
+std::optional<Vec3> centroid(const TriangleMesh& mesh, const Vec3& up, double lowest, double height, Slice slice) {
+  Vec3 sum = Vec3::Zero();
+  double area = 0;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vec3 &p = mesh.positions[a], &q = mesh.positions[b], &r = mesh.positions[c], middle = (p + q + r) / 3;
+    const double share = (middle.dot(up) - lowest) / height, own = (q - p).cross(r - p).norm();
+    if (share < slice.from || share >= slice.to) continue;
+    sum += own * middle;
+    area += own;
+  }
+  return area > 0 ? std::optional<Vec3>(sum / area) : std::nullopt;
+}
+
+/// Whether the shape says that a body looks the other way. Feet stick out in front of ankles, where a body is upright;
+/// one that is longer has its head in front, which is the highest part.
+bool looks_back(const TriangleMesh& mesh, const Stance& stance) {
+  constexpr double kUpright = 0.9, kFeet = 0.035, kHead = 0.2;
+  constexpr Slice kSoles{0, 0.04}, kAnkles{0.07, 0.14}, kTop{0.88, 1.01}, kWhole{0, 1.01};
+  const BoundingBox box = bounding_box(mesh);
+  const double height = std::abs((box.upper - box.lower).dot(stance.up));
+  const double length = std::abs((box.upper - box.lower).dot(stance.front));
+  const double lowest = std::min(box.lower.dot(stance.up), box.upper.dot(stance.up));
+  const auto offset = [&](Slice part, Slice from) {
+    const std::optional<Vec3> there = centroid(mesh, stance.up, lowest, height, part),
+                              here = centroid(mesh, stance.up, lowest, height, from);
+    return there && here ? (*there - *here).dot(stance.front) : 0;
+  };
+  if (length < kUpright * height) return offset(kSoles, kAnkles) < -kFeet * height;
+  return length > height && offset(kTop, kWhole) < -kHead * length;
+}
+
 /// Which way up a body is that is seen from z, or -y where up is z.
 Stance guess_upright(const TriangleMesh& mesh, const Skeleton& skeleton) {
   constexpr double kTall = 1.5, kLowest = 0.2;  // of the height along y, of that along z
@@ -61,7 +101,8 @@ Stance guess_upright(const TriangleMesh& mesh, const Skeleton& skeleton) {
 Stance guess_stance(const TriangleMesh& mesh, const Skeleton& skeleton) {
   Stance stance = guess_upright(mesh, skeleton);
   const Vec3 left = named_left(skeleton);
-  if (left.dot(stance.up.cross(stance.front)) < -0.5 * left.norm()) stance.front = -stance.front;
+  const double seen = left.dot(stance.up.cross(stance.front));
+  if (std::abs(seen) > 0.5 * left.norm() ? seen < 0 : looks_back(mesh, stance)) stance.front = -stance.front;
   return stance;
 }
 

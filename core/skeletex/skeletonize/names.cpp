@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "skeletex/convert/guess_stance.h"
 #include "skeletex/skeleton/pose.h"
 #include "skeletex/skeletonize/limbs.h"
 
@@ -24,6 +25,10 @@ class Namer {
 
   void run() {
     is_limb_.assign(skeleton_.bones.size(), false);
+    if (plane_) {
+      const Stance stance = guess_stance(surface_.mesh, skeleton_);
+      left_ = plane_->normal.dot(stance.up.cross(stance.front)) < -0.5 ? -plane_->normal : plane_->normal;
+    }
     sort_limbs();
     root_ = root();
     order_ = turn_away_from(root_, skeleton_);
@@ -79,7 +84,7 @@ class Namer {
         name(limb, "");
         continue;
       }
-      const bool is_left = plane_->height(skeleton_.nodes[limbs_[limb].nodes.back()].position) > 0;
+      const bool is_left = left_.dot(skeleton_.nodes[limbs_[limb].nodes.back()].position - plane_->point) > 0;
       name(limb, is_left ? "left_" : "right_");
       name(other, is_left ? "right_" : "left_");
     }
@@ -112,6 +117,7 @@ class Namer {
   std::vector<SkeletonLimb> limbs_;
   std::vector<int> order_;  // of bones, from the root outwards
   int root_ = 0;
+  Vec3 left_ = Vec3::UnitX();  // of the plane's two sides
 };
 
 }  // namespace

@@ -8,7 +8,7 @@ namespace skeletex {
 
 /// A plane that a body is its own mirror image about.
 struct MirrorPlane {
-  Vec3 point = Vec3::Zero(), normal = Vec3::UnitX();  ///< the normal points to the side that is called left
+  Vec3 point = Vec3::Zero(), normal = Vec3::UnitX();  ///< the normal points to +x, +y or +z, whichever is nearest
   Vec3 mirrored(const Vec3& p) const { return p - 2 * normal.dot(p - point) * normal; }
   double height(const Vec3& p) const { return normal.dot(p - point); }
 };
