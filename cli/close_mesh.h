@@ -34,8 +34,8 @@ struct MeshParts {
 Json close_mesh(MeshParts& open, const CloseOptions& options);
 
 /// Cuts handles off a closed mesh of one part, and says which.
-/// \param longest  the loops around them, diagonals
-/// \return for the JSON: these loops
+/// \param longest  length of the loops around them, diagonals
+/// \return the loops, for the JSON
 Json cut_handles_off(MeshParts& parts, double longest);
 
 }  // namespace skeletex::cli

@@ -152,7 +152,8 @@ run('view', at('bear.skx.exr'), '-o', at('bear.html'), '--against', join(source,
 // Two rings of bones and one between them.
 const compact = {bear: join(source, 'build/meshes/bear.off'), eight_dumbbell: join(source, 'build/meshes/eight.off')};
 for (const [name, mesh] of Object.entries(compact)) {
-  run('encode', mesh, join(source, 'configs/skeletons', `${name}.skeleton.json`), '-o', at(`${name}.skx`), '--size', '128', '--max-error', '1e-3');
+  run('encode', mesh, join(source, 'configs/skeletons', `${name}.skeleton.json`), '-o', at(`${name}.skx`), '--size', '128', '--max-error', '1e-3',
+      '--front', name === 'bear' ? 'z' : '-x');
   run('view', at(`${name}.skx`), '-o', at(`${name}-compact.html`), '--size', '200');
 }
 run('view', at('man.skx.exr'), at('homer.skx.exr'), '-o', at('morph.html'));
@@ -214,6 +215,12 @@ async function testPlaces() {
 async function testCompact(name) {
   const path = at(`${name}-compact.html`), page = await open(browser, path);
   const sizes = await page.evaluate(async () => (await globalThis.skeletex).model.levels.map((level) => Math.max(level.width, level.height)));
+  const seenFrom = await page.evaluate(async () => {
+    const {orbit, picture} = await globalThis.skeletex, {x, y, z} = picture.camera.position;
+    const [dx, dy, dz] = [x - orbit.target[0], y - orbit.target[1], z - orbit.target[2]], length = Math.hypot(dx, dy, dz);
+    return [dx / length, dz / length];
+  });
+  check((name === 'bear' ? seenFrom[1] : -seenFrom[0]) > 0.8, `${name} is not seen from its front but from ${seenFrom}`);
   check(statSync(path).size <= 0.65e6, `the page of the compact file has ${statSync(path).size} bytes`);
   check(sizes.length >= 3, `the page of the compact file has ${sizes.length} levels`);
   for (const [level, size] of sizes.entries()) {

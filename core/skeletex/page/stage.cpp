@@ -12,7 +12,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kColumnStep = 1.0 / 4096;
-constexpr double kPlaceStep = 1.0 / 64;  // texels, of the columns of seams, which are pictures only
+constexpr double kSeamColumnStep = 1.0 / 64;  // texels; the checker and the pointer alone read these columns
 constexpr double kTurnStep = 1.0 / (1 << 19);
 constexpr double kSlopeStep = 1e-5;
 constexpr double kStep = 2e-6;  // diagonals
@@ -22,8 +22,7 @@ struct Strips {
   Json starts = Json::array();       ///< per end, of the first triangle: vertex of the seam and column of the row
   std::vector<unsigned char> steps;  ///< one bit per triangle: it has an edge of the seam, not one of the row
   std::size_t step_count = 0;
-  std::vector<float>
-      columns;  ///< per vertex of a seam, in texels from the one before, in the first of a ring from 0 on
+  std::vector<float> columns;  ///< per vertex of a seam, in texels from the one before; the first of a ring from 0
 
   void add_step(bool is_along_seam) {
     if (step_count % 8 == 0) steps.push_back(0);
@@ -32,8 +31,8 @@ struct Strips {
   }
 };
 
-/// Adds the strip at an end of a patch. A triangle goes on from where the one before has ended, so that one bit says
-/// where its third corner is.
+/// Adds the strip at an end of a patch. Each triangle shares an edge with the one before, so that one bit says whether
+/// its third corner is the next vertex of the seam or of the row.
 void append_strip(const PreparedModel& prepared, std::span<const Vec3> positions, int bone, BoneEnd end,
                   Strips& strips) {
   const Lattice& lattice = prepared.lattice;
@@ -53,7 +52,7 @@ void append_strip(const PreparedModel& prepared, std::span<const Vec3> positions
     strips.add_step(std::ranges::count_if(triangle, [&](int v) { return v >= lattice.inner_count; }) == 2);
   double before = 0;
   for (const double turn : seam.turns) {
-    const double column = kPlaceStep * std::round(turn * width / kPlaceStep);
+    const double column = kSeamColumnStep * std::round(turn * width / kSeamColumnStep);
     strips.columns.push_back(static_cast<float>(column - before));
     before = column;
   }
@@ -135,7 +134,7 @@ Json add_stage(ClContext& context, PageArrays& arrays, std::span<const PageKey> 
   stage["starts"] = strips.starts;
   stage["strips"] = arrays.add(strips.steps);
   std::vector<int> none;
-  stage["columns"] = add_steps(arrays, strips.columns, kPlaceStep, none);
+  stage["columns"] = add_steps(arrays, strips.columns, kSeamColumnStep, none);
   if (is_decoded) return stage;
   stage["diagonals"] = arrays.add(second_diagonals(prepared, mesh.triangles));
   stage["keys"] = Json::array();

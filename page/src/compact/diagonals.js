@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Which diagonals the quads of a patch's grid take: the nearer ones (kernels/quad_diagonal.h). Two as near to 1e-6 can be
-// taken the other way than by the library, whose numbers have single precision.
+// Which diagonals the quads of a patch's grid take: the nearer ones (kernels/quad_diagonal.h). Where both
+// are equally near to 1e-6, the library, which computes in single precision, may take the other one.
 import {cross, dot, norm} from '../vector.js';
 
 /** Weights of the rows -1 to 2 at 1/2 of a cubic, which goes on straight where there is no row. */
