@@ -16,7 +16,8 @@ std::vector<int> turn_away_from(int node, Skeleton& skeleton);
 /// cycles, limb_1_1, limb_1_2.. from the body to a tip; left_ and right_ where two limbs are mirror images. The root is
 /// the node of the largest ball that is not on a limb. Limbs are numbered from the top (y, then z, then x). Left is the
 /// body's own left when it faces the front that guess_stance gives. Where that front lies along the plane's normal,
-/// left is the side that the normal points to. \param plane  of the body, if it has one
+/// left is the side that the normal points to.
+/// \param plane  of the body, if it has one
 void name_by_place(const Surface& surface, const std::optional<MirrorPlane>& plane, Skeleton& skeleton);
 
 }  // namespace skeletex
