@@ -132,9 +132,9 @@ SkeletexModel with_bones_reordered(const SkeletexModel& model, const std::vector
     result.ends[permutation[i]] = model.ends[i];
   }
   for (SeamArc& arc : result.arcs)
-    for (int& bone : arc.bones) bone = permutation[bone];
+    for (BoneIndex& bone : arc.bones) bone = permutation[bone];
   for (SeamCorner& corner : result.corners)
-    for (int& bone : corner.bones) bone = permutation[bone];
+    for (BoneIndex& bone : corner.bones) bone = permutation[bone];
   return result;
 }
 

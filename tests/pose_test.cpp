@@ -136,9 +136,9 @@ SkeletexModel with_bones_reordered(const SkeletexModel& model, const std::vector
     result.ends[place[i]] = model.ends[i];
   }
   for (SeamArc& arc : result.arcs)
-    for (int& bone : arc.bones) bone = place[bone];
+    for (BoneIndex& bone : arc.bones) bone = place[bone];
   for (SeamCorner& corner : result.corners)
-    for (int& bone : corner.bones) bone = place[bone];
+    for (BoneIndex& bone : corner.bones) bone = place[bone];
   return result;
 }
 

@@ -140,7 +140,8 @@ TEST(Replacement, BonesHaveTheNamesAndDirectionsOfTheWantedOnes) {
   EXPECT_EQ(skeleton.bones[0].name, "second");
   EXPECT_EQ(skeleton.bones[1].name, "second_part");
   const std::vector<std::pair<int, int>> expected{{1, 0}, {2, 1}, {3, 2}};
-  for (std::size_t b = 0; b < 3; ++b) EXPECT_EQ(std::pair(skeleton.bones[b].head, skeleton.bones[b].tail), expected[b]);
+  for (std::size_t b = 0; b < 3; ++b)
+    EXPECT_EQ((std::pair<int, int>(skeleton.bones[b].head, skeleton.bones[b].tail)), expected[b]);
 }
 
 TEST(Replacement, NodesComeAndGoWhereMarginsStayEnough) {

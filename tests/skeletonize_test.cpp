@@ -217,8 +217,8 @@ TEST(Skeletonize, ALegIsNotReachedByTheBonesOfTheNextOne) {
   made.bones.pop_back();
   made.nodes.erase(made.nodes.begin() + 2);
   for (Bone& bone : made.bones)
-    for (int* node : {&bone.head, &bone.tail})
-      if (*node > 2) --*node;
+    for (NodeIndex* node : {&bone.head, &bone.tail})
+      if (*node > 2) *node = *node - 1;
   EXPECT_EQ(count_reached(feet, made), 1) << "the foot left is 0.5 away, but not through the body";
 }
 

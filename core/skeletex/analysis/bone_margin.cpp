@@ -16,7 +16,7 @@ constexpr double kLeastMargin = -8;  // rays need not go further
 
 /// Directions of the other bones at an end of a bone.
 std::vector<Vec3> other_directions(const Skeleton& skeleton, const std::vector<std::vector<BoneAtNode>>& at_nodes,
-                                   int bone, BoneEnd end) {
+                                   BoneIndex bone, BoneEnd end) {
   std::vector<Vec3> directions;
   for (const BoneAtNode& other : at_nodes[end_node(skeleton, bone, end)])
     if (other.bone != bone) directions.push_back(direction_from(skeleton, other));
@@ -51,7 +51,7 @@ Exit first_exit(const TriangleMesh& mesh, const TriangleTree& tree, const std::a
 }  // namespace
 
 BoneMargin margin_of_bone(const TriangleMesh& mesh, const TriangleTree& tree, const Skeleton& skeleton,
-                          const std::vector<std::vector<BoneAtNode>>& at_nodes, int bone, int angles,
+                          const std::vector<std::vector<BoneAtNode>>& at_nodes, BoneIndex bone, int angles,
                           double stop_below) {
   BoneMargin result;
   const std::array<Vec3, 2> ends{end_position(skeleton, bone, BoneEnd::kHead),

@@ -30,7 +30,7 @@ struct BoneMargin {
 /// \param stop_below  further angles are left out once the margin is below
 /// \pre the bone has a length and lies inside the body; directions at its nodes differ
 BoneMargin margin_of_bone(const TriangleMesh& mesh, const TriangleTree& tree, const Skeleton& skeleton,
-                          const std::vector<std::vector<BoneAtNode>>& at_nodes, int bone, int angles = 24,
+                          const std::vector<std::vector<BoneAtNode>>& at_nodes, BoneIndex bone, int angles = 24,
                           double stop_below = -std::numeric_limits<double>::infinity());
 
 /// Of all bones, on all processors.

@@ -127,7 +127,7 @@ std::string remedy_of(const SurfaceProbe& surface, const Skeleton& skeleton, con
         text_of(stray.point), text_of_distance(stray.distance, surface.diagonal()), text_of(stray.nearest.point),
         text_of(surface.middle_of_body(stray.nearest.point, (stray.nearest.point - stray.point).normalized())));
   std::string ends;
-  for (const int node : {bone.head, bone.tail})
+  for (const NodeIndex node : {bone.head, bone.tail})
     if (is_outside[node]) ends += (ends.empty() ? "" : " and ") + name_of_node(skeleton, node);
   return ends.empty() ? "move its ends into the body, or bend it with a node in between"
                       : fmt::format("move {} into the body", ends);

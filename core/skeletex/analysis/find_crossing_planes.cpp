@@ -11,7 +11,7 @@ namespace skeletex {
 namespace {
 
 /// What would part the planes: a longer bone, or bones that bend less at its ends.
-std::string remedy_of(const Skeleton& skeleton, int bone, const BoneMargin& margin) {
+std::string remedy_of(const Skeleton& skeleton, BoneIndex bone, const BoneMargin& margin) {
   const double length = bone_length(skeleton, bone), factor = (1 - margin.margin) / (1 - kEnoughMargin);
   return fmt::format(
       "make the bone {:.3g} times as long ({:.4g} instead of {:.4g}), straighten the bones at its ends, or move its "

@@ -18,7 +18,7 @@ namespace {
 
 const char* plural(std::size_t count) { return count == 1 ? "" : "s"; }
 
-Vec3 centre_of(const TriangleMesh& mesh, int triangle) {
+Vec3 centre_of(const TriangleMesh& mesh, TriangleIndex triangle) {
   const auto [a, b, c] = mesh.triangles[triangle];
   return (mesh.positions[a] + mesh.positions[b] + mesh.positions[c]) / 3;
 }

@@ -105,7 +105,7 @@ void find_equal_directions(const Skeleton& skeleton, BoneAtNode a, BoneAtNode b,
   const double apart = (direction_from(skeleton, a) - direction_from(skeleton, b)).norm();
   const double degrees = 2 * std::asin(std::min(1.0, apart / 2)) * 180 / std::numbers::pi;
   if (degrees >= kSmallAngleDegrees) return;
-  const int node = end_node(skeleton, a.bone, a.end);
+  const NodeIndex node = end_node(skeleton, a.bone, a.end);
   const bool is_error = apart < kSameDirection;
   const double shift = 2 * std::sin(kSmallAngleDegrees * std::numbers::pi / 360) * bone_length(skeleton, b.bone);
   findings.push_back(
@@ -127,7 +127,7 @@ void find_contact(const Skeleton& skeleton, int i, int j, double diagonal, std::
   const Approach near = nearest_of_segments(head, tail, end_position(skeleton, j, BoneEnd::kHead),
                                             end_position(skeleton, j, BoneEnd::kTail));
   const double lengths = bone_length(skeleton, i) + bone_length(skeleton, j);
-  const auto is_at_end = [&](double share, int bone) {
+  const auto is_at_end = [&](double share, BoneIndex bone) {
     return std::min(share, 1 - share) * bone_length(skeleton, bone) <= kSamePlace * diagonal;
   };
   if (near.distance > 1e-6 * lengths || (is_at_end(near.first, i) && is_at_end(near.second, j))) return;
@@ -239,12 +239,12 @@ void find_unused_nodes(const Skeleton& skeleton, std::vector<Finding>& findings)
 
 }  // namespace
 
-std::string name_of_node(const Skeleton& skeleton, int n) {
+std::string name_of_node(const Skeleton& skeleton, NodeIndex n) {
   const std::string& name = skeleton.nodes[n].name;
   return name.empty() ? fmt::format("node {}", n) : fmt::format("node \"{}\"", name);
 }
 
-std::string name_of_bone(const Skeleton& skeleton, int b) {
+std::string name_of_bone(const Skeleton& skeleton, BoneIndex b) {
   const std::string& name = skeleton.bones[b].name;
   return name.empty() ? fmt::format("bone {}", b) : fmt::format("bone \"{}\"", name);
 }

@@ -15,8 +15,8 @@ namespace skeletex {
 inline constexpr double kSamePlace = 1e-9;
 
 /// "node "neck"", or "node 3" if it has no name
-std::string name_of_node(const Skeleton& skeleton, int node);
-std::string name_of_bone(const Skeleton& skeleton, int bone);
+std::string name_of_node(const Skeleton& skeleton, NodeIndex node);
+std::string name_of_bone(const Skeleton& skeleton, BoneIndex bone);
 /// "0.0123 (0.8 % of the diagonal)"
 std::string text_of_distance(double distance, double diagonal);
 

@@ -75,7 +75,7 @@ int end_corner(int corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
 int vertex_of(const TriangleMesh& mesh, int corner) { return mesh.triangles[corner / 3][corner % 3]; }
 
 /// Files one edge under what it is, and joins the corners at its ends.
-void add_edge(const TriangleMesh& mesh, int vertex, std::span<const Side> uses, UnionFind& fans,
+void add_edge(const TriangleMesh& mesh, VertexIndex vertex, std::span<const Side> uses, UnionFind& fans,
               ManifoldReport& report) {
   const int corner = uses[0].corner;
   ++report.edges;

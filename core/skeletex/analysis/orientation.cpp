@@ -13,7 +13,7 @@ struct EdgeUse {
 };
 
 struct NeighbourTriangle {
-  int triangle;
+  TriangleIndex triangle;
   bool is_opposed;  ///< it runs through the common edge in the same direction
 };
 

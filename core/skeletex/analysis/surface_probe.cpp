@@ -67,7 +67,7 @@ std::vector<Crossing> SurfaceProbe::crossings(const Vec3& begin, const Vec3& end
   for_each_triangle_near(tree_, lower, upper, [&](int t) { near.push_back(t); });
   std::sort(near.begin(), near.end());
   std::vector<Crossing> crossings;
-  for (const int triangle : near) {
+  for (const TriangleIndex triangle : near) {
     const auto& [i, j, k] = mesh_.triangles[triangle];
     const Vec3 &p = mesh_.positions[i], &q = mesh_.positions[j], &r = mesh_.positions[k];
     if ((p.cwiseMin(q).cwiseMin(r).array() > upper.array()).any() ||

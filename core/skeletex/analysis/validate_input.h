@@ -23,8 +23,8 @@ struct Finding {
   std::string rule;
   std::string message;  ///< what is wrong and where: names or numbers, and coordinates
   std::string remedy;   ///< what to do, with an amount where something is to be moved
-  int node = -1;        ///< of the skeleton, where one is meant; else -1
-  int bone = -1;
+  NodeIndex node;       ///< of the skeleton, where one is meant; else -1
+  BoneIndex bone;
   std::optional<Vec3> position{};  ///< where it is, if it has a place
 };
 

@@ -105,7 +105,7 @@ class LoopSearch {
     return loops;
   }
 
-  std::vector<int> path_to_root(int vertex, const Paths& paths) const {
+  std::vector<int> path_to_root(VertexIndex vertex, const Paths& paths) const {
     std::vector<int> path{vertex};
     while (paths.entry[path.back()] >= 0) path.push_back(origin(paths.entry[path.back()]));
     return path;

@@ -32,7 +32,7 @@ std::vector<std::vector<int>> boundary_loops(const std::vector<std::array<int, 2
     while (!path.empty()) {
       std::vector<int>& ways = next[path.back()];
       if (ways.empty()) break;
-      const int vertex = ways.back();
+      const VertexIndex vertex = ways.back();
       ways.pop_back();
       const auto found = place.find(vertex);
       if (found == place.end()) {
@@ -208,7 +208,7 @@ void mark_intersecting(const TriangleMesh& mesh, const Fillings& fillings, std::
   std::vector<int> query(fillings.triangles.size());
   std::iota(query.begin(), query.end(), before);
   for (const auto& pair : find_self_intersections(filled, build_triangle_tree(filled), query))
-    for (const int triangle : pair)
+    for (const TriangleIndex triangle : pair)
       if (triangle >= before) holes[fillings.holes[triangle - before]].is_intersecting = true;
 }
 

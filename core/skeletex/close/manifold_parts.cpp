@@ -46,7 +46,7 @@ struct Components {
 
 /// \param triangles  all at the vertex
 /// \param copies  per new vertex the one that it is a copy of
-void split_vertex(int vertex, const std::vector<int>& triangles, TriangleMesh& mesh, std::vector<int>& copies) {
+void split_vertex(VertexIndex vertex, const std::vector<int>& triangles, TriangleMesh& mesh, std::vector<int>& copies) {
   UnionFind sheets(static_cast<int>(triangles.size()));
   std::map<int, int> seen;  // another corner -> a triangle with it
   for (int i = 0; i < static_cast<int>(triangles.size()); ++i)
@@ -60,7 +60,8 @@ void split_vertex(int vertex, const std::vector<int>& triangles, TriangleMesh& m
       mesh.positions.push_back(mesh.positions[vertex]);
       copies.push_back(vertex);
     }
-    std::replace(mesh.triangles[triangles[i]].begin(), mesh.triangles[triangles[i]].end(), vertex, at->second);
+    std::replace(mesh.triangles[triangles[i]].begin(), mesh.triangles[triangles[i]].end(), static_cast<int>(vertex),
+                 at->second);
   }
 }
 

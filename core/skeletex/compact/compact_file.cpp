@@ -122,7 +122,7 @@ void write_sides(ByteWriter& out, const CompactModel& model) {
   for (const CompactCorner& corner : model.corners) {
     out.count(corner.node);
     out.count(corner.bones.size());
-    for (const int bone : corner.bones) out.count(bone);
+    for (const BoneIndex bone : corner.bones) out.count(bone);
     out.byte(corner.turn & 255);
     out.byte(corner.turn >> 8);
     out.count(corner.distance);
@@ -130,7 +130,7 @@ void write_sides(ByteWriter& out, const CompactModel& model) {
   out.count(model.arcs.size());
   for (const CompactArc& arc : model.arcs) {
     out.count(arc.node);
-    for (const int bone : arc.bones) out.count(bone);
+    for (const BoneIndex bone : arc.bones) out.count(bone);
     for (const int corner : arc.corners) out.count(corner + 1);
     out.byte(arc.step_count);
     out.byte(static_cast<int>(arc.steps.size()));
@@ -151,7 +151,7 @@ int read_index(ByteReader& in, std::size_t size) {
   return index;
 }
 
-void check_at(const CompactModel& model, int bone, int node) {
+void check_at(const CompactModel& model, BoneIndex bone, NodeIndex node) {
   const Bone& b = model.skeleton.bones[bone];
   if (b.head != node && b.tail != node) throw IoError(fmt::format("bone {} does not lie at node {}", bone, node));
 }
@@ -162,7 +162,7 @@ void read_seams(ByteReader& in, CompactModel& model) {
     corner.node = read_index(in, model.skeleton.nodes.size());
     corner.bones.resize(in.count(kMostListed));
     if (corner.bones.size() < 3) throw IoError("three or more bones meet at a corner");
-    for (int& bone : corner.bones) {
+    for (BoneIndex& bone : corner.bones) {
       bone = read_index(in, model.skeleton.bones.size());
       check_at(model, bone, corner.node);
     }
@@ -173,7 +173,7 @@ void read_seams(ByteReader& in, CompactModel& model) {
   model.arcs.resize(in.count(8 * kMostListed));
   for (CompactArc& arc : model.arcs) {
     arc.node = read_index(in, model.skeleton.nodes.size());
-    for (int& bone : arc.bones) {
+    for (BoneIndex& bone : arc.bones) {
       bone = read_index(in, model.skeleton.bones.size());
       check_at(model, bone, arc.node);
     }

@@ -48,16 +48,16 @@ struct CompactPatch {
 
 /// A point where three or more bones meet.
 struct CompactCorner {
-  int node = -1;
-  std::vector<int> bones;
+  NodeIndex node;
+  std::vector<BoneIndex> bones;
   int turn = 0;      ///< about bones[0], in 65536ths
   int distance = 0;  ///< in steps of the seams
 };
 
 /// The shared boundary of two patches, as a curve in the separation plane.
 struct CompactArc {
-  int node = -1;
-  std::array<int, 2> bones{-1, -1};
+  NodeIndex node;
+  std::array<BoneIndex, 2> bones{-1, -1};
   std::array<int, 2> corners{-1, -1};
   int step_count = 0;     ///< each step doubles the intervals: an open arc begins with 1, a closed one with 4
   std::vector<int> base;  ///< closed arcs: four points in the plane, two coordinates each, in steps

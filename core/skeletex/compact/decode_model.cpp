@@ -103,7 +103,7 @@ std::vector<double> row_table(const CompactPatch& patch, int rows) {
 }
 
 /// Texels of a patch's points.
-void store_texels(SkeletexModel& model, const SeparationPlanes& separation, int bone, const PatchGrid& grid) {
+void store_texels(SkeletexModel& model, const SeparationPlanes& separation, BoneIndex bone, const PatchGrid& grid) {
   const Patch& patch = model.patches[bone];
   const Rectangle& r = patch.rectangle;
   const Vec3 &head = end_position(model.skeleton, bone, BoneEnd::kHead),
@@ -195,7 +195,7 @@ SkeletexModel decode_model(const CompactModel& compact, int octaves) {
   store_seams(model, compact, separation, octaves == 0 ? seams : decode_seams(compact, separation, octaves));
   std::vector<PatchGrid> grids(compact.patches.size());
   for_each_block(grids.size(), 1, [&](std::size_t block, std::size_t, std::size_t) {
-    const int bone = static_cast<int>(block);
+    const BoneIndex bone = static_cast<int>(block);
     const CompactPatch& patch = compact.patches[bone];
     const std::array<bool, 2> has_pole{model.ends[bone][0].arcs.empty(), model.ends[bone][1].arcs.empty()};
     const EndRow row = [&](BoneEnd end, int columns) {
@@ -210,7 +210,7 @@ SkeletexModel decode_model(const CompactModel& compact, int octaves) {
   model.texture.height = height;
   for (std::vector<float>* plane : {&model.texture.along, &model.texture.around, &model.texture.out})
     plane->assign(static_cast<std::size_t>(width) * height, 0);
-  for (int bone = 0; bone < static_cast<int>(compact.patches.size()); ++bone) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(compact.patches.size()); ++bone) {
     const int free_ends =
         static_cast<int>(model.ends[bone][0].arcs.empty()) + static_cast<int>(model.ends[bone][1].arcs.empty());
     constexpr std::array kTopologies{SegmentTopology::kAnnulus, SegmentTopology::kDisk, SegmentTopology::kSphere};

@@ -40,7 +40,7 @@ void finish_values(const CompactLayer& layer, std::span<double> values) {
 }
 
 /// The planes of a layer, or of the weights, in one patch.
-void store_planes(const CompactModel& compact, const CompactLayer& layer, int first_plane, int bone,
+void store_planes(const CompactModel& compact, const CompactLayer& layer, int first_plane, BoneIndex bone,
                   const SkeletexModel& model, std::vector<std::vector<float>>& planes) {
   const Rectangle& r = model.patches[bone].rectangle;
   const CompactPatch& patch = compact.patches[bone];

@@ -7,7 +7,7 @@
 
 namespace skeletex {
 
-std::vector<BaseSite> base_sites(const CompactModel& model, const SeparationPlanes& separation, int bone,
+std::vector<BaseSite> base_sites(const CompactModel& model, const SeparationPlanes& separation, BoneIndex bone,
                                  const EndRow& end_row) {
   const CompactPatch& patch = model.patches[bone];
   const std::vector<Vec3> head = end_row(BoneEnd::kHead, patch.columns), tail = end_row(BoneEnd::kTail, patch.columns);
@@ -63,7 +63,7 @@ std::vector<Vec3> site_points(const CompactModel& model, const Refinement& refin
 
 }  // namespace
 
-PatchGrid decode_patch(const CompactModel& model, const SeparationPlanes& separation, int bone,
+PatchGrid decode_patch(const CompactModel& model, const SeparationPlanes& separation, BoneIndex bone,
                        const std::array<bool, 2>& has_pole, const EndRow& end_row, int step_count) {
   const CompactPatch& patch = model.patches[bone];
   PatchGrid grid = empty_grid(patch, has_pole, end_row);

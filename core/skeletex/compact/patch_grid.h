@@ -13,10 +13,10 @@ struct BaseSite {
   Vec3 predicted, out, around, along;
 };
 /// Row by row, from the two end rows.
-std::vector<BaseSite> base_sites(const CompactModel& model, const SeparationPlanes& separation, int bone,
+std::vector<BaseSite> base_sites(const CompactModel& model, const SeparationPlanes& separation, BoneIndex bone,
                                  const EndRow& end_row);
 /// Steps of the coarse grid's offsets: out, and around and along.
-inline std::array<double, 3> base_steps(const CompactModel& model, int bone) {
+inline std::array<double, 3> base_steps(const CompactModel& model, BoneIndex bone) {
   const double tangential = std::ldexp(model.step, model.patches[bone].base_exponent);
   return {0.6 * model.step, tangential, tangential};
 }
@@ -34,7 +34,7 @@ bool step_doubles_rows(const CompactPatch& patch, int step);
 
 /// The grid of a patch.
 /// \param step_count  steps to take; those that have no residuals are their predictions
-PatchGrid decode_patch(const CompactModel& model, const SeparationPlanes& separation, int bone,
+PatchGrid decode_patch(const CompactModel& model, const SeparationPlanes& separation, BoneIndex bone,
                        const std::array<bool, 2>& has_pole, const EndRow& end_row, int step_count);
 
 }  // namespace skeletex

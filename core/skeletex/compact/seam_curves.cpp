@@ -13,9 +13,9 @@
 
 namespace skeletex {
 
-ArcPlane arc_plane(const Skeleton& skeleton, const SeparationPlanes& separation, int node,
-                   const std::array<int, 2>& bones) {
-  const auto away = [&](int bone) { return direction_from(skeleton, {bone, end_at(skeleton, bone, node)}); };
+ArcPlane arc_plane(const Skeleton& skeleton, const SeparationPlanes& separation, NodeIndex node,
+                   const std::array<BoneIndex, 2>& bones) {
+  const auto away = [&](BoneIndex bone) { return direction_from(skeleton, {bone, end_at(skeleton, bone, node)}); };
   const Vec3 normal = (away(bones[0]) - away(bones[1])).normalized();
   const BoneBasis& basis = separation.bases()[bones[0]];
   const Vec3 s = basis.s - basis.s.dot(normal) * normal, b = basis.b - basis.b.dot(normal) * normal;
@@ -53,7 +53,7 @@ std::vector<Vec2> refined_curve(const std::vector<Vec2>& points, const std::vect
 }
 
 Vec3 corner_point(const CompactModel& model, const SeparationPlanes& separation, const CompactCorner& corner) {
-  const int bone = corner.bones[0];
+  const BoneIndex bone = corner.bones[0];
   return separation.seam_point(bone, end_at(model.skeleton, bone, corner.node), corner.turn / 65536.0,
                                corner.distance * seam_step(model.step));
 }
@@ -138,7 +138,7 @@ std::vector<std::array<PatchEnd, 2>> ends_of(const CompactModel& model) {
   for (std::size_t i = 0; i < model.arcs.size(); ++i) {
     const CompactArc& arc = model.arcs[i];
     for (const std::size_t side : {0u, 1u}) {
-      const auto end_of = [&](int bone) { return static_cast<int>(end_at(model.skeleton, bone, arc.node)); };
+      const auto end_of = [&](BoneIndex bone) { return static_cast<int>(end_at(model.skeleton, bone, arc.node)); };
       const int end = end_of(arc.bones[side]);
       // Angles about two bones run against each other when both begin, or both end, at the node.
       const bool is_reversed = side == 1 && end_of(arc.bones[0]) == end;
@@ -152,7 +152,7 @@ std::vector<std::array<PatchEnd, 2>> ends_of(const CompactModel& model) {
 }
 
 std::vector<Vec3> end_row(const CompactModel& model, const SeparationPlanes& separation,
-                          const std::vector<std::array<PatchEnd, 2>>& ends, const SeamCurves& seams, int bone,
+                          const std::vector<std::array<PatchEnd, 2>>& ends, const SeamCurves& seams, BoneIndex bone,
                           BoneEnd end, int columns) {
   const Vec3& node = end_position(model.skeleton, bone, end);
   const int side = static_cast<int>(end);

@@ -18,8 +18,8 @@ struct ArcPlane {
   Vec3 point(const Vec2& p) const { return node + p[0] * x + p[1] * y; }
   Vec2 coordinates(const Vec3& p) const { return {(p - node).dot(x), (p - node).dot(y)}; }
 };
-ArcPlane arc_plane(const Skeleton& skeleton, const SeparationPlanes& separation, int node,
-                   const std::array<int, 2>& bones);
+ArcPlane arc_plane(const Skeleton& skeleton, const SeparationPlanes& separation, NodeIndex node,
+                   const std::array<BoneIndex, 2>& bones);
 
 /// Step of seams and corners, from q.
 inline double seam_step(double q) { return q; }
@@ -51,7 +51,7 @@ std::vector<std::array<PatchEnd, 2>> ends_of(const CompactModel& model);
 
 /// The points of an end's first or last row.
 std::vector<Vec3> end_row(const CompactModel& model, const SeparationPlanes& separation,
-                          const std::vector<std::array<PatchEnd, 2>>& ends, const SeamCurves& seams, int bone,
+                          const std::vector<std::array<PatchEnd, 2>>& ends, const SeamCurves& seams, BoneIndex bone,
                           BoneEnd end, int columns);
 
 }  // namespace skeletex

@@ -203,7 +203,7 @@ std::vector<std::array<std::vector<Vec3>, 2>> find_end_points(const SkeletexMode
                                                               const SeparationPlanes& separation,
                                                               const MappedSurface& surface) {
   std::vector<std::array<std::vector<Vec3>, 2>> end_points(model.patches.size());
-  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
       const Chart& chart = surface.charts[bone];
       auto& points = end_points[bone][static_cast<int>(end)];

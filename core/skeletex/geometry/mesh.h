@@ -5,9 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "skeletex/geometry/index.h"
+
 namespace skeletex {
 
 using Vec3 = Eigen::Vector3d;
+/// Its vertices: plain numbers, as buffers of devices hold them.
 using Triangle = std::array<int, 3>;
 
 /// An indexed triangle mesh. Triangles are counter-clockwise seen from outside.

@@ -17,7 +17,7 @@ namespace {
 
 using Corners = std::array<Vec3, 3>;
 
-Corners corners_of(const TriangleMesh& mesh, int triangle) {
+Corners corners_of(const TriangleMesh& mesh, TriangleIndex triangle) {
   const Triangle& t = mesh.triangles[triangle];
   return {mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]};
 }
@@ -193,7 +193,7 @@ struct VertexCorners {
 VertexCorners list_vertex_corners(const TriangleMesh& mesh) {
   VertexCorners list{std::vector<int>(mesh.positions.size() + 1, 0), std::vector<int>(3 * mesh.triangles.size())};
   for (const Triangle& t : mesh.triangles)
-    for (const int vertex : t) ++list.begin[vertex + 1];
+    for (const VertexIndex vertex : t) ++list.begin[vertex + 1];
   std::partial_sum(list.begin.begin(), list.begin.end(), list.begin.begin());
   std::vector<int> next(list.begin.begin(), list.begin.end() - 1);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
@@ -204,7 +204,7 @@ VertexCorners list_vertex_corners(const TriangleMesh& mesh) {
 constexpr int kMostCorners = 24;  // of a vertex that is looked at
 
 /// Whether the triangles at a vertex go once around it, all facing one way.
-bool is_plain_vertex(const TriangleMesh& mesh, int vertex, std::span<const int> corners) {
+bool is_plain_vertex(const TriangleMesh& mesh, VertexIndex vertex, std::span<const int> corners) {
   constexpr double kLeastCosine = 0.1;
   const int n = static_cast<int>(corners.size());
   if (n < 3 || n > kMostCorners) return false;
@@ -288,7 +288,7 @@ struct PairSearch {
   std::vector<char> is_plain;    // per vertex; empty: not known
   std::vector<char> is_queried;  // per triangle; empty: all are
 
-  bool is_in_query(int triangle) const { return is_queried.empty() || is_queried[triangle] != 0; }
+  bool is_in_query(TriangleIndex triangle) const { return is_queried.empty() || is_queried[triangle] != 0; }
 
   bool do_share_plain_vertex(const Triangle& a, const Triangle& b) const {
     if (is_plain.empty()) return false;
@@ -421,7 +421,7 @@ std::vector<std::array<int, 2>> find_self_intersections(const TriangleMesh& mesh
                                                         std::span<const int> query) {
   if (query.empty()) return {};
   std::vector<char> is_queried(mesh.triangles.size(), 0);
-  for (const int triangle : query) is_queried[triangle] = 1;
+  for (const TriangleIndex triangle : query) is_queried[triangle] = 1;
   return PairSearch{mesh, tree, {}, std::move(is_queried)}.find();
 }
 

@@ -41,7 +41,7 @@ Box box_of_block(const TriangleMesh& mesh, std::size_t block, const TriangleTree
   Box around = kNoBox;
   const std::size_t end = std::min((block + 1) * kWidth, tree.order.size());
   for (std::size_t place = block * kWidth; place < end; ++place)
-    for (const int vertex : mesh.triangles[tree.order[place]]) {
+    for (const VertexIndex vertex : mesh.triangles[tree.order[place]]) {
       const Eigen::Vector3f& p = tree.points[vertex];
       around = joined(around, {p[0] - kMargin, p[1] - kMargin, p[2] - kMargin,  //
                                p[0] + kMargin, p[1] + kMargin, p[2] + kMargin});
@@ -134,7 +134,7 @@ void update_triangle_tree(const TriangleMesh& mesh, std::span<const int> places,
   std::vector<std::size_t> nodes;
   for (const int place : places) {
     nodes.push_back(static_cast<std::size_t>(place) / kWidth);
-    for (const int vertex : mesh.triangles[tree.order[place]])
+    for (const VertexIndex vertex : mesh.triangles[tree.order[place]])
       tree.points[vertex] = point_of(tree, mesh.positions[vertex]);
   }
   for (int level = 0; level < tree.top_level(); ++level) {
@@ -177,7 +177,7 @@ void open_children(const TriangleTree& tree, const OpenNode& node, const Eigen::
 }  // namespace
 
 NearestTriangle find_nearest_triangle(const TriangleMesh& mesh, const TriangleTree& tree, const Vec3& point,
-                                      double bound, const std::function<bool(int triangle)>& counts) {
+                                      double bound, const std::function<bool(TriangleIndex triangle)>& counts) {
   constexpr double kRounding = 1e-6;  // of the tree's units: more than what rounding to float32 moves a point or box
   const Eigen::Vector3f place = point_of(tree, point);
   NearestTriangle nearest{-1, bound};
@@ -208,7 +208,7 @@ NearestTriangle find_nearest_triangle(const TriangleMesh& mesh, const TriangleTr
 }
 
 void for_each_triangle_near(const TriangleTree& tree, const Vec3& lower, const Vec3& upper,
-                            const std::function<void(int triangle)>& visit) {
+                            const std::function<void(TriangleIndex triangle)>& visit) {
   constexpr double kRounding = 1e-6;  // of the tree's units, as above
   const Eigen::Vector3f least = ((lower - tree.origin) / tree.scale - Vec3::Constant(kRounding)).cast<float>(),
                         greatest = ((upper - tree.origin) / tree.scale + Vec3::Constant(kRounding)).cast<float>();

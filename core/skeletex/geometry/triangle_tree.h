@@ -42,7 +42,7 @@ std::vector<float> triangles_of_blocks(const TriangleMesh& mesh, const TriangleT
 void update_triangle_tree(const TriangleMesh& mesh, std::span<const int> places, TriangleTree& tree);
 
 struct NearestTriangle {
-  int triangle = -1;  ///< none where nothing is nearer than the bound
+  TriangleIndex triangle;  ///< none where nothing is nearer than the bound
   double distance = std::numeric_limits<double>::infinity();
 };
 /// The triangle nearest to a point, on the host and in double precision; of few points, else see NearestSearch.
@@ -51,12 +51,12 @@ struct NearestTriangle {
 /// \param counts when given, triangles for which it is false are left out
 NearestTriangle find_nearest_triangle(const TriangleMesh& mesh, const TriangleTree& tree, const Vec3& point,
                                       double bound = std::numeric_limits<double>::infinity(),
-                                      const std::function<bool(int triangle)>& counts = nullptr);
+                                      const std::function<bool(TriangleIndex triangle)>& counts = nullptr);
 
 /// Calls visit with every triangle whose box meets a box, and with some others near by.
 /// \param lower, upper  of the box, in the mesh's coordinates; may be infinite
 void for_each_triangle_near(const TriangleTree& tree, const Vec3& lower, const Vec3& upper,
-                            const std::function<void(int triangle)>& visit);
+                            const std::function<void(TriangleIndex triangle)>& visit);
 
 /// Where a ray first meets the mesh, in single precision: origin + share * direction. Triangles count from both sides.
 /// \param limit    hits at larger shares are left out

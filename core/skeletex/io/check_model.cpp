@@ -52,7 +52,7 @@ class ModelCheck {
   int node_of(std::size_t bone, std::size_t end) const {
     return end == 0 ? m_.skeleton.bones[bone].head : m_.skeleton.bones[bone].tail;
   }
-  bool is_at(int bone, int node) const {
+  bool is_at(BoneIndex bone, NodeIndex node) const {
     return m_.skeleton.bones[bone].head == node || m_.skeleton.bones[bone].tail == node;
   }
   bool is_index(int index, const auto& list) const { return index >= 0 && index < static_cast<int>(list.size()); }
@@ -126,11 +126,11 @@ class ModelCheck {
     for (std::size_t i = 0; i < m_.corners.size(); ++i) {
       const SeamCorner& corner = m_.corners[i];
       require(is_index(corner.node, m_.skeleton.nodes), entry("corners", i), "its node must exist");
-      std::vector<int> bones = corner.bones;
+      std::vector<BoneIndex> bones = corner.bones;
       std::sort(bones.begin(), bones.end());
       require(bones.size() >= 3 && std::adjacent_find(bones.begin(), bones.end()) == bones.end(), entry("corners", i),
               "three or more bones meet at a corner");
-      for (const int bone : bones)
+      for (const BoneIndex bone : bones)
         require(is_index(bone, m_.skeleton.bones) && is_at(bone, corner.node), entry("corners", i),
                 "its bones must lie at its node");
       require(is_sample(corner.sample), entry("corners", i),
@@ -143,7 +143,7 @@ class ModelCheck {
       const SeamArc& arc = m_.arcs[i];
       require(is_index(arc.node, m_.skeleton.nodes), entry("arcs", i), "its node must exist");
       require(arc.bones[0] != arc.bones[1], entry("arcs", i), "lies between two bones");
-      for (const int bone : arc.bones)
+      for (const BoneIndex bone : arc.bones)
         require(is_index(bone, m_.skeleton.bones) && is_at(bone, arc.node), entry("arcs", i),
                 "its bones must lie at its node");
       require((arc.corners[0] < 0) == (arc.corners[1] < 0), entry("arcs", i), "has two corners or none");
@@ -151,7 +151,7 @@ class ModelCheck {
         if (arc.is_closed()) continue;
         require(is_index(corner, m_.corners) && m_.corners[corner].node == arc.node, entry("arcs", i),
                 "its corners must exist and lie at its node");
-        for (const int bone : arc.bones) {
+        for (const BoneIndex bone : arc.bones) {
           const auto& bones = m_.corners[corner].bones;
           require(std::find(bones.begin(), bones.end(), bone) != bones.end(), entry("arcs", i),
                   "its bones must meet at its corners");
@@ -168,7 +168,8 @@ class ModelCheck {
   void check_end(std::size_t bone, std::size_t end, std::vector<std::array<int, 2>>& uses) const {
     const std::string here = fmt::format("patches[{}], ends.{}", bone, end == 0 ? "head" : "tail");
     const std::vector<ArcUse>& loop = m_.ends[bone][end].arcs;
-    const int node = node_of(bone, end), own = static_cast<int>(bone);
+    const NodeIndex node = node_of(bone, end);
+    const BoneIndex own = static_cast<int>(bone);
     require(loop.empty() == (bones_at_[node] == 1), here,
             "arcs run along an end that has neighbours, and none along a free one");
     for (std::size_t k = 0; k < loop.size(); ++k) {

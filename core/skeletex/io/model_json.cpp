@@ -136,7 +136,8 @@ UnitFrame frame_from(const Entry& header) {
 SeamCorner corner_from(const Entry& entry, const Skeleton& skeleton) {
   SeamCorner corner;
   corner.node = entry.member("node").index_into(skeleton.nodes.size());
-  corner.bones = entry.member("bones").indices_into(skeleton.bones.size());
+  const std::vector<int> bones = entry.member("bones").indices_into(skeleton.bones.size());
+  corner.bones.assign(bones.begin(), bones.end());
   const std::vector<double> sample = entry.member("sample").numbers();
   if (sample.size() != 2) entry.member("sample").fail("[turn, distance] is expected");
   corner.sample = {sample[0], sample[1]};
@@ -146,7 +147,8 @@ SeamCorner corner_from(const Entry& entry, const Skeleton& skeleton) {
 SeamArc arc_from(const Entry& entry, const SkeletexModel& model) {
   SeamArc arc;
   arc.node = entry.member("node").index_into(model.skeleton.nodes.size());
-  arc.bones = entry.member("bones").pair_into(model.skeleton.bones.size());
+  const std::array<int, 2> bones = entry.member("bones").pair_into(model.skeleton.bones.size());
+  arc.bones = {bones[0], bones[1]};
   if (entry.has("corners")) arc.corners = entry.member("corners").pair_into(model.corners.size());
   const std::vector<double> samples = entry.member("samples").numbers();
   if (samples.size() % 2 != 0) entry.member("samples").fail("pairs of turn and distance are expected");

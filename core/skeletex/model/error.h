@@ -4,6 +4,8 @@
 #include <string>
 #include <string_view>
 
+#include "skeletex/geometry/index.h"
+
 namespace skeletex {
 
 /// Base of everything the library throws. The message says what is wrong, where, and what to do about it.
@@ -27,12 +29,14 @@ class TopologyError : public Error {
   using Error::Error;
   /// \param bone  of the skeleton, where one stands in the way; -1: none
   /// \param node  the one to move; -1: none
-  TopologyError(const std::string& message, int bone, int node) : Error(message), bone_(bone), node_(node) {}
-  int bone() const { return bone_; }
-  int node() const { return node_; }
+  TopologyError(const std::string& message, BoneIndex bone, NodeIndex node)
+      : Error(message), bone_(bone), node_(node) {}
+  BoneIndex bone() const { return bone_; }
+  NodeIndex node() const { return node_; }
 
  private:
-  int bone_ = -1, node_ = -1;
+  BoneIndex bone_;
+  NodeIndex node_;
 };
 /// An OpenCL call failed.
 class DeviceError : public Error {

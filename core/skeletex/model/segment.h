@@ -14,8 +14,8 @@ enum class SegmentTopology { kAnnulus, kDisk, kSphere };
 /// A piece of the separation plane between two bones at one node: a polyline on the surface, shared by exactly two
 /// segments.
 struct Arc {
-  int node = -1;
-  std::array<int, 2> bones{-1, -1};
+  NodeIndex node;
+  std::array<BoneIndex, 2> bones{-1, -1};
   /// Vertices of the cut mesh in the direction of growing v about bones[0]. An open arc holds both corners, first and
   /// last; a closed one (two bones at the node, no corner) does not repeat its first vertex. Every open arc has at
   /// least one inner vertex; every closed one at least three vertices.
@@ -25,7 +25,7 @@ struct Arc {
 
 /// An arc as one segment runs through it.
 struct ArcUse {
-  int arc = -1;
+  ArcIndex arc;
   bool is_reversed = false;  ///< the segment's v grows against the arc's order
 };
 
@@ -37,7 +37,7 @@ struct BoundaryLoop {
 
 /// The surface of one bone.
 struct Segment {
-  int bone = -1;
+  BoneIndex bone;
   SegmentTopology topology = SegmentTopology::kAnnulus;
   TriangleMesh mesh;                  ///< local vertices and triangles, outward
   std::vector<int> source_vertices;   ///< local vertex -> vertex of the cut mesh

@@ -36,15 +36,15 @@ struct SeamSample {
 
 /// A point where three or more segments meet.
 struct SeamCorner {
-  int node = -1;
-  std::vector<int> bones;  ///< the bones that meet; the sample's angle is about bones[0]
+  NodeIndex node;
+  std::vector<BoneIndex> bones;  ///< the bones that meet; the sample's angle is about bones[0]
   SeamSample sample;
 };
 
 /// The shared boundary of two segments, stored once for both.
 struct SeamArc {
-  int node = -1;
-  std::array<int, 2> bones{-1, -1};
+  NodeIndex node;
+  std::array<BoneIndex, 2> bones{-1, -1};
   std::array<int, 2> corners{-1, -1};  ///< first and last corner; -1, -1 when closed
   std::vector<SeamSample> samples;     ///< in the direction of growing v about bones[0]; without the corners
   bool is_closed() const { return corners[0] < 0; }

@@ -81,7 +81,7 @@ Json skeleton_json(std::span<const PageKey> keys, const PageOptions& options) {
   if (options.second) {
     json["second"] = Json::array();
     const Skeleton other = in_frame(options.second->model.skeleton, skeleton.frame);
-    for (const int node : options.second->correspondence.nodes) {
+    for (const NodeIndex node : options.second->correspondence.nodes) {
       second.push_back(other.nodes[node].position);
       json["second"].push_back(to_json(second.back()));
     }
@@ -132,7 +132,7 @@ Json transfer_json(ClContext& context, PageArrays& arrays, const SkeletexModel& 
                    const Correspondence& correspondence) {
   SkeletexModel all = target;
   Json refused = Json::array();
-  for (int bone = 0; bone < static_cast<int>(target.patches.size()); ++bone) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(target.patches.size()); ++bone) {
     try {
       const SkeletexModel one =
           transfer(context, source, target,

@@ -33,7 +33,7 @@ struct Strips {
 
 /// Adds the strip at an end of a patch. Each triangle shares an edge with the one before, so that one bit says whether
 /// its third corner is the next vertex of the seam or of the row.
-void append_strip(const PreparedModel& prepared, std::span<const Vec3> positions, int bone, BoneEnd end,
+void append_strip(const PreparedModel& prepared, std::span<const Vec3> positions, BoneIndex bone, BoneEnd end,
                   Strips& strips) {
   const Lattice& lattice = prepared.lattice;
   const int width = prepared.model.patches[bone].rectangle.width;
@@ -60,7 +60,7 @@ void append_strip(const PreparedModel& prepared, std::span<const Vec3> positions
 
 Strips strips_of(const PreparedModel& prepared, std::span<const Vec3> positions) {
   Strips strips;
-  for (int bone = 0; bone < static_cast<int>(prepared.model.patches.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(prepared.model.patches.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) append_strip(prepared, positions, bone, end, strips);
   return strips;
 }
@@ -155,7 +155,7 @@ Json add_blend(PageArrays& arrays, const Morph& morph, std::span<const PageKey> 
   Json sources = Json::array();
   for (std::size_t i = 0; i < first.sources.size(); ++i) {
     const bool is_second = i >= bones;
-    const int bone = static_cast<int>(i % bones);
+    const BoneIndex bone = static_cast<int>(i % bones);
     const Rectangle& rectangle =
         morph.models()[is_second ? 1 : 0].patches[morph.correspondence(0, is_second ? 1 : 0).bones[bone]].rectangle;
     sources.push_back({rectangle.x, rectangle.y, rectangle.width, rectangle.height, first.sources[i].sign});

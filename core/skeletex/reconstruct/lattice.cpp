@@ -10,12 +10,12 @@
 namespace skeletex {
 namespace {
 
-[[noreturn]] void refuse(const SkeletexModel& model, int bone, int end, const std::string& what) {
+[[noreturn]] void refuse(const SkeletexModel& model, BoneIndex bone, int end, const std::string& what) {
   throw InputError(fmt::format("the model does not fit together at the {} of bone \"{}\": {}; encode it again",
                                end == 0 ? "head" : "tail", model.skeleton.bones[bone].name, what));
 }
 
-void check_end(const SkeletexModel& model, int bone, int end, const std::vector<int>& loop) {
+void check_end(const SkeletexModel& model, BoneIndex bone, int end, const std::vector<int>& loop) {
   const std::vector<ArcUse>& uses = model.ends[bone][end].arcs;
   for (std::size_t i = 0; i < uses.size(); ++i) {
     const SeamArc& arc = model.arcs[uses[i].arc];
@@ -42,7 +42,7 @@ std::vector<LatticeRow> lattice_rows(const std::vector<Patch>& patches, RowChoic
   const int margin = choice == RowChoice::kInner ? 1 : 0;
   std::vector<LatticeRow> rows;
   int vertex = 0, quad = 0;
-  for (int bone = 0; bone < static_cast<int>(patches.size()); ++bone) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(patches.size()); ++bone) {
     const Rectangle& rectangle = patches[bone].rectangle;
     for (int row = margin; row < rectangle.height - margin; ++row) {
       rows.push_back({bone, row, vertex, quad});
@@ -65,7 +65,7 @@ Lattice number_lattice(const SkeletexModel& model) {
   lattice.first_inner.resize(count);
   lattice.first_quad.resize(count);
   lattice.poles.assign(count, {-1, -1});
-  for (int bone = 0; bone < count; ++bone) {
+  for (BoneIndex bone = 0; bone < count; ++bone) {
     const auto [x, y, width, height] = model.patches[bone].rectangle;
     if (width < 4 || height < 4)
       throw InputError(fmt::format("bone \"{}\" has a rectangle of {} x {} texels; 4 x 4 is the least",
@@ -76,7 +76,7 @@ Lattice number_lattice(const SkeletexModel& model) {
     lattice.quad_count += width * (height - 3);
   }
   int next = lattice.inner_count;
-  for (int bone = 0; bone < count; ++bone)
+  for (BoneIndex bone = 0; bone < count; ++bone)
     for (int end = 0; end < 2; ++end)
       if (model.ends[bone][end].arcs.empty()) lattice.poles[bone][end] = next++;
   for (const SeamArc& arc : model.arcs) {
@@ -87,7 +87,7 @@ Lattice number_lattice(const SkeletexModel& model) {
   lattice.vertex_count = next + static_cast<int>(model.corners.size());
 
   lattice.triangle_count = 2 * lattice.quad_count;
-  for (int bone = 0; bone < count; ++bone)
+  for (BoneIndex bone = 0; bone < count; ++bone)
     for (int end = 0; end < 2; ++end) {
       lattice.triangle_count += model.patches[bone].rectangle.width;
       if (lattice.poles[bone][end] >= 0) continue;
@@ -98,7 +98,7 @@ Lattice number_lattice(const SkeletexModel& model) {
   return lattice;
 }
 
-std::vector<int> end_loop(const SkeletexModel& model, const Lattice& lattice, int bone, BoneEnd end) {
+std::vector<int> end_loop(const SkeletexModel& model, const Lattice& lattice, BoneIndex bone, BoneEnd end) {
   std::vector<int> loop;
   for (const ArcUse use : model.ends[bone][static_cast<int>(end)].arcs) {
     const SeamArc& arc = model.arcs[use.arc];
@@ -110,7 +110,7 @@ std::vector<int> end_loop(const SkeletexModel& model, const Lattice& lattice, in
   return loop;
 }
 
-std::vector<int> end_row(const SkeletexModel& model, const Lattice& lattice, int bone, BoneEnd end) {
+std::vector<int> end_row(const SkeletexModel& model, const Lattice& lattice, BoneIndex bone, BoneEnd end) {
   const Rectangle& rectangle = model.patches[bone].rectangle;
   const int first = lattice.first_inner[bone] + (end == BoneEnd::kHead ? 0 : (rectangle.height - 3) * rectangle.width);
   std::vector<int> row(rectangle.width);
@@ -128,7 +128,7 @@ void append_pole_fan(std::span<const int> row, int pole, BoneEnd end, std::vecto
   }
 }
 
-void append_pole_fan(const SkeletexModel& model, const Lattice& lattice, int bone, BoneEnd end,
+void append_pole_fan(const SkeletexModel& model, const Lattice& lattice, BoneIndex bone, BoneEnd end,
                      std::vector<Triangle>& triangles) {
   append_pole_fan(end_row(model, lattice, bone, end), lattice.poles[bone][static_cast<int>(end)], end, triangles);
 }

@@ -39,13 +39,13 @@ Lattice number_lattice(const SkeletexModel& model);
 
 /// Vertices of a seam once around a patch's end, in the direction of growing v: arcs with the corners between them.
 /// \pre the end has arcs
-std::vector<int> end_loop(const SkeletexModel& model, const Lattice& lattice, int bone, BoneEnd end);
+std::vector<int> end_loop(const SkeletexModel& model, const Lattice& lattice, BoneIndex bone, BoneEnd end);
 /// Vertices of the inner row next to an end, by column.
-std::vector<int> end_row(const SkeletexModel& model, const Lattice& lattice, int bone, BoneEnd end);
+std::vector<int> end_row(const SkeletexModel& model, const Lattice& lattice, BoneIndex bone, BoneEnd end);
 /// The triangles between a pole and the inner row next to it, outward, of any numbering.
 void append_pole_fan(std::span<const int> row, int pole, BoneEnd end, std::vector<Triangle>& triangles);
 /// Those of a lattice.
-void append_pole_fan(const SkeletexModel& model, const Lattice& lattice, int bone, BoneEnd end,
+void append_pole_fan(const SkeletexModel& model, const Lattice& lattice, BoneIndex bone, BoneEnd end,
                      std::vector<Triangle>& triangles);
 
 }  // namespace skeletex

@@ -55,7 +55,7 @@ std::vector<Vec3> skin_linearly(std::span<const Vec3> positions, const VertexInf
       for (int i = 0; i < 4; ++i) {
         const float weight = influences.weights[v][i];
         if (weight == 0) continue;
-        const int bone = influences.bones[v][i];
+        const BoneIndex bone = influences.bones[v][i];
         const BoneMotion& motion = motions[bone];
         sum += weight * (matrices[bone] * (positions[v] - motion.bind_head) + motion.rotation * motion.bind_head +
                          motion.translation);

@@ -24,8 +24,8 @@ std::vector<float> steps_of_vertices(const TriangleMesh& mesh, const SurfaceEdge
                                      const std::vector<int>& folds) {
   std::vector<float> steps(mesh.positions.size(), 0.f);
   for (const int fold : folds)
-    for (const int triangle : edges.triangles[fold])
-      for (const int vertex : mesh.triangles[triangle]) steps[vertex] = kStep;
+    for (const TriangleIndex triangle : edges.triangles[fold])
+      for (const VertexIndex vertex : mesh.triangles[triangle]) steps[vertex] = kStep;
   for (const auto& [a, b] : edges.vertices) {
     if (steps[a] == kStep && steps[b] == 0) steps[b] = kRingStep;
     if (steps[b] == kStep && steps[a] == 0) steps[a] = kRingStep;
@@ -73,8 +73,8 @@ std::vector<int> new_intersections(const std::vector<Triangle>& triangles, const
   for (const auto& pair : find_self_intersections({positions, triangles})) {
     if (std::binary_search(known.begin(), known.end(), pair)) continue;
     std::set<int> parts;
-    for (const int triangle : pair)
-      for (const int vertex : triangles[triangle])
+    for (const TriangleIndex triangle : pair)
+      for (const VertexIndex vertex : triangles[triangle])
         if (part[vertex] >= 0) parts.insert(part[vertex]);
     for (const int i : parts) ++counts[i];
   }

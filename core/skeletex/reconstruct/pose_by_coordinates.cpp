@@ -16,7 +16,7 @@ namespace {
 constexpr double kTwoPi = 2 * std::numbers::pi;
 
 /// The arcs around a bone's end by growing bind angle in [0, 2 pi): the one that runs across angle 0 comes as two.
-std::vector<PosedArcRecord> arc_records(const PosedPlanes& posed, int bone, BoneEnd end) {
+std::vector<PosedArcRecord> arc_records(const PosedPlanes& posed, BoneIndex bone, BoneEnd end) {
   const std::vector<PosedBound> bounds = posed.bounds(bone, end);
   if (bounds.empty()) return {PosedArcRecord{}};
   std::vector<PosedArcRecord> records;
@@ -41,7 +41,7 @@ struct EndTables {
 
 EndTables end_tables(const SkeletexModel& model, const PosedPlanes& posed) {
   EndTables tables;
-  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
     PosedEndsRecord record{};
     for (const int end : {0, 1}) {
       const std::vector<PosedArcRecord> arcs = arc_records(posed, bone, static_cast<BoneEnd>(end));
@@ -66,7 +66,7 @@ ClLocal loops_of_block() { return ClLocal{6 * SKIN_BLOCK * sizeof(float)}; }
 
 }  // namespace
 
-BoneCoordinates bone_coordinates(const Skeleton& skeleton, const SeparationPlanes& separation, int bone,
+BoneCoordinates bone_coordinates(const Skeleton& skeleton, const SeparationPlanes& separation, BoneIndex bone,
                                  const Vec3& point) {
   const Vec3 offset = point - end_position(skeleton, bone, BoneEnd::kHead);
   const bool is_head_free = separation.is_free(bone, BoneEnd::kHead),
@@ -85,7 +85,7 @@ BoneCoordinates bone_coordinates(const Skeleton& skeleton, const SeparationPlane
   return {u_of(at, is_head_free, is_tail_free), turn};
 }
 
-Vec3 posed_by_coordinates(const PreparedModel& prepared, const PosedPlanes& posed, int bone, const Vec3& point,
+Vec3 posed_by_coordinates(const PreparedModel& prepared, const PosedPlanes& posed, BoneIndex bone, const Vec3& point,
                           DistanceRule rule) {
   const SkeletexModel& model = prepared.model;
   const SeparationPlanes& bind = prepared.separation;
@@ -125,7 +125,7 @@ void place_shared_by_coordinates(const PreparedModel& model, const PosedPlanes& 
   place_shared_vertices(model, posed, rule, positions);
   std::vector<Vec3> bind_positions(positions.size());
   place_shared_vertices(model, bind_positions);
-  for_each_pole(model.model, model.lattice, [&](int vertex, int bone, int, std::size_t) {
+  for_each_pole(model.model, model.lattice, [&](VertexIndex vertex, BoneIndex bone, int, std::size_t) {
     positions[vertex] = posed_by_coordinates(model, posed, bone, bind_positions[vertex], rule);
   });
 }

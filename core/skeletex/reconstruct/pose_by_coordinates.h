@@ -25,11 +25,11 @@ struct BoneCoordinates {
 /// axial parameter is a / (a + b). A point beyond one plane takes that end's axial parameter. Where the planes have
 /// crossed, a point may be beyond both; its axial parameter is b / (a + b), which grows with x as well.
 /// \param skeleton, separation, point  of the bind pose; world
-BoneCoordinates bone_coordinates(const Skeleton& skeleton, const SeparationPlanes& separation, int bone,
+BoneCoordinates bone_coordinates(const Skeleton& skeleton, const SeparationPlanes& separation, BoneIndex bone,
                                  const Vec3& point);
 
 /// A bind point of a bone in a pose, world: posed_point of its SPD texel.
-Vec3 posed_by_coordinates(const PreparedModel& model, const PosedPlanes& posed, int bone, const Vec3& point,
+Vec3 posed_by_coordinates(const PreparedModel& model, const PosedPlanes& posed, BoneIndex bone, const Vec3& point,
                           DistanceRule rule);
 
 /// The coordinates of a model's inner vertices (lattice.h) on the device, made once. Any pose of them is one pass.

@@ -57,7 +57,7 @@ void place_shared_vertices(const PreparedModel& prepared, const PosedPlanes& pos
                            std::vector<Vec3>& positions) {
   const SkeletexModel& model = prepared.model;
   const DisplacementTexture& texture = model.texture;
-  for_each_pole(model, prepared.lattice, [&](int vertex, int bone, int end, std::size_t texel) {
+  for_each_pole(model, prepared.lattice, [&](VertexIndex vertex, BoneIndex bone, int end, std::size_t texel) {
     positions[vertex] = posed_point(model, prepared.separation, posed, bone, end, 0,
                                     Vec3(texture.along[texel], texture.around[texel], texture.out[texel]), rule);
   });
@@ -164,7 +164,7 @@ TriangleMesh constant_offset_mesh(ClContext& context, const PreparedModel& prepa
     firsts[i + 1] = firsts[i] + model.patches[i].rectangle.width * model.patches[i].rectangle.height;
   std::iota(all.begin(), all.end(), 0);
   TriangleMesh mesh;
-  for (const int bone : bones.empty() ? std::span<const int>(all) : bones) {
+  for (const BoneIndex bone : bones.empty() ? std::span<const int>(all) : bones) {
     const auto [x, y, width, height] = model.patches[bone].rectangle;
     const int base = static_cast<int>(mesh.positions.size());
     mesh.positions.insert(mesh.positions.end(), positions.begin() + firsts[bone], positions.begin() + firsts[bone + 1]);

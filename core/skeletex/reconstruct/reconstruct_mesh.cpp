@@ -15,7 +15,7 @@
 namespace skeletex {
 namespace {
 
-Vec3 sample_point(const Skeleton& skeleton, const SeparationPlanes& separation, int node, int bone,
+Vec3 sample_point(const Skeleton& skeleton, const SeparationPlanes& separation, NodeIndex node, BoneIndex bone,
                   const SeamSample& sample) {
   return separation.seam_point(bone, end_at(skeleton, bone, node), sample.turn, sample.distance);
 }
@@ -34,8 +34,8 @@ void place_seams(const SkeletexModel& model, const SeparationPlanes& separation,
 }
 
 void for_each_pole(const SkeletexModel& model, const Lattice& lattice,
-                   const std::function<void(int vertex, int bone, int end, std::size_t texel)>& place) {
-  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
+                   const std::function<void(VertexIndex vertex, BoneIndex bone, int end, std::size_t texel)>& place) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
     for (int end = 0; end < 2; ++end) {
       if (lattice.poles[bone][end] < 0) continue;
       const Rectangle& r = model.patches[bone].rectangle;
@@ -47,7 +47,7 @@ void for_each_pole(const SkeletexModel& model, const Lattice& lattice,
 void place_shared_vertices(const PreparedModel& prepared, std::vector<Vec3>& positions) {
   const SkeletexModel& model = prepared.model;
   const DisplacementTexture& texture = model.texture;
-  for_each_pole(model, prepared.lattice, [&](int vertex, int bone, int end, std::size_t texel) {
+  for_each_pole(model, prepared.lattice, [&](VertexIndex vertex, BoneIndex bone, int end, std::size_t texel) {
     positions[vertex] = decode_texel(tangent_frame(model.skeleton, prepared.separation, bone, end, 0),
                                      Vec3(texture.along[texel], texture.around[texel], texture.out[texel]),
                                      end_position(model.skeleton, bone, BoneEnd::kHead),
@@ -57,12 +57,12 @@ void place_shared_vertices(const PreparedModel& prepared, std::vector<Vec3>& pos
 }
 
 EndSeam end_seam(const SkeletexModel& model, const SeparationPlanes& separation, const Lattice& lattice,
-                 std::span<const Vec3> positions, int bone, BoneEnd end) {
+                 std::span<const Vec3> positions, BoneIndex bone, BoneEnd end) {
   EndSeam seam;
   if (lattice.poles[bone][static_cast<int>(end)] >= 0) return seam;
   seam.ring.vertices = end_loop(model, lattice, bone, end);
   std::vector<Vec3> points;
-  for (const int vertex : seam.ring.vertices) {
+  for (const VertexIndex vertex : seam.ring.vertices) {
     points.push_back(positions[vertex]);
     seam.ring.turns.push_back(separation.turn_of(bone, points.back() - end_position(model.skeleton, bone, end)));
   }
@@ -94,7 +94,7 @@ std::vector<Triangle> triangulate(ClContext& context, const PreparedModel& prepa
 }  // namespace
 
 void append_end_triangles(const SkeletexModel& model, const Lattice& lattice, std::span<const Vec3> positions,
-                          const EndSeam& seam, int bone, BoneEnd end, std::vector<Triangle>& triangles) {
+                          const EndSeam& seam, BoneIndex bone, BoneEnd end, std::vector<Triangle>& triangles) {
   if (seam.ring.vertices.empty()) {
     append_pole_fan(model, lattice, bone, end, triangles);
     return;
@@ -111,7 +111,7 @@ std::vector<Vec3> lattice_positions(ClContext& context, const PreparedModel& mod
 
 std::vector<Triangle> end_triangles(const PreparedModel& model, const std::vector<Vec3>& positions) {
   std::vector<Triangle> triangles;
-  for (int bone = 0; bone < static_cast<int>(model.model.patches.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(model.model.patches.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
       append_end_triangles(model.model, model.lattice, positions,
                            end_seam(model.model, model.separation, model.lattice, positions, bone, end), bone, end,

@@ -42,10 +42,10 @@ struct EndSeam {
   std::vector<double> turns;
 };
 EndSeam end_seam(const SkeletexModel& model, const SeparationPlanes& separation, const Lattice& lattice,
-                 std::span<const Vec3> positions, int bone, BoneEnd end);
+                 std::span<const Vec3> positions, BoneIndex bone, BoneEnd end);
 /// Appends the triangles between an end and the inner row next to it: a fan at a pole, else a strip.
 void append_end_triangles(const SkeletexModel& model, const Lattice& lattice, std::span<const Vec3> positions,
-                          const EndSeam& seam, int bone, BoneEnd end, std::vector<Triangle>& triangles);
+                          const EndSeam& seam, BoneIndex bone, BoneEnd end, std::vector<Triangle>& triangles);
 
 /// Places seam samples and corners. They are few, and several patches share them, so the host does this in double
 /// precision.
@@ -55,7 +55,7 @@ void place_seams(const SkeletexModel& model, const SeparationPlanes& separation,
 void place_shared_vertices(const PreparedModel& model, std::vector<Vec3>& positions);
 /// Calls `place` with every pole and the texel that holds it.
 void for_each_pole(const SkeletexModel& model, const Lattice& lattice,
-                   const std::function<void(int vertex, int bone, int end, std::size_t texel)>& place);
+                   const std::function<void(VertexIndex vertex, BoneIndex bone, int end, std::size_t texel)>& place);
 
 /// The same model with rectangles scaled to another texture size (longer side `size`, at least 4 x 4 each). Texels are
 /// resampled as bind-pose positions, averaged where the lattice gets coarser; seams are resampled as polylines.

@@ -66,8 +66,8 @@ class StripMerge {
     const int start_column = static_cast<int>(std::lround(ranges.place(start)));
     for (int k = 0; k <= m_; ++k) seam_.push_back(seam.vertices[start + k < m_ ? start + k : start + k - m_]);
     for (int j = 0; j <= n_; ++j) row_.push_back(row.vertices[column_of(start_column + j)]);
-    for (const int vertex : seam_) seam_points_.push_back(positions[vertex]);
-    for (const int vertex : row_) row_points_.push_back(positions[vertex]);
+    for (const VertexIndex vertex : seam_) seam_points_.push_back(positions[vertex]);
+    for (const VertexIndex vertex : row_) row_points_.push_back(positions[vertex]);
     first_.resize(m_ + 1), last_.resize(m_ + 1), place_.assign(m_ + 2, 0);
     for (int k = 0; k <= m_; ++k) {
       first_[k] = std::max(ranges.first(start + k) - start_column, 0);
@@ -198,7 +198,7 @@ std::vector<double> seam_turns(const std::vector<Vec3>& points, const std::vecto
 void append_seam_strip(std::span<const Vec3> positions, const Ring& seam, const Ring& row, BoneEnd end,
                        std::vector<Triangle>& triangles) {
   std::vector<Vec3> points;
-  for (const int vertex : seam.vertices) points.push_back(positions[vertex]);
+  for (const VertexIndex vertex : seam.vertices) points.push_back(positions[vertex]);
   append_seam_strip(positions, seam, seam_turns(points, seam.turns), row, end, triangles);
 }
 

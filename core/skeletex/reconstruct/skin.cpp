@@ -58,7 +58,7 @@ void weigh_inner_vertices(ClContext& context, const WeightWalks& walks, const De
 /// The weights of a place in a patch that a model's own weights say; the patch's own bone where all of them are 0.
 /// \param row  0 to height - 1
 /// \param turn  v; between columns weights are linear
-std::vector<BoneWeight> weights_at(const SkeletexModel& model, int bone, int row, double turn) {
+std::vector<BoneWeight> weights_at(const SkeletexModel& model, BoneIndex bone, int row, double turn) {
   const Rectangle& r = model.patches[bone].rectangle;
   const double x = (turn - std::floor(turn)) * r.width;
   const int column = static_cast<int>(x) % r.width;
@@ -83,7 +83,8 @@ void take_inner_weights(const SkeletexModel& model, Skin& skin) {
   std::vector<int> all(bones);
   std::iota(all.begin(), all.end(), 0);
   std::vector<float> weights(bones * SKIN_BLOCK);
-  int bone = -1, first_vertex = 0;  // of the patch
+  BoneIndex bone;
+  VertexIndex first_vertex = 0;  // of the patch
   for (SkinBlock& block : skin.blocks) {
     if (block.bone != bone) bone = block.bone, first_vertex = block.first_vertex;
     std::fill(weights.begin(), weights.end(), 0.f);
@@ -101,11 +102,11 @@ void take_inner_weights(const SkeletexModel& model, Skin& skin) {
 /// Poles, seam samples and corners as the rows at the ends of their patches have it.
 std::vector<std::vector<BoneWeight>> shared_weights_of(const SkeletexModel& model, const Lattice& lattice) {
   std::vector<std::vector<BoneWeight>> weights;
-  const auto at = [&](int bone, BoneEnd end, double turn) {
+  const auto at = [&](BoneIndex bone, BoneEnd end, double turn) {
     weights.push_back(
         weights_at(model, bone, end == BoneEnd::kHead ? 0 : model.patches[bone].rectangle.height - 1, turn));
   };
-  for (int bone = 0; bone < static_cast<int>(lattice.poles.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(lattice.poles.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
       if (lattice.poles[bone][static_cast<int>(end)] >= 0) at(bone, end, 0);
   for (const SeamArc& arc : model.arcs)
@@ -122,7 +123,7 @@ std::vector<int> bones_of_shared_vertices(const PreparedModel& prepared) {
   const SkeletexModel& model = prepared.model;
   const Lattice& lattice = prepared.lattice;
   std::vector<int> bones(lattice.vertex_count - lattice.inner_count, -1);
-  for (int bone = 0; bone < static_cast<int>(lattice.poles.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(lattice.poles.size()); ++bone)
     for (const int pole : lattice.poles[bone])
       if (pole >= 0) bones[pole - lattice.inner_count] = bone;
   for (std::size_t a = 0; a < model.arcs.size(); ++a)
@@ -135,8 +136,8 @@ std::vector<int> bones_of_shared_vertices(const PreparedModel& prepared) {
 
 std::vector<SkinBlock> skin_blocks(const std::vector<Patch>& patches) {
   std::vector<SkinBlock> blocks;
-  int vertex = 0;
-  for (int bone = 0; bone < static_cast<int>(patches.size()); ++bone) {
+  VertexIndex vertex = 0;
+  for (BoneIndex bone = 0; bone < static_cast<int>(patches.size()); ++bone) {
     const int end = vertex + patches[bone].rectangle.width * (patches[bone].rectangle.height - 2);
     for (; vertex < end; vertex = blocks.back().first_vertex + blocks.back().vertex_count)
       blocks.push_back({vertex, std::min(SKIN_BLOCK, end - vertex), bone, 0, 0, 0});
@@ -172,7 +173,7 @@ Skin make_skin(ClContext& context, const PreparedModel& prepared, const DevicePl
   return skin;
 }
 
-std::vector<float> vertex_weights(const Skin& skin, int bone) {
+std::vector<float> vertex_weights(const Skin& skin, BoneIndex bone) {
   std::vector<float> weights(skin.inner_count + skin.shared_weights.size(), 0.f);
   for (const SkinBlock& block : skin.blocks)
     for (int k = 0; k < block.bone_count; ++k)

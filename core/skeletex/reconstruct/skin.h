@@ -47,7 +47,7 @@ Skin make_skin(ClContext& context, const PreparedModel& model, const DevicePlane
 DeviceSkin upload_skin(ClContext& context, const Skin& skin, DevicePlanes points);
 
 /// How much a bone moves each vertex of the model's mesh, 0 to 1.
-std::vector<float> vertex_weights(const Skin& skin, int bone);
+std::vector<float> vertex_weights(const Skin& skin, BoneIndex bone);
 
 /// Weights in closed form of all texels, per bone a plane of the texture's size, as SkeletexModel::bone_weights has
 /// them; 0 outside patches.

@@ -20,13 +20,13 @@ namespace {
 
 /// The points of a patch's first or last row: the pole, or where the seam's polyline passes the columns.
 std::vector<Vec3> end_row_points(const SkeletexModel& model, const SeparationPlanes& separation, const Lattice& lattice,
-                                 int bone, BoneEnd end, std::span<const Vec3> positions) {
+                                 BoneIndex bone, BoneEnd end, std::span<const Vec3> positions) {
   const int columns = model.patches[bone].rectangle.width;
   const int pole = lattice.poles[bone][static_cast<int>(end)];
   if (pole >= 0) return std::vector<Vec3>(columns, positions[pole]);
   std::vector<Vec3> points;
   std::vector<double> turns;
-  for (const int vertex : end_loop(model, lattice, bone, end)) {
+  for (const VertexIndex vertex : end_loop(model, lattice, bone, end)) {
     points.push_back(positions[vertex]);
     turns.push_back(separation.turn_of(bone, points.back() - end_position(model.skeleton, bone, end)));
   }
@@ -34,12 +34,12 @@ std::vector<Vec3> end_row_points(const SkeletexModel& model, const SeparationPla
 }
 
 /// Whether any vertex at a patch's end has moved.
-bool has_end_moved(const SkeletexModel& model, const Lattice& lattice, int bone, BoneEnd end,
+bool has_end_moved(const SkeletexModel& model, const Lattice& lattice, BoneIndex bone, BoneEnd end,
                    std::span<const Vec3> before, std::span<const Vec3> after) {
   const int pole = lattice.poles[bone][static_cast<int>(end)];
   if (pole >= 0) return before[pole] != after[pole];
   const std::vector<int> loop = end_loop(model, lattice, bone, end);
-  return std::any_of(loop.begin(), loop.end(), [&](int vertex) { return before[vertex] != after[vertex]; });
+  return std::any_of(loop.begin(), loop.end(), [&](VertexIndex vertex) { return before[vertex] != after[vertex]; });
 }
 
 /// \param result  the texels of points that have moved are set
@@ -51,7 +51,7 @@ void store_texels(ClContext& context, const PreparedModel& prepared, std::span<c
   // All rows of all patches, in each bone's own axes: from H along s, b, o.
   std::array<std::vector<float>, 3> planes;
   std::vector<char> is_stored;
-  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
     const Rectangle& rectangle = model.patches[bone].rectangle;
     const BoneBasis& basis = separation.bases()[bone];
     const Vec3& head = end_position(model.skeleton, bone, BoneEnd::kHead);
@@ -68,7 +68,7 @@ void store_texels(ClContext& context, const PreparedModel& prepared, std::span<c
     };
     add_end(BoneEnd::kHead);
     const int first = lattice.first_inner[bone], last = first + rectangle.width * (rectangle.height - 2);
-    for (int vertex = first; vertex < last; ++vertex) add(after[vertex], before[vertex] != after[vertex]);
+    for (VertexIndex vertex = first; vertex < last; ++vertex) add(after[vertex], before[vertex] != after[vertex]);
     add_end(BoneEnd::kTail);
   }
   DevicePlanes texels = upload_texels(context, model.texture);
@@ -126,7 +126,7 @@ SkeletexModel store_positions(ClContext& context, const PreparedModel& prepared,
     turn_normal_layer(prepared, reconstruct_bind_mesh(context, prepared).mesh, positions, result);
   for (std::size_t a = 0; a < model.arcs.size(); ++a) {
     const SeamArc& arc = model.arcs[a];
-    const int bone = arc.bones[0];
+    const BoneIndex bone = arc.bones[0];
     const BoneEnd end = end_at(model.skeleton, bone, arc.node);
     for (std::size_t i = 0; i < arc.samples.size(); ++i) {
       const Vec3& point = positions[lattice.first_sample[a] + i];
@@ -140,7 +140,7 @@ SkeletexModel store_positions(ClContext& context, const PreparedModel& prepared,
   }
   for (std::size_t i = 0; i < model.corners.size(); ++i) {
     const Vec3& point = positions[lattice.first_corner + i];
-    const int bone = model.corners[i].bones[0];
+    const BoneIndex bone = model.corners[i].bones[0];
     if (point != before[lattice.first_corner + i])
       result.corners[i].sample.distance =
           separation.half_line_distance(bone, end_at(model.skeleton, bone, model.corners[i].node), point);
@@ -154,7 +154,7 @@ void slide_to_separation(const PreparedModel& prepared, std::span<const Vec3> no
   const Lattice& lattice = prepared.lattice;
   for (std::size_t a = 0; a < model.arcs.size(); ++a) {
     const SeamArc& arc = model.arcs[a];
-    const auto away = [&](int bone) {
+    const auto away = [&](BoneIndex bone) {
       return direction_from(model.skeleton, {bone, end_at(model.skeleton, bone, arc.node)});
     };
     const Vec3 plane_normal = (away(arc.bones[0]) - away(arc.bones[1])).normalized();

@@ -29,7 +29,7 @@ template <class T>
 std::vector<T> values_of(const ReducedMesh& reduced, const std::vector<T>& values) {
   std::vector<T> own;
   own.reserve(reduced.vertices.size());
-  for (const int vertex : reduced.vertices) own.push_back(values[vertex]);
+  for (const VertexIndex vertex : reduced.vertices) own.push_back(values[vertex]);
   return own;
 }
 

@@ -29,7 +29,7 @@ VertexColour from_oklch(double lightness, double chroma, double hue_rad) {
 
 }  // namespace
 
-VertexColour bone_colour(int bone) {
+VertexColour bone_colour(BoneIndex bone) {
   // Hues by the golden angle never come close again; three lightnesses set neighbours in hue apart.
   constexpr std::array<double, 3> kLightness{0.72, 0.58, 0.84};
   const double hue = 0.5 + 2 * std::numbers::pi * 0.6180339887498949 * bone;

@@ -80,7 +80,7 @@ TriangleMesh skeleton_mesh(const Skeleton& skeleton, double radius) {
 
 std::vector<int> skeleton_mesh_bones(const Skeleton& skeleton) {
   std::vector<int> bones(skeleton.nodes.size() * kBallTriangles, -1);
-  for (int bone = 0; bone < static_cast<int>(skeleton.bones.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(skeleton.bones.size()); ++bone)
     bones.insert(bones.end(), kSpindleTriangles, bone);
   return bones;
 }
@@ -88,7 +88,7 @@ std::vector<int> skeleton_mesh_bones(const Skeleton& skeleton) {
 void draw_skeleton(GlContext& gl, const Skeleton& skeleton, double diagonal, const Camera& camera,
                    const DrawOptions& options, Image& image) {
   std::vector<VertexColour> colours;
-  for (const int bone : skeleton_mesh_bones(skeleton))
+  for (const BoneIndex bone : skeleton_mesh_bones(skeleton))
     colours.push_back(bone < 0 ? VertexColour{38, 40, 46} : VertexColour{214, 92, 38});
   SurfacePaint paint;
   paint.paint = Paint::kFace;

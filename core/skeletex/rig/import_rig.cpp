@@ -30,7 +30,7 @@ VertexBoneWeights weights_of_bones(const TriangleMesh& mesh, const std::vector<s
       const std::vector<int>& bones = joints.bones_of_joint[joint];
       std::vector<double> shares;
       double sum = 0;
-      for (const int bone : bones) {
+      for (const BoneIndex bone : bones) {
         const double distance = distance_to_bone(mesh.positions[v], end_position(joints.skeleton, bone, BoneEnd::kHead),
                                                  end_position(joints.skeleton, bone, BoneEnd::kTail));
         shares.push_back(1 / std::max(std::pow(distance, 4), 1e-60));

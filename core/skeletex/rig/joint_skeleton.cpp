@@ -384,7 +384,7 @@ class SkeletonBuilder {
     // Of joints in one place, one that moves the surface around another one's bone is a helper of that.
     for (int other = 0; other < count(); ++other) {
       if (other == j || joints_[other].group != joint.group) continue;
-      for (const int bone : bones_of_[other])
+      for (const BoneIndex bone : bones_of_[other])
         if (direction_from(result_.skeleton, {bone, BoneEnd::kHead}).dot((tip - joint.position).normalized()) > 0.94)
           return joint.position;
     }

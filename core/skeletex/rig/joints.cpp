@@ -17,7 +17,7 @@ constexpr double kFramesPerSecond = 30;
 constexpr double kLargestTurn = 10 * std::numbers::pi / 180;
 
 /// \param end  of the bone, where the joint lies
-Eigen::Isometry3d bone_frame(const Skeleton& skeleton, const BoneBasis& basis, int bone, BoneEnd end) {
+Eigen::Isometry3d bone_frame(const Skeleton& skeleton, const BoneBasis& basis, BoneIndex bone, BoneEnd end) {
   const Vec3 y = end == BoneEnd::kHead ? basis.o : Vec3(-basis.o);
   Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
   frame.linear() << basis.s, y, basis.s.cross(y);
@@ -129,7 +129,7 @@ PosedSkeletons sample(const Skeleton& bind, const PoseAnimation& animation) {
 
 bool is_stretched(const Skeleton& bind, const PosedSkeletons& posed) {
   for (const Skeleton& skeleton : posed.skeletons)
-    for (int bone = 0; bone < static_cast<int>(bind.bones.size()); ++bone) {
+    for (BoneIndex bone = 0; bone < static_cast<int>(bind.bones.size()); ++bone) {
       const double length = bone_length(bind, bone);
       if (std::abs(bone_length(skeleton, bone) - length) > 1e-9 * length) return true;
     }
@@ -150,7 +150,7 @@ JointClip make_clip(const std::string& name, const Rig& rig, const Skeleton& bin
     const std::vector<BoneMotion> motions = bone_motions(bind, skeleton);
     clip.transforms.push_back(local_transforms(rig, posed_frames(rig, bind, skeleton, motions)));
     for (std::size_t j = 0; j < rig.joints.size(); ++j)
-      if (const int bone = rig.joints[j].bone; bone >= 0 && !motions[bone].stretch.isZero(0))
+      if (const BoneIndex bone = rig.joints[j].bone; bone >= 0 && !motions[bone].stretch.isZero(0))
         clip.transforms.back()[j].scale.y() = bone_length(skeleton, bone) / bone_length(bind, bone);
   }
   align_signs(clip.transforms);

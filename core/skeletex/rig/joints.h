@@ -13,7 +13,7 @@ namespace skeletex {
 struct RigJoint {
   std::string name;
   int parent = -1;                                         ///< an earlier joint; -1 at the root
-  int bone = -1;                                           ///< that it moves; -1: none
+  BoneIndex bone;                                          ///< that it moves; -1: none
   Eigen::Isometry3d bind = Eigen::Isometry3d::Identity();  ///< to the world; y points along the bone
 };
 

@@ -16,7 +16,7 @@ Vec3 middle_of(const Skeleton& skeleton, std::size_t bone) {
 int nearest_bone(const Skeleton& skeleton, const Vec3& point) {
   int best = 0;
   double least = INFINITY;
-  for (int bone = 0; bone < static_cast<int>(skeleton.bones.size()); ++bone) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(skeleton.bones.size()); ++bone) {
     const double distance = distance_to_bone(point, end_position(skeleton, bone, BoneEnd::kHead),
                                              end_position(skeleton, bone, BoneEnd::kTail));
     if (distance < least) least = distance, best = bone;
@@ -47,7 +47,7 @@ JointSkeleton with_skeleton(const JointSkeleton& joints, const Skeleton& skeleto
     if (became[bone].empty()) became[bone].push_back(nearest_bone(skeleton, middle_of(before, bone)));
   for (std::size_t joint = 0; joint < joints.bones_of_joint.size(); ++joint) {
     std::set<int> bones;
-    for (const int bone : joints.bones_of_joint[joint]) bones.insert(became[bone].begin(), became[bone].end());
+    for (const BoneIndex bone : joints.bones_of_joint[joint]) bones.insert(became[bone].begin(), became[bone].end());
     result.bones_of_joint[joint].assign(bones.begin(), bones.end());
   }
   for (std::size_t node = 0; node < skeleton.nodes.size(); ++node) {

@@ -60,7 +60,7 @@ class AnimationReader {
     const std::vector<int> roots = root_nodes(joints.skeleton);
     root_ = roots.front();
     before_.assign(joints.skeleton.nodes.size(), -1);
-    for (int bone = 0; bone < static_cast<int>(joints.skeleton.bones.size()); ++bone)
+    for (BoneIndex bone = 0; bone < static_cast<int>(joints.skeleton.bones.size()); ++bone)
       before_[joints.skeleton.bones[bone].tail] = bone;
   }
 
@@ -171,7 +171,7 @@ class AnimationReader {
     pose.nodes = moment.nodes;
     const std::vector<BoneBasis> bound = bone_bases(bind);
     const Skeleton fitted = apply_pose(bind, pose);
-    for (int bone = 0; bone < static_cast<int>(bind.bones.size()); ++bone) {
+    for (BoneIndex bone = 0; bone < static_cast<int>(bind.bones.size()); ++bone) {
       const Vec3 along = direction_from(fitted, {bone, BoneEnd::kHead});
       const auto across = [&](const Vec3& s) { return Vec3(s - s.dot(along) * along).normalized(); };
       const Vec3 has = across(*fitted.bones[bone].s), wanted = across(moment.rotations[bone] * bound[bone].s);

@@ -22,7 +22,7 @@ void align_signs(const Skeleton& skeleton, std::vector<BoneMotion>& motions) {
     is_done[start] = true;
     for (std::size_t i = 0; i < queue.size(); ++i) {
       const Bone& bone = skeleton.bones[queue[i]];
-      for (const int node : {bone.head, bone.tail})
+      for (const NodeIndex node : {bone.head, bone.tail})
         for (const BoneAtNode& next : at[node]) {
           if (is_done[next.bone]) continue;
           is_done[next.bone] = true;
@@ -39,7 +39,7 @@ void align_signs(const Skeleton& skeleton, std::vector<BoneMotion>& motions) {
 std::vector<BoneMotion> bone_motions(const Skeleton& bind, const Skeleton& posed) {
   const std::vector<BoneBasis> before = bone_bases(bind), after = bone_bases(posed);
   std::vector<BoneMotion> motions(bind.bones.size());
-  for (int bone = 0; bone < static_cast<int>(motions.size()); ++bone) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(motions.size()); ++bone) {
     BoneMotion& motion = motions[bone];
     motion.rotation = Eigen::Quaterniond(matrix_of(after[bone]) * matrix_of(before[bone]).transpose()).normalized();
     motion.bind_head = end_position(bind, bone, BoneEnd::kHead);

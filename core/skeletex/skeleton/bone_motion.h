@@ -25,7 +25,7 @@ std::vector<BoneMotion> bone_motions(const Skeleton& bind, const Skeleton& posed
 
 /// How much each bone moves a point.
 struct BoneWeight {
-  int bone = -1;
+  BoneIndex bone;
   double weight = 0;
 };
 /// Per vertex of a mesh.

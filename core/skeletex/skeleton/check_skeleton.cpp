@@ -114,7 +114,7 @@ void check_connected(const Skeleton& skeleton) {
 
 /// \param count  how many of the nodes with bones are looked at
 void check_nodes(const CutMesh& mesh, const Skeleton& skeleton, std::size_t count) {
-  std::vector<int> nodes;
+  std::vector<NodeIndex> nodes;
   for (const Bone& bone : skeleton.bones) nodes.insert(nodes.end(), {bone.head, bone.tail});
   std::sort(nodes.begin(), nodes.end());
   nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
@@ -138,7 +138,7 @@ void check_nodes(const CutMesh& mesh, const Skeleton& skeleton, std::size_t coun
 std::vector<double> first_crossings(const CutMesh& mesh, const Skeleton& skeleton) {
   std::vector<double> crossings(skeleton.bones.size());
   for_each_block(crossings.size(), 1, [&](std::size_t b, std::size_t, std::size_t) {
-    const int bone = static_cast<int>(b);
+    const BoneIndex bone = static_cast<int>(b);
     crossings[b] = first_crossing(mesh, end_position(skeleton, bone, BoneEnd::kHead),
                                   end_position(skeleton, bone, BoneEnd::kTail));
   });

@@ -48,7 +48,7 @@ Correspondence composed(const Correspondence& a_to_b, const Correspondence& b_to
     result.bones[i] = b_to_c.bones[a_to_b.bones[i]];
     result.is_reversed[i] = a_to_b.is_reversed[i] != b_to_c.is_reversed[a_to_b.bones[i]];
   }
-  for (int& node : result.nodes) node = b_to_c.nodes[node];
+  for (NodeIndex& node : result.nodes) node = b_to_c.nodes[node];
   result.cost += b_to_c.cost;
   return result;
 }
@@ -111,7 +111,7 @@ std::vector<NeighbourInterval> neighbour_order(const Skeleton& skeleton, BoneAtN
   std::vector<NeighbourInterval> order;
   for (std::size_t i = 0; i < bounds.size(); ++i) {
     const double begin = bounds[i], end = i + 1 < bounds.size() ? bounds[i + 1] : bounds[0] + 2 * std::numbers::pi;
-    const int bone = envelope.bone_at((begin + end) / 2);
+    const BoneIndex bone = envelope.bone_at((begin + end) / 2);
     const double turns = (end - begin) / (2 * std::numbers::pi);
     if (!order.empty() && order.back().bone == bone)
       order.back().turns += turns;
@@ -149,8 +149,8 @@ struct Side {
   }
   int count() const { return static_cast<int>(skeleton->bones.size()); }
   int node(BoneAtNode bone) const { return end_node(*skeleton, bone.bone, bone.end); }
-  const std::string& bone_name(int bone) const { return skeleton->bones[bone].name; }
-  const std::string& node_name(int node) const { return skeleton->nodes[node].name; }
+  const std::string& bone_name(BoneIndex bone) const { return skeleton->bones[bone].name; }
+  const std::string& node_name(NodeIndex node) const { return skeleton->nodes[node].name; }
 };
 
 /// Search for the cheapest isomorphism under a fixed rotation of A onto B. Partial assignments grow from a pair of
@@ -179,7 +179,8 @@ class Search {
 
  private:
   struct State {
-    std::vector<int> bones, nodes;
+    std::vector<BoneIndex> bones;
+    std::vector<NodeIndex> nodes;
     std::vector<bool> is_reversed, is_taken, is_node_taken;
   };
   /// Assigns all bones when x becomes y.
@@ -210,7 +211,7 @@ class Search {
     return s;
   }
 
-  bool assign_node(State& s, int node, int to) const {
+  bool assign_node(State& s, NodeIndex node, int to) const {
     if (s.nodes[node] == to) return true;
     if (s.nodes[node] >= 0 || s.is_node_taken[to] || a_.at[node].size() != b_.at[to].size()) return false;
     s.nodes[node] = to;
@@ -243,7 +244,7 @@ class Search {
   bool keeps_order(BoneAtNode x, BoneAtNode y, const std::map<int, int>& bones) const {
     const auto& from = a_.order[x.bone][static_cast<int>(x.end)];
     const auto& to = b_.order[y.bone][static_cast<int>(y.end)];
-    const auto turns_of = [](const std::vector<NeighbourInterval>& order, int bone) {
+    const auto turns_of = [](const std::vector<NeighbourInterval>& order, BoneIndex bone) {
       double turns = 0;
       for (const NeighbourInterval& i : order)
         if (i.bone == bone) turns += i.turns;
@@ -271,7 +272,7 @@ class Search {
   }
 
   /// \param targets  some bones at a node, and what they become
-  bool node_keeps_order(const std::map<int, BoneAtNode>& targets, int node) const {
+  bool node_keeps_order(const std::map<int, BoneAtNode>& targets, NodeIndex node) const {
     std::map<int, int> bones;
     for (const auto& [bone, target] : targets) bones[bone] = target.bone;
     return std::all_of(a_.at[node].begin(), a_.at[node].end(), [&](const BoneAtNode& x) {
@@ -293,8 +294,8 @@ class Search {
   /// \param cost_of  of a free bone and its target
   /// \param limit  returns what is too much by now
   template <class Cost, class Limit, class Visit>
-  void for_each_assignment(int node, int to, std::map<int, BoneAtNode> known, const Cost& cost_of, const Limit& limit,
-                           const Visit& visit) const {
+  void for_each_assignment(NodeIndex node, int to, std::map<int, BoneAtNode> known, const Cost& cost_of,
+                           const Limit& limit, const Visit& visit) const {
     std::vector<BoneAtNode> free_from, free_to;
     for (const BoneAtNode& x : a_.at[node])
       if (!known.contains(x.bone)) free_from.push_back(x);
@@ -331,7 +332,7 @@ class Search {
       return bone_cost(child, target) +
              subtree_cost({child.bone, opposite(child.end)}, {target.bone, opposite(target.end)});
     };
-    const int node = a_.node(x), to = b_.node(y);
+    const NodeIndex node = a_.node(x), to = b_.node(y);
     if (a_.at[node].size() == b_.at[to].size())
       for_each_assignment(
           node, to, {{x.bone, y}}, cost_of, [&] { return best; },

@@ -11,9 +11,9 @@ namespace skeletex {
 
 /// Which bone of skeleton B each bone of skeleton A becomes.
 struct Correspondence {
-  std::vector<int> bones;         ///< per bone of A, the bone of B
+  std::vector<BoneIndex> bones;   ///< per bone of A, the bone of B
   std::vector<bool> is_reversed;  ///< per bone of A: its head lies at the other bone's tail
-  std::vector<int> nodes;         ///< per node of A, the node of B
+  std::vector<NodeIndex> nodes;   ///< per node of A, the node of B
   double cost = 0;  ///< mean over bones: 0 for equal names, lengths and directions, about 1 for nothing in common
 };
 
@@ -38,7 +38,7 @@ Correspondence find_correspondence(const Skeleton& a, const Skeleton& b, const C
 /// The other bones at one end of a bone in counter-clockwise order about the direction away from that node, each with
 /// the part of a turn that its separation plane takes of the cell's boundary; the order starts anywhere.
 struct NeighbourInterval {
-  int bone = -1;
+  BoneIndex bone;
   double turns = 0;
 };
 std::vector<NeighbourInterval> neighbour_order(const Skeleton& skeleton, BoneAtNode at);

@@ -42,7 +42,7 @@ double u_of(const Axial& at, bool is_head_free, bool is_tail_free) {
   return begin + at.axial * (end - begin);
 }
 
-TangentFrame tangent_frame(const Skeleton& skeleton, const SeparationPlanes& separation, int bone, double u,
+TangentFrame tangent_frame(const Skeleton& skeleton, const SeparationPlanes& separation, BoneIndex bone, double u,
                            double turn) {
   const BoneBasis& basis = separation.bases()[bone];
   const Axial at = axial_of(u, separation.is_free(bone, BoneEnd::kHead), separation.is_free(bone, BoneEnd::kTail));
@@ -86,7 +86,7 @@ double leave_capsule(double z, double along, double across, double radius, doubl
 FrameTables frame_tables(const Skeleton& skeleton, const SeparationPlanes& separation,
                          const std::vector<Patch>& patches, const Vec3& origin) {
   FrameTables tables;
-  for (int bone = 0; bone < static_cast<int>(patches.size()); ++bone) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(patches.size()); ++bone) {
     const Patch& patch = patches[bone];
     const BoneBasis& basis = separation.bases()[bone];
     PatchRecord record{};
@@ -121,7 +121,7 @@ FrameTables frame_tables(const Skeleton& skeleton, const SeparationPlanes& separ
   return tables;
 }
 
-Eigen::Matrix3f texel_axes(const FrameTables& tables, int patch, int row, int column) {
+Eigen::Matrix3f texel_axes(const FrameTables& tables, PatchIndex patch, int row, int column) {
   const PatchRecord& p = tables.patches[patch];
   const RowRecord& r = tables.rows[p.row_begin + row];
   const ColumnRecord& c = tables.columns[p.column_begin + column];

@@ -24,7 +24,7 @@ struct TangentFrame {
   Vec3 along, around, out;
   Vec3 foot;  ///< W, world
 };
-TangentFrame tangent_frame(const Skeleton& skeleton, const SeparationPlanes& separation, int bone, double u,
+TangentFrame tangent_frame(const Skeleton& skeleton, const SeparationPlanes& separation, BoneIndex bone, double u,
                            double turn);
 
 /// Texel of a point: direction from the foot in the frame, scaled to the point's distance from the bone segment.
@@ -48,6 +48,6 @@ struct FrameTables {
 FrameTables frame_tables(const Skeleton& skeleton, const SeparationPlanes& separation,
                          const std::vector<Patch>& patches, const Vec3& origin);
 /// The axes along, around, out of a texel's frame as columns, from the tables.
-Eigen::Matrix3f texel_axes(const FrameTables& tables, int patch, int row, int column);
+Eigen::Matrix3f texel_axes(const FrameTables& tables, PatchIndex patch, int row, int column);
 
 }  // namespace skeletex

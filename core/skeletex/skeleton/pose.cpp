@@ -22,7 +22,7 @@ using Eigen::Quaterniond;
 
 /// One bone of the breadth-first order from a root, and the bone that it hangs on.
 struct Link {
-  int bone;
+  BoneIndex bone;
   int before;     ///< -1 at the root
   BoneEnd pivot;  ///< its end nearer to the root
   int depth;      ///< 0 at the root
@@ -45,7 +45,7 @@ Component walk_from(const Skeleton& skeleton, const std::vector<std::vector<Bone
   std::deque<int> queue{root};
   entry[root] = -1;
   while (!queue.empty()) {
-    const int node = queue.front();
+    const NodeIndex node = queue.front();
     queue.pop_front();
     for (const BoneAtNode bone : at[node]) {
       if (is_done[bone.bone]) continue;
@@ -70,10 +70,12 @@ Quaterniond smallest_rotation(const Vec3& from, const Vec3& to) {
   return Quaterniond::FromTwoVectors(from, to).normalized();
 }
 
-Vec3 bone_direction(const Skeleton& skeleton, int bone) { return direction_from(skeleton, {bone, BoneEnd::kHead}); }
+Vec3 bone_direction(const Skeleton& skeleton, BoneIndex bone) {
+  return direction_from(skeleton, {bone, BoneEnd::kHead});
+}
 
 void check_lengths(const Skeleton& posed) {
-  for (int bone = 0; bone < static_cast<int>(posed.bones.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(posed.bones.size()); ++bone)
     if (!(bone_length(posed, bone) > 0) || !std::isfinite(bone_length(posed, bone)))
       throw InputError(fmt::format("in this pose bone \"{}\" has no length; move node \"{}\" away from node \"{}\"",
                                    posed.bones[bone].name, posed.nodes[posed.bones[bone].tail].name,
@@ -84,13 +86,13 @@ void check_lengths(const Skeleton& posed) {
 /// not depend on which ends of the bones are heads.
 int central_node(const Skeleton& bind, const std::vector<std::vector<BoneAtNode>>& at, int start) {
   const Component component = walk_from(bind, at, start);
-  std::vector<int> nodes{start};
+  std::vector<NodeIndex> nodes{start};
   for (const Link& link : component.links) nodes.push_back(other_end(bind, {link.bone, link.pivot}));
   std::sort(nodes.begin(), nodes.end());
   int best = -1;
   double shortest = 0;
   std::vector<double> way(bind.nodes.size());
-  for (const int node : nodes) {
+  for (const NodeIndex node : nodes) {
     way[node] = 0;
     double sum = 0;
     for (const Link& link : walk_from(bind, at, node).links) {
@@ -139,7 +141,7 @@ void spread_twist(const Skeleton& bind, const Skeleton& posed, const std::vector
   std::vector<BoneBasis> turned = bound;
   std::vector<int> place(bind.bones.size(), -1);
   for (std::size_t i = 0; i < component.links.size(); ++i) {
-    const int bone = component.links[i].bone;
+    const BoneIndex bone = component.links[i].bone;
     place[bone] = static_cast<int>(i);
     rotations[bone] = smallest_rotation(fit * bone_direction(bind, bone), bone_direction(posed, bone)) * fit;
     turned[bone] = {bone_direction(posed, bone), rotations[bone] * bound[bone].s, rotations[bone] * bound[bone].b};
@@ -165,7 +167,7 @@ void spread_twist(const Skeleton& bind, const Skeleton& posed, const std::vector
       }
   const Eigen::VectorXd rolls = normal.ldlt().solve(right);
   for (std::size_t i = 0; i < component.links.size(); ++i) {
-    const int bone = component.links[i].bone;
+    const BoneIndex bone = component.links[i].bone;
     rotations[bone] =
         Quaterniond(Eigen::AngleAxisd(rolls[static_cast<Eigen::Index>(i)], turned[bone].o)) * rotations[bone];
   }
@@ -205,7 +207,7 @@ std::vector<int> root_nodes(const Skeleton& skeleton) {
   const int count = static_cast<int>(skeleton.nodes.size());
   std::vector<int> best(count, -1), component(count, -1), roots;
   std::vector<std::size_t> most;
-  for (int node = 0; node < count; ++node) {
+  for (NodeIndex node = 0; node < count; ++node) {
     const Component walk = walk_from(skeleton, at, node);
     std::size_t away = 0;
     for (const Link& link : walk.links) away += link.pivot == BoneEnd::kHead;
@@ -288,7 +290,7 @@ Pose make_random_pose(const Skeleton& skeleton, double largest, std::uint64_t se
   // The library's distributions differ from system to system: 53 bits in [0, 1).
   const auto uniform = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
   const std::vector<int> roots = root_nodes(skeleton);
-  const auto is_root = [&](int node) { return std::find(roots.begin(), roots.end(), node) != roots.end(); };
+  const auto is_root = [&](NodeIndex node) { return std::find(roots.begin(), roots.end(), node) != roots.end(); };
   Pose pose;
   for (std::size_t i = 0; i < skeleton.bones.size(); ++i) {
     const Bone& bone = skeleton.bones[i];

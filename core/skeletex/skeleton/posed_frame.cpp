@@ -15,14 +15,14 @@ void store(float (&out)[3], const Vec3& v) {
 
 }  // namespace
 
-PosedRow posed_row(const SkeletexModel& model, const PosedPlanes& posed, int bone, const Axial& at) {
+PosedRow posed_row(const SkeletexModel& model, const PosedPlanes& posed, BoneIndex bone, const Axial& at) {
   PosedRow row;
   const auto fade = [](double from_seam) {
     return from_seam < POSED_SEAM_SHARE ? std::pow(1 - from_seam / POSED_SEAM_SHARE, 2) : 0.0;
   };
   for (const int end : {0, 1}) {
     if (model.ends[bone][end].arcs.empty()) continue;
-    const int node = end_node(model.skeleton, bone, static_cast<BoneEnd>(end));
+    const NodeIndex node = end_node(model.skeleton, bone, static_cast<BoneEnd>(end));
     const double share = fade(end == 0 ? at.axial : 1 - at.axial);
     row.bind_extensions[1 - end] = share * (posed.bind_longest_at(node) - bone_length(model.skeleton, bone));
     row.extensions[1 - end] = share * (posed.longest_at(node) - bone_length(posed.skeleton(), bone));
@@ -30,8 +30,8 @@ PosedRow posed_row(const SkeletexModel& model, const PosedPlanes& posed, int bon
   return row;
 }
 
-Vec3 posed_point(const SkeletexModel& model, const SeparationPlanes& bind, const PosedPlanes& posed, int bone, double u,
-                 double turn, const Vec3& texel, DistanceRule rule) {
+Vec3 posed_point(const SkeletexModel& model, const SeparationPlanes& bind, const PosedPlanes& posed, BoneIndex bone,
+                 double u, double turn, const Vec3& texel, DistanceRule rule) {
   const bool is_head_free = bind.is_free(bone, BoneEnd::kHead), is_tail_free = bind.is_free(bone, BoneEnd::kTail);
   const Axial at = axial_of(u, is_head_free, is_tail_free);
   const double bind_length = bone_length(model.skeleton, bone), length = bone_length(posed.skeleton(), bone);
@@ -73,7 +73,7 @@ Vec3 posed_point(const SkeletexModel& model, const SeparationPlanes& bind, const
 std::vector<PatchRecord> posed_patches(const SkeletexModel& model, const PosedPlanes& posed, const Vec3& origin) {
   std::vector<PatchRecord> patches;
   int row_begin = 0, column_begin = 0;
-  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
     const Rectangle& rectangle = model.patches[bone].rectangle;
     PatchRecord record{};
     store(record.head, end_position(posed.skeleton(), bone, BoneEnd::kHead) - origin);
@@ -98,7 +98,7 @@ PoseTables pose_tables(const SkeletexModel& model, const PosedPlanes& posed) {
   PoseTables tables;
   tables.origin = middle_of_nodes(posed.skeleton());
   tables.patches = posed_patches(model, posed, tables.origin);
-  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
     const Patch& patch = model.patches[bone];
     for (const double u : patch.row_u) {
       const PosedRow row = posed_row(model, posed, bone,

@@ -13,12 +13,12 @@ struct PosedRow {
   /// How far the capsule extends past head and tail, in the bind pose and in this one; world units.
   std::array<double, 2> bind_extensions{0, 0}, extensions{0, 0};
 };
-PosedRow posed_row(const SkeletexModel& model, const PosedPlanes& posed, int bone, const Axial& at);
+PosedRow posed_row(const SkeletexModel& model, const PosedPlanes& posed, BoneIndex bone, const Axial& at);
 
 /// The point of a texel at (u, turn) of a bone in a pose (paper 3.4 and 3.6.1): roll and slopes interpolated along the
 /// bone, direction from the posed foot, distance by the rule. In the bind pose the same as decode_texel.
-Vec3 posed_point(const SkeletexModel& model, const SeparationPlanes& bind, const PosedPlanes& posed, int bone, double u,
-                 double turn, const Vec3& texel, DistanceRule rule);
+Vec3 posed_point(const SkeletexModel& model, const SeparationPlanes& bind, const PosedPlanes& posed, BoneIndex bone,
+                 double u, double turn, const Vec3& texel, DistanceRule rule);
 
 /// The posed bones as the kernels see them, with the rectangles, rows and columns of the model's patches.
 /// \param origin  world position that posed device coordinates are relative to

@@ -63,8 +63,8 @@ PosedPlanes::PosedPlanes(const SkeletexModel& model, const Skeleton& posed)
       bind_corners_(model.corners.size(), Vec3::Zero()),
       corners_(model.corners.size(), Vec3::Zero()),
       loops_(model.skeleton.bones.size()) {
-  for (int bone = 0; bone < static_cast<int>(model.skeleton.bones.size()); ++bone)
-    for (const int node : {model.skeleton.bones[bone].head, model.skeleton.bones[bone].tail}) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(model.skeleton.bones.size()); ++bone)
+    for (const NodeIndex node : {model.skeleton.bones[bone].head, model.skeleton.bones[bone].tail}) {
       bind_longest_[node] = std::max(bind_longest_[node], bone_length(model.skeleton, bone));
       longest_[node] = std::max(longest_[node], bone_length(posed, bone));
     }
@@ -87,17 +87,17 @@ PosedPlanes::PosedPlanes(const SkeletexModel& model, const Skeleton& posed)
     else
       arcs_at[seam.node].push_back(a);
   }
-  for (int node = 0; node < static_cast<int>(arcs_at.size()); ++node)
+  for (NodeIndex node = 0; node < static_cast<int>(arcs_at.size()); ++node)
     if (!arcs_at[node].empty()) build_node(node, arcs_at[node]);
-  for (int bone = 0; bone < static_cast<int>(loops_.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(loops_.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) wind_loop(bone, end);
 }
 
-Vec3 PosedPlanes::bind_direction(int bone, int node) const {
+Vec3 PosedPlanes::bind_direction(BoneIndex bone, NodeIndex node) const {
   return model_->skeleton.bones[bone].head == node ? bind_bases_[bone].o : Vec3(-bind_bases_[bone].o);
 }
 
-Vec3 PosedPlanes::posed_direction(int bone, int node) const {
+Vec3 PosedPlanes::posed_direction(BoneIndex bone, NodeIndex node) const {
   return posed_->bones[bone].head == node ? bases_[bone].o : Vec3(-bases_[bone].o);
 }
 
@@ -113,7 +113,7 @@ void PosedPlanes::join_linear(Arc& arc) {
   arc.sides[1].rolls.fill(twist / 2);
 }
 
-PosedPlanes::NodeSphere PosedPlanes::sphere_of(int node, const std::vector<int>& arcs) const {
+PosedPlanes::NodeSphere PosedPlanes::sphere_of(NodeIndex node, const std::vector<int>& arcs) const {
   NodeSphere sphere;
   sphere.arcs = arcs;
   for (const int a : arcs)
@@ -121,16 +121,16 @@ PosedPlanes::NodeSphere PosedPlanes::sphere_of(int node, const std::vector<int>&
       if (std::find(sphere.corners.begin(), sphere.corners.end(), c) == sphere.corners.end())
         sphere.corners.push_back(c);
   sphere.place_of.assign(loops_.size(), -1);
-  const auto add_bone = [&](int bone) {
+  const auto add_bone = [&](BoneIndex bone) {
     if (sphere.place_of[bone] >= 0) return;
     sphere.place_of[bone] = static_cast<int>(sphere.bind.size());
     sphere.bind.push_back(bind_direction(bone, node));
     sphere.posed.push_back(posed_direction(bone, node));
   };
   for (const int a : arcs)
-    for (const int bone : model_->arcs[a].bones) add_bone(bone);
+    for (const BoneIndex bone : model_->arcs[a].bones) add_bone(bone);
   for (const int c : sphere.corners)
-    for (const int bone : model_->corners[c].bones) add_bone(bone);
+    for (const BoneIndex bone : model_->corners[c].bones) add_bone(bone);
   return sphere;
 }
 
@@ -138,7 +138,7 @@ PosedPlanes::NodeSphere PosedPlanes::sphere_of(int node, const std::vector<int>&
 PosedPlanes::Triple PosedPlanes::triple_of(const NodeSphere& sphere, int c) const {
   const SeamCorner& corner = model_->corners[c];
   std::vector<int> places;
-  for (const int bone : corner.bones) places.push_back(sphere.place_of[bone]);
+  for (const BoneIndex bone : corner.bones) places.push_back(sphere.place_of[bone]);
   const auto axis_of = [&](const std::array<int, 3>& bones) {
     return triple_axis(sphere.bind[bones[0]], sphere.bind[bones[1]], sphere.bind[bones[2]]);
   };
@@ -200,7 +200,7 @@ void PosedPlanes::track_arcs(const NodeSphere& sphere, const std::vector<Triple>
   for (std::size_t i = 0; i < at.size(); ++i) corners_[sphere.corners[i]] = turned_back.conjugate() * at[i];
 }
 
-void PosedPlanes::build_node(int node, const std::vector<int>& arcs) {
+void PosedPlanes::build_node(NodeIndex node, const std::vector<int>& arcs) {
   const NodeSphere sphere = sphere_of(node, arcs);
   std::vector<Triple> triples;
   for (const int c : sphere.corners) {
@@ -218,7 +218,7 @@ void PosedPlanes::build_node(int node, const std::vector<int>& arcs) {
     }
 }
 
-void PosedPlanes::wind_loop(int bone, BoneEnd end) {
+void PosedPlanes::wind_loop(BoneIndex bone, BoneEnd end) {
   Loop& loop = loops_[bone][static_cast<int>(end)];
   double start = 0, length = 0, winding = 0, mean = 0;
   for (const ArcUse use : model_->ends[bone][static_cast<int>(end)].arcs) {
@@ -245,7 +245,7 @@ void PosedPlanes::wind_loop(int bone, BoneEnd end) {
       for (double& roll : arcs_[interval.arc].sides[interval.side].rolls) roll -= shift;
 }
 
-const PosedPlanes::Interval* PosedPlanes::interval_at(int bone, BoneEnd end, double turn, double& t) const {
+const PosedPlanes::Interval* PosedPlanes::interval_at(BoneIndex bone, BoneEnd end, double turn, double& t) const {
   const Loop& loop = loops_[bone][static_cast<int>(end)];
   if (loop.intervals.empty()) return nullptr;
   const double x = folded(turn - loop.base);
@@ -258,7 +258,7 @@ const PosedPlanes::Interval* PosedPlanes::interval_at(int bone, BoneEnd end, dou
   return &interval;
 }
 
-std::vector<PosedBound> PosedPlanes::bounds(int bone, BoneEnd end) const {
+std::vector<PosedBound> PosedPlanes::bounds(BoneIndex bone, BoneEnd end) const {
   const Loop& loop = loops_[bone][static_cast<int>(end)];
   std::vector<PosedBound> bounds;
   for (const Interval& interval : loop.intervals) {
@@ -280,13 +280,13 @@ PosedRadial PosedPlanes::radial_on(const Arc& arc, int s, double t, double turn)
   return result;
 }
 
-PosedRadial PosedPlanes::radial(int bone, BoneEnd end, double turn) const {
+PosedRadial PosedPlanes::radial(BoneIndex bone, BoneEnd end, double turn) const {
   double t = 0;
   const Interval* interval = interval_at(bone, end, turn, t);
   return interval ? radial_on(arcs_[interval->arc], interval->side, t, turn) : PosedRadial{};
 }
 
-Vec3 PosedPlanes::sample_point(int a, int sample, DistanceRule rule, int s) const {
+Vec3 PosedPlanes::sample_point(ArcIndex a, int sample, DistanceRule rule, int s) const {
   const SeamArc& seam = model_->arcs[a];
   const Arc& arc = arcs_[a];
   const Side& side = arc.sides[s];
@@ -317,7 +317,7 @@ Vec3 PosedPlanes::corner_point(int c, DistanceRule rule) const {
   return posed_->nodes[corner.node].position + radius * corners_[c];
 }
 
-double PosedPlanes::radius_at(int node, int bone, double distance, const Vec3& bound, const Vec3& direction,
+double PosedPlanes::radius_at(NodeIndex node, BoneIndex bone, double distance, const Vec3& bound, const Vec3& direction,
                               DistanceRule rule) const {
   // The bind point from the half-line's distance, its distance to the bone as extended, and out of the posed capsule.
   const double cosine = bound.dot(bind_direction(bone, node));

@@ -49,24 +49,24 @@ class PosedPlanes {
   const std::vector<BoneBasis>& bases() const { return bases_; }
 
   /// \param turn  angle about the bone in the bind pose, turns
-  PosedRadial radial(int bone, BoneEnd end, double turn) const;
+  PosedRadial radial(BoneIndex bone, BoneEnd end, double turn) const;
   /// Where the arcs at an end begin, in the order of SkeletexModel::ends; angles grow by less than a turn in all, rolls
   /// run on from arc to arc. A closed arc begins anywhere. Empty at a free end.
-  std::vector<PosedBound> bounds(int bone, BoneEnd end) const;
+  std::vector<PosedBound> bounds(BoneIndex bone, BoneEnd end) const;
 
   /// Length of the longest bone at a node, in the bind pose and in this one; world units. All bones there count as this
   /// long where they meet, so that they restore distances alike.
-  double bind_longest_at(int node) const { return bind_longest_[node]; }
-  double longest_at(int node) const { return longest_[node]; }
+  double bind_longest_at(NodeIndex node) const { return bind_longest_[node]; }
+  double longest_at(NodeIndex node) const { return longest_[node]; }
 
   /// Points of the seams, world. Every bone at a seam gives the same point; `side` chooses the one to compute it from.
-  Vec3 sample_point(int arc, int sample, DistanceRule rule, int side = 0) const;
+  Vec3 sample_point(ArcIndex arc, int sample, DistanceRule rule, int side = 0) const;
   Vec3 corner_point(int corner, DistanceRule rule) const;
 
  private:
   /// An arc as one of its bones sees it. Parameter t runs along the arc from its first corner (0) to its last (1).
   struct Side {
-    int bone = -1;
+    BoneIndex bone;
     BoneEnd end = BoneEnd::kHead;
     double sign = 1;                    ///< +1: v grows with t, -1: it falls
     double begin = 0;                   ///< bind angle at t = 0, turns
@@ -82,7 +82,7 @@ class PosedPlanes {
   /// One bone's end: the loop of arcs around it.
   struct Interval {
     double start = 0;  ///< bind angle from the loop's base, growing
-    int arc = -1;
+    ArcIndex arc;
     int side = 0;
   };
   struct Loop {
@@ -103,17 +103,17 @@ class PosedPlanes {
   };
 
   void join_linear(Arc& arc);
-  NodeSphere sphere_of(int node, const std::vector<int>& arcs) const;
+  NodeSphere sphere_of(NodeIndex node, const std::vector<int>& arcs) const;
   Triple triple_of(const NodeSphere& sphere, int corner) const;
   void track_arcs(const NodeSphere& sphere, const std::vector<Triple>& triples);
-  void build_node(int node, const std::vector<int>& arcs);
-  void wind_loop(int bone, BoneEnd end);
-  const Interval* interval_at(int bone, BoneEnd end, double turn, double& t) const;
+  void build_node(NodeIndex node, const std::vector<int>& arcs);
+  void wind_loop(BoneIndex bone, BoneEnd end);
+  const Interval* interval_at(BoneIndex bone, BoneEnd end, double turn, double& t) const;
   PosedRadial radial_on(const Arc& arc, int side, double t, double turn) const;
-  double radius_at(int node, int bone, double distance, const Vec3& bind_direction, const Vec3& direction,
+  double radius_at(NodeIndex node, BoneIndex bone, double distance, const Vec3& bind_direction, const Vec3& direction,
                    DistanceRule rule) const;
-  Vec3 bind_direction(int bone, int node) const;
-  Vec3 posed_direction(int bone, int node) const;
+  Vec3 bind_direction(BoneIndex bone, NodeIndex node) const;
+  Vec3 posed_direction(BoneIndex bone, NodeIndex node) const;
 
   const SkeletexModel* model_;
   const Skeleton* posed_;

@@ -19,12 +19,12 @@ SeparationPlanes::SeparationPlanes(const Skeleton& skeleton)
               {j.bone, direction_from(skeleton, i) - direction_from(skeleton, j)});
 }
 
-Vec3 SeparationPlanes::radial(int bone, double turn) const {
+Vec3 SeparationPlanes::radial(BoneIndex bone, double turn) const {
   const double angle = 2 * std::numbers::pi * turn;
   return portable::cos(angle) * bases_[bone].s + portable::sin(angle) * bases_[bone].b;
 }
 
-double SeparationPlanes::turn_of(int bone, const Vec3& offset) const {
+double SeparationPlanes::turn_of(BoneIndex bone, const Vec3& offset) const {
   const double turn = portable::atan2(offset.dot(bases_[bone].b), offset.dot(bases_[bone].s)) / (2 * std::numbers::pi);
   const double fraction = turn - std::floor(turn);
   return fraction < 1 ? fraction : 0;
@@ -38,7 +38,7 @@ double meet(const Vec3& normal, const Vec3& radial, const Vec3& o) { return -rad
 
 }  // namespace
 
-double SeparationPlanes::slope(int bone, BoneEnd end, double turn) const {
+double SeparationPlanes::slope(BoneIndex bone, BoneEnd end, double turn) const {
   const auto& neighbours = normals_[bone][static_cast<int>(end)];
   if (neighbours.empty()) return 0;
   const Vec3 direction = radial(bone, turn);
@@ -50,7 +50,7 @@ double SeparationPlanes::slope(int bone, BoneEnd end, double turn) const {
   return best;
 }
 
-int SeparationPlanes::neighbour(int bone, BoneEnd end, double turn) const {
+BoneIndex SeparationPlanes::neighbour(BoneIndex bone, BoneEnd end, double turn) const {
   const auto& neighbours = normals_[bone][static_cast<int>(end)];
   const Vec3 direction = radial(bone, turn);
   int found = -1;
@@ -65,7 +65,7 @@ int SeparationPlanes::neighbour(int bone, BoneEnd end, double turn) const {
   return found;
 }
 
-Vec3 SeparationPlanes::seam_point(int bone, BoneEnd end, double turn, double distance) const {
+Vec3 SeparationPlanes::seam_point(BoneIndex bone, BoneEnd end, double turn, double distance) const {
   // With |s'| = 1 and s' orthogonal to o, sin(phi) = 1 / |s' + k o|, and phi < 90 degrees where k points into the bone.
   const double k = slope(bone, end, turn);
   const double length = std::hypot(1, k);
@@ -75,7 +75,7 @@ Vec3 SeparationPlanes::seam_point(int bone, BoneEnd end, double turn, double dis
   return end_position(*skeleton_, bone, end) + r * f;
 }
 
-double SeparationPlanes::half_line_distance(int bone, BoneEnd end, const Vec3& point) const {
+double SeparationPlanes::half_line_distance(BoneIndex bone, BoneEnd end, const Vec3& point) const {
   const Vec3 offset = point - end_position(*skeleton_, bone, end);
   const Vec3 direction = end == BoneEnd::kHead ? bases_[bone].o : Vec3(-bases_[bone].o);
   return (offset - std::max(0.0, offset.dot(direction)) * direction).norm();

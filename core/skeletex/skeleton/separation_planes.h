@@ -19,25 +19,25 @@ class SeparationPlanes {
   /// Slope k of the separation plane at one end of a bone at an angle (in turns): the line N + s'(turn) + x o meets the
   /// cell's boundary at x = k (the largest x over the separation planes at the head, the smallest at the tail). 0 at a
   /// free end.
-  double slope(int bone, BoneEnd end, double turn) const;
+  double slope(BoneIndex bone, BoneEnd end, double turn) const;
   /// The bone on the other side of the separation plane at that angle; -1 at a free end.
-  int neighbour(int bone, BoneEnd end, double turn) const;
-  bool is_free(int bone, BoneEnd end) const { return normals_[bone][static_cast<int>(end)].empty(); }
+  BoneIndex neighbour(BoneIndex bone, BoneEnd end, double turn) const;
+  bool is_free(BoneIndex bone, BoneEnd end) const { return normals_[bone][static_cast<int>(end)].empty(); }
 
   /// s'(turn): s turned about o by 2 pi turn.
-  Vec3 radial(int bone, double turn) const;
+  Vec3 radial(BoneIndex bone, double turn) const;
   /// Angle of a point about the bone's axis in turns, in [0,1).
-  double turn_of(int bone, const Vec3& offset_from_node) const;
+  double turn_of(BoneIndex bone, const Vec3& offset_from_node) const;
 
   /// The point of a seam: at angle `turn` about the bone, in the separation plane at its `end`, at `distance` from the
   /// half-line that starts at the node and runs along the bone. Every bone that meets there gives the same point.
-  Vec3 seam_point(int bone, BoneEnd end, double turn, double distance) const;
+  Vec3 seam_point(BoneIndex bone, BoneEnd end, double turn, double distance) const;
   /// Distance from a point to the half-line that starts at the node at `end` and runs along the bone.
-  double half_line_distance(int bone, BoneEnd end, const Vec3& point) const;
+  double half_line_distance(BoneIndex bone, BoneEnd end, const Vec3& point) const;
 
  private:
   struct Neighbour {
-    int bone;
+    BoneIndex bone;
     Vec3 normal;  ///< d_i - d_j
   };
   const Skeleton* skeleton_;  // only read during construction and for node positions; must outlive this

@@ -36,19 +36,19 @@ std::vector<std::vector<BoneAtNode>> bones_at_nodes(const Skeleton& skeleton) {
   return at;
 }
 
-int end_node(const Skeleton& skeleton, int bone, BoneEnd end) {
+NodeIndex end_node(const Skeleton& skeleton, BoneIndex bone, BoneEnd end) {
   return end == BoneEnd::kHead ? skeleton.bones[bone].head : skeleton.bones[bone].tail;
 }
 
-BoneEnd end_at(const Skeleton& skeleton, int bone, int node) {
+BoneEnd end_at(const Skeleton& skeleton, BoneIndex bone, NodeIndex node) {
   return skeleton.bones[bone].head == node ? BoneEnd::kHead : BoneEnd::kTail;
 }
 
-const Vec3& end_position(const Skeleton& skeleton, int bone, BoneEnd end) {
+const Vec3& end_position(const Skeleton& skeleton, BoneIndex bone, BoneEnd end) {
   return skeleton.nodes[end_node(skeleton, bone, end)].position;
 }
 
-double bone_length(const Skeleton& skeleton, int bone) {
+double bone_length(const Skeleton& skeleton, BoneIndex bone) {
   return (end_position(skeleton, bone, BoneEnd::kTail) - end_position(skeleton, bone, BoneEnd::kHead)).norm();
 }
 
@@ -139,7 +139,7 @@ std::vector<BoneBasis> bone_bases(const Skeleton& skeleton) {
   const int count = static_cast<int>(bases.size());
   const auto at = bones_at_nodes(skeleton);
   std::deque<int> queue;
-  const auto add = [&](int bone, const Vec3& s) {
+  const auto add = [&](BoneIndex bone, const Vec3& s) {
     bases[bone].s = s;
     is_known[bone] = true;
     queue.push_back(bone);

@@ -19,8 +19,8 @@ struct Node {
 /// A bone from its head node to its tail node.
 struct Bone {
   std::string name;
-  int head = -1;
-  int tail = -1;
+  NodeIndex head;
+  NodeIndex tail;
   std::optional<Vec3> s;  ///< direction of angle 0, as the file gives it; need not be unit or orthogonal
 };
 
@@ -46,7 +46,7 @@ struct BoneBasis {
 
 /// A bone as seen from one of its end nodes.
 struct BoneAtNode {
-  int bone;
+  BoneIndex bone;
   BoneEnd end;  ///< which end of the bone lies at the node
 };
 
@@ -54,13 +54,13 @@ struct BoneAtNode {
 std::vector<std::vector<BoneAtNode>> bones_at_nodes(const Skeleton& skeleton);
 /// Unit direction from the node at `end` along the bone, away from that node.
 Vec3 direction_from(const Skeleton& skeleton, BoneAtNode bone);
-double bone_length(const Skeleton& skeleton, int bone);
+double bone_length(const Skeleton& skeleton, BoneIndex bone);
 /// Position of the node at one end of a bone.
-const Vec3& end_position(const Skeleton& skeleton, int bone, BoneEnd end);
-int end_node(const Skeleton& skeleton, int bone, BoneEnd end);
+const Vec3& end_position(const Skeleton& skeleton, BoneIndex bone, BoneEnd end);
+NodeIndex end_node(const Skeleton& skeleton, BoneIndex bone, BoneEnd end);
 /// The end of a bone that lies at a node.
 /// \pre one of them does
-BoneEnd end_at(const Skeleton& skeleton, int bone, int node);
+BoneEnd end_at(const Skeleton& skeleton, BoneIndex bone, NodeIndex node);
 
 /// Bases of all bones. A given `s` is made orthonormal to o; a missing one is carried from a neighbouring bone by the
 /// reflection in the separation plane between them, so that nothing twists: a point of the separation plane at angle v

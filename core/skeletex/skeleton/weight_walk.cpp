@@ -52,7 +52,7 @@ JointSizes joint_sizes(const SkeletexModel& model, const SeparationPlanes& separ
   sizes.radii.assign(skeleton.nodes.size(), 0);
   for (const SeamArc& arc : model.arcs) {
     std::vector<std::pair<Vec3, double>> points;  // with their distances
-    const auto add = [&](int bone, const SeamSample& sample) {
+    const auto add = [&](BoneIndex bone, const SeamSample& sample) {
       const BoneEnd end = end_at(skeleton, bone, arc.node);
       points.emplace_back(separation.seam_point(bone, end, sample.turn, sample.distance), sample.distance);
     };
@@ -77,7 +77,8 @@ JointSizes joint_sizes(const SkeletexModel& model, const SeparationPlanes& separ
 
 /// Where a walk has come to: a bone, and the joint that it was entered through.
 struct Place {
-  int bone = -1, joint = -1;
+  BoneIndex bone;
+  int joint = -1;
   int before = -1;  ///< number of the place before it
   int joints = 0;   ///< how many the walk has crossed
 };
@@ -88,7 +89,8 @@ bool has_crossed(const std::vector<Place>& places, int at, int joint) {
   return false;
 }
 
-WeightStep make_step(const SkeletexModel& model, const JointSizes& sizes, int node, BoneAtNode from, BoneAtNode to) {
+WeightStep make_step(const SkeletexModel& model, const JointSizes& sizes, NodeIndex node, BoneAtNode from,
+                     BoneAtNode to) {
   WeightStep step{};
   const Vec3 normal = (direction_from(model.skeleton, from) - direction_from(model.skeleton, to)) / sizes.girths[node];
   const Vec3 joint = model.skeleton.nodes[node].position - model.origin;
@@ -113,7 +115,7 @@ std::vector<WeightStep> walk_from(const SkeletexModel& model, const JointSizes& 
     if (place.joints == kMostJoints) continue;
     const Bone& bone = model.skeleton.bones[place.bone];
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
-      const int node = end == BoneEnd::kHead ? bone.head : bone.tail;
+      const NodeIndex node = end == BoneEnd::kHead ? bone.head : bone.tail;
       if (has_crossed(places, here, node)) continue;
       for (const BoneAtNode& next : at[node]) {
         if (next.bone == place.bone || next.bone == own || steps.size() == kMostSteps) continue;
@@ -145,7 +147,7 @@ WeightWalks make_weight_walks(const SkeletexModel& model, const SeparationPlanes
   return walks;
 }
 
-std::vector<BoneWeight> bone_weights(const WeightWalks& walks, int bone, const Vec3& point) {
+std::vector<BoneWeight> bone_weights(const WeightWalks& walks, BoneIndex bone, const Vec3& point) {
   const int first = walks.first_steps[bone], count = walks.first_steps[bone + 1] - first;
   std::vector<double> potentials(count + 1, 0.0);
   for (int k = 0; k < count; ++k) {
@@ -167,7 +169,7 @@ std::vector<BoneWeight> bone_weights(const WeightWalks& walks, int bone, const V
   for (int k = 0; k <= count; ++k) {
     const double weight = std::exp(lowest - potentials[k]) - SKIN_CUT;
     if (!(weight > 0)) continue;
-    weights.push_back({k == 0 ? bone : walks.steps[first + k - 1].bone, weight});
+    weights.push_back({k == 0 ? bone : BoneIndex(walks.steps[first + k - 1].bone), weight});
     sum += weight;
   }
   for (BoneWeight& weight : weights) weight.weight /= sum;

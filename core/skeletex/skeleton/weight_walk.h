@@ -28,6 +28,6 @@ WeightWalks make_weight_walks(const SkeletexModel& model, const SeparationPlanes
 
 /// The weights of a point that belongs to a bone: those above 0, the own bone first; their sum is 1.
 /// \param point  in the bind pose, relative to the model's origin
-std::vector<BoneWeight> bone_weights(const WeightWalks& walks, int bone, const Vec3& point);
+std::vector<BoneWeight> bone_weights(const WeightWalks& walks, BoneIndex bone, const Vec3& point);
 
 }  // namespace skeletex

@@ -46,7 +46,8 @@ std::string Acceptance::segment(Repair& repair, const std::function<std::string(
     if (!repair.run()) return refusal;
     Skeleton skeleton = repair.skeleton();
     give_numbers(skeleton);
-    int node = -1, bone = -1;
+    NodeIndex node;
+    BoneIndex bone;
     try {
       segment_mesh(context_, cut_, skeleton);
       return {};
@@ -62,7 +63,7 @@ std::string Acceptance::segment(Repair& repair, const std::function<std::string(
       continue;
     }
     moved_for_this = 0;
-    if (!repair.contract(std::max(bone, 0))) return refusal;
+    if (!repair.contract(std::max<int>(bone, 0))) return refusal;
     if (stop)
       if (std::string reason = stop(repair); !reason.empty()) return reason;
   }

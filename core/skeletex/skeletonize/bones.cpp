@@ -134,7 +134,7 @@ Skeleton make_bones(const Surface& surface, double voxel_side, const CurveGraph&
     const std::vector<int> kept = straighten(surface, voxel_side, points, least, bend);
     int before = branch.from;
     for (std::size_t i = 1; i < kept.size(); ++i) {
-      int node = branch.to;
+      NodeIndex node = branch.to;
       if (i + 1 < kept.size()) {
         node = static_cast<int>(skeleton.nodes.size());
         skeleton.nodes.push_back({"", points[kept[i]]});

@@ -36,7 +36,7 @@ void mirror_limb(const SkeletonLimb& from, const SkeletonLimb& to, const MirrorP
   int before = to.nodes[0];
   for (std::size_t i = 1; i < from.nodes.size(); ++i) {
     const Vec3 place = plane.mirrored(skeleton.nodes[from.nodes[i]].position);
-    int node = i < to.nodes.size() ? to.nodes[i] : -1;
+    NodeIndex node = i < to.nodes.size() ? to.nodes[i] : NodeIndex();
     if (node < 0) {
       node = static_cast<int>(skeleton.nodes.size());
       skeleton.nodes.push_back({"", place});
@@ -167,9 +167,9 @@ Skeleton with_joints(const Surface& surface, Skeleton skeleton) {
   constexpr double kLong = 9;            // radii of the body
   constexpr double kLeastLength = 0.08;  // diagonals
   constexpr int kSteps = 20;
-  std::vector<int> bones;
+  std::vector<BoneIndex> bones;
   for (const SkeletonLimb& limb : find_limbs(skeleton)) bones.insert(bones.end(), limb.bones.begin(), limb.bones.end());
-  for (const int long_bone : bones) {
+  for (const BoneIndex long_bone : bones) {
     const Vec3 head = end_position(skeleton, long_bone, BoneEnd::kHead),
                tail = end_position(skeleton, long_bone, BoneEnd::kTail);
     std::vector<double> radii;
@@ -184,7 +184,7 @@ Skeleton with_joints(const Surface& surface, Skeleton skeleton) {
     std::nth_element(radii.begin(), radii.begin() + kSteps / 2, radii.end());
     const double length = (tail - head).norm();
     if (length <= kLong * radii[kSteps / 2] || length < kLeastLength * surface.diagonal) continue;
-    const int node = static_cast<int>(skeleton.nodes.size());
+    const NodeIndex node = static_cast<int>(skeleton.nodes.size());
     skeleton.nodes.push_back({"", head + best_share * (tail - head)});
     Bone& bone = skeleton.bones[long_bone];
     const int end = std::exchange(bone.tail, node);

@@ -10,8 +10,8 @@ namespace skeletex {
 
 /// A chain of bones from where the skeleton branches to a free end, in this order.
 struct SkeletonLimb {
-  std::vector<int> bones;
-  std::vector<int> nodes;  ///< one more than bones: from the branching node to the free end
+  std::vector<BoneIndex> bones;
+  std::vector<NodeIndex> nodes;  ///< one more than bones: from the branching node to the free end
 };
 
 /// All limbs, in the order of the nodes of their free ends. A skeleton that does not branch has none.

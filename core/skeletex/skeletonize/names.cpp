@@ -93,7 +93,7 @@ class Namer {
   void name_trunk() {
     int spine = 0, ring = 0;
     const std::vector<bool> is_in_cycle = bones_in_cycles(skeleton_);
-    for (const int bone : order_)
+    for (const BoneIndex bone : order_)
       if (!is_limb_[bone])
         skeleton_.bones[bone].name =
             is_in_cycle[bone] ? fmt::format("ring_{}", ++ring) : fmt::format("spine_{}", ++spine);
@@ -103,7 +103,7 @@ class Namer {
   void name_nodes() {
     for (Node& node : skeleton_.nodes) node.name.clear();
     skeleton_.nodes[root_].name = "root";
-    for (const int bone : order_) {
+    for (const BoneIndex bone : order_) {
       Node& tail = skeleton_.nodes[skeleton_.bones[bone].tail];
       if (tail.name.empty()) tail.name = skeleton_.bones[bone].name + "_end";
     }
@@ -122,7 +122,7 @@ class Namer {
 
 }  // namespace
 
-std::vector<int> turn_away_from(int node, Skeleton& skeleton) {
+std::vector<int> turn_away_from(NodeIndex node, Skeleton& skeleton) {
   const auto at_nodes = bones_at_nodes(skeleton);
   std::vector<char> is_reached(skeleton.nodes.size(), 0), is_done(skeleton.bones.size(), 0);
   std::vector<int> order, queue{node};

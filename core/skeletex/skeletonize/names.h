@@ -10,7 +10,7 @@ namespace skeletex {
 
 /// Turns bones so that they point away from a node.
 /// \return the bones, from the node outwards
-std::vector<int> turn_away_from(int node, Skeleton& skeleton);
+std::vector<int> turn_away_from(NodeIndex node, Skeleton& skeleton);
 
 /// Turns all bones away from a root and names them by their place: spine_1, spine_2.. between limbs, ring_1.. on
 /// cycles, limb_1_1, limb_1_2.. from the body to a tip; left_ and right_ where two limbs are mirror images. The root is

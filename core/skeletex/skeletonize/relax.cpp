@@ -24,18 +24,19 @@ double Repair::cost_without(int hub, const std::set<int>& gone) const {
     number[b] = static_cast<int>(rest.bones.size());
     rest.bones.push_back(skeleton_.bones[b]);
   }
-  std::vector<int> left;
+  std::vector<BoneIndex> left;
   for (const int b : bones_around({hub}))
     if (number[b] >= 0) left.push_back(number[b]);
   return cost(rest, bones_at_nodes(rest), left, kNoLimit);
 }
 
 void Repair::drop(const SkeletonLimb& limb) {
-  std::vector<int> bones = limb.bones, nodes(limb.nodes.begin() + 1, limb.nodes.end());
+  std::vector<BoneIndex> bones = limb.bones;
+  std::vector<NodeIndex> nodes(limb.nodes.begin() + 1, limb.nodes.end());
   std::sort(bones.rbegin(), bones.rend());
   std::sort(nodes.rbegin(), nodes.rend());
-  for (const int bone : bones) skeleton_.bones.erase(skeleton_.bones.begin() + bone);
-  for (const int node : nodes) remove_node(node);
+  for (const BoneIndex bone : bones) skeleton_.bones.erase(skeleton_.bones.begin() + bone);
+  for (const NodeIndex node : nodes) remove_node(node);
   prepare();
 }
 
@@ -72,7 +73,7 @@ void Repair::drop_minor_limbs() {
 }
 
 double Repair::total_cost() const {
-  std::vector<int> bones(skeleton_.bones.size());
+  std::vector<BoneIndex> bones(skeleton_.bones.size());
   std::iota(bones.begin(), bones.end(), 0);
   double sum = cost(skeleton_, at_nodes_, bones, kNoLimit);
   for (int n = 0; n < static_cast<int>(skeleton_.nodes.size()); ++n) sum += displacement_cost(skeleton_, n);
@@ -85,8 +86,8 @@ std::vector<Vec3> Repair::gradient() const {
   std::vector<Vec3> result(skeleton_.nodes.size(), Vec3::Zero());
   for_each_block(result.size(), 1, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
-      const int node = static_cast<int>(n);
-      const std::vector<int> bones = bones_around({node});
+      const NodeIndex node = static_cast<int>(n);
+      const std::vector<BoneIndex> bones = bones_around({node});
       if (std::all_of(bones.begin(), bones.end(), [&](int b) { return margins_[b].margin > kGoodMargin; })) continue;
       Skeleton moved = skeleton_;
       for (int axis = 0; axis < 3; ++axis) {
@@ -133,7 +134,7 @@ void Repair::descend(int steps) {
 }
 
 /// Contracts the bone at a bone's ends, or next to them, whose loss does the least.
-bool Repair::merge_near(int bone) {
+bool Repair::merge_near(BoneIndex bone) {
   Merge best;
   for (const int b : bones_around({skeleton_.bones[bone].head, skeleton_.bones[bone].tail})) {
     const bool is_end =
@@ -150,7 +151,7 @@ void Repair::relax() {
   constexpr double kHelps = 0.95;  // of the cost before
   descend(kFirstSteps);
   for (double before = total_cost();;) {
-    const int bone = worst_bone();
+    const BoneIndex bone = worst_bone();
     if (bone < 0) return;
     const Skeleton skeleton = skeleton_;
     const std::vector<double> radii = radii_;

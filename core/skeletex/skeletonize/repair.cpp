@@ -53,21 +53,21 @@ void Repair::prepare() {
 }
 
 /// Bones whose margins depend on the places of these nodes.
-std::vector<int> Repair::bones_around(const std::vector<int>& nodes) const {
+std::vector<BoneIndex> Repair::bones_around(const std::vector<NodeIndex>& nodes) const {
   std::set<int> bones;
-  for (const int node : nodes)
+  for (const NodeIndex node : nodes)
     for (const BoneAtNode& at : at_nodes_[node])
       for (const BoneAtNode& next : at_nodes_[end_node(skeleton_, at.bone, opposite(at.end))]) bones.insert(next.bone);
-  for (const int node : nodes)
+  for (const NodeIndex node : nodes)
     for (const BoneAtNode& at : at_nodes_[node]) bones.insert(at.bone);
   return {bones.begin(), bones.end()};
 }
 
 /// What bones lack in margin, and for planes that are long. Not exact above the limit.
 double Repair::cost(const Skeleton& skeleton, const std::vector<std::vector<BoneAtNode>>& at_nodes,
-                    const std::vector<int>& bones, double limit) const {
+                    const std::vector<BoneIndex>& bones, double limit) const {
   double sum = 0;
-  for (const int bone : bones) {
+  for (const BoneIndex bone : bones) {
     if (sum > limit) break;
     const double stop_below = kGoodMargin - std::sqrt(limit - sum) - 1e-9;  // below it the cost is above the limit
     const BoneMargin margin =
@@ -80,7 +80,7 @@ double Repair::cost(const Skeleton& skeleton, const std::vector<std::vector<Bone
 }
 
 /// Whether a node and its bones keep clear of the surface.
-bool Repair::is_placed_well(const Skeleton& skeleton, int node, double least_radius) const {
+bool Repair::is_placed_well(const Skeleton& skeleton, NodeIndex node, double least_radius) const {
   const Vec3& p = skeleton.nodes[node].position;
   if (surface_.is_near(p, least_radius)) return false;
   for (const Bone& bone : skeleton.bones) {
@@ -96,7 +96,7 @@ bool Repair::is_placed_well(const Skeleton& skeleton, int node, double least_rad
 }
 
 /// What the distance of a node from its original place costs; it is measured in radii of the body.
-double Repair::displacement_cost(const Skeleton& skeleton, int node) const {
+double Repair::displacement_cost(const Skeleton& skeleton, NodeIndex node) const {
   const auto place = original_places_.find(skeleton.nodes[node].name);
   if (place == original_places_.end()) return 0;
   return kDisplacementWeight * (skeleton.nodes[node].position - place->second).squaredNorm() /
@@ -109,8 +109,8 @@ double Repair::length_of(const SkeletonLimb& limb) const {
   return length;
 }
 
-bool Repair::move_node(int node, double step, int trials) {
-  std::vector<int> bones = bones_around({node});
+bool Repair::move_node(NodeIndex node, double step, int trials) {
+  std::vector<BoneIndex> bones = bones_around({node});
   // The worst first: most moves are ruled out by it.
   std::stable_sort(bones.begin(), bones.end(), [&](int a, int b) { return margins_[a].margin < margins_[b].margin; });
   const double before = displacement_cost(skeleton_, node) + cost(skeleton_, at_nodes_, bones, kNoLimit);
@@ -146,19 +146,19 @@ bool Repair::move_node(int node, double step, int trials) {
 }
 
 /// \return whether its cost or that of the bones around has fallen noticeably
-bool Repair::improve(int bone) {
+bool Repair::improve(BoneIndex bone) {
   const int head = skeleton_.bones[bone].head, tail = skeleton_.bones[bone].tail;
-  std::vector<int> nodes{head, tail};
+  std::vector<NodeIndex> nodes{head, tail};
   if (margins_[bone].margin > -0.7)
-    for (const int node : {head, tail})
+    for (const NodeIndex node : {head, tail})
       for (const BoneAtNode& at : at_nodes_[node]) {
         const int other = end_node(skeleton_, at.bone, opposite(at.end));
         if (std::find(nodes.begin(), nodes.end(), other) == nodes.end()) nodes.push_back(other);
       }
-  const std::vector<int> bones = bones_around(nodes);
+  const std::vector<BoneIndex> bones = bones_around(nodes);
   const double before = cost(skeleton_, at_nodes_, bones, kNoLimit);
   for (int scale = 0; scale < 4; ++scale)
-    for (const int node : nodes) {
+    for (const NodeIndex node : nodes) {
       double length = 0;
       for (const BoneAtNode& at : at_nodes_[node]) length += bone_length(skeleton_, at.bone);
       length /= static_cast<double>(at_nodes_[node].size());
@@ -180,7 +180,7 @@ int Repair::worst_bone() const {
 
 bool Repair::run(bool may_contract) {
   for (;;) {
-    const int bone = worst_bone();
+    const BoneIndex bone = worst_bone();
     if (bone < 0) return true;
     if (failures_[bone] >= kPatience && margins_[bone].margin > kWorthTrying) return true;
     if (!improve(bone)) ++failures_[bone];
@@ -192,9 +192,9 @@ bool Repair::run(bool may_contract) {
   }
 }
 
-void Repair::shake(int node) {
+void Repair::shake(NodeIndex node) {
   const Vec3 start = skeleton_.nodes[node].position;
-  const std::vector<int> bones = bones_around({node});
+  const std::vector<BoneIndex> bones = bones_around({node});
   double least = std::numeric_limits<double>::infinity();
   Vec3 best = start;
   for (int trial = 0; trial < kTrials; ++trial) {
@@ -212,7 +212,7 @@ void Repair::shake(int node) {
 }
 
 /// Whether every cycle keeps three bones when a bone is contracted.
-bool Repair::is_ring_kept(int bone) const {
+bool Repair::is_ring_kept(BoneIndex bone) const {
   const Bone& gone = skeleton_.bones[bone];
   std::set<int> neighbours;
   for (const BoneAtNode& at : at_nodes_[gone.head])
@@ -223,7 +223,7 @@ bool Repair::is_ring_kept(int bone) const {
 }
 
 /// The tail goes, the head moves. Numbers of later bones fall by one; the tail's node is left without a bone.
-Skeleton Repair::merged(int bone, const Vec3& place) const {
+Skeleton Repair::merged(BoneIndex bone, const Vec3& place) const {
   Skeleton result = skeleton_;
   const Bone gone = result.bones[bone];
   result.bones.erase(result.bones.begin() + bone);
@@ -235,7 +235,7 @@ Skeleton Repair::merged(int bone, const Vec3& place) const {
   return result;
 }
 
-std::vector<Vec3> Repair::merge_places(int bone) {
+std::vector<Vec3> Repair::merge_places(BoneIndex bone) {
   const Vec3 &head = end_position(skeleton_, bone, BoneEnd::kHead),
              &tail = end_position(skeleton_, bone, BoneEnd::kTail);
   const Vec3 middle = 0.5 * (head + tail);
@@ -248,13 +248,13 @@ std::vector<Vec3> Repair::merge_places(int bone) {
   return places;
 }
 
-bool Repair::try_merge(int bone, const Vec3& place, Merge& best) const {
+bool Repair::try_merge(BoneIndex bone, const Vec3& place, Merge& best) const {
   const Bone& gone = skeleton_.bones[bone];
   const Skeleton candidate = merged(bone, place);
   if (!is_placed_well(candidate, gone.head, 0.3 * std::min(radii_[gone.head], radii_[gone.tail]))) return false;
-  const std::vector<int> before = bones_around({gone.head, gone.tail});
+  const std::vector<BoneIndex> before = bones_around({gone.head, gone.tail});
   const auto at_nodes = bones_at_nodes(candidate);
-  std::vector<int> after;
+  std::vector<BoneIndex> after;
   for (const int b : before)
     if (b != bone) after.push_back(b > bone ? b - 1 : b);
   const double change = cost(candidate, at_nodes, after, kNoLimit) - cost(skeleton_, at_nodes_, before, kNoLimit);
@@ -263,19 +263,19 @@ bool Repair::try_merge(int bone, const Vec3& place, Merge& best) const {
 }
 
 /// \pre no bone has it
-void Repair::remove_node(int node) {
+void Repair::remove_node(NodeIndex node) {
   skeleton_.nodes.erase(skeleton_.nodes.begin() + node);
   radii_.erase(radii_.begin() + node);
   for (Bone& bone : skeleton_.bones) {
-    bone.head -= bone.head > node;
-    bone.tail -= bone.tail > node;
+    for (NodeIndex* end : {&bone.head, &bone.tail})
+      if (*end > node) *end = *end - 1;
   }
 }
 
 void Repair::merge_at(const Merge& merge) {
   const Bone gone = skeleton_.bones[merge.bone];
   // The node with more bones, or the deeper one, keeps its name.
-  const auto rank = [&](int node) { return std::make_pair(at_nodes_[node].size(), radii_[node]); };
+  const auto rank = [&](NodeIndex node) { return std::make_pair(at_nodes_[node].size(), radii_[node]); };
   const bool is_tail_kept = rank(gone.tail) > rank(gone.head);
   skeleton_ = merged(merge.bone, merge.place);
   if (is_tail_kept) std::swap(skeleton_.nodes[gone.head].name, skeleton_.nodes[gone.tail].name);
@@ -285,7 +285,7 @@ void Repair::merge_at(const Merge& merge) {
 }
 
 /// Takes away a bone with a free end, and its end: one at the bone if there is, else the shortest.
-bool Repair::drop_free_end(int bone) {
+bool Repair::drop_free_end(BoneIndex bone) {
   if (skeleton_.bones.size() < 2) return false;
   int shortest = -1;
   bool is_near = false;
@@ -300,7 +300,7 @@ bool Repair::drop_free_end(int bone) {
   }
   if (shortest < 0) return false;
   const Bone gone = skeleton_.bones[shortest];
-  const int node = at_nodes_[gone.head].size() == 1 ? gone.head : gone.tail;
+  const NodeIndex node = at_nodes_[gone.head].size() == 1 ? gone.head : gone.tail;
   skeleton_.bones.erase(skeleton_.bones.begin() + shortest);
   remove_node(node);
   prepare();
@@ -308,7 +308,7 @@ bool Repair::drop_free_end(int bone) {
 }
 
 /// Where a bone is part of a limb, takes away what lies beyond it: planes at one end only do not cross.
-bool Repair::drop_beyond(int bone) {
+bool Repair::drop_beyond(BoneIndex bone) {
   for (SkeletonLimb limb : find_limbs(skeleton_)) {
     const auto at = std::find(limb.bones.begin(), limb.bones.end(), bone);
     if (at == limb.bones.end() || at + 1 == limb.bones.end()) continue;
@@ -321,7 +321,7 @@ bool Repair::drop_beyond(int bone) {
   return false;
 }
 
-bool Repair::contract(int bone) {
+bool Repair::contract(BoneIndex bone) {
   Merge best;
   const auto try_bone = [&](int b) {
     const bool is_end =
@@ -332,7 +332,7 @@ bool Repair::contract(int bone) {
   if (skeleton_.bones.size() > 1) try_bone(bone);
   if (best.bone < 0 && drop_beyond(bone)) return true;
   if (best.bone < 0)
-    for (const int node : {skeleton_.bones[bone].head, skeleton_.bones[bone].tail})
+    for (const NodeIndex node : {skeleton_.bones[bone].head, skeleton_.bones[bone].tail})
       for (const BoneAtNode& at : at_nodes_[node])
         if (at.bone != bone) try_bone(at.bone);
   if (best.bone < 0) return drop_free_end(bone);
@@ -358,10 +358,10 @@ bool Repair::try_skeleton(Skeleton changed, std::vector<double> radii) {
   return false;
 }
 
-bool Repair::split(int bone, const Vec3& place, const std::string& name) {
+bool Repair::split(BoneIndex bone, const Vec3& place, const std::string& name) {
   constexpr double kShortestPart = 0.3;  // radii of the body
   Skeleton changed = skeleton_;
-  const int node = static_cast<int>(changed.nodes.size());
+  const NodeIndex node = static_cast<int>(changed.nodes.size());
   changed.nodes.push_back({name, place});
   changed.bones[bone].s.reset();
   Bone part = changed.bones[bone];
@@ -369,12 +369,12 @@ bool Repair::split(int bone, const Vec3& place, const std::string& name) {
   changed.bones.push_back(std::move(part));
   std::vector<double> radii = radii_;
   radii.push_back(surface_.radius(place));
-  for (const int b : {bone, static_cast<int>(changed.bones.size()) - 1})
+  for (const BoneIndex b : {bone, BoneIndex(static_cast<int>(changed.bones.size()) - 1)})
     if (bone_length(changed, b) < kShortestPart * radii.back()) return false;
   return try_skeleton(std::move(changed), std::move(radii));
 }
 
-bool Repair::straighten(int node) {
+bool Repair::straighten(NodeIndex node) {
   const std::vector<BoneAtNode>& at = at_nodes_[node];
   if (at.size() != 2) return false;
   const int from = end_node(skeleton_, at[0].bone, opposite(at[0].end)),
@@ -402,10 +402,10 @@ void Repair::thin_out() {
 
 void Repair::move_back() {
   constexpr int kRounds = 3;
-  const auto is_fine_at = [&](int node, const Vec3& place) {
+  const auto is_fine_at = [&](NodeIndex node, const Vec3& place) {
     if (surface_.is_between(skeleton_.nodes[node].position, place)) return false;
     const Vec3 before = std::exchange(skeleton_.nodes[node].position, place);
-    const std::vector<int> bones = bones_around({node});
+    const std::vector<BoneIndex> bones = bones_around({node});
     const bool is_fine =
         is_placed_well(skeleton_, node, 0.25 * radii_[node]) && std::all_of(bones.begin(), bones.end(), [&](int b) {
           return margin_of_bone(surface_.mesh, surface_.tree, skeleton_, at_nodes_, b, kFinalAngles).margin >=
@@ -415,7 +415,7 @@ void Repair::move_back() {
     return is_fine;
   };
   for (int round = 0; round < kRounds; ++round)
-    for (int node = 0; node < static_cast<int>(skeleton_.nodes.size()); ++node) {
+    for (NodeIndex node = 0; node < static_cast<int>(skeleton_.nodes.size()); ++node) {
       const auto place = original_places_.find(skeleton_.nodes[node].name);
       if (place == original_places_.end()) continue;
       const Vec3 from = skeleton_.nodes[node].position;

@@ -36,17 +36,17 @@ class Repair {
   /// \return whether all margins are enough now, or so nearly that the segmentation may accept them
   bool run(bool may_contract = true);
   /// Moves a node to a place near by that costs little, whatever the margins are: for what the margins do not see.
-  void shake(int node);
+  void shake(NodeIndex node);
   /// Takes a bone away: its ends become one node, or an end between two bones is left out. Where that is not possible,
   /// a bone next to it, else a free end.
   /// \return whether a bone went
-  bool contract(int bone);
+  bool contract(BoneIndex bone);
   /// Puts a new node on a bone, unless margins would not be enough any more. Both parts of the bone have its name.
   /// \return whether it was put there
-  bool split(int bone, const Vec3& place, const std::string& name);
+  bool split(BoneIndex bone, const Vec3& place, const std::string& name);
   /// Takes a node between two bones away, which become one, unless margins would not be enough any more.
   /// \return whether it went
-  bool straighten(int node);
+  bool straighten(NodeIndex node);
   /// Takes the bones of a limb away, and its nodes but the first.
   void drop(const SkeletonLimb& limb);
   /// The bone whose loss does the least to margins and shape.
@@ -75,32 +75,32 @@ class Repair {
   static constexpr int kFinalAngles = 32;      ///< to accept
   static constexpr double kNoLimit = std::numeric_limits<double>::infinity();
   struct Merge {
-    int bone = -1;
+    BoneIndex bone;
     Vec3 place = Vec3::Zero();
     double cost = 0;
   };
   void prepare();
-  std::vector<int> bones_around(const std::vector<int>& nodes) const;
+  std::vector<BoneIndex> bones_around(const std::vector<NodeIndex>& nodes) const;
   double cost(const Skeleton& skeleton, const std::vector<std::vector<BoneAtNode>>& at_nodes,
-              const std::vector<int>& bones, double limit) const;
-  bool is_placed_well(const Skeleton& skeleton, int node, double least_radius) const;
-  double displacement_cost(const Skeleton& skeleton, int node) const;
+              const std::vector<BoneIndex>& bones, double limit) const;
+  bool is_placed_well(const Skeleton& skeleton, NodeIndex node, double least_radius) const;
+  double displacement_cost(const Skeleton& skeleton, NodeIndex node) const;
   double total_cost() const;
   std::vector<Vec3> gradient() const;
   void descend(int steps);
-  bool merge_near(int bone);
-  bool move_node(int node, double step, int trials);
-  bool improve(int bone);
+  bool merge_near(BoneIndex bone);
+  bool move_node(NodeIndex node, double step, int trials);
+  bool improve(BoneIndex bone);
   int worst_bone() const;
-  std::vector<Vec3> merge_places(int bone);
-  bool try_merge(int bone, const Vec3& place, Merge& best) const;
-  Skeleton merged(int bone, const Vec3& place) const;
-  bool is_ring_kept(int bone) const;
-  void remove_node(int node);
+  std::vector<Vec3> merge_places(BoneIndex bone);
+  bool try_merge(BoneIndex bone, const Vec3& place, Merge& best) const;
+  Skeleton merged(BoneIndex bone, const Vec3& place) const;
+  bool is_ring_kept(BoneIndex bone) const;
+  void remove_node(NodeIndex node);
   void merge_at(const Merge& merge);
   bool try_skeleton(Skeleton changed, std::vector<double> radii);
-  bool drop_free_end(int bone);
-  bool drop_beyond(int bone);
+  bool drop_free_end(BoneIndex bone);
+  bool drop_beyond(BoneIndex bone);
   double length_of(const SkeletonLimb& limb) const;
   bool is_minor(const SkeletonLimb& limb) const;
   double cost_without(int hub, const std::set<int>& gone) const;

@@ -21,7 +21,7 @@ constexpr double kReach = 0.06;  // diagonals beside the ball around a bone
 
 /// The nearest bone, and the place on it.
 struct OnBone {
-  int bone = -1;
+  BoneIndex bone;
   Vec3 place = Vec3::Zero();
   double distance = std::numeric_limits<double>::infinity();
 };
@@ -44,7 +44,7 @@ bool is_near(const Surface& surface, const Vec3& place, const Vec3& on_bone) {
 }
 
 /// The length of a bone that lies near the bones of another skeleton.
-double followed_length(const Surface& surface, const Skeleton& skeleton, int bone, const Skeleton& other) {
+double followed_length(const Surface& surface, const Skeleton& skeleton, BoneIndex bone, const Skeleton& other) {
   const Vec3 &head = end_position(skeleton, bone, BoneEnd::kHead), &tail = end_position(skeleton, bone, BoneEnd::kTail);
   int followed = 0;
   for (int i = 0; i < kSamples; ++i) {

@@ -66,7 +66,7 @@ void set_sizes(CompactModel& compact, const SkeletexModel& model, int size) {
 
 /// Poles from the source's end rows.
 void set_poles(CompactModel& compact, const SeparationPlanes& separation, const SourceSurface& source) {
-  for (int bone = 0; bone < static_cast<int>(compact.patches.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(compact.patches.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
       if (!separation.is_free(bone, end)) continue;
       const SourcePatch& patch = source.patches[bone];
@@ -87,7 +87,7 @@ void encode_patches(CompactModel& compact, const SeparationPlanes& separation, c
   const std::vector<std::array<PatchEnd, 2>> ends = ends_of(compact);
   const SeamCurves seams = decode_seams(compact, separation, 0);
   for_each_block(compact.patches.size(), 1, [&](std::size_t block, std::size_t, std::size_t) {
-    const int bone = static_cast<int>(block);
+    const BoneIndex bone = static_cast<int>(block);
     const std::array<bool, 2> has_pole{ends[bone][0].arcs.empty(), ends[bone][1].arcs.empty()};
     const EndRow row = [&](BoneEnd end, int columns) {
       return end_row(compact, separation, ends, seams, bone, end, columns);

@@ -50,7 +50,7 @@ std::vector<Source> sources_of(const SkeletexModel& model, int steps) {
 /// Values at places of a patch, in steps.
 class PatchValues {
  public:
-  PatchValues(const SkeletexModel& model, const Source& source, int bone)
+  PatchValues(const SkeletexModel& model, const Source& source, BoneIndex bone)
       : source_(source), rectangle_(model.patches[bone].rectangle), width_(model.texture.width) {}
 
   std::vector<std::vector<double>> at(const std::vector<Place>& places) const {

@@ -18,9 +18,9 @@ struct Traced {
 
 class PatchEncoder {
  public:
-  PatchEncoder(CompactModel& compact, const SeparationPlanes& separation, int bone, const std::array<bool, 2>& has_pole,
-               const EndRow& end_row, const SourcePatch& source, const ResidualOptions& options,
-               const std::vector<Place>& fixed_places)
+  PatchEncoder(CompactModel& compact, const SeparationPlanes& separation, BoneIndex bone,
+               const std::array<bool, 2>& has_pole, const EndRow& end_row, const SourcePatch& source,
+               const ResidualOptions& options, const std::vector<Place>& fixed_places)
       : compact_(compact),
         patch_(compact.patches[bone]),
         separation_(separation),
@@ -350,7 +350,7 @@ class PatchEncoder {
 
 }  // namespace
 
-void encode_patch(CompactModel& compact, const SeparationPlanes& separation, int bone,
+void encode_patch(CompactModel& compact, const SeparationPlanes& separation, BoneIndex bone,
                   const std::array<bool, 2>& has_pole, const EndRow& end_row, const SourcePatch& source,
                   const ResidualOptions& options, const std::vector<Place>& fixed_places, std::vector<Place>* places) {
   PatchEncoder(compact, separation, bone, has_pole, end_row, source, options, fixed_places).run(places);

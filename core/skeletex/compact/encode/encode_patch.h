@@ -23,7 +23,7 @@ struct ResidualOptions {
 /// \param compact  its skeleton, steps, weights and the patch's sizes and poles are set
 /// \param fixed_places  shares of the rows and columns around which points are stored at their home places
 /// \param places  where the points of the finest grid were read; null: not wanted
-void encode_patch(CompactModel& compact, const SeparationPlanes& separation, int bone,
+void encode_patch(CompactModel& compact, const SeparationPlanes& separation, BoneIndex bone,
                   const std::array<bool, 2>& has_pole, const EndRow& end_row, const SourcePatch& source,
                   const ResidualOptions& options, const std::vector<Place>& fixed_places, std::vector<Place>* places);
 

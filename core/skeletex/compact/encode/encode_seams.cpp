@@ -103,7 +103,7 @@ void encode_seams(CompactModel& compact, const SeparationPlanes& separation, con
   std::vector<Vec3> corners;
   for (std::size_t i = 0; i < compact.corners.size(); ++i) {
     CompactCorner& corner = compact.corners[i];
-    const int bone = corner.bones[0];
+    const BoneIndex bone = corner.bones[0];
     const BoneEnd end = end_at(compact.skeleton, bone, corner.node);
     const Vec3& point = source.corners[i];
     corner.turn =

@@ -35,7 +35,7 @@ std::vector<Intersections> intersections_by_patch(ClContext& context, const Comp
   for (const auto& [first, second] : find_self_intersections(mesh)) {
     ++result[bones[first]].pairs;
     if (bones[second] != bones[first]) ++result[bones[second]].pairs;
-    for (const int triangle : {first, second}) {
+    for (const TriangleIndex triangle : {first, second}) {
       const auto& [row, column] = coordinates[3 * static_cast<std::size_t>(triangle)];
       result[bones[triangle]].places.emplace_back(row, column);
     }

@@ -29,7 +29,7 @@ SourceSurface source_surface(ClContext& context, const PreparedModel& prepared) 
   const Lattice& lattice = prepared.lattice;
   const std::vector<Vec3> positions = lattice_positions(context, prepared);
   SourceSurface source;
-  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(model.patches.size()); ++bone) {
     const Rectangle& r = model.patches[bone].rectangle;
     SourcePatch& patch = source.patches.emplace_back();
     patch.rows = r.height;
@@ -43,7 +43,7 @@ SourceSurface source_surface(ClContext& context, const PreparedModel& prepared) 
       }
       const EndSeam seam = end_seam(model, prepared.separation, lattice, positions, bone, end);
       std::vector<Vec3> points;
-      for (const int vertex : seam.ring.vertices) points.push_back(positions[vertex]);
+      for (const VertexIndex vertex : seam.ring.vertices) points.push_back(positions[vertex]);
       const std::vector<Vec3> row = points_at_columns(points, seam.turns, r.width);
       patch.points.insert(patch.points.end(), row.begin(), row.end());
     };

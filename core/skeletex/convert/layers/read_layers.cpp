@@ -48,7 +48,7 @@ class SurfaceNormals {
   }
 
  private:
-  Vec3 in_triangle(int triangle, const Eigen::Vector3f& weights) const {
+  Vec3 in_triangle(TriangleIndex triangle, const Eigen::Vector3f& weights) const {
     const Triangle& corners = normals_.of(mesh_, triangle);
     Vec3 normal = Vec3::Zero();
     for (int k = 0; k < 3; ++k) normal += static_cast<double>(weights[k]) * normals_.values[corners[k]];

@@ -23,7 +23,7 @@ struct RowPoints {
 
   /// Half the cross product of the lattice's steps along and around: against the outward normal, with the area of a
   /// cell. Zero at poles.
-  Vec3 inward(const Patch& patch, int bone, int row, int column) const {
+  Vec3 inward(const Patch& patch, BoneIndex bone, int row, int column) const {
     const Rectangle& r = patch.rectangle;
     const auto at = [&](int i, int j) { return points[first[bone] + i * r.width + (j + r.width) % r.width]; };
     const int before = std::max(row - 1, 0), after = std::min(row + 1, r.height - 1);
@@ -46,13 +46,13 @@ RowPoints points_of_rows(ClContext& context, const PreparedModel& prepared) {
 
 }  // namespace
 
-SurfacePoint nearest_in_triangle(const TriangleMesh& mesh, int triangle, const Vec3& p) {
+SurfacePoint nearest_in_triangle(const TriangleMesh& mesh, TriangleIndex triangle, const Vec3& p) {
   const Triangle& t = mesh.triangles[triangle];
   return point_in_triangle(
       mesh, triangle, p - offset_from_triangle(p, mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]));
 }
 
-SurfacePoint point_in_triangle(const TriangleMesh& mesh, int triangle, const Vec3& nearest) {
+SurfacePoint point_in_triangle(const TriangleMesh& mesh, TriangleIndex triangle, const Vec3& nearest) {
   const Triangle& t = mesh.triangles[triangle];
   const Vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
   const Vec3 normal = (b - a).cross(c - a);
@@ -77,7 +77,7 @@ std::vector<SurfacePoint> find_surface_points(ClContext& context, const Triangle
   for_each_block(points.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const auto looks_away = [&](int t) { return area_vector(mesh, mesh.triangles[t]).dot(probes[i].outward) < 0; };
-      int triangle = nearest[i];
+      TriangleIndex triangle = nearest[i];
       if (looks_away(triangle)) {
         const NearestTriangle other =
             find_nearest_triangle(mesh, tree, points[i], probes[i].reach, [&](int t) { return !looks_away(t); });

@@ -11,14 +11,14 @@ namespace skeletex {
 
 /// A point of a mesh: a triangle and the weights of its corners, which add up to 1.
 struct SurfacePoint {
-  int triangle = -1;
+  TriangleIndex triangle;
   Eigen::Vector3f weights = Eigen::Vector3f::Zero();
 };
 
 /// The point of a triangle that is nearest to p.
-SurfacePoint nearest_in_triangle(const TriangleMesh& mesh, int triangle, const Vec3& p);
+SurfacePoint nearest_in_triangle(const TriangleMesh& mesh, TriangleIndex triangle, const Vec3& p);
 /// The weights of a point of a triangle.
-SurfacePoint point_in_triangle(const TriangleMesh& mesh, int triangle, const Vec3& point);
+SurfacePoint point_in_triangle(const TriangleMesh& mesh, TriangleIndex triangle, const Vec3& point);
 
 /// Points to look for on a mesh, and what their surroundings are like.
 struct Probe {

@@ -10,7 +10,7 @@ constexpr int kRows = 257, kColumns = 64;
 
 /// The points of one column. A ray that misses repeats the point before it, and adds no length; those before the first
 /// hit repeat that.
-void place_column(const Skeleton& skeleton, const SeparationPlanes& separation, int bone, const Patch& probe,
+void place_column(const Skeleton& skeleton, const SeparationPlanes& separation, BoneIndex bone, const Patch& probe,
                   const SpdHits& hits, int column, std::vector<Vec3>& points) {
   int last_hit = -1;
   for (int row = 0; row < kRows; ++row) {

@@ -134,7 +134,7 @@ RowProfile row_profile(const Chart& chart) {
     std::array<Corner, 3> c;
     int pole = -1;
     for (int k = 0; k < 3; ++k) {
-      const int vertex = chart.triangles[t][k];
+      const VertexIndex vertex = chart.triangles[t][k];
       c[k] = {chart.u[vertex], chart.v[vertex] + chart.turns[t][k], chart.positions[vertex]};
       if (is_pole(chart.kinds[vertex])) pole = k;
     }

@@ -57,7 +57,7 @@ std::vector<BoneDistance> summarize(const Samples& samples, std::vector<float> d
 /// The distance of a point from the nearer one of two triangles that follow each other.
 double distance_from_quad(const TriangleMesh& mesh, int first, const Vec3& point) {
   double least = std::numeric_limits<double>::infinity();
-  for (const int triangle : {first, first + 1}) {
+  for (const TriangleIndex triangle : {first, first + 1}) {
     const auto& [a, b, c] = mesh.triangles[triangle];
     least =
         std::min(least, offset_from_triangle(point, mesh.positions[a], mesh.positions[b], mesh.positions[c]).norm());
@@ -112,7 +112,7 @@ std::vector<BoneDistance> distances_to_surface(ClContext& context, const Skelete
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone) {
     const Rectangle& r = model.patches[bone].rectangle;
     const int first = 2 * lattice.first_quad[bone], end = first + 2 * r.width * (r.height - 3);
-    for (int triangle = first; triangle < end; ++triangle) {
+    for (TriangleIndex triangle = first; triangle < end; ++triangle) {
       const auto& [a, b, c] = mesh.triangles[triangle];
       samples.add_middle(mesh.positions[a], mesh.positions[b], mesh.positions[c]);
     }

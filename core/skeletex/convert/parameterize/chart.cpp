@@ -59,7 +59,7 @@ Row make_row(const BoundaryLoop& loop, const Segment& segment, const Skeleton& s
   return row;
 }
 
-int index_of(const Triangle& t, int vertex) {
+int index_of(const Triangle& t, VertexIndex vertex) {
   return t[0] == vertex ? 0 : t[1] == vertex ? 1 : t[2] == vertex ? 2 : -1;
 }
 
@@ -247,7 +247,7 @@ class Unroller {
 
   /// Calls `visit` with the half-edges out of a vertex, counter-clockwise; at a boundary from its first to its last.
   template <class Visit>
-  void visit_fan(int vertex, const Visit& visit) const {
+  void visit_fan(VertexIndex vertex, const Visit& visit) const {
     int h = first_[vertex];
     do {
       visit(h);
@@ -310,7 +310,7 @@ class Unroller {
   void raise_left_side(const std::vector<int>& path) {
     const int count = static_cast<int>(path.size());
     for (int k = 0; k < count; ++k) {
-      const int vertex = path[k];
+      const VertexIndex vertex = path[k];
       if (is_pole(chart_.kinds[vertex])) continue;
       const int before = k > 0 ? path[k - 1] : -1, after = k + 1 < count ? path[k + 1] : -1;
       visit_fan(vertex, [&](int h) { ++chart_.turns[h / 3][h % 3]; });

@@ -24,7 +24,7 @@ inline bool is_pole(ChartVertex kind) { return kind == ChartVertex::kHeadPole ||
 /// are continuous (corners at a pole have no v: the pole's triangle covers the trapezoid over its opposite edge).
 /// For an outward surface the lifted triangles are clockwise in (u, v), that is, counter-clockwise in (v, u).
 struct Chart {
-  int bone = -1;
+  BoneIndex bone;
   SegmentTopology topology = SegmentTopology::kAnnulus;
   std::vector<Vec3> positions;  ///< the segment's vertices first, then poles and the midpoints of split chords
   std::vector<Triangle> triangles;

@@ -95,7 +95,7 @@ struct Lists {
 
 /// Calls visit(j) for every one of `count` angles j / count that a triangle covers.
 template <class Visit>
-void for_each_angle(const LocalTriangles& local, int triangle, int count, Visit&& visit) {
+void for_each_angle(const LocalTriangles& local, TriangleIndex triangle, int count, Visit&& visit) {
   // Slack for the rounding of angles in single precision, here and on the device.
   constexpr double kSlack = 4e-7;
   int first = 0, last = count - 1;
@@ -146,7 +146,8 @@ struct RayTables {
   std::vector<int> column_patches, row_guesses;
   int texels = 0, tallest = 0;
 
-  void add(const Skeleton& skeleton, const SeparationPlanes& separation, int bone, const Patch& patch, double extent) {
+  void add(const Skeleton& skeleton, const SeparationPlanes& separation, BoneIndex bone, const Patch& patch,
+           double extent) {
     const int width = patch.rectangle.width, height = patch.rectangle.height;
     const bool is_head_free = separation.is_free(bone, BoneEnd::kHead),
                is_tail_free = separation.is_free(bone, BoneEnd::kTail);
@@ -178,7 +179,7 @@ struct RayTables {
 
 /// Whether the ray from the bone's axis to a triangle's centre meets another triangle first, or there is no such ray.
 bool is_hidden(const Skeleton& skeleton, const SeparationPlanes& separation, const TriangleMesh& mesh,
-               const TriangleTree& tree, int bone, int t) {
+               const TriangleTree& tree, BoneIndex bone, int t) {
   const Triangle& triangle = mesh.triangles[t];
   const Vec3 centre = (mesh.positions[triangle[0]] + mesh.positions[triangle[1]] + mesh.positions[triangle[2]]) / 3;
   const double u = spd_coordinates(skeleton, separation, bone, centre).u;
@@ -260,7 +261,7 @@ std::vector<double> unseen_area_fractions(const Skeleton& skeleton, const Separa
   return fractions;
 }
 
-SpdCoordinates spd_coordinates(const Skeleton& skeleton, const SeparationPlanes& separation, int bone,
+SpdCoordinates spd_coordinates(const Skeleton& skeleton, const SeparationPlanes& separation, BoneIndex bone,
                                const Vec3& point) {
   const BoneBasis& basis = separation.bases()[bone];
   const Vec3 offset = point - end_position(skeleton, bone, BoneEnd::kHead);

@@ -36,7 +36,7 @@ std::vector<double> unseen_area_fractions(const Skeleton& skeleton, const Separa
 struct SpdCoordinates {
   double u = 0, turn = 0;
 };
-SpdCoordinates spd_coordinates(const Skeleton& skeleton, const SeparationPlanes& separation, int bone,
+SpdCoordinates spd_coordinates(const Skeleton& skeleton, const SeparationPlanes& separation, BoneIndex bone,
                                const Vec3& point);
 
 }  // namespace skeletex

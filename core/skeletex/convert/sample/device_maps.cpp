@@ -54,7 +54,7 @@ void append_vertices(const Chart& chart, const Vec3& origin, HostMaps& maps) {
 
 /// \param first  the number of the chart's first triangle
 /// \param base   of its first vertex
-void set_triangle(const Chart& chart, int patch, std::size_t triangle, int first, int base, HostMaps& maps) {
+void set_triangle(const Chart& chart, PatchIndex patch, std::size_t triangle, int first, int base, HostMaps& maps) {
   const auto value = [&](int plane) -> int& { return maps.triangles[plane * maps.triangle_count + first + triangle]; };
   const Triangle& vertices = chart.triangles[triangle];
   int pole = -1;

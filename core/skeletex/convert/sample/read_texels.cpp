@@ -45,7 +45,7 @@ std::vector<int> known_places(const std::vector<float>& values, int line_begin, 
 int fill_missed(const SpdHits& hits, const Rectangle& r, std::vector<float>& distances) {
   distances = hits.distances;
   int missed = 0;
-  for (int texel = r.width; texel < (r.height - 1) * r.width; ++texel)
+  for (TexelIndex texel = r.width; texel < (r.height - 1) * r.width; ++texel)
     if (hits.triangles[texel] < 0) {
       distances[texel] = -1;
       ++missed;
@@ -356,7 +356,7 @@ DevicePlanes encode_points(const TexelStage& stage, const DevicePlanes& points) 
 void report_read(const TexelStage& stage, const ReadTexels& regular, const ReadTexels& placed, TexelReport& report) {
   std::vector<char> is_read(stage.maps.sizes.triangle_count, 0);
   for (const ClBuffer<int>& triangles : {regular.map_triangles, placed.map_triangles})
-    for (const int triangle : stage.context.download(triangles))
+    for (const TriangleIndex triangle : stage.context.download(triangles))
       if (triangle != kNoTriangle) is_read[triangle] = 1;
   for (std::size_t bone = 0; bone < stage.sources.patches.size(); ++bone) {
     const int begin = stage.maps.first_triangle[bone], end = stage.maps.first_triangle[bone + 1];

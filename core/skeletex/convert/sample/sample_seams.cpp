@@ -99,17 +99,17 @@ class SeamSampler {
   }
 
  private:
-  SeamSample sample_of(int bone, int node, const Vec3& point) const {
+  SeamSample sample_of(BoneIndex bone, NodeIndex node, const Vec3& point) const {
     return {separation_.turn_of(bone, point - skeleton_.nodes[node].position),
             separation_.half_line_distance(bone, end_at(skeleton_, bone, node), point)};
   }
 
   /// The corner at an arc's end, with the arc's bones.
-  int corner_of(const Arc& arc, int vertex) {
+  int corner_of(const Arc& arc, VertexIndex vertex) {
     const auto [it, is_new] = corner_of_vertex_.emplace(vertex, static_cast<int>(seams_.corners.size()));
     if (is_new) seams_.corners.push_back({arc.node, {}, {}});
-    std::vector<int>& bones = seams_.corners[it->second].bones;
-    for (const int bone : arc.bones)
+    std::vector<BoneIndex>& bones = seams_.corners[it->second].bones;
+    for (const BoneIndex bone : arc.bones)
       if (std::find(bones.begin(), bones.end(), bone) == bones.end()) bones.push_back(bone);
     return it->second;
   }
@@ -118,7 +118,7 @@ class SeamSampler {
   int interval_count(const Arc& arc, const Polyline& line) const {
     const Vec3& node = skeleton_.nodes[arc.node].position;
     double columns = 0;
-    for (const int bone : arc.bones) {
+    for (const BoneIndex bone : arc.bones) {
       double turning = 0;
       for (std::size_t i = 1; i < line.points.size(); ++i)
         turning += shortest_turn(separation_.turn_of(bone, line.points[i] - node) -
@@ -130,7 +130,7 @@ class SeamSampler {
 
   void add_samples(const Arc& arc, SeamArc& seam) const {
     Polyline line{{}, {0}};
-    for (const int vertex : arc.vertices) line.points.push_back(segmentation_.cut_mesh.positions[vertex]);
+    for (const VertexIndex vertex : arc.vertices) line.points.push_back(segmentation_.cut_mesh.positions[vertex]);
     if (arc.is_closed) line.points.push_back(line.points.front());
     for (std::size_t i = 1; i < line.points.size(); ++i)
       line.lengths.push_back(line.lengths.back() + (line.points[i] - line.points[i - 1]).norm());
@@ -168,7 +168,7 @@ std::vector<Vec3> points_on_loop(const Segment& segment, const Skeleton& skeleto
   const Vec3& node = end_position(skeleton, segment.bone, end);
   std::vector<Vec3> points;
   std::vector<double> angles;
-  for (const int vertex : loop) {
+  for (const VertexIndex vertex : loop) {
     points.push_back(segment.mesh.positions[vertex]);
     angles.push_back(separation.turn_of(segment.bone, points.back() - node));
   }

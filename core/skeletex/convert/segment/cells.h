@@ -19,7 +19,7 @@ struct Cell {
 /// lies in the cell c with the largest (x - node) . direction_c + offset_c. Cells are ordered by direction, so that
 /// neither order nor offsets depend on how bones and nodes are numbered.
 struct NodeCells {
-  int node = -1;
+  NodeIndex node;
   Vec3 position;
   std::vector<Cell> cells;
 

@@ -121,7 +121,7 @@ int first_crossing(const SeparationNetwork& network, const CutMesh& mesh, const 
 
 /// A corner of a convex piece of a triangle.
 struct PieceCorner {
-  int vertex;
+  VertexIndex vertex;
   Barycentric weights;
 };
 
@@ -201,7 +201,7 @@ class TriangleDivider {
 
   void divide(const MixedTriangle& mixed);
   void list_plane_sides(const MixedTriangle& mixed);
-  void list_own_sides(int triangle);
+  void list_own_sides(TriangleIndex triangle);
   std::vector<int> take_polygon(int seed);
   void add_pieces(const MixedTriangle& mixed, const std::vector<int>& polygon);
   void link(int half_edge, int opposite) {
@@ -211,7 +211,7 @@ class TriangleDivider {
   void link_plane(int half_edge, int local);
   void link_diagonal(int half_edge, int from, int to);
   void link_edges();
-  void add_corner(int vertex, const Barycentric& weights) {
+  void add_corner(VertexIndex vertex, const Barycentric& weights) {
     const auto known =
         std::find_if(corners_.begin(), corners_.end(), [&](const PieceCorner& c) { return c.vertex == vertex; });
     if (known == corners_.end()) corners_.push_back({vertex, weights});
@@ -252,7 +252,7 @@ void TriangleDivider::list_plane_sides(const MixedTriangle& mixed) {
 }
 
 /// The parts of the triangle's three sides, between kept points.
-void TriangleDivider::list_own_sides(int triangle) {
+void TriangleDivider::list_own_sides(TriangleIndex triangle) {
   int ring_size = 0;
   for (int c = 0; c < 3; ++c) ring_size += network_.edge(3 * triangle + c).point_count;
   int region = 0;

@@ -21,7 +21,7 @@ namespace {
 
 /// Which bone's side of which node's separation planes a half-edge runs along.
 struct SeamSide {
-  int node;
+  NodeIndex node;
   BoneAtNode bone;
 };
 
@@ -51,10 +51,10 @@ class Segmenter {
   }
 
  private:
-  const std::string& bone_name(int bone) const { return skeleton_.bones[bone].name; }
-  const std::string& node_name(int node) const { return skeleton_.nodes[node].name; }
+  const std::string& bone_name(BoneIndex bone) const { return skeleton_.bones[bone].name; }
+  const std::string& node_name(NodeIndex node) const { return skeleton_.nodes[node].name; }
   const SeamSide& side(int half_edge) const { return sides_[mesh_.seams[half_edge]]; }
-  const Vec3& position(int vertex) const { return mesh_.positions[vertex]; }
+  const Vec3& position(VertexIndex vertex) const { return mesh_.positions[vertex]; }
 
   /// A part of the surface between separation planes.
   struct Component {
@@ -69,17 +69,17 @@ class Segmenter {
   void assign_components();
   void find_loops();
   HalfEdgeLoop trace_loop(int start);
-  void check_loops(int bone, BoneEnd end, bool is_wanted) const;
+  void check_loops(BoneIndex bone, BoneEnd end, bool is_wanted) const;
   void build_arcs();
-  bool turn_to_first_corner(int bone, int node, std::vector<int>& ring) const;
-  void add_arc(int bone, BoneEnd end, bool has_corners, std::span<const int> half_edges);
+  bool turn_to_first_corner(BoneIndex bone, NodeIndex node, std::vector<int>& ring) const;
+  void add_arc(BoneIndex bone, BoneEnd end, bool has_corners, std::span<const int> half_edges);
   void build_segments();
   void add_triangles(const std::vector<int>& triangles, Segment& segment);
   void add_boundary(BoneEnd end, Segment& segment) const;
   void check_topology(const Segment& segment) const;
-  [[noreturn]] void throw_crossing(int node, const CutOutcome& outcome) const;
+  [[noreturn]] void throw_crossing(NodeIndex node, const CutOutcome& outcome) const;
   [[noreturn]] void throw_run_over(int first, int second) const;
-  double turn(int bone, int node, int vertex) const {
+  double turn(BoneIndex bone, NodeIndex node, VertexIndex vertex) const {
     return separation_.turn_of(bone, position(vertex) - skeleton_.nodes[node].position);
   }
 
@@ -99,14 +99,14 @@ class Segmenter {
   Segmentation result_;
 };
 
-void Segmenter::throw_crossing(int node, const CutOutcome& outcome) const {
+void Segmenter::throw_crossing(NodeIndex node, const CutOutcome& outcome) const {
   const int other = side(outcome.crossed_half_edge).node;
   int between = -1;
   for (int b = 0; b < static_cast<int>(skeleton_.bones.size()); ++b)
     if ((skeleton_.bones[b].head == node && skeleton_.bones[b].tail == other) ||
         (skeleton_.bones[b].head == other && skeleton_.bones[b].tail == node))
       between = b;
-  const int bone = between >= 0 ? between : side(outcome.crossed_half_edge).bone.bone;
+  const BoneIndex bone = between >= 0 ? BoneIndex(between) : side(outcome.crossed_half_edge).bone.bone;
   throw TopologyError(
       fmt::format("bone \"{}\": the separation planes at node \"{}\" and at node \"{}\" cross inside "
                   "the body, at {} on the surface; move the nodes apart, or turn the bones there so "
@@ -226,7 +226,7 @@ void Segmenter::assign_components() {
       throw TopologyError(
           fmt::format("a part of the mesh at {} belongs to no bone; join the mesh to one piece, or remove the part",
                       text_of(skeleton_, position(mesh_.origins[3 * component.first]))));
-    const int bone = component.seam < 0 ? 0 : side(component.seam).bone.bone;
+    const BoneIndex bone = component.seam < 0 ? BoneIndex(0) : side(component.seam).bone.bone;
     if (component_of_bone[bone] >= 0)
       throw TopologyError(fmt::format("bone \"{}\": its separation planes at node \"{}\" cut off a second piece of "
                                       "surface at {}; move the node so that they meet only the body around it",
@@ -257,7 +257,7 @@ void Segmenter::assign_components() {
 HalfEdgeLoop Segmenter::trace_loop(int start) {
   HalfEdgeLoop loop;
   const SeamSide& first = side(start);
-  const int bone = first.bone.bone;
+  const BoneIndex bone = first.bone.bone;
   int h = start;
   do {
     if (side(h).node != first.node)
@@ -282,9 +282,9 @@ HalfEdgeLoop Segmenter::trace_loop(int start) {
 }
 
 /// One boundary at an end that has neighbours, once around the bone.
-void Segmenter::check_loops(int bone, BoneEnd end, bool is_wanted) const {
+void Segmenter::check_loops(BoneIndex bone, BoneEnd end, bool is_wanted) const {
   const auto& loops = loops_[bone][static_cast<int>(end)];
-  const int node = end_node(skeleton_, bone, end);
+  const NodeIndex node = end_node(skeleton_, bone, end);
   if (is_wanted && loops.empty())
     throw TopologyError(fmt::format("bone \"{}\": its surface does not reach the separation planes of its node \"{}\" "
                                     "at {}; move the node, or lengthen the bone",
@@ -341,7 +341,7 @@ void Segmenter::find_loops() {
 /// Turns a loop so that it begins at the corner with the smallest angle; without corners at the vertex with the
 /// smallest angle.
 /// \return whether it has corners
-bool Segmenter::turn_to_first_corner(int bone, int node, std::vector<int>& ring) const {
+bool Segmenter::turn_to_first_corner(BoneIndex bone, NodeIndex node, std::vector<int>& ring) const {
   const auto is_corner = [&](int h) { return seam_degree_[mesh_.origins[h]] != 2; };
   const bool has_corners = std::any_of(ring.begin(), ring.end(), is_corner);
   const auto key = [&](int h) { return std::pair(has_corners && !is_corner(h), turn(bone, node, mesh_.origins[h])); };
@@ -351,10 +351,11 @@ bool Segmenter::turn_to_first_corner(int bone, int node, std::vector<int>& ring)
 }
 
 /// The arc of some half-edges of a loop, from corner to corner. The first of its bones adds it.
-void Segmenter::add_arc(int bone, BoneEnd end, bool has_corners, std::span<const int> half_edges) {
-  const int node = end_node(skeleton_, bone, end), other = side(mesh_.opposites[half_edges[0]]).bone.bone;
+void Segmenter::add_arc(BoneIndex bone, BoneEnd end, bool has_corners, std::span<const int> half_edges) {
+  const NodeIndex node = end_node(skeleton_, bone, end);
+  const BoneIndex other = side(mesh_.opposites[half_edges[0]]).bone.bone;
   for (const int h : half_edges)
-    if (const int changed = side(mesh_.opposites[h]).bone.bone; changed != other)
+    if (const BoneIndex changed = side(mesh_.opposites[h]).bone.bone; changed != other)
       throw TopologyError(fmt::format("bone \"{}\": its neighbour at node \"{}\" changes from \"{}\" to \"{}\" at {} "
                                       "without a corner; move the node",
                                       bone_name(bone), node_name(node), bone_name(other), bone_name(changed),
@@ -375,7 +376,7 @@ void Segmenter::add_arc(int bone, BoneEnd end, bool has_corners, std::span<const
 
 void Segmenter::build_arcs() {
   arc_of_.assign(mesh_.origins.size(), -1);
-  for (int bone = 0; bone < static_cast<int>(loops_.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(loops_.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
       auto& loops = loops_[bone][static_cast<int>(end)];
       if (loops.empty()) continue;
@@ -415,7 +416,7 @@ void Segmenter::add_boundary(BoneEnd end, Segment& segment) const {
   BoundaryLoop& loop = segment.loops[static_cast<int>(end)];
   for (const int h : loops[0].half_edges) {
     loop.vertices.push_back(local_[mesh_.origins[h]]);
-    const int arc = arc_of_[h];
+    const ArcIndex arc = arc_of_[h];
     if (loop.arcs.empty() || loop.arcs.back().arc != arc) loop.arcs.push_back({arc, false});
   }
   // Half-edges run with growing v at a head, against it at a tail; arcs with growing v of their first bone.

@@ -66,7 +66,7 @@ void SeparationNetwork::find_edge_points(DividedEdge& divided) {
 }
 
 /// Barycentric weights of a point in one of the triangles that it lies in.
-Barycentric SeparationNetwork::weights_in(int point, int triangle) const {
+Barycentric SeparationNetwork::weights_in(int point, TriangleIndex triangle) const {
   const NetworkPoint& p = points[point];
   if (p.triangle >= 0) return p.weights;
   for (int c = 0; c < 3; ++c) {
@@ -122,7 +122,7 @@ bool SeparationNetwork::split_at_repeated_cell(const Ring& ring, MixedTriangle& 
 }
 
 /// Where a third cell takes over first along the separation plane between the first two cells of a ring.
-NetworkPoint SeparationNetwork::end_of_first_plane(const Ring& ring, int triangle) const {
+NetworkPoint SeparationNetwork::end_of_first_plane(const Ring& ring, TriangleIndex triangle) const {
   const int i = ring.cells[0], j = ring.cells[1];
   const Barycentric start = weights_in(ring.points[0], triangle);
   Barycentric slope_ij;

@@ -17,9 +17,9 @@ using Barycentric = std::array<double, 3>;
 struct NetworkPoint {
   Vec3 position;
   std::array<int, 3> cells{-1, -1, -1};
-  Barycentric weights{};  ///< of a point on an edge: weights[0] is the parameter along the edge
-  int triangle = -1;      ///< of a point inside
-  int vertex = -1;        ///< once it is kept
+  Barycentric weights{};   ///< of a point on an edge: weights[0] is the parameter along the edge
+  TriangleIndex triangle;  ///< of a point inside
+  VertexIndex vertex;      ///< once it is kept
 };
 
 /// A piece of separation plane inside a triangle, from point to point, with the regions of the triangle on its two
@@ -39,7 +39,7 @@ struct DividedEdge {
 
 /// A triangle whose corners lie in different cells.
 struct MixedTriangle {
-  int triangle;
+  TriangleIndex triangle;
   int first_piece = 0, piece_count = 0;
   int region_count = 0;
   int first_merge = 0, merge_count = 0;  ///< pairs of regions that are one
@@ -54,7 +54,7 @@ class SeparationNetwork {
   /// The edge of a half-edge; it is added where the network does not meet it.
   DividedEdge& edge(int half_edge);
   /// Barycentric weights of a point in one of the triangles that it lies in.
-  Barycentric weights_in(int point, int triangle) const;
+  Barycentric weights_in(int point, TriangleIndex triangle) const;
   /// The component that a point lies in, by the smallest of its points.
   int component(int point) { return components_.find(point); }
 
@@ -73,13 +73,13 @@ class SeparationNetwork {
     /// Regions begin to end (cyclic), closed by a point.
     Ring part(int begin, int end, int closing_point) const;
   };
-  double value(int cell, int vertex) const { return node_.value(cell, mesh_.positions[vertex]); }
+  double value(int cell, VertexIndex vertex) const { return node_.value(cell, mesh_.positions[vertex]); }
   int edge_slot(int half_edge);
   void find_edge_points(DividedEdge& edge);
   void divide(MixedTriangle& triangle);
   void resolve(Ring ring, MixedTriangle& triangle);
   bool split_at_repeated_cell(const Ring& ring, MixedTriangle& triangle);
-  NetworkPoint end_of_first_plane(const Ring& ring, int triangle) const;
+  NetworkPoint end_of_first_plane(const Ring& ring, TriangleIndex triangle) const;
   void add_piece(const Ring& ring, int to, MixedTriangle& triangle);
 
   const CutMesh& mesh_;

@@ -40,7 +40,7 @@ constexpr std::array<std::array<double, 2>, 15> kPlaces{{{0, 0},
                                                          {0.2, 0.6},
                                                          {0.2, 0.2}}};
 
-std::array<Vec3, 3> corners_of(const TriangleMesh& mesh, int triangle) {
+std::array<Vec3, 3> corners_of(const TriangleMesh& mesh, TriangleIndex triangle) {
   const Triangle& t = mesh.triangles[triangle];
   return {mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]};
 }
@@ -61,7 +61,7 @@ struct Estimate {
   double distance = 0;  ///< infinite where not all corners are texels of VSM patches
   bool may_be_inverted = false;
 };
-Estimate estimate(const LatticeSurface& surface, const OriginalSurface& original, int triangle) {
+Estimate estimate(const LatticeSurface& surface, const OriginalSurface& original, TriangleIndex triangle) {
   const std::array<Vec3, 3> corners = corners_of(surface.mesh, triangle);
   const std::array<int, 3> read = surface.read_by(triangle, original);
   const Vec3 own = area_vector(corners);
@@ -105,21 +105,21 @@ NearestPoint find_nearest(const OriginalSurface& original, const std::array<int,
   return nearest;
 }
 
-NearestPoint find_nearest_to_middle(const LatticeSurface& surface, const OriginalSurface& original, int triangle,
-                                    double enough) {
+NearestPoint find_nearest_to_middle(const LatticeSurface& surface, const OriginalSurface& original,
+                                    TriangleIndex triangle, double enough) {
   const auto [a, b, c] = corners_of(surface.mesh, triangle);
   return find_nearest(original, surface.read_by(triangle, original), (a + b + c) / 3, enough);
 }
 
-bool is_inverted(const LatticeSurface& surface, int triangle, const NearestPoint& nearest) {
+bool is_inverted(const LatticeSurface& surface, TriangleIndex triangle, const NearestPoint& nearest) {
   return area_vector(corners_of(surface.mesh, triangle)).dot(nearest.normal) < 0;
 }
 
 /// The distance of the furthest of a triangle's sampled points but its middle.
 /// \param enough   distances up to it need not be exact
 /// \param at_most  nothing is looked for beyond it
-double furthest_place(const LatticeSurface& surface, const OriginalSurface& original, int triangle, double enough,
-                      double at_most) {
+double furthest_place(const LatticeSurface& surface, const OriginalSurface& original, TriangleIndex triangle,
+                      double enough, double at_most) {
   const auto [a, b, c] = corners_of(surface.mesh, triangle);
   const std::array<int, 3> read = surface.read_by(triangle, original);
   double furthest = 0;
@@ -188,10 +188,10 @@ OriginalSurface prepare_original(const TriangleMesh& mesh, const TriangleTree& t
   return original;
 }
 
-std::array<int, 3> LatticeSurface::read_by(int triangle, const OriginalSurface& original) const {
+std::array<int, 3> LatticeSurface::read_by(TriangleIndex triangle, const OriginalSurface& original) const {
   std::array<int, 3> read{-1, -1, -1};
   for (int k = 0; k < 3; ++k) {
-    const int vertex = mesh.triangles[triangle][k];
+    const VertexIndex vertex = mesh.triangles[triangle][k];
     if (!frame.is_inner(vertex)) continue;
     const int number = map_triangles[frame.texels[vertex]];
     if (number < static_cast<int>(original.map_triangles.size())) read[k] = number;
@@ -220,7 +220,7 @@ RegularGridFaults measure_regular_grid(const LatticeSurface& surface, const Orig
   std::vector<int> candidates;
   for (std::size_t i = 0; i < estimates.size(); ++i)
     if (estimates[i].may_be_inverted) candidates.push_back(static_cast<int>(i));
-  for (const int triangle : candidates)
+  for (const TriangleIndex triangle : candidates)
     if (is_inverted(surface, triangle, find_nearest_to_middle(surface, original, triangle, 0)))
       faults.inverted.push_back(triangle);
   return faults;
@@ -231,7 +231,7 @@ std::vector<MeasuredTriangle> measure_triangles(const LatticeSurface& surface, c
   std::vector<std::vector<MeasuredTriangle>> found(block_count(triangles.size(), kBlock));
   for_each_block(triangles.size(), kBlock, [&](std::size_t block, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const int triangle = triangles[i];
+      const TriangleIndex triangle = triangles[i];
       const Estimate estimated = estimate(surface, original, triangle);
       if (estimated.distance <= kWorthMeasuring * limit && !estimated.may_be_inverted) continue;
       const NearestPoint nearest =
@@ -255,7 +255,7 @@ std::vector<int> nearest_to_far_vertices(const LatticeSurface& surface, const Or
   for_each_index(nearest.size(), [&](std::size_t i) {
     const OriginalSurface::Vertex& vertex = original.vertices[i];
     if (is_held[vertex.number] != 0) return;
-    for (const int triangle : {2 * vertex.quad, 2 * vertex.quad + 1}) {
+    for (const TriangleIndex triangle : {2 * vertex.quad, 2 * vertex.quad + 1}) {
       const auto [a, b, c] = corners_of(surface.mesh, triangle);
       if (offset_from_triangle(vertex.position, a, b, c).norm() <= limit) return;
     }

@@ -34,11 +34,11 @@ struct LatticeSurface {
   std::span<const int> map_triangles;  ///< per texel: of OriginalSurface, or beyond all of them
 
   /// Per corner of a triangle the triangle of the maps that it reads; -1 where it is no texel of a VSM patch.
-  std::array<int, 3> read_by(int triangle, const OriginalSurface& original) const;
+  std::array<int, 3> read_by(TriangleIndex triangle, const OriginalSurface& original) const;
 };
 
 struct MeasuredTriangle {
-  int triangle;
+  TriangleIndex triangle;
   double distance;   ///< to the original, of the furthest of its sampled points
   bool is_inverted;  ///< against the original's triangle nearest to its middle
 };

@@ -36,7 +36,8 @@ std::vector<int> order_triangles(const SkeletexModel& model, const Lattice& latt
     const auto size = static_cast<int>(std::bit_ceil(static_cast<unsigned>(std::max(rows, columns))));
     append_square(0, 0, size, rows, columns, lattice.first_quad[patch], order);
   }
-  for (int triangle = 2 * lattice.quad_count; triangle < lattice.triangle_count; ++triangle) order.push_back(triangle);
+  for (TriangleIndex triangle = 2 * lattice.quad_count; triangle < lattice.triangle_count; ++triangle)
+    order.push_back(triangle);
   return order;
 }
 
@@ -81,11 +82,12 @@ LatticeFrame frame_lattice(ClContext& context, const SkeletexModel& model) {
         end_seam(model, separation, lattice, frame.positions, static_cast<int>(i / 2), static_cast<BoneEnd>(i % 2));
   });
   frame.texels.assign(lattice.vertex_count, -1);
-  for_each_inner_row(model, lattice, [&](int vertex, int texel, int columns) {
+  for_each_inner_row(model, lattice, [&](VertexIndex vertex, TexelIndex texel, int columns) {
     std::iota(frame.texels.begin() + vertex, frame.texels.begin() + vertex + columns, texel);
   });
-  for_each_pole(model, lattice,
-                [&](int vertex, int, int, std::size_t texel) { frame.texels[vertex] = static_cast<int>(texel); });
+  for_each_pole(model, lattice, [&](VertexIndex vertex, int, int, std::size_t texel) {
+    frame.texels[vertex] = static_cast<int>(texel);
+  });
   frame.texel_patches.assign(static_cast<std::size_t>(model.texture.width) * model.texture.height, -1);
   for (std::size_t patch = 0; patch < model.patches.size(); ++patch) {
     const Rectangle& r = model.patches[patch].rectangle;
@@ -135,7 +137,7 @@ void replace_triangles(std::span<const Triangle> triangles, int first, std::span
 }
 
 /// The two triangles of the quad to the right of and above a texel, as reconstruct.cl writes them.
-std::array<Triangle, 2> quad_triangles(const LatticeFrame& frame, int patch, int row, int column,
+std::array<Triangle, 2> quad_triangles(const LatticeFrame& frame, PatchIndex patch, int row, int column,
                                        const ClMapping<int>& diagonals) {
   const int width = frame.model.patches[patch].rectangle.width;
   const int first = frame.numbers.first_inner[patch] + (row - 1) * width;
@@ -162,7 +164,7 @@ void build_lattice_mesh(ClContext& context, const LatticeFrame& frame, DiagonalR
   const float *const x = values.data(), *const y = x + points.count, *const z = y + points.count;
   for_each_block(lattice.vertex_count, 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t vertex = begin; vertex < end; ++vertex)
-      if (const int texel = frame.texels[vertex]; texel >= 0)
+      if (const TexelIndex texel = frame.texels[vertex]; texel >= 0)
         mesh.positions[vertex] = frame.model.origin + Vec3(x[texel], y[texel], z[texel]);
   });
   std::vector<int> ends(frame.ends.size());
@@ -189,36 +191,37 @@ std::vector<int> move_texels(ClContext& context, const LatticeFrame& frame, Diag
   const SkeletexModel& model = frame.model;
   TexelPlanes moved;
   for (int axis = 0; axis < 3; ++axis)
-    for (const int texel : texels) moved[axis].push_back(points[axis][texel]);
+    for (const TexelIndex texel : texels) moved[axis].push_back(points[axis][texel]);
   context.launch(
       {"encode.cl", "place_points"}, ClRange(texels.size()),
       TexelParameters{model.texture.width, static_cast<int>(on_device.count), static_cast<int>(texels.size()), 0, 0},
       context.upload(texels), upload_planes(context, moved[0], moved[1], moved[2]).values, on_device.values);
   std::vector<char> has_moved(mesh.positions.size(), 0), is_near(frame.numbers.quad_count, 0);
   std::vector<int> changed;
-  const auto place_of = [&](int texel) {
+  const auto place_of = [&](TexelIndex texel) {
     const Rectangle& r = model.patches[frame.texel_patches[texel]].rectangle;
     return std::array{frame.texel_patches[texel], texel / model.texture.width - r.y, texel % model.texture.width - r.x};
   };
-  for (const int texel : texels) {
+  for (const TexelIndex texel : texels) {
     const auto [patch, row, column] = place_of(texel);
-    const int vertex = frame.numbers.first_inner[patch] + (row - 1) * model.patches[patch].rectangle.width + column;
+    const VertexIndex vertex =
+        frame.numbers.first_inner[patch] + (row - 1) * model.patches[patch].rectangle.width + column;
     has_moved[vertex] = 1;
     mesh.positions[vertex] = model.origin + Vec3(points[0][texel], points[1][texel], points[2][texel]);
   }
   // The diagonal of a quad depends on the 4 x 4 vertices around it.
-  const auto rows_near = [&](int patch, int row) {
+  const auto rows_near = [&](PatchIndex patch, int row) {
     return std::array{std::max(1, row - 2), std::min(model.patches[patch].rectangle.height - 3, row + 1)};
   };
   std::set<std::array<int, 2>> are_near;
-  for (const int texel : texels) {
+  for (const TexelIndex texel : texels) {
     const auto [patch, row, column] = place_of(texel);
     for (auto [i, last] = rows_near(patch, row); i <= last; ++i) are_near.insert({patch, i});
   }
   std::vector<LatticeRow> rows = frame.rows;
   std::erase_if(rows, [&](const LatticeRow& row) { return !are_near.contains({row[0], row[1]}); });
   const ClMapping<int> diagonals = diagonals_of(context, frame, rule, rows, on_device);
-  for (const int texel : texels) {
+  for (const TexelIndex texel : texels) {
     const auto [patch, row, column] = place_of(texel);
     const int width = model.patches[patch].rectangle.width;
     for (auto [i, last] = rows_near(patch, row); i <= last; ++i)
@@ -232,7 +235,7 @@ std::vector<int> move_texels(ClContext& context, const LatticeFrame& frame, Diag
   std::vector<int> ends;
   for (int end = 0; end < static_cast<int>(frame.ends.size()); ++end) {
     const std::vector<int> vertices = end_row(model, frame.numbers, end / 2, static_cast<BoneEnd>(end % 2));
-    if (std::any_of(vertices.begin(), vertices.end(), [&](int vertex) { return has_moved[vertex] != 0; }))
+    if (std::any_of(vertices.begin(), vertices.end(), [&](VertexIndex vertex) { return has_moved[vertex] != 0; }))
       ends.push_back(end);
   }
   const std::vector<int> firsts = first_triangles_of_ends(frame);

@@ -31,7 +31,7 @@ struct LatticeFrame {
   std::vector<int> texel_patches;    ///< per texel; -1 between rectangles
   std::vector<int> triangle_order;   ///< all triangles, those next to each other in the texture near each other
   std::vector<int> triangle_places;  ///< per triangle, in that order
-  bool is_inner(int vertex) const { return vertex < numbers.inner_count; }
+  bool is_inner(VertexIndex vertex) const { return vertex < numbers.inner_count; }
 };
 LatticeFrame frame_lattice(ClContext& context, const SkeletexModel& model);
 

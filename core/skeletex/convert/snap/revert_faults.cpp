@@ -38,22 +38,23 @@ class TexelSet {
   /// The texels of a triangle and all that are up to `around` columns or rows from them.
   void add(const Triangle& triangle, int around) {
     const int width = frame_.model.texture.width;
-    for (const int vertex : triangle) {
+    for (const VertexIndex vertex : triangle) {
       if (!frame_.is_inner(vertex)) continue;
       const int center = frame_.texels[vertex];
       const Rectangle& r = frame_.model.patches[frame_.texel_patches[center]].rectangle;
       const int row = center / width - r.y, column = center % width - r.x;
       for (int i = std::max(1, row - around); i <= std::min(r.height - 2, row + around); ++i)
         for (int j = column - around; j <= column + around; ++j) {
-          const int texel = (r.y + i) * width + r.x + wrapped(j, r.width);
+          const TexelIndex texel = (r.y + i) * width + r.x + wrapped(j, r.width);
           if (std::exchange(is_in_[texel], 1) == 0) texels_.push_back(texel);
         }
     }
   }
   /// Whether it has all texels of a triangle.
   bool has(const Triangle& triangle) const {
-    return std::all_of(triangle.begin(), triangle.end(),
-                       [&](int vertex) { return !frame_.is_inner(vertex) || is_in_[frame_.texels[vertex]] != 0; });
+    return std::all_of(triangle.begin(), triangle.end(), [&](VertexIndex vertex) {
+      return !frame_.is_inner(vertex) || is_in_[frame_.texels[vertex]] != 0;
+    });
   }
   const std::vector<int>& texels() const { return texels_; }
 
@@ -78,7 +79,7 @@ RegularGrid prepare_regular_grid(ClContext& context, const LatticeFrame& frame, 
                                  const PlacedTexels& texels, TriangleMesh& mesh) {
   build_lattice_mesh(context, frame, DiagonalRule::kNearest, texels.on_device, mesh);
   RegularGrid grid{texels, measure_regular_grid({frame, mesh, texels.map_triangles}, original), TexelSet(frame)};
-  for (const int triangle : grid.faults.inverted) grid.near_faults.add(mesh.triangles[triangle], kTolerance);
+  for (const TriangleIndex triangle : grid.faults.inverted) grid.near_faults.add(mesh.triangles[triangle], kTolerance);
   return grid;
 }
 
@@ -139,7 +140,7 @@ void next_pass(ClContext& context, const LatticeFrame& frame, const OriginalSurf
   const std::vector<int> changed =
       move_texels(context, frame, frame.model.diagonals, reverted, texels.points, texels.on_device, pass.mesh);
   std::vector<int> places;
-  for (const int triangle : changed) places.push_back(frame.triangle_places[triangle]);
+  for (const TriangleIndex triangle : changed) places.push_back(frame.triangle_places[triangle]);
   update_triangle_tree(pass.mesh, places, pass.tree);
   measure(frame, original, vertex_points, texels, limit, changed, pass);
 }
@@ -156,7 +157,7 @@ void choose_tolerances(ClContext& context, const LatticeFrame& frame, const Pass
   build_lattice_mesh(context, frame, DiagonalRule::kNearest, grid.texels.on_device, mesh);
   const Pairs pairs =
       find_self_intersections(mesh, build_triangle_tree(mesh, frame.triangle_order), triangles_in(pass.intersections));
-  for (const int triangle : triangles_in(pairs)) grid.near_faults.add(mesh.triangles[triangle], kTolerance);
+  for (const TriangleIndex triangle : triangles_in(pairs)) grid.near_faults.add(mesh.triangles[triangle], kTolerance);
   const auto near = std::count_if(pass.intersections.begin(), pass.intersections.end(), [&](const auto& pair) {
     return grid.is_near_fault(pass.triangle(pair[0])) && grid.is_near_fault(pass.triangle(pair[1]));
   });
@@ -167,7 +168,7 @@ void choose_tolerances(ClContext& context, const LatticeFrame& frame, const Pass
 /// Texels at the faults of a pass that are not the regular grid's.
 TexelSet texels_at_faults(const LatticeFrame& frame, const Pass& pass, const RegularGrid& grid, double limit) {
   TexelSet texels(frame);
-  const auto is_near_fault = [&](int triangle) { return grid.is_near_fault(pass.triangle(triangle)); };
+  const auto is_near_fault = [&](TriangleIndex triangle) { return grid.is_near_fault(pass.triangle(triangle)); };
   for (const auto& [first, second] : pass.intersections) {
     if (grid.tolerates_intersection && is_near_fault(first) && is_near_fault(second)) continue;
     texels.add(pass.triangle(first), 0), texels.add(pass.triangle(second), 0);
@@ -179,7 +180,7 @@ TexelSet texels_at_faults(const LatticeFrame& frame, const Pass& pass, const Reg
     else if (suspect.is_inverted && !(grid.tolerates_inversion && is_near_fault(suspect.triangle)))
       texels.add(triangle, 0);
   }
-  for (const int triangle : pass.nearest_to_far_vertices) texels.add(pass.triangle(triangle), kAroundFar);
+  for (const TriangleIndex triangle : pass.nearest_to_far_vertices) texels.add(pass.triangle(triangle), kAroundFar);
   return texels;
 }
 
@@ -202,7 +203,7 @@ RevertReport revert_faults(ClContext& context, const RevertSources& sources, std
         static_cast<int>(std::count_if(pass.suspects.begin(), pass.suspects.end(),
                                        [](const MeasuredTriangle& suspect) { return suspect.is_inverted; }));
     std::vector<int> listed = texels_at_faults(frame, pass, grid, limit).texels();
-    std::erase_if(listed, [&](int texel) { return texels.has_same_point(texel, regular); });
+    std::erase_if(listed, [&](TexelIndex texel) { return texels.has_same_point(texel, regular); });
     if (listed.empty() || number == kPasses) break;
     // Vertices are given up only when the texels between them have been.
     const bool with_vertices = number > 0;

@@ -25,7 +25,7 @@ struct Quad {
 
 /// \param row  of its texel, 0 to height - 2;
 /// \param column  any
-Quad quad_at(const LatticeFrame& frame, int patch, int row, int column) {
+Quad quad_at(const LatticeFrame& frame, PatchIndex patch, int row, int column) {
   const Rectangle& r = frame.model.patches[patch].rectangle;
   const int width = frame.model.texture.width, line = (r.y + row) * width + r.x;
   const int left = line + wrapped(column, r.width), right = line + wrapped(column + 1, r.width);
@@ -34,7 +34,7 @@ Quad quad_at(const LatticeFrame& frame, int patch, int row, int column) {
 }
 
 /// The four around an inner texel.
-std::array<Quad, 4> quads_at(const LatticeFrame& frame, int texel) {
+std::array<Quad, 4> quads_at(const LatticeFrame& frame, TexelIndex texel) {
   const int width = frame.model.texture.width, patch = frame.texel_patches[texel];
   const Rectangle& r = frame.model.patches[patch].rectangle;
   const int row = texel / width - r.y, column = texel % width - r.x;
@@ -80,7 +80,7 @@ bool is_turned(const QuadPoints& now, const QuadPoints& regular, const std::arra
 /// Whether a quad folds in the map, or for both its diagonals a triangle turns from the regular grid's quad.
 bool is_bad(const Quad& quad, const PlacedTexels& regular, const PlacedTexels& texels) {
   if (std::all_of(quad.texels.begin(), quad.texels.end(),
-                  [&](int texel) { return texels.has_same_point(texel, regular); }))
+                  [&](TexelIndex texel) { return texels.has_same_point(texel, regular); }))
     return false;
   if (is_folded(quad, texels)) return true;
   const QuadPoints now = points_of(quad, texels.points), before = points_of(quad, regular.points);
@@ -94,7 +94,7 @@ bool is_bad(const Quad& quad, const PlacedTexels& regular, const PlacedTexels& t
 std::vector<int> revert_texels(const LatticeFrame& frame, std::span<const int> listed, bool with_vertices,
                                const PlacedTexels& regular, PlacedTexels& texels) {
   std::vector<int> reverted;
-  const auto revert = [&](int texel) {
+  const auto revert = [&](TexelIndex texel) {
     if (texels.has_same_point(texel, regular)) return;
     for (int axis = 0; axis < 3; ++axis) texels.points[axis][texel] = regular.points[axis][texel];
     texels.offset_x[texel] = regular.offset_x[texel], texels.offset_y[texel] = regular.offset_y[texel];
@@ -102,7 +102,7 @@ std::vector<int> revert_texels(const LatticeFrame& frame, std::span<const int> l
     texels.map_triangles[texel] = regular.map_triangles[texel];
     reverted.push_back(texel);
   };
-  for (const int texel : listed)
+  for (const TexelIndex texel : listed)
     if (texels.anchors[texel] <= 0 || with_vertices) revert(texel);
   for (std::size_t next = 0; next < reverted.size(); ++next)
     for (const Quad& quad : quads_at(frame, reverted[next])) {

@@ -15,7 +15,7 @@ struct PlacedTexels {
   std::vector<int> map_triangles;         ///< near them, numbered as in DeviceMaps; beyond all of them: none
   DevicePlanes on_device{};               ///< the same points
 
-  bool has_same_point(int texel, const PlacedTexels& other) const {
+  bool has_same_point(TexelIndex texel, const PlacedTexels& other) const {
     return points[0][texel] == other.points[0][texel] && points[1][texel] == other.points[1][texel] &&
            points[2][texel] == other.points[2][texel];
   }

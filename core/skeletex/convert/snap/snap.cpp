@@ -136,7 +136,7 @@ SnapFeatures place_features(const MapFeatures& features, std::span<const Chart> 
   for (const auto& edges : features.edges) edge_count += edges.size();
   placed.vertices.reserve(vertex_count), placed.edges.reserve(edge_count);
   int first_point = 0;
-  for (int bone = 0; bone < static_cast<int>(charts.size()); ++bone) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(charts.size()); ++bone) {
     if (is_height_field(patches[bone].method)) continue;
     const Chart& chart = charts[bone];
     const Rectangle& r = patches[bone].rectangle;

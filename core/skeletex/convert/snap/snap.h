@@ -12,7 +12,7 @@ namespace skeletex {
 /// Vertices and edges of the maps that texels should sit on, whatever the layout.
 struct MapFeatures {
   struct Vertex {
-    int vertex = -1;      ///< of the chart
+    VertexIndex vertex;   ///< of the chart
     double strength = 0;  ///< how much it counts; see what found it
     int rank = 0;         ///< by strength, from 1, among those of all patches
   };
@@ -38,13 +38,13 @@ void rank_vertices(MapFeatures& features);
 /// patch's row table.
 struct SnapFeatures {
   struct Vertex {
-    int patch = -1;
+    PatchIndex patch;
     int point = -1;  ///< its number among the vertices of DeviceMaps
     double x = 0, y = 0;
     int rank = 0;  ///< the stronger, the higher
   };
   struct Edge {
-    int patch = -1;
+    PatchIndex patch;
     std::array<int, 2> points{-1, -1};
     std::array<double, 2> x{0, 0}, y{0, 0};
     double dihedral = 0;  ///< radians

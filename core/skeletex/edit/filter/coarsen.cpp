@@ -48,13 +48,13 @@ struct Mix {
 };
 
 /// The two vertices of a seam's loop on both sides of each column.
-std::vector<Mix> loop_at_columns(const CoarseLattice& coarse, const SeparationPlanes& separation, int bone, BoneEnd end,
-                                 int columns) {
+std::vector<Mix> loop_at_columns(const CoarseLattice& coarse, const SeparationPlanes& separation, BoneIndex bone,
+                                 BoneEnd end, int columns) {
   const std::vector<int> loop = end_loop(coarse.model, coarse.lattice, bone, end);
   const int count = static_cast<int>(loop.size());
   std::vector<Vec3> points;
   std::vector<double> angles;
-  for (const int vertex : loop) {
+  for (const VertexIndex vertex : loop) {
     points.push_back(coarse.positions[vertex]);
     angles.push_back(separation.turn_of(bone, points.back() - end_position(coarse.model.skeleton, bone, end)));
   }
@@ -88,11 +88,11 @@ class Coarsening {
   CoarseLattice run(const std::vector<Vec3>& positions) {
     choose_steps();
     pick_vertices();
-    for (const int vertex : coarse_.picks) coarse_.positions.push_back(positions[vertex]);
+    for (const VertexIndex vertex : coarse_.picks) coarse_.positions.push_back(positions[vertex]);
     coarse_.sources.resize(lattice_.vertex_count);
     coarse_.shares.resize(lattice_.vertex_count);
     const SeparationPlanes separation(model_.skeleton);
-    for (int bone = 0; bone < bones_; ++bone) mix_patch(separation, bone);
+    for (BoneIndex bone = 0; bone < bones_; ++bone) mix_patch(separation, bone);
     for (std::size_t a = 0; a < model_.arcs.size(); ++a) mix_arc(a);
     for (int c = 0; c < static_cast<int>(model_.corners.size()); ++c)
       set(lattice_.first_corner + c, Mix(coarse_.lattice.first_corner + c));
@@ -109,7 +109,7 @@ class Coarsening {
     coarse.ends = model_.ends;
     coarse.arcs = model_.arcs;
     coarse.corners = model_.corners;
-    for (int bone = 0; bone < bones_; ++bone) {
+    for (BoneIndex bone = 0; bone < bones_; ++bone) {
       Rectangle& rectangle = coarse.patches[bone].rectangle;
       rows_[bone] = spaced_steps(rectangle.height - 1, half(rectangle.height, 4) - 1);
       columns_[bone] = spaced_steps(rectangle.width, half(rectangle.width, 4));
@@ -129,7 +129,7 @@ class Coarsening {
   void pick_vertices() {
     std::vector<int>& picks = coarse_.picks;
     picks.resize(coarse_.lattice.vertex_count);
-    for (int bone = 0; bone < bones_; ++bone) {
+    for (BoneIndex bone = 0; bone < bones_; ++bone) {
       const auto [x, y, width, height] = coarse_.model.patches[bone].rectangle;
       for (int row = 1; row + 1 < height; ++row)
         for (int j = 0; j < width; ++j)
@@ -149,13 +149,13 @@ class Coarsening {
       picks[coarse_.lattice.first_corner + c] = lattice_.first_corner + c;
   }
 
-  void set(int vertex, const Mix& mix) {
+  void set(VertexIndex vertex, const Mix& mix) {
     coarse_.sources[vertex] = mix.sources;
     coarse_.shares[vertex] = mix.shares;
   }
 
   /// The inner rows and the poles of a patch.
-  void mix_patch(const SeparationPlanes& separation, int bone) {
+  void mix_patch(const SeparationPlanes& separation, BoneIndex bone) {
     const Rectangle &fine = model_.patches[bone].rectangle, &coarse = coarse_.model.patches[bone].rectangle;
     const std::vector<Place> rows = places_between(rows_[bone]), columns = places_between(columns_[bone]);
     std::array<std::vector<Mix>, 2> ends;

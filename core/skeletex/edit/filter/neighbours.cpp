@@ -16,7 +16,7 @@ constexpr int kSmallestLevel = 200;  // vertices
 /// no other leads to, a closed one with the smallest vertex.
 void order_fan(std::span<std::array<int, 2>> fan) {
   std::sort(fan.begin(), fan.end());
-  const auto leads_to = [&](int vertex) {
+  const auto leads_to = [&](VertexIndex vertex) {
     return std::any_of(fan.begin(), fan.end(), [&](const auto& pair) { return pair[1] == vertex; });
   };
   const auto start = std::find_if(fan.begin(), fan.end(), [&](const auto& pair) { return !leads_to(pair[0]); });
@@ -56,7 +56,7 @@ Neighbours find_neighbours(const SkeletexModel& model, const Lattice& lattice,
 void mark_ends(const SkeletexModel& model, const Lattice& lattice, const std::vector<bool>& is_chosen,
                std::vector<float>& values) {
   const auto are_chosen = [&](const auto& bones) {
-    return std::all_of(bones.begin(), bones.end(), [&](int bone) { return is_chosen[bone]; });
+    return std::all_of(bones.begin(), bones.end(), [&](BoneIndex bone) { return is_chosen[bone]; });
   };
   for (std::size_t bone = 0; bone < model.patches.size(); ++bone)
     for (const int pole : lattice.poles[bone])
@@ -114,7 +114,7 @@ std::shared_ptr<const DeviceCoarseLattice> upload_coarser(ClContext& context, co
   const int fine_count = lattice.vertex_count, count = coarse.lattice.vertex_count;
   if (count > 0.6 * fine_count || count < kSmallestLevel) return nullptr;
   struct Reader {
-    int vertex;
+    VertexIndex vertex;
     float share;
   };
   std::vector<std::vector<Reader>> readers_of(count);

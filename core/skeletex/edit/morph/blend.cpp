@@ -35,7 +35,7 @@ std::vector<double> smoothed_around(const std::vector<double>& values) {
 }
 
 /// The model's v at each column of the result, at head and tail, with no whole turn between the two.
-std::array<std::vector<double>, 2> places_of_columns(const SeamMap& map, int bone, int width) {
+std::array<std::vector<double>, 2> places_of_columns(const SeamMap& map, BoneIndex bone, int width) {
   std::array<std::vector<double>, 2> places;
   double twist = 0;
   for (int j = 0; j < width; ++j) {
@@ -53,7 +53,9 @@ double row_at_same_share(int row, int height, int model_height, bool is_reversed
   return is_reversed ? model_height - 1 - at : at;
 }
 
-int source_columns(const SeamMap& map, int bone) { return map.model().patches[map.model_bone(bone)].rectangle.width; }
+int source_columns(const SeamMap& map, BoneIndex bone) {
+  return map.model().patches[map.model_bone(bone)].rectangle.width;
+}
 
 /// The rows to do as the kernels take them.
 std::vector<BlendRow> blend_rows(const std::vector<LatticeRow>& rows, const FrameTables& result, int texture_width) {
@@ -69,7 +71,7 @@ std::vector<BlendRow> blend_rows(const std::vector<LatticeRow>& rows, const Fram
 
 }  // namespace
 
-std::array<std::vector<float>, 2> model_columns(const SeamMap& map, int bone, int width) {
+std::array<std::vector<float>, 2> model_columns(const SeamMap& map, BoneIndex bone, int width) {
   const auto places = places_of_columns(map, bone, width);
   std::array<std::vector<float>, 2> columns;
   for (const int end : {0, 1})
@@ -78,7 +80,7 @@ std::array<std::vector<float>, 2> model_columns(const SeamMap& map, int bone, in
   return columns;
 }
 
-void append_columns(const SeamMap& map, int bone, int width, BlendTables& tables) {
+void append_columns(const SeamMap& map, BoneIndex bone, int width, BlendTables& tables) {
   const auto places = places_of_columns(map, bone, width);
   const double sign = map.sign(bone);
   std::array<std::vector<double>, 2> even;
@@ -95,7 +97,7 @@ void append_columns(const SeamMap& map, int bone, int width, BlendTables& tables
   }
 }
 
-void append_turned_columns(const SeamMap& map, const SeparationPlanes& separation, int bone, int width,
+void append_turned_columns(const SeamMap& map, const SeparationPlanes& separation, BoneIndex bone, int width,
                            BlendSource& source, BlendTables& tables) {
   append_columns(map, bone, width, tables);
   source.slope_begin = static_cast<int>(tables.slopes.size() / 2);

@@ -21,12 +21,12 @@ struct BlendTables {
 /// The columns, at the bone's head and tail, that the columns of one patch of the result read in a model.
 /// \param bone  of the result
 /// \param width  columns of its patch
-std::array<std::vector<float>, 2> model_columns(const SeamMap& map, int bone, int width);
+std::array<std::vector<float>, 2> model_columns(const SeamMap& map, BoneIndex bone, int width);
 /// Appends the same, and their smoothed values. Texels are not turned.
-void append_columns(const SeamMap& map, int bone, int width, BlendTables& tables);
+void append_columns(const SeamMap& map, BoneIndex bone, int width, BlendTables& tables);
 /// Appends the same. Texels are turned from the source's frames to those of the result; sets source.slope_begin.
 /// \param separation  of the result
-void append_turned_columns(const SeamMap& map, const SeparationPlanes& separation, int bone, int width,
+void append_turned_columns(const SeamMap& map, const SeparationPlanes& separation, BoneIndex bone, int width,
                            BlendSource& source, BlendTables& tables);
 /// Appends the rows of one source, which lie at the same share of its patch's height.
 /// \param rows, patches  the rows to do, and the result's patches

@@ -30,7 +30,7 @@ std::vector<Vec3> mapped_points(ClContext& context, const SkeletexModel& first, 
   const std::vector<Vec3> images = map_surface(context, first, second, first_to_second);
   std::vector<Vec3> mapped;
   for (const Vec3& point : points) {
-    const int triangle = find_nearest_triangle(mesh, tree, point).triangle;
+    const TriangleIndex triangle = find_nearest_triangle(mesh, tree, point).triangle;
     const SurfacePoint at = nearest_in_triangle(mesh, triangle, point);
     Vec3 image = Vec3::Zero();
     for (int k = 0; k < 3; ++k) image += at.weights[k] * images[mesh.triangles[triangle][k]];
@@ -41,7 +41,7 @@ std::vector<Vec3> mapped_points(ClContext& context, const SkeletexModel& first, 
 
 /// A place on a model's patches, in texels.
 struct Place {
-  int bone = -1;
+  BoneIndex bone;
   Eigen::Vector2d at = Eigen::Vector2d::Zero();  ///< column, row
 };
 
@@ -60,7 +60,7 @@ double u_of(const Patch& patch, double row) {
 Place place_of(const Chart& chart, const Patch& patch, const SurfacePoint& at) {
   double u = 0, v = 0, share_of_v = 0;  // a pole has no v
   for (int k = 0; k < 3; ++k) {
-    const int vertex = chart.triangles[at.triangle][k];
+    const VertexIndex vertex = chart.triangles[at.triangle][k];
     u += at.weights[k] * chart.u[vertex];
     if (is_pole(chart.kinds[vertex])) continue;
     v += at.weights[k] * (chart.v[vertex] + chart.turns[at.triangle][k]);
@@ -112,7 +112,7 @@ void warp_chart(const Patch& patch, const PatchWarp& warp, Chart& chart) {
 std::vector<std::vector<PlaceMove>> landmark_moves(const SkeletexModel& second, std::span<const Chart> charts,
                                                    std::span<const Vec3> points, std::span<const Vec3> goals,
                                                    std::span<const Landmark> landmarks) {
-  const auto name_of = [&](int bone) { return second.skeleton.bones[bone].name; };
+  const auto name_of = [&](BoneIndex bone) { return second.skeleton.bones[bone].name; };
   const std::vector<Place> all_from = nearest_places(charts, second.patches, points),
                            all_to = nearest_places(charts, second.patches, goals);
   std::vector<std::vector<PlaceMove>> moves(second.patches.size());

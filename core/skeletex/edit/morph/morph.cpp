@@ -29,7 +29,7 @@ constexpr double kNoMove = 1e-6;  // diagonals: the accuracy of stored seams
 /// by the mean of the angles to the others.
 void set_mean_s(Skeleton& skeleton, const std::deque<SeamMap>& maps, std::span<const double> weights,
                 const SeamMap& layout) {
-  for (int bone = 0; bone < static_cast<int>(skeleton.bones.size()); ++bone) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(skeleton.bones.size()); ++bone) {
     const Vec3 o =
         (end_position(skeleton, bone, BoneEnd::kTail) - end_position(skeleton, bone, BoneEnd::kHead)).normalized();
     const Vec3& s = layout.posed_s(bone);
@@ -48,7 +48,7 @@ void set_mean_s(Skeleton& skeleton, const std::deque<SeamMap>& maps, std::span<c
 std::vector<Patch> mean_patches(const std::deque<SeamMap>& maps, std::span<const double> weights,
                                 const SkeletexModel& layout) {
   std::vector<Patch> patches = layout.patches;
-  for (int bone = 0; bone < static_cast<int>(patches.size()); ++bone) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(patches.size()); ++bone) {
     Patch& patch = patches[bone];
     const int height = patch.rectangle.height;
     std::fill(patch.row_u.begin(), patch.row_u.end(), 0.0);
@@ -69,7 +69,7 @@ std::vector<Patch> mean_patches(const std::deque<SeamMap>& maps, std::span<const
 /// The moves of the end rows onto the seams: texels are averaged as vectors, seams by angle and distance.
 EndMoves end_moves(const SkeletexModel& result, const SeparationPlanes& separation, const std::deque<SeamMap>& maps,
                    std::span<const double> weights) {
-  const auto move_at = [&](int bone, BoneEnd end, double v) {
+  const auto move_at = [&](BoneIndex bone, BoneEnd end, double v) {
     if (result.ends[bone][static_cast<int>(end)].arcs.empty()) return Vec3(Vec3::Zero());
     Vec3 move = maps[0].target_end_texel(result.skeleton, separation, bone, end, v);
     for (std::size_t m = 0; m < maps.size(); ++m)
@@ -77,7 +77,7 @@ EndMoves end_moves(const SkeletexModel& result, const SeparationPlanes& separati
     return move.norm() < kNoMove * result.diagonal ? Vec3(Vec3::Zero()) : move;
   };
   EndMoves moves;
-  for (int bone = 0; bone < static_cast<int>(result.patches.size()); ++bone) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(result.patches.size()); ++bone) {
     const int width = result.patches[bone].rectangle.width;
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
       for (int j = 0; j < width; ++j) moves.add(end, move_at(bone, end, static_cast<double>(j) / width));
@@ -227,7 +227,7 @@ void Morph::set_mean_skeleton(int layout, Between& between) const {
   }
   const std::vector<Vec3> nodes = mean_nodes(skeletons, from_layout, between.weights, layout);
   for (std::size_t n = 0; n < nodes.size(); ++n) result.skeleton.nodes[n].position = nodes[n];
-  for (int bone = 0; bone < static_cast<int>(result.skeleton.bones.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(result.skeleton.bones.size()); ++bone)
     if (!(bone_length(result.skeleton, bone) > 0))
       throw InputError(
           fmt::format("bone \"{}\" shrinks to nothing between the models", result.skeleton.bones[bone].name));
@@ -272,7 +272,7 @@ MorphPlan Morph::plan(std::span<const double> given) const {
   const std::vector<LatticeRow> rows = lattice_rows(result.patches, RowChoice::kAll);
   const auto add_source = [&](std::size_t m, int texel_begin, double weight) {
     ++tables.source_count;
-    for (int bone = 0; bone < static_cast<int>(result.patches.size()); ++bone) {
+    for (BoneIndex bone = 0; bone < static_cast<int>(result.patches.size()); ++bone) {
       const auto [x, y, width, height] = models_[m].patches[maps[m].model_bone(bone)].rectangle;
       const int stride = models_[m].texture.width;
       BlendSource source{

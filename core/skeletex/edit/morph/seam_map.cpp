@@ -30,7 +30,7 @@ LoopPoint point_at(const std::vector<LoopPoint>& points, double LoopPoint::*key,
 }
 
 /// The texel of a point of a seam in the row at the patch's end.
-Vec3 seam_texel(const Skeleton& skeleton, const SeparationPlanes& separation, int bone, BoneEnd end,
+Vec3 seam_texel(const Skeleton& skeleton, const SeparationPlanes& separation, BoneIndex bone, BoneEnd end,
                 const LoopPoint& point) {
   const TangentFrame frame = tangent_frame(skeleton, separation, bone, end == BoneEnd::kHead ? 0 : 1, point.v);
   return encode_texel(frame, separation.seam_point(bone, end, point.turn + point.turn_offset, point.distance),
@@ -47,10 +47,10 @@ Skeleton posed_to(const Skeleton& model, const Skeleton& target, const Correspon
 
 /// Appends the points of all arcs of an end to a loop.
 /// \return their positions
-std::vector<Vec3> append_points(const SkeletexModel& model, const SeparationPlanes& separation, int bone,
+std::vector<Vec3> append_points(const SkeletexModel& model, const SeparationPlanes& separation, BoneIndex bone,
                                 const std::vector<ArcUse>& uses, SeamLoop& loop) {
   std::vector<Vec3> positions;
-  const auto append = [&](int owner, int node, const SeamSample& sample, int arc) {
+  const auto append = [&](int owner, NodeIndex node, const SeamSample& sample, ArcIndex arc) {
     positions.push_back(
         separation.seam_point(owner, end_at(model.skeleton, owner, node), sample.turn, sample.distance));
     loop.turns.push_back(
@@ -91,7 +91,7 @@ void set_shares(const std::vector<Vec3>& positions, SeamLoop& loop) {
 SeamLoops trace_seams(const SkeletexModel& model) {
   const SeparationPlanes separation(model.skeleton);
   SeamLoops loops(model.patches.size());
-  for (int bone = 0; bone < static_cast<int>(loops.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(loops.size()); ++bone)
     for (const int end : {0, 1}) {
       const std::vector<ArcUse>& uses = model.ends[bone][end].arcs;
       if (uses.empty()) continue;
@@ -113,13 +113,13 @@ SeamMap::SeamMap(const SkeletexModel& model, const Skeleton& target, Corresponde
       target_bones_(model.skeleton.bones.size(), -1),
       loops_(target.bones.size()),
       target_loops_(target.bones.size()) {
-  for (int bone = 0; bone < static_cast<int>(loops_.size()); ++bone) target_bones_[model_bone(bone)] = bone;
-  for (int bone = 0; bone < static_cast<int>(loops_.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(loops_.size()); ++bone) target_bones_[model_bone(bone)] = bone;
+  for (BoneIndex bone = 0; bone < static_cast<int>(loops_.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
       set_model_loop(bone, end, loops[model_bone(bone)][static_cast<int>(model_end(bone, end))]);
 }
 
-std::vector<AngleInterval> SeamMap::target_intervals(int bone, BoneEnd end, const SeparationPlanes& separation,
+std::vector<AngleInterval> SeamMap::target_intervals(BoneIndex bone, BoneEnd end, const SeparationPlanes& separation,
                                                      const SeamNetwork& network) const {
   std::vector<AngleInterval> intervals;
   for (const ArcUse use : network.ends[bone][static_cast<int>(end)].arcs) {
@@ -140,7 +140,7 @@ std::vector<AngleInterval> SeamMap::target_intervals(int bone, BoneEnd end, cons
   return intervals;
 }
 
-std::vector<AngleInterval> SeamMap::model_intervals(int bone, BoneEnd end) const {
+std::vector<AngleInterval> SeamMap::model_intervals(BoneIndex bone, BoneEnd end) const {
   const int own = model_bone(bone);
   const BoneEnd own_end = model_end(bone, end);
   const std::vector<PosedBound> bounds = posed_planes_.bounds(own, own_end);
@@ -154,7 +154,7 @@ std::vector<AngleInterval> SeamMap::model_intervals(int bone, BoneEnd end) const
 }
 
 void SeamMap::set_network(const SeparationPlanes& separation, const SeamNetwork& network) {
-  for (int bone = 0; bone < static_cast<int>(loops_.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(loops_.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
       std::vector<AnglePair>& pairs = loops_[bone][static_cast<int>(end)].pairs;
       pairs.clear();
@@ -171,7 +171,7 @@ void SeamMap::set_network(const SeparationPlanes& separation, const SeamNetwork&
     }
 }
 
-void SeamMap::set_model_loop(int bone, BoneEnd end, const SeamLoop& traced) {
+void SeamMap::set_model_loop(BoneIndex bone, BoneEnd end, const SeamLoop& traced) {
   if (traced.turns.empty()) return;
   Loop& loop = loops_[bone][static_cast<int>(end)];
   const std::vector<AngleInterval> intervals = model_intervals(bone, end);
@@ -190,55 +190,55 @@ void SeamMap::set_model_loop(int bone, BoneEnd end, const SeamLoop& traced) {
     }
 }
 
-double SeamMap::model_turn(int bone, BoneEnd end, double turn) const {
+double SeamMap::model_turn(BoneIndex bone, BoneEnd end, double turn) const {
   return map_angle(loop(bone, end).pairs, &AnglePair::target, &AnglePair::model, is_reversed(bone) ? -turn : turn);
 }
 
-double SeamMap::target_turn(int bone, BoneEnd end, double model_turn) const {
+double SeamMap::target_turn(BoneIndex bone, BoneEnd end, double model_turn) const {
   const double turn = map_angle(loop(bone, end).pairs, &AnglePair::model, &AnglePair::target, model_turn);
   return is_reversed(bone) ? -turn : turn;
 }
 
-SeamMap::SeamPoint SeamMap::seam_at(int bone, BoneEnd end, double turn) const {
+SeamMap::SeamPoint SeamMap::seam_at(BoneIndex bone, BoneEnd end, double turn) const {
   const LoopPoint point = point_at(loop(bone, end).points, &LoopPoint::turn, model_turn(bone, end, turn));
   return {is_reversed(bone) ? -point.turn_offset : point.turn_offset, point.distance};
 }
 
-LoopPoint SeamMap::model_point(int bone, BoneEnd end, double v) const {
+LoopPoint SeamMap::model_point(BoneIndex bone, BoneEnd end, double v) const {
   const LoopPoint target = point_at(target_loops_[bone][static_cast<int>(end)], &LoopPoint::v, v);
   return point_at(loop(bone, end).points, &LoopPoint::turn, model_turn(bone, end, target.turn));
 }
 
-double SeamMap::model_v(int bone, BoneEnd end, double v) const {
+double SeamMap::model_v(BoneIndex bone, BoneEnd end, double v) const {
   if (target_loops_[bone][static_cast<int>(end)].empty()) return model_turn(bone, end, v);
   return model_point(bone, end, v).v;
 }
 
-double SeamMap::model_slope(int bone, BoneEnd end, double model_turn) const {
+double SeamMap::model_slope(BoneIndex bone, BoneEnd end, double model_turn) const {
   const double slope = separation_.slope(model_bone(bone), model_end(bone, end), model_turn);
   return is_reversed(bone) ? -slope : slope;
 }
 
-Vec3 SeamMap::model_end_texel(int bone, BoneEnd end, double v) const {
+Vec3 SeamMap::model_end_texel(BoneIndex bone, BoneEnd end, double v) const {
   Vec3 texel =
       seam_texel(model_->skeleton, separation_, model_bone(bone), model_end(bone, end), model_point(bone, end, v));
   if (is_reversed(bone)) texel.head<2>() = -texel.head<2>();
   return texel;
 }
 
-Vec3 SeamMap::target_end_texel(const Skeleton& target, const SeparationPlanes& separation, int bone, BoneEnd end,
+Vec3 SeamMap::target_end_texel(const Skeleton& target, const SeparationPlanes& separation, BoneIndex bone, BoneEnd end,
                                double v) const {
   return seam_texel(target, separation, bone, end,
                     point_at(target_loops_[bone][static_cast<int>(end)], &LoopPoint::v, v));
 }
 
-std::vector<double> SeamMap::arc_parameters(int bone, BoneEnd end, int model_arc) const {
+std::vector<double> SeamMap::arc_parameters(BoneIndex bone, BoneEnd end, ArcIndex model_arc) const {
   const Loop& at = loop(bone, end);
   const int count = static_cast<int>(at.points.size());
   const auto first_sample = std::find(at.arcs.begin(), at.arcs.end(), model_arc);
   const int first = static_cast<int>(first_sample - at.arcs.begin());
   const int samples = static_cast<int>(
-      std::find_if(first_sample, at.arcs.end(), [&](int arc) { return arc != model_arc; }) - first_sample);
+      std::find_if(first_sample, at.arcs.end(), [&](ArcIndex arc) { return arc != model_arc; }) - first_sample);
   const bool is_closed = model_->arcs[model_arc].is_closed();
   const int last = first + samples;
   const double begin = is_closed ? 0 : at.points[first - 1].turn,
@@ -254,7 +254,7 @@ std::vector<double> SeamMap::arc_parameters(int bone, BoneEnd end, int model_arc
   return parameters;
 }
 
-std::vector<double> SeamMap::sample_turns(int bone, BoneEnd end, int model_arc) const {
+std::vector<double> SeamMap::sample_turns(BoneIndex bone, BoneEnd end, ArcIndex model_arc) const {
   const Loop& at = loop(bone, end);
   std::vector<double> turns;
   for (std::size_t i = 0; i < at.points.size(); ++i)
@@ -262,7 +262,7 @@ std::vector<double> SeamMap::sample_turns(int bone, BoneEnd end, int model_arc) 
   return turns;
 }
 
-int SeamMap::model_arc(int node, int first_bone, int second_bone) const {
+ArcIndex SeamMap::model_arc(NodeIndex node, BoneIndex first_bone, BoneIndex second_bone) const {
   const int a = model_bone(first_bone), b = model_bone(second_bone);
   for (int i = 0; i < static_cast<int>(model_->arcs.size()); ++i) {
     const SeamArc& arc = model_->arcs[i];

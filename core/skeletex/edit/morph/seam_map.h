@@ -55,22 +55,22 @@ class SeamMap {
   SeamMap& operator=(const SeamMap&) = delete;
 
   const SkeletexModel& model() const { return *model_; }
-  int model_bone(int bone) const { return to_model_.bones[bone]; }
-  bool is_reversed(int bone) const { return to_model_.is_reversed[bone]; }
+  BoneIndex model_bone(BoneIndex bone) const { return to_model_.bones[bone]; }
+  bool is_reversed(BoneIndex bone) const { return to_model_.is_reversed[bone]; }
   /// -1 where the model's bone is reversed, else 1.
-  double sign(int bone) const { return is_reversed(bone) ? -1 : 1; }
-  BoneEnd model_end(int bone, BoneEnd end) const { return is_reversed(bone) ? opposite(end) : end; }
+  double sign(BoneIndex bone) const { return is_reversed(bone) ? -1 : 1; }
+  BoneEnd model_end(BoneIndex bone, BoneEnd end) const { return is_reversed(bone) ? opposite(end) : end; }
   /// The model's direction of angle 0, in its pose at the target's nodes.
-  const Vec3& posed_s(int bone) const { return posed_planes_.bases()[model_bone(bone)].s; }
+  const Vec3& posed_s(BoneIndex bone) const { return posed_planes_.bases()[model_bone(bone)].s; }
 
   /// Sets the target's directions of angle 0 and its seams. All functions below need them.
   void set_network(const SeparationPlanes& separation, const SeamNetwork& network);
 
   /// The model's angle at an angle of the target, in turns. It grows by a turn per turn, or falls where the bone is
   /// reversed.
-  double model_turn(int bone, BoneEnd end, double turn) const;
+  double model_turn(BoneIndex bone, BoneEnd end, double turn) const;
   /// The inverse of model_turn.
-  double target_turn(int bone, BoneEnd end, double model_turn) const;
+  double target_turn(BoneIndex bone, BoneEnd end, double model_turn) const;
 
   /// A point of the model's seam: how far its angle lies from the one it is found by, turns of the target, and its
   /// distance from the bone's half-line.
@@ -78,34 +78,34 @@ class SeamMap {
     double turn_offset = 0;
     double distance = 0;
   };
-  SeamPoint seam_at(int bone, BoneEnd end, double turn) const;
+  SeamPoint seam_at(BoneIndex bone, BoneEnd end, double turn) const;
   /// The parameters, 0 to 1, of the samples on an arc of the model, in the direction of the target's growing angles. Of
   /// a closed arc, their angles about the target's bone.
-  std::vector<double> arc_parameters(int bone, BoneEnd end, int model_arc) const;
+  std::vector<double> arc_parameters(BoneIndex bone, BoneEnd end, ArcIndex model_arc) const;
   /// The model's arc between two bones at a node; -1 when it has none.
-  int model_arc(int node, int first_bone, int second_bone) const;
+  ArcIndex model_arc(NodeIndex node, BoneIndex first_bone, BoneIndex second_bone) const;
 
   /// Sets how the row at an end of a target's patch runs along its seam.
-  void set_target_loop(int bone, BoneEnd end, std::vector<LoopPoint> points) {
+  void set_target_loop(BoneIndex bone, BoneEnd end, std::vector<LoopPoint> points) {
     target_loops_[bone][static_cast<int>(end)] = std::move(points);
   }
   /// v of the model's end row where it passes the point of the seam that the target's row passes at v. Without a target
   /// loop, model_turn.
-  double model_v(int bone, BoneEnd end, double v) const;
+  double model_v(BoneIndex bone, BoneEnd end, double v) const;
   /// The slope of the model's separation plane at one of its own angles (SeparationPlanes::slope), along the target's
   /// bone.
-  double model_slope(int bone, BoneEnd end, double model_turn) const;
+  double model_slope(BoneIndex bone, BoneEnd end, double model_turn) const;
   /// The texel of the model's seam at a target's v, in the directions of the target's bone.
   /// \pre set_target_loop
-  Vec3 model_end_texel(int bone, BoneEnd end, double v) const;
+  Vec3 model_end_texel(BoneIndex bone, BoneEnd end, double v) const;
   /// The texel of the target's own seam.
   /// \pre set_target_loop
-  Vec3 target_end_texel(const Skeleton& target, const SeparationPlanes& separation, int bone, BoneEnd end,
+  Vec3 target_end_texel(const Skeleton& target, const SeparationPlanes& separation, BoneIndex bone, BoneEnd end,
                         double v) const;
   /// The model's own loop, with the model's angles.
-  const std::vector<LoopPoint>& model_loop(int bone, BoneEnd end) const { return loop(bone, end).points; }
+  const std::vector<LoopPoint>& model_loop(BoneIndex bone, BoneEnd end) const { return loop(bone, end).points; }
   /// The angles that the samples of one of the model's arcs are found by, the model's.
-  std::vector<double> sample_turns(int bone, BoneEnd end, int model_arc) const;
+  std::vector<double> sample_turns(BoneIndex bone, BoneEnd end, ArcIndex model_arc) const;
 
  private:
   struct Loop {
@@ -113,12 +113,12 @@ class SeamMap {
     std::vector<LoopPoint> points;  ///< angles are the model's
     std::vector<int> arcs;          ///< per point; -1: a corner
   };
-  std::vector<AngleInterval> target_intervals(int bone, BoneEnd end, const SeparationPlanes& separation,
+  std::vector<AngleInterval> target_intervals(BoneIndex bone, BoneEnd end, const SeparationPlanes& separation,
                                               const SeamNetwork& network) const;
-  std::vector<AngleInterval> model_intervals(int bone, BoneEnd end) const;
-  void set_model_loop(int bone, BoneEnd end, const SeamLoop& traced);
-  LoopPoint model_point(int bone, BoneEnd end, double v) const;
-  const Loop& loop(int bone, BoneEnd end) const { return loops_[bone][static_cast<int>(end)]; }
+  std::vector<AngleInterval> model_intervals(BoneIndex bone, BoneEnd end) const;
+  void set_model_loop(BoneIndex bone, BoneEnd end, const SeamLoop& traced);
+  LoopPoint model_point(BoneIndex bone, BoneEnd end, double v) const;
+  const Loop& loop(BoneIndex bone, BoneEnd end) const { return loops_[bone][static_cast<int>(end)]; }
 
   const SkeletexModel* model_;
   Correspondence to_model_;

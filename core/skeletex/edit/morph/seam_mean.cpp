@@ -26,7 +26,7 @@ class SeamMean {
   void fill(SeamNetwork& network) {
     for (std::size_t c = 0; c < network.corners.size(); ++c) {
       SeamCorner& corner = network.corners[c];
-      for (const int bone : corner.bones)
+      for (const BoneIndex bone : corner.bones)
         corner.sample.distance +=
             mean_at(bone, end_at(skeleton_, bone, corner.node), separation_.turn_of(bone, network.directions[c]))
                 .distance /
@@ -37,11 +37,11 @@ class SeamMean {
 
   /// The loop around an end as the row follows it; empty at a free end.
   /// \pre fill
-  std::vector<LoopPoint> loop(const SeamNetwork& network, int bone, BoneEnd end) const {
+  std::vector<LoopPoint> loop(const SeamNetwork& network, BoneIndex bone, BoneEnd end) const {
     std::vector<LoopPoint> points;
     std::vector<Vec3> positions;
     std::vector<double> angles;
-    const auto add = [&](int owner, const SeamSample& sample, int node, double turn) {
+    const auto add = [&](int owner, const SeamSample& sample, NodeIndex node, double turn) {
       positions.push_back(separation_.seam_point(owner, end_at(skeleton_, owner, node), sample.turn, sample.distance));
       angles.push_back(owner == bone ? sample.turn
                                      : separation_.turn_of(bone, positions.back() - skeleton_.nodes[node].position));
@@ -80,7 +80,7 @@ class SeamMean {
         arc.bones[1], separation_.radial(arc.bones[0], turn) + separation_.slope(arc.bones[0], end, turn) * basis.o);
   }
 
-  SeamMap::SeamPoint mean_at(int bone, BoneEnd end, double turn) const {
+  SeamMap::SeamPoint mean_at(BoneIndex bone, BoneEnd end, double turn) const {
     SeamMap::SeamPoint mean;
     for (std::size_t m = 0; m < maps_.size(); ++m) {
       if (weights_[m] == 0) continue;
@@ -104,7 +104,8 @@ class SeamMean {
   /// Where the samples of an arc lie, from 0 to 1: as the layout's, or evenly where it has no such arc.
   /// \param width  of the arc, turns
   std::vector<double> arc_parameters(const SeamArc& arc, double width) const {
-    const int bone = arc.bones[0], layout_arc = layout_.model_arc(arc.node, bone, arc.bones[1]);
+    const BoneIndex bone = arc.bones[0];
+    const ArcIndex layout_arc = layout_.model_arc(arc.node, bone, arc.bones[1]);
     if (layout_arc >= 0) return layout_.arc_parameters(bone, end_at(skeleton_, bone, arc.node), layout_arc);
     const int columns = std::max(patches_[bone].rectangle.width, patches_[arc.bones[1]].rectangle.width);
     const int intervals = std::max(2, static_cast<int>(std::lround(width * columns)));
@@ -157,7 +158,7 @@ SeamNetwork mean_seams(const SkeletexModel& result, const SeparationPlanes& sepa
   for (SeamMap& map : maps) map.set_network(separation, network);
   SeamMean mean(result, separation, maps, weights, maps[layout]);
   mean.fill(network);
-  for (int bone = 0; has_loops && bone < static_cast<int>(result.patches.size()); ++bone)
+  for (BoneIndex bone = 0; has_loops && bone < static_cast<int>(result.patches.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
       const std::vector<LoopPoint> loop = mean.loop(network, bone, end);
       for (SeamMap& map : maps) map.set_target_loop(bone, end, loop);

@@ -72,7 +72,7 @@ std::vector<ArcUse>& arcs_of(SeamNetwork& network, BoneAtNode bone) {
 /// A node of two bones: one closed arc.
 void append_closed_arc(const NodeCells& node, SeamNetwork& network) {
   const BoneAtNode a = node.cells[0].bone, b = node.cells[1].bone;
-  const int arc = static_cast<int>(network.arcs.size());
+  const ArcIndex arc = static_cast<int>(network.arcs.size());
   network.arcs.push_back({node.node, {a.bone, b.bone}, {-1, -1}, {}});
   arcs_of(network, a).push_back({arc, false});
   arcs_of(network, b).push_back({arc, a.end == b.end});
@@ -91,7 +91,7 @@ void append_arcs(const Skeleton& skeleton, const SeparationPlanes& separation, c
                     skeleton.nodes[node.node].name));
   const int first_corner = static_cast<int>(network.corners.size());
   for (const CellCorner& corner : corners) {
-    std::vector<int> bones;
+    std::vector<BoneIndex> bones;
     for (const int cell : corner.cells) bones.push_back(node.cells[cell].bone.bone);
     std::sort(bones.begin(), bones.end());
     network.corners.push_back({node.node, bones, {separation.turn_of(bones[0], corner.direction), 0}});
@@ -109,7 +109,7 @@ void append_arcs(const Skeleton& skeleton, const SeparationPlanes& separation, c
 
 /// Orders the arcs around a bone at a node, from corner to corner.
 /// \param first_arc  of the node
-void close_loop(const Skeleton& skeleton, int node, BoneAtNode bone, int first_arc, SeamNetwork& network) {
+void close_loop(const Skeleton& skeleton, NodeIndex node, BoneAtNode bone, ArcIndex first_arc, SeamNetwork& network) {
   std::vector<ArcUse> uses;
   for (int a = first_arc; a < static_cast<int>(network.arcs.size()); ++a)
     for (const int side : {0, 1}) {
@@ -144,7 +144,7 @@ SeamNetwork seam_network(const Skeleton& skeleton, const SeparationPlanes& separ
       append_closed_arc(node, network);
       continue;
     }
-    const int first_arc = static_cast<int>(network.arcs.size());
+    const ArcIndex first_arc = static_cast<int>(network.arcs.size());
     append_arcs(skeleton, separation, node, network);
     for (const Cell& cell : node.cells) close_loop(skeleton, node.node, cell.bone, first_arc, network);
   }

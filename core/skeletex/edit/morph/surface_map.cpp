@@ -23,7 +23,7 @@ DisplacementTexture read_points(ClContext& context, const SkeletexModel& from, c
   std::vector<int> begins{0};
   for (const Patch& patch : to.patches)
     begins.push_back(begins.back() + patch.rectangle.width * patch.rectangle.height);
-  for (int bone = 0; bone < static_cast<int>(from.patches.size()); ++bone) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(from.patches.size()); ++bone) {
     const Rectangle& source = to.patches[map.model_bone(bone)].rectangle;
     tables.sources.push_back({begins[map.model_bone(bone)], source.width, source.width, source.height,
                               static_cast<int>(tables.columns.size()), -1, 1.0f});
@@ -42,7 +42,7 @@ DisplacementTexture read_points(ClContext& context, const SkeletexModel& from, c
 /// Sets the vertices of the inner rows and the poles.
 void set_inner(const SkeletexModel& from, const Lattice& lattice, const DisplacementTexture& points, const Vec3& origin,
                std::vector<Vec3>& positions) {
-  for (int bone = 0; bone < static_cast<int>(from.patches.size()); ++bone) {
+  for (BoneIndex bone = 0; bone < static_cast<int>(from.patches.size()); ++bone) {
     const auto [x, y, width, height] = from.patches[bone].rectangle;
     const auto point_at = [&, x = x, y = y](int row, int column) {
       const std::size_t at = static_cast<std::size_t>(y + row) * points.width + x + column;
@@ -65,14 +65,14 @@ std::vector<Vec3> map_surface(ClContext& context, const SkeletexModel& from, con
   const SeamNetwork network = seam_network(from.skeleton, separation);
   map.set_network(separation, network);
   own.set_network(separation, network);
-  for (int bone = 0; bone < static_cast<int>(from.patches.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(from.patches.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
       map.set_target_loop(bone, end, own.model_loop(bone, end));
 
   std::vector<Vec3> positions(lattice.vertex_count);
   set_inner(from, lattice, read_points(context, from, separation, map), to.origin, positions);
   // The point of the other seam that is found by the same angle.
-  const auto seam_point = [&](int bone, int node, double turn) {
+  const auto seam_point = [&](BoneIndex bone, NodeIndex node, double turn) {
     const BoneEnd end = end_at(from.skeleton, bone, node);
     const SeamMap::SeamPoint point = map.seam_at(bone, end, turn);
     return to_separation.seam_point(map.model_bone(bone), map.model_end(bone, end),

@@ -73,7 +73,7 @@ class Joining {
         is_in_part_(model.patches.size(), false),
         patch_of_(model.patches.size(), nullptr) {
     for (const PlacedPatch& patch : patches) patch_of_[patch.bone] = &patch, is_in_part_[patch.bone] = true;
-    for_each_texel([&](const PlacedPatch& patch, int vertex, int row, int j) {
+    for_each_texel([&](const PlacedPatch& patch, VertexIndex vertex, int row, int j) {
       is_free_[vertex] = row >= patch.rows[j][0] && row <= patch.rows[j][1];
     });
     mark_ends(model, surface_.lattice, is_in_part_, is_free_);
@@ -102,7 +102,7 @@ class Joining {
  private:
   template <class Bones>
   bool is_inside(const Bones& bones) const {
-    return std::all_of(bones.begin(), bones.end(), [&](int bone) { return is_in_part_[bone]; });
+    return std::all_of(bones.begin(), bones.end(), [&](BoneIndex bone) { return is_in_part_[bone]; });
   }
   /// Visits all inner texels of the part.
   template <class Visit>
@@ -125,7 +125,7 @@ class Joining {
 
   /// The value at an angle in the first or the last row of a patch.
   /// \param values  row by row, or of one row
-  Vec3 end_value(const std::vector<Vec3>& values, int bone, BoneEnd end, double turn) const {
+  Vec3 end_value(const std::vector<Vec3>& values, BoneIndex bone, BoneEnd end, double turn) const {
     const std::size_t width = model_.patches[bone].rectangle.width,
                       first = end == BoneEnd::kHead ? 0 : values.size() - width;
     const double column = (turn - std::floor(turn)) * static_cast<double>(width), share = column - std::floor(column);
@@ -134,12 +134,12 @@ class Joining {
   }
 
   /// Moves a seam vertex between bones of the part to the mean of their ends there, and appends each bone's gap to it.
-  void place_seam_vertex(int vertex, int node, std::span<const int> bones, const SeparationPlanes& separation,
-                         EndGaps& gaps) {
+  void place_seam_vertex(VertexIndex vertex, NodeIndex node, std::span<const BoneIndex> bones,
+                         const SeparationPlanes& separation, EndGaps& gaps) {
     const Vec3 offset = positions_[vertex] - model_.skeleton.nodes[node].position;
     Vec3 mean = Vec3::Zero();
     std::vector<Vec3> ends;
-    for (const int bone : bones) {
+    for (const BoneIndex bone : bones) {
       ends.push_back(end_value(patch_of_[bone]->placed, bone, end_at(model_.skeleton, bone, node),
                                separation.turn_of(bone, offset)));
       mean += ends.back() / static_cast<double>(bones.size());
@@ -181,7 +181,7 @@ class Joining {
     const EndGaps inner = place_inner_seams(separation);
     VertexGaps result{std::vector<Vec3>(positions_.size(), Vec3::Zero()), is_free_};
     set_poles(&PlacedPatch::placed, positions_);
-    for_each_texel([&](const PlacedPatch& patch, int vertex, int row, int j) {
+    for_each_texel([&](const PlacedPatch& patch, VertexIndex vertex, int row, int j) {
       const int width = model_.patches[patch.bone].rectangle.width;
       if (is_free_[vertex] != 0) positions_[vertex] = patch.placed[static_cast<std::size_t>(row) * width + j];
       for (const int end : {0, 1}) {
@@ -195,7 +195,7 @@ class Joining {
       for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) {
         const std::vector<Vec3>& given = patch.gaps[static_cast<int>(end)];
         if (given.empty()) continue;
-        for (const int vertex : end_loop(model_, surface_.lattice, patch.bone, end))
+        for (const VertexIndex vertex : end_loop(model_, surface_.lattice, patch.bone, end))
           result.gaps[vertex] = end_value(
               given, patch.bone, BoneEnd::kHead,
               separation.turn_of(patch.bone, positions_[vertex] - end_position(model_.skeleton, patch.bone, end)));
@@ -236,8 +236,8 @@ class Joining {
     std::vector<Eigen::Quaterniond> of_bones(model_.patches.size(), Eigen::Quaterniond::Identity());
     for (const PlacedPatch& patch : patches_) of_bones[patch.bone] = rotation_of(patch);
     const auto at_node = bones_at_nodes(model_.skeleton);
-    const auto at_end = [&](int bone, BoneEnd end) {
-      const int node = end_node(model_.skeleton, bone, end);
+    const auto at_end = [&](BoneIndex bone, BoneEnd end) {
+      const NodeIndex node = end_node(model_.skeleton, bone, end);
       Eigen::Vector4d sum = Eigen::Vector4d::Zero();
       for (const BoneAtNode other : at_node[node])
         if (patch_of_[other.bone])
@@ -245,7 +245,7 @@ class Joining {
       return Eigen::Quaterniond(Eigen::Vector4d(sum.normalized()));
     };
     std::vector<Eigen::Quaternionf> rotations;
-    for (int bone = 0; bone < static_cast<int>(model_.patches.size()); ++bone) {
+    for (BoneIndex bone = 0; bone < static_cast<int>(model_.patches.size()); ++bone) {
       const Patch& patch = model_.patches[bone];
       const std::array ends{at_end(bone, BoneEnd::kHead), at_end(bone, BoneEnd::kTail)};
       for (int row = 1; row + 1 < patch.rectangle.height; ++row) {
@@ -262,11 +262,11 @@ class Joining {
   std::vector<Vec3> source_positions() const {
     const Lattice& lattice = surface_.lattice;
     std::vector<Vec3> points = surface_.positions;
-    for_each_texel([&](const PlacedPatch& patch, int vertex, int row, int j) {
+    for_each_texel([&](const PlacedPatch& patch, VertexIndex vertex, int row, int j) {
       points[vertex] = patch.source[static_cast<std::size_t>(row) * model_.patches[patch.bone].rectangle.width + j];
     });
     set_poles(&PlacedPatch::source, points);
-    const auto seam_point = [&](int bone, int node, double turn) {
+    const auto seam_point = [&](BoneIndex bone, NodeIndex node, double turn) {
       return end_value(patch_of_[bone]->source, bone, end_at(model_.skeleton, bone, node), turn);
     };
     for (std::size_t a = 0; a < model_.arcs.size(); ++a)

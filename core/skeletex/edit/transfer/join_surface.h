@@ -11,7 +11,7 @@ namespace skeletex {
 
 /// The surface of a bone's part, placed around the target's bone without corrections. Points go row by row, all rows.
 struct PlacedPatch {
-  int bone = 0;
+  BoneIndex bone = 0;
   std::vector<Vec3> placed;  ///< world units
   std::vector<Vec3> source;  ///< the same points of the surface that it comes from, which may lie anywhere
   /// By column, the first and the last row of the part; outside of them the surface is the target's.

@@ -37,18 +37,20 @@ std::vector<int> steps_from(const Skeleton& skeleton, int start, int without = -
 
 /// The numbers of a model's parts in an extracted part; -1 where they are not in it.
 struct PartIndex {
-  std::vector<int> bones, nodes;
+  std::vector<BoneIndex> bones;
+  std::vector<NodeIndex> nodes;
 };
 
 /// Copies the bones, their nodes and patches.
 PartIndex copy_bones(const SkeletexModel& whole, Part& part) {
   const std::vector<BoneBasis> bases = bone_bases(whole.skeleton);
-  PartIndex index{std::vector<int>(whole.skeleton.bones.size(), -1), std::vector<int>(whole.skeleton.nodes.size(), -1)};
+  PartIndex index{std::vector<BoneIndex>(whole.skeleton.bones.size()),
+                  std::vector<NodeIndex>(whole.skeleton.nodes.size())};
   Skeleton& skeleton = part.model.skeleton;
   for (const int b : part.bones) {
     index.bones[b] = static_cast<int>(skeleton.bones.size());
     Bone bone = whole.skeleton.bones[b];
-    for (int* node : {&bone.head, &bone.tail}) {
+    for (NodeIndex* node : {&bone.head, &bone.tail}) {
       if (index.nodes[*node] < 0) {
         index.nodes[*node] = static_cast<int>(skeleton.nodes.size());
         skeleton.nodes.push_back(whole.skeleton.nodes[*node]);
@@ -65,7 +67,7 @@ PartIndex copy_bones(const SkeletexModel& whole, Part& part) {
 /// Appends the bone that stands for the rest of the body, and sets the directions to it.
 void append_rest(const SkeletexModel& whole, const PartIndex& index, Part& part) {
   const Skeleton& skeleton = whole.skeleton;
-  const int near_node = end_node(skeleton, part.bones[0], part.near);
+  const NodeIndex near_node = end_node(skeleton, part.bones[0], part.near);
   const std::vector<int> steps = steps_from(skeleton, near_node);
   const Vec3& origin = skeleton.nodes[near_node].position;
   Vec3 near_rest = Vec3::Zero(), centre = Vec3::Zero();
@@ -91,14 +93,14 @@ void append_rest(const SkeletexModel& whole, const PartIndex& index, Part& part)
 /// Copies the corners, arcs and ends of the nodes all of whose bones are in the part.
 void copy_seams(const SkeletexModel& whole, const PartIndex& index, Part& part) {
   const auto at = bones_at_nodes(whole.skeleton);
-  const auto is_inside = [&](int node) {
+  const auto is_inside = [&](NodeIndex node) {
     return std::all_of(at[node].begin(), at[node].end(), [&](BoneAtNode bone) { return index.bones[bone.bone] >= 0; });
   };
   std::vector<int> part_arc(whole.arcs.size(), -1), part_corner(whole.corners.size(), -1);
   for (std::size_t c = 0; c < whole.corners.size(); ++c) {
     SeamCorner corner = whole.corners[c];
     if (!is_inside(corner.node)) continue;
-    for (int& bone : corner.bones) bone = index.bones[bone];
+    for (BoneIndex& bone : corner.bones) bone = index.bones[bone];
     corner.node = index.nodes[corner.node];
     part_corner[c] = static_cast<int>(part.model.corners.size());
     part.model.corners.push_back(corner);
@@ -123,11 +125,11 @@ void copy_seams(const SkeletexModel& whole, const PartIndex& index, Part& part) 
 
 }  // namespace
 
-bool is_free_end(const SkeletexModel& model, int bone, BoneEnd end) {
+bool is_free_end(const SkeletexModel& model, BoneIndex bone, BoneEnd end) {
   return model.ends[bone][static_cast<int>(end)].arcs.empty();
 }
 
-BoneEnd near_end(const SkeletexModel& model, int bone) {
+BoneEnd near_end(const SkeletexModel& model, BoneIndex bone) {
   const bool is_head_free = is_free_end(model, bone, BoneEnd::kHead),
              is_tail_free = is_free_end(model, bone, BoneEnd::kTail);
   if (is_head_free != is_tail_free) return is_head_free ? BoneEnd::kTail : BoneEnd::kHead;
@@ -139,20 +141,20 @@ BoneEnd near_end(const SkeletexModel& model, int bone) {
   return BoneEnd::kHead;
 }
 
-std::vector<int> limb_of(const SkeletexModel& model, int bone) {
+std::vector<BoneIndex> limb_of(const SkeletexModel& model, BoneIndex bone) {
   const Skeleton& skeleton = model.skeleton;
   const BoneEnd near = near_end(model, bone);
   const std::vector<int> steps = steps_from(skeleton, end_node(skeleton, bone, opposite(near)), bone);
   if (steps[end_node(skeleton, bone, near)] >= 0)
     throw InputError(fmt::format("bone \"{}\" is part of a cycle: no limb hangs on it; transfer its bones one by one",
                                  skeleton.bones[bone].name));
-  std::vector<int> limb{bone};
+  std::vector<BoneIndex> limb{bone};
   for (int other = 0; other < static_cast<int>(skeleton.bones.size()); ++other)
     if (other != bone && steps[skeleton.bones[other].head] >= 0) limb.push_back(other);
   return limb;
 }
 
-Part extract_part(const SkeletexModel& whole, std::vector<int> bones) {
+Part extract_part(const SkeletexModel& whole, std::vector<BoneIndex> bones) {
   Part part;
   part.bones = std::move(bones);
   part.near = near_end(whole, part.bones[0]);

@@ -12,7 +12,7 @@ namespace skeletex {
 /// last: it ends where the part leaves the rest of the body, and comes from there. The part has the seams of the nodes
 /// all of whose bones are in it.
 struct Part {
-  std::vector<int> bones;
+  std::vector<BoneIndex> bones;
   BoneEnd near = BoneEnd::kHead;  ///< the end of bones[0] that the rest of the body lies at
   /// Unit directions from there to the bones nearby, and to the centre of all other bones.
   std::array<Vec3, 2> rest{Vec3::Zero(), Vec3::Zero()};
@@ -21,13 +21,13 @@ struct Part {
 /// Name of the bone that stands for the rest of the body: no file's bone has it.
 extern const char* const kRestOfBody;
 
-bool is_free_end(const SkeletexModel& model, int bone, BoneEnd end);
+bool is_free_end(const SkeletexModel& model, BoneIndex bone, BoneEnd end);
 
 /// The end that the rest of the body lies at: the one that is not free, else the one nearer to a root.
-BoneEnd near_end(const SkeletexModel& model, int bone);
+BoneEnd near_end(const SkeletexModel& model, BoneIndex bone);
 /// The bone and all bones behind its far end.
 /// \throw InputError when it is part of a cycle
-std::vector<int> limb_of(const SkeletexModel& model, int bone);
-Part extract_part(const SkeletexModel& whole, std::vector<int> bones);
+std::vector<BoneIndex> limb_of(const SkeletexModel& model, BoneIndex bone);
+Part extract_part(const SkeletexModel& whole, std::vector<BoneIndex> bones);
 
 }  // namespace skeletex

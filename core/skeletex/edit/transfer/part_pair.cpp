@@ -143,7 +143,7 @@ void PartPair::set_rows(int i, Patch& patch) const {
 }
 
 void PartPair::set_seams(SkeletexModel& result, const SeparationPlanes& separation) const {
-  const auto set = [&](int node, const std::vector<int>& bones, SeamSample& sample) {
+  const auto set = [&](NodeIndex node, const std::vector<BoneIndex>& bones, SeamSample& sample) {
     const Vec3 direction = separation.seam_point(bones[0], end_at(target_.skeleton, bones[0], node), sample.turn, 1) -
                            target_.skeleton.nodes[node].position;
     sample.distance = seam_distance(separation, node, bones, direction);
@@ -165,7 +165,7 @@ double PartPair::shear(const SeparationPlanes& source_separation, const Separati
 
 Vec3 PartPair::seam_offset(const SeparationPlanes& source_separation, const SeparationPlanes& separation, int i,
                            BoneEnd end, double turn) const {
-  const int bone = target_bone(i);
+  const BoneIndex bone = target_bone(i);
   const double slope = separation.slope(bone, end, turn);
   const double source_slope =
       source_separation.slope(source_bone(i), map_.model_end(i, end), map_.model_turn(i, end, turn)) *
@@ -180,21 +180,21 @@ Vec3 PartPair::seam_offset(const SeparationPlanes& source_separation, const Sepa
   return {wanted - placed, 0, (wanted - placed) * slope};
 }
 
-int PartPair::index_of(int target_bone) const {
+int PartPair::index_of(BoneIndex target_bone) const {
   const auto found = std::find(to_.bones.begin(), to_.bones.end(), target_bone);
   return found == to_.bones.end() ? -1 : static_cast<int>(found - to_.bones.begin());
 }
 
-bool PartPair::is_inside(int target_bone, int node) const {
+bool PartPair::is_inside(BoneIndex target_bone, NodeIndex node) const {
   const int i = index_of(target_bone);
   return i >= 0 && is_inner_seam(i, end_at(target_.skeleton, target_bone, node));
 }
 
 /// The scaled distance of the source's seam in a direction: the mean of what the bones that meet there read.
-double PartPair::seam_distance(const SeparationPlanes& separation, int node, const std::vector<int>& bones,
+double PartPair::seam_distance(const SeparationPlanes& separation, NodeIndex node, const std::vector<BoneIndex>& bones,
                                const Vec3& direction) const {
   double sum = 0;
-  for (const int bone : bones)
+  for (const BoneIndex bone : bones)
     sum += map_.seam_at(index_of(bone), end_at(target_.skeleton, bone, node), separation.turn_of(bone, direction))
                .distance;
   // A part with such a seam has the same scale at both ends.

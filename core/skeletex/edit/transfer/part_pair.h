@@ -74,9 +74,9 @@ class PartPair {
                    double turn) const;
 
  private:
-  int index_of(int target_bone) const;
-  bool is_inside(int target_bone, int node) const;
-  double seam_distance(const SeparationPlanes& separation, int node, const std::vector<int>& bones,
+  int index_of(BoneIndex target_bone) const;
+  bool is_inside(BoneIndex target_bone, NodeIndex node) const;
+  double seam_distance(const SeparationPlanes& separation, NodeIndex node, const std::vector<BoneIndex>& bones,
                        const Vec3& direction) const;
 
   const SkeletexModel &source_, &target_;

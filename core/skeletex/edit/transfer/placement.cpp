@@ -41,18 +41,18 @@ class Placing {
 
   Placement run(std::span<const std::unique_ptr<PartPair>> pairs) {
     set_owners(pairs);
-    for_each_bone([&](int bone, const PartPair& pair, int i) { append_bone(bone, pair, i); });
+    for_each_bone([&](BoneIndex bone, const PartPair& pair, int i) { append_bone(bone, pair, i); });
     tables_.corrections.assign(tables_.correction_size(), 0);
     if (options_.blend != TransferBlend::kNone && options_.skip < 0) {
       place();
-      for_each_bone([&](int bone, PartPair& pair, int i) { skip_reversed_rows(bone, pair, i); });
+      for_each_bone([&](BoneIndex bone, PartPair& pair, int i) { skip_reversed_rows(bone, pair, i); });
     }
     if (options_.blend != TransferBlend::kNone) {
       place();
-      for_each_bone([&](int bone, const PartPair& pair, int i) { find_lean(bone, pair, i); });
+      for_each_bone([&](BoneIndex bone, const PartPair& pair, int i) { find_lean(bone, pair, i); });
     }
     place();
-    for_each_bone([&](int bone, const PartPair& pair, int i) {
+    for_each_bone([&](BoneIndex bone, const PartPair& pair, int i) {
       for (const BoneEnd end : kEnds) find_correction(bone, pair, i, end);
     });
     return std::move(place_);
@@ -61,7 +61,7 @@ class Placing {
  private:
   template <class Visit>
   void for_each_bone(const Visit& visit) {
-    for (int bone = 0; bone < static_cast<int>(place_.owners.size()); ++bone)
+    for (BoneIndex bone = 0; bone < static_cast<int>(place_.owners.size()); ++bone)
       if (place_.owners[bone].pair) visit(bone, *place_.owners[bone].pair, place_.owners[bone].index);
   }
 
@@ -81,11 +81,11 @@ class Placing {
     place_.points =
         download_points(context_, place_part(context_, tables_, input_.source_points, input_.target_points));
   }
-  PatchPoints placed_points_of(int bone) const {
+  PatchPoints placed_points_of(BoneIndex bone) const {
     const Rectangle& rectangle = input_.target.patches[bone].rectangle;
     return {&place_.points, place_.first[bone], rectangle.width, rectangle.height};
   }
-  TransferColumn& column(int bone, int j) { return tables_.columns[tables_.patches[bone].column_begin + j]; }
+  TransferColumn& column(BoneIndex bone, int j) { return tables_.columns[tables_.patches[bone].column_begin + j]; }
 
   /// Rows over which the correction at an end fades; 0: there is none.
   double fade_width(const PartPair& pair, int i, BoneEnd end) const {
@@ -94,7 +94,7 @@ class Placing {
   }
 
   /// Appends the tables of a bone.
-  void append_bone(int bone, const PartPair& pair, int i) {
+  void append_bone(BoneIndex bone, const PartPair& pair, int i) {
     const Rectangle& source = pair.source_patch(i).rectangle;
     const auto [x, y, width, height] = input_.target.patches[bone].rectangle;
     TransferPatch& patch = tables_.patches[bone];
@@ -137,7 +137,7 @@ class Placing {
   }
 
   /// Sets the rows that one column reads: the source's from cut to cut.
-  void set_column_rows(int bone, const PartPair& pair, int i, int j) {
+  void set_column_rows(BoneIndex bone, const PartPair& pair, int i, int j) {
     double first = 0, last = pair.target_patch(i).rectangle.height - 1, source_first = 0,
            source_last = pair.source_patch(i).rectangle.height - 1;
     const bool has_head = pair.is_boundary(i, BoneEnd::kHead), has_tail = pair.is_boundary(i, BoneEnd::kTail);
@@ -155,7 +155,7 @@ class Placing {
 
   /// Where the target's edge lies further along the bone than the part's, the surface behind the edge would run back
   /// along the bone. There the part begins later.
-  void skip_reversed_rows(int bone, PartPair& pair, int i) {
+  void skip_reversed_rows(BoneIndex bone, PartPair& pair, int i) {
     const double length = pair.target_length(i);
     const PatchPoints placed = placed_points_of(bone), target = input_.target_patches[bone];
     for (const BoneEnd end : kEnds) {
@@ -178,7 +178,7 @@ class Placing {
   }
 
   /// Where the centre of a part's edge lies away from the target's, the part leans towards it; its far end stays.
-  void find_lean(int bone, const PartPair& pair, int i) {
+  void find_lean(BoneIndex bone, const PartPair& pair, int i) {
     if (pair.is_boundary(i, BoneEnd::kHead) == pair.is_boundary(i, BoneEnd::kTail)) return;
     const BoneEnd end = pair.is_boundary(i, BoneEnd::kHead) ? BoneEnd::kHead : BoneEnd::kTail;
     const PatchPoints placed = placed_points_of(bone), target = input_.target_patches[bone];
@@ -207,7 +207,7 @@ class Placing {
     Vec3 offset = Vec3::Zero(), slope = Vec3::Zero();
   };
   /// From the placed part to the target, where the part begins.
-  Correction boundary_correction(int bone, const PartPair& pair, int i, BoneEnd end, int j) const {
+  Correction boundary_correction(BoneIndex bone, const PartPair& pair, int i, BoneEnd end, int j) const {
     const BoneProfile to = bone_profile(input_.target_patches[bone], j, end, 0),
                       from = bone_profile(placed_points_of(bone), j, end, 0);
     const double kept = pair.cut(end).kept_rows[j], range = std::max(1.0, pair.width_in_rows(i) / 6),
@@ -220,7 +220,7 @@ class Placing {
     return {change(kept), (change(kept + range - back) - change(kept - back)) / range};
   }
 
-  void find_correction(int bone, const PartPair& pair, int i, BoneEnd end) {
+  void find_correction(BoneIndex bone, const PartPair& pair, int i, BoneEnd end) {
     const bool is_boundary = pair.is_boundary(i, end);
     if (!is_boundary && !pair.is_inner_seam(i, end)) return;
     const int width = pair.target_patch(i).rectangle.width;
@@ -242,7 +242,7 @@ class Placing {
     store_correction(bone, end, slopes, true);
   }
 
-  void store_correction(int bone, BoneEnd end, const std::array<std::vector<double>, 3>& values, bool is_slope) {
+  void store_correction(BoneIndex bone, BoneEnd end, const std::array<std::vector<double>, 3>& values, bool is_slope) {
     const int width = static_cast<int>(values[0].size());
     const std::array bands{wave_bands(values[0]), wave_bands(values[1]), wave_bands(values[2])};
     for (int band = 0; band < SKELETEX_TRANSFER_BANDS; ++band)

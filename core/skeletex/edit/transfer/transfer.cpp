@@ -37,13 +37,13 @@ int bone_by_name(const Skeleton& skeleton, const std::string& name, const char* 
 }
 
 Pairs pair_parts(const TransferInput& input, const std::vector<std::pair<std::string, std::string>>& bones) {
-  const auto part_of = [&](const SkeletexModel& model, int bone) {
-    return extract_part(model, input.options.has_limbs ? limb_of(model, bone) : std::vector<int>{bone});
+  const auto part_of = [&](const SkeletexModel& model, BoneIndex bone) {
+    return extract_part(model, input.options.has_limbs ? limb_of(model, bone) : std::vector<BoneIndex>{bone});
   };
   Pairs pairs;
   for (const auto& [from, to] : bones) {
-    const int source_bone = bone_by_name(input.source.skeleton, from, "source"),
-              target_bone = bone_by_name(input.target.skeleton, to, "target");
+    const BoneIndex source_bone = bone_by_name(input.source.skeleton, from, "source"),
+                    target_bone = bone_by_name(input.target.skeleton, to, "target");
     pairs.push_back(std::make_unique<PartPair>(input.source, input.target, part_of(input.source, source_bone),
                                                part_of(input.target, target_bone), input.options));
     find_cuts(input, *pairs.back());

@@ -29,13 +29,13 @@ void for_each_row(const PreparedModel& prepared, const Act& act) {
 }
 
 /// Samples and corners of the seam at an end of a patch.
-void read_end(const PreparedModel& prepared, std::span<const Vec3> positions, int bone, BoneEnd end,
+void read_end(const PreparedModel& prepared, std::span<const Vec3> positions, BoneIndex bone, BoneEnd end,
               std::vector<int>& columns, std::vector<VertexTexels>& vertices) {
   const EndSeam seam = end_seam(prepared.model, prepared.separation, prepared.lattice, positions, bone, end);
   const Rectangle& r = prepared.model.patches[bone].rectangle;
   const int line = (r.y + (end == BoneEnd::kHead ? 0 : r.height - 1)) * prepared.model.texture.width + r.x;
   for (std::size_t i = 0; i < seam.ring.vertices.size(); ++i) {
-    const int vertex = seam.ring.vertices[i];
+    const VertexIndex vertex = seam.ring.vertices[i];
     if (columns[vertex] >= r.width) continue;
     columns[vertex] = r.width;
     const double x = (seam.turns[i] - std::floor(seam.turns[i])) * r.width;
@@ -50,20 +50,20 @@ std::vector<VertexTexels> texels_of_vertices(const PreparedModel& prepared) {
   const SkeletexModel& model = prepared.model;
   const Lattice& lattice = prepared.lattice;
   std::vector<VertexTexels> vertices(lattice.vertex_count);
-  for_each_row(prepared, [&](int bone, int row, std::size_t texel) {
+  for_each_row(prepared, [&](BoneIndex bone, int row, std::size_t texel) {
     const Rectangle& r = model.patches[bone].rectangle;
     if (row == 0 || row == r.height - 1) return;
     const int first = lattice.first_inner[bone] + (row - 1) * r.width;
     for (int j = 0; j < r.width; ++j)
       vertices[first + j] = {static_cast<int>(texel) + j, static_cast<int>(texel) + j, 0};
   });
-  for_each_pole(model, lattice, [&](int vertex, int, int, std::size_t texel) {
+  for_each_pole(model, lattice, [&](VertexIndex vertex, int, int, std::size_t texel) {
     vertices[vertex] = {static_cast<int>(texel), static_cast<int>(texel), 0};
   });
   std::vector<Vec3> positions(lattice.vertex_count);
   place_seams(model, prepared.separation, lattice, positions);
   std::vector<int> columns(lattice.vertex_count, 0);  // of the patch that a seam's vertex reads
-  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
       read_end(prepared, positions, bone, end, columns, vertices);
   return vertices;
@@ -85,7 +85,7 @@ std::vector<float> values_at(std::span<const VertexTexels> vertices, std::span<c
 
 std::vector<Eigen::Vector3f> texel_normals(const PreparedModel& prepared, const Layer& layer) {
   std::vector<Eigen::Vector3f> normals(layer.planes[0].size(), Eigen::Vector3f::Zero());
-  for_each_row(prepared, [&](int bone, int row, std::size_t texel) {
+  for_each_row(prepared, [&](BoneIndex bone, int row, std::size_t texel) {
     for (int j = 0; j < prepared.model.patches[bone].rectangle.width; ++j, ++texel)
       normals[texel] =
           texel_axes(prepared.tables, bone, row, j) * direction_of({layer.planes[0][texel], layer.planes[1][texel]});
@@ -107,7 +107,7 @@ std::vector<Vec3> normals_at(std::span<const VertexTexels> vertices, std::span<c
 Layer normal_layer(const PreparedModel& prepared, std::span<const Eigen::Vector3f> normals) {
   Layer layer{kNormalLayer, LayerKind::kNormal, {}};
   layer.planes.assign(2, std::vector<float>(normals.size(), 0.f));
-  for_each_row(prepared, [&](int bone, int row, std::size_t texel) {
+  for_each_row(prepared, [&](BoneIndex bone, int row, std::size_t texel) {
     for (int j = 0; j < prepared.model.patches[bone].rectangle.width; ++j, ++texel) {
       const Eigen::Vector2f p = octahedral_of(texel_axes(prepared.tables, bone, row, j).transpose() * normals[texel]);
       layer.planes[0][texel] = p.x(), layer.planes[1][texel] = p.y();
@@ -170,7 +170,7 @@ std::vector<VertexTexels> vertices_of_texels(const PreparedModel& prepared) {
   std::vector<VertexTexels> texels(static_cast<std::size_t>(model.texture.width) * model.texture.height);
   std::vector<Vec3> positions(lattice.vertex_count);
   place_seams(model, prepared.separation, lattice, positions);
-  const auto end_columns = [&](int bone, BoneEnd end, VertexTexels* row) {
+  const auto end_columns = [&](BoneIndex bone, BoneEnd end, VertexTexels* row) {
     const int width = model.patches[bone].rectangle.width, pole = lattice.poles[bone][static_cast<int>(end)];
     if (pole >= 0) {
       std::fill_n(row, width, VertexTexels{pole, pole, 0});
@@ -187,7 +187,7 @@ std::vector<VertexTexels> vertices_of_texels(const PreparedModel& prepared) {
                 static_cast<float>(after > before ? (turn - before) / (after - before) : 0)};
     }
   };
-  for_each_row(prepared, [&](int bone, int row, std::size_t texel) {
+  for_each_row(prepared, [&](BoneIndex bone, int row, std::size_t texel) {
     const int width = model.patches[bone].rectangle.width, height = model.patches[bone].rectangle.height;
     if (row == 0 || row == height - 1) {
       end_columns(bone, row == 0 ? BoneEnd::kHead : BoneEnd::kTail, texels.data() + texel);

@@ -248,7 +248,7 @@ class TexelResampling {
 };
 
 SeamArc resample_arc(const SkeletexModel& model, const SeparationPlanes& separation, const SeamArc& arc, int cells) {
-  const int bone = arc.bones[0];
+  const BoneIndex bone = arc.bones[0];
   const BoneEnd end = end_at(model.skeleton, bone, arc.node);
   const Vec3& node = model.skeleton.nodes[arc.node].position;
   const std::vector<Vec3> points = arc_points(model, separation, arc);
@@ -271,7 +271,7 @@ SeamArc resample_arc(const PreparedModel& prepared, const SkeletexModel& result,
                      bool keeps_samples) {
   const SkeletexModel& model = prepared.model;
   double ratio = 0;
-  for (const int bone : arc.bones)
+  for (const BoneIndex bone : arc.bones)
     ratio = std::max(ratio,
                      static_cast<double>(result.patches[bone].rectangle.width) / model.patches[bone].rectangle.width);
   if (keeps_samples)

@@ -68,7 +68,7 @@ std::vector<char> first_diagonals(const PreparedModel& model, const TriangleMesh
         const int vertex = model.lattice.first_inner[bone] + (row - 1) * r.width + column,
                   across = model.lattice.first_inner[bone] + row * r.width + (column + 1) % r.width,
                   quad = model.lattice.first_quad[bone] + (row - 1) * r.width + column;
-        const auto has = [&](int triangle, int which) {
+        const auto has = [&](TriangleIndex triangle, int which) {
           const Triangle& t = mesh.triangles[triangle];
           return std::find(t.begin(), t.end(), which) != t.end();
         };
@@ -142,11 +142,11 @@ MapFeatures features_of_model(std::span<const Chart> charts, std::span<const Met
 /// Builds the chart of one patch from the mesh's triangles.
 class ChartBuilder {
  public:
-  ChartBuilder(const PreparedModel& model, const TriangleMesh& mesh, int bone) : mesh_(mesh) {
+  ChartBuilder(const PreparedModel& model, const TriangleMesh& mesh, BoneIndex bone) : mesh_(mesh) {
     chart_.bone = bone;
     chart_.topology = model.model.patches[bone].topology;
   }
-  void add(int vertex, ChartVertex kind, double u, double v) {
+  void add(VertexIndex vertex, ChartVertex kind, double u, double v) {
     locals_.emplace(vertex, static_cast<int>(chart_.positions.size()));
     chart_.positions.push_back(mesh_.positions[vertex]);
     chart_.kinds.push_back(kind);
@@ -178,20 +178,21 @@ class ChartBuilder {
 };
 
 /// How many triangles there are between an end and the row next to it.
-int count_end_triangles(const SkeletexModel& model, const EndSeam& seam, int bone) {
+int count_end_triangles(const SkeletexModel& model, const EndSeam& seam, BoneIndex bone) {
   return model.patches[bone].rectangle.width + static_cast<int>(seam.ring.vertices.size());
 }
 
 std::vector<std::array<EndSeam, 2>> end_seams(const PreparedModel& model, std::span<const Vec3> positions) {
   std::vector<std::array<EndSeam, 2>> seams(model.model.patches.size());
-  for (int bone = 0; bone < static_cast<int>(seams.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(seams.size()); ++bone)
     for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail})
       seams[bone][static_cast<int>(end)] = end_seam(model.model, model.separation, model.lattice, positions, bone, end);
   return seams;
 }
 
 /// The vertices of a patch at their places in the map.
-void add_vertices(const PreparedModel& prepared, int bone, const std::array<EndSeam, 2>& seams, ChartBuilder& builder) {
+void add_vertices(const PreparedModel& prepared, BoneIndex bone, const std::array<EndSeam, 2>& seams,
+                  ChartBuilder& builder) {
   const Patch& patch = prepared.model.patches[bone];
   const Lattice& lattice = prepared.lattice;
   const int width = patch.rectangle.width;
@@ -218,7 +219,7 @@ bool is_finer(const SkeletexModel& model, const std::vector<Patch>& patches) {
   return true;
 }
 
-std::vector<double> rows_of_finer(const PreparedModel& model, int bone, int height) {
+std::vector<double> rows_of_finer(const PreparedModel& model, BoneIndex bone, int height) {
   const auto [head_pole, tail_pole] = model.lattice.poles[bone];
   const int old_last = model.model.patches[bone].rectangle.height - 1, head = head_pole < 0, tail = tail_pole < 0;
   std::vector<double> rows = read_between(old_last - head - tail, height - 1 - head - tail);
@@ -282,7 +283,7 @@ void refine_texels(ClContext& context, const PreparedModel& prepared, SkeletexMo
 
 std::vector<Vec3> arc_points(const SkeletexModel& model, const SeparationPlanes& separation, const SeamArc& arc) {
   std::vector<Vec3> points;
-  const auto add = [&](int bone, const SeamSample& sample) {
+  const auto add = [&](BoneIndex bone, const SeamSample& sample) {
     points.push_back(separation.seam_point(bone, end_at(model.skeleton, bone, arc.node), sample.turn, sample.distance));
   };
   const auto add_corner = [&](int corner) { add(model.corners[corner].bones[0], model.corners[corner].sample); };
@@ -293,7 +294,7 @@ std::vector<Vec3> arc_points(const SkeletexModel& model, const SeparationPlanes&
 }
 
 SeamArc divide_arc(const SkeletexModel& model, const SeparationPlanes& separation, const SeamArc& arc, int parts) {
-  const int bone = arc.bones[0];
+  const BoneIndex bone = arc.bones[0];
   const BoneEnd end = end_at(model.skeleton, bone, arc.node);
   const Vec3& node = model.skeleton.nodes[arc.node].position;
   const std::vector<Vec3> points = arc_points(model, separation, arc);
@@ -328,9 +329,9 @@ std::vector<Chart> charts_of_mesh(const PreparedModel& prepared, const TriangleM
     ChartBuilder builder(prepared, mesh, static_cast<int>(bone));
     add_vertices(prepared, static_cast<int>(bone), seams[bone], builder);
     const int first = 2 * prepared.lattice.first_quad[bone];
-    for (int triangle = first; triangle < first + 2 * rectangle.width * (rectangle.height - 3); ++triangle)
+    for (TriangleIndex triangle = first; triangle < first + 2 * rectangle.width * (rectangle.height - 3); ++triangle)
       builder.add(mesh.triangles[triangle]);
-    for (int triangle = first_ends[2 * bone]; triangle < first_ends[2 * bone + 2]; ++triangle)
+    for (TriangleIndex triangle = first_ends[2 * bone]; triangle < first_ends[2 * bone + 2]; ++triangle)
       builder.add(mesh.triangles[triangle]);
     charts[bone] = builder.finish();
   });

@@ -17,7 +17,7 @@ bool is_finer(const SkeletexModel& model, const std::vector<Patch>& patches);
 
 /// Rows of a finer patch: each of the old rows is one of them, the others lie evenly between, but none between a seam
 /// and the row next to it, where triangles follow no columns. Per new row the old one that it reads, with fractions.
-std::vector<double> rows_of_finer(const PreparedModel& model, int bone, int height);
+std::vector<double> rows_of_finer(const PreparedModel& model, BoneIndex bone, int height);
 /// The same of columns; they lie evenly between the old ones, of which the old one numbered `old_width` is column 0
 /// again.
 std::vector<double> columns_of_finer(int old_width, int width);

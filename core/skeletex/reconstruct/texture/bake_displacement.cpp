@@ -22,12 +22,12 @@ class SurfacePoints {
  public:
   SurfacePoints(const PreparedModel& model, std::vector<Vec3> positions)
       : model_(model), positions_(std::move(positions)) {
-    for (int bone = 0; bone < static_cast<int>(model.model.patches.size()); ++bone)
+    for (BoneIndex bone = 0; bone < static_cast<int>(model.model.patches.size()); ++bone)
       for (const BoneEnd end : {BoneEnd::kHead, BoneEnd::kTail}) ends_.push_back(end_points(bone, end));
   }
 
   /// \param row, column  beyond the patch: the nearest row, and around
-  Vec3 at(int bone, int row, double column) const {
+  Vec3 at(BoneIndex bone, int row, double column) const {
     const Rectangle& r = model_.model.patches[bone].rectangle;
     const double below = std::floor(column);
     const auto on_row = [&](double c) {
@@ -38,7 +38,7 @@ class SurfacePoints {
   }
 
  private:
-  const Vec3& texel(int bone, int row, int column) const {
+  const Vec3& texel(BoneIndex bone, int row, int column) const {
     const Rectangle& r = model_.model.patches[bone].rectangle;
     if (row == 0) return ends_[2 * bone][column];
     if (row == r.height - 1) return ends_[2 * bone + 1][column];
@@ -46,13 +46,13 @@ class SurfacePoints {
   }
 
   /// A pole, or the points of the seam at the columns' angles.
-  std::vector<Vec3> end_points(int bone, BoneEnd end) const {
+  std::vector<Vec3> end_points(BoneIndex bone, BoneEnd end) const {
     const int columns = model_.model.patches[bone].rectangle.width;
     const int pole = model_.lattice.poles[bone][static_cast<int>(end)];
     if (pole >= 0) return std::vector<Vec3>(columns, positions_[pole]);
     const EndSeam seam = end_seam(model_.model, model_.separation, model_.lattice, positions_, bone, end);
     std::vector<Vec3> points;
-    for (const int vertex : seam.ring.vertices) points.push_back(positions_[vertex]);
+    for (const VertexIndex vertex : seam.ring.vertices) points.push_back(positions_[vertex]);
     return points_at_columns(std::move(points), seam.turns, columns);
   }
 

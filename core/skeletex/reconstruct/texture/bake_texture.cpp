@@ -11,7 +11,7 @@
 namespace skeletex {
 namespace {
 
-void paint_patch(const SkeletexModel& model, const Layer& layer, int bone, const std::array<int, 2>& place,
+void paint_patch(const SkeletexModel& model, const Layer& layer, BoneIndex bone, const std::array<int, 2>& place,
                  int repeated, ColourImage& image) {
   const Rectangle& r = model.patches[bone].rectangle;
   for (int row = -kGutter; row < r.height + kGutter; ++row)
@@ -41,7 +41,7 @@ BakedTexture bake_texture(const SkeletexModel& model, const PreparedModel& prepa
   baked.image = {layout.width, layout.height,
                  std::vector<std::uint8_t>(std::size_t{4} * static_cast<std::size_t>(layout.width) *
                                            static_cast<std::size_t>(layout.height))};
-  for (int bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(model.patches.size()); ++bone)
     paint_patch(model, *layer, bone, layout.places[bone], layout.repeated, baked.image);
   baked.coordinates = picture_coordinates(layout, model, prepared, mesh);
   return baked;

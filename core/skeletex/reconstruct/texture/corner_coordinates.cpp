@@ -16,7 +16,7 @@ std::vector<int> triangle_bones(const Lattice& lattice, const std::vector<Triang
   for (const Triangle& t : triangles) {
     // Inner vertices come first, and every triangle has one: seams and poles never join up without the row next to
     // them.
-    const int vertex = *std::min_element(t.begin(), t.end());
+    const VertexIndex vertex = *std::min_element(t.begin(), t.end());
     bones.push_back(static_cast<int>(std::upper_bound(lattice.first_inner.begin(), lattice.first_inner.end(), vertex) -
                                      lattice.first_inner.begin()) -
                     1);
@@ -29,7 +29,7 @@ namespace {
 /// v of the vertices of a seam, as its columns go along it.
 using SeamTurns = std::unordered_map<int, double>;
 
-SeamTurns turns_of_seam(const PreparedModel& model, const TriangleMesh& mesh, int bone, BoneEnd end) {
+SeamTurns turns_of_seam(const PreparedModel& model, const TriangleMesh& mesh, BoneIndex bone, BoneEnd end) {
   const EndSeam seam = end_seam(model.model, model.separation, model.lattice, mesh.positions, bone, end);
   SeamTurns turns;
   for (std::size_t i = 0; i < seam.turns.size(); ++i) turns[seam.ring.vertices[i]] = seam.turns[i];
@@ -40,14 +40,15 @@ SeamTurns turns_of_seam(const PreparedModel& model, const TriangleMesh& mesh, in
 class CornerPlaces {
  public:
   /// \param seams  of the bone's head and tail
-  CornerPlaces(const PreparedModel& model, const std::array<SeamTurns, 2>& seams, int bone, const Triangle& triangle)
+  CornerPlaces(const PreparedModel& model, const std::array<SeamTurns, 2>& seams, BoneIndex bone,
+               const Triangle& triangle)
       : model_(model),
         seams_(seams),
         bone_(bone),
         rectangle_(model.model.patches[bone].rectangle),
         triangle_(triangle) {
     int row = 1;
-    for (const int vertex : triangle) row = std::max(row, row_of(vertex));
+    for (const VertexIndex vertex : triangle) row = std::max(row, row_of(vertex));
     const BoneEnd near_end = row <= 1 ? BoneEnd::kHead : BoneEnd::kTail;
     for (int c = 0; c < 3; ++c) place(c, near_end);
   }
@@ -64,14 +65,15 @@ class CornerPlaces {
   }
 
  private:
-  int inner_number(int vertex) const { return vertex - model_.lattice.first_inner[bone_]; }
+  int inner_number(VertexIndex vertex) const { return vertex - model_.lattice.first_inner[bone_]; }
   /// -1 for vertices of seams and poles
-  int row_of(int vertex) const {
+  int row_of(VertexIndex vertex) const {
     const int inner = inner_number(vertex);
     return inner >= 0 && inner < rectangle_.width * (rectangle_.height - 2) ? 1 + inner / rectangle_.width : -1;
   }
   void place(int c, BoneEnd near_end) {
-    const int vertex = triangle_[c], row = row_of(vertex);
+    const VertexIndex vertex = triangle_[c];
+    const int row = row_of(vertex);
     const auto& poles = model_.lattice.poles[bone_];
     is_pole_[c] = vertex == poles[0] || vertex == poles[1];
     if (row >= 0) {
@@ -99,7 +101,7 @@ std::vector<std::array<double, 2>> corner_coordinates(const PreparedModel& model
   std::vector<std::array<double, 2>> coordinates;
   coordinates.reserve(3 * mesh.triangles.size());
   std::vector<std::array<SeamTurns, 2>> seams;
-  for (int bone = 0; bone < static_cast<int>(model.model.patches.size()); ++bone)
+  for (BoneIndex bone = 0; bone < static_cast<int>(model.model.patches.size()); ++bone)
     seams.push_back(
         {turns_of_seam(model, mesh, bone, BoneEnd::kHead), turns_of_seam(model, mesh, bone, BoneEnd::kTail)});
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)

@@ -23,7 +23,7 @@ constexpr double kWhole = 0.97;    // share of the voxels that must hang togethe
 int genus_of(const TriangleMesh& mesh) {
   std::vector<char> is_used(mesh.positions.size(), 0);
   for (const Triangle& triangle : mesh.triangles)
-    for (const int vertex : triangle) is_used[vertex] = 1;
+    for (const VertexIndex vertex : triangle) is_used[vertex] = 1;
   const auto vertices = static_cast<int>(std::count(is_used.begin(), is_used.end(), 1));
   return (2 - (vertices - static_cast<int>(mesh.triangles.size()) / 2)) / 2;
 }
