@@ -13,8 +13,8 @@
 #include <numbers>
 
 #include "skeletex/convert/layers/surface_points.h"
+#include "skeletex/convert/measure/nearest_search.h"
 #include "skeletex/geometry/hilbert_order.h"
-#include "skeletex/geometry/nearest_search.h"
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/geometry/point_triangle.h"
 #include "skeletex/model/error.h"

@@ -187,8 +187,7 @@ class Search {
   /// \return the cost, or kImpossible if it is not below the bound
   double assign_tree(State& state, BoneAtNode x, BoneAtNode y) {
     const BoneAtNode behind_x{x.bone, opposite(x.end)}, behind_y{y.bone, opposite(y.end)};
-    double cost = bone_cost(x, y);
-    cost += subtree_cost(x, y) + subtree_cost(behind_x, behind_y);
+    const double cost = bone_cost(x, y) + (subtree_cost(x, y) + subtree_cost(behind_x, behind_y));
     if (cost >= bound_ || !expand_tree(state, x, y) || !expand_tree(state, behind_x, behind_y)) return kImpossible;
     return cost;
   }

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "skeletex/geometry/nearest_search.h"
+#include "skeletex/convert/measure/nearest_search.h"
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/geometry/point_triangle.h"
 #include "skeletex/reconstruct/displace.h"

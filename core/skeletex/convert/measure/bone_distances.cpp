@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 
-#include "skeletex/geometry/nearest_search.h"
+#include "skeletex/convert/measure/nearest_search.h"
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/geometry/point_triangle.h"
 

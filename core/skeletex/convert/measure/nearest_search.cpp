@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/geometry/nearest_search.h"
+#include "skeletex/convert/measure/nearest_search.h"
 
 #include <algorithm>
 #include <cmath>
