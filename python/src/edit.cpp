@@ -54,7 +54,7 @@ std::vector<Model> morph(const std::vector<Model>& models, const std::vector<std
 /// \return per bone of the first skeleton the bone of the second, whether it is reversed, and the cost
 py::tuple correspond(const Model& a, const Model& b, const BonePairs& bones) {
   const Correspondence found = find_correspondence(a.rest->skeleton, b.rest->skeleton, {.given = bones});
-  return py::make_tuple(found.bones, found.is_reversed, found.cost);
+  return py::make_tuple(std::vector<int>(found.bones.begin(), found.bones.end()), found.is_reversed, found.cost);
 }
 
 /// \param json  from transfer() of the package: every key is there, null where the default is wanted

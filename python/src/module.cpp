@@ -39,8 +39,8 @@ void translate(std::exception_ptr exception) {
                [&](py::object& value) { value.attr("_set_findings")(findings_list(error.findings())); });
   } catch (const TopologyError& error) {
     raise_with("TopologyError", error, [&](py::object& value) {
-      if (error.bone() >= 0) value.attr("bone") = error.bone();
-      if (error.node() >= 0) value.attr("node") = error.node();
+      if (error.bone() >= 0) value.attr("bone") = static_cast<int>(error.bone());
+      if (error.node() >= 0) value.attr("node") = static_cast<int>(error.node());
     });
   } catch (const InputError& error) {
     raise("InputError", error);
