@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Holds the code against the project's rules: clang-format, the sizes of files and folders, and clang-tidy's checks (.clang-tidy) over a
-# build made by `cmake --preset release`. Ends with 1 and names each place that breaks a rule.
+# Holds the code against the project's rules: clang-format, the sizes of files and folders, the way of includes, and
+# clang-tidy's checks (.clang-tidy) over a build made by `cmake --preset release`. Ends with 1 and names each place that
+# breaks a rule.
 #
 #   scripts/lint.sh            everything
 #   scripts/lint.sh FILE...    clang-tidy on these sources alone
@@ -22,6 +23,20 @@ for ending in h cpp; do
     [ "$count" -le 14 ] || { echo "$folder: $count .$ending files; make folders by meaning (at most 14)" >&2; status=1; }
   done < <(git ls-files "core/**/*.$ending" | xargs -n 1 dirname | sort | uniq -c)
 done
+
+# Includes go one way between groups of folders (CONTRIBUTING.md).
+git grep -o '#include "skeletex/[^"]*' -- core/skeletex | awk -F '[:"]' '
+  function folder(path, parts) { split(path, parts, "/"); return parts[1] == "compact" && parts[2] == "encode" ? "compact/encode" : parts[1] }
+  BEGIN {
+    count = split("math,geometry,skeleton model,device compact io,convert reconstruct analysis,edit render,compact/encode skeletonize close rig page", groups, ",")
+    for (i = 1; i <= count; ++i) { n = split(groups[i], names, " "); for (k = 1; k <= n; ++k) rank[names[k]] = i }
+  }
+  {
+    from = folder(substr($1, length("core/skeletex/") + 1)); to = folder(substr($3, length("skeletex/") + 1))
+    for (i = 0; i < 2; ++i) if (!((i ? to : from) in rank)) { print $1 ": no group has the folder " (i ? to : from); bad = 1 }
+    if (rank[to] > rank[from] && $3 != "skeletex/model/error.h") { print $1 ": " from " includes " $3; bad = 1 }
+  }
+  END { exit bad }' >&2 || status=1
 
 # The linker takes the functions of two types of one name for the same.
 doubles=$(git ls-files 'core/**/*.h' | xargs grep -hoE '^(struct|class) \w+ *(final *)?[:{]' | awk '{print $2}' | sort | uniq -d)

@@ -20,7 +20,7 @@ class Index {
     return *this;
   }
   template <class Json>
-  friend void to_json(Json& json, Index index) {
+  friend void to_json(Json& json, Index index) {  // for nlohmann::json, whose braces else make it a string's length
     json = index.value_;
   }
 
