@@ -4,7 +4,7 @@
 #include <string>
 
 #include "command.h"
-#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/pose/pose_mesh.h"
 
 namespace skeletex::cli {
 

@@ -28,7 +28,7 @@ done
 git grep -o '#include "skeletex/[^"]*' -- core/skeletex | awk -F '[:"]' '
   function folder(path, parts) { split(path, parts, "/"); return parts[1] == "compact" && parts[2] == "encode" ? "compact/encode" : parts[1] }
   BEGIN {
-    count = split("math,geometry,skeleton model,device compact io,convert reconstruct analysis,edit render,compact/encode skeletonize close rig page", groups, ",")
+    count = split("math,geometry,skeleton,model,device compact,io,reconstruct,convert,analysis,edit render,compact/encode skeletonize close rig page", groups, ",")
     for (i = 1; i <= count; ++i) { n = split(groups[i], names, " "); for (k = 1; k <= n; ++k) rank[names[k]] = i }
   }
   {

@@ -11,8 +11,8 @@
 #include <set>
 
 #include "skeletex/convert/encode_model.h"
-#include "skeletex/reconstruct/pose_by_coordinates.h"
-#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/pose/pose_by_coordinates.h"
+#include "skeletex/reconstruct/pose/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/skeleton/pose.h"
 #include "support/load_model.h"

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "skeletex/edit/polish.h"
 #include "skeletex/model/error.h"
-#include "skeletex/reconstruct/polish.h"
 
 namespace skeletex {
 namespace {

@@ -7,7 +7,7 @@
 #include "skeletex/convert/layout/row_profile.h"
 #include "skeletex/convert/sample/read_texels.h"
 #include "skeletex/convert/sample/sample_seams.h"
-#include "skeletex/skeleton/frame.h"
+#include "skeletex/model/frame.h"
 #include "support/encode_twin.h"
 
 namespace skeletex {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/skeleton/frame.h"
+#include "skeletex/model/frame.h"
 
 #include <gtest/gtest.h>
 

@@ -11,10 +11,11 @@
 
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/convert/encode_model.h"
+#include "skeletex/convert/resample/resample.h"
 #include "skeletex/edit/morph/blend.h"
 #include "skeletex/edit/transfer/transfer.h"
 #include "skeletex/model/error.h"
-#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/pose/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/skeleton/pose.h"
 #include "support/load_model.h"

@@ -4,9 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <mutex>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <vector>
 
 namespace skeletex {
 namespace {
@@ -34,6 +37,23 @@ TEST(ForEachBlock, ThrowsWhatABlockThrows) {
   } catch (const std::runtime_error& error) {
     EXPECT_EQ(error.what(), std::string("block 40"));
   }
+}
+
+TEST(ForEachCostliestFirst, TakesEveryItemOnceAndTheCostliestFirst) {
+  constexpr std::size_t kCount = 1000;
+  std::vector<std::size_t> costs(kCount);
+  for (std::size_t i = 0; i < kCount; ++i) costs[i] = i * 7 % kCount;
+  std::vector<int> counts(kCount, 0);
+  std::optional<std::size_t> first;
+  std::mutex mutex;
+  for_each_costliest_first(costs, [&](std::size_t i) {
+    const std::lock_guard lock(mutex);
+    ++counts[i];
+    if (!first) first = costs[i];
+  });
+  EXPECT_EQ(counts, std::vector<int>(kCount, 1));
+  // Others may come before the thread that has the costliest one.
+  EXPECT_GE(*first + processor_count(), kCount);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/analysis/metro.h"
 #include "skeletex/convert/encode_model.h"
+#include "skeletex/convert/resample/resample.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "support/load_model.h"

@@ -8,10 +8,10 @@
 
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/convert/encode_model.h"
-#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/pose/pose_mesh.h"
+#include "skeletex/reconstruct/pose/posed_frame.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/skeleton/pose.h"
-#include "skeletex/skeleton/posed_frame.h"
 #include "support/load_model.h"
 
 namespace skeletex {

@@ -14,9 +14,9 @@
 #include "skeletex/io/skeleton_file.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/lattice.h"
-#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/pose/pose_mesh.h"
+#include "skeletex/reconstruct/pose/posed_frame.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
-#include "skeletex/skeleton/posed_frame.h"
 #include "support/mesh_topology.h"
 #include "support/synthetic_model.h"
 

@@ -12,8 +12,8 @@
 
 #include "skeletex/analysis/metro.h"
 #include "skeletex/convert/encode_model.h"
+#include "skeletex/model/frame.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
-#include "skeletex/skeleton/frame.h"
 #include "support/mesh_topology.h"
 #include "support/random_skeleton.h"
 #include "support/shapes.h"

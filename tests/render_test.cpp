@@ -8,7 +8,7 @@
 
 #include "skeletex/convert/encode_model.h"
 #include "skeletex/model/error.h"
-#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/pose/pose_mesh.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/render/draw.h"
 #include "skeletex/render/gpu_model.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/reconstruct/resample/resample.h"
+#include "skeletex/convert/resample/resample.h"
 
 #include <gtest/gtest.h>
 
@@ -12,11 +12,11 @@
 #include "reconstruct_structs.h"
 #include "skeletex/analysis/metro.h"
 #include "skeletex/convert/encode_model.h"
+#include "skeletex/convert/resample/resample_snapped.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
-#include "skeletex/reconstruct/resample/resample_snapped.h"
 #include "support/load_model.h"
 #include "support/mesh_topology.h"
 #include "support/reconstruct_twin.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/reconstruct/skin.h"
+#include "skeletex/reconstruct/pose/skin.h"
 
 #include <gtest/gtest.h>
 
@@ -10,11 +10,12 @@
 #include <random>
 
 #include "skeletex/analysis/manifold.h"
-#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/convert/resample/resample.h"
+#include "skeletex/reconstruct/pose/pose_mesh.h"
+#include "skeletex/reconstruct/pose/weight_walk.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/skeleton/pose.h"
 #include "skeletex/skeleton/separation_planes.h"
-#include "skeletex/skeleton/weight_walk.h"
 #include "support/synthetic_model.h"
 
 namespace skeletex {

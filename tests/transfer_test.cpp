@@ -10,6 +10,7 @@
 #include "skeletex/analysis/folds.h"
 #include "skeletex/analysis/manifold.h"
 #include "skeletex/convert/encode_model.h"
+#include "skeletex/convert/resample/resample.h"
 #include "skeletex/edit/transfer/mirror.h"
 #include "skeletex/edit/transfer/place_part.h"
 #include "skeletex/model/error.h"

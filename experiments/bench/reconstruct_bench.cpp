@@ -4,6 +4,7 @@
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
+#include "skeletex/convert/resample/resample.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "stage_benchmarks.h"
 

@@ -7,6 +7,7 @@
 
 #include "peers/skinning.h"
 #include "skeletex/analysis/deformation.h"
+#include "skeletex/edit/polish.h"
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_file.h"
@@ -14,10 +15,9 @@
 #include "skeletex/io/same_file.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/lattice.h"
-#include "skeletex/reconstruct/polish.h"
-#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/pose/pose_mesh.h"
+#include "skeletex/reconstruct/pose/skin.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
-#include "skeletex/reconstruct/skin.h"
 #include "skeletex/reconstruct/thin_triangles.h"
 
 namespace {

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "fuzz.h"
+#include "skeletex/convert/resample/resample.h"
 #include "skeletex/edit/morph/morph.h"
 #include "skeletex/edit/transfer/transfer.h"
 #include "skeletex/io/check_model.h"

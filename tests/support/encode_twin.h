@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "skeletex/convert/parameterize/chart.h"
-#include "skeletex/skeleton/frame.h"
+#include "skeletex/model/frame.h"
 
 namespace skeletex::twin {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "skeletex/skeleton/frame.h"
+#include "skeletex/model/frame.h"
 
 namespace skeletex::twin {
 

@@ -4,11 +4,11 @@
 #include <vector>
 
 #include "skeletex/geometry/loop_turns.h"
+#include "skeletex/model/frame.h"
 #include "skeletex/model/texture.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/seam_strip.h"
-#include "skeletex/skeleton/frame.h"
 #include "skeletex/skeleton/separation_planes.h"
 
 namespace skeletex::test {

@@ -3,8 +3,8 @@
 #include <utility>
 #include <vector>
 
+#include "skeletex/model/frame.h"
 #include "skeletex/model/texture.h"
-#include "skeletex/skeleton/frame.h"
 
 namespace skeletex {
 

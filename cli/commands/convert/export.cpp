@@ -13,6 +13,7 @@
 #include "files.h"
 #include "progress_bar.h"
 #include "skeletex/convert/guess_stance.h"
+#include "skeletex/convert/resample/resample.h"
 #include "skeletex/edit/regular_grid.h"
 #include "skeletex/io/gltf/write_gltf.h"
 #include "skeletex/io/model_file.h"

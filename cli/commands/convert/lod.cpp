@@ -9,10 +9,11 @@
 #include "files.h"
 #include "progress_bar.h"
 #include "result_file.h"
+#include "skeletex/convert/resample/levels.h"
+#include "skeletex/convert/resample/resample.h"
 #include "skeletex/convert/sample/half_texels.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/model/error.h"
-#include "skeletex/reconstruct/levels.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 
 namespace skeletex::cli {

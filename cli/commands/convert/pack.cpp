@@ -10,6 +10,7 @@
 #include "files.h"
 #include "progress_bar.h"
 #include "result_file.h"
+#include "skeletex/convert/resample/resample.h"
 #include "skeletex/io/compact/compact_model_file.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/model/error.h"

@@ -8,7 +8,7 @@
 #include "progress_bar.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/model_json.h"
-#include "skeletex/reconstruct/skin.h"
+#include "skeletex/reconstruct/pose/skin.h"
 
 namespace skeletex::cli {
 namespace {

@@ -11,6 +11,7 @@
 #include "files.h"
 #include "program_path.h"
 #include "progress_bar.h"
+#include "skeletex/convert/resample/resample.h"
 #include "skeletex/io/model_file.h"
 #include "skeletex/io/pose_file.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"

@@ -6,13 +6,14 @@
 
 #include "skeletex/analysis/metro.h"
 #include "skeletex/convert/encode_model.h"
+#include "skeletex/convert/resample/resample.h"
 #include "skeletex/edit/filter/filter.h"
 #include "skeletex/edit/live.h"
 #include "skeletex/edit/morph/morph.h"
 #include "skeletex/edit/transfer/transfer.h"
-#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/pose/pose_mesh.h"
+#include "skeletex/reconstruct/pose/skin.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
-#include "skeletex/reconstruct/skin.h"
 #include "skeletex/skeleton/correspondence.h"
 
 namespace skeletex::cli {

@@ -10,6 +10,7 @@
 #include "command.h"
 #include "files.h"
 #include "progress_bar.h"
+#include "skeletex/convert/resample/resample.h"
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/mesh_file.h"
 #include "skeletex/io/model_file.h"

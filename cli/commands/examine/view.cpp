@@ -11,6 +11,7 @@
 #include "files.h"
 #include "progress_bar.h"
 #include "skeletex/compact/decode_model.h"
+#include "skeletex/convert/resample/resample.h"
 #include "skeletex/io/atomic_file.h"
 #include "skeletex/io/compact/compact_model_file.h"
 #include "skeletex/io/model_file.h"

@@ -87,9 +87,8 @@ std::vector<BoneMargin> bone_margins(const TriangleMesh& mesh, const TriangleTre
                                      int angles) {
   const auto at_nodes = bones_at_nodes(skeleton);
   std::vector<BoneMargin> margins(skeleton.bones.size());
-  for_each_block(margins.size(), 8, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t b = begin; b < end; ++b)
-      margins[b] = margin_of_bone(mesh, tree, skeleton, at_nodes, static_cast<int>(b), angles);
+  for_each_index(margins.size(), 8, [&](std::size_t b) {
+    margins[b] = margin_of_bone(mesh, tree, skeleton, at_nodes, static_cast<int>(b), angles);
   });
   return margins;
 }

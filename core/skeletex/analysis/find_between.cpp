@@ -45,7 +45,7 @@ Finding finding_of_node(const SurfaceProbe& surface, const std::string& name, co
 
 /// A skeleton that lies elsewhere altogether.
 Finding finding_of_frame(const SurfaceProbe& surface, const std::vector<Vec3>& points) {
-  const BoundingBox box = bounding_box({points, {}});
+  const BoundingBox box = bounding_box(points);
   return {
       Severity::kError, "frame",
       fmt::format("no node of the skeleton lies in the mesh: its nodes fill the box {} to {} (diagonal {:.4g}), the "

@@ -50,14 +50,12 @@ class DistanceSearch {
   void find(std::span<const Vec3> points, std::span<double> distances, std::span<SurfacePoint> feet = {}) {
     nearest_.resize(points.size());
     search_.find(points, nearest_);
-    for_each_block(points.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        const Triangle& t = mesh_.triangles[nearest_[i]];
-        const Vec3 offset =
-            offset_from_triangle(points[i], mesh_.positions[t[0]], mesh_.positions[t[1]], mesh_.positions[t[2]]);
-        distances[i] = offset.norm();
-        if (!feet.empty()) feet[i] = point_in_triangle(mesh_, nearest_[i], points[i] - offset);
-      }
+    for_each_index(points.size(), kBlock, [&](std::size_t i) {
+      const Triangle& t = mesh_.triangles[nearest_[i]];
+      const Vec3 offset =
+          offset_from_triangle(points[i], mesh_.positions[t[0]], mesh_.positions[t[1]], mesh_.positions[t[2]]);
+      distances[i] = offset.norm();
+      if (!feet.empty()) feet[i] = point_in_triangle(mesh_, nearest_[i], points[i] - offset);
     });
   }
 
@@ -217,10 +215,9 @@ SurfaceStatistics measure_surface(DistanceSearch& search, const SurfaceSamples& 
     search.find(points, distances, feet);
     accumulator.add(distances);
     if (own == nullptr) continue;
-    for_each_block(points.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i)
-        angles[i] = {static_cast<float>(angle_between(own->of_triangle(places[i]), other->of_triangle(feet[i]))),
-                     static_cast<float>(angle_between(own->for_shading(places[i]), other->for_shading(feet[i])))};
+    for_each_index(points.size(), kBlock, [&](std::size_t i) {
+      angles[i] = {static_cast<float>(angle_between(own->of_triangle(places[i]), other->of_triangle(feet[i]))),
+                   static_cast<float>(angle_between(own->for_shading(places[i]), other->for_shading(feet[i])))};
     });
     for (const auto& [of_surface, of_shading] : angles) surface.add(of_surface), shading.add(of_shading);
   }

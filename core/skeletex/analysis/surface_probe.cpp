@@ -30,7 +30,7 @@ std::vector<double> SurfaceProbe::winding_numbers(std::span<const Vec3> points, 
   const std::size_t count = mesh_.triangles.size();
   std::vector<double> windings(points.size(), 0);
   if (is_closed) {
-    for_each_block(points.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+    for_each_index(points.size(), [&](std::size_t i) {
       std::vector<int> corners;  // of the triangles that the ray along z may meet
       const Vec3 end(points[i].x(), points[i].y(), std::numeric_limits<double>::infinity());
       for_each_triangle_near(tree_, points[i], end, [&](int t) {

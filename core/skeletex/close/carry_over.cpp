@@ -82,18 +82,16 @@ CarriedOver carry_over(const TriangleMesh& from, const TriangleTree& tree, const
     result.attributes.numbers.push_back({numbers.name, std::vector<float>(count)});
   if (!weights.empty()) result.weights.resize(count);
   const SurfaceColours colours(from, attributes);
-  for_each_block(count, 256, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v) {
-      const SurfacePoint point =
-          nearest_in_triangle(from, find_nearest_triangle(from, tree, to.positions[v]).triangle, to.positions[v]);
-      if (has_colours) result.attributes.colours.values[v] = colours.at(point);
-      if (!weights.empty()) result.weights[v] = mixed(from, weights, point);
-      for (std::size_t i = 0; i < attributes.numbers.size(); ++i) {
-        float sum = 0;
-        for (int k = 0; k < 3; ++k)
-          sum += point.weights[k] * attributes.numbers[i].values[from.triangles[point.triangle][k]];
-        result.attributes.numbers[i].values[v] = sum;
-      }
+  for_each_index(count, 256, [&](std::size_t v) {
+    const SurfacePoint point =
+        nearest_in_triangle(from, find_nearest_triangle(from, tree, to.positions[v]).triangle, to.positions[v]);
+    if (has_colours) result.attributes.colours.values[v] = colours.at(point);
+    if (!weights.empty()) result.weights[v] = mixed(from, weights, point);
+    for (std::size_t i = 0; i < attributes.numbers.size(); ++i) {
+      float sum = 0;
+      for (int k = 0; k < 3; ++k)
+        sum += point.weights[k] * attributes.numbers[i].values[from.triangles[point.triangle][k]];
+      result.attributes.numbers[i].values[v] = sum;
     }
   });
   return result;

@@ -165,9 +165,9 @@ std::vector<Hole> find_holes(const TriangleMesh& mesh, const std::vector<std::ar
   std::vector<Hole> holes;
   for (std::vector<int>& loop : boundary_loops(boundary_edges)) {
     Hole hole;
-    TriangleMesh points;
+    std::vector<Vec3> points;
     for (const int v : loop) {
-      points.positions.push_back(mesh.positions[v]);
+      points.push_back(mesh.positions[v]);
       hole.centre += mesh.positions[v] / static_cast<double>(loop.size());
     }
     hole.size = bounding_box(points).diagonal();

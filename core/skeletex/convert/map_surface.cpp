@@ -61,12 +61,12 @@ MappedSurface map_surface(ClContext& context, Segmentation segmentation, std::ve
   MappedSurface surface{std::move(segmentation), {}, {}, std::move(methods), {}, {}, {}};
   const std::size_t count = skeleton.bones.size();
   surface.charts.resize(count), surface.profiles.resize(count), surface.errors.resize(count);
-  for_each_block(count, 1, [&](std::size_t i, std::size_t, std::size_t) {
+  for_each_index(count, [&](std::size_t i) {
     surface.charts[i] = make_chart(surface.segmentation.segments[i], skeleton, separation);
   });
   surface.unseen = unseen_area_fractions(skeleton, separation, surface.charts);
   surface.reports = map_charts(context, surface.methods, surface.charts, {options.vsm});
-  for_each_block(count, 1, [&](std::size_t i, std::size_t, std::size_t) {
+  for_each_index(count, [&](std::size_t i) {
     if (!is_height_field(surface.methods[i])) judge_map(options, i, surface);
   });
   if (options.reweights_squeezed) reweight_squeezed(context, options, surface);

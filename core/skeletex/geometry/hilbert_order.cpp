@@ -72,11 +72,7 @@ void sort_by_key(std::vector<KeyAndIndex>& items) {
 std::vector<int> hilbert_order(std::span<const Vec3> points) {
   std::vector<int> order(points.size());
   if (points.empty()) return order;
-  Vec3 lower = points.front(), upper = points.front();
-  for (const Vec3& p : points) {
-    lower = lower.cwiseMin(p);
-    upper = upper.cwiseMax(p);
-  }
+  const auto [lower, upper] = bounding_box(points);
   const double side = (upper - lower).maxCoeff();
   const double cells_per_unit = side > 0 ? ((1 << kBits) - 1) / side : 0;
   std::vector<KeyAndIndex> items(points.size());

@@ -39,15 +39,17 @@ std::string text_of(const Vec3& p) {
   return fmt::format("({:.{}g}, {:.{}g}, {:.{}g})", p.x(), digits, p.y(), digits, p.z(), digits);
 }
 
-BoundingBox bounding_box(const TriangleMesh& mesh) {
-  if (mesh.positions.empty()) return {};
-  BoundingBox box{mesh.positions.front(), mesh.positions.front()};
-  for (const Vec3& p : mesh.positions) {
+BoundingBox bounding_box(std::span<const Vec3> points) {
+  if (points.empty()) return {};
+  BoundingBox box{points.front(), points.front()};
+  for (const Vec3& p : points) {
     box.lower = box.lower.cwiseMin(p);
     box.upper = box.upper.cwiseMax(p);
   }
   return box;
 }
+
+BoundingBox bounding_box(const TriangleMesh& mesh) { return bounding_box(mesh.positions); }
 
 Vec3 area_vector(const TriangleMesh& mesh, const Triangle& t) {
   const Vec3& a = mesh.positions[t[0]];

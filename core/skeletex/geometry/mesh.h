@@ -2,6 +2,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -65,7 +66,8 @@ TriangleMesh in_user_units(TriangleMesh mesh, const UnitFrame& frame);
 
 /// A point for messages: "(0.12, 0.4, 0.03)".
 std::string text_of(const Vec3& point);
-/// Bounding box of all positions; zero for an empty mesh.
+/// Bounding box of points, or of all positions of a mesh; zero for none.
+BoundingBox bounding_box(std::span<const Vec3> points);
 BoundingBox bounding_box(const TriangleMesh& mesh);
 /// Area vector of a triangle: half the cross product of its edges, along the outward normal.
 Vec3 area_vector(const TriangleMesh& mesh, const Triangle& triangle);

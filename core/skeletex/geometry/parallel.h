@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <exception>
 #include <mutex>
+#include <numeric>
+#include <span>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -42,6 +44,30 @@ void for_each_block(std::size_t size, std::size_t block_size, const Act& act) {
   work();
   others.clear();
   if (failure) std::rethrow_exception(failure);
+}
+
+/// Calls act(i) for every i of [0, size) on all processors, each of which takes so many at a time. Exceptions are those
+/// of for_each_block.
+template <class Act>
+void for_each_index(std::size_t size, std::size_t block_size, const Act& act) {
+  for_each_block(size, block_size, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) act(i);
+  });
+}
+/// One at a time.
+template <class Act>
+void for_each_index(std::size_t size, const Act& act) {
+  for_each_index(size, 1, act);
+}
+
+/// As for_each_index, from the item that costs most to the one that costs least, so that no processor begins with a
+/// long one when the others end.
+template <class Act>
+void for_each_costliest_first(std::span<const std::size_t> costs, const Act& act) {
+  std::vector<std::size_t> order(costs.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return costs[a] > costs[b]; });
+  for_each_index(order.size(), [&](std::size_t i) { act(order[i]); });
 }
 
 /// Number of blocks that for_each_block makes.

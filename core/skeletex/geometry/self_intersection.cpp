@@ -241,10 +241,9 @@ bool is_plain_vertex(const TriangleMesh& mesh, VertexIndex vertex, std::span<con
 std::vector<char> find_plain_vertices(const TriangleMesh& mesh) {
   const VertexCorners list = list_vertex_corners(mesh);
   std::vector<char> is_plain(mesh.positions.size(), 0);
-  for_each_block(is_plain.size(), 1 << 12, [&](std::size_t, std::size_t first, std::size_t last) {
-    for (std::size_t v = first; v < last; ++v)
-      is_plain[v] = is_plain_vertex(mesh, static_cast<int>(v),
-                                    std::span(list.corners).subspan(list.begin[v], list.begin[v + 1] - list.begin[v]));
+  for_each_index(is_plain.size(), 1 << 12, [&](std::size_t v) {
+    is_plain[v] = is_plain_vertex(mesh, static_cast<int>(v),
+                                  std::span(list.corners).subspan(list.begin[v], list.begin[v + 1] - list.begin[v]));
   });
   return is_plain;
 }

@@ -69,11 +69,9 @@ Box box_of_node(int level, std::size_t node, const TriangleTree& tree) {
 
 TriangleTree build_triangle_tree(const TriangleMesh& mesh) {
   std::vector<Vec3> centres(mesh.triangles.size());
-  for_each_block(centres.size(), 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) {
-      const auto [a, b, c] = mesh.triangles[t];
-      centres[t] = (mesh.positions[a] + mesh.positions[b] + mesh.positions[c]) / 3;
-    }
+  for_each_index(centres.size(), 1 << 14, [&](std::size_t t) {
+    const auto [a, b, c] = mesh.triangles[t];
+    centres[t] = (mesh.positions[a] + mesh.positions[b] + mesh.positions[c]) / 3;
   });
   return build_triangle_tree(mesh, hilbert_order(centres));
 }
@@ -97,9 +95,8 @@ TriangleTree build_triangle_tree(const TriangleMesh& mesh, std::vector<int> orde
   } while (sizes.back() > 1);
 
   tree.points.resize(mesh.positions.size());
-  for_each_block(tree.points.size(), 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v) tree.points[v] = point_of(tree, mesh.positions[v]);
-  });
+  for_each_index(tree.points.size(), 1 << 14,
+                 [&](std::size_t v) { tree.points[v] = point_of(tree, mesh.positions[v]); });
   tree.boxes.assign(nodes * 6 * kWidth, kFarAway);
   for_each_block(sizes[0], 1 << 12, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t block = begin; block < end; ++block) set_box(0, block, box_of_block(mesh, block, tree), tree);
@@ -112,19 +109,17 @@ TriangleTree build_triangle_tree(const TriangleMesh& mesh, std::vector<int> orde
 std::vector<float> triangles_of_blocks(const TriangleMesh& mesh, const TriangleTree& tree) {
   const std::size_t blocks = block_count(tree.order.size(), kWidth);
   std::vector<float> values(blocks * 9 * kWidth);
-  for_each_block(blocks * kWidth, 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t place = begin; place < end; ++place) {
-      float* const planes = values.data() + place / kWidth * 9 * kWidth + place % kWidth;
-      const bool is_past_end = place >= tree.order.size();
-      const Triangle triangle = is_past_end ? Triangle{} : mesh.triangles[tree.order[place]];
-      const Vec3 a = (mesh.positions[triangle[0]] - tree.origin) / tree.scale,
-                 b = (mesh.positions[triangle[1]] - tree.origin) / tree.scale,
-                 c = (mesh.positions[triangle[2]] - tree.origin) / tree.scale;
-      for (int d = 0; d < 3; ++d) {
-        planes[d * kWidth] = is_past_end ? kFarAway : static_cast<float>(a[d]);
-        planes[(3 + d) * kWidth] = static_cast<float>(b[d] - a[d]);
-        planes[(6 + d) * kWidth] = static_cast<float>(c[d] - a[d]);
-      }
+  for_each_index(blocks * kWidth, 1 << 14, [&](std::size_t place) {
+    float* const planes = values.data() + place / kWidth * 9 * kWidth + place % kWidth;
+    const bool is_past_end = place >= tree.order.size();
+    const Triangle triangle = is_past_end ? Triangle{} : mesh.triangles[tree.order[place]];
+    const Vec3 a = (mesh.positions[triangle[0]] - tree.origin) / tree.scale,
+               b = (mesh.positions[triangle[1]] - tree.origin) / tree.scale,
+               c = (mesh.positions[triangle[2]] - tree.origin) / tree.scale;
+    for (int d = 0; d < 3; ++d) {
+      planes[d * kWidth] = is_past_end ? kFarAway : static_cast<float>(a[d]);
+      planes[(3 + d) * kWidth] = static_cast<float>(b[d] - a[d]);
+      planes[(6 + d) * kWidth] = static_cast<float>(c[d] - a[d]);
     }
   });
   return values;

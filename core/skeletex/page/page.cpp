@@ -11,6 +11,7 @@
 #include "skeletex/analysis/metro.h"
 #include "skeletex/compact/compact_file.h"
 #include "skeletex/compact/decode_model.h"
+#include "skeletex/convert/resample/levels.h"
 #include "skeletex/device/kernel_source.h"
 #include "skeletex/edit/morph/morph.h"
 #include "skeletex/edit/transfer/transfer.h"
@@ -18,7 +19,6 @@
 #include "skeletex/model/error.h"
 #include "skeletex/page/pack.h"
 #include "skeletex/page/stage.h"
-#include "skeletex/reconstruct/levels.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/skeleton/pose.h"
 

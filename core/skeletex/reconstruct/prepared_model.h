@@ -2,8 +2,8 @@
 #pragma once
 #include <vector>
 
+#include "skeletex/model/frame.h"
 #include "skeletex/reconstruct/lattice.h"
-#include "skeletex/skeleton/frame.h"
 #include "skeletex/skeleton/separation_planes.h"
 
 namespace skeletex {

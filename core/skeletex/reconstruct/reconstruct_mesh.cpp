@@ -6,11 +6,11 @@
 #include <algorithm>
 
 #include "reconstruct_structs.h"
+#include "skeletex/model/frame.h"
 #include "skeletex/model/memory.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/lattice.h"
 #include "skeletex/reconstruct/seam_strip.h"
-#include "skeletex/skeleton/frame.h"
 
 namespace skeletex {
 namespace {

@@ -57,9 +57,4 @@ void place_shared_vertices(const PreparedModel& model, std::vector<Vec3>& positi
 void for_each_pole(const SkeletexModel& model, const Lattice& lattice,
                    const std::function<void(VertexIndex vertex, BoneIndex bone, int end, std::size_t texel)>& place);
 
-/// The same model with rectangles scaled to another texture size (longer side `size`, at least 4 x 4 each). Texels are
-/// resampled as bind-pose positions, averaged where the lattice gets coarser; seams are resampled as polylines.
-/// \throw InputError when the size is too small for the number of bones
-SkeletexModel resample_model(ClContext& context, const PreparedModel& model, int size);
-
 }  // namespace skeletex

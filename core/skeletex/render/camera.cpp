@@ -63,20 +63,6 @@ View parse_view(const nlohmann::json& json, const std::string& source) {
 
 namespace {
 
-/// The box around the places of points.
-/// \param place  (point) -> place
-template <class Place>
-BoundingBox bounds_of(std::span<const Vec3> points, const Place& place) {
-  if (points.empty()) return {};
-  BoundingBox bounds{Vec3::Constant(std::numeric_limits<double>::infinity()),
-                     Vec3::Constant(-std::numeric_limits<double>::infinity())};
-  for (const Vec3& p : points) {
-    bounds.lower = bounds.lower.cwiseMin(place(p));
-    bounds.upper = bounds.upper.cwiseMax(place(p));
-  }
-  return bounds;
-}
-
 /// Places a camera, whose axes and opening are set, so that all points are in its picture.
 class CameraFit {
  public:
@@ -112,7 +98,9 @@ class CameraFit {
   }
 
   void fit_orthographic() {
-    const auto [low, high] = bounds_of(points_, [this](const Vec3& p) { return seen(p); });
+    std::vector<Vec3> places;
+    for (const Vec3& p : points_) places.push_back(seen(p));
+    const auto [low, high] = bounding_box(places);
     Vec3 half = 0.5 * (high - low);
     if (view_.target)
       half = high.cwiseMax(-low);
@@ -184,7 +172,7 @@ void turn_camera(const View& view, const Vec3& target, Camera& camera) {
 }  // namespace
 
 Camera fit_camera(const View& view, std::span<const Vec3> points, int width, int height) {
-  const auto [lower, upper] = bounds_of(points, [](const Vec3& p) { return p; });
+  const auto [lower, upper] = bounding_box(points);
   const double radius = std::max(0.5 * (upper - lower).norm(), 1e-12);
   const Vec3 target = view.target.value_or(0.5 * (lower + upper));
   Camera camera;
@@ -208,7 +196,7 @@ Camera fit_camera(const View& view, std::span<const Vec3> points, int width, int
 }
 
 std::vector<Camera> turntable(const View& view, std::span<const Vec3> points, int width, int height, int count) {
-  const auto [lower, upper] = bounds_of(points, [](const Vec3& p) { return p; });
+  const auto [lower, upper] = bounding_box(points);
   View turned = view;
   turned.target = view.target.value_or(0.5 * (lower + upper));
   std::vector<Camera> cameras;

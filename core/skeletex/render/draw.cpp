@@ -74,15 +74,12 @@ struct Sphere {
 };
 
 Sphere bounding_sphere(const GpuSurface& surface) {
-  BoundingBox box{Vec3::Constant(1e300), Vec3::Constant(-1e300)};
   std::vector<float> values(3 * static_cast<std::size_t>(surface.vertex_count));
   surface.positions.read(values.size() * sizeof(float), values.data());
-  for (std::size_t i = 0; i < values.size(); i += 3) {
-    const Vec3 p(values[i], values[i + 1], values[i + 2]);
-    box.lower = box.lower.cwiseMin(p);
-    box.upper = box.upper.cwiseMax(p);
-  }
   if (values.empty()) return {};
+  std::vector<Vec3> points;
+  for (std::size_t i = 0; i < values.size(); i += 3) points.emplace_back(values[i], values[i + 1], values[i + 2]);
+  const BoundingBox box = bounding_box(points);
   return {box.centre(), std::max(0.5 * box.diagonal(), 1e-12)};
 }
 

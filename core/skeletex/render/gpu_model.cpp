@@ -6,10 +6,10 @@
 
 #include <algorithm>
 
+#include "skeletex/model/frame.h"
 #include "skeletex/reconstruct/displace.h"
-#include "skeletex/reconstruct/pose_mesh.h"
-#include "skeletex/skeleton/frame.h"
-#include "skeletex/skeleton/posed_frame.h"
+#include "skeletex/reconstruct/pose/pose_mesh.h"
+#include "skeletex/reconstruct/pose/posed_frame.h"
 
 namespace skeletex {
 namespace {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 #include "skeletex/model/texture.h"
+#include "skeletex/reconstruct/pose/posed_planes.h"
+#include "skeletex/reconstruct/pose/skin.h"
 #include "skeletex/reconstruct/prepared_model.h"
-#include "skeletex/reconstruct/skin.h"
 #include "skeletex/render/gpu_surface.h"
-#include "skeletex/skeleton/posed_planes.h"
 
 namespace skeletex {
 

@@ -4,9 +4,10 @@
 #include <cmath>
 
 #include "skeletex/close/carry_over.h"
+#include "skeletex/convert/resample/resample.h"
 #include "skeletex/io/gltf/write_gltf.h"
 #include "skeletex/reconstruct/layers/layer_values.h"
-#include "skeletex/reconstruct/linear_skin.h"
+#include "skeletex/reconstruct/pose/linear_skin.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/reconstruct/texture/bake_texture.h"
 

@@ -88,12 +88,10 @@ void replace_outliers(const SkeletexModel& model, Planes& planes) {
       return;
     }
   };
-  for_each_block(model.patches.size(), 1, [&](std::size_t, std::size_t first, std::size_t last) {
-    for (std::size_t p = first; p < last; ++p) {
-      const Rectangle& r = model.patches[p].rectangle;
-      for (int y = r.y; y < r.y + r.height; ++y)
-        for (int x = r.x; x < r.x + r.width; ++x) replace(r, x, y);
-    }
+  for_each_index(model.patches.size(), [&](std::size_t p) {
+    const Rectangle& r = model.patches[p].rectangle;
+    for (int y = r.y; y < r.y + r.height; ++y)
+      for (int x = r.x; x < r.x + r.width; ++x) replace(r, x, y);
   });
 }
 

@@ -120,7 +120,7 @@ void check_nodes(const CutMesh& mesh, const Skeleton& skeleton, std::size_t coun
   nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
   nodes.resize(std::min(count, nodes.size()));
   std::vector<int> windings(nodes.size());
-  for_each_block(nodes.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+  for_each_index(nodes.size(), [&](std::size_t i) {
     windings[i] = winding_number(mesh.positions, mesh.origins, skeleton.nodes[nodes[i]].position);
   });
   for (std::size_t i = 0; i < nodes.size(); ++i) {
@@ -137,7 +137,7 @@ void check_nodes(const CutMesh& mesh, const Skeleton& skeleton, std::size_t coun
 /// Per bone where it first meets the surface.
 std::vector<double> first_crossings(const CutMesh& mesh, const Skeleton& skeleton) {
   std::vector<double> crossings(skeleton.bones.size());
-  for_each_block(crossings.size(), 1, [&](std::size_t b, std::size_t, std::size_t) {
+  for_each_index(crossings.size(), [&](std::size_t b) {
     const BoneIndex bone = static_cast<int>(b);
     crossings[b] = first_crossing(mesh, end_position(skeleton, bone, BoneEnd::kHead),
                                   end_position(skeleton, bone, BoneEnd::kTail));

@@ -75,12 +75,9 @@ void check_directions(const Skeleton& skeleton) {
 }
 
 Vec3 middle_of_nodes(const Skeleton& skeleton) {
-  BoundingBox box{skeleton.nodes[0].position, skeleton.nodes[0].position};
-  for (const Node& node : skeleton.nodes) {
-    box.lower = box.lower.cwiseMin(node.position);
-    box.upper = box.upper.cwiseMax(node.position);
-  }
-  return box.centre();
+  std::vector<Vec3> positions;
+  for (const Node& node : skeleton.nodes) positions.push_back(node.position);
+  return bounding_box(positions).centre();
 }
 
 double distance_to_bone(const Vec3& point, const Vec3& head, const Vec3& tail) {

@@ -84,21 +84,19 @@ double Repair::total_cost() const {
 std::vector<Vec3> Repair::gradient() const {
   constexpr double kStep = 0.03;  // radii
   std::vector<Vec3> result(skeleton_.nodes.size(), Vec3::Zero());
-  for_each_block(result.size(), 1, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      const NodeIndex node = static_cast<int>(n);
-      const std::vector<BoneIndex> bones = bones_around({node});
-      if (std::all_of(bones.begin(), bones.end(), [&](int b) { return margins_[b].margin > kGoodMargin; })) continue;
-      Skeleton moved = skeleton_;
-      for (int axis = 0; axis < 3; ++axis) {
-        std::array<double, 2> costs{};
-        for (const int side : {0, 1}) {
-          moved.nodes[n].position = skeleton_.nodes[n].position;
-          moved.nodes[n].position[axis] += (side == 0 ? -kStep : kStep) * radii_[n];
-          costs[side] = cost(moved, at_nodes_, bones, kNoLimit) + displacement_cost(moved, node);
-        }
-        result[n][axis] = (costs[1] - costs[0]) / (2 * kStep);
+  for_each_index(result.size(), [&](std::size_t n) {
+    const NodeIndex node = static_cast<int>(n);
+    const std::vector<BoneIndex> bones = bones_around({node});
+    if (std::all_of(bones.begin(), bones.end(), [&](int b) { return margins_[b].margin > kGoodMargin; })) return;
+    Skeleton moved = skeleton_;
+    for (int axis = 0; axis < 3; ++axis) {
+      std::array<double, 2> costs{};
+      for (const int side : {0, 1}) {
+        moved.nodes[n].position = skeleton_.nodes[n].position;
+        moved.nodes[n].position[axis] += (side == 0 ? -kStep : kStep) * radii_[n];
+        costs[side] = cost(moved, at_nodes_, bones, kNoLimit) + displacement_cost(moved, node);
       }
+      result[n][axis] = (costs[1] - costs[0]) / (2 * kStep);
     }
   });
   return result;

@@ -158,7 +158,7 @@ std::vector<Level> make_levels(const Surface& surface, const VoxelBody& body, co
   if (options.detail) details = {*options.detail};
   for (const double detail : details)
     add(fmt::format("detail {:.2g}", detail), tips_of(body, paths, detail, surface.diagonal, genus));
-  for_each_block(levels.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+  for_each_index(levels.size(), [&](std::size_t i) {
     levels[i].curves = curves_of(surface, body, levels[i].tips, genus);
     levels[i].repair = std::make_unique<Repair>(surface, make_bones(surface, body.side, levels[i].curves));
     levels[i].repair->run();

@@ -8,9 +8,9 @@
 #include "skeletex/edit/transfer/part.h"
 #include "skeletex/edit/transfer/transfer.h"
 #include "skeletex/model/error.h"
-#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/pose/pose_mesh.h"
+#include "skeletex/reconstruct/pose/skin.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
-#include "skeletex/reconstruct/skin.h"
 #include "skeletex/skeleton/correspondence.h"
 #include "stages.h"
 
@@ -51,8 +51,8 @@ Stage stage_of(const char* name, const TextureInput& input) {
 }
 
 Pose bent(const Skeleton& skeleton) {
-  TriangleMesh nodes;
-  for (const auto& node : skeleton.nodes) nodes.positions.push_back(node.position);
+  std::vector<Vec3> nodes;
+  for (const auto& node : skeleton.nodes) nodes.push_back(node.position);
   const BoundingBox box = bounding_box(nodes);
   const Vec3 extent = box.upper - box.lower;
   int axis = 0;
@@ -60,7 +60,7 @@ Pose bent(const Skeleton& skeleton) {
   Vec3 about = Vec3::Zero();
   about[(axis + 1) % 3] = 1;
   Pose pose;
-  for (const Vec3& p : nodes.positions) {
+  for (const Vec3& p : nodes) {
     const double angle = extent[axis] > 0 ? std::numbers::pi / 4.5 * (p[axis] - box.lower[axis]) / extent[axis] : 0;
     pose.nodes.push_back(box.lower + Eigen::AngleAxisd(angle, about) * (p - box.lower));
   }

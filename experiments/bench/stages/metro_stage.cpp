@@ -46,9 +46,7 @@ Stage metro_stage(ClContext& context, MeshInputPointer input, double noise_rel_d
     std::vector<double> distances(points->size());
     return wall_ms([&] {
       const EmbreeScene scene(input->mesh.positions, input->mesh.triangles, distance_from_triangle);
-      for_each_block(points->size(), 4096, [&](std::size_t, std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) distances[i] = scene.closest_distance((*points)[i]);
-      });
+      for_each_index(points->size(), 4096, [&](std::size_t i) { distances[i] = scene.closest_distance((*points)[i]); });
     });
   };
   stage.details = [points] {

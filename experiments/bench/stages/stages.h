@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "inputs.h"
-#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/pose/pose_mesh.h"
 #include "skeletex/skeleton/pose.h"
 #include "stage.h"
 

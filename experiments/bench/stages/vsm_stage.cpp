@@ -74,14 +74,12 @@ Stage vsm_stage(ClContext& context, MeshInputPointer input, int threads) {
   stage.run_reference = [matrices, threads] {
     const int solves = VsmOptions().iterations + 1;
     std::vector<double> sums(matrices->size());
-    const auto solve = [&](std::size_t i, std::size_t, std::size_t) {
-      sums[i] = solve_directly((*matrices)[i], solves);
-    };
+    const auto solve = [&](std::size_t i) { sums[i] = solve_directly((*matrices)[i], solves); };
     return wall_ms([&] {
       if (threads == 1)
-        for (std::size_t i = 0; i < matrices->size(); ++i) solve(i, i, i + 1);
+        for (std::size_t i = 0; i < matrices->size(); ++i) solve(i);
       else
-        for_each_block(matrices->size(), 1, solve);
+        for_each_index(matrices->size(), solve);
     });
   };
   stage.details = [charts, reports] {

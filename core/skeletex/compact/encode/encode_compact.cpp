@@ -86,8 +86,8 @@ void encode_patches(CompactModel& compact, const SeparationPlanes& separation, c
   const std::vector<Place> none;
   const std::vector<std::array<PatchEnd, 2>> ends = ends_of(compact);
   const SeamCurves seams = decode_seams(compact, separation, 0);
-  for_each_block(compact.patches.size(), 1, [&](std::size_t block, std::size_t, std::size_t) {
-    const BoneIndex bone = static_cast<int>(block);
+  for_each_costliest_first(point_counts(compact), [&](std::size_t i) {
+    const BoneIndex bone = static_cast<int>(i);
     const std::array<bool, 2> has_pole{ends[bone][0].arcs.empty(), ends[bone][1].arcs.empty()};
     const EndRow row = [&](BoneEnd end, int columns) {
       return end_row(compact, separation, ends, seams, bone, end, columns);

@@ -16,6 +16,8 @@ constexpr int kLargestSize = 1600;  // larger textures are looked at in a smalle
 /// Fixed places are worth their bytes where they leave at most these shares of the intersections of a patch, and of
 /// all.
 constexpr double kMostLeft = 0.25, kMostLeftOfAll = 0.5;
+/// More intersections for each texel than these are never reduced to that.
+constexpr double kMostOfTexels = 0.004;
 
 /// Pairs of triangles of a patch that intersect each other, or others, and where they lie in it.
 struct Intersections {
@@ -53,7 +55,7 @@ int count_of(const std::vector<Intersections>& patches) {
 void reduce_intersections(ClContext& context, const SkeletexModel& model, const SourceSurface& source,
                           CompactOptions& options, CompactModel& compact) {
   const std::vector<Intersections> first = intersections_by_patch(context, compact);
-  if (count_of(first) == 0) return;
+  if (count_of(first) == 0 || count_of(first) > kMostOfTexels * options.size * options.size) return;
   CompactOptions trial = options;
   trial.weights = compact.weights;
   trial.fixed_places.assign(first.size(), {});

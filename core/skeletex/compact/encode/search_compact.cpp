@@ -139,7 +139,8 @@ class Search {
   }
   /// The step to begin with: that of the best trial so far, with another number of levels.
   static double first_step(const std::optional<Trial>& best, int bare_levels, double wanted) {
-    return best ? best->options.step * portable::pow(kStepRatio, best->options.bare_levels - bare_levels) : 3 * wanted;
+    return best ? best->options.step * portable::pow(kStepRatio, best->options.bare_levels - bare_levels)
+                : 2.4 * wanted;
   }
 
   /// Whether a good trial comes nearer to what is wanted than the best one so far.
@@ -218,7 +219,7 @@ class Search {
     };
     // Downhill from where the spacing of the residuals suits the error as on the standard models.
     const int first =
-        std::clamp(static_cast<int>(std::lround(2 * std::log2(size_ / 128.0) + std::log2(wanted / 1e-4))), 0, 12);
+        std::clamp(static_cast<int>(std::lround(2 * std::log2(size_ / 256.0) + std::log2(wanted / 1e-4))), 0, 12);
     int bare = first;
     while (bare >= 0 && !try_levels(bare)) bare -= 2;
     // All levels with residuals take more bytes than a larger size does.

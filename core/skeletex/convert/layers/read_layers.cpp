@@ -90,9 +90,8 @@ CornerValues<Vec3> normals_of(const TriangleMesh& mesh, const MeshAttributes& at
 /// Calls act(texel, point) for the texels that have one, on all processors.
 template <class Act>
 void for_each_point(std::span<const SurfacePoint> points, const Act& act) {
-  for_each_block(points.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i)
-      if (points[i].triangle >= 0) act(i, points[i]);
+  for_each_index(points.size(), kBlock, [&](std::size_t i) {
+    if (points[i].triangle >= 0) act(i, points[i]);
   });
 }
 

@@ -74,17 +74,15 @@ std::vector<SurfacePoint> find_surface_points(ClContext& context, const Triangle
   std::vector<int> nearest(points.size());
   NearestSearch(context, mesh, tree).find(points, nearest, {}, static_cast<float>(kNearEnough * tree.scale));
   std::vector<SurfacePoint> found(points.size());
-  for_each_block(points.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const auto looks_away = [&](int t) { return area_vector(mesh, mesh.triangles[t]).dot(probes[i].outward) < 0; };
-      TriangleIndex triangle = nearest[i];
-      if (looks_away(triangle)) {
-        const NearestTriangle other =
-            find_nearest_triangle(mesh, tree, points[i], probes[i].reach, [&](int t) { return !looks_away(t); });
-        if (other.triangle >= 0) triangle = other.triangle;
-      }
-      found[i] = nearest_in_triangle(mesh, triangle, points[i]);
+  for_each_index(points.size(), kBlock, [&](std::size_t i) {
+    const auto looks_away = [&](int t) { return area_vector(mesh, mesh.triangles[t]).dot(probes[i].outward) < 0; };
+    TriangleIndex triangle = nearest[i];
+    if (looks_away(triangle)) {
+      const NearestTriangle other =
+          find_nearest_triangle(mesh, tree, points[i], probes[i].reach, [&](int t) { return !looks_away(t); });
+      if (other.triangle >= 0) triangle = other.triangle;
     }
+    found[i] = nearest_in_triangle(mesh, triangle, points[i]);
   });
   return found;
 }
@@ -112,13 +110,11 @@ std::vector<SurfacePoint> surface_points(ClContext& context, const PreparedModel
   const SkeletexModel& model = prepared.model;
   const RowPoints rows = points_of_rows(context, prepared);
   std::vector<Probe> probes(rows.points.size());
-  for_each_block(prepared.all_rows.size(), 8, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      const auto [bone, row, vertex, quad] = prepared.all_rows[k];
-      for (int j = 0; j < model.patches[bone].rectangle.width; ++j) {
-        const Vec3 inward = rows.inward(model.patches[bone], bone, row, j);
-        probes[vertex + j] = {rows.points[vertex + j], -inward, std::sqrt(inward.norm())};
-      }
+  for_each_index(prepared.all_rows.size(), 8, [&](std::size_t k) {
+    const auto [bone, row, vertex, quad] = prepared.all_rows[k];
+    for (int j = 0; j < model.patches[bone].rectangle.width; ++j) {
+      const Vec3 inward = rows.inward(model.patches[bone], bone, row, j);
+      probes[vertex + j] = {rows.points[vertex + j], -inward, std::sqrt(inward.norm())};
     }
   });
   const std::vector<SurfacePoint> found = find_surface_points(context, mesh, tree, probes);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "skeletex/convert/layout/ray_profile.h"
 
-#include "skeletex/skeleton/frame.h"
+#include "skeletex/model/frame.h"
 
 namespace skeletex {
 namespace {

@@ -30,11 +30,9 @@ void NearestSearch::find(std::span<const Vec3> points, std::span<int> triangles,
   const std::size_t count = points.size();
   if (count == 0) return;
   points_.resize(3 * count);
-  for_each_block(count, kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const Vec3 p = (points[i] - origin_) / scale_;
-      for (std::size_t axis = 0; axis < 3; ++axis) points_[axis * count + i] = static_cast<float>(p[axis]);
-    }
+  for_each_index(count, kBlock, [&](std::size_t i) {
+    const Vec3 p = (points[i] - origin_) / scale_;
+    for (std::size_t axis = 0; axis < 3; ++axis) points_[axis * count + i] = static_cast<float>(p[axis]);
   });
   if (nearest_.size != count)
     nearest_ = context_.allocate<int>(count), nearest_squared_ = context_.allocate<float>(count);

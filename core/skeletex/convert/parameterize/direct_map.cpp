@@ -77,7 +77,7 @@ int map_directly(Chart& chart, int iterations, double alpha) {
   std::array<Factorization, 2> solvers;  // of u and v
   for (int iteration = 0, flipped = 0;; ++iteration) {
     const std::vector<double> u = chart.u, v = chart.v;
-    for_each_block(2, 1, [&](std::size_t k, std::size_t, std::size_t) {
+    for_each_index(2, [&](std::size_t k) {
       solve(chart, unknown, rows, weights, k == 0, solvers[k], k == 0 ? chart.u : chart.v);
     });
     if (const int before = std::exchange(flipped, count_flipped(chart)); iteration > 0 && flipped > before) {

@@ -41,7 +41,7 @@ LocalTriangles localize(const Skeleton& skeleton, const SeparationPlanes& separa
   local.first_turn.resize(local.count());
   local.last_turn.resize(local.count());
   std::vector<double> extents(charts.size(), 0);
-  for_each_block(charts.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
+  for_each_index(charts.size(), [&](std::size_t k) {
     const Chart& chart = charts[k];
     const BoneBasis& basis = separation.bases()[chart.bone];
     const Vec3& head = end_position(skeleton, chart.bone, BoneEnd::kHead);
@@ -115,7 +115,7 @@ Lists fill_lists(int count, std::size_t charts, ForEach&& for_each_list) {
   Lists lists;
   lists.begins.assign(count + 1, 0);
   const auto for_charts = [&](const auto& visit) {
-    for_each_block(charts, 1, [&](std::size_t chart, std::size_t, std::size_t) { for_each_list(chart, visit); });
+    for_each_index(charts, [&](std::size_t chart) { for_each_list(chart, visit); });
   };
   for_charts([&](int list, int) { ++lists.begins[list + 1]; });
   for (std::size_t i = 1; i < lists.begins.size(); ++i) lists.begins[i] += lists.begins[i - 1];
@@ -246,9 +246,8 @@ std::vector<double> unseen_area_fractions(const Skeleton& skeleton, const Separa
     if (mesh.triangles.empty()) continue;
     const TriangleTree tree = build_triangle_tree(mesh);
     std::vector<std::uint8_t> hidden(mesh.triangles.size());
-    for_each_block(hidden.size(), 256, [&](std::size_t, std::size_t begin, std::size_t end) {
-      for (std::size_t t = begin; t < end; ++t)
-        hidden[t] = is_hidden(skeleton, separation, mesh, tree, charts[i].bone, static_cast<int>(t));
+    for_each_index(hidden.size(), 256, [&](std::size_t t) {
+      hidden[t] = is_hidden(skeleton, separation, mesh, tree, charts[i].bone, static_cast<int>(t));
     });
     double unseen = 0, area = 0;
     for (std::size_t t = 0; t < hidden.size(); ++t) {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "skeletex/convert/parameterize/method.h"
-#include "skeletex/skeleton/frame.h"
+#include "skeletex/model/frame.h"
 
 namespace skeletex {
 

@@ -4,7 +4,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/math/portable.h"
@@ -195,12 +194,9 @@ std::vector<double> relative_surface_areas(const Chart& chart) {
 }
 
 void for_each_chart(std::span<const Chart> charts, const std::function<void(std::size_t)>& act) {
-  std::vector<std::size_t> order(charts.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return charts[a].triangles.size() > charts[b].triangles.size();
-  });
-  for_each_block(order.size(), 1, [&](std::size_t i, std::size_t, std::size_t) { act(order[i]); });
+  std::vector<std::size_t> costs;
+  for (const Chart& chart : charts) costs.push_back(chart.triangles.size());
+  for_each_costliest_first(costs, act);
 }
 
 }  // namespace skeletex

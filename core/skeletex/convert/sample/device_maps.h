@@ -5,8 +5,8 @@
 
 #include "skeletex/convert/parameterize/chart.h"
 #include "skeletex/device/context.h"
+#include "skeletex/model/frame.h"
 #include "skeletex/reconstruct/displace.h"
-#include "skeletex/skeleton/frame.h"
 #include "texel_structs.h"
 
 namespace skeletex {

@@ -13,7 +13,7 @@
 #include "skeletex/convert/snap/revert_faults.h"
 #include "skeletex/convert/snap/snap.h"
 #include "skeletex/device/context.h"
-#include "skeletex/skeleton/frame.h"
+#include "skeletex/model/frame.h"
 
 namespace skeletex {
 

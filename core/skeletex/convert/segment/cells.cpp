@@ -65,12 +65,7 @@ std::vector<NodeCells> node_cells(const Skeleton& skeleton, double perturbation)
 
 ClassifyTables classify_tables(const std::vector<Vec3>& points, const std::vector<NodeCells>& nodes) {
   ClassifyTables tables;
-  Vec3 lower = points.empty() ? Vec3(Vec3::Zero()) : points[0], upper = lower;
-  for (const Vec3& p : points) {
-    lower = lower.cwiseMin(p);
-    upper = upper.cwiseMax(p);
-  }
-  tables.origin = 0.5 * (lower + upper);
+  tables.origin = bounding_box(points).centre();
   tables.points.resize(3 * points.size());
   double radius_squared = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {

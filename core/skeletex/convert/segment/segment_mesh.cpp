@@ -116,13 +116,8 @@ void Segmenter::throw_crossing(NodeIndex node, const CutOutcome& outcome) const 
 }
 
 void Segmenter::cut() {
-  BoundingBox box;
-  if (!mesh_.positions.empty()) box = {mesh_.positions[0], mesh_.positions[0]};
-  for (const Vec3& p : mesh_.positions) {
-    box.lower = box.lower.cwiseMin(p);
-    box.upper = box.upper.cwiseMax(p);
-  }
-  const std::vector<NodeCells> nodes = node_cells(skeleton_, kMostPerturbation * box.diagonal());
+  const double diagonal = bounding_box(mesh_.positions).diagonal();
+  const std::vector<NodeCells> nodes = node_cells(skeleton_, kMostPerturbation * diagonal);
   const std::vector<std::uint8_t> labels_at_nodes = classify_points(context_, mesh_.positions, nodes);
   const std::size_t input_count = mesh_.positions.size();
   std::vector<std::uint8_t> labels;

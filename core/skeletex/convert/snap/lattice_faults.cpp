@@ -131,14 +131,6 @@ double furthest_place(const LatticeSurface& surface, const OriginalSurface& orig
   return furthest;
 }
 
-/// Calls act(index) for [0, count) on all processors.
-template <class Act>
-void for_each_index(std::size_t count, const Act& act) {
-  for_each_block(count, kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) act(i);
-  });
-}
-
 /// The triangles with the highest estimates, of those that are finite.
 std::vector<int> highest(const std::vector<Estimate>& estimates) {
   std::vector<double> distances;
@@ -201,17 +193,17 @@ std::array<int, 3> LatticeSurface::read_by(TriangleIndex triangle, const Origina
 
 RegularGridFaults measure_regular_grid(const LatticeSurface& surface, const OriginalSurface& original) {
   std::vector<Estimate> estimates(2 * static_cast<std::size_t>(surface.frame.numbers.quad_count));
-  for_each_index(estimates.size(),
+  for_each_index(estimates.size(), kBlock,
                  [&](std::size_t i) { estimates[i] = estimate(surface, original, static_cast<int>(i)); });
   const std::vector<int> suspects = highest(estimates);
   std::vector<double> distances(suspects.size());
-  for_each_index(suspects.size(), [&](std::size_t i) {
+  for_each_index(suspects.size(), kBlock, [&](std::size_t i) {
     distances[i] = find_nearest_to_middle(surface, original, suspects[i], 0).distance;
   });
   RegularGridFaults faults;
   for (const double distance : distances) faults.furthest = std::max(faults.furthest, distance);
   const double middle = faults.furthest;
-  for_each_index(suspects.size(), [&](std::size_t i) {
+  for_each_index(suspects.size(), kBlock, [&](std::size_t i) {
     if (distances[i] >= kGridWorthALook * middle)
       distances[i] = std::max(distances[i], furthest_place(surface, original, suspects[i], middle, kInfinity));
   });
@@ -252,7 +244,7 @@ std::vector<MeasuredTriangle> measure_triangles(const LatticeSurface& surface, c
 std::vector<int> nearest_to_far_vertices(const LatticeSurface& surface, const OriginalSurface& original,
                                          const TriangleTree& tree, std::span<const char> is_held, double limit) {
   std::vector<int> nearest(original.vertices.size(), -1);
-  for_each_index(nearest.size(), [&](std::size_t i) {
+  for_each_index(nearest.size(), kBlock, [&](std::size_t i) {
     const OriginalSurface::Vertex& vertex = original.vertices[i];
     if (is_held[vertex.number] != 0) return;
     for (const TriangleIndex triangle : {2 * vertex.quad, 2 * vertex.quad + 1}) {

@@ -77,7 +77,7 @@ LatticeFrame frame_lattice(ClContext& context, const SkeletexModel& model) {
   frame.positions.resize(lattice.vertex_count);
   place_seams(model, separation, lattice, frame.positions);
   frame.ends.resize(2 * model.patches.size());
-  for_each_block(frame.ends.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+  for_each_index(frame.ends.size(), [&](std::size_t i) {
     frame.ends[i] =
         end_seam(model, separation, lattice, frame.positions, static_cast<int>(i / 2), static_cast<BoneEnd>(i % 2));
   });
@@ -108,7 +108,7 @@ namespace {
 std::vector<std::vector<Triangle>> make_ends(const LatticeFrame& frame, std::span<const int> ends,
                                              std::span<const Vec3> positions) {
   std::vector<std::vector<Triangle>> triangles(ends.size());
-  for_each_block(ends.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+  for_each_index(ends.size(), [&](std::size_t i) {
     append_end_triangles(frame.model, frame.numbers, positions, frame.ends[ends[i]], ends[i] / 2,
                          static_cast<BoneEnd>(ends[i] % 2), triangles[i]);
   });
@@ -162,10 +162,9 @@ void build_lattice_mesh(ClContext& context, const LatticeFrame& frame, DiagonalR
   const ClMapping<int> diagonals = diagonals_of(context, frame, rule, frame.rows, points);
   const ClMapping<float> values = context.map(points.values);
   const float *const x = values.data(), *const y = x + points.count, *const z = y + points.count;
-  for_each_block(lattice.vertex_count, 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t vertex = begin; vertex < end; ++vertex)
-      if (const TexelIndex texel = frame.texels[vertex]; texel >= 0)
-        mesh.positions[vertex] = frame.model.origin + Vec3(x[texel], y[texel], z[texel]);
+  for_each_index(lattice.vertex_count, 1 << 14, [&](std::size_t vertex) {
+    if (const TexelIndex texel = frame.texels[vertex]; texel >= 0)
+      mesh.positions[vertex] = frame.model.origin + Vec3(x[texel], y[texel], z[texel]);
   });
   std::vector<int> ends(frame.ends.size());
   std::iota(ends.begin(), ends.end(), 0);

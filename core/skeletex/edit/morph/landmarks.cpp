@@ -9,13 +9,13 @@
 
 #include "skeletex/convert/layers/read_layers.h"
 #include "skeletex/convert/layers/surface_points.h"
+#include "skeletex/convert/resample/resample_snapped.h"
 #include "skeletex/edit/morph/patch_warp.h"
 #include "skeletex/edit/morph/surface_map.h"
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/model/encoder_settings.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
-#include "skeletex/reconstruct/resample/resample_snapped.h"
 
 namespace skeletex {
 namespace {
@@ -92,16 +92,14 @@ std::vector<Place> nearest_places(std::span<const Chart> charts, std::span<const
 void warp_chart(const Patch& patch, const PatchWarp& warp, Chart& chart) {
   const int width = patch.rectangle.width;
   std::vector<int> passed(chart.positions.size(), 0);  // turns that the vertex has gone beyond its period
-  for_each_block(chart.positions.size(), 256, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      if (chart.kinds[i] != ChartVertex::kInner) continue;
-      const Eigen::Vector2d place(width * chart.v[i], row_of(patch, chart.u[i]));
-      const Eigen::Vector2d moved = place + warp.move(place);
-      const double v = moved.x() / width;
-      passed[i] = static_cast<int>(std::floor(v));
-      chart.v[i] = v - passed[i];
-      chart.u[i] = u_of(patch, moved.y());
-    }
+  for_each_index(chart.positions.size(), 256, [&](std::size_t i) {
+    if (chart.kinds[i] != ChartVertex::kInner) return;
+    const Eigen::Vector2d place(width * chart.v[i], row_of(patch, chart.u[i]));
+    const Eigen::Vector2d moved = place + warp.move(place);
+    const double v = moved.x() / width;
+    passed[i] = static_cast<int>(std::floor(v));
+    chart.v[i] = v - passed[i];
+    chart.u[i] = u_of(patch, moved.y());
   });
   for (std::size_t t = 0; t < chart.triangles.size(); ++t)
     for (int k = 0; k < 3; ++k)

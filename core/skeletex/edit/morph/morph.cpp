@@ -9,6 +9,7 @@
 #include <deque>
 #include <numbers>
 
+#include "skeletex/convert/resample/resample.h"
 #include "skeletex/edit/morph/morph_layers.h"
 #include "skeletex/edit/morph/orientation.h"
 #include "skeletex/edit/morph/seam_mean.h"

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "skeletex/geometry/loop_turns.h"
-#include "skeletex/skeleton/frame.h"
+#include "skeletex/model/frame.h"
 #include "skeletex/skeleton/pose.h"
 
 namespace skeletex {

@@ -6,8 +6,8 @@
 
 #include "skeletex/edit/morph/angle_map.h"
 #include "skeletex/edit/morph/seam_network.h"
+#include "skeletex/reconstruct/pose/posed_planes.h"
 #include "skeletex/skeleton/correspondence.h"
-#include "skeletex/skeleton/posed_planes.h"
 
 namespace skeletex {
 

@@ -7,9 +7,9 @@
 
 #include "skeletex/edit/morph/blend.h"
 #include "skeletex/edit/morph/seam_map.h"
+#include "skeletex/model/frame.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/lattice.h"
-#include "skeletex/skeleton/frame.h"
 
 namespace skeletex {
 namespace {

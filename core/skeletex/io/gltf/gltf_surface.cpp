@@ -77,11 +77,11 @@ class SurfaceBuilder {
  private:
   /// The size of what a skin moves, before it is placed.
   double extent_of(int skin) const {
-    TriangleMesh points;
+    std::vector<Vec3> points;
     for (const GltfNode& node : scene_.nodes)
       if (node.skin == skin && node.mesh >= 0)
         for (const GltfPrimitive& primitive : scene_.meshes[node.mesh].primitives)
-          points.positions.insert(points.positions.end(), primitive.positions.begin(), primitive.positions.end());
+          points.insert(points.end(), primitive.positions.begin(), primitive.positions.end());
     return bounding_box(points).diagonal();
   }
 

@@ -8,7 +8,6 @@
 #include "skeletex/model/octahedral.h"
 #include "skeletex/reconstruct/layers/turn_normals.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
-#include "skeletex/reconstruct/resample/filter_taps.h"
 
 namespace skeletex {
 namespace {
@@ -19,12 +18,10 @@ constexpr std::size_t kRowsAtOnce = 8;
 template <class Act>
 void for_each_row(const PreparedModel& prepared, const Act& act) {
   const std::vector<LatticeRow>& rows = prepared.all_rows;
-  for_each_block(rows.size(), kRowsAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      const int bone = rows[k][0], row = rows[k][1];
-      const Rectangle& r = prepared.model.patches[bone].rectangle;
-      act(bone, row, static_cast<std::size_t>(r.y + row) * prepared.model.texture.width + r.x);
-    }
+  for_each_index(rows.size(), kRowsAtOnce, [&](std::size_t k) {
+    const int bone = rows[k][0], row = rows[k][1];
+    const Rectangle& r = prepared.model.patches[bone].rectangle;
+    act(bone, row, static_cast<std::size_t>(r.y + row) * prepared.model.texture.width + r.x);
   });
 }
 
@@ -235,53 +232,6 @@ void turn_normal_layer(const PreparedModel& prepared, const TriangleMesh& mesh, 
   for (std::size_t i = 0; i < places.size(); ++i)
     if (turned[places[i].first] != normals[places[i].first] || turned[places[i].second] != normals[places[i].second])
       for (int k = 0; k < 2; ++k) layer->planes[k][i] = made[0].planes[k][i];
-}
-
-std::vector<float> resample_plane(std::span<const float> values, const SkeletexModel& model,
-                                  const SkeletexModel& result) {
-  std::vector<float> filtered(static_cast<std::size_t>(result.texture.width) * result.texture.height, 0.f);
-  for_each_block(model.patches.size(), 1, [&](std::size_t bone, std::size_t, std::size_t) {
-    const Rectangle &from = model.patches[bone].rectangle, &to = result.patches[bone].rectangle;
-    const auto taps = [](int old_count, int new_count, bool is_periodic) {
-      return filter_taps(old_count, new_count, is_periodic,
-                         new_count < old_count ? ResampleFilter::kAverage : ResampleFilter::kLinear, 0);
-    };
-    const FilterTaps rows = taps(from.height, to.height, false), columns = taps(from.width, to.width, true);
-    std::vector<float> line(from.width);  // a new row of old columns
-    for (int row = 0; row < to.height; ++row) {
-      std::fill(line.begin(), line.end(), 0.f);
-      for (int k = 0; k < rows.taps[row][1]; ++k) {
-        const float weight = rows.weights[rows.taps[row][2] + k];
-        const float* old =
-            values.data() + static_cast<std::size_t>(from.y + rows.taps[row][0] + k) * model.texture.width + from.x;
-        for (int j = 0; j < from.width; ++j) line[j] += weight * old[j];
-      }
-      float* made = filtered.data() + static_cast<std::size_t>(to.y + row) * result.texture.width + to.x;
-      for (int j = 0; j < to.width; ++j)
-        for (int k = 0; k < columns.taps[j][1]; ++k)
-          made[j] += columns.weights[columns.taps[j][2] + k] * line[(columns.taps[j][0] + k) % from.width];
-    }
-  });
-  return filtered;
-}
-
-void resample_layers(const PreparedModel& prepared, SkeletexModel& result) {
-  const PreparedModel made(result);
-  for (Layer& layer : result.layers) {
-    if (layer.kind != LayerKind::kNormal) {
-      for (std::vector<float>& plane : layer.planes) plane = resample_plane(plane, prepared.model, result);
-      continue;
-    }
-    const std::vector<Eigen::Vector3f> old = texel_normals(prepared, layer);
-    std::vector<Eigen::Vector3f> normals(static_cast<std::size_t>(result.texture.width) * result.texture.height);
-    std::vector<float> plane(old.size());
-    for (int axis = 0; axis < 3; ++axis) {
-      for (std::size_t i = 0; i < old.size(); ++i) plane[i] = old[i][axis];
-      const std::vector<float> filtered = resample_plane(plane, prepared.model, result);
-      for (std::size_t i = 0; i < normals.size(); ++i) normals[i][axis] = filtered[i];
-    }
-    layer.planes = normal_layer(made, normals).planes;
-  }
 }
 
 }  // namespace skeletex

@@ -38,16 +38,6 @@ std::vector<Layer> layers_of_texels(const PreparedModel& model, const MeshAttrib
 /// Layers from values per vertex: the inverse of vertex_attributes. Rows 0 and height-1 follow the seams and poles.
 std::vector<Layer> layers_of_vertices(const PreparedModel& model, const MeshAttributes& vertices);
 
-/// A plane of one value per texel at another size: linear between texels of the same patch where it gets finer,
-/// averaged where it gets coarser.
-/// \param result  of the same patches
-std::vector<float> resample_plane(std::span<const float> values, const SkeletexModel& model,
-                                  const SkeletexModel& result);
-/// Sets the layers of a model that has another size, as resample_plane does. Normals are averaged as directions in
-/// space.
-/// \param result  of the same patches; its layers are those of `model`
-void resample_layers(const PreparedModel& model, SkeletexModel& result);
-
 /// Turns the normals of a model whose vertices have moved, see turn_normals. The others stay bit by bit.
 /// \param mesh  of the model before
 /// \param positions  of its vertices afterwards

@@ -59,9 +59,8 @@ std::vector<Vec3> turn_normals(const TriangleMesh& before, std::span<const Vec3>
   }
   for (int ring = 0; ring < kRings; ++ring) moments = summed(before.triangles, moments);
   std::vector<Vec3> turned(normals.begin(), normals.end());
-  for_each_block(count, kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v)
-      if (has_moved[v]) turned[v] = (best_rotation(moments[v]) * normals[v]).normalized();
+  for_each_index(count, kBlock, [&](std::size_t v) {
+    if (has_moved[v]) turned[v] = (best_rotation(moments[v]) * normals[v]).normalized();
   });
   return turned;
 }

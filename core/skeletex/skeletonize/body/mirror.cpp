@@ -18,9 +18,7 @@ constexpr std::size_t kPoints = 600;
 /// Mean distance of the mirrored points from the surface, diagonals.
 double mirror_error(const Surface& surface, const std::vector<Vec3>& points, const MirrorPlane& plane) {
   std::vector<double> distances(points.size());
-  for_each_block(points.size(), 64, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) distances[i] = surface.radius(plane.mirrored(points[i]));
-  });
+  for_each_index(points.size(), 64, [&](std::size_t i) { distances[i] = surface.radius(plane.mirrored(points[i])); });
   double sum = 0;
   for (const double d : distances) sum += d;
   return sum / static_cast<double>(points.size()) / surface.diagonal;

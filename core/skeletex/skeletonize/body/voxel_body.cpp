@@ -236,29 +236,26 @@ void link_voxels(const Columns& columns, const Runs& runs, VoxelBody& body) {
     if (run == end || run->first > z) return -1;
     return number[run - runs.runs.begin()] + z - run->first;
   };
-  for_each_block(runs.runs.size(), kBlock, [&](std::size_t, std::size_t run_begin, std::size_t run_end) {
-    for (std::size_t r = run_begin; r < run_end; ++r)
-      for (int z = runs.runs[r].first; z <= runs.runs[r].last; ++z) {
-        const int voxel = number[r] + z - runs.runs[r].first;
-        const int x = runs.runs[r].column / columns.y_count, y = runs.runs[r].column % columns.y_count;
-        body.centres[voxel] = columns.origin + columns.side * Vec3(x, y, z);
-        for (int place = 0; place < kVoxelPlaces; ++place)
-          body.neighbours[voxel][place] = find(x + place / 9 - 1, y + place / 3 % 3 - 1, z + place % 3 - 1);
-      }
+  for_each_index(runs.runs.size(), kBlock, [&](std::size_t r) {
+    for (int z = runs.runs[r].first; z <= runs.runs[r].last; ++z) {
+      const int voxel = number[r] + z - runs.runs[r].first;
+      const int x = runs.runs[r].column / columns.y_count, y = runs.runs[r].column % columns.y_count;
+      body.centres[voxel] = columns.origin + columns.side * Vec3(x, y, z);
+      for (int place = 0; place < kVoxelPlaces; ++place)
+        body.neighbours[voxel][place] = find(x + place / 9 - 1, y + place / 3 % 3 - 1, z + place % 3 - 1);
+    }
   });
 }
 
 /// Per voxel, bit p: the way to the neighbour at place p meets the surface.
 std::vector<unsigned> find_crossed_links(const Surface& surface, const VoxelBody& body) {
   std::vector<unsigned> crossed(body.size(), 0);
-  for_each_block(crossed.size(), kBlock, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v) {
-      if (!surface.is_near(body.centres[v], std::sqrt(3.0) * body.side)) continue;
-      for (int place = kOwnPlace + 1; place < kVoxelPlaces; ++place)
-        if (const int other = body.neighbours[v][place];
-            other >= 0 && surface.is_between(body.centres[v], body.centres[other]))
-          crossed[v] |= 1u << place;
-    }
+  for_each_index(crossed.size(), kBlock, [&](std::size_t v) {
+    if (!surface.is_near(body.centres[v], std::sqrt(3.0) * body.side)) return;
+    for (int place = kOwnPlace + 1; place < kVoxelPlaces; ++place)
+      if (const int other = body.neighbours[v][place];
+          other >= 0 && surface.is_between(body.centres[v], body.centres[other]))
+        crossed[v] |= 1u << place;
   });
   for (int v = 0; v < body.size(); ++v)
     for (int place = kOwnPlace + 1; place < kVoxelPlaces; ++place)

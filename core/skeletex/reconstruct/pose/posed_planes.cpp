@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/skeleton/posed_planes.h"
+#include "skeletex/reconstruct/pose/posed_planes.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "skeletex/geometry/best_rotation.h"
-#include "skeletex/skeleton/frame.h"
+#include "skeletex/model/frame.h"
 
 namespace skeletex {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/reconstruct/skin.h"
+#include "skeletex/reconstruct/pose/skin.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,9 +8,9 @@
 #include "reconstruct_structs.h"
 #include "skeletex/geometry/parallel.h"
 #include "skeletex/reconstruct/lattice.h"
+#include "skeletex/reconstruct/pose/weight_walk.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
 #include "skeletex/skeleton/separation_planes.h"
-#include "skeletex/skeleton/weight_walk.h"
 
 namespace skeletex {
 namespace {
@@ -194,16 +194,14 @@ std::vector<std::vector<float>> weight_planes(ClContext& context, const Prepared
   const std::size_t texels = static_cast<std::size_t>(model.texture.width) * model.texture.height;
   std::vector<std::vector<float>> planes(model.skeleton.bones.size(), std::vector<float>(texels, 0.f));
   const std::vector<LatticeRow>& rows = prepared.all_rows;
-  for_each_block(rows.size(), 8, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      const auto [bone, row, vertex, quad] = rows[k];
-      const Rectangle& r = model.patches[bone].rectangle;
-      for (int j = 0; j < r.width; ++j)
-        for (const auto& [moving, weight] :
-             bone_weights(walks, bone, Vec3(points[0][vertex + j], points[1][vertex + j], points[2][vertex + j])))
-          planes[moving][static_cast<std::size_t>(r.y + row) * model.texture.width + r.x + j] =
-              static_cast<float>(weight);
-    }
+  for_each_index(rows.size(), 8, [&](std::size_t k) {
+    const auto [bone, row, vertex, quad] = rows[k];
+    const Rectangle& r = model.patches[bone].rectangle;
+    for (int j = 0; j < r.width; ++j)
+      for (const auto& [moving, weight] :
+           bone_weights(walks, bone, Vec3(points[0][vertex + j], points[1][vertex + j], points[2][vertex + j])))
+        planes[moving][static_cast<std::size_t>(r.y + row) * model.texture.width + r.x + j] =
+            static_cast<float>(weight);
   });
   return planes;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/skeleton/posed_frame.h"
+#include "skeletex/reconstruct/pose/posed_frame.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/reconstruct/linear_skin.h"
+#include "skeletex/reconstruct/pose/linear_skin.h"
 
 #include <algorithm>
 
@@ -49,19 +49,17 @@ std::vector<Vec3> skin_linearly(std::span<const Vec3> positions, const VertexInf
   for (const BoneMotion& motion : motions)
     matrices.push_back(motion.rotation.toRotationMatrix() + motion.stretch * motion.bind_axis.transpose());
   std::vector<Vec3> moved(positions.size());
-  for_each_block(positions.size(), 1 << 12, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v) {
-      Vec3 sum = Vec3::Zero();
-      for (int i = 0; i < 4; ++i) {
-        const float weight = influences.weights[v][i];
-        if (weight == 0) continue;
-        const BoneIndex bone = influences.bones[v][i];
-        const BoneMotion& motion = motions[bone];
-        sum += weight * (matrices[bone] * (positions[v] - motion.bind_head) + motion.rotation * motion.bind_head +
-                         motion.translation);
-      }
-      moved[v] = sum;
+  for_each_index(positions.size(), 1 << 12, [&](std::size_t v) {
+    Vec3 sum = Vec3::Zero();
+    for (int i = 0; i < 4; ++i) {
+      const float weight = influences.weights[v][i];
+      if (weight == 0) continue;
+      const BoneIndex bone = influences.bones[v][i];
+      const BoneMotion& motion = motions[bone];
+      sum += weight * (matrices[bone] * (positions[v] - motion.bind_head) + motion.rotation * motion.bind_head +
+                       motion.translation);
     }
+    moved[v] = sum;
   });
   return moved;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/pose/pose_mesh.h"
 
 #include <fmt/format.h>
 
@@ -9,10 +9,10 @@
 #include "reconstruct_structs.h"
 #include "skeletex/model/error.h"
 #include "skeletex/reconstruct/lattice.h"
-#include "skeletex/reconstruct/linear_skin.h"
-#include "skeletex/reconstruct/pose_by_coordinates.h"
+#include "skeletex/reconstruct/pose/linear_skin.h"
+#include "skeletex/reconstruct/pose/pose_by_coordinates.h"
+#include "skeletex/reconstruct/pose/skin.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
-#include "skeletex/reconstruct/skin.h"
 
 namespace skeletex {
 DevicePose upload_pose(ClContext& context, const PreparedModel& model, const PosedPlanes& posed, RowChoice choice,

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/reconstruct/pose_by_coordinates.h"
+#include "skeletex/reconstruct/pose/pose_by_coordinates.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "reconstruct_structs.h"
-#include "skeletex/reconstruct/pose_mesh.h"
+#include "skeletex/reconstruct/pose/pose_mesh.h"
+#include "skeletex/reconstruct/pose/skin.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
-#include "skeletex/reconstruct/skin.h"
 
 namespace skeletex {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/lattice.h"
-#include "skeletex/skeleton/posed_frame.h"
+#include "skeletex/reconstruct/pose/posed_frame.h"
 
 namespace skeletex {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/reconstruct/levels.h"
+#include "skeletex/convert/resample/levels.h"
 
 #include <algorithm>
 
+#include "skeletex/convert/resample/resample.h"
 #include "skeletex/model/error.h"
-#include "skeletex/reconstruct/reconstruct_mesh.h"
 
 namespace skeletex {
 

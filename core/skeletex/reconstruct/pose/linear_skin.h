@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "skeletex/reconstruct/skin.h"
+#include "skeletex/reconstruct/pose/skin.h"
 
 namespace skeletex {
 

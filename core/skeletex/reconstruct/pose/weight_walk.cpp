@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/skeleton/weight_walk.h"
+#include "skeletex/reconstruct/pose/weight_walk.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/reconstruct/resample/resample.h"
+#include "skeletex/convert/resample/resample.h"
 
 #include <fmt/format.h>
 
@@ -9,13 +9,14 @@
 #include "reconstruct_structs.h"
 #include "skeletex/convert/layers/read_layers.h"
 #include "skeletex/convert/layout/pack_atlas.h"
+#include "skeletex/convert/resample/resample_layers.h"
+#include "skeletex/convert/resample/resample_snapped.h"
 #include "skeletex/model/encoder_settings.h"
+#include "skeletex/model/frame.h"
 #include "skeletex/model/memory.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/layers/layer_values.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
-#include "skeletex/reconstruct/resample/resample_snapped.h"
-#include "skeletex/skeleton/frame.h"
 
 namespace skeletex {
 namespace {

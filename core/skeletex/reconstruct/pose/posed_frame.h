@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-#include "skeletex/skeleton/frame.h"
-#include "skeletex/skeleton/posed_planes.h"
+#include "skeletex/model/frame.h"
+#include "skeletex/reconstruct/pose/posed_planes.h"
 
 namespace skeletex {
 

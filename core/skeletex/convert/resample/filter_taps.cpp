@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/reconstruct/resample/filter_taps.h"
+#include "skeletex/convert/resample/filter_taps.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,9 +2,10 @@
 #pragma once
 #include <vector>
 
+#include "skeletex/convert/resample/filter_taps.h"
+#include "skeletex/device/context.h"
 #include "skeletex/geometry/mesh.h"
-#include "skeletex/model/texture.h"
-#include "skeletex/reconstruct/resample/filter_taps.h"
+#include "skeletex/reconstruct/prepared_model.h"
 
 namespace skeletex {
 
@@ -18,5 +19,10 @@ std::vector<Vec3> resample_polyline(const std::vector<Vec3>& points, bool is_clo
 /// \return empty when a rectangle would fall below 4 x 4
 std::vector<Rectangle> scale_rectangles(const std::vector<Patch>& patches, int width, int height, int new_width,
                                         int new_height);
+
+/// The same model with rectangles scaled to another texture size (longer side `size`, at least 4 x 4 each). Texels are
+/// resampled as bind-pose positions, averaged where the lattice gets coarser; seams are resampled as polylines.
+/// \throw InputError when the size is too small for the number of bones
+SkeletexModel resample_model(ClContext& context, const PreparedModel& model, int size);
 
 }  // namespace skeletex

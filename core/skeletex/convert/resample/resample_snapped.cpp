@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/reconstruct/resample/resample_snapped.h"
+#include "skeletex/convert/resample/resample_snapped.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -10,9 +10,9 @@
 #include "skeletex/convert/choose_placing.h"
 #include "skeletex/convert/sample/read_texels.h"
 #include "skeletex/geometry/parallel.h"
+#include "skeletex/model/frame.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/reconstruct_mesh.h"
-#include "skeletex/skeleton/frame.h"
 
 namespace skeletex {
 namespace {
@@ -256,7 +256,7 @@ void refine_texels(ClContext& context, const PreparedModel& prepared, SkeletexMo
   }
   std::array<std::vector<float>, 3> made;
   for (std::vector<float>& plane : made) plane.resize(begins.back());
-  for_each_block(model.patches.size(), 1, [&](std::size_t bone, std::size_t, std::size_t) {
+  for_each_index(model.patches.size(), [&](std::size_t bone) {
     const Rectangle &from = model.patches[bone].rectangle, &to = result.patches[bone].rectangle;
     const std::size_t first = old_begins[bone];
     const PatchPoints points{old[0].data() + first, old[1].data() + first,   old[2].data() + first, from.width,
@@ -324,7 +324,7 @@ std::vector<Chart> charts_of_mesh(const PreparedModel& prepared, const TriangleM
     for (const EndSeam& seam : seams[bone])
       first_ends.push_back(first_ends.back() + count_end_triangles(model, seam, static_cast<int>(bone)));
   std::vector<Chart> charts(model.patches.size());
-  for_each_block(charts.size(), 1, [&](std::size_t bone, std::size_t, std::size_t) {
+  for_each_index(charts.size(), [&](std::size_t bone) {
     const Rectangle& rectangle = model.patches[bone].rectangle;
     ChartBuilder builder(prepared, mesh, static_cast<int>(bone));
     add_vertices(prepared, static_cast<int>(bone), seams[bone], builder);

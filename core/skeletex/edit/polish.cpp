@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "skeletex/reconstruct/polish.h"
+#include "skeletex/edit/polish.h"
 
 #include <fmt/format.h>
 

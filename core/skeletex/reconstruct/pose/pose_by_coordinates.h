@@ -5,7 +5,7 @@
 #include "skeletex/device/context.h"
 #include "skeletex/reconstruct/displace.h"
 #include "skeletex/reconstruct/lattice.h"
-#include "skeletex/skeleton/posed_frame.h"
+#include "skeletex/reconstruct/pose/posed_frame.h"
 #include "skeletex_structs.h"
 
 namespace skeletex {
