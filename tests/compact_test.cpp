@@ -250,10 +250,13 @@ TEST(CompactLayers, AreLeftOutWhenAskedAndCountAsBytes) {
   EXPECT_TRUE(model.layers.empty());
   EXPECT_TRUE(model.bone_weights.empty());
   EXPECT_EQ(without.bytes, packed("branch").bytes);
-  const std::size_t wanted = 2 * packed(kWithLayers).bytes.size() / 3;
-  const CompactResult bounded = pack(kWithLayers, 0, wanted, 128, 16);
-  EXPECT_LE(bounded.bytes.size(), wanted);
-  EXPECT_EQ(decode_model(read_compact(bounded.bytes, "file")).layers.size(), 2u);
+  for (const std::size_t percent : {62, 67, 71, 80}) {
+    const std::size_t wanted = packed(kWithLayers).bytes.size() * percent / 100;
+    const CompactResult bounded = pack(kWithLayers, 0, wanted, 128, 16);
+    EXPECT_LE(bounded.bytes.size(), wanted);
+    EXPECT_GT(20 * bounded.bytes.size(), 17 * wanted);
+    EXPECT_EQ(decode_model(read_compact(bounded.bytes, "file")).layers.size(), 2u);
+  }
   EXPECT_THROW(pack(kWithLayers, 0, 700, 128, 64), InputError);
 }
 

@@ -46,12 +46,13 @@ class Search {
     if (!goal_.max_bytes) return within_error(goal_.max_error.value_or(1e-4));
     // The shape gets what the layers leave of the bytes; how much they take depends a little on the shape.
     std::size_t for_shape = *goal_.max_bytes;
-    for (int i = 0; i < 4; ++i) {
+    for (int i = 0; i < 10; ++i) {
       Trial result = completed(by_bytes(for_shape));
       const std::size_t bytes = compact_bytes(result.model).size();
       if (bytes <= *goal_.max_bytes) return measured(result);
-      if (bytes - *goal_.max_bytes >= for_shape) break;
-      for_shape -= bytes - *goal_.max_bytes;
+      const std::size_t fewer = bytes - *goal_.max_bytes + for_shape / 64;
+      if (fewer >= for_shape) break;
+      for_shape -= fewer;
     }
     throw InputError(
         fmt::format("the model and its layers do not fit into {} bytes; code the layers in fewer steps "
