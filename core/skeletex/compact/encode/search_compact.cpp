@@ -209,6 +209,12 @@ class Search {
     };
     const auto try_levels = [&](int bare) {
       if (bare < 0) return false;
+      if (best && lacks_part(*best)) {
+        // A part that these levels do not have is in none of their trials.
+        Trial one = trial(first_step(best, bare, wanted), bare);
+        measure(one);
+        if (lacks_part(one)) return false;
+      }
       std::optional<Trial> found = largest_step(
           bare, first_step(best, bare, wanted), wanted, true, [&](Trial& t) { return measure(t); },
           best && !lacks_part(*best) ? best->bytes : 0);
