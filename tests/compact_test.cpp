@@ -132,6 +132,27 @@ TEST_P(Compact, ComesBackWithNamesAndTheSameIntegers) {
   }
 }
 
+/// Also of a patch with so few rows that its columns are doubled first.
+TEST(CompactSizes, NeedNoUnusedSteps) {
+  const Skeleton& skeleton = skeletons().at("chain");
+  std::vector<std::pair<int, int>> sizes(skeleton.bones.size(), {96, 96});
+  sizes[1] = {96, 5};
+  const SkeletexModel source = SyntheticSurface(skeleton, 0.2).model(sizes);
+  CompactGoal goal;
+  goal.quality = 60;
+  goal.size = 128;
+  const CompactModel compact = read_compact(search_compact(context(), source, nullptr, goal).bytes, "file");
+  for (const int octaves : {-8, -3, -2, -1, 0}) {
+    CompactModel less = compact;
+    less.bare_levels = std::max(compact.bare_levels, unused_steps(compact, octaves));
+    less = read_compact(compact_bytes(less), "file");
+    const SkeletexModel model = decode_model(compact, octaves), same = decode_model(less, octaves);
+    EXPECT_EQ(model.texture.out, same.texture.out) << octaves;
+    EXPECT_EQ(model.texture.along, same.texture.along) << octaves;
+    EXPECT_LE(less.bare_levels, std::max(compact.bare_levels, -2 * octaves));
+  }
+}
+
 /// What is read of a prefix grows nearer to the whole.
 TEST_P(Compact, ReadsPrefixesAsCoarserModels) {
   const std::string& bytes = packed(GetParam()).bytes;

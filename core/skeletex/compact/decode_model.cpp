@@ -171,6 +171,13 @@ int decoded_size(const CompactModel& compact, int octaves) {
   return std::max(width, height);
 }
 
+int unused_steps(const CompactModel& compact, int octaves) {
+  int unused = 31;
+  for (const CompactPatch& patch : compact.patches)
+    unused = std::min(unused, patch.step_count - patch_size(patch, octaves).steps);
+  return std::max(0, unused);
+}
+
 int octaves_for(const CompactModel& compact, int size) {
   int octaves = 0;
   while (octaves < 8 && decoded_size(compact, octaves) < size) ++octaves;

@@ -12,6 +12,8 @@ SkeletexModel decode_model(const CompactModel& compact, int octaves = 0);
 
 /// The longer side of the texture that decode_model gives.
 int decoded_size(const CompactModel& compact, int octaves);
+/// How many of the finest steps of every patch decode_model does not take; 0 or more.
+int unused_steps(const CompactModel& compact, int octaves);
 /// The fewest octaves, from -8 to 8, at which it is at least `size`.
 int octaves_for(const CompactModel& compact, int size);
 

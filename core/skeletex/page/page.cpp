@@ -262,9 +262,10 @@ Json model_levels(ClContext& context, PageArrays& arrays, const SkeletexModel& m
     const std::vector<PageKey> keys{{0, levels[i], {}, {}}};
     Json level = level_json(context, arrays, keys, options);
     if (options.compact) {
-      compact.bare_levels = std::max(bare_levels, 2 * (i - options.compact->octaves));
+      const int octaves = options.compact->octaves - i;
+      compact.bare_levels = std::max(bare_levels, unused_steps(compact, octaves));
       const std::size_t end = compact_payload(compact).size();
-      level["octaves"] = options.compact->octaves - i;
+      level["octaves"] = octaves;
       level["payload"] = arrays.add(bytes_of(payload).subspan(sent, end - sent));
       sent = end;
     }
