@@ -72,8 +72,8 @@ void sort_by_key(std::vector<KeyAndIndex>& items) {
 std::vector<int> hilbert_order(std::span<const Vec3> points) {
   std::vector<int> order(points.size());
   if (points.empty()) return order;
-  const auto [lower, upper] = bounding_box(points);
-  const double side = (upper - lower).maxCoeff();
+  const BoundingBox box = bounding_box(points);
+  const double side = (box.upper - box.lower).maxCoeff();
   const double cells_per_unit = side > 0 ? ((1 << kBits) - 1) / side : 0;
   std::vector<KeyAndIndex> items(points.size());
   for_each_block(points.size(), 1 << 14, [&](std::size_t, std::size_t begin, std::size_t end) {
@@ -81,7 +81,7 @@ std::vector<int> hilbert_order(std::span<const Vec3> points) {
       const int count = static_cast<int>(std::min<std::size_t>(kLanes, end - first));
       Cells cells{};
       for (int k = 0; k < count; ++k) {
-        const Vec3 cell = (points[first + k] - lower) * cells_per_unit;
+        const Vec3 cell = (points[first + k] - box.lower) * cells_per_unit;
         for (int axis = 0; axis < 3; ++axis) cells[axis][k] = static_cast<std::uint32_t>(cell[axis]);
       }
       const std::array<std::uint64_t, kLanes> keys = keys_of(cells);

@@ -199,31 +199,35 @@ class Search {
                                  size_, size_, goal_.size ? ", or give a larger --size" : ""));
   }
 
+  static bool lacks_part(const Trial& trial, double wanted) {
+    return trial.distance.max > std::max(kFurthest, kFurthestOfMean * wanted);
+  }
+  /// Replaces the best trial so far by one with another number of levels that keeps to an error, if it is better: with
+  /// all parts of the body, or fewer bytes.
+  /// \return whether it was
+  bool find_better(int bare_levels, double wanted, std::optional<Trial>& best) {
+    const bool wants_part = best && lacks_part(*best, wanted);
+    const double first = first_step(best, bare_levels, wanted);
+    if (wants_part) {
+      // A part that these levels do not have is in none of their trials.
+      Trial one = trial(first, bare_levels);
+      measure(one);
+      if (lacks_part(one, wanted)) return false;
+    }
+    std::optional<Trial> found = largest_step(
+        bare_levels, first, wanted, true, [&](Trial& t) { return measure(t); }, best && !wants_part ? best->bytes : 0);
+    if (!found) return false;
+    count_bytes(*found);
+    const bool lacks = lacks_part(*found, wanted);
+    if (best && (lacks == wants_part ? found->bytes >= best->bytes : lacks)) return false;
+    best = std::move(found);
+    return true;
+  }
+
   /// The trial with the fewest bytes that keeps to an error; nothing where none is found.
   std::optional<Trial> fewest_bytes(double wanted) {
     std::optional<Trial> best;
-    const double furthest = std::max(kFurthest, kFurthestOfMean * wanted);
-    const auto lacks_part = [&](const Trial& trial) { return trial.distance.max > furthest; };
-    const auto is_better = [&](const Trial& one, const Trial& other) {
-      return lacks_part(one) == lacks_part(other) ? one.bytes < other.bytes : lacks_part(other);
-    };
-    const auto try_levels = [&](int bare) {
-      if (bare < 0) return false;
-      if (best && lacks_part(*best)) {
-        // A part that these levels do not have is in none of their trials.
-        Trial one = trial(first_step(best, bare, wanted), bare);
-        measure(one);
-        if (lacks_part(one)) return false;
-      }
-      std::optional<Trial> found = largest_step(
-          bare, first_step(best, bare, wanted), wanted, true, [&](Trial& t) { return measure(t); },
-          best && !lacks_part(*best) ? best->bytes : 0);
-      if (!found) return false;
-      count_bytes(*found);
-      if (best && !is_better(*found, *best)) return false;
-      best = std::move(found);
-      return true;
-    };
+    const auto try_levels = [&](int bare) { return bare >= 0 && find_better(bare, wanted, best); };
     // Downhill from where the spacing of the residuals suits the error as on the standard models.
     const int first =
         std::clamp(static_cast<int>(std::lround(2 * std::log2(size_ / 256.0) + std::log2(wanted / 1e-4))), 0, 12);
@@ -232,12 +236,12 @@ class Search {
     // All levels with residuals take more bytes than a larger size does.
     if (!best && goal_.size) try_levels(0);
     const int start = bare;
-    if (best && start == first && !lacks_part(*best))
+    if (best && start == first && !lacks_part(*best, wanted))
       while (try_levels(++bare)) {
       }
     if (best && bare <= start + 1) {
       bare = start;
-      while (--bare >= 0 && (try_levels(bare) || lacks_part(*best))) {
+      while (--bare >= 0 && (try_levels(bare) || lacks_part(*best, wanted))) {
       }
     }
     return best;
