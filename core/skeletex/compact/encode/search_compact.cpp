@@ -127,8 +127,8 @@ class Search {
     return rises ? std::clamp(measured, kLeastSlope, 1.5) : std::clamp(measured, -2.0, -0.2);
   }
   /// Whether a search for an error leads nowhere: the trial that keeps to it will have more bytes than there may be, or
-  /// the error hardly falls with the step any more, as it is that of what has no residuals. Near the wanted error, the
-  /// logarithm of the bytes falls by half to one and a tenth of what that of the error rises.
+  /// the error hardly falls though the step falls much, as it is that of what has no residuals. Near the wanted error,
+  /// the logarithm of the bytes falls by half to one and a tenth of what that of the error rises.
   /// \param most_bytes  0: no limit
   static bool is_in_vain(Trial& trial, double reached, double step_change, double value_change,
                          std::size_t most_bytes) {
@@ -136,7 +136,7 @@ class Search {
         static_cast<double>(count_bytes(trial)) * portable::exp((reached > 0 ? 0.5 : 1.1) * reached) >=
             static_cast<double>(most_bytes))
       return true;
-    return reached > 0 && step_change < 0 && value_change > kLeastSlope * step_change;
+    return reached > 0 && step_change < -0.5 && value_change > kLeastSlope * step_change;
   }
   /// The step to begin with: that of the best trial so far, with another number of levels.
   static double first_step(const std::optional<Trial>& best, int bare_levels, double wanted) {
