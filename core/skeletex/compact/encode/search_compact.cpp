@@ -207,15 +207,9 @@ class Search {
   /// \return whether it was
   bool find_better(int bare_levels, double wanted, std::optional<Trial>& best) {
     const bool wants_part = best && lacks_part(*best, wanted);
-    const double first = first_step(best, bare_levels, wanted);
-    if (wants_part) {
-      // A part that these levels do not have is in none of their trials.
-      Trial one = trial(first, bare_levels);
-      measure(one);
-      if (lacks_part(one, wanted)) return false;
-    }
     std::optional<Trial> found = largest_step(
-        bare_levels, first, wanted, true, [&](Trial& t) { return measure(t); }, best && !wants_part ? best->bytes : 0);
+        bare_levels, first_step(best, bare_levels, wanted), wanted, true, [&](Trial& t) { return measure(t); },
+        best && !wants_part ? best->bytes : 0);
     if (!found) return false;
     count_bytes(*found);
     const bool lacks = lacks_part(*found, wanted);
