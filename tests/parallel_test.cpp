@@ -4,8 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
-#include <mutex>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -23,7 +21,8 @@ TEST(ForEachBlock, HasEveryIndexOnce) {
         ++blocks[block];
         for (std::size_t i = begin; i < end; ++i) ++counts[i];
       });
-      EXPECT_EQ(counts, std::vector<int>(size, 1));
+      for_each_index(size, block_size, [&](std::size_t i) { ++counts[i]; });
+      EXPECT_EQ(counts, std::vector<int>(size, 2));
       EXPECT_EQ(blocks, std::vector<int>(block_count(size, block_size), 1));
     }
 }
@@ -37,23 +36,6 @@ TEST(ForEachBlock, ThrowsWhatABlockThrows) {
   } catch (const std::runtime_error& error) {
     EXPECT_EQ(error.what(), std::string("block 40"));
   }
-}
-
-TEST(ForEachCostliestFirst, TakesEveryItemOnceAndTheCostliestFirst) {
-  constexpr std::size_t kCount = 1000;
-  std::vector<std::size_t> costs(kCount);
-  for (std::size_t i = 0; i < kCount; ++i) costs[i] = i * 7 % kCount;
-  std::vector<int> counts(kCount, 0);
-  std::optional<std::size_t> first;
-  std::mutex mutex;
-  for_each_costliest_first(costs, [&](std::size_t i) {
-    const std::lock_guard lock(mutex);
-    ++counts[i];
-    if (!first) first = costs[i];
-  });
-  EXPECT_EQ(counts, std::vector<int>(kCount, 1));
-  // Others may come before the thread that has the costliest one.
-  EXPECT_GE(*first + processor_count(), kCount);
 }
 
 }  // namespace

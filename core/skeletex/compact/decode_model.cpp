@@ -201,7 +201,7 @@ SkeletexModel decode_model(const CompactModel& compact, int octaves) {
   const SeamCurves seams = decode_seams(compact, separation, 0);
   store_seams(model, compact, separation, octaves == 0 ? seams : decode_seams(compact, separation, octaves));
   std::vector<PatchGrid> grids(compact.patches.size());
-  for_each_costliest_first(point_counts(compact), [&](std::size_t i) {
+  for_each_index(grids.size(), [&](std::size_t i) {
     const BoneIndex bone = static_cast<int>(i);
     const CompactPatch& patch = compact.patches[bone];
     const std::array<bool, 2> has_pole{model.ends[bone][0].arcs.empty(), model.ends[bone][1].arcs.empty()};
@@ -224,9 +224,8 @@ SkeletexModel decode_model(const CompactModel& compact, int octaves) {
     model.patches.push_back({rectangles[bone], Method::kVsm, kTopologies[free_ends],
                              row_table(compact.patches[bone], rectangles[bone].height)});
   }
-  for_each_costliest_first(point_counts(compact), [&](std::size_t bone) {
-    store_texels(model, separation, static_cast<int>(bone), grids[bone]);
-  });
+  for_each_index(grids.size(),
+                 [&](std::size_t bone) { store_texels(model, separation, static_cast<int>(bone), grids[bone]); });
   decode_layers(model, compact);
   model.genus = genus_of(model);
   return model;

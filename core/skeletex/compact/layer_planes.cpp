@@ -105,7 +105,7 @@ void decode_layers(SkeletexModel& model, const CompactModel& compact) {
   int first_plane = 0;
   for (const CompactLayer& layer : compact.layers) {
     std::vector<std::vector<float>> planes(layer.planes, std::vector<float>(texels, 0));
-    for_each_costliest_first(point_counts(compact), [&](std::size_t bone) {
+    for_each_index(model.patches.size(), [&](std::size_t bone) {
       store_planes(compact, layer, first_plane, static_cast<int>(bone), model, planes);
     });
     first_plane += layer.planes;

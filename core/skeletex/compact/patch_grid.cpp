@@ -63,13 +63,6 @@ std::vector<Vec3> site_points(const CompactModel& model, const Refinement& refin
 
 }  // namespace
 
-std::vector<std::size_t> point_counts(const CompactModel& model) {
-  std::vector<std::size_t> counts;
-  for (const CompactPatch& patch : model.patches)
-    counts.push_back(static_cast<std::size_t>(patch.columns) * patch.intervals << patch.step_count);
-  return counts;
-}
-
 PatchGrid decode_patch(const CompactModel& model, const SeparationPlanes& separation, BoneIndex bone,
                        const std::array<bool, 2>& has_pole, const EndRow& end_row, int step_count) {
   const CompactPatch& patch = model.patches[bone];

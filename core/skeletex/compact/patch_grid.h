@@ -32,9 +32,6 @@ PatchGrid empty_grid(const CompactPatch& patch, const std::array<bool, 2>& has_p
 /// Whether a step doubles rows. Beyond the model's own, rows and columns take turns.
 bool step_doubles_rows(const CompactPatch& patch, int step);
 
-/// Per patch its number of points in all steps, about: what it costs to encode or decode.
-std::vector<std::size_t> point_counts(const CompactModel& model);
-
 /// The grid of a patch.
 /// \param step_count  steps to take; those that have no residuals are their predictions
 PatchGrid decode_patch(const CompactModel& model, const SeparationPlanes& separation, BoneIndex bone,

@@ -5,8 +5,6 @@
 #include <cstddef>
 #include <exception>
 #include <mutex>
-#include <numeric>
-#include <span>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -58,16 +56,6 @@ void for_each_index(std::size_t size, std::size_t block_size, const Act& act) {
 template <class Act>
 void for_each_index(std::size_t size, const Act& act) {
   for_each_index(size, 1, act);
-}
-
-/// As for_each_index, from the item that costs most to the one that costs least, so that no processor begins with a
-/// long one when the others end.
-template <class Act>
-void for_each_costliest_first(std::span<const std::size_t> costs, const Act& act) {
-  std::vector<std::size_t> order(costs.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return costs[a] > costs[b]; });
-  for_each_index(order.size(), [&](std::size_t i) { act(order[i]); });
 }
 
 /// Number of blocks that for_each_block makes.

@@ -86,7 +86,7 @@ void encode_patches(CompactModel& compact, const SeparationPlanes& separation, c
   const std::vector<Place> none;
   const std::vector<std::array<PatchEnd, 2>> ends = ends_of(compact);
   const SeamCurves seams = decode_seams(compact, separation, 0);
-  for_each_costliest_first(point_counts(compact), [&](std::size_t i) {
+  for_each_index(compact.patches.size(), [&](std::size_t i) {
     const BoneIndex bone = static_cast<int>(i);
     const std::array<bool, 2> has_pole{ends[bone][0].arcs.empty(), ends[bone][1].arcs.empty()};
     const EndRow row = [&](BoneEnd end, int columns) {

@@ -6,7 +6,6 @@
 
 #include "skeletex/compact/encode/rounding.h"
 #include "skeletex/compact/layer_planes.h"
-#include "skeletex/compact/patch_grid.h"
 #include "skeletex/geometry/parallel.h"
 
 namespace skeletex {
@@ -135,7 +134,7 @@ void encode_layers(CompactModel& compact, const SkeletexModel& model, const std:
                    int steps, double rounding) {
   const std::vector<Source> sources = sources_of(model, steps);
   for (const Source& source : sources) compact.layers.push_back(source.layer);
-  for_each_costliest_first(point_counts(compact), [&](std::size_t bone) {
+  for_each_index(compact.patches.size(), [&](std::size_t bone) {
     for (const Source& source : sources)
       for (const std::vector<double>& values : PatchValues(model, source, static_cast<int>(bone)).at(places[bone]))
         compact.patches[bone].planes.push_back(

@@ -16,7 +16,7 @@ constexpr int kLargestSize = 1600;  // larger textures are looked at in a smalle
 /// Fixed places are worth their bytes where they leave at most these shares of the intersections of a patch, and of
 /// all.
 constexpr double kMostLeft = 0.25, kMostLeftOfAll = 0.5;
-/// More pairs for each texel than these were never reduced to that.
+/// With more pairs than this for each texel, no attempt came to that.
 constexpr double kMostOfTexels = 0.004;
 
 /// Pairs of triangles of a patch that intersect each other, or others, and where they lie in it.

@@ -12,6 +12,7 @@
 #include "skeletex/convert/parameterize/direct_map.h"
 #include "skeletex/convert/parameterize/elimination.h"
 #include "skeletex/convert/parameterize/vsm_tables.h"
+#include "skeletex/geometry/parallel.h"
 #include "skeletex/math/portable.h"
 
 namespace skeletex {
@@ -154,7 +155,7 @@ class VsmSolver {
   std::vector<MapReport> finish() {
     const std::vector<float> map = context_.download(map_);
     std::vector<MapReport> reports(charts_.size());
-    for_each_chart(charts_, [&](std::size_t k) {
+    for_each_index(charts_.size(), [&](std::size_t k) {
       Chart& chart = charts_[k];
       const std::vector<double> guess = chart.v;
       for (std::size_t v = 0; v < chart.positions.size(); ++v) {

@@ -33,7 +33,7 @@ class TableBuilder {
   VsmTables build() {
     place_rows();
     place_entries();
-    for_each_chart(charts_, [&](std::size_t k) {
+    for_each_index(charts_.size(), [&](std::size_t k) {
       fill_map(k);
       fill_entries(k);
       fill_corners(k);
@@ -56,7 +56,7 @@ class TableBuilder {
     }
     systems_.resize(charts_.size());
     row_length_.assign(s_.layout.rows, 0);
-    for_each_chart(charts_, [&](std::size_t k) {
+    for_each_index(charts_.size(), [&](std::size_t k) {
       systems_[k] = graph_of(charts_[k]);
       systems_[k].first_row = first_rows_[k];
       const Dissection& d = systems_[k].dissection;
@@ -191,12 +191,6 @@ std::vector<double> relative_surface_areas(const Chart& chart) {
   const double mean = total / static_cast<double>(areas.size());
   for (double& area : areas) area = std::max(area / mean, kSmallestArea);
   return areas;
-}
-
-void for_each_chart(std::span<const Chart> charts, const std::function<void(std::size_t)>& act) {
-  std::vector<std::size_t> costs;
-  for (const Chart& chart : charts) costs.push_back(chart.triangles.size());
-  for_each_costliest_first(costs, act);
 }
 
 }  // namespace skeletex

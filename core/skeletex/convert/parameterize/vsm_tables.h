@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-#include <functional>
 #include <span>
 #include <vector>
 
@@ -28,8 +27,5 @@ VsmTables make_vsm_tables(std::span<const Chart> charts, double alpha);
 
 /// Surface areas, kept away from zero, in units of the chart's mean.
 std::vector<double> relative_surface_areas(const Chart& chart);
-
-/// Calls act(k) for every chart on all processors, the largest first: so they end together.
-void for_each_chart(std::span<const Chart> charts, const std::function<void(std::size_t)>& act);
 
 }  // namespace skeletex
